@@ -1,0 +1,149 @@
+"""Tables of measured values: CSV with the unit of every column in its header, read strictly.
+
+The accepted text, in full: UTF-8; lines that start with ``#`` and empty lines are skipped; the first
+other line is the header, ``name [unit], name [unit], ...`` in any order; every further line holds one
+finite number per column, comma between columns, point as decimal sign; the last line ends with a line
+end, because without one nobody can tell a complete last number from one that was cut off.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from models.errors import InputError
+
+METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+DISTANCES = {"m": 1.0, "km": 1e3}
+SECONDS = {"s": 1.0, "ms": 1e-3}
+NEWTONS = {"N": 1.0, "kN": 1e3}
+RADIANS = {"rad": 1.0, "deg": math.pi / 180.0}
+
+Columns = Mapping[str, Mapping[str, float]]
+Lines = list[tuple[int, str]]
+
+_HEADING = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
+
+
+def read_table(
+    path: str | Path, columns: Columns, *, increasing: str | None = None, least: int = 1
+) -> dict[str, np.ndarray]:
+    """Read a CSV table whose header names the unit of every column.
+
+    Parameters
+    ----------
+    path : the file
+    columns : name of each wanted column -> its accepted units, each with its factor to SI, for example
+        ``{"time": SECONDS, "front": NEWTONS}``; the file has these columns and no others
+    increasing : column whose values must rise from every row to the next one (time, arc length)
+    least : smallest accepted number of rows
+
+    Returns
+    -------
+    name -> float array of shape (rows,), in SI units; signs and frames are as in the file
+
+    Raises
+    ------
+    InputError : naming file, line (counted from 1), column, value, what is allowed and the nearest match
+    """
+    header, rows = _header_and_rows(path)
+    names, factors = _headings(path, header, columns)
+    raw = _numbers(path, rows, header[1].split(","))
+    if len(rows) < least:
+        raise InputError(path, "rows", len(rows), f"at least {least} rows of numbers are needed")
+    table = {name: raw[:, i] * factors[i] for i, name in enumerate(names)}
+    if increasing is not None:
+        _check_increasing(path, rows, increasing, raw[:, names.index(increasing)])
+    return {name: table[name] for name in columns}
+
+
+def _text(path: str | Path) -> str:
+    """Whole text of a file; whatever prevents reading it is the user's to repair."""
+    try:
+        return Path(path).read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(path, f"byte {error.start}", None, "the file must be text in UTF-8") from None
+    except OSError as error:
+        raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
+
+
+def _header_and_rows(path: str | Path) -> tuple[tuple[int, str], Lines]:
+    """Numbered header line and numbered rows, without comments and empty lines."""
+    text = _text(path)
+    lines = [(i, line.strip()) for i, line in enumerate(text.split("\n"), start=1)]
+    used = [(i, line) for i, line in lines if line and not line.startswith("#")]
+    if not used:
+        raise InputError(path, "", None, "the file is empty: a header line and rows of numbers are needed")
+    if not text.endswith("\n"):
+        place = f"line {len(lines)}"
+        raise InputError(path, place, lines[-1][1], "the last line has no line end and may be cut off: add one")
+    return used[0], used[1:]
+
+
+def _headings(path: str | Path, header: tuple[int, str], columns: Columns) -> tuple[list[str], list[float]]:
+    """Column names and factors to SI, in the order of the file."""
+    place = f"line {header[0]} (header)"
+    found = [_heading(path, place, cell, columns) for cell in header[1].split(",")]
+    names = [name for name, _ in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(path, place, name, "this column appears twice")
+    missing = [name for name in columns if name not in names]
+    if missing:
+        raise InputError(path, place, header[1], f"column {missing[0]!r} is missing; wanted: {_wanted(columns)}")
+    return names, [factor for _, factor in found]
+
+
+def _heading(path: str | Path, place: str, cell: str, columns: Columns) -> tuple[str, float]:
+    """Name and factor to SI of one heading such as ``left [mm]``."""
+    match = _HEADING.fullmatch(cell.strip().strip('"'))
+    name, unit = match.groups() if match else (cell.strip(), None)
+    if name not in columns:
+        allowed = f"this column is not known; wanted, separated by commas: {_wanted(columns)}"
+        raise InputError(path, place, name, allowed, tuple(columns))
+    units = tuple(columns[name])
+    if unit is None:
+        raise InputError(path, place, cell.strip(), f"the unit is missing: write {name} [{units[0]}]", units)
+    if unit not in columns[name]:
+        raise InputError(path, f"{place}, column {name!r}, unit", unit, "this unit is not known here", units)
+    return name, columns[name][unit]
+
+
+def _wanted(columns: Columns) -> str:
+    """Return the wanted header, with the first unit of each column."""
+    return ", ".join(f"{name} [{next(iter(units))}]" for name, units in columns.items())
+
+
+def _numbers(path: str | Path, rows: Lines, headings: list[str]) -> np.ndarray:
+    """All cells as an array of shape (rows, columns), in the units of the file."""
+    values = np.empty((len(rows), len(headings)))
+    for i, (line, row) in enumerate(rows):
+        cells = row.split(",")
+        if len(cells) != len(headings):
+            raise InputError(path, f"line {line}", row, f"{len(headings)} values are needed, found {len(cells)}")
+        for j, cell in enumerate(cells):
+            values[i, j] = _number(path, line, headings[j], cell)
+    return values
+
+
+def _number(path: str | Path, line: int, heading: str, cell: str) -> float:
+    """One finite number; Python's own extras (1_000, non-Latin digits) are text here."""
+    try:
+        value = float(cell) if cell.isascii() and "_" not in cell else math.nan
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        place = f"line {line}, column {heading.strip()!r}"
+        raise InputError(path, place, cell.strip(), "a finite number such as 0.5 or -1.2e-3 is needed")
+    return value
+
+
+def _check_increasing(path: str | Path, rows: Lines, name: str, values: np.ndarray) -> None:
+    """Refuse rows that are out of order or repeat a station."""
+    wrong = np.flatnonzero(np.diff(values) <= 0.0)
+    if wrong.size:
+        i = int(wrong[0]) + 1
+        place = f"line {rows[i][0]}, column {name!r}"
+        raise InputError(path, place, float(values[i]), f"must be greater than {values[i - 1]:g} in the row before it")
