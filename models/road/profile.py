@@ -1,0 +1,243 @@
+"""The two kinds of smooth road: a sum of sines without end, and a cubic spline through points.
+
+Both are twice continuously differentiable (C2). That is not a matter of looks: with a slope that jumps,
+a fourth-order integrator falls to first order. Arc length s is in m; zeta is the height in m, positive
+**down** (a rise is negative, models/__init__.py); the slope is d(zeta)/ds, dimensionless.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
+
+from models.errors import InputError
+from models.road import kernels
+
+Samples = tuple[np.ndarray, np.ndarray]
+
+SLACK = 1e-9
+"""Part of its length by which a road may be overrun: the rounding of s = v t is not the end of the road."""
+
+
+class Profile(Protocol):
+    """What a vehicle asks of a road; heights in m, positive down."""
+
+    @property
+    def name(self) -> str:
+        """Name for reports and messages."""
+        ...
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """First and last arc length (m) at which the road is defined; infinite where it has no end."""
+        ...
+
+    def height_and_slope(self, s: ArrayLike) -> Samples:
+        """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
+        ...
+
+    def sample_uniform(self, start: float, step: float, count: int) -> Samples:
+        """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
+        ...
+
+    def height_slope_at(self, s: float) -> tuple[float, float]:
+        """Height (m, positive down) and slope at one arc length ``s`` (m)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class SineProfile:
+    """Sum of sines, zeta(s) = -w(s) sum_i amplitude_i sin(wavenumber_i s + phase_i), and 0 for s <= 0.
+
+    Parameters
+    ----------
+    amplitude : of each wave, m, shape (n,)
+    wavenumber : angular wavenumber 2 pi / wavelength of each wave, rad/m, shape (n,)
+    phase : of each wave at s = 0, rad, shape (n,)
+    window_length : length in m of the quintic smoothstep w, which lets the road begin without a jump of
+        height, slope or curvature; 0 for none (height and slope then jump at s = 0: a hard case)
+    name : for reports
+
+    Raises
+    ------
+    InputError : arrays of different lengths, values that are not finite, a negative window
+    """
+
+    amplitude: np.ndarray
+    wavenumber: np.ndarray
+    phase: np.ndarray
+    window_length: float = 0.0
+    name: str = "sines"
+
+    def __post_init__(self) -> None:
+        for field in ("amplitude", "wavenumber", "phase"):
+            object.__setattr__(self, field, _frozen(getattr(self, field), field, 1))
+            if getattr(self, field).shape != self.amplitude.shape:
+                raise InputError("", field, getattr(self, field).shape, f"must have shape {self.amplitude.shape}")
+        object.__setattr__(self, "window_length", _window(self.window_length))
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Without end on both sides."""
+        return -math.inf, math.inf
+
+    def height_and_slope(self, s: ArrayLike) -> Samples:
+        """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
+        flat, shape = _flat(s)
+        height, slope = np.empty_like(flat), np.empty_like(flat)
+        kernels.sines(flat, self.amplitude, self.wavenumber, self.phase, self.window_length, height, slope)
+        return height.reshape(shape), slope.reshape(shape)
+
+    def sample_uniform(self, start: float, step: float, count: int) -> Samples:
+        """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1.
+
+        Agrees with :meth:`height_and_slope` to about 1e-14 of the sum of the amplitudes (slopes: of the
+        sum of amplitude times wavenumber), as long as the rounding of s itself, 1e-16 of s times the
+        wavenumber, stays below that.
+        """
+        start, step = _finite(start, "start"), _finite(step, "step")
+        height, slope = np.empty(count), np.empty(count)
+        waves = (self.amplitude, self.wavenumber, self.phase, self.window_length)
+        kernels.sines_uniform(start, step, *waves, height, slope)
+        return height, slope
+
+    def height_slope_at(self, s: float) -> tuple[float, float]:
+        """Height (m, positive down) and slope at one arc length ``s`` (m)."""
+        return kernels.sines_at(float(s), self.amplitude, self.wavenumber, self.phase, self.window_length)
+
+
+@dataclass(frozen=True, eq=False)
+class SplineProfile:
+    """Road of cubic pieces between stations; C2 when made by :meth:`through`.
+
+    Parameters
+    ----------
+    station : arc lengths of the points, m, strictly increasing, shape (n,)
+    coefficients : of the piece from station i to i + 1 as powers 3, 2, 1, 0 of s - station_i; zeta in m,
+        positive down; shape (n - 1, 4)
+    window_length : length in m of a quintic smoothstep from the first station on, before which the road
+        is flat at height 0 (see models/road/continuation.py); 0 for none
+    name : for reports and messages, for example the file's name
+
+    Raises
+    ------
+    InputError : stations out of order, wrong shapes, values that are not finite; and, from the three
+        evaluations, arc lengths outside the extent
+    """
+
+    station: np.ndarray
+    coefficients: np.ndarray
+    window_length: float = 0.0
+    name: str = "spline"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "station", _frozen(self.station, "station", 1))
+        object.__setattr__(self, "coefficients", _frozen(self.coefficients, "coefficients", 2))
+        object.__setattr__(self, "window_length", _window(self.window_length))
+        wanted = (self.station.size - 1, 4)
+        if self.station.size < 2 or self.coefficients.shape != wanted:
+            raise InputError(self.name, "coefficients", self.coefficients.shape, f"must have shape {wanted}")
+        _check_order(self.name, self.station)
+
+    @classmethod
+    def through(cls, station: ArrayLike, height: ArrayLike, name: str = "spline") -> "SplineProfile":
+        """C2 spline through at least 4 points: ``station`` and ``height`` (positive down) in m, shape (n,).
+
+        The ends are "not-a-knot". A natural spline would bend the first and the last few metres straight,
+        an error of order h^2 where the rest has h^4, for the sake of a curvature of 0 that no measured
+        road has. Raises InputError for fewer points, points out of order or values that are not finite.
+        """
+        s, zeta = _frozen(station, "station", 1), _frozen(height, "height", 1)
+        if s.size < 4 or zeta.shape != s.shape:
+            raise InputError(name, "points", (s.size, zeta.size), "as many heights as stations, 4 or more, are needed")
+        _check_order(name, s)
+        return cls(s, CubicSpline(s, zeta, bc_type="not-a-knot").c.T, name=name)
+
+    @property
+    def start(self) -> float:
+        """Arc length of the first point, m."""
+        return float(self.station[0])
+
+    @property
+    def end(self) -> float:
+        """Arc length of the last point, m."""
+        return float(self.station[-1])
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """First and last arc length (m); a road with a window is flat for ever before its start."""
+        return (-math.inf if self.window_length > 0.0 else self.start), self.end
+
+    @property
+    def points(self) -> Samples:
+        """Stations (m) and heights (m, positive down, without the window), each of shape (n,)."""
+        last = kernels.cubic_one(self.end, self.station, self.coefficients, 0.0)[0]
+        return self.station, np.append(self.coefficients[:, 3], last)
+
+    def height_and_slope(self, s: ArrayLike) -> Samples:
+        """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
+        flat, shape = _flat(s)
+        if flat.size:
+            self._check(float(flat.min()), float(flat.max()))
+        height, slope = np.empty_like(flat), np.empty_like(flat)
+        kernels.cubics(flat, self.station, self.coefficients, self.window_length, height, slope)
+        return height.reshape(shape), slope.reshape(shape)
+
+    def sample_uniform(self, start: float, step: float, count: int) -> Samples:
+        """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
+        last = start + max(count - 1, 0) * step
+        self._check(min(start, last), max(start, last))
+        height, slope = np.empty(count), np.empty(count)
+        road = (self.station, self.coefficients, self.window_length)
+        kernels.cubics_uniform(float(start), float(step), *road, height, slope)
+        return height, slope
+
+    def height_slope_at(self, s: float) -> tuple[float, float]:
+        """Height (m, positive down) and slope at one arc length ``s`` (m)."""
+        self._check(s, s)
+        return kernels.cubic_one(float(s), self.station, self.coefficients, self.window_length)
+
+    def _check(self, first: float, last: float) -> None:
+        """Refuse arc lengths outside the road: a spline carried on beyond its points is no road at all."""
+        slack = SLACK * (self.end - self.start)
+        begin, end = self.extent
+        if not (first >= begin - slack and last <= end + slack):
+            allowed = f"the road is defined from s = {begin:.6g} m to {end:.6g} m; declare how it goes on"
+            raise InputError(self.name, "arc length (m)", first if not first >= begin - slack else last, allowed)
+
+
+def _frozen(values: ArrayLike, field: str, dimensions: int) -> np.ndarray:
+    """Read-only, contiguous copy with finite values only."""
+    array = np.array(values, dtype=float, order="C")
+    if array.ndim != dimensions or not np.isfinite(array).all():
+        raise InputError("", field, None, f"must be an array of finite numbers with {dimensions} dimension(s)")
+    array.setflags(write=False)
+    return array
+
+
+def _flat(s: ArrayLike) -> tuple[np.ndarray, tuple[int, ...]]:
+    """Arc lengths as a flat contiguous array, and their shape."""
+    array = np.asarray(s, dtype=float)
+    return np.ascontiguousarray(array).reshape(-1), array.shape
+
+
+def _finite(value: float, field: str) -> float:
+    if not math.isfinite(value):
+        raise InputError("", field, value, "must be a finite number")
+    return float(value)
+
+
+def _window(length: float) -> float:
+    if not (math.isfinite(length) and length >= 0.0):
+        raise InputError("", "window_length", length, "must be a finite length in m, 0 or more")
+    return float(length)
+
+
+def _check_order(name: str, station: np.ndarray) -> None:
+    wrong = np.flatnonzero(np.diff(station) <= 0.0)
+    if wrong.size:
+        i = int(wrong[0]) + 1
+        raise InputError(name, f"station {i}", float(station[i]), f"must be greater than {station[i - 1]:g} before it")
