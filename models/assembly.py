@@ -1,0 +1,88 @@
+"""Scene -> what will be computed: the vehicle, its input, its effects, and nothing else."""
+
+from dataclasses import dataclass, replace
+from importlib import import_module
+from typing import Any, Literal
+
+import numpy as np
+
+from models.errors import InputError
+from models.scene import Scene
+from models.signals import Signal
+from models.vehicles import pitch_plane
+from models.vehicles.description import Vehicle
+
+Mode = Literal["free", "road", "force", "force-body", "pitch"]
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """What a run computes. Effects extend it; engines read it.
+
+    Attributes
+    ----------
+    vehicle : bodies and struts that take part (no tyres where wheel forces are prescribed)
+    parameters : the paper's symbols, for the equations and the outputs
+    mode : which equations hold; "free" is the vehicle on its tyres over a flat road
+    input : signal of that mode (see ``pitch_plane_equations``), None if nothing drives the vehicle
+    initial : state at t = 0, shape (8,)
+    outputs : functions of the run that add channels to its result, one per effect that asks for any
+    """
+
+    scene: Scene
+    vehicle: Vehicle
+    parameters: pitch_plane.Parameters
+    mode: Mode
+    input: Signal | None
+    initial: np.ndarray
+    outputs: tuple[Any, ...] = ()
+
+    def with_input(self, mode: Mode, signal: Signal) -> "Assembly":
+        """The same, driven by ``signal``."""
+        return replace(self, mode=mode, input=signal)
+
+    def without_tyres(self) -> "Assembly":
+        """The same, cut off the road."""
+        struts = tuple(strut for strut in self.vehicle.struts if strut.lower.body is not None)
+        return replace(self, vehicle=replace(self.vehicle, struts=struts))
+
+
+def assemble(scene: Scene) -> Assembly:
+    """Build what the scene names; only the files of its effects are imported."""
+    p = scene.vehicle_parameters()
+    vehicle = pitch_plane.describe(p, scene.vehicle.geometry)
+    assembly = Assembly(scene, vehicle, p, "free", None, _initial(scene, p))
+    for name in _ordered(scene):
+        module = import_module(f"models.effects.{name}")
+        assembly = module.extend(assembly, scene.effects[name])
+    return assembly
+
+
+def _initial(scene: Scene, p: pitch_plane.Parameters) -> np.ndarray:
+    """Static equilibrium, with the coordinates that the scene sets put in its place."""
+    state = pitch_plane.equilibrium(p, scene.vehicle.geometry)
+    names = (*pitch_plane.STATES, *(f"{name}_rate" for name in pitch_plane.STATES))
+    for name, value in scene.start.items():
+        if name not in names:
+            raise InputError(scene.file, f"start.{name}", value, "not a state", names)
+        state[names.index(name)] = value
+    return state
+
+
+def _ordered(scene: Scene) -> list[str]:
+    """The scene's effects, each after those that it needs; refuses illegal combinations."""
+    modules = {name: import_module(f"models.effects.{name}") for name in scene.effects}
+    for name, module in modules.items():
+        for needed in module.NEEDS:
+            if needed not in modules:
+                raise InputError(scene.file, f"effects.{name}", None, f"needs the effect {needed!r}: name it too")
+        for other in module.EXCLUDES:
+            if other in modules:
+                raise InputError(scene.file, f"effects.{name}", None, f"cannot stand beside {other!r}: drop one of them")
+    done: list[str] = []
+    waiting = list(modules)
+    while waiting:
+        ready = [n for n in waiting if all(m in done for m in (*modules[n].NEEDS, *modules[n].AFTER) if m in modules)]
+        done += ready
+        waiting = [n for n in waiting if n not in ready]
+    return done

@@ -1,0 +1,6 @@
+"""Effects: one file each, named as in a scene and imported only when a scene names it.
+
+An effect file holds ``Parameters`` (what a scene may say), ``NEEDS`` and ``EXCLUDES`` (names of other
+effects), ``COST`` (one sentence) and ``extend(assembly, parameters, folder)``, which returns the
+assembly with the effect in it. There is no switch: an effect that is not named is not there.
+"""

@@ -1,0 +1,27 @@
+"""A rotational spring and damper between chassis and ground: the folk remedy against drift."""
+
+from dataclasses import replace
+from typing import Any
+
+from models.assembly import Assembly
+from models.strict import Strict, quantity
+from models.vehicles.description import PitchSpring
+
+NEEDS: tuple[str, ...] = ()
+EXCLUDES = ("prescribed_pitch",)
+AFTER: tuple[str, ...] = ()
+COST = "one native spring-damper"
+
+
+class Parameters(Strict):
+    """[effects.pitch_spring]."""
+
+    stiffness: float = quantity("N m/rad", "rotational stiffness to the ground")
+    damping: float = quantity("N m s/rad", "rotational damping to the ground", default=0.0, zero=True)
+
+
+def extend(assembly: Assembly, p: Any) -> Assembly:
+    """The assembly with the spring on its chassis."""
+    spring = PitchSpring("chassis", p.stiffness, p.damping)
+    vehicle = replace(assembly.vehicle, pitch_springs=(*assembly.vehicle.pitch_springs, spring))
+    return replace(assembly, vehicle=vehicle)

@@ -1,0 +1,42 @@
+"""Pitch prescribed from a file (eq. 39): the vehicle is guided, and the moment that this takes is a result."""
+
+from typing import Any
+
+from pydantic import Field
+
+from models.assembly import Assembly
+from models.errors import InputError
+from models.signals import Smooth, Stacked
+from models.strict import Strict
+
+NEEDS = ("wheel_forces",)
+EXCLUDES = ("pitch_spring",)
+AFTER: tuple[str, ...] = ()
+COST = "one constraint in Exudyn; one degree of freedom less and an inverse-dynamics pass in MuJoCo"
+ANGLE = {"rad": 1.0, "deg": 0.017453292519943295}
+
+
+class Parameters(Strict):
+    """[effects.prescribed_pitch]."""
+
+    file: str = Field(description="CSV with the columns time [s], pitch [rad]; positive nose up")
+
+
+def extend(assembly: Assembly, p: Any) -> Assembly:
+    """The force-excited vehicle with its pitch as an input, twice differentiable by a quintic spline."""
+    from models.tables import read_uniform
+
+    scene = assembly.scene
+    if scene.effects["wheel_forces"].frame == "body":
+        raise InputError(scene.file, "effects.wheel_forces.frame", "body",
+                         "a prescribed pitch makes the frame a matter of the file: use 'inertial'")
+    values, period = read_uniform(scene.path(p.file), {"pitch": ANGLE})
+    pitch = Smooth(values, period, derivatives=2, degree=5)
+    if pitch.end < scene.run.duration * (1 - 1e-9):
+        raise InputError(scene.file, "effects.prescribed_pitch.file", p.file,
+                         f"ends at {pitch.end:g} s, but the run lasts {scene.run.duration:g} s: shorten run.duration")
+    assert assembly.input is not None
+    guided = assembly.with_input("pitch", Stacked((assembly.input, pitch)))
+    start = pitch.at(0.0)
+    guided.initial[[3, 7]] = start[:2]
+    return guided

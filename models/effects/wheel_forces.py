@@ -1,0 +1,38 @@
+"""Wheel forces prescribed from a file (eq. 37): the vehicle is cut off the road."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from models.assembly import Assembly
+from models.errors import InputError
+from models.signals import Interpolation, sampled
+from models.strict import Strict
+
+NEEDS: tuple[str, ...] = ()
+EXCLUDES = ("road",)
+AFTER: tuple[str, ...] = ()
+COST = "one force per wheel, read from a table; no tyre"
+FORCE = {"N": 1.0, "kN": 1e3}
+
+
+class Parameters(Strict):
+    """[effects.wheel_forces]."""
+
+    file: str = Field(description="CSV with the columns time [s], front [N], rear [N]; forces up on the wheels")
+    interpolation: Interpolation = Field(description="held, linear or smooth between the samples")
+    frame: Literal["inertial", "body"] = Field("inertial", description="axis of the forces: vertical, or the chassis'")
+
+
+def extend(assembly: Assembly, p: Any) -> Assembly:
+    """The vehicle without tyres, driven by the two forces."""
+    from models.tables import read_uniform
+
+    scene = assembly.scene
+    columns = {"front": FORCE, "rear": FORCE}
+    values, period = read_uniform(scene.path(p.file), columns)
+    signal = sampled(values, period, p.interpolation)
+    if signal.end < scene.run.duration * (1 - 1e-9):
+        raise InputError(scene.file, "effects.wheel_forces.file", p.file,
+                         f"ends at {signal.end:g} s, but the run lasts {scene.run.duration:g} s: shorten run.duration")
+    return assembly.without_tyres().with_input("force" if p.frame == "inertial" else "force-body", signal)

@@ -1,0 +1,346 @@
+"""The vehicle in Exudyn: native bodies and spring-dampers, a constraint for a prescribed pitch.
+
+Exudyn's plane is x-y with rotation from x to y. The description's x forward, z down, nose-up pitch
+becomes x **backward**, y down: then a positive rotation lifts the front, as it should.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import exudyn as exu
+import exudyn.itemInterface as items
+import numpy as np
+
+from models.assembly import Assembly
+from models.engines.catalogue import CATALOGUE
+from models.engines.protocol import Settings, Trajectory, guard
+from models.errors import Refused, RunFailed
+from models.vehicles.description import PitchSpring, Point, Strut
+from models.vehicles.linear import matrices
+
+exu.config.printToConsole = False
+
+
+@dataclass
+class Build:
+    """Handles of what was put into Exudyn's system.
+
+    places maps (body, "z" or "pitch") to a coordinate marker; columns are the places of the vehicle's
+    four coordinates within Exudyn's vector.
+    """
+
+    container: Any
+    mbs: Any
+    places: dict[tuple[str, str], Any] = field(default_factory=dict)
+    columns: list[int] = field(default_factory=list)
+    nodes: dict[str, Any] = field(default_factory=dict)
+    ground: Any = None
+    callbacks: int = 0
+
+
+def _exact(assembly: Assembly) -> Build:
+    """Point masses, a rigid body, and vertical springs between points: exact in sin and cos of pitch."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    built = Build(container, mbs, ground=mbs.AddObject(items.ObjectGround()))
+    bodies = {}
+    for body in assembly.vehicle.bodies:
+        if body.pitch_inertia is None:
+            node = mbs.AddNode(items.NodePoint2D())
+            bodies[body.name] = mbs.AddObject(items.MassPoint2D(nodeNumber=node, physicsMass=body.mass))
+        else:
+            node = mbs.AddNode(items.NodeRigidBody2D())
+            bodies[body.name] = mbs.AddObject(
+                items.RigidBody2D(nodeNumber=node, physicsMass=body.mass, physicsInertia=body.pitch_inertia)
+            )
+            built.places[body.name, "pitch"] = _marker(mbs, node, 2)
+        built.nodes[body.name] = node
+        built.places[body.name, "z"] = _marker(mbs, node, 1)
+        mbs.AddLoad(items.LoadCoordinate(markerNumber=built.places[body.name, "z"], load=body.mass * assembly.vehicle.gravity))
+    for strut in assembly.vehicle.struts:
+        _strut(mbs, strut, lambda point: _point(built, bodies, point))
+    for spring in assembly.vehicle.pitch_springs:
+        _pitch_spring(built, spring)
+    return built
+
+
+def _point(built: Build, bodies: dict[str, Any], point: Point) -> Any:
+    """Position marker of a point; x is counted backward in Exudyn's plane."""
+    body = built.ground if point.body is None else bodies[point.body]
+    return built.mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=body, localPosition=[-point.x, 0, 0]))
+
+
+def _strut(mbs: Any, strut: Strut, marker: Callable[[Point], Any]) -> None:
+    mbs.AddObject(items.CartesianSpringDamper(
+        markerNumbers=[marker(strut.lower), marker(strut.upper)],
+        stiffness=[0, strut.stiffness, 0], damping=[0, strut.damping, 0],
+    ))  # fmt: skip
+
+
+def _pitch_spring(built: Build, spring: PitchSpring) -> None:
+    ground = built.mbs.AddMarker(items.MarkerNodeCoordinate(
+        nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
+    built.mbs.AddObject(items.CoordinateSpringDamper(
+        markerNumbers=[ground, built.places[spring.body, "pitch"]],
+        stiffness=spring.stiffness, damping=spring.damping,
+    ))  # fmt: skip
+
+
+def _linear(assembly: Assembly) -> Build:
+    """One object with constant M, D, K: the vehicle linearised about zero pitch."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    built = Build(container, mbs)
+    mass, damping, stiffness = matrices(assembly.vehicle)
+    zero = [0.0] * len(mass)
+    node = mbs.AddNode(items.NodeGenericODE2(
+        referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero, numberOfODE2Coordinates=len(mass)))
+    weight = [body.mass * assembly.vehicle.gravity for body in assembly.vehicle.bodies]
+    mbs.AddObject(items.ObjectGenericODE2(
+        nodeNumbers=[node], massMatrix=mass, dampingMatrix=damping, stiffnessMatrix=stiffness,
+        forceVector=[*weight, *zero[len(weight):]],
+    ))  # fmt: skip
+    for i, place in enumerate(assembly.vehicle.coordinates()):
+        built.places[place] = _marker(mbs, node, i)
+    built.nodes = {"vehicle": node}
+    return built
+
+
+def _marker(mbs: Any, node: Any, coordinate: int) -> Any:
+    return mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
+
+
+class Clock:
+    """The input as Exudyn's callbacks read it: by step, by half step or at any time."""
+
+    def __init__(self, assembly: Assembly, settings: Settings) -> None:
+        signal, h, n = assembly.input, settings.step, settings.steps
+        assert signal is not None
+        self.per_time = 2.0 / h
+        self.step = 0
+        nodes = CATALOGUE["exudyn"][settings.integrator].nodes
+        self.held = signal.held
+        self.table: list[list[float]] = []
+        self.steps: list[list[float]] = []
+        if self.held:
+            self.steps = signal.sample(0.0, h, n).T.tolist()
+        if not self.held and nodes != "any":
+            self.table = signal.sample(0.0, h / 2, 2 * n + 1).T.tolist()
+        self.signal = signal
+
+    def reader(self, column: int, scale: float) -> Callable[[Any, float, float], float]:
+        """Callback (mbs, t, load) -> scale times one channel."""
+        if self.held:
+            values = [scale * value for value in self.steps[column]]
+            return lambda mbs, t, load: values[self.step]
+        if self.table:
+            values, per_time = [scale * value for value in self.table[column]], self.per_time
+            return lambda mbs, t, load: values[round(t * per_time)]
+        at = self.signal.at
+        return lambda mbs, t, load: scale * at(t)[column]
+
+    def advance(self, mbs: Any, t: float) -> bool:
+        """Before each step: t is its end, so the step is the one before it."""
+        self.step = min(round(t * self.per_time / 2) - 1, len(self.steps[0]) - 1)
+        return True
+
+
+def _drive(built: Build, assembly: Assembly, clock: Clock) -> None:
+    """Put the input onto the wheels (and the chassis, for forces along its own axis)."""
+    if clock.held:
+        built.mbs.SetPreStepUserFunction(clock.advance)
+        built.callbacks += 1
+    tyres = {strut.upper.body: strut for strut in assembly.vehicle.struts if strut.lower.body is None}
+    for i, axle in enumerate(assembly.vehicle.axles):
+        if assembly.mode == "road":
+            tyre = tyres[axle.wheel]
+            _load(built, (axle.wheel, "z"), clock.reader(i, tyre.stiffness))
+            _load(built, (axle.wheel, "z"), clock.reader(2 + i, tyre.damping))
+        elif assembly.mode == "force-body" and assembly.vehicle.geometry == "exact":
+            _body_fixed(built, axle.wheel, axle.x, clock.reader(i, 1.0))
+        else:
+            _load(built, (axle.wheel, "z"), clock.reader(i, -1.0))
+
+
+def _load(built: Build, place: tuple[str, str], function: Callable[[Any, float, float], float]) -> None:
+    built.mbs.AddLoad(items.LoadCoordinate(markerNumber=built.places[place], load=0.0, loadUserFunction=function))
+    built.callbacks += 1
+
+
+def _body_fixed(built: Build, wheel: str, x: float, force: Callable[[Any, float, float], float]) -> None:
+    """A force along the chassis' vertical axis: f cos on the wheel, f x sin^2 on the chassis."""
+    node, coordinates = built.nodes["chassis"], exu.OutputVariableType.Coordinates
+
+    def pitch(mbs: Any) -> float:
+        return mbs.GetNodeOutput(node, coordinates)[2]
+
+    _load(built, (wheel, "z"), lambda mbs, t, load: -force(mbs, t, load) * np.cos(pitch(mbs)))
+    _load(built, ("chassis", "pitch"), lambda mbs, t, load: x * force(mbs, t, load) * np.sin(pitch(mbs)) ** 2)
+
+
+def _prescribe(built: Build, assembly: Assembly, settings: Settings) -> Any:
+    """Pitch as a constraint with its Lagrange multiplier; returns the constraint."""
+    signal = assembly.input
+    assert signal is not None
+    table = signal.sample(0.0, settings.step / 2, 2 * settings.steps + 1)
+    angle, rate, per_time = table[:, 2].tolist(), table[:, 3].tolist(), 2.0 / settings.step
+    ground = built.mbs.AddMarker(items.MarkerNodeCoordinate(
+        nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
+    built.callbacks += 2
+    return built.mbs.AddObject(items.CoordinateConstraint(
+        markerNumbers=[ground, built.places["chassis", "pitch"]],
+        offsetUserFunction=lambda mbs, t, item, offset: angle[round(t * per_time)],
+        offsetUserFunction_t=lambda mbs, t, item, offset: rate[round(t * per_time)],
+    ))  # fmt: skip
+
+
+class ExudynModel:
+    """One assembly in one Exudyn system."""
+
+    def __init__(self, assembly: Assembly, settings: Settings) -> None:
+        self.assembly, self.settings = assembly, settings
+        self.built = _exact(assembly) if assembly.vehicle.geometry == "exact" else _linear(assembly)
+        if assembly.input is not None:
+            self.clock = Clock(assembly, settings)
+            _drive(self.built, assembly, self.clock)
+        self.constraint = _prescribe(self.built, assembly, settings) if assembly.mode == "pitch" else None
+        self._sensors = self._add_sensors()
+        self.built.mbs.Assemble()
+        self._columns = self._find_columns()
+        self._set_state(assembly.initial)
+
+    def _add_sensors(self) -> list[tuple[Any, Any]]:
+        kinds = exu.OutputVariableType
+        def sensor(node: Any, kind: Any) -> Any:
+            return self.built.mbs.AddSensor(items.SensorNode(
+                nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind))
+        nodes = self.built.nodes.values()
+        sensors = [(sensor(node, kinds.Coordinates), sensor(node, kinds.Coordinates_t)) for node in nodes]
+        if self.constraint is not None:
+            moment = self.built.mbs.AddSensor(items.SensorObject(
+                objectNumber=self.constraint, storeInternal=True, writeToFile=False, outputVariableType=kinds.Force))
+            self._moment = moment
+        return sensors
+
+    def _find_columns(self) -> list[int]:
+        """Place of each of the four coordinates within Exudyn's vector."""
+        if self.assembly.vehicle.geometry == "linear":
+            return [0, 1, 2, 3]
+        start = {name: self.built.mbs.GetNodeODE2Index(node) for name, node in self.built.nodes.items()}
+        return [start[body] + (1 if kind == "z" else 2) for body, kind in self.assembly.vehicle.coordinates()]
+
+    def _set_state(self, state: np.ndarray) -> None:
+        data, initial = self.built.mbs.systemData, exu.ConfigurationType.Initial
+        q, v = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
+        q[self._columns], v[self._columns] = state[:4], state[4:]
+        data.SetODE2Coordinates(q, initial)
+        data.SetODE2Coordinates_t(v, initial)
+
+    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
+        """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,), from Exudyn's own residual and mass matrix."""
+        self._set_state(state)
+        solver, options = exu.MainSolverImplicitSecondOrder(), self._options()
+        options.timeIntegration.startTime = time
+        solver.InitializeSolver(self.built.mbs, options)
+        solver.ComputeMassMatrix(self.built.mbs)
+        solver.ComputeODE2RHS(self.built.mbs)
+        count = solver.GetODE2size()
+        mass, residual = solver.GetSystemMassMatrix()[:count, :count], solver.GetSystemResidual()[:count]
+        solver.FinalizeSolver(self.built.mbs, options)
+        self._set_state(self.assembly.initial)
+        return np.linalg.solve(mass, residual)[self._columns]
+
+    def plan(self) -> dict[str, int]:
+        """What was built: degrees of freedom, native items, callbacks."""
+        data = self.built.mbs.systemData
+        return {"degrees of freedom": 4, "native items": data.NumberOfObjects() + data.NumberOfLoads(),
+                "callbacks": self.built.callbacks}
+
+    def _options(self) -> Any:
+        """Exudyn's settings for this run; nothing is written to files."""
+        own, options = self.settings, exu.SimulationSettings()
+        options.solution.file.write = False
+        options.solution.sensors.active = True
+        options.solution.sensors.writePeriod = own.step
+        ti = options.timeIntegration
+        ti.numberOfSteps, ti.endTime, ti.verboseMode = own.steps, own.duration, 0
+        ti.adaptiveStep = False
+        ti.automaticStepSize = CATALOGUE["exudyn"][own.integrator].adaptive
+        ti.relativeTolerance, ti.absoluteTolerance = own.tolerance, own.tolerance * 1e-2
+        ti.generalizedAlpha.spectralRadius = own.spectral_radius
+        ti.newton.relativeTolerance, ti.newton.absoluteTolerance = 1e-8, 1e-10
+        ti.explicit.computeEndOfStepAccelerations = False
+        return options
+
+    def run(self) -> Trajectory:
+        """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
+        if self.settings.integrator == "DVERK6":
+            raise Refused("exudyn", "DVERK6 is named but not implemented in Exudyn; use DOPRI5 or RK67")
+        options = self._options()
+        if self.constraint is not None:
+            self._consistent_start(options)
+        note = ""
+        try:
+            solver = getattr(exu.DynamicSolverType, self.settings.integrator)
+            if not self.built.mbs.SolveDynamic(options, solverType=solver):
+                note = "; the solver reported failure"
+        except (exu.ExudynError, RuntimeError, ValueError) as error:
+            note = f"; the solver stopped: {str(error).strip().splitlines()[0]}"
+        times, states = self._recorded()
+        guard("exudyn", times, states, self.settings.duration, note)
+        return Trajectory(times, states, self._enforced(), self._counts())
+
+    def _consistent_start(self, options: Any) -> None:
+        """Begin with the accelerations that belong to the prescribed pitch.
+
+        Exudyn leaves the constraint's own acceleration out of its initial values; the multiplier then
+        rings, or never forgets the error.
+        """
+        signal = self.assembly.input
+        assert signal is not None
+        acceleration = self.acceleration(0.0, self.assembly.initial)
+        acceleration[3] = signal.at(0.0)[4]
+        data, initial = self.built.mbs.systemData, exu.ConfigurationType.Initial
+        all_of_them = np.zeros(data.ODE2Size())
+        all_of_them[self._columns] = acceleration
+        data.SetODE2Coordinates_tt(all_of_them, initial)
+        options.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
+        options.timeIntegration.generalizedAlpha.resetAccelerations = False
+
+    def _recorded(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times (n,) and states (n, 8) from the sensors; heave is y, pitch the rotation."""
+        read = self.built.mbs.GetSensorStoredData
+        positions = [read(position) for position, _ in self._sensors]
+        rates = [read(rate) for _, rate in self._sensors]
+        times = positions[0][:, 0]
+        if self.assembly.vehicle.geometry == "linear":
+            return times, np.hstack([positions[0][:, 1:], rates[0][:, 1:]])
+        halves = [np.column_stack([part[0][:, 2], part[1][:, 2], part[2][:, 2], part[2][:, 3]])
+                  for part in (positions, rates)]
+        return self._on_grid(times), np.hstack(halves)
+
+    def _on_grid(self, times: np.ndarray) -> np.ndarray:
+        """Fixed steps are counted; Exudyn accumulates them and ends 1e-13 early."""
+        counted = self.settings.step * np.arange(len(times))
+        return counted if np.allclose(times, counted, rtol=0, atol=1e-9 * max(1.0, self.settings.duration)) else times
+
+    def _enforced(self) -> np.ndarray | None:
+        """Enforced pitch moment (n,): the multiplier, with the sign of a moment on the chassis."""
+        if self.constraint is None:
+            return None
+        return -self.built.mbs.GetSensorStoredData(self._moment)[:, 1]
+
+    def _counts(self) -> dict[str, int]:
+        """Steps and evaluations of the forces, from the solver's own counters."""
+        solver = self.built.mbs.sys["dynamicSolver"]
+        steps = solver.it.currentStepIndex - 1
+        tried = steps + solver.it.rejectedAutomaticStepSizeSteps
+        explicit = hasattr(solver, "GetNumberOfStages")
+        calls = tried * solver.GetNumberOfStages() if explicit else solver.it.newtonStepsCount + steps
+        return {"steps": steps, "force calls": calls, "Jacobians": solver.it.newtonJacobiCount}
+
+
+def build(assembly: Assembly, settings: Settings) -> ExudynModel:
+    """The Exudyn model of an assembly."""
+    return ExudynModel(assembly, settings)

@@ -1,0 +1,290 @@
+"""The vehicle in MuJoCo: native joints, tendons and actuators; sampled input through a compiled callback.
+
+World axes are the description's own (x forward, y right, z down), so gravity is (0, 0, +g) and the
+hinge about +y lifts the front. A strut with exact geometry is a site actuator whose reference site sits
+on the wheel, which does not rotate; with linear geometry it is a fixed tendon. MuJoCo's own equality
+constraints are soft (a fifth of the enforced moment is lost), so a prescribed pitch uses the model
+without that joint, and inverse dynamics of the full one for the moment.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+
+from models.assembly import Assembly
+from models.engines.protocol import Settings, Trajectory, guard
+from models.errors import RunFailed
+from models.vehicles.description import Strut, Vehicle
+
+INTEGRATORS = {
+    "RK4": mujoco.mjtIntegrator.mjINT_RK4,
+    "Euler": mujoco.mjtIntegrator.mjINT_EULER,
+    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
+    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+    "discrete": mujoco.mjtIntegrator.mjINT_DISCRETE,
+}
+STAGES = {"RK4": 4}
+CHUNK = 4096
+"""Steps between two looks at the guard."""
+
+
+def _spec(vehicle: Vehicle, settings: Settings, guided: bool) -> mujoco.MjSpec:
+    """Bodies and joints; ``guided`` leaves the pitch out."""
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.option.gravity = [0, 0, vehicle.gravity]
+    spec.option.timestep = settings.step
+    spec.option.integrator = INTEGRATORS[settings.integrator]
+    off = mujoco.mjtDisableBit
+    spec.option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT
+    places = {axle.wheel: axle.x for axle in vehicle.axles}
+    for body in vehicle.bodies:
+        own = spec.worldbody.add_body(name=body.name, pos=[places.get(body.name, 0.0), 0, 0], mass=body.mass,
+                                      inertia=[body.pitch_inertia or 1.0] * 3, explicitinertial=True)
+        own.add_joint(name=f"{body.name} z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
+        if body.pitch_inertia is not None and not guided:
+            own.add_joint(name=f"{body.name} pitch", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
+    for strut in vehicle.struts:
+        _tyre(spec, strut) if strut.lower.body is None else _suspension(spec, vehicle, strut, guided)
+    for spring in vehicle.pitch_springs:
+        joint = spec.joint(f"{spring.body} pitch")
+        joint.stiffness[0], joint.damping[0] = spring.stiffness, spring.damping
+    return spec
+
+
+def _tyre(spec: mujoco.MjSpec, strut: Strut) -> None:
+    joint = spec.joint(f"{strut.upper.body} z")
+    joint.stiffness[0], joint.damping[0] = strut.stiffness, strut.damping
+
+
+def _suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, guided: bool) -> None:
+    if vehicle.geometry == "linear":
+        tendon = spec.add_tendon(name=strut.name, springlength=[0, 0])
+        tendon.stiffness[0], tendon.damping[0] = strut.stiffness, strut.damping
+        tendon.wrap_joint(f"{strut.upper.body} z", 1.0)
+        tendon.wrap_joint(f"{strut.lower.body} z", -1.0)
+        if not guided:
+            tendon.wrap_joint(f"{strut.upper.body} pitch", -strut.upper.x)
+        return
+    spec.body(strut.upper.body).add_site(name=f"{strut.name} upper", pos=[strut.upper.x, 0, 0])
+    spec.body(strut.lower.body).add_site(name=f"{strut.name} lower")
+    spec.add_actuator(
+        name=strut.name, target=f"{strut.name} upper", refsite=f"{strut.name} lower",
+        trntype=mujoco.mjtTrn.mjTRN_SITE, gear=[0, 0, 1, 0, 0, 0], gainprm=[0.0] * 10,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE, biasprm=[0, -strut.stiffness, -strut.damping, *[0] * 7],
+    )  # fmt: skip
+
+
+def _held(spec: mujoco.MjSpec, vehicle: Vehicle, gear: float) -> None:
+    """One motor per wheel for forces that stay constant over a step; they come first among the controls."""
+    for axle in vehicle.axles:
+        spec.add_actuator(name=f"{axle.name} force", target=f"{axle.wheel} z", trntype=mujoco.mjtTrn.mjTRN_JOINT,
+                          gear=[gear, 0, 0, 0, 0, 0], gainprm=[1.0 if gear else 0.0, *[0] * 9])
+
+
+@dataclass
+class Drive:
+    """How the input enters: a table (rows, columns) of generalised forces per half step, controls (n, 2), arms."""
+
+    table: np.ndarray | None = None
+    controls: np.ndarray | None = None
+    arms: np.ndarray | None = None
+    law: Any = None
+
+
+def _drive(assembly: Assembly, settings: Settings) -> Drive:
+    signal, h, n = assembly.input, settings.step, settings.steps
+    if signal is None:
+        return Drive()
+    held = signal.sample(0.0, h, n)[:, :2] if signal.held else None
+    if held is not None and assembly.mode == "force":
+        return Drive(controls=held)
+    from models.engines.mujoco_callback import body_fixed_law, table_law
+
+    inputs = signal.sample(0.0, h / 2, 2 * n + 1)
+    if assembly.mode == "force-body" and assembly.vehicle.geometry == "exact":
+        arms = np.array([axle.x for axle in assembly.vehicle.axles])
+        return Drive(None if signal.held else inputs, held, arms, body_fixed_law())
+    return Drive(_generalised(assembly, inputs), held, None, table_law())
+
+
+def _generalised(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
+    """Forces (rows, 2 or 3) on the heave coordinates that the input stands for."""
+    if assembly.mode == "road":
+        tyres = [strut for strut in assembly.vehicle.struts if strut.lower.body is None]
+        return np.column_stack([tyre.stiffness * inputs[:, i] + tyre.damping * inputs[:, 2 + i]
+                                for i, tyre in enumerate(tyres)])
+    if assembly.mode != "pitch":
+        return -inputs[:, :2]
+    forces = np.zeros((len(inputs), 3))
+    if not (assembly.input is not None and assembly.input.held):
+        forces[:, :2] -= inputs[:, :2]
+    return forces + _guidance(assembly, inputs[:, 2], inputs[:, 3])
+
+
+def _guidance(assembly: Assembly, pitch: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """What the prescribed pitch adds to the strut forces on the heave coordinates, shape (rows, 3)."""
+    exact = assembly.vehicle.geometry == "exact"
+    sine, cosine = (np.sin(pitch), np.cos(pitch)) if exact else (pitch, np.ones_like(pitch))
+    forces = np.zeros((len(pitch), 3))
+    names = [body.name for body in assembly.vehicle.bodies]
+    for strut in assembly.vehicle.struts:
+        force = -strut.upper.x * (strut.stiffness * sine + strut.damping * rate * cosine)
+        forces[:, names.index(str(strut.upper.body))] -= force
+        forces[:, names.index(str(strut.lower.body))] += force
+    return forces
+
+
+def _compiled(assembly: Assembly, settings: Settings, drive: Drive, guided: bool) -> mujoco.MjModel:
+    """The model with its input table in its numeric data."""
+    spec = _spec(assembly.vehicle, settings, guided)
+    if drive.controls is not None:
+        _held(spec, assembly.vehicle, 0.0 if drive.arms is not None else -1.0)
+    if drive.law is None:
+        return spec.compile()
+    arms = np.empty(0) if drive.arms is None else drive.arms
+    table = np.empty((0, 2)) if drive.table is None else drive.table
+    header = [2.0 / settings.step, table.shape[1], len(table), float(drive.controls is not None)]
+    content = np.concatenate((header, arms, table.ravel()))
+    spec.add_numeric(name="input", size=len(content), data=[0.0])
+    model = spec.compile()
+    model.numeric_data[:] = content
+    return model
+
+
+class MujocoModel:
+    """One assembly in one MuJoCo model (two, where the pitch is prescribed)."""
+
+    def __init__(self, assembly: Assembly, settings: Settings) -> None:
+        self.assembly, self.settings = assembly, settings
+        self.guided = assembly.mode == "pitch"
+        self.drive = _drive(assembly, settings)
+        self.model = _compiled(assembly, settings, self.drive, self.guided)
+        self.data = mujoco.MjData(self.model)
+        if self.drive.law is not None:
+            from models.engines.mujoco_layout import check
+
+            check(self.model, self.data)
+
+    def run(self) -> Trajectory:
+        """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
+        n = self.settings.steps
+        states = np.empty((n + 1, 8))
+        free = [0, 1, 2, 4, 5, 6] if self.guided else list(range(8))
+        states[0] = self.assembly.initial
+        with self._callback():
+            self._advance(states, free)
+        times = self.settings.step * np.arange(n + 1)
+        if self.guided:
+            states[:, [3, 7]] = self._signal().sample(0.0, self.settings.step, n + 1)[:, 2:4]
+        guard("mujoco", times, states, self.settings.duration, self._warnings())
+        moment = self._enforced(times, states) if self.guided else None
+        return Trajectory(times, states, moment, self._counts())
+
+    def _advance(self, states: np.ndarray, free: list[int]) -> None:
+        """March in chunks, so that a run that has failed is not carried to its end."""
+        n, size = self.settings.steps, self.model.nq + self.model.nv + 1
+        state = np.concatenate(([0.0], states[0, free]))
+        for first in range(0, n, CHUNK):
+            count = min(CHUNK, n - first)
+            controls = None if self.drive.controls is None else self.drive.controls[first : first + count]
+            path, _ = rollout.rollout(self.model, self.data, state[None, :], control=self._padded(controls), nstep=count)
+            path = path[0, :, :size]
+            states[first + 1 : first + 1 + count, free] = path[:, 1:]
+            expected = self.settings.step * (first + 1 + np.arange(count))
+            late = np.abs(path[:, 0] - expected) > 1e-6 * self.settings.step * n
+            if late.any() or self._warnings():
+                self._fail(states, first + int(np.argmax(late)) if late.any() else first + count)
+            state = path[-1]
+
+    def _fail(self, states: np.ndarray, last: int) -> None:
+        """Raise for a run that MuJoCo stopped or reset; the guard names a worse reason if there is one."""
+        guard("mujoco", self.settings.step * np.arange(last + 1), states[: last + 1], last * self.settings.step)
+        raise RunFailed("mujoco", f"the engine gave up{self._warnings()}", last * self.settings.step, states[last])
+
+    def _padded(self, controls: np.ndarray | None) -> np.ndarray | None:
+        """Controls of all actuators: springs take none, the wheels' motors come last."""
+        if controls is None:
+            return None
+        padded = np.zeros((1, len(controls), self.model.nu))
+        padded[0, :, self.model.nu - 2 :] = controls
+        return padded
+
+    def _warnings(self) -> str:
+        """What MuJoCo itself noticed, as a phrase; empty if nothing."""
+        found = [mujoco.mjtWarning(i).name for i in range(len(self.data.warning)) if self.data.warning[i].number]
+        return f"; MuJoCo warned {', '.join(found)}" if found else ""
+
+    def _callback(self):
+        from contextlib import nullcontext
+
+        if self.drive.law is None:
+            return nullcontext()
+        from models.engines.mujoco_callback import installed
+
+        return installed(self.drive.law)
+
+    def _signal(self) -> Any:
+        assert self.assembly.input is not None
+        return self.assembly.input
+
+    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
+        """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,)."""
+        free = [0, 1, 2] if self.guided else [0, 1, 2, 3]
+        self.data.time, self.data.qpos[:], self.data.qvel[:] = time, state[:4][free], state[4:][free]
+        if self.drive.controls is not None:
+            row = min(round(time / self.settings.step), len(self.drive.controls) - 1)
+            self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[row]
+        with self._callback():
+            mujoco.mj_forward(self.model, self.data)
+        out = np.empty(4)
+        out[free] = self.data.qacc
+        if self.guided:
+            out[3] = self._signal().at(time)[4]
+        return out
+
+    def _enforced(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """Moment (n,) that the prescribed motion takes: inverse dynamics of the vehicle with its pitch joint.
+
+        Wheel forces and motors act on heave coordinates only, so the pitch row needs neither.
+        """
+        full = _compiled(self.assembly, self.settings, Drive(), guided=False)
+        data, moment = mujoco.MjData(full), np.empty(len(times))
+        accelerations = self._accelerations(times, states)
+        for i, state in enumerate(states):
+            data.qpos[:], data.qvel[:], data.qacc[:] = state[:4], state[4:], accelerations[i]
+            mujoco.mj_inverse(full, data)
+            mujoco.mj_fwdActuation(full, data)
+            moment[i] = data.qfrc_inverse[3] - data.qfrc_actuator[3]
+        return moment
+
+    def _accelerations(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """Accelerations (n, 4) along a guided run."""
+        signal = self._signal().sample(0.0, self.settings.step, len(times))
+        out = np.empty((len(times), 4))
+        with self._callback():
+            for i, time in enumerate(times):
+                self.data.time, self.data.qpos[:], self.data.qvel[:] = time, states[i, :3], states[i, 4:7]
+                if self.drive.controls is not None:
+                    self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[min(i, len(self.drive.controls) - 1)]
+                mujoco.mj_forward(self.model, self.data)
+                out[i, :3] = self.data.qacc
+        out[:, 3] = signal[:, 4]
+        return out
+
+    def plan(self) -> dict[str, int]:
+        """What was built: degrees of freedom, native items, callbacks."""
+        native = self.model.nu + self.model.ntendon + int((self.model.jnt_stiffness != 0).sum())
+        return {"degrees of freedom": self.model.nv, "native items": native, "callbacks": int(self.drive.law is not None)}
+
+    def _counts(self) -> dict[str, int]:
+        n = self.settings.steps
+        return {"steps": n, "force calls": n * STAGES.get(self.settings.integrator, 1)}
+
+
+def build(assembly: Assembly, settings: Settings) -> MujocoModel:
+    """The MuJoCo model of an assembly."""
+    return MujocoModel(assembly, settings)

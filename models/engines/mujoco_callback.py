@@ -1,0 +1,117 @@
+"""Compiled MuJoCo callbacks: input tables added to the passive forces at every stage of a step.
+
+The table lives in the model's own numeric data, behind a header: rows per second, columns, rows. So one
+compiled function serves every model in the process, adds nothing to a model without a table, survives
+copies of the model, and holds no address that could go stale in numba's cache.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import llvmlite.ir as ir
+import mujoco
+import numpy as np
+from numba import carray, cfunc, types
+from numba.extending import intrinsic
+
+from models.engines.mujoco_layout import offset
+
+HEADER = 4
+DOUBLES = types.CPointer(types.float64)
+
+
+@intrinsic
+def _double_at(typing_context, base, shift):
+    """Pointer to the double that lies ``shift`` bytes after ``base``."""
+
+    def generate(context, builder, signature, arguments):
+        start = builder.ptrtoint(arguments[0], ir.IntType(64))
+        return builder.inttoptr(builder.add(start, arguments[1]), context.get_value_type(DOUBLES))
+
+    return DOUBLES(types.voidptr, types.intp), generate
+
+
+@intrinsic
+def _array_at(typing_context, base, shift):
+    """The double pointer that is stored ``shift`` bytes after ``base``."""
+
+    def generate(context, builder, signature, arguments):
+        start = builder.ptrtoint(arguments[0], ir.IntType(64))
+        kind = ir.PointerType(context.get_value_type(DOUBLES))
+        return builder.load(builder.inttoptr(builder.add(start, arguments[1]), kind))
+
+    return DOUBLES(types.voidptr, types.intp), generate
+
+
+def _compile_table(numeric, passive, time):
+    @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
+    def law(model, data):
+        header = carray(_array_at(model, numeric), (HEADER,))
+        columns = int(header[1])
+        row = int(np.rint(carray(_double_at(data, time), (1,))[0] * header[0]))
+        if 0 <= row < int(header[2]):
+            table = carray(_array_at(model, numeric), (HEADER + columns * int(header[2]),))
+            force = carray(_array_at(data, passive), (columns,))
+            for i in range(columns):
+                force[i] += table[HEADER + row * columns + i]
+
+    return law
+
+
+def _compile_body_fixed(numeric, passive, time, position, control):
+    """Forces along the chassis' vertical axis; header[3] is 1 where they are held in the controls."""
+
+    @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
+    def law(model, data):
+        header = carray(_array_at(model, numeric), (HEADER,))
+        columns, rows = int(header[1]), int(header[2])
+        row = int(np.rint(carray(_double_at(data, time), (1,))[0] * header[0]))
+        table = carray(_array_at(model, numeric), (HEADER + 2 + columns * rows,))
+        held = carray(_array_at(data, control), (2,))
+        pitch = carray(_array_at(data, position), (4,))[3]
+        force = carray(_array_at(data, passive), (4,))
+        sine, cosine = np.sin(pitch), np.cos(pitch)
+        if header[3] == 0.0 and not 0 <= row < rows:
+            return
+        for i in range(2):
+            f = held[i] if header[3] == 1.0 else table[HEADER + 2 + row * columns + i]
+            force[i] -= f * cosine
+            force[3] += table[HEADER + i] * f * sine * sine
+
+    return law
+
+
+_COMPILED: dict[str, object] = {}
+
+
+def table_law():
+    """Callback that adds the table's row at the stage's time to the first passive forces."""
+    if "table" not in _COMPILED:
+        _COMPILED["table"] = _compile_table(*_offsets("numeric_data", "qfrc_passive", "time"))
+    return _COMPILED["table"]
+
+
+def body_fixed_law():
+    """Callback for wheel forces that turn with the chassis: the model's own arms precede the table."""
+    if "body" not in _COMPILED:
+        _COMPILED["body"] = _compile_body_fixed(*_offsets("numeric_data", "qfrc_passive", "time", "qpos", "ctrl"))
+    return _COMPILED["body"]
+
+
+def _offsets(*fields: str) -> list[int]:
+    return [offset("mjModel" if field == "numeric_data" else "mjData", field) for field in fields]
+
+
+@contextmanager
+def installed(law) -> Iterator[None]:
+    """Install a compiled callback for the block only: MuJoCo's callbacks are global to the process."""
+    if law is None:
+        yield
+        return
+    if mujoco.get_mjcb_passive() is not None:
+        raise RuntimeError("another MuJoCo callback is installed in this process")
+    mujoco.set_mjcb_passive(law.ctypes)
+    try:
+        yield
+    finally:
+        mujoco.set_mjcb_passive(None)

@@ -1,0 +1,69 @@
+"""Byte offsets of fields in MuJoCo's C structures, from MuJoCo's own description of itself.
+
+A compiled callback receives bare pointers; the offsets differ from version to version, so they are
+computed from ``mujoco.introspect`` and checked against the addresses of the bound arrays.
+"""
+
+import ctypes
+from functools import cache
+
+import mujoco
+from mujoco.introspect import ast_nodes, enums, structs
+
+_SCALARS = {
+    "mjtNum": ctypes.c_double,
+    "mjtByte": ctypes.c_ubyte,
+    "mjtBool": ctypes.c_ubyte,
+    "mjtSize": ctypes.c_int64,
+    "double": ctypes.c_double,
+    "float": ctypes.c_float,
+    "int": ctypes.c_int,
+    "unsigned int": ctypes.c_uint,
+    "char": ctypes.c_char,
+    "size_t": ctypes.c_size_t,
+    "uint64_t": ctypes.c_uint64,
+    "uintptr_t": ctypes.c_size_t,
+}
+
+
+def _ctype(node: ast_nodes.ValueType | ast_nodes.PointerType | ast_nodes.ArrayType) -> type:
+    if isinstance(node, ast_nodes.PointerType):
+        return ctypes.c_void_p
+    if isinstance(node, ast_nodes.ArrayType):
+        kind = _ctype(node.inner_type)
+        for extent in reversed(node.extents):
+            kind = kind * extent
+        return kind
+    if isinstance(node, ast_nodes.AnonymousStructDecl):
+        return _structure(node.fields)
+    if node.name in structs.STRUCTS:
+        return layout(node.name)
+    if node.name in enums.ENUMS:
+        return ctypes.c_int
+    return _SCALARS[node.name]
+
+
+def _structure(fields: tuple) -> type:
+    pairs = [(field.name, _ctype(field.type)) for field in fields]
+    return type("Layout", (ctypes.Structure,), {"_fields_": pairs})
+
+
+@cache
+def layout(name: str) -> type:
+    """``ctypes.Structure`` of a MuJoCo structure, for example ``mjData``."""
+    return _structure(structs.STRUCTS[name].fields)
+
+
+def offset(structure: str, field: str) -> int:
+    """Offset (bytes) of a field within a MuJoCo structure."""
+    return getattr(layout(structure), field).offset
+
+
+def check(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Compare offsets with the addresses of the bound arrays; raises RuntimeError on a mismatch."""
+    pairs = (("mjModel", model, "numeric_data"), ("mjModel", model, "qpos0"),
+             ("mjData", data, "qfrc_passive"), ("mjData", data, "qvel"), ("mjData", data, "qpos"))
+    for structure, owner, field in pairs:
+        found = ctypes.c_void_p.from_address(owner._address + offset(structure, field)).value
+        if found != getattr(owner, field).ctypes.data:
+            raise RuntimeError(f"MuJoCo {mujoco.__version__}: {structure}.{field} is not where its description says")

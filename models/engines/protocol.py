@@ -1,0 +1,129 @@
+"""What an engine is to the rest of twinrig, and the guard that every run passes.
+
+An engine is a module with ``build(assembly, settings) -> Model``. A model runs once over the asked time
+and can be asked for its acceleration at any state, for the build audit.
+"""
+
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from models.engines.catalogue import CATALOGUE, Integrator
+from models.errors import Refused, RunFailed
+
+if TYPE_CHECKING:
+    from models.assembly import Assembly
+    from models.scene import Scene
+
+SIZE_BOUND = 1e4
+"""A state above this (m, rad, m/s, rad/s) is not a vehicle any more: 1e303 is finite, too."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to integrate: integrator by its engine's name, step and duration in s."""
+
+    integrator: str
+    step: float
+    duration: float
+    tolerance: float = 1e-9
+    spectral_radius: float = 0.6
+
+    @property
+    def steps(self) -> int:
+        """Number of fixed steps that cover the duration."""
+        return round(self.duration / self.step)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """times (n,), states (n, 8), enforced pitch moment (n,) in N m or None, and what the run cost in counts."""
+
+    times: np.ndarray
+    states: np.ndarray
+    moment: np.ndarray | None = None
+    counts: dict[str, int] = field(default_factory=dict)
+
+
+class Model(Protocol):
+    """A vehicle built in one engine."""
+
+    def run(self) -> Trajectory:
+        """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
+        ...
+
+    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
+        """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,)."""
+        ...
+
+    def plan(self) -> dict[str, int]:
+        """What was built: degrees of freedom, native items, callbacks."""
+        ...
+
+
+def settings_of(scene: "Scene", engine: str) -> Settings:
+    """Settings of a scene for one engine."""
+    own = scene.settings(engine)
+    assert own.integrator is not None and own.step is not None
+    return Settings(own.integrator, own.step, scene.run.duration, own.tolerance, own.spectral_radius)
+
+
+def build(engine: str, assembly: "Assembly", settings: Settings) -> Model:
+    """Build an assembly in an engine by name; raises Refused where the engine would answer wrongly."""
+    check(engine, assembly, settings)
+    return import_module(f"models.engines.{engine}").build(assembly, settings)
+
+
+def check(engine: str, assembly: "Assembly", settings: Settings) -> None:
+    """Refuse combinations that no integrator treats correctly."""
+    integrator = CATALOGUE[engine][settings.integrator]
+    _whole(engine, settings.duration / settings.step, "the step", settings.step, "the duration", settings.duration)
+    if assembly.mode == "pitch" and not integrator.constraints:
+        raise Refused(engine, f"{settings.integrator} does not solve for a prescribed pitch: its enforced moment would "
+                              f"be wrong without a word; use {_constrained(engine)}")
+    if assembly.mode == "pitch" and settings.integrator == "GeneralizedAlpha" and settings.spectral_radius > 0.95:
+        raise Refused(engine, f"a spectral radius of {settings.spectral_radius} never damps the error of the enforced "
+                              "moment at the start; use at most 0.95 (0.6 is recommended)")
+    signal = assembly.input
+    if signal is not None and signal.period is not None:
+        _sampling(engine, integrator, settings, signal.period, signal.held)
+
+
+def _constrained(engine: str) -> str:
+    return " or ".join(name for name, integrator in CATALOGUE[engine].items() if integrator.constraints)
+
+
+def _sampling(engine: str, integrator: Integrator, settings: Settings, period: float, held: bool) -> None:
+    if integrator.adaptive and engine != "reference":
+        if held:
+            raise Refused(engine, f"{settings.integrator} picks its own steps and cannot hold samples over them; "
+                                  "use a fixed-step integrator")
+        return
+    if not integrator.adaptive:
+        _whole(engine, period / settings.step, "the step", settings.step, "the sampling period", period)
+
+
+def _whole(engine: str, ratio: float, what: str, step: float, whole: str, length: float) -> None:
+    if ratio < 0.5 or abs(ratio - round(ratio)) > 1e-6 * max(1.0, ratio * 1e-3):
+        fitting = length / max(1, round(ratio))
+        raise Refused(engine, f"{what} {step:g} s does not divide {whole} {length:g} s; use for example {fitting:g} s")
+
+
+def guard(engine: str, times: np.ndarray, states: np.ndarray, duration: float, note: str = "") -> None:
+    """Raise RunFailed unless the run is finite, of sane size and complete in time.
+
+    times (n,), states (n, anything), duration in s; ``note`` is what the engine itself reported.
+    """
+    sane = np.isfinite(states).all(axis=1) & (np.abs(np.where(np.isfinite(states), states, 0)) < SIZE_BOUND).all(axis=1)
+    forward = np.concatenate(([True], np.diff(times) > 0))
+    bad = np.flatnonzero(~(sane & forward & np.isfinite(times)))
+    if len(bad):
+        last = bad[0] - 1
+        reason = "time ran backwards" if sane[bad[0]] else "the state became infinite or not a number"
+        raise RunFailed(engine, reason + note, times[last] if last >= 0 else None, states[last] if last >= 0 else None)
+    if note:
+        raise RunFailed(engine, note.lstrip("; "), times[-1], states[-1])
+    if abs(times[-1] - duration) > 1e-9 * max(1.0, duration):
+        raise RunFailed(engine, f"stopped at {times[-1]:.6g} s instead of {duration:.6g} s", times[-1], states[-1])

@@ -1,0 +1,193 @@
+"""The hand-written reference: the paper's equations, a compiled fixed-step Runge-Kutta, scipy's adaptive solvers."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from scipy.integrate import solve_ivp
+
+from models.assembly import Assembly
+from models.engines.catalogue import CATALOGUE
+from models.engines.protocol import Settings, Trajectory, guard
+from models.errors import RunFailed
+from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, pitch_spring
+
+NO_INPUT = np.zeros((1, 4))
+"""The flat road."""
+
+
+def _compile_fixed(rhs):
+    @njit(cache=True)
+    def march(y, step, count, inputs, per_step, p, states):
+        """Classical Runge-Kutta; ``inputs`` has ``per_step`` rows a step (0: constant, 1: held, 2: half steps)."""
+        k1, k2, k3, k4 = np.empty(8), np.empty(8), np.empty(8), np.empty(8)
+        stage = np.empty(8)
+        states[0] = y
+        last = per_step if per_step != 1 else 0
+        for i in range(count):
+            row = i * per_step
+            middle, end = inputs[row + last // 2], inputs[row + last]
+            rhs(y, inputs[row], p, k1)
+            for j in range(8):
+                stage[j] = y[j] + 0.5 * step * k1[j]
+            rhs(stage, middle, p, k2)
+            for j in range(8):
+                stage[j] = y[j] + 0.5 * step * k2[j]
+            rhs(stage, middle, p, k3)
+            for j in range(8):
+                stage[j] = y[j] + step * k3[j]
+            rhs(stage, end, p, k4)
+            for j in range(8):
+                y[j] += step / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j])
+            states[i + 1] = y
+
+    return march
+
+
+def _compile_single(rhs):
+    @njit(cache=True)
+    def derivative(y, u, p):
+        dy, copy = np.empty(8), y.copy()
+        rhs(copy, u, p, dy)
+        return dy
+
+    return derivative
+
+
+def _sum(rhs, moment):
+    def total(y, u, p, dy):
+        rhs(y, u, p, dy)
+        moment(y, p, dy)
+
+    return total
+
+
+@dataclass
+class Reference:
+    """The vehicle as compiled equations."""
+
+    assembly: Assembly
+    settings: Settings
+
+    def __post_init__(self) -> None:
+        springs = self.assembly.vehicle.pitch_springs
+        self._key = ("road" if self.assembly.mode == "free" else self.assembly.mode,
+                     self.assembly.vehicle.geometry, bool(springs))
+        extra = [value for spring in springs for value in (spring.stiffness, spring.damping)]
+        self._p = np.concatenate((self.assembly.parameters.array(), extra))
+
+    def run(self) -> Trajectory:
+        """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
+        adaptive = CATALOGUE["reference"][self.settings.integrator].adaptive
+        times, states, counts = self._adaptive() if adaptive else self._fixed()
+        guard("reference", times, states, self.settings.duration)
+        return Trajectory(times, states, self._moment(times, states), counts)
+
+    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
+        """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,)."""
+        return derivative_of(*self._key)(np.ascontiguousarray(state), self._at(time), self._p)[4:]
+
+    def plan(self) -> dict[str, int]:
+        """What was built."""
+        return {"degrees of freedom": 4, "native items": 0, "callbacks": 0}
+
+    def _at(self, time: float) -> np.ndarray:
+        return NO_INPUT[0] if self.assembly.input is None else self.assembly.input.at(time)
+
+    def _inputs(self) -> tuple[np.ndarray, int]:
+        """Input table and its rows per step."""
+        signal, h, n = self.assembly.input, self.settings.step, self.settings.steps
+        if signal is None:
+            return NO_INPUT, 0
+        if signal.held and self.assembly.mode != "pitch":
+            return signal.sample(0.0, h, n), 1
+        return signal.sample(0.0, h / 2, 2 * n + 1), 2
+
+    def _fixed(self) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
+        n = self.settings.steps
+        states = np.empty((n + 1, 8))
+        inputs, per_step = self._inputs()
+        march = march_of(*self._key)
+        march(self.assembly.initial.copy(), self.settings.step, n, inputs, per_step, self._p, states)
+        if self.assembly.mode == "pitch":
+            states[:, [3, 7]] = inputs[::2, 2:4]
+        return self.settings.step * np.arange(n + 1), states, {"steps": n, "force calls": 4 * n}
+
+    def _adaptive(self) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
+        """Piecewise between the knots of the input, so that each piece is smooth."""
+        h, n = self.settings.step, self.settings.steps
+        times = h * np.arange(n + 1)
+        states = np.empty((n + 1, 8))
+        y = states[0] = self.assembly.initial
+        knots = np.empty(0) if self.assembly.input is None else self.assembly.input.knots(self.settings.duration)
+        edges = np.concatenate(([0.0], knots, [self.settings.duration]))
+        steps = calls = 0
+        for start, end in zip(edges[:-1], edges[1:], strict=True):
+            solution = self._piece(start, end, y)
+            inside = slice(*np.searchsorted(times, (start + 1e-9 * h, end + 1e-9 * h)))
+            if inside.start < inside.stop:
+                states[inside] = solution.sol(np.minimum(times[inside], end)).T
+            y = solution.y[:, -1]
+            steps, calls = steps + len(solution.t) - 1, calls + solution.nfev
+        states[-1] = y
+        if self.assembly.mode == "pitch" and self.assembly.input is not None:
+            states[:, [3, 7]] = self.assembly.input.sample(0.0, h, n + 1)[:, 2:4]
+        return times, states, {"steps": steps, "force calls": calls}
+
+    def _piece(self, start: float, end: float, y: np.ndarray):
+        derivative, p = derivative_of(*self._key), self._p
+        held = self._at(0.5 * (start + end)) if self._constant() else None
+        at = self._at
+
+        def rhs(t, y):
+            return derivative(y, at(t) if held is None else held, p)
+
+        tolerance = max(self.settings.tolerance, 3e-14)
+        solution = solve_ivp(rhs, (start, end), y, method=self.settings.integrator, dense_output=True,
+                             rtol=tolerance, atol=tolerance * 1e-2)
+        if not solution.success:
+            raise RunFailed("reference", solution.message, solution.t[-1], solution.y[:, -1])
+        return solution
+
+    def _constant(self) -> bool:
+        return self.assembly.input is None or self.assembly.input.held
+
+    def _moment(self, times: np.ndarray, states: np.ndarray) -> np.ndarray | None:
+        """Enforced moment A = I beta'' - cos(beta) (b f3 - a f4), below eq. (34)."""
+        if self.assembly.mode != "pitch" or self.assembly.input is None:
+            return None
+        p = self.assembly.parameters
+        free = derivative_of("force", *self._key[1:])
+        inputs = self.assembly.input.sample(0.0, self.settings.step, len(times))
+        without = np.array([free(y, u[:2].copy(), self._p)[7] for y, u in zip(states, inputs, strict=True)])
+        return p.I * (inputs[:, 4] - without)
+
+
+_FIXED: dict[tuple, object] = {}
+_SINGLE: dict[tuple, object] = {}
+
+
+def _right_hand_side(mode: str, geometry: str, spring: bool):
+    rhs = RIGHT_HAND_SIDES[mode, geometry]
+    return _sum(rhs, pitch_spring) if spring else rhs
+
+
+def march_of(mode: str, geometry: str, spring: bool = False):
+    """The compiled fixed-step solver of one mode, made when first asked for."""
+    key = (mode, geometry, spring)
+    if key not in _FIXED:
+        _FIXED[key] = _compile_fixed(_right_hand_side(*key))
+    return _FIXED[key]
+
+
+def derivative_of(mode: str, geometry: str, spring: bool = False):
+    """The compiled right-hand side of one mode, made when first asked for: (y, u, p) -> dy (8,)."""
+    key = (mode, geometry, spring)
+    if key not in _SINGLE:
+        _SINGLE[key] = _compile_single(_right_hand_side(*key))
+    return _SINGLE[key]
+
+
+def build(assembly: Assembly, settings: Settings) -> Reference:
+    """The reference model of an assembly."""
+    return Reference(assembly, settings)

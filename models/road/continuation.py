@@ -1,0 +1,106 @@
+"""Where a measured road ends and where it begins: only by a declared rule.
+
+Beyond its end a finite road is ``refused``, or it goes on ``mirrored``: the measured **points** are
+reflected at the end in arc length, zeta(2 L - s) = zeta(s), again and again, and the spline is fitted
+through all of them. Reflecting the finished spline would put a kink at L wherever its slope is not 0
+there; reflecting about the end *point*, 2 zeta(L) - zeta, would keep the slope but climb for ever on a
+road with any grade. Through mirrored points the spline is C2 everywhere by construction, the heights stay
+within the measured ones, and only the last few stations of the measured part differ from the spline
+without continuation (by a factor 0.27 less per station).
+
+Before its start a measured road needs a run-in: a vehicle at rest on the flat has to meet it without a
+jump in height, slope or curvature.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from models.errors import InputError
+from models.road.profile import Profile, SplineProfile
+
+RULES = ("mirrored", "refused")
+RUN_IN = 5.0
+"""Default length of the run-in, m."""
+MOST_POINTS = 5_000_000
+"""Longest mirrored road, in points: about 400 MB with its coefficients and the fit."""
+
+
+def continued(profile: Profile, rule: str, needed: float, file: object = "") -> Profile:
+    """Road that reaches at least to ``needed``, or an error; a road that is long enough comes back as it is.
+
+    Parameters
+    ----------
+    profile : any road; one without end is never changed
+    rule : "mirrored" or "refused", see the top of this file
+    needed : last arc length that the run reads, m
+    file : the user's file, for the message
+
+    Raises
+    ------
+    InputError : unknown rule; the road is too short and the rule is "refused"
+    """
+    if rule not in RULES:
+        raise InputError(file, "continuation", rule, "must be a rule for what follows a road's end", RULES)
+    if not math.isfinite(needed):
+        raise InputError(file, "distance", needed, "must be a finite distance in m")
+    if profile.extent[1] >= needed or not isinstance(profile, SplineProfile):
+        return profile
+    if rule == "refused":
+        allowed = f"the road ends at s = {profile.end:.6g} m and the run needs {needed:.6g} m"
+        raise InputError(file, profile.name, None, f"{allowed}: shorten the run or declare continuation 'mirrored'")
+    station, height = _mirrored_points(profile, needed, file)
+    longer = type(profile).through(station, height, f"{profile.name}, mirrored")
+    return replace(longer, window_length=profile.window_length)
+
+
+def _mirrored_points(profile: SplineProfile, needed: float, file: object) -> tuple[np.ndarray, np.ndarray]:
+    """Stations and heights, reflected at every end until they cover ``needed``."""
+    station, height = profile.points
+    gaps, length = np.diff(station), profile.end - profile.start
+    copies = math.ceil((needed - profile.start) / length)
+    if copies * gaps.size > MOST_POINTS:
+        allowed = f"mirroring {profile.name!r} that far takes more than {MOST_POINTS} points"
+        raise InputError(file, "distance (m)", needed, allowed)
+    stations, heights = [station], [height]
+    for i in range(1, copies):
+        points, back = (station, height), (profile.end - (station[::-1] - profile.start), height[::-1])
+        s, zeta = back if i % 2 else points
+        stations.append(s[1:] + i * length)
+        heights.append(zeta[1:])
+    return np.concatenate(stations), np.concatenate(heights)
+
+
+def run_in(profile: SplineProfile, length: float = RUN_IN, reference: float | None = None) -> SplineProfile:
+    """Road that rises from the flat: 0 up to its first point, then w(s / length) (zeta - reference).
+
+    w is the quintic smoothstep, so height, slope and curvature are continuous; beyond ``length`` the road
+    is the measured one, moved by ``reference``. Without moving it, a road surveyed at 200 m above the sea
+    would begin with a cliff.
+
+    Parameters
+    ----------
+    profile : spline through measured points
+    length : of the run-in, m
+    reference : height (m, positive down) that becomes 0. None takes the mean over the run-in, which puts
+        the least step into it. Two tracks of one road must share one value, or the bank between them is
+        lost: pass ``reference_height`` of their mean track.
+
+    Raises
+    ------
+    InputError : ``length`` is not positive or is longer than the road
+    """
+    level = reference_height(profile, length) if reference is None else float(reference)
+    moved = profile.coefficients.copy()
+    moved[:, 3] -= level
+    return replace(profile, coefficients=moved, window_length=float(length))
+
+
+def reference_height(profile: SplineProfile, length: float = RUN_IN) -> float:
+    """Mean height (m, positive down) over the first ``length`` m of a road, which must be as long."""
+    if not 0.0 < length <= profile.end - profile.start:
+        allowed = f"must be above 0 and at most the road's own {profile.end - profile.start:.6g} m"
+        raise InputError(profile.name, "run-in length (m)", length, allowed)
+    raw = replace(profile, window_length=0.0)
+    return float(raw.sample_uniform(profile.start, length / 512, 513)[0].mean())

@@ -1,0 +1,57 @@
+"""Measured roads from CSV: arc length and the heights of two tracks, each with its unit.
+
+    # anything
+    s [m], left [mm], right [mm]
+    0.0, 12.5, 11.0
+    0.1, 12.9, 10.2
+
+Heights are positive **up** in the file, as surveyors write them, and become zeta = -height here. The
+stations may begin anywhere; the first one becomes s = 0. How strict the text is: models/tables.py.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from models.errors import InputError
+from models.road.profile import SplineProfile
+from models.tables import DISTANCES, METRES, read_table
+
+TRACKS = ("left", "right", "mean")
+
+_COLUMNS = {"s": DISTANCES, "left": METRES, "right": METRES}
+
+
+def read_csv_road(path: str | Path, track: str = "mean") -> SplineProfile:
+    """C2 road through one track of a CSV file.
+
+    Parameters
+    ----------
+    path : file with the columns ``s``, ``left`` and ``right``: s in m or km, heights in m, cm or mm
+    track : "left", "right" or "mean", the mean of the two at each station
+
+    Returns
+    -------
+    profile with stations from 0 (m) and zeta positive down (m)
+
+    Raises
+    ------
+    InputError : naming file, line, value and what is allowed; fewer than 4 points are no road
+    """
+    if track not in TRACKS:
+        raise InputError(path, "track", track, "must be a track of the file", TRACKS)
+    left, right = read_csv_tracks(path)
+    mean = SplineProfile.through(left.station, (left.points[1] + right.points[1]) / 2.0, f"{Path(path).name}, mean")
+    return {"left": left, "right": right, "mean": mean}[track]
+
+
+def read_csv_tracks(path: str | Path) -> tuple[SplineProfile, SplineProfile]:
+    """Left and right track of a CSV file; file, frame and errors as in :func:`read_csv_road`."""
+    table = read_table(path, _COLUMNS, increasing="s", least=4)
+    station = table["s"] - table["s"][0]
+    name = Path(path).name
+    return _track(station, table["left"], f"{name}, left"), _track(station, table["right"], f"{name}, right")
+
+
+def _track(station: np.ndarray, up: np.ndarray, name: str) -> SplineProfile:
+    return SplineProfile.through(station, -up, name)

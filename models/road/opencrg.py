@@ -1,0 +1,243 @@
+"""Roads in OpenCRG files (.crg), by the library pyopencrg behind a check of every promised byte.
+
+OpenCRG gives heights **up** over u (along the reference line) and v (across, positive to the left);
+here zeta = -height, and u minus the file's first u is the arc length s, for every track, so that the
+wheels of an axle stay side by side in a bend. Height = grid + reference line + banking v.
+
+The library alone does not notice everything that is missing: a text file cut within its last number is
+read with the number that is left, one cut between records as a shorter road (with a warning), and a
+binary file without the lost part if that was a whole number of 80-byte blocks. So the number of records that the
+header promises is compared with the bytes that are there before the library reads them, and every
+warning of the library about the reading is an error here.
+"""
+
+import math
+import re
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyopencrg
+from pyopencrg.io import IplData, cut_block, read_ipl
+
+from models.errors import InputError
+from models.road.profile import Profile, SplineProfile
+
+TRACK_WIDTH = 1.5
+"""Default distance between the two tracks, m."""
+SMALLEST_INCREMENT = 1e-3
+"""Smallest distance of stations that the format's own checks accept, m."""
+
+_SIDES = {"left": (0.5,), "right": (-0.5,), "centre": (0.0,), "mean": (0.5, -0.5)}
+_WIDTHS = {"KRBI": 4, "KDBI": 8, "LRFI": 10, "LDFI": 20}
+_LINE = 80
+_KEYWORD = re.compile(r"\s*(\w+)\s*=\s*(\S+)")
+
+
+@dataclass(frozen=True)
+class _Promise:
+    """What the header says of the data: records, channels, bytes per value, text or binary."""
+
+    records: int
+    channels: int
+    width: int
+    text: bool
+    offset: int
+
+
+def read_opencrg(
+    path: str | Path, track: str = "mean", *, offset: float = 0.0, track_width: float = TRACK_WIDTH
+) -> SplineProfile:
+    """C2 road along one track of an OpenCRG file.
+
+    Parameters
+    ----------
+    path : file of any of the formats KRBI, KDBI, LRFI, LDFI
+    track : "left" and "right" lie at v = offset +- track_width / 2, "centre" at v = offset, and "mean" is
+        the mean height of left and right; between two long sections the height is linear in v
+    offset, track_width : m; v is positive to the left of the reference line
+
+    Returns
+    -------
+    profile with stations from 0 (m) and zeta positive down (m)
+
+    Raises
+    ------
+    InputError : naming file, place, value and what is allowed, for every file that is damaged, cut off,
+        inconsistent, has no height on the track, or scales itself by modifiers (apply them first)
+    """
+    if track not in _SIDES:
+        raise InputError(path, "track", track, "must be a track", tuple(_SIDES))
+    road = _load(path)
+    lines = [_heights(path, road, offset + side * track_width) for side in _SIDES[track]]
+    up = lines[0] if len(lines) == 1 else 0.5 * (lines[0] + lines[1])
+    if up.size < 4:
+        raise InputError(path, "cross sections", up.size, "at least 4 are needed")
+    return SplineProfile.through(np.arange(up.size) * road.u_inc, -up, f"{Path(path).name}, {track}")
+
+
+def write_opencrg(
+    profile: Profile,
+    path: str | Path,
+    length: float,
+    increment: float,
+    right: Profile | None = None,
+    track_width: float = TRACK_WIDTH,
+) -> None:
+    """Write a road from s = 0 to ``length`` in the format KDBI.
+
+    KDBI holds IEEE doubles, and the header writes the increment with 17 digits: what is read back at the
+    stations is what was written, bit for bit. Between them the reader's spline stands for the road.
+
+    Parameters
+    ----------
+    profile : the road, or its left track if ``right`` is given
+    path : file to write; it is replaced
+    length, increment : m; the length is a whole number (3 or more) of increments of at least 1 mm
+    right : right track
+    track_width : the two long sections stand at v = +- track_width / 2, m
+
+    Raises
+    ------
+    InputError : lengths that are not possible, a road too short, a file that cannot be written
+    """
+    count = _stations(path, length, increment)
+    tracks = [right if right is not None else profile, profile]  # the format goes from right to left
+    s = np.arange(count) * increment
+    up = np.column_stack([-track.height_and_slope(s)[0] for track in tracks])
+    across = [-track_width / 2.0, track_width / 2.0]
+    try:
+        road = pyopencrg.CrgRoad(up, increment, across, comments=[f"{profile.name[:60]} (heights up, m)"])
+        road.save(path, fmt="KDBI")
+    except (OSError, ValueError) as error:
+        raise InputError(path, "", None, f"the file cannot be written: {error}") from None
+
+
+def _stations(path: str | Path, length: float, increment: float) -> int:
+    """Count the stations of a road to be written."""
+    if not (math.isfinite(increment) and increment >= SMALLEST_INCREMENT):
+        raise InputError(path, "increment (m)", increment, f"must be {SMALLEST_INCREMENT} or more")
+    steps = round(length / increment) if math.isfinite(length) else 0
+    if steps < 3 or abs(steps * increment - length) > 1e-9 * length:
+        raise InputError(path, "length (m)", length, f"must be a whole number, 3 or more, of increments of {increment}")
+    return steps + 1
+
+
+def _load(path: str | Path) -> Any:
+    """Read a file that is complete; whatever the library finds to say about reading it is an error."""
+    promise = _promise(path)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # looked at below, where they can be told apart
+            road = pyopencrg.read(path)
+    except Exception as error:
+        raise _unreadable(path, error) from None
+    if road.read_warnings:
+        raise InputError(path, "data", None, road.read_warnings[0])
+    if road.nu != promise.records:
+        raise InputError(path, "cross sections", road.nu, f"the header promises {promise.records}")
+    scaled = {key: x for key, x in (road.mods or {}).items() if key.startswith("scale_") and x != 1.0}
+    if scaled:
+        key, value = next(iter(scaled.items()))
+        raise InputError(path, key, value, "modifiers are not applied here: save the file with them applied")
+    return road
+
+
+def _unreadable(path: str | Path, error: Exception) -> InputError:
+    """Turn any error of the library into the user's: damaged bytes may raise almost anything there."""
+    reason = str(error).replace(f"{path}: ", "").split("\nTo open it anyway")[0]
+    return InputError(path, "", None, f"not a readable OpenCRG file: {reason or type(error).__name__}")
+
+
+def _promise(path: str | Path) -> _Promise:
+    """Read the header, check it, and compare the bytes that follow with what it promises."""
+    try:
+        header = read_ipl(path, meta_only=True)
+        data = Path(path).read_bytes()[header.data_offset :]
+        marked = b"#:" in Path(path).read_bytes()[: header.data_offset]
+    except Exception as error:
+        raise _unreadable(path, error) from None
+    if not header.kd_def or not marked or header.fmt not in _WIDTHS:
+        formats = ", ".join(_WIDTHS)
+        raise InputError(path, "$KD_DEFINITION", None, f"the data channels and one of the formats {formats} are needed")
+    text = header.fmt.startswith("L")
+    promise = _Promise(_records(path, header), len(header.kd_def), _WIDTHS[header.fmt], text, header.data_offset)
+    (_check_text if text else _check_binary)(path, promise, data)
+    return promise
+
+
+def _records(path: str | Path, header: IplData) -> int:
+    """Count the cross sections between the first and the last u of the header."""
+    if cut_block(header.struct, "ROAD_CRG_FILE")[0] is not None:
+        raise InputError(path, "$ROAD_CRG_FILE", None, "the data must be in the same file as the header")
+    block, _ = cut_block(header.struct, "ROAD_CRG")
+    values = dict(match.groups() for match in map(_KEYWORD.match, (line.lower() for line in block or [])) if match)
+    start = _value(path, values, "reference_line_start_u", "0")
+    end = _value(path, values, "reference_line_end_u")
+    increment = _value(path, values, "reference_line_increment")
+    if increment < SMALLEST_INCREMENT:
+        raise InputError(path, "reference_line_increment", increment, f"must be {SMALLEST_INCREMENT} m or more")
+    if _value(path, values, "long_section_v_increment", "1") <= 0.0:
+        raise InputError(path, "long_section_v_increment", values["long_section_v_increment"], "must be above 0")
+    if end <= start:
+        raise InputError(path, "reference_line_end_u", end, f"must be greater than the start, {start:g}")
+    return round((end - start) / increment) + 1
+
+
+def _value(path: str | Path, values: dict[str, str], key: str, default: str = "") -> float:
+    """One number of the header; without the length and the increment nobody can tell if data are missing."""
+    text = values.get(key, default)
+    try:
+        number = float(text.replace("d", "e"))
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise InputError(path, f"$ROAD_CRG, {key}", text or None, "a finite number in m is needed here")
+    return number
+
+
+def _check_binary(path: str | Path, promise: _Promise, data: bytes) -> None:
+    """Binary data are records without gaps, filled up to a whole number of 80 bytes."""
+    wanted = math.ceil(promise.records * promise.channels * promise.width / _LINE) * _LINE
+    if len(data) != wanted:
+        what = f"{promise.records} cross sections of {promise.channels} values need {wanted} bytes"
+        raise InputError(path, f"data from byte {promise.offset}", len(data), f"{what}: the file is cut off or damaged")
+
+
+def _check_text(path: str | Path, promise: _Promise, data: bytes) -> None:
+    """Text data are lines of full width, each with its line end: a shorter number shows as a shorter line."""
+    *lines, rest = data.rstrip(b"\r\n").split(b"\n") + [data[len(data.rstrip(b"\r\n")) :]]
+    per_line = _LINE // promise.width
+    per_record = math.ceil(promise.channels / per_line)
+    wanted = promise.records * per_record
+    if len(lines) != wanted or not rest:
+        found = len(lines) if rest else f"{len(lines)}, the last without a line end"
+        allowed = f"{promise.records} cross sections need {wanted} lines: the file is cut off or damaged"
+        raise InputError(path, f"lines of data from byte {promise.offset}", found, allowed)
+    last = promise.channels - (per_record - 1) * per_line
+    for i, line in enumerate(lines):
+        width = (last if i % per_record == per_record - 1 else per_line) * promise.width
+        if len(line.rstrip()) != width:
+            raise InputError(path, f"data line {i + 1}", line.decode("latin-1"), f"must be {width} characters wide")
+
+
+def _heights(path: str | Path, road: Any, v: float) -> np.ndarray:
+    """Heights (m, up) of every cross section at the lateral position ``v`` (m, positive left)."""
+    if not road.v_min - 1e-9 <= v <= road.v_max + 1e-9:
+        allowed = f"the file covers v = {road.v_min:g} to {road.v_max:g} m"
+        raise InputError(path, "lateral position of the track (m)", v, allowed)
+    nearest = int(np.argmin(np.abs(road.v - v)))
+    if abs(road.v[nearest] - v) <= 1e-9:  # on a long section: its neighbour may well be empty
+        grid = road.z[:, nearest]
+    else:
+        j = int(np.searchsorted(road.v, v)) - 1
+        part = (v - road.v[j]) / (road.v[j + 1] - road.v[j])
+        grid = (1.0 - part) * road.z[:, j] + part * road.z[:, j + 1]
+    up = grid + road.zr + road.banking * v
+    empty = np.flatnonzero(~np.isfinite(up))
+    if empty.size:
+        place = f"cross section {empty[0] + 1} (u = {road.u[empty[0]]:g} m), v = {v:g} m"
+        raise InputError(path, place, float(up[empty[0]]), "a height is needed at every station of the track")
+    return up

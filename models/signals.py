@@ -1,0 +1,167 @@
+"""Inputs over time: sampled data held, linear or smooth, on uniform grids or at any instant.
+
+Every signal has ``channels`` columns and three readings: ``sample`` on a uniform grid (the tables
+that engines step through), ``at`` one instant (adaptive solvers), and ``knots``, the times at which it
+is not smooth, where an accurate solver must restart.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+import numpy as np
+from scipy.interpolate import PPoly, make_interp_spline
+
+Interpolation = Literal["held", "linear", "smooth"]
+
+
+class Signal(Protocol):
+    """What an engine may ask of an input."""
+
+    channels: int
+    period: float | None
+    held: bool
+
+    def sample(self, start: float, step: float, count: int) -> np.ndarray:
+        """Values at start + i step, shape (count, channels)."""
+        ...
+
+    def at(self, time: float) -> np.ndarray:
+        """Values at one time (s), shape (channels,)."""
+        ...
+
+    def knots(self, duration: float) -> np.ndarray:
+        """Times inside (0, duration) at which the signal is not smooth."""
+        ...
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """Uniformly sampled data, held over each period or linear in between.
+
+    values : shape (n, channels), the first one at t = 0; period : s.
+    The nearest sample is found by rounding, never by truncating an accumulated time.
+    """
+
+    values: np.ndarray
+    period: float
+    held: bool
+
+    @property
+    def channels(self) -> int:
+        """Number of columns."""
+        return self.values.shape[1]
+
+    @property
+    def end(self) -> float:
+        """Last time (s) at which the signal is defined."""
+        return (len(self.values) - (0 if self.held else 1)) * self.period
+
+    def sample(self, start: float, step: float, count: int) -> np.ndarray:
+        """Values at start + i step, shape (count, channels)."""
+        index, part = self._place((start + step * np.arange(count)) / self.period)
+        if self.held:
+            return self.values[index]
+        after = np.minimum(index + 1, len(self.values) - 1)
+        return self.values[index] + part[:, None] * (self.values[after] - self.values[index])
+
+    def at(self, time: float) -> np.ndarray:
+        """Values at one time (s), shape (channels,)."""
+        return self.sample(time, self.period, 1)[0]
+
+    def knots(self, duration: float) -> np.ndarray:
+        """All sample times inside (0, duration)."""
+        return self.period * np.arange(1, math.ceil(duration / self.period - 1e-9))
+
+    def _place(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Index of the sample at or before each position, and the part of the period after it."""
+        nearest = np.rint(position)
+        snapped = np.where(np.abs(position - nearest) < 1e-6, nearest, position)
+        index = np.clip(np.floor(snapped), 0, len(self.values) - 1).astype(np.int64)
+        return index, snapped - index
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """A spline through uniformly sampled data, with ``derivatives`` derivatives as further channels.
+
+    values : shape (n, columns); channels are ordered value columns, first derivatives, second ones.
+    A cubic spline is C2; a quintic one is C4 and used where second derivatives are read.
+    """
+
+    values: np.ndarray
+    period: float
+    derivatives: int = 0
+    held: bool = False
+    degree: int = 3
+    _pieces: tuple[PPoly, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        times = self.period * np.arange(len(self.values))
+        spline = make_interp_spline(times, self.values, k=self.degree)
+        pieces = tuple(PPoly.from_spline(spline.derivative(i) if i else spline) for i in range(self.derivatives + 1))
+        object.__setattr__(self, "_pieces", pieces)
+
+    @property
+    def channels(self) -> int:
+        """Number of columns, derivatives included."""
+        return self.values.shape[1] * (self.derivatives + 1)
+
+    @property
+    def end(self) -> float:
+        """Last time (s) at which the signal is defined."""
+        return (len(self.values) - 1) * self.period
+
+    def sample(self, start: float, step: float, count: int) -> np.ndarray:
+        """Values and derivatives at start + i step, shape (count, channels)."""
+        times = np.clip(start + step * np.arange(count), 0.0, self.end)
+        return np.hstack([piece(times) for piece in self._pieces])
+
+    def at(self, time: float) -> np.ndarray:
+        """Values and derivatives at one time (s), shape (channels,)."""
+        return self.sample(time, self.period, 1)[0]
+
+    def knots(self, duration: float) -> np.ndarray:
+        """None that a solver of moderate order must stop at."""
+        return np.empty(0)
+
+
+def sampled(values: np.ndarray, period: float, interpolation: Interpolation) -> Sampled | Smooth:
+    """Signal from uniform samples, shape (n, channels), by the rule that a scene declares."""
+    if interpolation == "smooth":
+        return Smooth(values, period)
+    return Sampled(values, period, held=interpolation == "held")
+
+
+@dataclass(frozen=True)
+class Stacked:
+    """Signals side by side, as one."""
+
+    parts: tuple[Signal, ...]
+
+    @property
+    def channels(self) -> int:
+        """Number of columns of all parts."""
+        return sum(part.channels for part in self.parts)
+
+    @property
+    def period(self) -> float | None:
+        """Period of the first sampled part."""
+        return next((part.period for part in self.parts if part.period is not None), None)
+
+    @property
+    def held(self) -> bool:
+        """True if any part is constant over each step."""
+        return any(part.held for part in self.parts)
+
+    def sample(self, start: float, step: float, count: int) -> np.ndarray:
+        """Values of all parts at start + i step, shape (count, channels)."""
+        return np.hstack([part.sample(start, step, count) for part in self.parts])
+
+    def at(self, time: float) -> np.ndarray:
+        """Values of all parts at one time (s), shape (channels,)."""
+        return np.hstack([part.at(time) for part in self.parts])
+
+    def knots(self, duration: float) -> np.ndarray:
+        """Times at which any part is not smooth."""
+        return np.unique(np.concatenate([part.knots(duration) for part in self.parts]))

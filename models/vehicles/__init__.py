@@ -1,0 +1,1 @@
+"""Vehicles: an engine-neutral description each, and equations written straight from its paper."""

@@ -1,0 +1,68 @@
+"""The pitch-plane test vehicle: a chassis that heaves and pitches on two wheels.
+
+Source: "drift from noisy wheel forces" (Fraunhofer ITWM), Section 4 and Appendices A and B.
+This file holds its parameters, its engine-neutral description and its static equilibrium; the
+paper's equations of motion are in ``pitch_plane_equations.py``.
+"""
+
+import math
+
+import numpy as np
+
+from models.strict import Strict, quantity
+from models.vehicles.description import Axle, Body, Geometry, Point, Strut, Vehicle
+
+STATES = ("z1", "z2", "z3", "pitch")
+"""Names of the coordinates; the state is these four and their rates."""
+
+
+class Parameters(Strict):
+    """Parameters of the pitch-plane vehicle, with the paper's symbols (Appendix B)."""
+
+    a: float = quantity("m", "centre of mass to rear axle")
+    b: float = quantity("m", "centre of mass to front axle")
+    m1: float = quantity("kg", "front wheel")
+    m2: float = quantity("kg", "rear wheel")
+    m3: float = quantity("kg", "chassis")
+    I: float = quantity("kg m^2", "pitch inertia of the chassis about its centre of mass")  # noqa: E741
+    k1: float = quantity("N/m", "front tyre stiffness")
+    k2: float = quantity("N/m", "rear tyre stiffness")
+    k3: float = quantity("N/m", "front suspension stiffness")
+    k4: float = quantity("N/m", "rear suspension stiffness")
+    d1: float = quantity("N s/m", "front tyre damping")
+    d2: float = quantity("N s/m", "rear tyre damping")
+    d3: float = quantity("N s/m", "front suspension damping")
+    d4: float = quantity("N s/m", "rear suspension damping")
+    g: float = quantity("m/s^2", "gravity, acting down", default=9.81, zero=True)
+
+    def array(self) -> np.ndarray:
+        """All values in the order of the fields, shape (15,): what the compiled equations read."""
+        return np.array([getattr(self, name) for name in type(self).model_fields])
+
+
+def describe(p: Parameters, geometry: Geometry = "exact") -> Vehicle:
+    """The vehicle on its tyres, over a flat road, as bodies and struts."""
+    bodies = (Body("wheel1", p.m1), Body("wheel2", p.m2), Body("chassis", p.m3, p.I))
+    front, rear, ground = Point("wheel1"), Point("wheel2"), Point(None)
+    struts = (
+        Strut("tyre1", front, ground, p.k1, p.d1),
+        Strut("tyre2", rear, ground, p.k2, p.d2),
+        Strut("suspension3", Point("chassis", p.b), front, p.k3, p.d3),
+        Strut("suspension4", Point("chassis", -p.a), rear, p.k4, p.d4),
+    )
+    axles = (Axle("front", "wheel1", p.b), Axle("rear", "wheel2", -p.a))
+    return Vehicle(bodies, struts, axles, p.g, geometry)
+
+
+def equilibrium(p: Parameters, geometry: Geometry = "exact") -> np.ndarray:
+    """Static equilibrium on the flat road, shape (8,), rates zero.
+
+    Closed form: the axle loads follow from the moment about the other axle, and the two strut lengths
+    give heave and (the sine of) pitch.
+    """
+    f3, f4 = p.m3 * p.g * p.a / (p.a + p.b), p.m3 * p.g * p.b / (p.a + p.b)
+    z1, z2 = (f3 + p.m1 * p.g) / p.k1, (f4 + p.m2 * p.g) / p.k2
+    front, rear = z1 + f3 / p.k3, z2 + f4 / p.k4
+    sine = (rear - front) / (p.a + p.b)
+    pitch = math.asin(sine) if geometry == "exact" else sine
+    return np.array([z1, z2, front + p.b * sine, pitch, 0.0, 0.0, 0.0, 0.0])

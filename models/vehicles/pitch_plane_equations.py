@@ -1,0 +1,128 @@
+"""The pitch-plane vehicle's equations of motion, written straight from the paper (eqs 35 to 39).
+
+Each right-hand side takes the state y (8,), the input u of its mode, the parameters p (15,) in the
+order of ``pitch_plane.Parameters`` and fills dy (8,). They are plain functions that numba can compile
+into a caller, which keeps them cacheable.
+
+| mode | input u | equation |
+|---|---|---|
+| road | zeta1, zeta2, zeta1', zeta2' | (38) |
+| force | f1, f2 | (37) |
+| pitch | f1, f2, beta, beta', beta'' | (39) |
+"""
+
+import math
+
+from numba.extending import register_jitable
+
+
+@register_jitable
+def suspension(y, p, sine, cosine):
+    """Suspension forces f3, f4 (N, compression positive), eq. (35)."""
+    a, b = p[0], p[1]
+    f3 = p[8] * (y[2] - y[0] - b * sine) + p[12] * (y[6] - y[4] - b * y[7] * cosine)
+    f4 = p[9] * (y[2] - y[1] + a * sine) + p[13] * (y[6] - y[5] + a * y[7] * cosine)
+    return f3, f4
+
+
+@register_jitable
+def tyres(y, u, p):
+    """Wheel forces f1, f2 (N, up on the wheel) on a road u, eqs (33) and (35)."""
+    f1 = p[6] * (y[0] - u[0]) + p[10] * (y[4] - u[2])
+    f2 = p[7] * (y[1] - u[1]) + p[11] * (y[5] - u[3])
+    return f1, f2
+
+
+@register_jitable
+def newton_euler(y, f1, f2, f3, f4, cosine, p, dy):
+    """Balance of forces and moments, eq. (36)."""
+    for i in range(4):
+        dy[i] = y[4 + i]
+    dy[4] = p[14] + (f3 - f1) / p[2]
+    dy[5] = p[14] + (f4 - f2) / p[3]
+    dy[6] = p[14] - (f3 + f4) / p[4]
+    dy[7] = cosine * (p[1] * f3 - p[0] * f4) / p[5]
+
+
+@register_jitable
+def road_exact(y, u, p, dy):
+    """Road-excited vehicle, nonlinear in pitch (38)."""
+    sine, cosine = math.sin(y[3]), math.cos(y[3])
+    f3, f4 = suspension(y, p, sine, cosine)
+    f1, f2 = tyres(y, u, p)
+    newton_euler(y, f1, f2, f3, f4, cosine, p, dy)
+
+
+@register_jitable
+def road_linear(y, u, p, dy):
+    """Road-excited vehicle, linearised about zero pitch (38 with A(0))."""
+    f3, f4 = suspension(y, p, y[3], 1.0)
+    f1, f2 = tyres(y, u, p)
+    newton_euler(y, f1, f2, f3, f4, 1.0, p, dy)
+
+
+@register_jitable
+def force_exact(y, u, p, dy):
+    """Force-excited vehicle, wheel forces vertical in the inertial frame (37)."""
+    sine, cosine = math.sin(y[3]), math.cos(y[3])
+    f3, f4 = suspension(y, p, sine, cosine)
+    newton_euler(y, u[0], u[1], f3, f4, cosine, p, dy)
+
+
+@register_jitable
+def force_linear(y, u, p, dy):
+    """Force-excited vehicle, linearised about zero pitch (37 with A(0))."""
+    f3, f4 = suspension(y, p, y[3], 1.0)
+    newton_euler(y, u[0], u[1], f3, f4, 1.0, p, dy)
+
+
+@register_jitable
+def force_body(y, u, p, dy):
+    """Force-excited vehicle, wheel forces along the chassis' own vertical axis.
+
+    By virtual work: the vertical part f cos(beta) acts on the wheel; the horizontal part f sin(beta)
+    goes through the wheel's guide to the chassis at the strut's point, f b sin(beta)^2 about its centre.
+    Without wheel mass the moment is b f1 - a f2 at every pitch: no cosine, hence no instability.
+    """
+    sine, cosine = math.sin(y[3]), math.cos(y[3])
+    f3, f4 = suspension(y, p, sine, cosine)
+    newton_euler(y, u[0] * cosine, u[1] * cosine, f3, f4, cosine, p, dy)
+    dy[7] += sine * sine * (p[1] * u[0] - p[0] * u[1]) / p[5]
+
+
+@register_jitable
+def pitch_exact(y, u, p, dy):
+    """Force-excited vehicle guided by a prescribed pitch (39); pitch and its rate are read from u."""
+    sine, cosine = math.sin(u[2]), math.cos(u[2])
+    y[3], y[7] = u[2], u[3]
+    f3, f4 = suspension(y, p, sine, cosine)
+    newton_euler(y, u[0], u[1], f3, f4, cosine, p, dy)
+    dy[7] = u[4]
+
+
+@register_jitable
+def pitch_linear(y, u, p, dy):
+    """The same, linearised about zero pitch."""
+    y[3], y[7] = u[2], u[3]
+    f3, f4 = suspension(y, p, u[2], 1.0)
+    newton_euler(y, u[0], u[1], f3, f4, 1.0, p, dy)
+    dy[7] = u[4]
+
+
+RIGHT_HAND_SIDES = {
+    ("road", "exact"): road_exact,
+    ("road", "linear"): road_linear,
+    ("force", "exact"): force_exact,
+    ("force", "linear"): force_linear,
+    ("force-body", "exact"): force_body,
+    ("force-body", "linear"): force_linear,
+    ("pitch", "exact"): pitch_exact,
+    ("pitch", "linear"): pitch_linear,
+}
+"""By mode and geometry; a body-fixed force is vertical when the geometry is linear."""
+
+
+@register_jitable
+def pitch_spring(y, p, dy):
+    """A rotational spring and damper to the ground, p[15] in N m/rad and p[16] in N m s/rad."""
+    dy[7] -= (p[15] * y[3] + p[16] * y[7]) / p[5]
