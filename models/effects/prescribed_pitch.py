@@ -8,12 +8,12 @@ from models.assembly import Assembly
 from models.errors import InputError
 from models.signals import Smooth, Stacked
 from models.strict import Strict
+from models.tables import RADIANS
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("pitch_spring",)
 AFTER: tuple[str, ...] = ()
 COST = "one constraint in Exudyn; one degree of freedom less and an inverse-dynamics pass in MuJoCo"
-ANGLE = {"rad": 1.0, "deg": 0.017453292519943295}
 
 
 class Parameters(Strict):
@@ -24,13 +24,13 @@ class Parameters(Strict):
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The force-excited vehicle with its pitch as an input, twice differentiable by a quintic spline."""
-    from models.tables import read_uniform
+    from models.time_series import read_time_series
 
     scene = assembly.scene
     if scene.effects["wheel_forces"].frame == "body":
         raise InputError(scene.file, "effects.wheel_forces.frame", "body",
                          "a prescribed pitch makes the frame a matter of the file: use 'inertial'")
-    values, period = read_uniform(scene.path(p.file), {"pitch": ANGLE})
+    values, period = read_time_series(scene.path(p.file), {"pitch": RADIANS})
     pitch = Smooth(values, period, derivatives=2, degree=5)
     if pitch.end < scene.run.duration * (1 - 1e-9):
         raise InputError(scene.file, "effects.prescribed_pitch.file", p.file,

@@ -8,12 +8,12 @@ from models.assembly import Assembly
 from models.errors import InputError
 from models.signals import Interpolation, sampled
 from models.strict import Strict
+from models.tables import NEWTONS
 
 NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("road",)
 AFTER: tuple[str, ...] = ()
 COST = "one force per wheel, read from a table; no tyre"
-FORCE = {"N": 1.0, "kN": 1e3}
 
 
 class Parameters(Strict):
@@ -26,11 +26,11 @@ class Parameters(Strict):
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The vehicle without tyres, driven by the two forces."""
-    from models.tables import read_uniform
+    from models.time_series import read_time_series
 
     scene = assembly.scene
-    columns = {"front": FORCE, "rear": FORCE}
-    values, period = read_uniform(scene.path(p.file), columns)
+    columns = {"front": NEWTONS, "rear": NEWTONS}
+    values, period = read_time_series(scene.path(p.file), columns)
     signal = sampled(values, period, p.interpolation)
     if signal.end < scene.run.duration * (1 - 1e-9):
         raise InputError(scene.file, "effects.wheel_forces.file", p.file,

@@ -145,10 +145,11 @@ def _compiled(assembly: Assembly, settings: Settings, drive: Drive, guided: bool
         _held(spec, assembly.vehicle, 0.0 if drive.arms is not None else -1.0)
     if drive.law is None:
         return spec.compile()
-    arms = np.empty(0) if drive.arms is None else drive.arms
+    arms = (0.0, 0.0) if drive.arms is None else drive.arms
     table = np.empty((0, 2)) if drive.table is None else drive.table
-    header = [2.0 / settings.step, table.shape[1], len(table), float(drive.controls is not None)]
-    content = np.concatenate((header, arms, table.ravel()))
+    motors = len(spec.actuators) - 2 if drive.controls is not None else -1
+    header = [2.0 / settings.step, table.shape[1], len(table), motors, *arms]
+    content = np.concatenate((header, table.ravel()))
     spec.add_numeric(name="input", size=len(content), data=[0.0])
     model = spec.compile()
     model.numeric_data[:] = content

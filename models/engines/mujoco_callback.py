@@ -1,6 +1,7 @@
 """Compiled MuJoCo callbacks: input tables added to the passive forces at every stage of a step.
 
-The table lives in the model's own numeric data, behind a header: rows per second, columns, rows. So one
+The table lives in the model's own numeric data, behind a header: rows per second, columns, rows, place of
+the wheels' motors among the controls (-1: no held forces) and the two wheels' arms. So one
 compiled function serves every model in the process, adds nothing to a model without a table, survives
 copies of the model, and holds no address that could go stale in numba's cache.
 """
@@ -16,7 +17,7 @@ from numba.extending import intrinsic
 
 from models.engines.mujoco_layout import offset
 
-HEADER = 4
+HEADER = 6
 DOUBLES = types.CPointer(types.float64)
 
 
@@ -59,24 +60,24 @@ def _compile_table(numeric, passive, time):
 
 
 def _compile_body_fixed(numeric, passive, time, position, control):
-    """Forces along the chassis' vertical axis; header[3] is 1 where they are held in the controls."""
+    """Forces along the chassis' vertical axis, from the table or, where they are held, from the controls."""
 
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
     def law(model, data):
         header = carray(_array_at(model, numeric), (HEADER,))
-        columns, rows = int(header[1]), int(header[2])
+        rows, motors = int(header[2]), int(header[3])
         row = int(np.rint(carray(_double_at(data, time), (1,))[0] * header[0]))
-        table = carray(_array_at(model, numeric), (HEADER + 2 + columns * rows,))
-        held = carray(_array_at(data, control), (2,))
+        if motors < 0 and not 0 <= row < rows:
+            return
+        table = carray(_array_at(model, numeric), (HEADER + 2 * rows,))
+        controls = carray(_array_at(data, control), (max(motors, 0) + 2,))
         pitch = carray(_array_at(data, position), (4,))[3]
         force = carray(_array_at(data, passive), (4,))
         sine, cosine = np.sin(pitch), np.cos(pitch)
-        if header[3] == 0.0 and not 0 <= row < rows:
-            return
         for i in range(2):
-            f = held[i] if header[3] == 1.0 else table[HEADER + 2 + row * columns + i]
+            f = controls[motors + i] if motors >= 0 else table[HEADER + 2 * row + i]
             force[i] -= f * cosine
-            force[3] += table[HEADER + i] * f * sine * sine
+            force[3] += header[4 + i] * f * sine * sine
 
     return law
 
@@ -92,7 +93,7 @@ def table_law():
 
 
 def body_fixed_law():
-    """Callback for wheel forces that turn with the chassis: the model's own arms precede the table."""
+    """Callback for wheel forces that turn with the chassis: from the table or the controls."""
     if "body" not in _COMPILED:
         _COMPILED["body"] = _compile_body_fixed(*_offsets("numeric_data", "qfrc_passive", "time", "qpos", "ctrl"))
     return _COMPILED["body"]

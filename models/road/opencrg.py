@@ -4,11 +4,12 @@ OpenCRG gives heights **up** over u (along the reference line) and v (across, po
 here zeta = -height, and u minus the file's first u is the arc length s, for every track, so that the
 wheels of an axle stay side by side in a bend. Height = grid + reference line + banking v.
 
-The library alone does not notice everything that is missing: a text file cut within its last number is
-read with the number that is left, one cut between records as a shorter road (with a warning), and a
-binary file without the lost part if that was a whole number of 80-byte blocks. So the number of records that the
-header promises is compared with the bytes that are there before the library reads them, and every
-warning of the library about the reading is an error here.
+The library alone does not refuse everything that is cut off: a text file cut within its last number is
+read, without a word, with the digits that are left; one cut anywhere between records, or a binary file
+cut between two blocks of 80 bytes, is read as a shorter road with a warning. So the number of records
+that the header promises is compared with the bytes that are there before the library reads them, and
+every warning of the library about the reading is an error here. What no reader can see is a digit or a
+bit of a height that was changed: the format has no check sum.
 """
 
 import math
@@ -173,7 +174,8 @@ def _records(path: str | Path, header: IplData) -> int:
     if cut_block(header.struct, "ROAD_CRG_FILE")[0] is not None:
         raise InputError(path, "$ROAD_CRG_FILE", None, "the data must be in the same file as the header")
     block, _ = cut_block(header.struct, "ROAD_CRG")
-    values = dict(match.groups() for match in map(_KEYWORD.match, (line.lower() for line in block or [])) if match)
+    found = [_KEYWORD.match(line.lower()) for line in block or []]
+    values = {match[1]: match[2] for match in found if match}
     start = _value(path, values, "reference_line_start_u", "0")
     end = _value(path, values, "reference_line_end_u")
     increment = _value(path, values, "reference_line_increment")
@@ -208,12 +210,13 @@ def _check_binary(path: str | Path, promise: _Promise, data: bytes) -> None:
 
 def _check_text(path: str | Path, promise: _Promise, data: bytes) -> None:
     """Text data are lines of full width, each with its line end: a shorter number shows as a shorter line."""
-    *lines, rest = data.rstrip(b"\r\n").split(b"\n") + [data[len(data.rstrip(b"\r\n")) :]]
+    body = data.rstrip(b"\r\n")
+    lines, ended = body.split(b"\n"), len(body) < len(data)
     per_line = _LINE // promise.width
     per_record = math.ceil(promise.channels / per_line)
     wanted = promise.records * per_record
-    if len(lines) != wanted or not rest:
-        found = len(lines) if rest else f"{len(lines)}, the last without a line end"
+    if len(lines) != wanted or not ended:
+        found = len(lines) if ended else f"{len(lines)}, the last without a line end"
         allowed = f"{promise.records} cross sections need {wanted} lines: the file is cut off or damaged"
         raise InputError(path, f"lines of data from byte {promise.offset}", found, allowed)
     last = promise.channels - (per_record - 1) * per_line

@@ -188,11 +188,12 @@ class SplineProfile:
 
     def sample_uniform(self, start: float, step: float, count: int) -> Samples:
         """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
+        start, step = _finite(start, "start"), _finite(step, "step")
         last = start + max(count - 1, 0) * step
         self._check(min(start, last), max(start, last))
         height, slope = np.empty(count), np.empty(count)
         road = (self.station, self.coefficients, self.window_length)
-        kernels.cubics_uniform(float(start), float(step), *road, height, slope)
+        kernels.cubics_uniform(start, step, *road, height, slope)
         return height, slope
 
     def height_slope_at(self, s: float) -> tuple[float, float]:

@@ -1,0 +1,95 @@
+"""A road under the wheels (eq. 38): from a formula, an ISO 8608 class, or a measured file."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from models.assembly import Assembly
+from models.errors import InputError
+from models.strict import Strict, quantity
+
+NEEDS: tuple[str, ...] = ()
+EXCLUDES = ("wheel_forces", "prescribed_pitch", "contact_points")
+AFTER: tuple[str, ...] = ()
+COST = "height and slope under each wheel, read from a table of half steps"
+
+OWN = {
+    "study": ("gd",),
+    "hills": (),
+    "iso8608": ("road_class", "seed", "level"),
+    "opencrg": ("file", "track", "offset", "beyond_end", "run_in"),
+    "csv": ("file", "track", "beyond_end", "run_in"),
+}
+"""Which keys belong to which source."""
+NEEDED = {"iso8608": ("road_class",), "opencrg": ("file", "beyond_end"), "csv": ("file", "beyond_end")}
+
+
+class Parameters(Strict):
+    """[effects.road]; keys beyond source and speed belong to one source each."""
+
+    source: Literal["study", "hills", "iso8608", "opencrg", "csv"] = Field(description="where the road comes from")
+    speed: float = quantity("m/s", "constant speed of the vehicle")
+    gd: float | None = quantity("m^3", "study: one-sided roughness at 0.1 1/m", default=None)
+    road_class: Literal["A", "B", "C", "D", "E", "F", "G", "H"] | None = Field(None, description="iso8608: class")
+    seed: int | None = Field(None, description="iso8608: seed of the phases")
+    level: Literal["one-sided", "two-sided"] | None = Field(None, description="iso8608: how the class's level is read")
+    file: str | None = Field(None, description="opencrg, csv: the measured road")
+    track: Literal["left", "right", "mean", "centre"] | None = Field(None, description="opencrg, csv: which track")
+    offset: float | None = quantity("m", "opencrg: lateral place of the vehicle", default=None, signed=True)
+    beyond_end: Literal["mirrored", "refused"] | None = Field(None, description="opencrg, csv: how the road goes on")
+    run_in: float | None = quantity("m", "opencrg, csv: length over which the road rises from the flat", default=None)
+
+
+def extend(assembly: Assembly, p: Any) -> Assembly:
+    """The vehicle driven over the road."""
+    from models.road.signal import RoadUnderWheels
+
+    _check_keys(assembly.scene.file, p)
+    distance = p.speed * assembly.scene.run.duration
+    profile, kinks = _profile(assembly.scene, p, distance)
+    wheelbase = assembly.parameters.a + assembly.parameters.b
+    return assembly.with_input("road", RoadUnderWheels(profile, p.speed, wheelbase, kinks))
+
+
+def _check_keys(file: str, p: Parameters) -> None:
+    given = [name for name in type(p).model_fields if name not in ("source", "speed") and getattr(p, name) is not None]
+    for name in given:
+        if name not in OWN[p.source]:
+            raise InputError(file, f"effects.road.{name}", getattr(p, name),
+                             f"has no meaning for source = {p.source!r}, which takes {', '.join(OWN[p.source]) or 'none'}")
+    for name in NEEDED.get(p.source, ()):
+        if name not in given:
+            raise InputError(file, f"effects.road.{name}", None, f"missing: source = {p.source!r} needs it: "
+                             f"{type(p).model_fields[name].description}")
+
+
+def _profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[float, ...]]:
+    """The profile, and the stations (m) at which it is only C2."""
+    if p.source in ("opencrg", "csv"):
+        return _measured(scene, p, distance), (0.0,)
+    if p.source == "iso8608":
+        from models.road.iso8608 import iso8608_road
+
+        assert p.road_class is not None
+        profile = iso8608_road(p.road_class, p.seed or 0, level=p.level or "one-sided")
+    else:
+        from models.road.study import STUDY_GD, hills_road, study_road
+
+        profile = hills_road() if p.source == "hills" else study_road(p.gd or STUDY_GD)
+    return profile, (0.0, profile.window_length)
+
+
+def _measured(scene: Any, p: Parameters, distance: float) -> Any:
+    from models.road.continuation import RUN_IN, continued, run_in
+
+    path = scene.path(p.file)
+    track = p.track or "mean"
+    if p.source == "opencrg":
+        from models.road.opencrg import read_opencrg
+
+        raw = read_opencrg(path, track, offset=p.offset or 0.0)
+    else:
+        from models.road.csv_road import read_csv_road
+
+        raw = read_csv_road(path, track)
+    return run_in(continued(raw, str(p.beyond_end), distance, path), p.run_in or RUN_IN)

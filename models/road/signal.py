@@ -1,0 +1,46 @@
+"""A road profile under a moving vehicle: what the two wheels feel over time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.road.profile import Profile
+
+
+@dataclass(frozen=True)
+class RoadUnderWheels:
+    """Channels zeta1, zeta2 (m, down) and their time derivatives (m/s) at constant speed (m/s).
+
+    The front contact is at s = speed t, the rear one ``wheelbase`` (m) behind it, with no rounding of the
+    delay to whole steps.
+    """
+
+    profile: Profile
+    speed: float
+    wheelbase: float
+    kinks: tuple[float, ...] = (0.0,)
+    channels: int = 4
+    period: None = None
+    held: bool = False
+
+    def sample(self, start: float, step: float, count: int) -> np.ndarray:
+        """Values at start + i step, shape (count, 4)."""
+        out = np.empty((count, 4))
+        for wheel, behind in enumerate((0.0, self.wheelbase)):
+            height, slope = self.profile.sample_uniform(self.speed * start - behind, self.speed * step, count)
+            out[:, wheel], out[:, 2 + wheel] = height, self.speed * slope
+        return out
+
+    def at(self, time: float) -> np.ndarray:
+        """Values at one time (s), shape (4,)."""
+        out = np.empty(4)
+        for wheel, behind in enumerate((0.0, self.wheelbase)):
+            height, slope = self.profile.height_slope_at(self.speed * time - behind)
+            out[wheel], out[2 + wheel] = height, self.speed * slope
+        return out
+
+    def knots(self, duration: float) -> np.ndarray:
+        """Times at which a wheel passes a place where the road is only C2, such as its start."""
+        stations = np.array(self.kinks)
+        times = np.concatenate((stations, stations + self.wheelbase)) / self.speed
+        return np.unique(times[(times > 0) & (times < duration)])

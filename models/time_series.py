@@ -1,0 +1,36 @@
+"""Uniformly sampled time series from CSV, with the unit of every column in its header."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from models.errors import InputError
+from models.tables import SECONDS, read_table
+
+
+def read_time_series(path: str | Path, columns: Mapping[str, Mapping[str, float]]) -> tuple[np.ndarray, float]:
+    """Values (n, columns) in SI and the sampling period (s) of a CSV file with a column ``time``.
+
+    The first sample must lie at t = 0 and the period must be constant to 1e-6 of itself: a clock that
+    jitters has to be repaired by someone who knows why.
+    """
+    table = read_table(path, {"time": SECONDS, **columns}, increasing="time", least=8)
+    time = table["time"]
+    period = (time[-1] - time[0]) / (len(time) - 1)
+    if abs(time[0]) > 1e-6 * period:
+        raise InputError(path, "first row, column 'time'", float(time[0]), "the first sample must lie at time 0")
+    off = np.abs(time - period * np.arange(len(time)))
+    if off.max() > 1e-6 * period + 1e-12 * time[-1]:
+        row = int(np.argmax(off > 1e-6 * period + 1e-12 * time[-1])) + 1
+        raise InputError(path, f"row {row} of the numbers, column 'time'", float(time[row - 1]),
+                         f"the samples must be equally spaced, here every {period:g} s")
+    return np.column_stack([table[name] for name in columns]), float(f"{period:.12g}")
+
+
+def write_time_series(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]], period: float) -> None:
+    """Write columns name -> (unit, values) with every digit, so that reading gives back the same numbers."""
+    names = [f"{name} [{unit}]" for name, (unit, _) in columns.items()]
+    values = np.column_stack([values for _, values in columns.values()])
+    rows = np.column_stack([period * np.arange(len(values)), values])
+    np.savetxt(path, rows, fmt="%.17g", delimiter=",", header=",".join(["time [s]", *names]), comments="")
