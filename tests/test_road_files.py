@@ -54,7 +54,7 @@ def edited(tmp_path, content, old, new):
     return path
 
 
-@pytest.mark.parametrize(("length", "increment"), [(30.0, 0.1), (12.5, 1 / 64), (3.0, 1.0), (99.999, 0.333)])
+@pytest.mark.parametrize(("length", "increment"), [(30.0, 0.1), (12.5, 1 / 64), (3.0, 1.0), (99.9, 0.333)])
 def test_what_is_written_is_read_bit_for_bit(tmp_path, length, increment):
     road, path = study_road(), tmp_path / "study.crg"
     write_opencrg(road, path, length, increment)
@@ -91,7 +91,7 @@ def test_height_is_grid_plus_reference_line_plus_banking(tmp_path):
 def test_every_format_is_read(tmp_path, fmt):
     path = tmp_path / "road.crg"
     z = grid_file(path, fmt)
-    resolution = {"KDBI": 0.0, "KRBI": 2.0**-29, "LDFI": 1e-16, "LRFI": 1e-8}[fmt]  # of heights below 0.1 m
+    resolution = {"KDBI": 0.0, "KRBI": 2.0**-29, "LDFI": 1e-16, "LRFI": 1e-7}[fmt]  # of heights below 0.1 m
     np.testing.assert_allclose(read_opencrg(path, "centre").points[1], -z[:, 1], rtol=1e-15, atol=resolution)
 
 
@@ -120,6 +120,15 @@ def test_a_file_cut_in_its_last_bytes_or_between_blocks_is_refused(tmp_path, goo
     for lost in [*range(1, 25), 80, 160, 240, 61 * 4, 61]:
         path.write_bytes(content[:-lost])
         assert "cut off or damaged" in refusal(path) or fmt in ("LDFI", "LRFI")
+
+
+@pytest.mark.parametrize("fmt", ["LDFI", "LRFI"])
+def test_without_the_count_of_bytes_a_cut_number_would_be_read(tmp_path, good_bytes, fmt, monkeypatch):
+    """Planted fault: the library alone reads the digits that are left. If this fails, it has learnt to refuse."""
+    path = tmp_path / "cut.crg"
+    path.write_bytes(good_bytes[fmt][:-3])
+    monkeypatch.setattr("models.road.opencrg._check_text", lambda *_: None)
+    assert read_opencrg(path).station.size == 21
 
 
 @pytest.mark.parametrize("fmt", FORMATS)
@@ -152,7 +161,7 @@ def test_a_damaged_byte_gives_an_input_error_or_a_whole_road(tmp_path_factory, g
         (b"$KD_DEFINITION", b"$KD_DEFINITIOM", "$KD_DEFINITION"),
         (b"#:KDBI", b"#:KDBJ", "KRBI, KDBI, LRFI, LDFI"),
         (b"#:KDBI\n", b"", "KRBI, KDBI, LRFI, LDFI"),
-        (b"increment  =   5.0", b"increment  =   0.0", "reference_line_increment = 0.0"),
+        (b"increment  =   5.0000000000000003e-02", b"increment  =   0.0", "reference_line_increment = 0.0"),
         (b"increment  =   5.0", b"increment  =  -5.0", "reference_line_increment = -0.05"),
         (b"increment  =   5.0", b"increment  =   nan", "reference_line_increment = 'nan"),
         (b"reference_line_increment ", b"reference_line_incrememt ", "reference_line_increment"),
@@ -265,7 +274,8 @@ def test_csv_and_opencrg_tell_the_same_road(tmp_path):
     road, s = study_road(), np.arange(0.0, 20.05, 0.1)
     up = -road.height_and_slope(s)[0]
     text = io.StringIO()
-    np.savetxt(text, np.column_stack([s, up, up]), fmt="%.17g", delimiter=",", header="s [m],left [m],right [m]", comments="")
+    header = "s [m],left [m],right [m]"
+    np.savetxt(text, np.column_stack([s, up, up]), fmt="%.17g", delimiter=",", header=header, comments="")
     from_csv = read_csv_road(csv_file(tmp_path, text.getvalue()))
     write_opencrg(road, tmp_path / "road.crg", 20.0, 0.1)
     from_crg = read_opencrg(tmp_path / "road.crg")
@@ -281,4 +291,5 @@ def test_measured_roads_of_the_data_folder():
     np.testing.assert_array_equal(course[0].coefficients, course[1].coefficients)
     assert read_opencrg(folder / "Horstwalde.crg").end == pytest.approx(250.2)
     blocks = [read_opencrg(folder / "belgian_block.crg", track).points[1] for track in ("left", "right")]
-    assert [1e3 * z.std() for z in blocks] == pytest.approx([25.6, 25.7], abs=0.2) or blocks[0].size == 1001
+    assert [1e3 * z.std() for z in blocks] == pytest.approx([25.6, 25.7], abs=0.06)
+    assert np.corrcoef(blocks)[0, 1] == pytest.approx(-0.38, abs=0.006)

@@ -91,7 +91,8 @@ def run_in(profile: SplineProfile, length: float = RUN_IN, reference: float | No
     ------
     InputError : ``length`` is not positive or is longer than the road
     """
-    level = reference_height(profile, length) if reference is None else float(reference)
+    mean = reference_height(profile, length)  # also checks the length
+    level = mean if reference is None else float(reference)
     moved = profile.coefficients.copy()
     moved[:, 3] -= level
     return replace(profile, coefficients=moved, window_length=float(length))
