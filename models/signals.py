@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 import numpy as np
-from scipy.interpolate import PPoly, make_interp_spline
+from scipy.interpolate import BSpline, make_interp_spline
 
 Interpolation = Literal["held", "linear", "smooth"]
 
@@ -94,12 +94,12 @@ class Smooth:
     derivatives: int = 0
     held: bool = False
     degree: int = 3
-    _pieces: tuple[PPoly, ...] = field(init=False, repr=False, compare=False)
+    _pieces: tuple[BSpline, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         times = self.period * np.arange(len(self.values))
         spline = make_interp_spline(times, self.values, k=self.degree)
-        pieces = tuple(PPoly.from_spline(spline.derivative(i) if i else spline) for i in range(self.derivatives + 1))
+        pieces = tuple(spline.derivative(i) if i else spline for i in range(self.derivatives + 1))
         object.__setattr__(self, "_pieces", pieces)
 
     @property

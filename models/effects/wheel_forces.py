@@ -35,4 +35,5 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     if signal.end < scene.run.duration * (1 - 1e-9):
         raise InputError(scene.file, "effects.wheel_forces.file", p.file,
                          f"ends at {signal.end:g} s, but the run lasts {scene.run.duration:g} s: shorten run.duration")
-    return assembly.without_tyres().with_input("force" if p.frame == "inertial" else "force-body", signal)
+    turns = p.frame == "body" and assembly.vehicle.geometry == "exact"
+    return assembly.without_tyres().with_input("force-body" if turns else "force", signal)

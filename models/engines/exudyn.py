@@ -157,7 +157,7 @@ def _drive(built: Build, assembly: Assembly, clock: Clock) -> None:
             tyre = tyres[axle.wheel]
             _load(built, (axle.wheel, "z"), clock.reader(i, tyre.stiffness))
             _load(built, (axle.wheel, "z"), clock.reader(2 + i, tyre.damping))
-        elif assembly.mode == "force-body" and assembly.vehicle.geometry == "exact":
+        elif assembly.mode == "force-body":
             _body_fixed(built, axle.wheel, axle.x, clock.reader(i, 1.0))
         else:
             _load(built, (axle.wheel, "z"), clock.reader(i, -1.0))

@@ -105,7 +105,7 @@ def _drive(assembly: Assembly, settings: Settings) -> Drive:
     from models.engines.mujoco_callback import body_fixed_law, table_law
 
     inputs = signal.sample(0.0, h / 2, 2 * n + 1)
-    if assembly.mode == "force-body" and assembly.vehicle.geometry == "exact":
+    if assembly.mode == "force-body":
         arms = np.array([axle.x for axle in assembly.vehicle.axles])
         return Drive(None if signal.held else inputs, held, arms, body_fixed_law())
     return Drive(_generalised(assembly, inputs), held, None, table_law())

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 from scipy.integrate import solve_ivp
 
 from models.assembly import Assembly
@@ -18,15 +19,15 @@ NO_INPUT = np.zeros((1, 4))
 
 def _compile_fixed(rhs):
     @njit(cache=True)
-    def march(y, step, count, inputs, per_step, p, states):
-        """Classical Runge-Kutta; ``inputs`` has ``per_step`` rows a step (0: constant, 1: held, 2: half steps)."""
+    def march(y, step, count, inputs, rows, p, states):
+        """Classical Runge-Kutta; ``rows`` says where the middle, the end and the next step's input lie."""
         k1, k2, k3, k4 = np.empty(8), np.empty(8), np.empty(8), np.empty(8)
         stage = np.empty(8)
         states[0] = y
-        last = per_step if per_step != 1 else 0
+        to_middle, to_end, to_next = rows
         for i in range(count):
-            row = i * per_step
-            middle, end = inputs[row + last // 2], inputs[row + last]
+            row = i * to_next
+            middle, end = inputs[row + to_middle], inputs[row + to_end]
             rhs(y, inputs[row], p, k1)
             for j in range(8):
                 stage[j] = y[j] + 0.5 * step * k1[j]
@@ -55,6 +56,7 @@ def _compile_single(rhs):
 
 
 def _sum(rhs, moment):
+    @register_jitable
     def total(y, u, p, dy):
         rhs(y, u, p, dy)
         moment(y, p, dy)
@@ -94,24 +96,34 @@ class Reference:
     def _at(self, time: float) -> np.ndarray:
         return NO_INPUT[0] if self.assembly.input is None else self.assembly.input.at(time)
 
-    def _inputs(self) -> tuple[np.ndarray, int]:
-        """Input table and its rows per step."""
+    def _inputs(self) -> tuple[np.ndarray, tuple[int, int, int]]:
+        """Input table, and how many rows lie from a step's start to its middle, its end and the next step."""
         signal, h, n = self.assembly.input, self.settings.step, self.settings.steps
         if signal is None:
-            return NO_INPUT, 0
-        if signal.held and self.assembly.mode != "pitch":
-            return signal.sample(0.0, h, n), 1
-        return signal.sample(0.0, h / 2, 2 * n + 1), 2
+            return NO_INPUT, (0, 0, 0)
+        if not signal.held:
+            return signal.sample(0.0, h / 2, 2 * n + 1), (1, 2, 2)
+        if self.assembly.mode != "pitch":
+            return signal.sample(0.0, h, n), (0, 0, 1)
+        stages = signal.sample(0.0, h / 2, 2 * n + 1)
+        table = np.stack([stages[0:-1:2], stages[1::2], stages[2::2]], axis=1)
+        table[:, 1:, :2] = table[:, :1, :2]
+        return table.reshape(3 * n, -1), (1, 2, 3)
 
     def _fixed(self) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
         n = self.settings.steps
         states = np.empty((n + 1, 8))
-        inputs, per_step = self._inputs()
+        inputs, rows = self._inputs()
         march = march_of(*self._key)
-        march(self.assembly.initial.copy(), self.settings.step, n, inputs, per_step, self._p, states)
+        march(self.assembly.initial.copy(), self.settings.step, n, inputs, rows, self._p, states)
         if self.assembly.mode == "pitch":
-            states[:, [3, 7]] = inputs[::2, 2:4]
+            self._guide(states)
         return self.settings.step * np.arange(n + 1), states, {"steps": n, "force calls": 4 * n}
+
+    def _guide(self, states: np.ndarray) -> None:
+        """Put the prescribed pitch and its rate into the states."""
+        assert self.assembly.input is not None
+        states[:, [3, 7]] = self.assembly.input.sample(0.0, self.settings.step, len(states))[:, 2:4]
 
     def _adaptive(self) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
         """Piecewise between the knots of the input, so that each piece is smooth."""
@@ -130,8 +142,8 @@ class Reference:
             y = solution.y[:, -1]
             steps, calls = steps + len(solution.t) - 1, calls + solution.nfev
         states[-1] = y
-        if self.assembly.mode == "pitch" and self.assembly.input is not None:
-            states[:, [3, 7]] = self.assembly.input.sample(0.0, h, n + 1)[:, 2:4]
+        if self.assembly.mode == "pitch":
+            self._guide(states)
         return times, states, {"steps": steps, "force calls": calls}
 
     def _piece(self, start: float, end: float, y: np.ndarray):

@@ -115,11 +115,10 @@ RIGHT_HAND_SIDES = {
     ("force", "exact"): force_exact,
     ("force", "linear"): force_linear,
     ("force-body", "exact"): force_body,
-    ("force-body", "linear"): force_linear,
     ("pitch", "exact"): pitch_exact,
     ("pitch", "linear"): pitch_linear,
 }
-"""By mode and geometry; a body-fixed force is vertical when the geometry is linear."""
+"""By mode and geometry; linearised, a body-fixed force is a vertical one."""
 
 
 @register_jitable

@@ -1,0 +1,101 @@
+"""Results: labelled channels with units, counts, cost and provenance, saved as netCDF."""
+
+import json
+import os
+import platform
+import subprocess
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from models.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PACKAGES = ("exudyn", "mujoco", "numpy", "scipy", "numba")
+
+
+@dataclass(frozen=True)
+class Result:
+    """One run: ``data`` is an xarray Dataset over ``time`` (s), each channel with its unit and meaning.
+
+    Its attributes hold engine, integrator, step, status, counts, seconds and provenance as text or numbers.
+    """
+
+    data: "xr.Dataset"
+
+    def __getitem__(self, channel: str) -> np.ndarray:
+        """Values of a channel, shape (n,)."""
+        return self.data[channel].values
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times (n,) in s."""
+        return self.data["time"].values
+
+    @property
+    def states(self) -> np.ndarray:
+        """States (n, 8) in the order of the conventions page."""
+        from models.vehicles.pitch_plane import STATES
+
+        return np.column_stack([self[name] for name in (*STATES, *(f"{name}_rate" for name in STATES))])
+
+    def counts(self) -> dict[str, int]:
+        """Steps and force calls of the run."""
+        return json.loads(self.data.attrs["counts"])
+
+    def save(self, path: Path) -> None:
+        """Write netCDF whole or not at all."""
+        part = path.with_name(f".{path.name}.part")
+        self.data.to_netcdf(part, engine="h5netcdf")
+        os.replace(part, path)
+
+
+def load(path: Path) -> Result:
+    """Read a saved result; raises InputError if the file is not one."""
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as data:
+            return Result(data.load())
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(path, "", None, f"not a saved result: {str(error).splitlines()[0]}") from None
+
+
+def provenance(command: str = "") -> dict[str, Any]:
+    """Versions, machine and commit: what someone needs to repeat a figure."""
+    return {
+        "twinrig": version("twinrig"),
+        "commit": _commit(),
+        "versions": {name: version(name) for name in PACKAGES},
+        "python": platform.python_version(),
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores, {_processor()}",
+        "system": f"{platform.system()} {platform.release()}",
+        "command": command,
+    }
+
+
+def _commit() -> str:
+    """Commit of the checkout that runs, with a mark if it was changed since."""
+    def ask(*arguments: str) -> str:
+        here = Path(__file__).parent
+        done = subprocess.run(["git", *arguments], cwd=here, capture_output=True, text=True, timeout=10, check=False)
+        return done.stdout.strip() if done.returncode == 0 else ""
+
+    try:
+        commit = ask("rev-parse", "--short=12", "HEAD")
+        return f"{commit}, changed since" if commit and ask("status", "--porcelain") else commit or "not a checkout"
+    except OSError:
+        return "not a checkout"
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or "unknown processor"
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown processor")

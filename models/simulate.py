@@ -1,0 +1,126 @@
+"""One run, from scene to result: assemble, build in an engine, integrate, label."""
+
+import json
+import time
+from typing import Any
+
+import numpy as np
+
+from models.assembly import Assembly, assemble
+from models.engines.protocol import Settings, Trajectory, build, settings_of
+from models.errors import InputError
+from models.result import Result
+from models.scene import Scene
+from models.vehicles import pitch_plane
+
+Channels = dict[str, tuple[str, str, np.ndarray]]
+
+
+def simulate(scene: Scene, engine: str, settings: Settings | None = None) -> Result:
+    """Run a scene in one engine; raises InputError, Refused or RunFailed, never returns a partial run."""
+    assembly = assemble(scene)
+    own = settings or settings_of(scene, engine)
+    keep = _keep_every(scene, own)
+    model = build(engine, assembly, own)
+    start = time.perf_counter()
+    trajectory = model.run()
+    seconds = time.perf_counter() - start
+    return _label(assembly, engine, own, trajectory, keep, seconds)
+
+
+def _keep_every(scene: Scene, settings: Settings) -> int:
+    """How many steps lie between two saved rows."""
+    wanted = scene.run.output_step
+    if wanted is None:
+        return 1
+    ratio = wanted / settings.step
+    if ratio < 0.5 or abs(ratio - round(ratio)) > 1e-6 * ratio:
+        raise InputError(scene.file, "run.output_step", wanted, f"must be a multiple of the step {settings.step:g} s")
+    return round(ratio)
+
+
+def _label(assembly: Assembly, engine: str, settings: Settings, run: Trajectory, keep: int, seconds: float) -> Result:
+    import xarray as xr
+
+    channels = outputs(assembly, run)
+    rows = slice(None, None, keep)
+    data = xr.Dataset(
+        {name: ("time", values[rows], {"units": unit, "long_name": meaning})
+         for name, (unit, meaning, values) in channels.items()},
+        coords={"time": ("time", run.times[rows], {"units": "s", "long_name": "time"})},
+    )
+    data.attrs = {
+        "title": assembly.scene.title, "scene": assembly.scene.file, "system": assembly.scene.system,
+        "mode": assembly.mode, "engine": engine, "integrator": settings.integrator, "step": settings.step,
+        "status": "complete", "counts": json.dumps(run.counts), "seconds": seconds,
+    }  # fmt: skip
+    return Result(data)
+
+
+def outputs(assembly: Assembly, run: Trajectory) -> Channels:
+    """All channels of a run as name -> (unit, meaning, values): states, forces, and what its effects add."""
+    names = {"z1": "front wheel, down", "z2": "rear wheel, down", "z3": "chassis heave, down", "pitch": "pitch, nose up"}
+    channels: Channels = {}
+    for i, (name, meaning) in enumerate(names.items()):
+        unit = "rad" if name == "pitch" else "m"
+        channels[name] = (unit, meaning, run.states[:, i])
+        channels[f"{name}_rate"] = (f"{unit}/s", f"rate of {meaning}", run.states[:, 4 + i])
+    inputs = _inputs(assembly, run.times)
+    channels |= _forces(assembly, run, inputs)
+    for output in assembly.outputs:
+        for name, (unit, values) in output(assembly, run.times, run.states).items():
+            channels[name] = (unit, name, values)
+    return channels
+
+
+def _inputs(assembly: Assembly, times: np.ndarray) -> np.ndarray | None:
+    """The input at the saved times: on a uniform grid, or one by one for adaptive engines."""
+    if assembly.input is None:
+        return None
+    step = times[1] - times[0]
+    if np.allclose(np.diff(times), step, rtol=1e-6, atol=0):
+        return assembly.input.sample(0.0, float(step), len(times))
+    return np.array([assembly.input.at(time) for time in times])
+
+
+def _forces(assembly: Assembly, run: Trajectory, inputs: np.ndarray | None) -> Channels:
+    """Wheel forces f1, f2, suspension forces f3, f4, inertia term and enforced moment (eqs 33, 35, 36)."""
+    p, y = assembly.parameters, run.states
+    exact = assembly.vehicle.geometry == "exact"
+    sine, cosine = (np.sin(y[:, 3]), np.cos(y[:, 3])) if exact else (y[:, 3], np.ones(len(y)))
+    f3 = p.k3 * (y[:, 2] - y[:, 0] - p.b * sine) + p.d3 * (y[:, 6] - y[:, 4] - p.b * y[:, 7] * cosine)
+    f4 = p.k4 * (y[:, 2] - y[:, 1] + p.a * sine) + p.d4 * (y[:, 6] - y[:, 5] + p.a * y[:, 7] * cosine)
+    f1, f2 = _wheel_forces(assembly, y, inputs)
+    moment = cosine * (p.b * f3 - p.a * f4)
+    channels: Channels = {
+        "f1": ("N", "front wheel force, up", f1), "f2": ("N", "rear wheel force, up", f2),
+        "f3": ("N", "front suspension force, compression", f3), "f4": ("N", "rear suspension force, compression", f4),
+        "suspension_moment": ("N m", "pitch moment of the suspension on the chassis, nose up", moment),
+    }  # fmt: skip
+    if run.moment is not None and inputs is not None:
+        channels["inertia_term"] = ("N m", "I beta''", p.I * inputs[:, 4])
+        channels["enforced_moment"] = ("N m", "moment that the prescribed pitch takes", run.moment)
+    return channels
+
+
+def _wheel_forces(assembly: Assembly, y: np.ndarray, inputs: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    p = assembly.parameters
+    if assembly.mode not in ("free", "road"):
+        assert inputs is not None
+        return inputs[:, 0], inputs[:, 1]
+    u = np.zeros((len(y), 4)) if inputs is None else inputs
+    f1 = p.k1 * (y[:, 0] - u[:, 0]) + p.d1 * (y[:, 4] - u[:, 2])
+    f2 = p.k2 * (y[:, 1] - u[:, 1]) + p.d2 * (y[:, 5] - u[:, 3])
+    return f1, f2
+
+
+def state_names() -> tuple[str, ...]:
+    """Names of the eight state channels."""
+    return (*pitch_plane.STATES, *(f"{name}_rate" for name in pitch_plane.STATES))
+
+
+def summary(result: Result) -> dict[str, Any]:
+    """Largest magnitude and rms of every channel, with its unit."""
+    return {str(name): {"unit": channel.attrs["units"], "max": float(np.abs(channel.values).max()),
+                        "rms": float(np.sqrt(np.mean(channel.values**2)))}
+            for name, channel in result.data.data_vars.items()}

@@ -1,0 +1,6 @@
+"""Studies: one script per question, run as ``python studies/NAME.py`` or ``twinrig run SCENE``.
+
+A study is a module with ``run(scene, engines, folder, progress) -> summary``: it writes results and
+figures into the folder and returns what ``--json`` prints. Scenes are in ``scenes/``; a scene's
+``study`` key names the study that runs it.
+"""

@@ -1,0 +1,102 @@
+"""One scene in one or all implementations: results, a figure, and how far the implementations agree."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.errors import RunFailed
+from models.result import Result
+from models.scene import Scene
+from models.simulate import simulate, state_names, summary
+
+Progress = Callable[[str, float], None]
+
+
+def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Run the scene, save ``ENGINE.nc`` and ``states.png``; a run that fails is reported, the others go on."""
+    results: dict[str, Result] = {}
+    failed: dict[str, str] = {}
+    for i, engine in enumerate(engines):
+        progress(f"{scene.title}: {engine}", i / len(engines))
+        try:
+            results[engine] = simulate(scene, engine)
+        except RunFailed as error:
+            failed[engine] = str(error)
+            continue
+        results[engine].save(folder / f"{engine}.nc")
+    progress("figure", 1.0)
+    if results:
+        _figure(scene, results, folder / "states.png")
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "runs": {engine: _line(result) for engine, result in results.items()},
+        "failed": failed,
+        "largest difference of states": agreement(results),
+    }
+
+
+def _line(result: Result) -> dict[str, Any]:
+    attributes = result.data.attrs
+    return {"integrator": attributes["integrator"], "step": attributes["step"], "seconds": attributes["seconds"],
+            "counts": result.counts(), "channels": summary(result)}
+
+
+def agreement(results: dict[str, Result]) -> dict[str, float]:
+    """Largest difference of any state (m, rad, m/s, rad/s) between each two results, on their common grid."""
+    names = list(results)
+    pairs = [(a, b) for i, a in enumerate(names) for b in names[i + 1 :]]
+    return {f"{a} - {b}": difference(results[a], results[b]) for a, b in pairs}
+
+
+def difference(one: Result, other: Result) -> float:
+    """Largest difference of any state, the finer time grid read by interpolation where the two differ."""
+    if len(one.times) == len(other.times) and np.allclose(one.times, other.times, rtol=0, atol=1e-9):
+        return float(np.abs(one.states - other.states).max())
+    fine, coarse = (one, other) if len(one.times) > len(other.times) else (other, one)
+    at = np.column_stack([np.interp(coarse.times, fine.times, column) for column in fine.states.T])
+    return float(np.abs(at - coarse.states).max())
+
+
+def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
+    from studies.figures import COLOURS, LABELS, plt, save
+
+    panels = [("z3", "heave of the chassis, down [m]", 1.0), ("pitch", "pitch, nose up [rad]", 1.0),
+              ("f1", "front wheel force [kN]", 1e-3)]
+    if all("enforced_moment" in result.data for result in results.values()):
+        panels.append(("enforced_moment", "enforced moment [N m]", 1.0))
+    rows = len(panels) + (1 if len(results) > 1 else 0)
+    figure, axes = plt.subplots(rows, 1, figsize=(8.5, 1.9 * rows + 0.6), sharex=True)
+    for axis, (channel, label, scale) in zip(axes, panels, strict=False):
+        for i, (engine, result) in enumerate(results.items()):
+            axis.plot(result.times, scale * result[channel], color=COLOURS[engine], label=LABELS[engine],
+                      linewidth=2.4 - 0.8 * i, alpha=0.9)
+        axis.set_title(label)
+    if len(results) > 1:
+        _differences(axes[-1], results)
+    axes[-1].set_xlabel("time [s]")
+    axes[0].legend(loc="upper right", ncols=len(results))
+    figure.suptitle(scene.title, x=0.01, ha="left", fontweight="bold")
+    save(figure, path)
+
+
+def _differences(axis: Any, results: dict[str, Result]) -> None:
+    """Difference to the first implementation, on a logarithmic scale, against time."""
+    from studies.figures import COLOURS, LABELS
+
+    (base, first), *others = results.items()
+    for engine, result in others:
+        if len(result.times) == len(first.times):
+            gap = np.abs(result.states - first.states).max(axis=1)
+            axis.semilogy(result.times, np.maximum(gap, 1e-18), color=COLOURS[engine],
+                          label=f"{LABELS[engine]} - {LABELS[base]}")
+    axis.set_title(f"largest difference of the {len(state_names())} states [m, rad, m/s, rad/s]")
+    axis.legend(loc="lower right", ncols=2)
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("study_road")
