@@ -97,7 +97,7 @@ def test_every_format_is_read(tmp_path, fmt):
 
 def test_empty_borders_do_not_matter_but_an_empty_track_does(tmp_path):
     path, z = tmp_path / "holes.crg", np.zeros((21, 5))
-    z[:, 0] = z[13, 4] = np.nan
+    z[:, :2] = z[13, 4] = np.nan
     grid_file(path, z=z)
     assert read_opencrg(path, "centre").end == pytest.approx(1.0)
     text = refusal(path, track="left")
@@ -120,6 +120,14 @@ def test_a_file_cut_in_its_last_bytes_or_between_blocks_is_refused(tmp_path, goo
     for lost in [*range(1, 25), 80, 160, 240, 61 * 4, 61]:
         path.write_bytes(content[:-lost])
         assert "cut off or damaged" in refusal(path) or fmt in ("LDFI", "LRFI")
+
+
+@pytest.mark.parametrize("fmt", ["LDFI", "LRFI"])
+def test_a_digit_lost_inside_a_text_is_refused(tmp_path, good_bytes, fmt):
+    """All lines are there, but every number after the lost digit stands one place too far left."""
+    content, path = good_bytes[fmt], tmp_path / "shifted.crg"
+    path.write_bytes(content[:-215] + content[-214:])
+    assert "characters wide" in refusal(path)
 
 
 @pytest.mark.parametrize("fmt", ["LDFI", "LRFI"])
