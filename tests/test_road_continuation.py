@@ -74,6 +74,7 @@ def test_the_measured_part_changes_only_near_its_end():
 
 def test_long_enough_or_endless_roads_are_left_alone():
     assert continued(ROAD, "refused", ROAD.end) is ROAD
+    assert continued(ROAD, "refused", ROAD.end * (1 + 1e-15)) is ROAD  # a run to the end, with v t rounded up
     study = study_road()
     assert continued(study, "refused", 1e6) is study
 
