@@ -1,0 +1,75 @@
+"""Rows of the validation report: one quantity each, with what was expected and why."""
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+System = Literal["pitch-plane", "drift", "contact", "ride", "rolling-vehicle", "anti-lock", "hard-cases", "cost", "effects"]
+Independence = Literal["native", "shared kernel", "closed form", "published", "none"]
+"""How far the two sides are apart: separate force laws, the same force code, an exact answer, a published
+figure, or no second side."""
+Status = Literal["passed", "failed", "not run"]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measured quantity. ``value`` and ``expected`` may be text where a behaviour is judged."""
+
+    id: str
+    system: System
+    quantity: str
+    value: float | str | None
+    unit: str
+    expected: float | str
+    tolerance: float | None
+    why: str
+    independence: Independence
+    status: Status
+    reason: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """The row as ``results.json`` keeps it."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the report: a title, a sentence on how to read it, headings and rows of text."""
+
+    title: str
+    note: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def within(id: str, system: System, quantity: str, value: float, unit: str, expected: float, tolerance: float,
+           why: str, independence: Independence) -> Row:  # fmt: skip
+    """Row that passes if |value - expected| <= tolerance; a value that is not a number fails."""
+    passed = abs(value - expected) <= tolerance
+    status: Status = "passed" if passed else "failed"
+    reason = "" if passed else f"off by {abs(value - expected):.3g}, allowed {tolerance:.3g}"
+    return Row(id, system, quantity, value, unit, expected, tolerance, why, independence, status, reason)
+
+
+def at_most(id: str, system: System, quantity: str, value: float, unit: str, bound: float, why: str,
+            independence: Independence) -> Row:  # fmt: skip
+    """Row for an error or a ratio that must not exceed a bound: expected 0, tolerance the bound."""
+    return within(id, system, quantity, value, unit, 0.0, bound, why, independence)
+
+
+def behaves(id: str, system: System, quantity: str, found: str, expected: str, why: str,
+            independence: Independence = "none") -> Row:  # fmt: skip
+    """Row for a behaviour, such as "refused": passes if found and expected are the same word."""
+    passed = found == expected
+    reason = "" if passed else f"found {found!r}"
+    return Row(id, system, quantity, found, "", expected, None, why, independence, "passed" if passed else "failed", reason)
+
+
+def finding(id: str, system: System, quantity: str, value: float, unit: str, expected: float | str, why: str,
+            independence: Independence = "published") -> Row:  # fmt: skip
+    """Row that reports a figure beside a published one without judging it; it passes by being measured."""
+    return Row(id, system, quantity, value, unit, expected, None, why, independence, "passed", "reported, not judged")
+
+
+def not_run(id: str, system: System, quantity: str, reason: str) -> Row:
+    """Row for something that could not be measured here, with the reason."""
+    return Row(id, system, quantity, None, "", "", None, "", "none", "not run", reason)

@@ -1,0 +1,72 @@
+"""Measure the cases and save what they found; the report is then written from the saved files alone."""
+
+import csv
+import json
+import time
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from models.result import provenance
+from validation.rows import Row
+
+CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "hard_cases",
+         "planted_faults", "absent", "price")  # fmt: skip
+"""Case modules in the order of the report."""
+
+
+def validate(folder: Path, quick: bool, command: str) -> int:
+    """Measure all cases into ``folder``; returns the number of failed rows."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    rows: list[Row] = []
+    seconds: dict[str, float] = {}
+    (folder / "data").mkdir(exist_ok=True)
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("validate", total=len(CASES))
+        for name in CASES:
+            bar.update(task, description=name)
+            start = time.perf_counter()
+            rows += _measure(name, quick, folder)
+            seconds[name] = time.perf_counter() - start
+            bar.advance(task)
+    _save(folder, rows, {**provenance(command), "quick": quick, "seconds": seconds})
+    from validation.report import write
+
+    page = write(folder)
+    return _say(rows, sum(seconds.values()), page)
+
+
+def _measure(name: str, quick: bool, folder: Path) -> list[Row]:
+    """Rows of one case; a case that breaks is a failed row, not the end of the report."""
+    case = import_module(f"validation.cases.{name}")
+    try:
+        rows, data = case.measure(quick, folder)
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        return [Row(f"{name}.broken", case.SYSTEM, case.TITLE, None, "", "", None, "", "none", "failed", reason)]
+    (folder / "data" / f"{name}.json").write_text(json.dumps(data))
+    return rows
+
+
+def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:
+    """results.json and results.csv."""
+    table = [row.as_dict() for row in rows]
+    (folder / "results.json").write_text(json.dumps({"provenance": source, "rows": table}, indent=1))
+    with (folder / "results.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, fieldnames=list(Row.__dataclass_fields__))
+        writer.writeheader()
+        writer.writerows(table)
+
+
+def _say(rows: list[Row], seconds: float, page: Path) -> int:
+    """Print the verdict and every row that did not pass."""
+    failed = [row for row in rows if row.status == "failed"]
+    skipped = [row for row in rows if row.status == "not run"]
+    print(f"{len(rows)} rows: {len(rows) - len(failed) - len(skipped)} passed, {len(failed)} failed, "
+          f"{len(skipped)} not run, {seconds:.0f} s")
+    for row in failed + skipped:
+        print(f"  {row.status}: {row.id}: {row.quantity}: {row.reason}")
+    print(f"report: {page}")
+    return len(failed)
