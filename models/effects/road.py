@@ -66,30 +66,31 @@ def _check_keys(file: str, p: Parameters) -> None:
 def _profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[float, ...]]:
     """The profile, and the stations (m) at which it is only C2."""
     if p.source in ("opencrg", "csv"):
-        return _measured(scene, p, distance), (0.0,)
+        profile = _measured(scene, p, distance)
+        return profile, (profile.start, profile.start + profile.window_length)
     if p.source == "iso8608":
         from models.road.iso8608 import iso8608_road
 
         assert p.road_class is not None
-        profile = iso8608_road(p.road_class, p.seed or 0, level=p.level or "one-sided")
+        profile = iso8608_road(p.road_class, 0 if p.seed is None else p.seed, level=p.level or "one-sided")
     else:
         from models.road.study import STUDY_GD, hills_road, study_road
 
-        profile = hills_road() if p.source == "hills" else study_road(p.gd or STUDY_GD)
+        profile = hills_road() if p.source == "hills" else study_road(STUDY_GD if p.gd is None else p.gd)
     return profile, (0.0, profile.window_length)
 
 
 def _measured(scene: Any, p: Parameters, distance: float) -> Any:
     from models.road.continuation import RUN_IN, continued, run_in
 
-    path = scene.path(p.file)
-    track = p.track or "mean"
+    path, track = scene.path(p.file), p.track or "mean"
+    length = RUN_IN if p.run_in is None else p.run_in
     if p.source == "opencrg":
         from models.road.opencrg import read_opencrg
 
-        raw = read_opencrg(path, track, offset=p.offset or 0.0)
+        raw = read_opencrg(path, track, offset=0.0 if p.offset is None else p.offset)
     else:
         from models.road.csv_road import read_csv_road
 
         raw = read_csv_road(path, track)
-    return run_in(continued(raw, str(p.beyond_end), distance, path), p.run_in or RUN_IN)
+    return run_in(continued(raw, str(p.beyond_end), distance, path), length)
