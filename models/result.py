@@ -48,6 +48,11 @@ class Result:
         """Steps and force calls of the run."""
         return json.loads(self.data.attrs["counts"])
 
+    def every(self, spacing: float) -> "Result":
+        """The same with rows ``spacing`` (s) apart, or all of them where they already are."""
+        step = max(1, round(spacing / float(self.times[1] - self.times[0])))
+        return Result(self.data.isel(time=slice(None, None, step)))
+
     def save(self, path: Path) -> None:
         """Write netCDF whole or not at all."""
         part = path.with_name(f".{path.name}.part")

@@ -12,7 +12,7 @@ from models.tables import RADIANS
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("pitch_spring",)
-AFTER: tuple[str, ...] = ()
+AFTER = ("wheel_forces", "force_noise")
 COST = "one constraint in Exudyn; one degree of freedom less and an inverse-dynamics pass in MuJoCo"
 
 

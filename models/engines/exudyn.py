@@ -299,8 +299,9 @@ class ExudynModel:
         """
         signal = self.assembly.input
         assert signal is not None
-        acceleration = self.acceleration(0.0, self.assembly.initial)
-        acceleration[3] = signal.at(0.0)[4]
+        acceleration, wanted = self.acceleration(0.0, self.assembly.initial), signal.at(0.0)[4]
+        self._first_moment = self.assembly.parameters.I * (wanted - acceleration[3])
+        acceleration[3] = wanted
         data, initial = self.built.mbs.systemData, exu.ConfigurationType.Initial
         all_of_them = np.zeros(data.ODE2Size())
         all_of_them[self._columns] = acceleration
@@ -326,10 +327,15 @@ class ExudynModel:
         return counted if np.allclose(times, counted, rtol=0, atol=1e-9 * max(1.0, self.settings.duration)) else times
 
     def _enforced(self) -> np.ndarray | None:
-        """Enforced pitch moment (n,): the multiplier, with the sign of a moment on the chassis."""
+        """Enforced pitch moment (n,): the multiplier, with the sign of a moment on the chassis.
+
+        Exudyn has no multiplier at t = 0 yet; that one follows from the accelerations of the start.
+        """
         if self.constraint is None:
             return None
-        return -self.built.mbs.GetSensorStoredData(self._moment)[:, 1]
+        moment = -self.built.mbs.GetSensorStoredData(self._moment)[:, 1]
+        moment[0] = self._first_moment
+        return moment
 
     def _counts(self) -> dict[str, int]:
         """Steps and evaluations of the forces, from the solver's own counters."""

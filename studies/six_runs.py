@@ -1,0 +1,230 @@
+"""Why a force-excited vehicle runs away: the six runs of the paper, Section 4.
+
+A virtual measurement on a road gives wheel forces and pitch. The vehicle is then driven by these forces:
+undisturbed, with noise, with a perturbed model, with both; at last its pitch is prescribed, and the moment
+that this takes is the price. Each run is a scene of its own on the files that the measurement left.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.result import Result
+from models.scene import Scene, build
+from models.simulate import simulate
+from models.strict import Strict, quantity, read
+from models.time_series import write_time_series
+
+Progress = Callable[[str, float], None]
+
+PAPER = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
+"""The perturbed model of Appendix B, as factors on the parameters."""
+DRIFT = 0.05
+"""A run has drifted off when its pitch is this far (rad) from the measured one."""
+
+KEPT = 0.01
+"""Spacing (s) of the saved runs; the table is made from every step."""
+
+
+class Options(Strict):
+    """[options] of this study."""
+
+    sampling_rate: float = quantity("Hz", "rate at which forces and pitch are measured", default=1000.0)
+    noise_fraction: float = quantity("", "standard deviation of the noise by the largest force", default=0.002, zero=True)
+    noise_samples: int = Field(5, ge=1, description="number of noise samples")
+    perturbed_models: int = Field(5, ge=0, description="number of random models beside the paper's")
+    seed: int = Field(1, ge=0, description="seed of noise and models")
+
+
+def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """All six runs in each engine; saves every result, five figures and ``table.txt``."""
+    options = read(Options, scene.options, scene.file, "options")
+    measured = simulate(scene, "reference")
+    measured.save(folder / "measurement.nc")
+    deviation = _write_measurement(measured, options, folder)
+    scenes = _scenes(scene, options, folder, deviation)
+    runs: dict[str, dict[str, Result]] = {}
+    for i, engine in enumerate(engines):
+        runs[engine] = {}
+        for j, (name, own) in enumerate(scenes.items()):
+            progress(f"{engine}: {name}", (i + j / len(scenes)) / len(engines))
+            runs[engine][name] = simulate(own, engine)
+            runs[engine][name].every(KEPT).save(folder / f"{engine} {name}.nc")
+    table = [line for engine in engines for line in rows(engine, measured, runs[engine])]
+    (folder / "table.txt").write_text("\n".join(text(table, options, deviation)) + "\n")
+    progress("figures", 1.0)
+    _figures(measured, runs[engines[0]], folder)
+    return {"scene": scene.title, "folder": str(folder), "sampling rate": options.sampling_rate,
+            "noise deviation": deviation, "rows": table, "table": text(table, options, deviation)}
+
+
+def _write_measurement(measured: Result, options: Options, folder: Path) -> float:
+    """Forces and pitch as files at the sampling rate; returns the noise's standard deviation (N)."""
+    period = 1.0 / options.sampling_rate
+    every = round(period / float(measured.times[1] - measured.times[0]))
+    front, rear, pitch = (measured[name][::every] for name in ("f1", "f2", "pitch"))
+    write_time_series(folder / "wheel_forces.csv", {"front": ("N", front), "rear": ("N", rear)}, period)
+    write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, period)
+    return options.noise_fraction * float(max(np.abs(front).max(), np.abs(rear).max()))
+
+
+def _scenes(scene: Scene, options: Options, folder: Path, deviation: float) -> dict[str, Scene]:
+    """The runs that follow the measurement, by name."""
+    base = scene.vehicle_parameters()
+    paper = {name: getattr(base, name) * factor for name, factor in PAPER.items()}
+    make = _maker(scene, folder)
+    noises = [{"force_noise": {"deviation": deviation, "seed": 1000 * options.seed + i}}
+              for i in range(options.noise_samples)]
+    scenes = {"undisturbed": make({}, {})}
+    scenes |= {f"noisy {i + 1}": make({}, noise) for i, noise in enumerate(noises)}
+    scenes["perturbed"] = make(paper, {})
+    for i in range(options.perturbed_models):
+        scenes[f"model {i + 1}"] = make(_random_model(base, options.seed, i), {})
+    scenes["both"] = make(paper, noises[0])
+    guide = {"prescribed_pitch": {"file": "pitch.csv"}}
+    scenes["guided, undisturbed"] = make({}, guide)
+    scenes["guided, noisy"] = make({}, noises[0] | guide)
+    scenes["guided, perturbed"] = make(paper, guide)
+    scenes["guided, both"] = make(paper, noises[0] | guide)
+    return scenes
+
+
+def _maker(scene: Scene, folder: Path) -> Callable[[dict[str, float], dict[str, Any]], Scene]:
+    """Builder of a force-excited scene from overrides and further effects; it starts where the measurement did."""
+    from models.vehicles.pitch_plane import STATES, equilibrium
+
+    start = dict(zip(STATES, equilibrium(scene.vehicle_parameters()).tolist(), strict=False))
+
+    def make(override: dict[str, float], effects: dict[str, Any]) -> Scene:
+        forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}}
+        vehicle = scene.vehicle.model_dump() | {"override": scene.vehicle.override | override}
+        return build({"title": scene.title, "vehicle": vehicle, "run": scene.run.model_dump(), "start": start,
+                      "engines": {name: table.model_dump() for name, table in scene.engines.items()},
+                      "effects": forces | effects}, scene.file, folder)
+
+    return make
+
+
+def _random_model(base: Any, seed: int, index: int) -> dict[str, float]:
+    """Chassis springs, dampers and inertia, each times a random factor between 0.9 and 1.1 (Fig. 7)."""
+    factors = np.random.Generator(np.random.Philox(key=[seed, index])).uniform(0.9, 1.1, 5)
+    return {name: float(getattr(base, name) * factor) for name, factor in zip(PAPER, factors, strict=True)}
+
+
+def drift_off(measured: Result, run: Result) -> float | None:
+    """First time (s) at which the pitch is more than DRIFT from the measured one; None if it never is."""
+    far = np.flatnonzero(np.abs(run["pitch"] - measured["pitch"]) > DRIFT)
+    return float(run.times[far[0]]) if len(far) else None
+
+
+def rows(engine: str, measured: Result, runs: dict[str, Result]) -> list[dict[str, Any]]:
+    """A row per run: drift-off time, heave error, enforced moment and inertia term."""
+    table = []
+    for name, result in runs.items():
+        row: dict[str, Any] = {"engine": engine, "run": name, "drift-off": drift_off(measured, result)}
+        row["heave error"] = float(np.abs(result["z3"] - measured["z3"]).max())
+        if "enforced_moment" in result.data:
+            moment, inertia = result["enforced_moment"], result["inertia_term"]
+            row |= {"moment rms": float(np.sqrt(np.mean(moment**2))), "moment max": float(np.abs(moment).max()),
+                    "inertia max": float(np.abs(inertia).max())}
+        table.append(row)
+    return table
+
+
+PUBLISHED = {
+    "undisturbed": "beyond 30 s (Fig. 5)", "noisy 1": "about 10 s", "perturbed": "about 10 s",
+    "guided, undisturbed": "about 70 N m", "guided, both": "+-800 N m, inertia term about 15 kN m",
+}  # fmt: skip
+"""What the paper prints. Its "85 kN m" cannot be: |I beta''| <= b|f3| + a|f4|, and 5 % of it is the moment."""
+
+
+def text(table: list[dict[str, Any]], options: Options, deviation: float) -> list[str]:
+    """The table as lines of text."""
+    lines = [f"  sampled at {options.sampling_rate:g} Hz, linear in between; noise {deviation:.1f} N; "
+             f"drifted off when the pitch is {DRIFT} rad wrong",
+             f"  {'engine':<10} {'run':<20} {'drift-off':>9} {'heave error':>12} {'moment rms':>11} {'max':>7} "
+             f"{'I beta max':>11}   paper"]
+    for row in table:
+        when = "never" if row["drift-off"] is None else f"{row['drift-off']:.2f} s"
+        moment = f"{row['moment rms']:>7.1f} N m {row['moment max']:>7.0f} {row['inertia max'] / 1e3:>6.1f} kN m" \
+            if "moment rms" in row else " " * 31
+        lines.append(f"  {row['engine']:<10} {row['run']:<20} {when:>9} {row['heave error']:>10.2e} m {moment}   "
+                     f"{PUBLISHED.get(row['run'], '')}".rstrip())
+    return lines
+
+
+def _figures(measured: Result, runs: dict[str, Result], folder: Path) -> None:
+    """Figures like the paper's 4 to 8."""
+    from studies.figures import save
+
+    save(_figure_measurement(measured), folder / "fig4_measurement.png")
+    main = {"virtual measurement": measured, "undisturbed": runs["undisturbed"], "noisy": runs["noisy 1"],
+            "perturbed model": runs["perturbed"], "both": runs["both"]}
+    save(_figure_drift(main, "Force-excited runs beside the measurement: heave stays, pitch runs away"),
+         folder / "fig5_drift.png")
+    for prefix, title, name in (("noisy", "noise samples", "fig6_noise_samples"),
+                                ("model", "perturbed models", "fig7_perturbed_models")):
+        chosen = {"virtual measurement": measured} | {key: run for key, run in runs.items() if key.startswith(prefix)}
+        save(_figure_drift(chosen, f"Force-excited runs: {len(chosen) - 1} {title}"), folder / f"{name}.png")
+    save(_figure_moment(runs["guided, both"]), folder / "fig8_enforced_moment.png")
+
+
+def _figure_measurement(measured: Result) -> Any:
+    from studies.figures import plt
+
+    figure, axes = plt.subplots(2, 2, figsize=(10, 5), width_ratios=(2, 1))
+    detail = (measured.times >= 20) & (measured.times <= 21)
+    for row, (channels, label, scale) in enumerate(((("z1", "z2"), "wheel heave, up [m]", -1.0),
+                                                    (("f1", "f2"), "wheel force [kN]", 1e-3))):
+        for channel, name in zip(channels, ("front", "rear"), strict=True):
+            axes[row, 0].plot(measured.times, scale * measured[channel], label=name, linewidth=0.7)
+            axes[row, 1].plot(measured.times[detail], scale * measured[channel][detail], label=name)
+        axes[row, 0].set_title(label)
+        axes[row, 1].set_title("detail, 20 to 21 s")
+    axes[0, 0].legend(ncols=2, loc="upper right")
+    for axis in axes[1]:
+        axis.set_xlabel("time [s]")
+    figure.suptitle("Virtual measurement: the vehicle on the study road", x=0.01, ha="left", fontweight="bold")
+    return figure
+
+
+def _figure_drift(results: dict[str, Result], title: str) -> Any:
+    from studies.figures import plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(10, 3.8))
+    for i, (name, result) in enumerate(results.items()):
+        style = {"color": "black", "linewidth": 1.8, "zorder": 9} if i == 0 else {"color": f"C{i - 1}"}
+        axes[0].plot(result.times, -result["z3"], label=name, **style)
+        axes[1].plot(result.times, result["pitch"], label=name, **style)
+    axes[0].set_title("heave of the chassis, up [m]")
+    axes[1].set_title("pitch, nose up [rad]")
+    axes[1].set_ylim(-1, 1)
+    for axis in axes:
+        axis.set_xlabel("time [s]")
+    axes[1].legend(loc="lower left", fontsize=8.5)
+    figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    return figure
+
+
+def _figure_moment(result: Result) -> Any:
+    from studies.figures import plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(10, 3.4))
+    axes[0].plot(result.times, result["inertia_term"] / 1e3, linewidth=0.5)
+    axes[0].set_title("inertia term I beta'' [kN m]")
+    axes[1].plot(result.times, result["enforced_moment"], linewidth=0.5, color="C1")
+    axes[1].set_title("enforced moment [N m]")
+    for axis in axes:
+        axis.set_xlabel("time [s]")
+    figure.suptitle("Pitch prescribed, perturbed model and noisy forces: what the guidance takes", x=0.01, ha="left",
+                    fontweight="bold")
+    return figure
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("six_runs")
