@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from models.engines.catalogue import CATALOGUE, Integrator
+from models.engines.stability import check_step
 from models.errors import Refused, RunFailed
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ def check(engine: str, assembly: "Assembly", settings: Settings) -> None:
     signal = assembly.input
     if signal is not None and signal.period is not None:
         _sampling(engine, integrator, settings, signal.period, signal.held)
+    check_step(engine, assembly, settings)
 
 
 def _constrained(engine: str) -> str:

@@ -1,0 +1,169 @@
+"""Which step an explicit integrator can take: computed from the vehicle before a run, not seen after it.
+
+A step that is too long does not always show: a mode that grows by a tenth per step leaves a short run
+finite, of sane size and wrong. So each fixed-step integrator is written here as the matrix that takes
+the state (q, q') of the linearised vehicle over one step, and a step is refused if any mode would grow
+over the run. The vehicle itself never grows: its springs and dampers are passive. Zero eigenvalues (a
+free vehicle) and weakly damped modes, which a first-order method lets grow a little, are allowed.
+
+The matrices were derived and then compared with the ones measured from the engines, column by column
+over five steps (tests/test_guards.py); they agree to 1e-11. They hold about zero pitch, where the vehicle is stiffest: a
+tilt shortens the struts' arms. What is not linear is left to the guard that follows every run.
+"""
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.errors import Refused
+from models.vehicles.description import Vehicle
+from models.vehicles.linear import matrices
+
+if TYPE_CHECKING:
+    from models.assembly import Assembly
+    from models.engines.protocol import Settings
+
+Linear = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""M, D, K and the part of D that sits on single joints (tyres, pitch springs), (n, n) each."""
+
+GROWTH = 2.0
+"""How much a mode may grow over a run. Rounding moves the double eigenvalue 1 of a free vehicle by 1e-7,
+which is 1.06 over 10 minutes at 1 kHz; a step 3 % above RK4's limit passes 2 after seven steps."""
+
+TAYLOR = {1: ("ExplicitEuler",), 2: ("ExplicitMidpoint",), 3: ("RK33",), 4: ("RK44", "RK4")}
+"""Runge-Kutta methods whose number of stages is their order: R(z) is the Taylor polynomial of exp."""
+RK67_SEVENTH = -2.2652475842503 / math.factorial(7)
+"""Coefficient of z^7 of Exudyn's seven stages of order six, measured from one step (residual 1e-15)."""
+
+
+def coefficients(integrator: str) -> list[float] | None:
+    """Stability polynomial R(z) of a Runge-Kutta method, lowest power first; None for other methods."""
+    for order, names in TAYLOR.items():
+        if integrator in names:
+            return [1 / math.factorial(k) for k in range(order + 1)]
+    if integrator == "RK67":
+        return [*(1 / math.factorial(k) for k in range(7)), RK67_SEVENTH]
+    return None
+
+
+def linearised(vehicle: Vehicle, guided: bool) -> Linear:
+    """The vehicle's matrices about zero pitch; ``guided`` leaves the pitch out."""
+    grounded = tuple(strut for strut in vehicle.struts if strut.lower.body is None)
+    mass, damping, stiffness = matrices(vehicle)
+    joint = matrices(replace(vehicle, struts=grounded))[1]
+    kept = [i for i, (_, kind) in enumerate(vehicle.coordinates()) if not (guided and kind == "pitch")]
+    pick = np.ix_(kept, kept)
+    return mass[pick], damping[pick], stiffness[pick], joint[pick]
+
+
+def first_order(linear: Linear) -> np.ndarray:
+    """A (2n, 2n) of y' = A y, y = (q, q')."""
+    mass, damping, stiffness, _ = linear
+    n = len(mass)
+    inverse = np.diag(1 / mass.diagonal())
+    return np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ damping]])
+
+
+def step_matrix(integrator: str, step: float, linear: Linear) -> np.ndarray | None:
+    """The matrix of one step of ``step`` seconds over (q, q'), (2n, 2n); None where no step is too long.
+
+    That is so for generalised-alpha, the trapezoidal rule and MuJoCo's ``discrete``, which are implicit in
+    position and velocity, and for adaptive integrators, which shorten their own steps.
+    """
+    polynomial = coefficients(integrator)
+    if polynomial is not None:
+        return _polynomial(polynomial, step * first_order(linear))
+    if integrator == "VelocityVerlet":
+        return _verlet(step, linear)
+    mass, damping, _, joint = linear
+    implicit = {"Euler": joint, "implicit": _within_trees(damping), "implicitfast": np.diag(damping.diagonal())}
+    return _semi_implicit(step, linear, implicit[integrator]) if integrator in implicit else None
+
+
+def _polynomial(polynomial: list[float], z: np.ndarray) -> np.ndarray:
+    """R(z) by Horner's rule."""
+    out = np.zeros_like(z)
+    for coefficient in reversed(polynomial):
+        out = out @ z + coefficient * np.eye(len(z))
+    return out
+
+
+def _verlet(step: float, linear: Linear) -> np.ndarray:
+    """Exudyn's velocity Verlet, (3n, 3n) over (q, q', q'').
+
+    The acceleration of a step's end reads the velocity of its middle, and the next step begins with it: a
+    state of its own. One step alone looks stable up to 5.6 ms where two are not beyond 2.7 ms.
+    """
+    a = first_order(linear)
+    n = len(a) // 2
+    q, v, first = (np.eye(3 * n)[i * n : (i + 1) * n] for i in range(3))
+    after = q + step * v + 0.5 * step**2 * first
+    second = a[n:, :n] @ after + a[n:, n:] @ (v + 0.5 * step * first)
+    return np.vstack([after, v + 0.5 * step * (first + second), second])
+
+
+def _semi_implicit(step: float, linear: Linear, implicit: np.ndarray) -> np.ndarray:
+    """MuJoCo's single steps: velocities with part of the damping implicit, then positions with the new ones."""
+    mass, damping, stiffness, _ = linear
+    n = len(mass)
+    q, v = np.eye(2 * n)[:n], np.eye(2 * n)[n:]
+    after = v - step * np.linalg.solve(mass + step * implicit, stiffness @ q + damping @ v)
+    return np.vstack([q + step * after, after])
+
+
+def _within_trees(damping: np.ndarray) -> np.ndarray:
+    """The damping that MuJoCo's ``implicit`` sees: between coordinates of one body, not across branches."""
+    out = np.diag(damping.diagonal())
+    out[2:, 2:] = damping[2:, 2:]
+    return out
+
+
+def growth(integrator: str, step: float, duration: float, linear: Linear) -> float:
+    """Natural logarithm of the growth of the fastest growing mode over a run; 0 if none grows."""
+    matrix = step_matrix(integrator, step, linear)
+    if matrix is None:
+        return 0.0
+    radius = float(np.abs(np.linalg.eigvals(matrix)).max())
+    return max(0.0, duration / step * math.log(radius)) if math.isfinite(radius) else math.inf
+
+
+def limit(integrator: str, step: float, duration: float, linear: Linear) -> float:
+    """Longest step (s) below an unstable one at which no mode grows over the run, to four digits."""
+    allowed, stable = math.log(GROWTH), step / 2
+    while growth(integrator, stable, duration, linear) > allowed and stable > 1e-12 * step:
+        stable /= 2
+    unstable = 2 * stable
+    while unstable - stable > 1e-5 * stable:
+        middle = 0.5 * (stable + unstable)
+        if growth(integrator, middle, duration, linear) > allowed:
+            unstable = middle
+        else:
+            stable = middle
+    return stable
+
+
+def check_step(engine: str, assembly: "Assembly", settings: "Settings") -> None:
+    """Refuse a step at which a mode of the vehicle would grow, naming the limit and the fastest pole."""
+    linear = linearised(assembly.vehicle, guided=assembly.mode == "pitch")
+    grown = growth(settings.integrator, settings.step, settings.duration, linear)
+    if grown <= math.log(GROWTH):
+        return
+    longest = limit(settings.integrator, settings.step, settings.duration, linear)
+    raise Refused(engine, f"step {settings.step:g} s exceeds the stability limit {_down(longest):g} s of "
+                          f"{settings.integrator} for this vehicle (fastest pole {_pole(linear)}): an error would grow "
+                          f"1e{grown / math.log(10):.0f}-fold over the run; shorten the step")
+
+
+def _down(value: float) -> float:
+    """Three digits, rounded down: a limit that is named must hold."""
+    scale = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return math.floor(value / scale) * scale
+
+
+def _pole(linear: Linear) -> str:
+    """The eigenvalue of the vehicle that lies farthest from zero, as text."""
+    poles = np.linalg.eigvals(first_order(linear))
+    pole = complex(poles[np.abs(poles).argmax()])
+    return f"{pole.real:.4g} 1/s" if abs(pole.imag) < 1e-9 * abs(pole) else f"{pole.real:.4g} +- {abs(pole.imag):.4g}i 1/s"
