@@ -5,6 +5,9 @@ from typing import Any
 
 import numpy as np
 
+LONGEST = 80
+"""Characters of an offending value that a message shows."""
+
 
 class InputError(ValueError):
     """Something that the user wrote cannot be used; its text is one complete message.
@@ -15,25 +18,35 @@ class InputError(ValueError):
     place : key, row or column within the file
     value : the offending value, None if there is none to show
     allowed : what would have been accepted, as a phrase
-    choices : accepted names, from which the nearest match is offered
+    choices : accepted names, from which the one nearest to a text value, or else to the key, is offered
     """
 
     def __init__(self, file: object, place: str, value: Any, allowed: str, choices: tuple[str, ...] = ()) -> None:
         self.file, self.place, self.value, self.allowed = str(file), place, value, allowed
         where = ": ".join(part for part in (str(file), place) if part)
-        shown = "" if value is None else f" = {value!r}"
-        if len(shown) > 120:
-            shown = shown[:117] + "..."
-        super().__init__(f"{where}{shown}: {allowed}{nearest(value, choices)}")
+        name = value if isinstance(value, str) else place.rpartition(".")[2]
+        super().__init__(f"{where}{_shown(value)}: {allowed}{nearest(name, choices)}")
 
 
-def nearest(value: object, choices: tuple[str, ...]) -> str:
-    """Phrase that lists the accepted names and offers the one most like ``value``."""
-    if not choices:
+def _shown(value: Any) -> str:
+    """Return `` = value`` as a scene file would hold it, cut to a readable length."""
+    if value is None:
         return ""
-    match = get_close_matches(str(value), choices, n=1, cutoff=0.5)
-    offered = f"; did you mean {match[0]!r}?" if match else ""
-    return f" (allowed: {', '.join(sorted(choices))}){offered}"
+    plain = value.item() if isinstance(value, np.generic) else value
+    text = str(plain).lower() if isinstance(plain, bool) else repr(plain)
+    return f" = {text if len(text) <= LONGEST else text[: LONGEST - 3] + '...'}"
+
+
+def nearest(name: object, choices: tuple[str, ...]) -> str:
+    """Phrase that lists the accepted names and offers the one most like ``name``."""
+    return f" (allowed: {', '.join(sorted(choices))}){suggestion(name, choices)}" if choices else ""
+
+
+def suggestion(name: object, choices: tuple[str, ...]) -> str:
+    """Phrase that offers the accepted name most like ``name``, whatever its case; empty if none is."""
+    lower = {choice.casefold(): choice for choice in choices}
+    match = get_close_matches(str(name).casefold(), lower, n=1, cutoff=0.6)
+    return f"; did you mean {lower[match[0]]!r}?" if match else ""
 
 
 class RunFailed(RuntimeError):
@@ -56,5 +69,6 @@ class RunFailed(RuntimeError):
 class Refused(InputError):
     """A scene that is well written but asks an engine for something it does not do correctly."""
 
-    def __init__(self, engine: str, why: str) -> None:
-        super().__init__("", engine, None, why)
+    def __init__(self, engine: str, why: str, file: str = "") -> None:
+        self.engine, self.why = engine, why
+        super().__init__(file, engine, None, why)

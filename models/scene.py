@@ -1,15 +1,18 @@
 """The user's file: read strictly, before anything is imported that a run would need."""
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field
 
 from models.engines.catalogue import CATALOGUE, RECOMMENDED
-from models.errors import InputError
+from models.errors import InputError, suggestion
+from models.steps import MOST_STEPS, divides, fitting
 from models.strict import Strict, quantity, read
 from models.vehicles import pitch_plane
 from models.vehicles.description import Geometry
@@ -25,6 +28,11 @@ def _names(folder: str) -> tuple[str, ...]:
 def effect_names() -> tuple[str, ...]:
     """Names of all effects that a scene may call for."""
     return _names("effects")
+
+
+def parameter_sets() -> tuple[str, ...]:
+    """Names of the published parameter sets."""
+    return _names("parameters")
 
 
 class VehicleTable(Strict):
@@ -49,7 +57,7 @@ class EngineTable(Strict):
     integrator: str | None = Field(None, description="name of an integrator of this engine")
     step: float | None = quantity("s", "step for this engine alone", default=None)
     tolerance: float = quantity("", "relative tolerance of adaptive integrators", default=1e-9)
-    spectral_radius: float = quantity("", "of generalised-alpha at infinite frequency", default=0.6, zero=True)
+    spectral_radius: float = Field(0.6, ge=0, le=1, description="of generalised-alpha at infinite frequency")
 
 
 class Scene(Strict):
@@ -59,23 +67,25 @@ class Scene(Strict):
     system: Literal["pitch-plane"] = "pitch-plane"
     study: str = Field("single_run", description="the study that runs the scene")
     vehicle: VehicleTable = VehicleTable()
-    run: RunTable
+    run: RunTable = Field(description="table with at least the duration")
     start: dict[str, float] = Field(default_factory=dict, description="initial states beside the static equilibrium")
     effects: dict[str, Any] = Field(default_factory=dict, description="the effects of the scene, a table each")
     engines: dict[str, EngineTable] = Field(default_factory=dict)
     options: dict[str, Any] = Field(default_factory=dict, description="options of the study")
-    file: str = ""
-    folder: str = "."
+    file: str = Field("", exclude=True)
+    folder: str = Field(".", exclude=True)
 
     def vehicle_parameters(self) -> pitch_plane.Parameters:
-        """The parameter set with the scene's overrides."""
-        values = _parameter_set(self.vehicle.parameters, self.file, Path(self.folder))
-        merged = {**values, **self.vehicle.override}
-        return read(pitch_plane.Parameters, merged, self.file, "vehicle.override")
+        """The parameter set with the scene's overrides; each is judged under its own file's name."""
+        base = _parameter_set(self.vehicle.parameters, self.file, Path(self.folder))
+        values = {**base.model_dump(), **self.vehicle.override}
+        p = read(pitch_plane.Parameters, values, self.file, "vehicle.override")
+        _check_rest(p, self)
+        return p
 
-    def path(self, name: str) -> Path:
-        """A file that the scene names, relative to the scene's own folder."""
-        return Path(self.folder) / name
+    def path(self, name: str, place: str = "") -> Path:
+        """A file that the scene names at ``place``, relative to the scene's own folder; it must be there."""
+        return _existing(name, Path(self.folder), self.file, place)
 
     def settings(self, engine: str) -> EngineTable:
         """Settings of one engine, with recommended values where the scene says nothing."""
@@ -87,34 +97,73 @@ class Scene(Strict):
         return engine == "exudyn" and "prescribed_pitch" in self.effects
 
 
-def _parameter_set(name: str, file: str, folder: Path) -> dict[str, Any]:
+def _parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
+    """A published set by its name, or the user's own from a TOML file."""
     if name.endswith(".toml"):
-        return parse(folder / name)
-    if name not in _names("parameters"):
-        raise InputError(file, "vehicle.parameters", name, "no such parameter set", _names("parameters"))
-    return import_module(f"models.parameters.{name}").PARAMETERS.model_dump()
+        return read(pitch_plane.Parameters, parse(_existing(name, folder, file, "vehicle.parameters")), name)
+    if name not in parameter_sets():
+        allowed = "must be a TOML file with all parameters, or a published set"
+        raise InputError(file, "vehicle.parameters", name, allowed, parameter_sets())
+    return import_module(f"models.parameters.{name}").PARAMETERS
+
+
+def _existing(name: str, folder: Path, file: str, place: str) -> Path:
+    path = folder / name
+    try:
+        if path.is_file():
+            return path
+        beside = tuple(p.name for p in path.parent.iterdir() if p.suffix == path.suffix)
+    except OSError:
+        beside = ()
+    raise InputError(file, place, name, f"no such file in the folder {str(folder)!r}{suggestion(path.name, beside)}")
+
+
+def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
+    """Every run begins from the static equilibrium, so there must be one."""
+    try:
+        rest = pitch_plane.equilibrium(p, scene.vehicle.geometry)
+    except (ValueError, ArithmeticError):  # the sine of the pitch beyond 1
+        rest = np.full(8, np.nan)
+    if not np.isfinite(rest).all():
+        raise InputError(scene.file, "vehicle", None, "the vehicle has no static equilibrium with these parameters: "
+                         "its springs k1 to k4 are too soft for its weight")
 
 
 def parse(path: Path) -> dict[str, Any]:
     """A TOML file as nested tables; raises InputError where it cannot be read."""
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8"))
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
-        raise InputError(path, "", None, "no such file") from None
+        beside = tuple(p.name for p in path.parent.glob("*.toml"))
+        raise InputError(path, "", None, f"no such file{suggestion(path.name, beside)}") from None
     except OSError as error:
-        raise InputError(path, "", None, f"cannot be read: {error.strerror}") from None
+        raise InputError(path, "", None, f"cannot be read as a file: {error.strerror}") from None
     except UnicodeDecodeError as error:
-        raise InputError(path, f"byte {error.start}", None, "not UTF-8 text") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(path, "", None, f"not valid TOML: {error}") from None
+        raise InputError(path, f"byte {error.start}", None, "the file must be text in UTF-8") from None
+    except (ValueError, RecursionError) as error:  # tomllib's own, too long numbers, too deep nesting
+        raise _not_toml(path, error) from None
+
+
+def _not_toml(path: Path, error: Exception) -> InputError:
+    """Message with the line at which reading stopped."""
+    if isinstance(error, RecursionError):
+        return InputError(path, "", None, "not valid TOML: nested too deeply")
+    what, line, column = _WHERE.fullmatch(str(error)).groups()  # type: ignore[union-attr]
+    if line is None:
+        return InputError(path, "", None, f"not valid TOML: {what}")
+    text = path.read_bytes().decode("utf-8-sig").splitlines()[int(line) - 1].strip()
+    return InputError(path, f"line {line}, column {column}", text, f"not valid TOML: {what}")
+
+
+_WHERE = re.compile(r"(.*?)(?: \(at line (\d+), column (\d+)\))?", re.DOTALL)
 
 
 def load(path: Path, changes: Iterable[str] = ()) -> Scene:
     """Read a scene file, with ``--set`` changes of the form KEY.KEY=VALUE applied on top."""
-    table = parse(path)
+    table, changes = parse(path), list(changes)
     for change in changes:
         _apply(table, change)
-    return build(table, path.name, path.parent)
+    return build(table, path.name + (" with --set" if changes else ""), path.parent)
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Scene:
@@ -124,11 +173,10 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Sc
             raise InputError(file, key, table[key], "unknown key", tuple(set(Scene.model_fields) - {"file", "folder"}))
     scene = read(Scene, {**table, "file": file, "folder": str(folder)}, file)
     effects = {name: _effect(name, values, file) for name, values in scene.effects.items()}
-    for name, settings in scene.engines.items():
-        _check_engine(name, settings, file)
+    for name in scene.engines:
+        _check_engine(name, scene)
+    _check_times(scene)
     return scene.model_copy(update={"effects": effects})
-
-
 
 
 def _effect(name: str, values: Any, file: str) -> Any:
@@ -137,29 +185,64 @@ def _effect(name: str, values: Any, file: str) -> Any:
     return read(import_module(f"models.effects.{name}").Parameters, values, file, f"effects.{name}")
 
 
-def _check_engine(name: str, settings: EngineTable, file: str) -> None:
+def _check_engine(name: str, scene: Scene) -> None:
+    """Known names, and no setting that the integrator would not read."""
     if name not in CATALOGUE:
-        raise InputError(file, f"engines.{name}", None, "no such engine", tuple(CATALOGUE))
-    if settings.integrator is not None and settings.integrator not in CATALOGUE[name]:
-        place = f"engines.{name}.integrator"
-        raise InputError(file, place, settings.integrator, "no such integrator", tuple(CATALOGUE[name]))
-    if settings.spectral_radius > 1:
-        place = f"engines.{name}.spectral_radius"
-        raise InputError(file, place, settings.spectral_radius, "must be between 0 and 1")
+        raise InputError(scene.file, f"engines.{name}", None, "no such engine", tuple(CATALOGUE))
+    given, place = scene.engines[name], f"engines.{name}"
+    integrator = str(scene.settings(name).integrator)
+    if integrator not in CATALOGUE[name]:
+        raise InputError(scene.file, f"{place}.integrator", integrator, "no such integrator", tuple(CATALOGUE[name]))
+    if "spectral_radius" in given.model_fields_set and integrator != "GeneralizedAlpha":
+        allowed = f"has no meaning for {integrator}: it belongs to exudyn's GeneralizedAlpha"
+        raise InputError(scene.file, f"{place}.spectral_radius", given.spectral_radius, allowed)
+    if "tolerance" in given.model_fields_set and not CATALOGUE[name][integrator].adaptive:
+        adaptive = " or ".join(key for key, value in CATALOGUE[name].items() if value.adaptive) or "other engines"
+        allowed = f"has no meaning for {integrator}, which takes steps of fixed length: it belongs to {adaptive}"
+        raise InputError(scene.file, f"{place}.tolerance", given.tolerance, allowed)
+
+
+def _check_times(scene: Scene) -> None:
+    """The duration and the saved spacing are whole numbers of every engine's steps."""
+    for name in CATALOGUE:
+        own = name in scene.engines and scene.engines[name].step is not None
+        _check_step(scene, f"engines.{name}.step" if own else "run.step", float(scene.settings(name).step or 0))
+    wanted = scene.run.output_step
+    if wanted is not None and wanted > scene.run.duration * (1 + 1e-9):
+        allowed = f"must be at most run.duration = {scene.run.duration:g} s"
+        raise InputError(scene.file, "run.output_step", wanted, allowed)
+
+
+def _check_step(scene: Scene, place: str, step: float) -> None:
+    length, wanted = scene.run.duration, scene.run.output_step
+    if length / step > MOST_STEPS:
+        allowed = f"makes {length / step:.3g} steps of the duration {length:g} s; at most {MOST_STEPS:.0e} are possible"
+        raise InputError(scene.file, place, step, allowed)
+    if not divides(step, length):
+        allowed = f"must divide run.duration = {length:g} s; use for example {fitting(step, length)}"
+        raise InputError(scene.file, place, step, allowed)
+    if wanted is not None and not divides(step, wanted):
+        allowed = f"must be a multiple of {place} = {step:g} s"
+        raise InputError(scene.file, "run.output_step", wanted, allowed)
 
 
 def _apply(table: dict[str, Any], change: str) -> None:
     """Set one nested key from KEY.KEY=VALUE; the value is read as TOML, or as text if it is not."""
-    key, equals, text = change.partition("=")
-    if not equals or not key.strip():
+    key, equals, text = (part.strip() for part in change.partition("="))
+    *parents, last = key.split(".")
+    if not equals or not all((*parents, last)):
         raise InputError("--set", "", change, "must read KEY=VALUE, for example run.step=5e-4")
-    try:
-        value = tomllib.loads(f"x = {text}")["x"]
-    except tomllib.TOMLDecodeError:
-        value = text.strip()
-    *parents, last = key.strip().split(".")
-    for parent in parents:
+    for i, parent in enumerate(parents):
         table = table.setdefault(parent, {})
         if not isinstance(table, dict):
-            raise InputError("--set", key.strip(), text, f"{parent!r} is a value, not a table")
-    table[last] = value
+            raise InputError("--set", key, text, f"{'.'.join(parents[: i + 1])} is a value, not a table of keys")
+    table[last] = _value(text)
+
+
+def _value(text: str) -> Any:
+    """A value as in a scene file; text needs no quotes."""
+    try:
+        found = tomllib.loads(f"x = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return found["x"] if len(found) == 1 else text

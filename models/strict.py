@@ -1,11 +1,12 @@
 """Reading a user's values strictly: unknown or non-physical ones become one clear message."""
 
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
 
-from models.errors import InputError, nearest
+from models.errors import InputError, nearest, suggestion
 
 
 class Strict(BaseModel):
@@ -25,36 +26,48 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def read(model: type[Model], values: Mapping[str, Any], file: object, place: str = "") -> Model:
-    """Build ``model`` from a user's table; raises InputError that names file, place, value and what is allowed."""
+    """Build ``model`` from a user's table; raises InputError that names file, place, value and what is allowed.
+
+    Of several errors the first is told in full, an unknown key before all others, and the rest are named.
+    """
     if not isinstance(values, Mapping):
-        raise InputError(file, place, values, "must be a table of keys and values")
+        raise InputError(file, place, values, WORDS["dict_type"])
     try:
         return model.model_validate(dict(values))
     except ValidationError as error:
-        raise _message(error, model, values, file, place) from None
+        raise _message(error, model, file, place) from None
 
 
-def _message(error: ValidationError, model: type[BaseModel], values: Any, file: object, place: str) -> InputError:
-    first = error.errors()[0]
-    keys = tuple(str(part) for part in first["loc"])
-    where = ".".join((*((place,) if place else ()), *keys))
-    unit, meaning = _facts(model, keys)
-    if first["type"] == "extra_forbidden":
-        return InputError(file, where, first["input"], f"unknown key{nearest(keys[-1], _owner(model, keys))}")
-    if first["type"] == "missing":
-        return InputError(file, where, None, f"missing{meaning}{unit}")
-    return InputError(file, where, first["input"], _allowed(first) + meaning + unit, _choices(first))
+def _message(error: ValidationError, model: type[BaseModel], file: object, place: str) -> InputError:
+    """One message for all that was found."""
+    first, *others = sorted(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
+    keys = _keys(first)
+    value = None if first["type"] == "missing" else first["input"]
+    rest = [_dotted(place, _keys(found)) for found in others]
+    more = f"; and {len(rest)} more: {', '.join(rest[:5])}{', ...' if len(rest) > 5 else ''}" if rest else ""
+    return InputError(file, _dotted(place, keys), value, _phrase(first, keys, _owner(model, keys)) + more)
 
 
-def _owner(model: type[BaseModel], keys: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the fields beside an unknown key."""
-    for key in keys[:-1]:
+def _keys(found: Any) -> tuple[str, ...]:
+    return tuple(str(part) for part in found["loc"])
+
+
+def _dotted(place: str, keys: tuple[str, ...]) -> str:
+    return ".".join((*((place,) if place else ()), *keys))
+
+
+def _owner(model: type[BaseModel], keys: tuple[str, ...]) -> type[BaseModel] | None:
+    """The table that holds the last key, None where no table of ours does."""
+    parents = iter(keys[:-1])
+    for key in parents:
         field = model.model_fields.get(key)
-        inner = _inner(field.annotation) if field else None
-        if inner is None:
-            return ()
+        inner = None if field is None else _inner(field.annotation)
+        if field is None or inner is None:
+            return None
+        if get_origin(field.annotation) is dict:
+            next(parents, None)  # a name that the user chose
         model = inner
-    return tuple(model.model_fields)
+    return model
 
 
 def _inner(annotation: Any) -> type[BaseModel] | None:
@@ -62,34 +75,48 @@ def _inner(annotation: Any) -> type[BaseModel] | None:
     return next((o for o in options if isinstance(o, type) and issubclass(o, BaseModel)), None)
 
 
-def _facts(model: type[BaseModel], keys: tuple[str, ...]) -> tuple[str, str]:
-    for key in keys[:-1]:
-        field = model.model_fields.get(key)
-        inner = _inner(field.annotation) if field else None
-        if inner is None:
-            return "", ""
-        model = inner
-    field = model.model_fields.get(keys[-1]) if keys else None
+def _phrase(first: Any, keys: tuple[str, ...], owner: type[BaseModel] | None) -> str:
+    """What would have been accepted, in plain words."""
+    fields = {} if owner is None else owner.model_fields
+    key = keys[-1] if keys else ""
+    kind, facts = first["type"], _facts(fields.get(key))
+    if kind == "extra_forbidden":
+        known = tuple(name for name, field in fields.items() if not field.exclude)
+        return "unknown key" + (nearest(key, known) or ": this table takes none")
+    if kind == "missing":
+        return f"is missing{facts}"
+    if kind == "literal_error":
+        names = tuple(part.strip().strip("'") for part in first["ctx"]["expected"].replace(" or ", ", ").split(","))
+        return f"must be {' or '.join(names)}{facts}{suggestion(first['input'], names)}"
+    if kind == "value_error":
+        return f"{first['ctx']['error']}{facts}"
+    return WORDS.get(kind, "is not accepted here").format(**first.get("ctx", {})) + facts
+
+
+WORDS = {
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "finite_number": "must be a finite number",
+    "string_type": "must be text in quotes",
+    "bool_type": "must be true or false",
+    "list_type": "must be a list in [ ]",
+    "tuple_type": "must be a list in [ ]",
+    "dict_type": "must be a table of keys and values",
+    "model_type": "must be a table of keys and values",
+    "greater_than": "must be above {gt}",
+    "greater_than_equal": "must be {ge} or more",
+    "less_than": "must be below {lt}",
+    "less_than_equal": "must be at most {le}",
+}
+"""What each kind of error of the library means to a person who writes a file."""
+
+
+def _facts(field: FieldInfo | None) -> str:
+    """Unit and meaning of a key, in brackets."""
     if field is None:
-        return "", ""
+        return ""
     extra = field.json_schema_extra
-    unit = f" in {extra['unit']}" if isinstance(extra, dict) and "unit" in extra else ""
-    return unit, f": {field.description}" if field.description else ""
-
-
-def _allowed(first: Any) -> str:
-    """What pydantic would have accepted, in plain words."""
-    text: str = first["msg"]
-    for prefix in ("Value error, ", "Input should be ", "Input "):
-        text = text.removeprefix(prefix)
-    if first["type"].startswith("value_error"):
-        return text
-    if first["type"] == "literal_error":
-        return "not one of the accepted names"
-    return f"must be {text}"
-
-
-def _choices(first: Any) -> tuple[str, ...]:
-    if first["type"] != "literal_error":
-        return ()
-    return tuple(part.strip().strip("'") for part in first["ctx"]["expected"].replace(" or ", ", ").split(","))
+    unit = f"in {extra['unit']}" if isinstance(extra, dict) and extra.get("unit") else ""
+    told = ", ".join(part for part in (field.description or "", unit) if part)
+    return f" ({told})" if told else ""

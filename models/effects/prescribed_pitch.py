@@ -30,7 +30,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     if scene.effects["wheel_forces"].frame == "body":
         raise InputError(scene.file, "effects.wheel_forces.frame", "body",
                          "a prescribed pitch makes the frame a matter of the file: use 'inertial'")
-    values, period = read_time_series(scene.path(p.file), {"pitch": RADIANS})
+    values, period = read_time_series(scene.path(p.file, "effects.prescribed_pitch.file"), {"pitch": RADIANS})
     pitch = Smooth(values, period, derivatives=2, degree=5)
     if pitch.end < scene.run.duration * (1 - 1e-9):
         raise InputError(scene.file, "effects.prescribed_pitch.file", p.file,

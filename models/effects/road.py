@@ -83,7 +83,7 @@ def _profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[flo
 def _measured(scene: Any, p: Parameters, distance: float) -> Any:
     from models.road.continuation import RUN_IN, continued, run_in
 
-    path, track = scene.path(p.file), p.track or "mean"
+    path, track = scene.path(p.file, "effects.road.file"), p.track or "mean"
     length = RUN_IN if p.run_in is None else p.run_in
     if p.source == "opencrg":
         from models.road.opencrg import read_opencrg

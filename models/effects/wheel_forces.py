@@ -30,7 +30,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
     scene = assembly.scene
     columns = {"front": NEWTONS, "rear": NEWTONS}
-    values, period = read_time_series(scene.path(p.file), columns)
+    values, period = read_time_series(scene.path(p.file, "effects.wheel_forces.file"), columns)
     signal = sampled(values, period, p.interpolation)
     if signal.end < scene.run.duration * (1 - 1e-9):
         raise InputError(scene.file, "effects.wheel_forces.file", p.file,
