@@ -5,8 +5,9 @@ from importlib import import_module
 from models.assembly import Assembly, assemble
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build, check as check_engine, settings_of
-from models.errors import InputError
-from models.scene import Scene
+from models.errors import Refused
+from models.scene import Scene, effect_names
+from models.simulate import state_names
 
 MODES = {
     "free": "free motion on the flat road",
@@ -21,24 +22,45 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
     assembly = assemble(scene)
     for engine in engines:
-        check_engine(engine, assembly, settings_of(scene, engine))
+        try:
+            check_engine(engine, assembly, settings_of(scene, engine))
+        except Refused as error:
+            raise Refused(error.engine, error.why, scene.file) from None
 
 
 def describe(scene: Scene) -> str:
     """The scene's plan as text: vehicle, states, effects, channels, and what each engine builds."""
     assembly = assemble(scene)
-    lines = [scene.title, f"  {MODES[assembly.mode]}, geometry {scene.vehicle.geometry}, {scene.run.duration:g} s"]
-    lines += _vehicle(assembly) + _effects(scene) + _engines(scene, assembly)
+    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"), _line("motion", _motion(scene, assembly))]
+    lines += _vehicle(scene, assembly) + _effects(scene)
+    lines += [_line("channels", ", ".join(_channels(assembly))), "", *_engines(scene, assembly)]
     return "\n".join(lines)
 
 
-def _vehicle(assembly: Assembly) -> list[str]:
-    vehicle = assembly.vehicle
-    bodies = ", ".join(f"{body.name} {body.mass:g} kg" for body in vehicle.bodies)
-    struts = ", ".join(f"{strut.name} {strut.stiffness:g} N/m {strut.damping:g} N s/m" for strut in vehicle.struts)
-    states = ", ".join(f"{body} {kind}" for body, kind in vehicle.coordinates())
-    return [f"  bodies    {bodies}", f"  struts    {struts}", f"  states    2 x ({states})",
-            f"  channels  {', '.join(_channels(assembly))}"]
+def _line(head: str, text: str) -> str:
+    return f"  {head:<10} {text}"
+
+
+def _motion(scene: Scene, assembly: Assembly) -> str:
+    return f"{MODES[assembly.mode]}, geometry {scene.vehicle.geometry}, {scene.run.duration:g} s"
+
+
+def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:
+    """Parameter set, bodies, struts and start, a line each."""
+    own, vehicle = scene.vehicle, assembly.vehicle
+    changed = ", ".join(f"{name} = {value:g}" for name, value in own.override.items())
+    lines = [_line("vehicle", own.parameters + (f", but {changed}" if changed else ""))]
+    for body in vehicle.bodies:
+        inertia = "" if body.pitch_inertia is None else f", {body.pitch_inertia:g} kg m^2"
+        lines.append(_line("  body", f"{body.name:<12} {body.mass:g} kg{inertia}"))
+    for strut in vehicle.struts:
+        ends = f"{strut.upper.body} - {strut.lower.body or 'ground'}"
+        lines.append(_line("  strut", f"{strut.name:<12} {strut.stiffness:g} N/m, {strut.damping:g} N s/m, {ends}"))
+    for spring in vehicle.pitch_springs:
+        text = f"{spring.body:<12} {spring.stiffness:g} N m/rad, {spring.damping:g} N m s/rad, to the ground"
+        lines.append(_line("  spring", text))
+    start = ", ".join(f"{name} {value:.4g}" for name, value in zip(state_names(), assembly.initial, strict=True) if value)
+    return [*lines, _line("states", ", ".join(state_names())), _line("start", start or "all zero")]
 
 
 def _channels(assembly: Assembly) -> list[str]:
@@ -49,20 +71,27 @@ def _channels(assembly: Assembly) -> list[str]:
 
 def _effects(scene: Scene) -> list[str]:
     """Effects that the scene names, with what each costs; all others are not imported."""
-    if not scene.effects:
-        return ["  effects   none"]
-    return [f"  effect    {name}: {import_module(f'models.effects.{name}').COST}" for name in scene.effects]
+    lines = [_line("effect", f"{name}: {import_module(f'models.effects.{name}').COST}") for name in scene.effects]
+    absent = ", ".join(name for name in effect_names() if name not in scene.effects)
+    return [*lines, _line("absent", f"{absent} (not imported, not computed)")]
+
+
+HEADINGS = ("engine", "integrator", "order", "step", "steps", "freedoms", "native items", "callbacks")
 
 
 def _engines(scene: Scene, assembly: Assembly) -> list[str]:
-    lines = []
-    for engine in CATALOGUE:
-        settings = settings_of(scene, engine)
-        head = f"  {engine:<10}{settings.integrator}, step {settings.step:g} s, {settings.steps} steps"
-        try:
-            plan = build(engine, assembly, settings).plan()
-        except InputError as error:
-            lines.append(f"{head}: refused: {error}")
-            continue
-        lines.append(f"{head}: " + ", ".join(f"{count} {what}" for what, count in plan.items()))
-    return lines
+    """Table of what each engine builds, or why it refuses."""
+    rows = [HEADINGS, *(_engine(scene, assembly, engine) for engine in CATALOGUE)]
+    widths = [max(len(row[i]) for row in rows if len(row) > 2) for i in range(len(HEADINGS))]
+    return ["  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip() for row in rows]
+
+
+def _engine(scene: Scene, assembly: Assembly, engine: str) -> tuple[str, ...]:
+    settings = settings_of(scene, engine)
+    try:
+        plan = build(engine, assembly, settings).plan()
+    except Refused as error:
+        return engine, f"refused: {error.why}"
+    order = CATALOGUE[engine][settings.integrator].order
+    return (engine, settings.integrator, str(order), f"{settings.step:g} s", str(settings.steps),
+            *(str(plan[key]) for key in ("degrees of freedom", "native items", "callbacks")))

@@ -20,12 +20,20 @@ def read_time_series(path: str | Path, columns: Mapping[str, Mapping[str, float]
     period = (time[-1] - time[0]) / (len(time) - 1)
     if abs(time[0]) > 1e-6 * period:
         raise InputError(path, "first row, column 'time'", float(time[0]), "the first sample must lie at time 0")
-    off = np.abs(time - period * np.arange(len(time)))
-    if off.max() > 1e-6 * period + 1e-12 * time[-1]:
-        row = int(np.argmax(off > 1e-6 * period + 1e-12 * time[-1])) + 1
-        raise InputError(path, f"row {row} of the numbers, column 'time'", float(time[row - 1]),
-                         f"the samples must be equally spaced, here every {period:g} s")
+    _check_even(path, time, period)
     return np.column_stack([table[name] for name in columns]), float(f"{period:.12g}")
+
+
+def _check_even(path: str | Path, time: np.ndarray, period: float) -> None:
+    """Refuse a clock that jitters or leaves something out, at the first row where it shows."""
+    slack = 1e-6 * period + 1e-12 * time[-1]
+    if np.abs(time - period * np.arange(len(time))).max() <= slack:
+        return
+    usual = float(np.median(np.diff(time)))  # one gap moves the mean period, and with it every row
+    row = 1 + int(np.argmax(np.abs(np.diff(time) - usual) > slack))
+    raise InputError(path, f"row {row + 1} of the numbers, column 'time' (s)", float(f"{time[row]:.12g}"),
+                     f"the samples must be equally spaced: {time[row - 1] + usual:.9g} is expected here, {usual:.9g} "
+                     "after the row before it")
 
 
 def write_time_series(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]], period: float) -> None:

@@ -47,6 +47,9 @@ CATALOGUE: dict[str, dict[str, Integrator]] = {
 }
 """Constrained MuJoCo and reference runs use the reduced model, in which the pitch is an input."""
 
+MISSING = {("exudyn", "DVERK6"): "DVERK6 is named but not implemented in Exudyn; use DOPRI5 or RK67"}
+"""Integrators that an engine names and does not have, with what to say to who asks for one."""
+
 RECOMMENDED = {"reference": "RK4", "exudyn": "RK44", "mujoco": "RK4"}
 DEFAULT = {"exudyn": "GeneralizedAlpha", "mujoco": "Euler"}
 """What an engine does if it is not told otherwise (Exudyn 1.13, MuJoCo 4)."""

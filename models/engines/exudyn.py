@@ -15,7 +15,7 @@ import numpy as np
 from models.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, Trajectory, guard
-from models.errors import Refused, RunFailed
+from models.errors import RunFailed
 from models.vehicles.description import PitchSpring, Point, Strut
 from models.vehicles.linear import matrices
 
@@ -275,8 +275,6 @@ class ExudynModel:
 
     def run(self) -> Trajectory:
         """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
-        if self.settings.integrator == "DVERK6":
-            raise Refused("exudyn", "DVERK6 is named but not implemented in Exudyn; use DOPRI5 or RK67")
         options = self._options()
         if self.constraint is not None:
             self._consistent_start(options)

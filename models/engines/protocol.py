@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from models.engines.catalogue import CATALOGUE, Integrator
+from models.engines.catalogue import CATALOGUE, MISSING, Integrator
 from models.engines.stability import check_step
 from models.errors import Refused, RunFailed
+from models.steps import divides, fitting
 
 if TYPE_CHECKING:
     from models.assembly import Assembly
@@ -80,7 +81,9 @@ def build(engine: str, assembly: "Assembly", settings: Settings) -> Model:
 def check(engine: str, assembly: "Assembly", settings: Settings) -> None:
     """Refuse combinations that no integrator treats correctly."""
     integrator = CATALOGUE[engine][settings.integrator]
-    _whole(engine, settings.duration / settings.step, "the step", settings.step, "the duration", settings.duration)
+    if (engine, settings.integrator) in MISSING:
+        raise Refused(engine, MISSING[engine, settings.integrator])
+    _whole(engine, settings.step, "the duration", settings.duration)
     if assembly.mode == "pitch" and not integrator.constraints:
         raise Refused(engine, f"{settings.integrator} does not solve for a prescribed pitch: its enforced moment would "
                               f"be wrong without a word; use {_constrained(engine)}")
@@ -104,13 +107,13 @@ def _sampling(engine: str, integrator: Integrator, settings: Settings, period: f
                                   "use a fixed-step integrator")
         return
     if not integrator.adaptive:
-        _whole(engine, period / settings.step, "the step", settings.step, "the sampling period", period)
+        _whole(engine, settings.step, "the sampling period", period)
 
 
-def _whole(engine: str, ratio: float, what: str, step: float, whole: str, length: float) -> None:
-    if ratio < 0.5 or abs(ratio - round(ratio)) > 1e-6 * max(1.0, ratio * 1e-3):
-        fitting = length / max(1, round(ratio))
-        raise Refused(engine, f"{what} {step:g} s does not divide {whole} {length:g} s; use for example {fitting:g} s")
+def _whole(engine: str, step: float, whole: str, length: float) -> None:
+    if not divides(step, length):
+        raise Refused(engine, f"the step {step:g} s does not divide {whole} {length:g} s; "
+                              f"use for example {fitting(step, length)} s")
 
 
 def guard(engine: str, times: np.ndarray, states: np.ndarray, duration: float, note: str = "") -> None:
