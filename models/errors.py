@@ -71,4 +71,4 @@ class Refused(InputError):
 
     def __init__(self, engine: str, why: str, file: str = "") -> None:
         self.engine, self.why = engine, why
-        super().__init__(file, engine, None, why)
+        super().__init__(file, f"engines.{engine}" if file else engine, None, why)

@@ -4,7 +4,8 @@ from importlib import import_module
 
 from models.assembly import Assembly, assemble
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import build, check as check_engine, settings_of
+from models.engines.protocol import build, settings_of
+from models.engines.protocol import check as check_engine
 from models.errors import Refused
 from models.scene import Scene, effect_names
 from models.simulate import state_names
@@ -31,7 +32,8 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
 def describe(scene: Scene) -> str:
     """The scene's plan as text: vehicle, states, effects, channels, and what each engine builds."""
     assembly = assemble(scene)
-    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"), _line("motion", _motion(scene, assembly))]
+    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
+    lines += [_line("motion", _motion(scene, assembly))]
     lines += _vehicle(scene, assembly) + _effects(scene)
     lines += [_line("channels", ", ".join(_channels(assembly))), "", *_engines(scene, assembly)]
     return "\n".join(lines)
@@ -59,7 +61,8 @@ def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:
     for spring in vehicle.pitch_springs:
         text = f"{spring.body:<12} {spring.stiffness:g} N m/rad, {spring.damping:g} N m s/rad, to the ground"
         lines.append(_line("  spring", text))
-    start = ", ".join(f"{name} {value:.4g}" for name, value in zip(state_names(), assembly.initial, strict=True) if value)
+    values = zip(state_names(), assembly.initial, strict=True)
+    start = ", ".join(f"{name} {value:.4g}" for name, value in values if value)
     return [*lines, _line("states", ", ".join(state_names())), _line("start", start or "all zero")]
 
 
@@ -83,7 +86,8 @@ def _engines(scene: Scene, assembly: Assembly) -> list[str]:
     """Table of what each engine builds, or why it refuses."""
     rows = [HEADINGS, *(_engine(scene, assembly, engine) for engine in CATALOGUE)]
     widths = [max(len(row[i]) for row in rows if len(row) > 2) for i in range(len(HEADINGS))]
-    return ["  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip() for row in rows]
+    padded = [[cell.ljust(width) for cell, width in zip(row, widths, strict=False)] for row in rows]
+    return ["  " + "  ".join(row).rstrip() for row in padded]
 
 
 def _engine(scene: Scene, assembly: Assembly, engine: str) -> tuple[str, ...]:

@@ -44,7 +44,7 @@ def _message(error: ValidationError, model: type[BaseModel], file: object, place
     keys = _keys(first)
     value = None if first["type"] == "missing" else first["input"]
     rest = [_dotted(place, _keys(found)) for found in others]
-    more = f"; and {len(rest)} more: {', '.join(rest[:5])}{', ...' if len(rest) > 5 else ''}" if rest else ""
+    more = f"; also wrong: {', '.join(rest[:5])}{', ...' if len(rest) > 5 else ''}" if rest else ""
     return InputError(file, _dotted(place, keys), value, _phrase(first, keys, _owner(model, keys)) + more)
 
 

@@ -1,23 +1,29 @@
 """The command ``twinrig``: list, show, run, validate."""
 
 import json
+import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.exceptions import TyperException
 
 SCENES = Path(__file__).parent / "scenes"
 ENGINES = ("reference", "exudyn", "mujoco")
 
 app = typer.Typer(
-    add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
+    add_completion=False, pretty_exceptions_enable=False,
     help="Ground vehicles built in Exudyn, in MuJoCo and by hand, held to closed forms and to one another.",
 )  # fmt: skip
 
 SceneName = Annotated[str, typer.Argument(help="A scene file, or the name of one from `twinrig list`.")]
-Changes = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key, e.g. run.step=5e-4.")]
+Changes = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key, e.g. run.step=5e-4; repeatable.")
+]
 Out = Annotated[Path | None, typer.Option(help="Folder for the results; it must be new or empty.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON and nothing else.")]
 
@@ -27,31 +33,49 @@ def main() -> None:
     from models.errors import InputError, RunFailed
 
     try:
-        app()
+        sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0)
+    except TyperException as error:  # what was typed does not fit the command's options
+        command = getattr(getattr(error, "ctx", None), "command_path", "twinrig")
+        _end(f"{error.format_message().rstrip('.')}; see `{command} --help`", 2)
     except InputError as error:
-        print(f"twinrig: {error}", file=sys.stderr)
-        sys.exit(2)
+        _end(str(error), 2)
     except RunFailed as error:
-        print(f"twinrig: the run failed: {error}", file=sys.stderr)
-        sys.exit(1)
-    except KeyboardInterrupt:
-        print("twinrig: interrupted; finished results are kept", file=sys.stderr)
-        sys.exit(130)
+        _end(f"the run failed: {error}", 1)
+    except MemoryError:
+        _end("the run failed: it does not fit into the memory of this machine; use a longer step or shorten it", 1)
+    except OSError as error:
+        _end(f"the results could not be written: {error}", 1)
+
+
+def _end(message: str, code: int) -> NoReturn:
+    print(f"twinrig: {message}", file=sys.stderr)
+    sys.exit(code)
 
 
 @app.command("list")
 def list_scenes() -> None:
     """List the scenes that come with twinrig, the effects, the parameter sets and the engines."""
     from models.engines.catalogue import CATALOGUE
-    from models.scene import _names, effect_names, load
+    from models.scene import effect_names, load, parameter_sets
 
-    print("scenes (twinrig run NAME, or a file of your own)")
-    for path in sorted(SCENES.glob("*.toml")):
-        print(f"  {path.stem:<22} {load(path).title}")
-    print("effects     " + ", ".join(effect_names()))
-    print("parameters  " + ", ".join(_names("parameters")))
-    for engine, integrators in CATALOGUE.items():
-        print(f"{engine:<11} {', '.join(integrators)}")
+    scenes = {path.stem: load(path).title for path in sorted(SCENES.glob("*.toml"))}
+    effects = {name: _first_sentence(f"models.effects.{name}") for name in effect_names()}
+    sets = {name: import_module(f"models.parameters.{name}").SOURCE for name in parameter_sets()}
+    _print_list("scenes (twinrig run NAME, or a file of your own)", scenes)
+    _print_list("effects ([effects.NAME] in a scene; one that is not named is not computed)", effects)
+    _print_list("parameter sets (vehicle.parameters = NAME, or a TOML file of your own)", sets)
+    _print_list("engines and their integrators (--engine NAME; [engines.NAME] integrator = ...)",
+                {name: ", ".join(integrators) for name, integrators in CATALOGUE.items()})
+
+
+def _first_sentence(module: str) -> str:
+    return (import_module(module).__doc__ or "").partition("\n")[0].rstrip(".")
+
+
+def _print_list(title: str, entries: dict[str, str]) -> None:
+    print(title)
+    for name, text in entries.items():
+        print(f"  {name:<18} {text}")
 
 
 @app.command()
@@ -90,15 +114,16 @@ def validate(
 
 
 def _load(name: str, changes: list[str] | None) -> Any:
-    """A built-in scene by its name, or a file."""
+    """A scene that comes with twinrig by its name, or a file; a file's name ends in .toml."""
     from models.errors import InputError
     from models.scene import load
 
-    builtin = SCENES / f"{name}.toml"
-    path = builtin if builtin.exists() else Path(name)
-    if not path.exists() and path.suffix != ".toml":
-        raise InputError("", "scene", name, "no such scene", tuple(p.stem for p in SCENES.glob("*.toml")))
-    return load(path, changes or ())
+    names = tuple(sorted(path.stem for path in SCENES.glob("*.toml")))
+    if name in names:
+        return load(SCENES / f"{name}.toml", changes or ())
+    if not name.endswith(".toml") and not os.path.lexists(name):
+        raise InputError("", "scene", name, "no such scene, and no such file", names)
+    return load(Path(name), changes or ())
 
 
 def _engines(name: str) -> tuple[str, ...]:
@@ -114,13 +139,18 @@ def _engines(name: str) -> tuple[str, ...]:
 def _finish(scene: Any, engines: tuple[str, ...], out: Path | None, as_json: bool) -> None:
     """Check everything, then run the scene's study with a progress bar and print its summary."""
     from models.plan import check
-    from studies.folders import new_folder
+    from studies.folders import drop_if_empty, new_folder
 
     module = _study(scene)
     check(scene, engines)
     folder = new_folder(out, Path(scene.file).stem)
-    with _progress(as_json) as progress:
-        summary = module.run(scene, engines, folder, progress)
+    try:
+        with _progress(as_json) as progress:
+            summary = module.run(scene, engines, folder, progress)
+    except KeyboardInterrupt:
+        _end(f"interrupted; finished results are kept in {folder}", 130)
+    finally:
+        drop_if_empty(folder)
     if as_json:
         print(json.dumps(summary, indent=1))
     else:
@@ -130,37 +160,37 @@ def _finish(scene: Any, engines: tuple[str, ...], out: Path | None, as_json: boo
 
 
 def _study(scene: Any) -> Any:
+    """The study's module, once the scene's options are known to be its own."""
     from models.errors import InputError
+    from models.strict import read
 
     names = tuple(sorted(path.stem for path in SCENES.parent.glob("*.py") if path.stem not in NOT_STUDIES))
     if scene.study not in names:
         raise InputError(scene.file, "study", scene.study, "no such study", names)
-    return import_module(f"studies.{scene.study}")
+    module = import_module(f"studies.{scene.study}")
+    if hasattr(module, "Options"):
+        read(module.Options, scene.options, scene.file, "options")
+    elif scene.options:
+        place, value = next(iter(scene.options.items()))
+        raise InputError(scene.file, f"options.{place}", value, f"the study {scene.study!r} takes no options")
+    return module
 
 
 NOT_STUDIES = ("__init__", "command_line", "figures", "folders")
 
 
-class _progress:  # noqa: N801 - used like a function
+@contextmanager
+def _progress(silent: bool) -> Iterator[Any]:
     """A progress bar on the terminal; silent where nobody looks."""
+    if silent or not sys.stderr.isatty():
+        yield lambda text, part: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
 
-    def __init__(self, silent: bool) -> None:
-        self.silent = silent
-
-    def __enter__(self) -> Any:
-        if self.silent or not sys.stderr.isatty():
-            return lambda text, part: None
-        from rich.console import Console
-        from rich.progress import Progress
-
-        self.bar = Progress(console=Console(stderr=True), transient=True)
-        self.bar.__enter__()
-        task = self.bar.add_task("", total=1.0)
-        return lambda text, part: self.bar.update(task, description=text, completed=part)
-
-    def __exit__(self, *error: object) -> None:
-        if hasattr(self, "bar"):
-            self.bar.__exit__(*error)
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda text, part: bar.update(task, description=text, completed=part)
 
 
 def _print(summary: dict[str, Any]) -> None:

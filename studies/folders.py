@@ -1,5 +1,7 @@
 """Where results go: a new folder each time, so that nothing earlier is overwritten or lost."""
 
+from collections.abc import Iterator
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
 
@@ -13,14 +15,24 @@ def new_folder(wanted: Path | None, name: str) -> Path:
     """
     if wanted is None:
         return _make(next(path for path in _candidates(name) if not path.exists()))
-    if wanted.exists() and not wanted.is_dir():
-        raise InputError("--out", "", str(wanted), "is a file: name a folder")
-    if wanted.exists() and any(wanted.iterdir()):
-        raise InputError("--out", "", str(wanted), "holds files already and is left as it is: name a new or empty folder")
+    try:
+        if wanted.exists() and not wanted.is_dir():
+            raise InputError("--out", "", str(wanted), "is a file: name a folder")
+        if wanted.exists() and any(wanted.iterdir()):
+            allowed = "holds files already and is left as it is: name a new or empty folder"
+            raise InputError("--out", "", str(wanted), allowed)
+    except OSError as error:
+        raise InputError("--out", "", str(wanted), f"cannot be used: {error.strerror}") from None
     return _make(wanted)
 
 
-def _candidates(name: str):
+def drop_if_empty(folder: Path) -> None:
+    """Leave no trace of a run that saved nothing."""
+    with suppress(OSError):
+        folder.rmdir()
+
+
+def _candidates(name: str) -> Iterator[Path]:
     yield Path("results") / name
     for i in count(2):
         yield Path("results") / f"{name}-{i}"

@@ -55,8 +55,9 @@ def _check_keys(file: str, p: Parameters) -> None:
     given = [name for name in type(p).model_fields if name not in ("source", "speed") and getattr(p, name) is not None]
     for name in given:
         if name not in OWN[p.source]:
+            own = ", ".join(("speed", *OWN[p.source]))
             raise InputError(file, f"effects.road.{name}", getattr(p, name),
-                             f"has no meaning for source = {p.source!r}, which takes {', '.join(OWN[p.source]) or 'none'}")
+                             f"has no meaning for source = {p.source!r}, which takes {own}")
     for name in NEEDED.get(p.source, ()):
         if name not in given:
             raise InputError(file, f"effects.road.{name}", None, f"missing: source = {p.source!r} needs it: "

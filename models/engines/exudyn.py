@@ -15,7 +15,6 @@ import numpy as np
 from models.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, Trajectory, guard
-from models.errors import RunFailed
 from models.vehicles.description import PitchSpring, Point, Strut
 from models.vehicles.linear import matrices
 
