@@ -47,7 +47,7 @@ class RunTable(Strict):
     """[run]: how long, and how finely."""
 
     duration: float = quantity("s", "length of the run")
-    step: float = quantity("s", "step of fixed-step integrators", default=1e-3)
+    step: float = quantity("s", "step of fixed-step integrators", default=2.5e-4)
     output_step: float | None = quantity("s", "spacing of the saved results, a multiple of the step", default=None)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import make_interp_spline
 
 Interpolation = Literal["held", "linear", "smooth"]
 
@@ -94,13 +94,14 @@ class Smooth:
     derivatives: int = 0
     held: bool = False
     degree: int = 3
-    _pieces: tuple[BSpline, ...] = field(init=False, repr=False, compare=False)
+    _pieces: np.ndarray = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         times = self.period * np.arange(len(self.values))
         spline = make_interp_spline(times, self.values, k=self.degree)
-        pieces = tuple(spline.derivative(i) if i else spline for i in range(self.derivatives + 1))
-        object.__setattr__(self, "_pieces", pieces)
+        powers = [spline.derivative(i)(times[:-1]) if i else self.values[:-1] for i in range(self.degree + 1)]
+        pieces = np.stack([values / math.factorial(i) for i, values in enumerate(powers)])
+        object.__setattr__(self, "_pieces", np.ascontiguousarray(pieces))
 
     @property
     def channels(self) -> int:
@@ -114,8 +115,9 @@ class Smooth:
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values and derivatives at start + i step, shape (count, channels)."""
-        times = np.clip(start + step * np.arange(count), 0.0, self.end)
-        return np.hstack([piece(times) for piece in self._pieces])
+        from models.piecewise import evaluate
+
+        return evaluate(self._pieces, self.period, start, step, count, self.derivatives)
 
     def at(self, time: float) -> np.ndarray:
         """Values and derivatives at one time (s), shape (channels,)."""

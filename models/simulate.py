@@ -97,6 +97,9 @@ def _forces(assembly: Assembly, run: Trajectory, inputs: np.ndarray | None) -> C
         "f3": ("N", "front suspension force, compression", f3), "f4": ("N", "rear suspension force, compression", f4),
         "suspension_moment": ("N m", "pitch moment of the suspension on the chassis, nose up", moment),
     }  # fmt: skip
+    if assembly.mode == "road" and inputs is not None:
+        channels["zeta1"] = ("m", "road under the front wheel, down", inputs[:, 0])
+        channels["zeta2"] = ("m", "road under the rear wheel, down", inputs[:, 1])
     if run.moment is not None and inputs is not None:
         channels["inertia_term"] = ("N m", "I beta''", p.I * inputs[:, 4])
         channels["enforced_moment"] = ("N m", "moment that the prescribed pitch takes", run.moment)

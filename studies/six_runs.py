@@ -177,7 +177,7 @@ def _figure_measurement(measured: Result) -> Any:
 
     figure, axes = plt.subplots(2, 2, figsize=(10, 5), width_ratios=(2, 1))
     detail = (measured.times >= 20) & (measured.times <= 21)
-    for row, (channels, label, scale) in enumerate(((("z1", "z2"), "wheel heave, up [m]", -1.0),
+    for row, (channels, label, scale) in enumerate(((("zeta1", "zeta2"), "road under the wheels, up [m]", -1.0),
                                                     (("f1", "f2"), "wheel force [kN]", 1e-3))):
         for channel, name in zip(channels, ("front", "rear"), strict=True):
             axes[row, 0].plot(measured.times, scale * measured[channel], label=name, linewidth=0.7)
@@ -204,7 +204,7 @@ def _figure_drift(results: dict[str, Result], title: str) -> Any:
     axes[1].set_ylim(-1, 1)
     for axis in axes:
         axis.set_xlabel("time [s]")
-    axes[1].legend(loc="lower left", fontsize=8.5)
+    figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=len(results), fontsize=8.5)
     figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
     return figure
 

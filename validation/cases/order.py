@@ -1,0 +1,73 @@
+"""Observed order of convergence of every fixed-step family on the study road."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.engines.protocol import Settings
+from models.simulate import simulate
+from validation.rows import Row, Table, within
+from validation.scenes import road_scene
+
+TITLE = "Observed order of the largest state error over the first 2 s on the study road"
+SYSTEM = "pitch-plane"
+DURATION = 2.0
+GRID = 1e-3
+"""Coarse grid (s) on which all runs are compared."""
+
+FAMILIES = (
+    ("reference", "RK4", {}, 4.0, 0.15),
+    ("exudyn", "RK44", {}, 4.0, 0.15),
+    ("mujoco", "RK4", {}, 4.0, 0.15),
+    ("exudyn", "GeneralizedAlpha", {"spectral_radius": 0.6}, 2.0, 0.1),
+    ("exudyn", "GeneralizedAlpha", {"spectral_radius": 0.9}, 2.0, 0.1),
+    ("exudyn", "TrapezoidalIndex2", {}, 2.0, 0.1),
+    ("exudyn", "ExplicitMidpoint", {}, 2.0, 0.15),
+    ("exudyn", "RK33", {}, 3.0, 0.15),
+    ("exudyn", "ExplicitEuler", {}, 1.0, 0.1),
+    ("exudyn", "VelocityVerlet", {}, 1.0, 0.1),
+    ("mujoco", "Euler", {}, 1.0, 0.1),
+    ("mujoco", "implicit", {}, 1.0, 0.1),
+    ("mujoco", "implicitfast", {}, 1.0, 0.1),
+    ("mujoco", "discrete", {}, 1.0, 0.1),
+)
+STEPS = (5e-4, 2.5e-4, 1.25e-4, 6.25e-5)
+WHY = "two or three halvings inside the asymptotic range; the band leaves room for the next term of the error"
+
+
+def errors(engine: str, integrator: str, options: dict[str, float], truth: np.ndarray,
+           steps: tuple[float, ...]) -> list[float]:  # fmt: skip
+    """Largest state error at each step, on the common grid."""
+    found = []
+    for step in steps:
+        run = simulate(road_scene(step=step, duration=DURATION), engine,
+                       Settings(integrator, step, DURATION, **options))
+        found.append(float(np.abs(run.states[:: round(GRID / step)] - truth).max()))
+    return found
+
+
+def fitted(steps: tuple[float, ...], found: list[float]) -> float:
+    """Slope of log error over log step by least squares."""
+    return float(np.polyfit(np.log(steps), np.log(found), 1)[0])
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """A row per family; the reference solution is DOP853 at a tolerance of 1e-13."""
+    truth = simulate(road_scene(step=GRID, duration=DURATION), "reference", Settings("DOP853", GRID, DURATION, 1e-13)).states
+    steps = STEPS[:3] if quick else STEPS
+    rows, table = [], []
+    for engine, integrator, options, order, band in FAMILIES:
+        found = errors(engine, integrator, options, truth, steps)
+        name = " ".join([integrator, *(f"{value:g}" for value in options.values())])
+        rows.append(within(f"order.{engine}.{name}", SYSTEM, f"order of {name} in {engine}", fitted(steps, found), "",
+                           order, band, WHY, "closed form"))
+        table.append([engine, name, *found])
+    return rows, {"table": table, "steps": steps}
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Largest state error by step."""
+    heads = ("engine", "integrator", *(f"{1e3 * step:g} ms" for step in data["steps"]))
+    rows = tuple((engine, name, *(f"{value:.2e}" for value in found)) for engine, name, *found in data["table"])
+    return [Table(TITLE, "Largest error of any state (m, rad, m/s, rad/s). Equal rows are the same method.", heads, rows)]

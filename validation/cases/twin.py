@@ -1,0 +1,62 @@
+"""Twin test: same tableau, same step, native elements against the hand-written equations."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from models.result import Result
+from models.scene import Scene
+from models.simulate import simulate
+from validation.rows import Row, at_most, not_run
+from validation.scenes import COURSE, VEHICLES, data_folder, force_scene, gap, road_scene, write_forces
+
+TITLE = "Same tableau and step: whole paths against the reference"
+SYSTEM = "pitch-plane"
+STEPS = (2e-3, 1e-3, 5e-4)
+BOUND = 1e-12
+WHY = "RK4 with the same stages differs only by the order of additions: 1e-16 a step over at most 20,000 steps"
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows per road, excitation, vehicle and engine; each is the worst over the three steps."""
+    rows: list[Row] = []
+    for parameters in VEHICLES:
+        rows += _compare(f"study road, {parameters}", [road_scene(parameters, step) for step in STEPS])
+        rows += _forces(parameters, "study road", simulate(road_scene(parameters, 5e-4, 2.1), "reference"))
+        rows += _course(parameters)
+    return rows, {}
+
+
+def _forces(parameters: str, where: str, measured: Result) -> list[Row]:
+    """Force-excited by the wheel forces of a road-excited run, the samples held and linear."""
+    with TemporaryDirectory() as name:
+        write_forces(measured, Path(name), 2e-3)
+        rows = []
+        for interpolation in ("held", "linear"):
+            scenes = [force_scene(Path(name), parameters, step, 2.0, interpolation) for step in STEPS]
+            rows += _compare(f"{interpolation} wheel forces of the {where}, {parameters}", scenes)
+        return rows
+
+
+def _course(parameters: str) -> list[Row]:
+    """The measured course, 500 m at 20 m/s, and force-excited by the forces found there."""
+    data = data_folder()
+    if data is None or not (data / COURSE).exists():
+        return [not_run(f"twin.course.{parameters}", SYSTEM, f"paths on the measured course, {parameters}",
+                        "TWINRIG_DATA names no folder with the measured course")]
+    road = {"source": "opencrg", "file": COURSE, "speed": 50.0, "beyond_end": "refused"}
+    scenes = [road_scene(parameters, step, 10.0, road, data) for step in STEPS]
+    measured = simulate(scenes[-1], "reference")
+    rough = Result(measured.data.isel(time=slice(10_000, None)).assign_coords(time=measured.data.time[:-10_000]))
+    return _compare(f"measured course, {parameters}", scenes) + _forces(parameters, "measured course", rough)
+
+
+def _compare(what: str, scenes: list[Scene]) -> list[Row]:
+    """Rows of both engines: the largest difference to the reference over all scenes."""
+    rows = []
+    for engine in ("exudyn", "mujoco"):
+        worst = max(gap(simulate(scene, engine), simulate(scene, "reference")) for scene in scenes)
+        steps = ", ".join(f"{1e3 * step:g}" for step in STEPS)
+        rows.append(at_most(f"twin.{engine}.{what}", SYSTEM, f"states, {engine} against reference, RK4 at {steps} ms, {what}",
+                            worst, "m, rad, m/s, rad/s", BOUND, WHY, "native"))
+    return rows
