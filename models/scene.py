@@ -38,8 +38,8 @@ def parameter_sets() -> tuple[str, ...]:
 class VehicleTable(Strict):
     """[vehicle]: a published parameter set or the user's own file, with overrides."""
 
-    parameters: str = Field("itwm_drift", description="a parameter set, or a TOML file with one")
-    geometry: Geometry = Field("exact", description="sin and cos of pitch, or linearised")
+    parameters: str = Field(default="itwm_drift", description="a parameter set, or a TOML file with one")
+    geometry: Geometry = Field(default="exact", description="sin and cos of pitch, or linearised")
     override: dict[str, float] = Field(default_factory=dict, description="parameters that differ from the set")
 
 
@@ -54,10 +54,10 @@ class RunTable(Strict):
 class EngineTable(Strict):
     """[engines.NAME]: settings that differ from the recommended ones."""
 
-    integrator: str | None = Field(None, description="name of an integrator of this engine")
+    integrator: str | None = Field(default=None, description="name of an integrator of this engine")
     step: float | None = quantity("s", "step for this engine alone", default=None)
     tolerance: float = quantity("", "relative tolerance of adaptive integrators", default=1e-9)
-    spectral_radius: float = Field(0.6, ge=0, le=1, description="of generalised-alpha at infinite frequency")
+    spectral_radius: float = Field(default=0.6, ge=0, le=1, description="of generalised-alpha at infinite frequency")
 
 
 class Scene(Strict):
@@ -65,15 +65,15 @@ class Scene(Strict):
 
     title: str = Field(description="what the scene shows")
     system: Literal["pitch-plane"] = "pitch-plane"
-    study: str = Field("single_run", description="the study that runs the scene")
+    study: str = Field(default="single_run", description="the study that runs the scene")
     vehicle: VehicleTable = VehicleTable()
     run: RunTable = Field(description="table with at least the duration")
     start: dict[str, float] = Field(default_factory=dict, description="initial states beside the static equilibrium")
     effects: dict[str, Any] = Field(default_factory=dict, description="the effects of the scene, a table each")
     engines: dict[str, EngineTable] = Field(default_factory=dict)
     options: dict[str, Any] = Field(default_factory=dict, description="options of the study")
-    file: str = Field("", exclude=True)
-    folder: str = Field(".", exclude=True)
+    file: str = Field(default="", exclude=True)
+    folder: str = Field(default=".", exclude=True)
 
     def vehicle_parameters(self) -> pitch_plane.Parameters:
         """The parameter set with the scene's overrides; each is judged under its own file's name."""

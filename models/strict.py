@@ -17,9 +17,8 @@ class Strict(BaseModel):
 
 def quantity(unit: str, meaning: str, *, default: Any = ..., zero: bool = False, signed: bool = False) -> Any:
     """Field of a physical quantity in SI: positive, or from zero on, or of either sign."""
-    bound: dict[str, float] = {} if signed else {"ge": 0} if zero else {"gt": 0}
-    extra = {"unit": unit}
-    return Field(default, description=meaning, json_schema_extra=extra, **bound)  # type: ignore[arg-type]
+    above, least = (None, None) if signed else (None, 0) if zero else (0, None)
+    return Field(default, description=meaning, json_schema_extra={"unit": unit}, gt=above, ge=least)
 
 
 Model = TypeVar("Model", bound=BaseModel)

@@ -94,4 +94,6 @@ def _measured(scene: Any, p: Parameters, distance: float) -> Any:
         from models.road.csv_road import read_csv_road
 
         raw = read_csv_road(path, track)
-    return run_in(continued(raw, str(p.beyond_end), distance, path), length)
+    longer = continued(raw, str(p.beyond_end), distance, path)
+    assert isinstance(longer, type(raw))
+    return run_in(longer, length)
