@@ -47,11 +47,11 @@ def _exact(assembly: Assembly) -> Build:
     for body in assembly.vehicle.bodies:
         if body.pitch_inertia is None:
             node = mbs.AddNode(items.NodePoint2D())
-            bodies[body.name] = mbs.AddObject(items.MassPoint2D(nodeNumber=node, physicsMass=body.mass))
+            bodies[body.name] = mbs.AddObject(items.MassPoint2D(nodeNumber=node, mass=body.mass))
         else:
             node = mbs.AddNode(items.NodeRigidBody2D())
             bodies[body.name] = mbs.AddObject(
-                items.RigidBody2D(nodeNumber=node, physicsMass=body.mass, physicsInertia=body.pitch_inertia)
+                items.RigidBody2D(nodeNumber=node, mass=body.mass, inertia=body.pitch_inertia)
             )
             built.places[body.name, "pitch"] = _marker(mbs, node, 2)
         built.nodes[body.name] = node

@@ -1,6 +1,9 @@
 """The hand-written reference: the paper's equations, a compiled fixed-step Runge-Kutta, scipy's adaptive solvers."""
 
+import zlib
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -11,14 +14,27 @@ from models.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, Trajectory, guard
 from models.errors import RunFailed
+from models.vehicles import pitch_plane_equations
 from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, pitch_spring
 
 NO_INPUT = np.zeros((1, 4))
 """The flat road."""
+EQUATIONS = zlib.crc32(Path(pitch_plane_equations.__file__).read_bytes())
+"""Checksum of the equations' source."""
 
 
-def _compile_fixed(rhs):
-    @njit(cache=True)
+def _compiled(function: Any, key: tuple) -> Any:
+    """Compile a closure with a cache file of its own.
+
+    Closures of one factory would share numba's index, and two processes that compile different ones at the
+    same time can then each load the other's machine code. Nor does numba see when the equations change, which
+    stand in another file; so the name of the cache file carries their checksum.
+    """
+    function.__qualname__ = "_".join([function.__name__, *(str(part) for part in key), f"{EQUATIONS:08x}"])
+    return njit(cache=True)(function)
+
+
+def _compile_fixed(rhs, key):
     def march(y, step, count, inputs, rows, p, states):
         """Classical Runge-Kutta; ``rows`` says where the middle, the end and the next step's input lie."""
         k1, k2, k3, k4 = np.empty(8), np.empty(8), np.empty(8), np.empty(8)
@@ -42,17 +58,16 @@ def _compile_fixed(rhs):
                 y[j] += step / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j])
             states[i + 1] = y
 
-    return march
+    return _compiled(march, key)
 
 
-def _compile_single(rhs):
-    @njit(cache=True)
+def _compile_single(rhs, key):
     def derivative(y, u, p):
         dy, copy = np.empty(8), y.copy()
         rhs(copy, u, p, dy)
         return dy
 
-    return derivative
+    return _compiled(derivative, key)
 
 
 def _sum(rhs, moment):
@@ -175,8 +190,8 @@ class Reference:
         return p.I * (inputs[:, 4] - without)
 
 
-_FIXED: dict[tuple, object] = {}
-_SINGLE: dict[tuple, object] = {}
+_FIXED: dict[tuple, Any] = {}
+_SINGLE: dict[tuple, Any] = {}
 
 
 def _right_hand_side(mode: str, geometry: str, spring: bool):
@@ -188,7 +203,7 @@ def march_of(mode: str, geometry: str, spring: bool = False):
     """The compiled fixed-step solver of one mode, made when first asked for."""
     key = (mode, geometry, spring)
     if key not in _FIXED:
-        _FIXED[key] = _compile_fixed(_right_hand_side(*key))
+        _FIXED[key] = _compile_fixed(_right_hand_side(*key), key)
     return _FIXED[key]
 
 
@@ -196,7 +211,7 @@ def derivative_of(mode: str, geometry: str, spring: bool = False):
     """The compiled right-hand side of one mode, made when first asked for: (y, u, p) -> dy (8,)."""
     key = (mode, geometry, spring)
     if key not in _SINGLE:
-        _SINGLE[key] = _compile_single(_right_hand_side(*key))
+        _SINGLE[key] = _compile_single(_right_hand_side(*key), key)
     return _SINGLE[key]
 
 

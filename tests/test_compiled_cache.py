@@ -1,0 +1,38 @@
+"""Compiled kernels: each has a cache file of its own, and a change of the equations makes a new one."""
+
+import subprocess
+import sys
+
+from models.engines.reference import derivative_of, march_of
+
+MODES = (("road", "exact", False), ("road", "linear", False), ("force", "exact", False), ("force-body", "exact", False))
+
+
+def test_no_two_kernels_share_a_cache_file():
+    names = [make(*mode)._cache._impl.filename_base for make in (march_of, derivative_of) for mode in MODES]
+    assert len(set(names)) == len(names)
+
+
+def test_a_change_of_the_equations_is_seen(tmp_path):
+    """Copy the package, run, change a sign in the equations, run again: the answer must change."""
+    import shutil
+    from pathlib import Path
+
+    import models
+
+    copy = tmp_path / "models"
+    shutil.copytree(Path(models.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    script = (
+        "import numpy as np; from models.engines.reference import derivative_of; "
+        "from models.parameters.itwm_drift import PARAMETERS as p; "
+        "print(derivative_of('road', 'exact')(np.full(8, 0.1), np.zeros(4), p.array())[7])"
+    )
+
+    def answer():
+        done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=True)
+        return float(done.stdout)
+
+    first, again = answer(), answer()
+    equations = copy / "vehicles" / "pitch_plane_equations.py"
+    equations.write_text(equations.read_text().replace("p[1] * f3 - p[0] * f4", "p[1] * f3 + p[0] * f4"))
+    assert first == again and answer() != first

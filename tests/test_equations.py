@@ -1,0 +1,126 @@
+"""The hand-written equations against the paper's matrices, and against what must hold of any vehicle."""
+
+import numpy as np
+import pytest
+
+from models.engines.reference import derivative_of
+from models.parameters import asymmetric_twin, itwm_drift
+from models.vehicles.linear import matrices
+from models.vehicles.pitch_plane import describe, equilibrium
+
+SETS = {"itwm_drift": itwm_drift.PARAMETERS, "asymmetric_twin": asymmetric_twin.PARAMETERS}
+RANDOM = np.random.default_rng(7)
+
+
+@pytest.fixture(params=SETS)
+def p(request):
+    return SETS[request.param]
+
+
+def paper_matrix(p, beta):
+    """M (diagonal) and A of M x' = A x + F, typed from eq. (37), without the contact points."""
+    s, c = (np.sin(beta) / beta if beta else 1.0), np.cos(beta)
+    k1, k3, k4, d1, d3, d4, a, b = p.k1, p.k3, p.k4, p.d1, p.d3, p.d4, p.a, p.b
+    del k1, d1
+    stiff = np.array([
+        [-k3, 0, k3, -b * k3 * s], [0, -k4, k4, a * k4 * s], [k3, k4, -k3 - k4, (b * k3 - a * k4) * s],
+        [-b * k3 * c, a * k4 * c, (b * k3 - a * k4) * c, (-b * b * k3 - a * a * k4) * s * c],
+    ])  # fmt: skip
+    damp = np.array([
+        [-d3, 0, d3, -b * d3 * c], [0, -d4, d4, a * d4 * c], [d3, d4, -d3 - d4, (b * d3 - a * d4) * c],
+        [-b * d3 * c, a * d4 * c, (b * d3 - a * d4) * c, (-b * b * d3 - a * a * d4) * c * c],
+    ])  # fmt: skip
+    return np.array([p.m1, p.m2, p.m3, p.I]), stiff, damp
+
+
+def test_force_excitation_is_equation_37(p):
+    for _ in range(50):
+        y, f = RANDOM.uniform(-0.7, 0.7, 8), RANDOM.uniform(-1e4, 1e4, 2)
+        mass, stiff, damp = paper_matrix(p, y[3])
+        load = np.array([p.m1 * p.g - f[0], p.m2 * p.g - f[1], p.m3 * p.g, 0.0])
+        expected = (stiff @ y[:4] + damp @ y[4:] + load) / mass
+        found = derivative_of("force", "exact")(y, f, p.array())
+        assert np.allclose(found[:4], y[4:], rtol=0, atol=0)
+        # 1e-12 of the largest: a dozen products of doubles
+        assert np.abs(found[4:] - expected).max() <= 1e-12 * np.abs(expected).max()
+
+
+def test_road_excitation_is_equation_38(p):
+    for _ in range(50):
+        y, u = RANDOM.uniform(-0.7, 0.7, 8), RANDOM.uniform(-1, 1, 4)
+        mass, stiff, damp = paper_matrix(p, y[3])
+        stiff[0, 0] -= p.k1
+        stiff[1, 1] -= p.k2
+        damp[0, 0] -= p.d1
+        damp[1, 1] -= p.d2
+        load = np.array([p.m1 * p.g + p.k1 * u[0] + p.d1 * u[2], p.m2 * p.g + p.k2 * u[1] + p.d2 * u[3], p.m3 * p.g, 0.0])
+        expected = (stiff @ y[:4] + damp @ y[4:] + load) / mass
+        found = derivative_of("road", "exact")(y, u, p.array())[4:]
+        assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
+
+
+def test_prescribed_pitch_is_equation_39_with_its_third_row_repaired(p):
+    for _ in range(50):
+        y, f = RANDOM.uniform(-0.7, 0.7, 8), RANDOM.uniform(-1e4, 1e4, 2)
+        beta, rate, second = RANDOM.uniform(-0.7, 0.7, 3)
+        s, c = np.sin(beta), np.cos(beta)
+        z, w = y[:3], y[4:7]
+        rows = np.array([
+            [-p.k3, 0, p.k3], [0, -p.k4, p.k4], [p.k3, p.k4, -p.k3 - p.k4]]) @ z + np.array([
+            [-p.d3, 0, p.d3], [0, -p.d4, p.d4], [p.d3, p.d4, -p.d3 - p.d4]]) @ w  # fmt: skip
+        load = np.array([
+            p.m1 * p.g - f[0] - p.k3 * p.b * s - p.d3 * p.b * rate * c,
+            p.m2 * p.g - f[1] + p.k4 * p.a * s + p.d4 * p.a * rate * c,
+            p.m3 * p.g + (p.k3 * p.b - p.k4 * p.a) * s + (p.d3 * p.b - p.d4 * p.a) * rate * c,
+        ])  # fmt: skip
+        expected = (rows + load) / np.array([p.m1, p.m2, p.m3])
+        u = np.array([*f, beta, rate, second])
+        found = derivative_of("pitch", "exact")(y, u, p.array())
+        assert np.abs(found[4:7] - expected).max() <= 1e-12 * np.abs(expected).max()
+        assert found[7] == second
+
+
+def test_linear_geometry_is_the_linearisation(p):
+    mass, damping, stiffness = matrices(describe(p, "linear"))
+    for _ in range(20):
+        y = RANDOM.uniform(-0.5, 0.5, 8)
+        weight = p.g * np.array([p.m1, p.m2, p.m3, 0.0])
+        expected = np.linalg.solve(mass, weight - stiffness @ y[:4] - damping @ y[4:])
+        found = derivative_of("road", "linear")(y, np.zeros(4), p.array())[4:]
+        assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("geometry", ["exact", "linear"])
+def test_static_equilibrium_is_at_rest(p, geometry):
+    y = equilibrium(p, geometry)
+    rest = derivative_of("road", geometry)(y, np.zeros(4), p.array())
+    # forces of some kN on 15 kg cancel to their last digits
+    assert np.abs(rest).max() < 1e-10
+
+
+def test_equilibrium_of_the_published_vehicle():
+    # by hand: 7651.8 N over two tyres of 2e5 N/m, chassis 3678.75 N a spring; printed figures 0.0191295, 0.0559170
+    assert equilibrium(itwm_drift.PARAMETERS)[:4] == pytest.approx([0.0191295, 0.0191295, 0.055917, 0.0], abs=1e-9)
+
+
+def test_body_fixed_forces_have_no_cosine_in_their_moment(p):
+    """Without wheel mass and gravity the pitch row of body-fixed forces is b f1 - a f2 at every angle."""
+    light = p.model_copy(update={"m1": 1e-9, "m2": 1e-9, "g": 0.0})
+    f = np.array([5000.0, 3000.0])
+    for beta in (0.0, 0.3, -0.6):
+        # with weightless wheels at rest the struts carry f cos(beta) each
+        y = np.zeros(8)
+        y[3] = beta
+        y[0] = -p.b * np.sin(beta) - f[0] * np.cos(beta) / p.k3
+        y[1] = p.a * np.sin(beta) - f[1] * np.cos(beta) / p.k4
+        found = derivative_of("force-body", "exact")(y, f, light.array())[7] * p.I
+        assert found == pytest.approx(p.b * f[0] - p.a * f[1], rel=1e-12)
+
+
+def test_a_nose_up_moment_lifts_the_front(p):
+    """More force at the front wheel than at the rear one pitches the nose up (positive)."""
+    y = equilibrium(p)
+    y[0] += 0.01
+    assert derivative_of("force", "exact")(y, np.array([p.k1 * y[0], p.k2 * y[1]]), p.array())[7] < 0
+    y[0] -= 0.02
+    assert derivative_of("force", "exact")(y, np.array([p.k1 * y[0], p.k2 * y[1]]), p.array())[7] > 0
