@@ -1,0 +1,56 @@
+"""The README's two commands are the ones that CI runs, and what it lists exists."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+
+
+def commands():
+    return [block.strip() for block in re.findall(r"```\n(.*?)```", README, flags=re.DOTALL)]
+
+
+def test_both_commands_are_what_ci_runs_tests_first():
+    main, tests = commands()
+    assert main.endswith("twinrig validate --quick") and tests.endswith("python -m pytest")
+    lines = (ROOT / ".ci" / "run").read_text().splitlines()
+    assert lines.index(tests) < lines.index(main)
+
+
+def test_every_study_is_listed_with_its_duration_and_run_by_ci():
+    ci = (ROOT / ".ci" / "run").read_text()
+    not_studies = {"__init__", "command_line", "figures", "folders"}
+    for path in (ROOT / "studies").glob("*.py"):
+        if path.stem not in not_studies:
+            row = next(line for line in README.splitlines() if f"studies/{path.name}" in line)
+            assert re.search(r"\d+ (s|min) \|$", row), row
+            assert path.stem in ci
+
+
+def test_every_effect_and_folder_is_listed():
+    from models.scene import effect_names
+
+    for name in effect_names():
+        assert f"| `{name}` |" in README
+    for folder in ("models", "studies", "validation", "tests"):
+        assert f"| `{folder}/` |" in README and (ROOT / folder).is_dir()
+
+
+def test_the_scene_of_the_readme_is_a_valid_scene(tmp_path):
+    import tomllib
+
+    from models.scene import build
+
+    table = tomllib.loads(re.search(r"```toml\n(.*?)```", README, flags=re.DOTALL).group(1))
+    assert set(build(table, "README.md", tmp_path).effects) == {"road"}
+
+
+def test_the_figure_of_the_readme_is_there():
+    for name in re.findall(r"!\[.*?\]\((.*?)\)", README):
+        assert (ROOT / name).stat().st_size < 400_000
+
+
+def test_the_constraints_are_plain_pins():
+    for line in (ROOT / ".ci" / "constraints.txt").read_text().splitlines():
+        assert re.fullmatch(r"[A-Za-z0-9_.-]+==[A-Za-z0-9_.]+", line), line
