@@ -127,13 +127,13 @@ def _impulse(assembly: Assembly, settings: Settings) -> np.ndarray:
 
 
 def moment_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
-    """Largest difference of the enforced pitch moment to the eliminated form, relative to its rms."""
+    """Rms difference of the enforced pitch moment to the eliminated form, relative to its rms."""
     found = run(make, assembly, settings)
     if found is None or found.moment is None:
         return float("inf")
     hand = engine("reference")(assembly, _by_hand(settings)).run().moment
     assert hand is not None
-    return float(np.abs(found.moment - hand).max() / np.sqrt(np.mean(hand**2)))
+    return float(np.sqrt(np.mean((found.moment - hand) ** 2) / np.mean(hand**2)))
 
 
 def _by_hand(settings: Settings) -> Settings:

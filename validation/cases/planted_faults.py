@@ -1,0 +1,140 @@
+"""Planted faults: whether the checks see what they are there to see, on both vehicles."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+from validation.fault_bench import CHECKS, Bench, size
+from validation.planted_faults import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, Fault, planted
+from validation.rows import Row, Table, finding, within
+
+TITLE = "Planted faults: what each check sees"
+SYSTEM = "pitch-plane"
+TWIN, SYMMETRIC = "asymmetric_twin", "itwm_drift"
+DURATION, QUICK_DURATION = 0.4, 0.1
+HIDDEN = ("a and b swapped", "front and rear suspension swapped", "front and rear tyre swapped",
+          "front and rear wheel mass swapped", "chassis row of eq. (39) with the other sign")  # fmt: skip
+"""What a vehicle with equal halves cannot show: exchanges of the halves, and terms in k3 b - k4 a."""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Every fault on both vehicles under every check; ``quick`` shortens the runs, it leaves no fault out."""
+    benches = [Bench(name, QUICK_DURATION if quick else DURATION) for name in (TWIN, SYMMETRIC)]
+    clean = [_record(fault, benches) for fault in CLEAN]
+    found = [_record(fault, benches) for fault in FAULTS]
+    return _rows(clean, found), {"clean": clean, "faults": found}
+
+
+def _record(fault: Fault, benches: list[Bench]) -> dict[str, Any]:
+    """Size over tolerance of every check, by vehicle and engine; None stands for a refused or failed run."""
+    ratios = {
+        bench.parameters: {engine: {name: _ratio(fault, engine, name, bench) for name in CHECKS} for engine in fault.engines}
+        for bench in benches
+    }
+    return {"fault": fault.name, "place": _place(fault), "engines": fault.engines, "ratios": ratios}
+
+
+def _ratio(fault: Fault, engine: str, name: str, bench: Bench) -> float | None:
+    check = CHECKS[name]
+    found = size(check, bench, engine, planted(fault, engine)) / check.tolerance(engine)
+    return found if math.isfinite(found) else None
+
+
+def _place(fault: Fault) -> str:
+    places = {"description": DESCRIPTION, "input": INPUT, "adapter": ADAPTER, "equations": EQUATIONS}
+    return next((name for name, group in places.items() if fault in group), "nowhere")
+
+
+def seen(record: dict[str, Any], check: str, vehicle: str = TWIN) -> bool:
+    """Whether a check sees the fault in every engine that it was planted in."""
+    return all(ratio is None or ratio > 1 for ratio in _of(record, check, vehicle))
+
+
+def least(record: dict[str, Any], check: str, vehicle: str) -> float:
+    """Smallest size over tolerance among the engines; infinite for refused runs."""
+    return min(math.inf if ratio is None else ratio for ratio in _of(record, check, vehicle))
+
+
+def _of(record: dict[str, Any], check: str, vehicle: str) -> list[float | None]:
+    return [ratios[check] for ratios in record["ratios"][vehicle].values()]
+
+
+def caught(record: dict[str, Any], vehicle: str = TWIN) -> bool:
+    """Whether in every engine at least one check sees the fault."""
+    return all(any(ratio is None or ratio > 1 for ratio in ratios.values()) for ratios in record["ratios"][vehicle].values())
+
+
+def _rows(clean: list[dict[str, Any]], found: list[dict[str, Any]]) -> list[Row]:
+    alarms = sum(ratio is None or ratio > 1 for record in clean for vehicle in (TWIN, SYMMETRIC)
+                 for ratios in record["ratios"][vehicle].values() for ratio in ratios.values())  # fmt: skip
+    missed = {record["fault"] for record in found if not caught(record, SYMMETRIC)}
+    single = [record for record in found if sum(seen(record, name) for name in CHECKS) == 1]
+    return [
+        within("planted.caught", SYSTEM, "planted faults that a check catches, asymmetric vehicle", sum(map(caught, found)),
+               "faults", len(found), 0, "every one of them is a wrong model", "native"),
+        within("planted.false_alarms", SYSTEM, "alarms without a fault, all checks, both vehicles, all implementations",
+               alarms, "alarms", 0, 0, "a check that cries without a fault is no check", "native"),
+        within("planted.hidden", SYSTEM, "planted faults that the symmetric vehicle of the paper hides", len(missed),
+               "faults", len(HIDDEN), 0,
+               "exchanges of front and rear, and terms in k3 b - k4 a: equal halves cannot show them", "native"),
+        finding("planted.single", SYSTEM, "planted faults that one check alone catches", len(single), "faults",
+                "few", "what would pass if that check were dropped: " + _listed(single), "native"),
+    ]  # fmt: skip
+
+
+def _listed(records: list[dict[str, Any]]) -> str:
+    """Faults with the one check that sees each."""
+    sees = [(record["fault"], next(name for name in CHECKS if seen(record, name))) for record in records]
+    return ", ".join(f"{fault} ({name})" for fault, name in sees) or "none"
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """The checks with their tolerances, and every fault with what sees it."""
+    return [_check_table(data), _fault_table(data)]
+
+
+def _check_table(data: dict[str, Any]) -> Table:
+    lines = []
+    for name, check in CHECKS.items():
+        worst = max(ratio or 0.0 for record in data["clean"] for vehicle in (TWIN, SYMMETRIC)
+                    for ratio in _of(record, name, vehicle))  # fmt: skip
+        catches = sum(seen(record, name) for record in data["faults"])
+        limits = sorted({check.tolerance(engine) for engine in ("exudyn", "mujoco")})
+        lines.append((name, check.title, " / ".join(f"{limit:g}" for limit in limits), check.unit, check.why,
+                      f"{worst:.2g}", f"{catches} of {len(data['faults'])}"))
+    return Table("The checks", "Worst without a fault is size over tolerance: below 1 is quiet.",
+                 ("check", "compares", "tolerance", "unit", "because", "worst without a fault", "faults seen"), tuple(lines))
+
+
+def _fault_table(data: dict[str, Any]) -> Table:
+    lines = tuple(
+        (record["fault"], f"{record['place']} ({', '.join(record['engines'])})",
+         ", ".join(f"{name} {_size(record, name)}" for name in CHECKS if seen(record, name)),
+         ", ".join(name for name in CHECKS if not seen(record, name)) or "-",
+         "no" if caught(record, SYMMETRIC) else "yes")
+        for record in data["faults"]
+    )  # fmt: skip
+    note = ("Sizes on the asymmetric vehicle, in the unit of the check, the smaller one where a fault was planted in two "
+            "engines. Each check in the fourth column, had it been the only one, would have let the fault pass.")
+    return Table("Every fault, one at a time", note,
+                 ("fault", "planted in", "caught by", "not seen by", "hidden by the symmetric vehicle"), lines)
+
+
+def _size(record: dict[str, Any], name: str) -> str:
+    """The smaller size among the engines, from its ratio to the tolerance."""
+    sizes = [math.inf if ratios[name] is None else ratios[name] * CHECKS[name].tolerance(engine)
+             for engine, ratios in record["ratios"][TWIN].items()]  # fmt: skip
+    return "refused" if min(sizes) == math.inf else f"{min(sizes):.0e}"
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """How far above its tolerance each check stands, fault by fault, on both vehicles."""
+    from validation.fault_map import fault_map
+
+    vehicles = {TWIN: "asymmetric vehicle", SYMMETRIC: "symmetric vehicle (the paper's)"}
+    depth = {vehicle: [[least(record, name, vehicle) for name in CHECKS] for record in data["faults"]] for vehicle in vehicles}
+    marks = [not caught(record, SYMMETRIC) for record in data["faults"]]
+    figure = fault_map([record["fault"] for record in data["faults"]], tuple(CHECKS), depth, vehicles, marks)
+    caption = ("Decades between what a check finds and its tolerance; white: not seen. Left the asymmetric twin, right the "
+               f"paper's vehicle, whose equal halves hide {sum(marks)} faults from every check (marked).")
+    return [(caption, figure)]

@@ -1,0 +1,156 @@
+"""The bench on which an engine is judged with and without a fault: one vehicle in five small situations.
+
+Inputs are closed forms that start at rest in the static equilibrium, with different frequencies front
+and rear, so that nothing cancels by accident. Forces are sampled at 500 Hz and stepped at 1 kHz: a sample
+spans two steps, so an index that is off by one shows.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from models.assembly import Assembly, assemble
+from models.engines.protocol import Settings, Trajectory
+from models.errors import InputError, RunFailed
+from models.scene import Scene
+from models.scene import build as build_scene
+from models.signals import Sampled, Smooth, Stacked
+from validation import checks
+from validation.checks import Make
+
+STEP = 1e-3
+PERIOD = 2e-3
+SHORT = 2.5e-4
+"""Step of the order check (s), where the stiff wheels no longer bend the observed order of RK4."""
+RUNGE_KUTTA = {"reference": "RK4", "exudyn": "RK44", "mujoco": "RK4"}
+CONSTRAINED = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
+ROUNDING = 1e-12
+
+
+def bench_scene(parameters: str, duration: float) -> Scene:
+    """The vehicle on the study road at 20 m/s."""
+    return build_scene({
+        "title": "bench", "vehicle": {"parameters": parameters}, "run": {"duration": duration, "step": STEP},
+        "effects": {"road": {"source": "study", "speed": 20.0}},
+    })  # fmt: skip
+
+
+@dataclass
+class Bench:
+    """One vehicle, by the name of its parameter set, and runs of ``duration`` (s)."""
+
+    parameters: str
+    duration: float
+
+    @cached_property
+    def road(self) -> Assembly:
+        """On the study road."""
+        return assemble(bench_scene(self.parameters, self.duration))
+
+    @cached_property
+    def flat(self) -> Assembly:
+        """On a flat road, at rest."""
+        return replace(self.road, mode="free", input=None)
+
+    @cached_property
+    def linear(self) -> Assembly:
+        """Under wheel forces that are linear between their samples."""
+        return self.road.without_tyres().with_input("force", Sampled(self._forces(), PERIOD, held=False))
+
+    @cached_property
+    def held(self) -> Assembly:
+        """Under wheel forces that are constant over each sample."""
+        return self.road.without_tyres().with_input("force", Sampled(self._forces(), PERIOD, held=True))
+
+    @cached_property
+    def guided(self) -> Assembly:
+        """Under wheel forces, with a prescribed pitch."""
+        start = self.road.initial
+        pitch = Smooth((start[3] + 0.05 * self._swell(7.0))[:, None], PERIOD, derivatives=2, degree=5)
+        forces = Smooth(self._forces(), PERIOD)
+        return self.road.without_tyres().with_input("pitch", Stacked((forces, pitch)))
+
+    @cached_property
+    def truth(self) -> Trajectory:
+        """The road run of the reference at a sixteenth of the order check's step."""
+        return checks.engine("reference")(self.road, Settings("RK4", SHORT / 16, self.duration)).run()
+
+    def _swell(self, frequency: float) -> np.ndarray:
+        """From 0 to 1 and back with a smooth start; frequency in rad/s."""
+        times = PERIOD * np.arange(round(self.duration / PERIOD) + 4)
+        return 0.5 * (1 - np.cos(frequency * times))
+
+    def _forces(self) -> np.ndarray:
+        """Static wheel forces, swollen by 20 % in front and 15 % behind, shape (n, 2), N."""
+        p = self.road.parameters
+        front, rear = p.m1 + p.m3 * p.a / (p.a + p.b), p.m2 + p.m3 * p.b / (p.a + p.b)
+        return p.g * np.column_stack([front * (1 + 0.2 * self._swell(20.0)), rear * (1 + 0.15 * self._swell(27.0))])
+
+    def settings(self, engine: str) -> Settings:
+        """Classical Runge-Kutta at 1 ms in every engine."""
+        return Settings(RUNGE_KUTTA[engine], STEP, self.duration)
+
+
+@dataclass(frozen=True)
+class Check:
+    """measure(bench, engine name, make) -> size; what exceeds ``tolerance`` is seen."""
+
+    title: str
+    unit: str
+    tolerance: Callable[[str], float]
+    why: str
+    measure: Callable[[Bench, str, Make], float]
+
+
+def _audit(bench: Bench, engine: str, make: Make) -> float:
+    own = bench.settings(engine)
+    return max(checks.acceleration_gap(make, assembly, own) for assembly in (bench.road, bench.linear))
+
+
+def _order(bench: Bench, engine: str, make: Make) -> float:
+    return checks.order_gap(make, bench.road, replace(bench.settings(engine), step=SHORT), bench.truth)
+
+
+def _momentum(bench: Bench, engine: str, make: Make) -> float:
+    return max(checks.momentum_gap(make, assembly, bench.settings(engine)) for assembly in (bench.linear, bench.held))
+
+
+def _moment(bench: Bench, engine: str, make: Make) -> float:
+    own = replace(bench.settings(engine), integrator=CONSTRAINED[engine], step=STEP / 2)
+    return checks.moment_gap(make, bench.guided, own)
+
+
+def _twin(situation: str) -> Callable[[Bench, str, Make], float]:
+    return lambda bench, engine, make: checks.trajectory_gap(make, getattr(bench, situation), bench.settings(engine))
+
+
+def _rounding(engine: str) -> float:
+    return ROUNDING
+
+
+CHECKS: dict[str, Check] = {
+    "audit": Check("accelerations at 100 states", "of the largest", _rounding, "rounding of a dozen products", _audit),
+    "road twin": Check("path on the road", "SI", _rounding, "same tableau, same step: rounding", _twin("road")),
+    "linear twin": Check("path under linear forces", "SI", _rounding, "the same", _twin("linear")),
+    "held twin": Check("path under held forces", "SI", _rounding, "the same", _twin("held")),
+    "order": Check("observed order against the declared one", "", lambda engine: 0.15,
+                   "the stiff wheels still bend it by 0.06 at these steps", _order),
+    "equilibrium": Check("drift off the static equilibrium", "SI", _rounding, "the closed form is exact",
+                         lambda bench, engine, make: checks.equilibrium_gap(make, bench.flat, bench.settings(engine))),
+    "momentum": Check("vertical momentum against impulse", "of weight times time", _rounding,
+                      "Runge-Kutta integrates such forces exactly", _momentum),
+    "moment": Check("enforced moment against the eliminated form", "of its rms",
+                    lambda engine: 1e-4 if engine == "exudyn" else ROUNDING,
+                    "generalised-alpha at 0.5 ms leaves 4e-5; MuJoCo's inverse dynamics is exact", _moment),
+}  # fmt: skip
+"""What every fault is put to, in the order of the table."""
+
+
+def size(check: Check, bench: Bench, engine: str, make: Make) -> float:
+    """Size that a check finds; infinite where the engine refuses or fails."""
+    try:
+        return check.measure(bench, engine, make)
+    except (InputError, RunFailed):
+        return float("inf")

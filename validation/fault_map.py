@@ -1,0 +1,45 @@
+"""Figure: which check sees which fault, and by how much."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+
+from studies.figures import plt
+
+DECADES = 12
+"""End of the colour scale; a refused run counts as this."""
+BLUES = LinearSegmentedColormap.from_list("seen", ("#d6e6f4", "#6aaed6", "#08488e"))
+
+
+def fault_map(faults: Sequence[str], checks: Sequence[str], ratios: dict[str, list[list[float]]],
+              titles: dict[str, str], hidden: Sequence[bool]) -> Figure:  # fmt: skip
+    """Cells of log10(size over tolerance) by vehicle; white where a check does not see the fault.
+
+    ratios : by vehicle, rows of faults and columns of checks; hidden : faults that the second vehicle hides.
+    """
+    figure, axes = plt.subplots(1, len(ratios), figsize=(9.5, 1.4 + 0.19 * len(faults)), sharey=True)
+    for axis, (vehicle, values) in zip(np.atleast_1d(axes), ratios.items(), strict=True):
+        image = _cells(axis, np.array(values), checks)
+        axis.set_title(titles[vehicle])
+    first, last = np.atleast_1d(axes)[[0, -1]]
+    first.set_yticks(range(len(faults)), faults, fontsize=8)
+    for row in np.flatnonzero(hidden):
+        last.text(len(checks) / 2 - 0.5, row, "hidden", ha="center", va="center", fontsize=7.5, color="#b03000")
+    bar = figure.colorbar(image, ax=axes, shrink=0.4, aspect=30, pad=0.01)
+    bar.set_label("decades above the tolerance")
+    return figure
+
+
+def _cells(axis: Any, ratios: np.ndarray, checks: Sequence[str]) -> Any:
+    decades = np.log10(np.clip(ratios, 1e-3, 10.0**DECADES))
+    image = axis.imshow(np.where(ratios > 1, decades, np.nan), cmap=BLUES, vmin=0, vmax=DECADES, aspect="auto")
+    axis.set_xticks(range(len(checks)), checks, rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
+    axis.set_xticks(np.arange(0.5, len(checks) - 1), minor=True)
+    axis.set_yticks(np.arange(0.5, len(ratios) - 1), minor=True)
+    axis.grid(False)
+    axis.grid(True, which="minor", color="#cccccc", linewidth=0.5, alpha=1.0)
+    axis.tick_params(which="both", length=0)
+    return image

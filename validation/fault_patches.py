@@ -1,0 +1,191 @@
+"""Patches that plant a fault in the code of an engine's adapter or in the equations, for a block only.
+
+Each is called once per built model and gives a context that can be entered again and again.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from models.vehicles import pitch_plane_equations as equations
+
+Context = Callable[[], AbstractContextManager[Any]]
+Patch = Callable[[], Context]
+
+
+def nothing() -> Context:
+    """No fault."""
+    return nullcontext
+
+
+def attribute(path: str, change: Callable[[Any], Any]) -> Patch:
+    """``module:object.name`` replaced by change(what is there)."""
+
+    def prepare() -> Context:
+        owner, name = _owner(path)
+        return lambda: patch.object(owner, name, change(getattr(owner, name)))
+
+    return prepare
+
+
+def _owner(path: str) -> tuple[Any, str]:
+    from importlib import import_module
+
+    module, _, rest = path.partition(":")
+    *parents, name = rest.split(".")
+    owner: Any = import_module(module)
+    for parent in parents:
+        owner = getattr(owner, parent)
+    return owner, name
+
+
+# Exudyn
+
+
+def index_of_the_end(original: Any) -> Any:
+    """Held samples: a step reads the sample of its end."""
+
+    def advance(clock: Any, mbs: Any, t: float) -> bool:
+        clock.step = min(round(t * clock.per_time / 2), len(clock.steps[0]) - 1)
+        return True
+
+    return advance
+
+
+def truncated_time(original: Any) -> Any:
+    """Table of half steps: the row is cut off instead of rounded."""
+
+    def reader(clock: Any, column: int, scale: float) -> Any:
+        if not clock.table:
+            return original(clock, column, scale)
+        return lambda mbs, t, load: scale * clock.table[column][int(t * clock.per_time)]
+
+    return reader
+
+
+def reset_accelerations(original: Any) -> Any:
+    """Start of a constrained run: Exudyn finds its initial accelerations without the constraint's own."""
+
+    def start(model: Any, options: Any) -> None:
+        original(model, options)
+        options.timeIntegration.generalizedAlpha.computeInitialAccelerations = True
+        options.timeIntegration.generalizedAlpha.resetAccelerations = True
+
+    return start
+
+
+# MuJoCo
+
+
+def weightless_wheel(original: Any) -> Any:
+    """Gravity missing on the front wheel."""
+
+    def spec(*arguments: Any) -> Any:
+        built = original(*arguments)
+        built.body("wheel1").gravcomp = 1.0
+        return built
+
+    return spec
+
+
+def turning_reference(original: Any) -> Any:
+    """Struts measured along the axis of the chassis: the reference site sits on the body that rotates."""
+
+    def suspension(spec: Any, vehicle: Any, strut: Any, guided: bool) -> None:
+        original(spec, vehicle, strut, guided)
+        own = spec.actuator(strut.name)
+        own.target, own.refsite = own.refsite, own.target
+
+    return suspension
+
+
+def misprinted_row(original: Any) -> Any:
+    """Prescribed pitch: the chassis' row of eq. (39) with the other sign."""
+
+    def guidance(*arguments: Any) -> np.ndarray:
+        forces = original(*arguments)
+        forces[:, 2] *= -1.0
+        return forces
+
+    return guidance
+
+
+def negative(original: Any) -> Any:
+    """A method's result with the other sign, where it has one."""
+
+    def method(*arguments: Any) -> Any:
+        found = original(*arguments)
+        return None if found is None else -found
+
+    return method
+
+
+# the equations
+
+
+def rewritten(**functions: Callable[[], Any]) -> Patch:
+    """The reference interpreted instead of compiled, with functions of its equations replaced."""
+
+    def prepare() -> Context:
+        from models.engines import reference
+
+        changes = {
+            reference: {"_FIXED": {}, "_SINGLE": {}, "njit": lambda **options: lambda function: function},
+            equations: {name: function() for name, function in functions.items()},
+        }  # fmt: skip
+        return lambda: _patched(changes)
+
+    return prepare
+
+
+@contextmanager
+def _patched(changes: dict[Any, dict[str, Any]]) -> Iterator[None]:
+    with ExitStack() as stack:
+        for module, replaced in changes.items():
+            for name, value in replaced.items():
+                stack.enter_context(patch.object(module, name, value))
+        yield
+
+
+def moment_without_cosine() -> Any:
+    """b f3 - a f4 in the place of cos(beta) (b f3 - a f4)."""
+    original = equations.newton_euler
+
+    def newton_euler(y: Any, f1: float, f2: float, f3: float, f4: float, cosine: float, p: Any, dy: Any) -> None:
+        original(y, f1, f2, f3, f4, 1.0, p, dy)
+
+    return newton_euler
+
+
+def no_reaction() -> Any:
+    """The suspension pushes the chassis but not the front wheel."""
+    original = equations.newton_euler
+
+    def newton_euler(y: Any, f1: float, f2: float, f3: float, f4: float, cosine: float, p: Any, dy: Any) -> None:
+        original(y, f1, f2, f3, f4, cosine, p, dy)
+        dy[4] -= f3 / p[2]
+
+    return newton_euler
+
+
+def damper_without_cosine() -> Any:
+    """Dampers see b beta' instead of b beta' cos(beta)."""
+    original = equations.suspension
+    return lambda y, p, sine, cosine: original(y, p, sine, 1.0)
+
+
+def stale_state() -> Any:
+    """Suspension forces from the state of the evaluation before."""
+    original, before = equations.suspension, []
+
+    def suspension(y: Any, p: Any, sine: float, cosine: float) -> Any:
+        before.append(y.copy())
+        old = before[-2] if len(before) > 1 else y
+        del before[:-1]
+        return original(old, p, math.sin(old[3]), math.cos(old[3]))
+
+    return suspension

@@ -1,0 +1,148 @@
+"""Faults, planted one at a time into what one engine is given, into its adapter or into the equations.
+
+A check that has never seen a fault proves nothing. Each fault here is a mistake that is easily made in
+such code; ``planted`` gives an engine with it, and outside of the engine's work nothing is changed.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.assembly import Assembly
+from models.engines.protocol import Model, Settings, Trajectory, build
+from validation import fault_changes as change
+from validation import fault_patches as patches
+from validation.checks import Make
+from validation.fault_changes import Change
+from validation.fault_patches import Context, Patch, attribute, rewritten
+
+BOTH = ("exudyn", "mujoco")
+EXUDYN, MUJOCO, HAND = ("exudyn",), ("mujoco",), ("reference",)
+FORCES = ("force", "pitch")
+
+
+def _as_asked(settings: Settings) -> Settings:
+    return settings
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault in words, the engines it is planted in, and what it changes before or while they work."""
+
+    name: str
+    engines: tuple[str, ...]
+    change: Change = change.same
+    inside: Patch = patches.nothing
+    settings: Callable[[Settings], Settings] = _as_asked
+
+
+@dataclass
+class Planted:
+    """A model with a fault in it, which is alive only while the model works."""
+
+    context: Context
+    model: Model
+
+    def run(self) -> Trajectory:
+        """The engine's run, with the fault."""
+        with self.context():
+            return self.model.run()
+
+    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
+        """The engine's accelerations (4,), with the fault."""
+        with self.context():
+            return self.model.acceleration(time, state)
+
+    def plan(self) -> dict[str, int]:
+        """What was built."""
+        return self.model.plan()
+
+
+def planted(fault: Fault, engine: str) -> Make:
+    """The engine with the fault, as the checks take it."""
+
+    def make(assembly: Assembly, settings: Settings) -> Planted:
+        context = fault.inside()
+        with context():
+            return Planted(context, build(engine, fault.change(assembly), fault.settings(settings)))
+
+    return make
+
+
+def _euler(settings: Settings) -> Settings:
+    """A first-order integrator where Runge-Kutta was asked for."""
+    lower = {"RK44": "ExplicitEuler", "RK4": "Euler"}
+    return replace(settings, integrator=lower.get(settings.integrator, settings.integrator))
+
+
+CLEAN = (Fault("no fault", (*BOTH, *HAND)), Fault("no fault, equations interpreted", HAND, inside=rewritten()))
+
+DESCRIPTION = (
+    Fault("a and b swapped", BOTH, change.moved(lambda x, a, b: a if x > 0 else -b)),
+    Fault("sign of pitch mirrored", BOTH, change.moved(lambda x, a, b: -x)),
+    Fault("front and rear suspension swapped", BOTH, change.swapped("suspension3", "suspension4")),
+    Fault("front and rear tyre swapped", BOTH, change.swapped("tyre1", "tyre2")),
+    Fault("front and rear wheel mass swapped", BOTH, change.bodies(change.swapped_wheel)),
+    Fault("mass and pitch inertia of the chassis exchanged", BOTH, change.bodies(change.mixed_inertia)),
+    Fault("pitch inertia about the front axle", BOTH, change.inertia_about_axle),
+    Fault("front suspension 1 % too stiff", BOTH, change.stiffened("suspension3", 1.01)),
+    Fault("front suspension in N/mm", BOTH, change.stiffened("suspension3", 1e-3)),
+    Fault("tyre damping dropped", BOTH, change.struts(change.undamped_tyre)),
+    Fault("linear geometry where exact was asked for", BOTH, change.vehicle(lambda v: replace(v, geometry="linear"))),
+    Fault("gravity upward", BOTH, change.vehicle(lambda v: replace(v, gravity=-v.gravity))),
+    Fault("gravity 9.80665 for 9.81", BOTH, change.vehicle(lambda v: replace(v, gravity=9.80665))),
+    Fault("start from zero heave", BOTH, change.unstressed_start),
+)
+"""In the description that an engine is built from."""
+
+INPUT = (
+    Fault("input half a sample late", BOTH, change.late(0.5)),
+    Fault("input a whole sample late", BOTH, change.late(1.0)),
+    Fault("road held at the middle stages", BOTH, change.driven(("road",), change.HeldStages)),
+    Fault("rear wheel ahead of the front one", BOTH, change.road(wheelbase=-1.0)),
+    Fault("rear delay missing", BOTH, change.road(wheelbase=0.0)),
+    Fault("speed in km/h", BOTH, change.road(speed=3.6)),
+    Fault("rate of the road missing", BOTH, change.channels(("road",), change.times({2: 0.0, 3: 0.0}))),
+    Fault("left track instead of the mean", BOTH, change.driven(("road",), change.OtherTrack)),
+    Fault("wheel forces in kN", BOTH, change.channels(FORCES, change.times({0: 1e-3, 1: 1e-3}))),
+    Fault("wheel forces with the other sign", BOTH, change.channels(FORCES, change.times({0: -1.0, 1: -1.0}))),
+    Fault("front wheel force at both wheels", BOTH, change.channels(FORCES, change.front_twice)),
+    Fault("wheel forces along the chassis, not vertical", BOTH, change.body_fixed),
+    Fault("prescribed pitch in degrees", BOTH, change.channels(
+        ("pitch",), change.times(dict.fromkeys((2, 3, 4), 180 / math.pi)))),
+    Fault("rate of the prescribed pitch missing", MUJOCO, change.channels(("pitch",), change.times({3: 0.0}))),
+    Fault("Euler where Runge-Kutta was asked for", BOTH, settings=_euler),
+)  # fmt: skip
+"""In the input or the settings that an engine is run with."""
+
+ADAPTER = (
+    Fault("held sample of the step's end", EXUDYN,
+          inside=attribute("models.engines.exudyn:Clock.advance", patches.index_of_the_end)),
+    Fault("time cut off instead of rounded", EXUDYN,
+          inside=attribute("models.engines.exudyn:Clock.reader", patches.truncated_time)),
+    Fault("constraint starts without its acceleration", EXUDYN,
+          inside=attribute("models.engines.exudyn:ExudynModel._consistent_start", patches.reset_accelerations)),
+    Fault("enforced moment with the other sign", EXUDYN,
+          inside=attribute("models.engines.exudyn:ExudynModel._enforced", patches.negative)),
+    Fault("gravity missing on one wheel", MUJOCO,
+          inside=attribute("models.engines.mujoco:_spec", patches.weightless_wheel)),
+    Fault("strut measured along the rotating body", MUJOCO,
+          inside=attribute("models.engines.mujoco:_suspension", patches.turning_reference)),
+    Fault("chassis row of eq. (39) with the other sign", MUJOCO,
+          inside=attribute("models.engines.mujoco:_guidance", patches.misprinted_row)),
+    Fault("callback never installed", MUJOCO,
+          inside=attribute("models.engines.mujoco_callback:installed", lambda original: lambda law: patches.nullcontext())),
+)  # fmt: skip
+"""In the code of an engine's adapter."""
+
+EQUATIONS = (
+    Fault("cos(pitch) missing in the moment", HAND, inside=rewritten(newton_euler=patches.moment_without_cosine)),
+    Fault("cos(pitch) missing in the damper", HAND, inside=rewritten(suspension=patches.damper_without_cosine)),
+    Fault("forces from the state before", HAND, inside=rewritten(suspension=patches.stale_state)),
+    Fault("no reaction on the front wheel", HAND, inside=rewritten(newton_euler=patches.no_reaction)),
+)
+"""In the hand-written equations."""
+
+FAULTS = (*DESCRIPTION, *INPUT, *ADAPTER, *EQUATIONS)
