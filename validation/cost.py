@@ -1,0 +1,188 @@
+"""The one work-precision runner: every setting of a problem tried, judged, counted and timed.
+
+    problem (validation/problems) -> points -> curves -> table of cheapest settings
+
+Counts are what the report is gated on; seconds stand beside them. A setting that fails is a point like
+any other, and one that gives a wrong answer without saying so is called SILENT.
+"""
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from models.errors import InputError, RunFailed
+from validation import curves
+from validation.problems import Problem, Setting
+from validation.timing import interleave, interval, resamples
+
+Status = Literal["ok", "raised", "refused", "SILENT"]
+COSTS = ("force calls", "seconds")
+DRAWS = 200
+"""Bootstrapped sets of rounds behind the interval of an interpolated ratio."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One setting and what became of it: errors by quantity, counts, seconds of every round."""
+
+    setting: Setting
+    status: Status
+    reason: str = ""
+    errors: dict[str, float] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
+    seconds: tuple[float, ...] = ()
+
+    def cost(self, kind: str) -> float:
+        """Force calls, or the median of the seconds."""
+        return float(np.median(self.seconds)) if kind == "seconds" else float(self.counts["force calls"])
+
+    def as_dict(self) -> dict[str, Any]:
+        """The point as ``data/price.json`` keeps it."""
+        return asdict(self)
+
+
+def point(saved: dict[str, Any]) -> Point:
+    """A point from what ``as_dict`` saved."""
+    return Point(**{**saved, "setting": Setting(**saved["setting"]), "seconds": tuple(saved["seconds"])})
+
+
+def attempt(problem: Problem, setting: Setting) -> Point:
+    """Try one setting: ok, raised (the run failed and said so), refused (it was not run), or SILENT."""
+    try:
+        solution = problem.build(setting).run()
+    except InputError as error:
+        return Point(setting, "refused", str(error))
+    except RunFailed as error:
+        return Point(setting, "raised", str(error))
+    errors, counts = problem.errors(solution), dict(solution.counts)
+    return Point(setting, *_judged(problem, errors), errors, counts)
+
+
+def _judged(problem: Problem, errors: dict[str, float]) -> tuple[Status, str]:
+    """An answer that came back without a word is SILENT if it is not finite or beyond all sense."""
+    first = errors[next(iter(problem.units))]
+    if not all(math.isfinite(error) for error in errors.values()):
+        return "SILENT", "an error that is not a number came back as a result"
+    if first > problem.bound:
+        return "SILENT", f"an error of {first:.3g}, more than {problem.bound:.3g}, came back as a result"
+    return "ok", ""
+
+
+def miscounted(points: list[Point], duration: float) -> list[str]:
+    """Settings with fixed stages whose force calls are not stages times steps."""
+    wrong = []
+    for p in points:
+        if p.status == "ok" and p.setting.stages:
+            steps = round(duration / p.setting.value)
+            found = (p.counts["steps"], p.counts["force calls"])
+            if found != (steps, p.setting.stages * steps):
+                wrong.append(f"{p.setting.curve} {p.setting.label()}: {found[1]} instead of {p.setting.stages * steps}")
+    return wrong
+
+
+def measure(problem: Problem, quick: bool, rounds: int, least: float) -> list[Point]:
+    """All points of a problem, with the seconds of ``rounds`` interleaved rounds for those that are ok.
+
+    Seconds are those of building the model and running it, input tables included, for every engine alike.
+    """
+    points = [attempt(problem, setting) for setting in problem.settings(quick)]
+    timed = [i for i, p in enumerate(points) if p.status == "ok"]
+    jobs = [lambda s=points[i].setting: problem.build(s).run() for i in timed]
+    for i, seconds in zip(timed, interleave(jobs, rounds, least), strict=True):
+        p = points[i]
+        points[i] = Point(p.setting, p.status, p.reason, p.errors, p.counts, tuple(seconds))
+    return points
+
+
+def by_curve(points: list[Point], status: Status | None = "ok") -> dict[str, list[Point]]:
+    """Points of each curve, from coarse to fine; None takes every status."""
+    found: dict[str, list[Point]] = defaultdict(list)
+    for p in sorted(points, key=lambda p: -p.setting.value):
+        if status is None or p.status == status:
+            found[p.setting.curve].append(p)
+    return found
+
+
+def orders(points: list[Point], quantity: str, uncertainty: float) -> dict[str, float]:
+    """Observed order of each curve: over the step, or over 1 / force calls for adaptive methods."""
+    found = {}
+    for curve, own in by_curve(points).items():
+        sizes = [1 / p.cost("force calls") if p.setting.adaptive else p.setting.value for p in own]
+        found[curve] = curves.observed_order(sizes, [p.errors[quantity] for p in own], curves.HOLLOW * uncertainty)
+    return found
+
+
+def same(points: list[Point], quantity: str, uncertainty: float) -> list[tuple[str, ...]]:
+    """Groups of curves that coincide, judged on the points that stand clear of the reference's uncertainty."""
+    clear = {curve: {p.setting.value: p.errors[quantity] for p in own
+                     if p.errors[quantity] >= curves.HOLLOW * uncertainty}
+             for curve, own in by_curve(points).items()}  # fmt: skip
+    return curves.coinciding(clear)
+
+
+def reaches(points: list[Point], quantity: str, target: float, kind: str,
+            extrapolate: bool = False) -> dict[str, curves.Reach]:  # fmt: skip
+    """What each curve needs to meet ``target``, in force calls or seconds; curves that do not are left out."""
+    found = {}
+    for curve, own in by_curve(points).items():
+        one = _reach(own, quantity, target, [p.cost(kind) for p in own], extrapolate)
+        if one is not None:
+            found[curve] = one
+    return found
+
+
+def _reach(own: list[Point], quantity: str, target: float, costs: Sequence[float],
+           extrapolate: bool = False) -> curves.Reach | None:  # fmt: skip
+    """``curves.reach`` on the points of one curve."""
+    values, errors = [p.setting.value for p in own], [p.errors[quantity] for p in own]
+    order = 0 if own[0].setting.adaptive else own[0].setting.order
+    return curves.reach(values, errors, costs, target, order, extrapolate)
+
+
+def cheapest(found: dict[str, curves.Reach], among: str = "") -> tuple[str, curves.Reach] | None:
+    """The curve that meets a tolerance at the least cost, among those of one engine or of all."""
+    able = {curve: one for curve, one in found.items() if curve.startswith(among)}
+    return min(able.items(), key=lambda item: item[1].cost) if able else None
+
+
+@dataclass(frozen=True)
+class Loss:
+    """How many times the cheapest setting's cost a default method takes for the same error.
+
+    factor with its 95 % interval (equal to it for counts); ``how`` as in ``Reach``, for the default's side.
+    """
+
+    factor: float
+    low: float
+    high: float
+    how: str
+
+
+def loss(points: list[Point], quantity: str, target: float, kind: str, default: str, among: str = "") -> Loss | None:
+    """Loss of the curve ``default`` against the cheapest one among ``among`` ("" for all); None if none meets it."""
+    best = cheapest(reaches(points, quantity, target, kind), among)
+    own = reaches(points, quantity, target, kind, extrapolate=True).get(default)
+    if best is None or own is None:
+        return None
+    factor = low = high = own.cost / best[1].cost
+    if kind == "seconds" and best[0] != default:
+        sides = [_resampled(by_curve(points)[curve], quantity, target) for curve in (default, best[0])]
+        _, low, high = interval(sides[0] / sides[1])
+    return Loss(factor, low, high, own.how)
+
+
+def _resampled(own: list[Point], quantity: str, target: float) -> np.ndarray:
+    """Seconds that one curve needs, once per bootstrapped set of rounds."""
+    seconds = np.array([p.seconds for p in own])
+    medians = np.median(seconds[:, resamples(seconds.shape[1], DRAWS)], axis=2)
+    found = [_reach(own, quantity, target, costs, extrapolate=True) for costs in medians.T]
+    return np.array([one.cost for one in found if one is not None])
+
+
+def defaults(points: list[Point]) -> dict[str, Point]:
+    """The points that are somebody's default setting, by whose."""
+    return {p.setting.default: p for p in points if p.setting.default}

@@ -1,0 +1,152 @@
+"""The work-precision figure: error over force calls and over seconds, a curve per integrator."""
+
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from studies.figures import COLOURS, plt
+from validation import cost, curves
+from validation.cost import Point, by_curve
+from validation.cost_tables import groups_of, named, quantity_of
+
+MARKERS = "osD^v<>PXhp*8dH"
+STYLES = {1: ":", 2: "--", 3: "-.", 4: "-"}
+SIZES = {"reference": 8.5, "exudyn": 6.5, "mujoco": 4.5}
+"""Coinciding curves show as rings within each other."""
+AXES = {"force calls": "force calls in the run", "seconds": "seconds for the run, model built anew (median)"}
+
+
+def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
+    """Two panels that share the error axis; failures stand above the first, whose axis they have a place on."""
+    figure, axes = plt.subplots(1, 2, figsize=(12.5, 7.6), sharey=True)
+    styles = _styles(points)
+    top = _top(problem, points)
+    for ax, kind in zip(axes, cost.COSTS, strict=True):
+        _floor(ax, problem)
+        _front(ax, problem, points, kind)
+        for curve, own in by_curve(points).items():
+            _curve(ax, problem, own, kind, styles[curve])
+        _defaults(ax, problem, points, kind)
+        ax.set(xscale="log", yscale="log", xlabel=AXES[kind])
+        measured = "exact" if kind == "force calls" else f"{problem['rounds']} interleaved rounds"
+        ax.set_title(f"by {kind}, {measured}")
+    _failures(axes[0], points, top)
+    quantity = quantity_of(problem)
+    axes[0].set_ylabel(f"largest {quantity} error over the run [{problem['units'][quantity]}]")
+    axes[0].set_ylim(0.3 * problem["uncertainty"][quantity], 3 * top)
+    alike = "; ".join(named(group[0], [group]) for group in groups_of(problem, points))
+    figure.suptitle(f"What accuracy costs. {problem['title']}\n", x=0.01, ha="left", fontsize=12)
+    figure.text(0.011, 0.945, f"Same error at the same step: {alike}." if alike else "", fontsize=9, color="#333333")
+    figure.legend(handles=_legend(points, styles), loc="outside lower center", ncols=4, fontsize=8.5, handlelength=3.2)
+    return figure
+
+
+def _styles(points: list[Point]) -> dict[str, dict[str, Any]]:
+    """Colour by engine, marker by method, line by declared order (solid from 4 up)."""
+    methods = list(dict.fromkeys(_family(p) for p in points))
+    return {p.setting.curve: {
+        "color": COLOURS.get(p.setting.engine, "#777777"), "marker": MARKERS[methods.index(_family(p)) % len(MARKERS)],
+        "linestyle": STYLES.get(p.setting.order, "-"), "markersize": SIZES.get(p.setting.engine, 5),
+    } for p in points}  # fmt: skip
+
+
+def _family(p: Point) -> str:
+    """Methods of one name in several engines share a marker."""
+    return {"RK44": "RK4", "ExplicitEuler": "Euler"}.get(p.setting.method, p.setting.method)
+
+
+def _top(problem: dict[str, Any], points: list[Point]) -> float:
+    """Height at which failures are drawn: above every error."""
+    return 6 * max(p.errors[quantity_of(problem)] for p in points if p.status == "ok")
+
+
+def _curve(ax: Axes, problem: dict[str, Any], own: list[Point], kind: str, style: dict[str, Any]) -> None:
+    """One curve; points that the reference cannot judge are hollow."""
+    quantity = quantity_of(problem)
+    costs, errors = [p.cost(kind) for p in own], [p.errors[quantity] for p in own]
+    floor = curves.HOLLOW * problem["uncertainty"][quantity]
+    ax.plot(costs, errors, **{**style, "marker": "none"}, alpha=0.75)
+    for x, y in zip(costs, errors, strict=True):
+        face = style["color"] if y >= floor else "white"
+        ax.plot(x, y, **{**style, "linestyle": "none"}, markerfacecolor=face, markeredgewidth=0.9)
+
+
+def _floor(ax: Axes, problem: dict[str, Any]) -> None:
+    """The band in which the reference itself is not certain."""
+    own = problem["uncertainty"][quantity_of(problem)]
+    unit = problem["units"][quantity_of(problem)]
+    ax.axhspan(1e-30, own, color="#bbbbbb", alpha=0.6, zorder=0, linewidth=0)
+    ax.axhspan(own, curves.HOLLOW * own, color="#bbbbbb", alpha=0.25, zorder=0, linewidth=0)
+    ax.text(0.985, curves.HOLLOW * own, f"reference known to {own:.1g} {unit} (dark); below ten times that: hollow",
+            transform=ax.get_yaxis_transform(), ha="right", va="bottom", fontsize=8, color="#555555")  # fmt: skip
+
+
+def _front(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> None:
+    """The settings that no other one beats, as a broad pale line behind the curves."""
+    quantity = quantity_of(problem)
+    floor = curves.HOLLOW * problem["uncertainty"][quantity]
+    clear = [p for p in points if p.status == "ok" and p.errors[quantity] >= floor]
+    costs, errors = [p.cost(kind) for p in clear], [p.errors[quantity] for p in clear]
+    front = curves.pareto(costs, errors)
+    ax.plot([costs[i] for i in front], [errors[i] for i in front], color="#f0c808", linewidth=9, alpha=0.45,
+            solid_capstyle="round", zorder=1)  # fmt: skip
+
+
+def _defaults(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> None:
+    """Ring and name each engine's default setting."""
+    found = [(owner, p) for owner, p in cost.defaults(points).items() if p.status == "ok"]
+    for (owner, p), text in zip(found, PLACES[kind], strict=False):
+        place = (p.cost(kind), p.errors[quantity_of(problem)])
+        ax.plot(*place, "o", markersize=15, markerfacecolor="none", markeredgecolor="#111111", markeredgewidth=1.4,
+                zorder=5)  # fmt: skip
+        ax.annotate(f"{owner} default:\n{p.setting.method}, {p.setting.label()}", place, fontsize=8.5,
+                    xytext=text, textcoords="axes fraction", ha="left", va="center", zorder=6,
+                    arrowprops={"arrowstyle": "-", "color": "#111111", "linewidth": 0.7, "shrinkB": 7})  # fmt: skip
+
+
+PLACES = {"force calls": ((0.02, 0.46), (0.02, 0.37)), "seconds": ((0.02, 0.88), (0.02, 0.96))}
+"""Where the defaults are named, in fractions of the panel: the corner that accuracy leaves empty."""
+
+
+def _failures(ax: Axes, points: list[Point], top: float) -> None:
+    """A cross where each failed setting would have stood: stages times steps on the cost axis."""
+    failed = [p for p in points if p.status != "ok"]
+    for p in failed:
+        calls = _expected(p, points)
+        if calls:
+            ax.plot(calls, top, "x", color=COLOURS.get(p.setting.engine, "#777777"), markersize=7, markeredgewidth=1.6)
+    if failed:
+        text = "; ".join(f"{status}: {_who(failed, status)}" for status in dict.fromkeys(p.status for p in failed))
+        ax.annotate(text, (0.995, top), xycoords=("axes fraction", "data"), ha="right", va="center", fontsize=8)
+
+
+def _expected(p: Point, points: list[Point]) -> float:
+    """Force calls that a failed fixed-step setting would have cost, from its neighbours on the curve."""
+    own = by_curve(points).get(p.setting.curve)
+    if not own or p.setting.adaptive:
+        return 0.0
+    return own[0].cost("force calls") * own[0].setting.value / p.setting.value
+
+
+def _who(failed: list[Point], status: str) -> str:
+    """Methods without an answer, those with none at all named."""
+    own = [p for p in failed if p.status == status]
+    unstable = [p for p in own if not p.setting.adaptive]
+    parts = [f"{len(unstable)} steps beyond stability (crosses)"] if unstable else []
+    parts += [f"{p.setting.method} ({'not implemented' if 'not implemented' in p.reason else 'see table'})"
+              for p in own if p.setting.adaptive]  # fmt: skip
+    return ", ".join(parts)
+
+
+def _legend(points: list[Point], styles: dict[str, dict[str, Any]]) -> list[Line2D]:
+    """A handle per curve, then what is not a curve."""
+    handles = [Line2D([], [], **styles[curve], label=named(curve)) for curve in by_curve(points)]
+    handles.sort(key=lambda handle: str(handle.get_label()))
+    front = "no other setting is better (Pareto)"
+    handles.append(Line2D([], [], color="#f0c808", linewidth=9, alpha=0.45, label=front))
+    if any(p.status != "ok" for p in points):
+        failed = "no answer (refused or raised)"
+        handles.append(Line2D([], [], color="#777777", marker="x", linestyle="none", label=failed))
+    return handles

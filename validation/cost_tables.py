@@ -1,0 +1,153 @@
+"""Tables of a work-precision run: cheapest settings, what defaults lose, all curves, and what failed."""
+
+import math
+from collections import defaultdict
+from typing import Any
+
+from studies.figures import LABELS
+from validation import cost
+from validation.cost import Loss, Point, by_curve
+from validation.curves import HOLLOW, Reach
+from validation.problems import Setting
+from validation.rows import Table
+
+
+def tables(problem: dict[str, Any], points: list[Point]) -> list[Table]:
+    """All tables of one problem from its saved data."""
+    return [cheapest(problem, points), losses(problem, points), every_curve(problem, points), failures(points)]
+
+
+def named(curve: str, groups: list[tuple[str, ...]] | None = None) -> str:
+    """A curve as a reader names it, with those that coincide with it."""
+    alike = next((group for group in groups or [] if curve in group), (curve,))
+    return " = ".join(_plain(one) for one in sorted(alike, key=lambda one: one != curve))
+
+
+def _plain(curve: str) -> str:
+    engine, _, method = curve.partition(" ")
+    return f"{LABELS.get(engine, engine)} {method}"
+
+
+def quantity_of(problem: dict[str, Any]) -> str:
+    """The quantity that tolerances are set on."""
+    return next(iter(problem["units"]))
+
+
+def groups_of(problem: dict[str, Any], points: list[Point]) -> list[tuple[str, ...]]:
+    """Coinciding curves of a saved problem."""
+    quantity = quantity_of(problem)
+    return cost.same(points, quantity, problem["uncertainty"][quantity])
+
+
+def cheapest(problem: dict[str, Any], points: list[Point]) -> Table:
+    """The cheapest setting that meets each tolerance."""
+    quantity, groups = quantity_of(problem), groups_of(problem, points)
+    unit = problem["units"][quantity]
+    rows = []
+    for target in problem["tolerances"]:
+        calls = cost.reaches(points, quantity, target, "force calls")
+        seconds = cost.reaches(points, quantity, target, "seconds")
+        rows.append((f"{target:g}", _won(points, calls, "", "calls", groups), *(
+            _won(points, seconds, among, "ms") for among in ("", "exudyn", "mujoco"))))  # fmt: skip
+    note = ("Fixed steps are interpolated log-log between neighbouring settings, adaptive methods count at the loosest "
+            "tolerance tried that does; \"coarsest\" is the coarsest setting tried. Nothing is extrapolated. Force calls "
+            "are exact and the same on every machine; seconds are those of one run on this one, model and input tables "
+            "built anew, and wander.")  # fmt: skip
+    heads = (f"{quantity} error at most [{unit}]", "fewest force calls", "fewest seconds", "fewest in Exudyn",
+             "fewest in MuJoCo")  # fmt: skip
+    return Table("Cheapest setting that meets the tolerance", note, heads, tuple(rows))
+
+
+def _won(points: list[Point], found: dict[str, Reach], among: str, unit: str,
+         groups: list[tuple[str, ...]] | None = None) -> str:  # fmt: skip
+    best = cost.cheapest(found, among)
+    if best is None:
+        return "none of those tried"
+    curve, one = best
+    paid = f"{one.cost:,.0f} calls" if unit == "calls" else f"{1e3 * one.cost:.3g} ms"
+    return f"{named(curve, groups)}, {_setting(points, curve, one)}: {paid}"
+
+
+def _setting(points: list[Point], curve: str, one: Reach) -> str:
+    adaptive = by_curve(points)[curve][0].setting.adaptive
+    label = Setting("", "", one.value, 0, adaptive).label()
+    return f"{label} (coarsest)" if one.how == "coarsest" else label
+
+
+def losses(problem: dict[str, Any], points: list[Point]) -> Table:
+    """What each engine's default method costs beside the cheapest one, for the same error."""
+    quantity = quantity_of(problem)
+    owners = cost.defaults(points)
+    rows = [(f"{target:g}", *(
+        _lost(cost.loss(points, quantity, target, kind, own.setting.curve, among))
+        for own in owners.values() for among in (own.setting.engine, "") for kind in cost.COSTS))
+        for target in problem["tolerances"]]  # fmt: skip
+    heads = tuple(f"{owner} default by the cheapest of {among}, {kind}"
+                  for owner in owners for among in (owner, "all") for kind in cost.COSTS)  # fmt: skip
+    as_is = "; ".join(f"{owner}: {own.setting.method} at {own.setting.label()}, which by itself gives "
+                      f"{own.errors[quantity]:.3g} {problem['units'][quantity]}" for owner, own in owners.items()
+                      if own.status == "ok")  # fmt: skip
+    note = ("The default method, its step refined until it meets the tolerance, by the cheapest setting that does. "
+            f"{as_is}. * means that no step tried was fine enough: extrapolated by the method's declared order. "
+            "In brackets: 95 % interval, bootstrapped over rounds.")  # fmt: skip
+    return Table("Factor that a default setting loses", note, (f"{quantity} error at most", *heads), tuple(rows))
+
+
+def _lost(found: Loss | None) -> str:
+    if found is None:
+        return "-"
+    mark = "*" if found.how == "extrapolated" else ""
+    if found.low == found.high:
+        return f"{_short(found.factor)}{mark}"
+    return f"{_short(found.factor)}{mark} [{_short(found.low)}, {_short(found.high)}]"
+
+
+def _short(value: float) -> str:
+    return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
+
+
+def every_curve(problem: dict[str, Any], points: list[Point]) -> Table:
+    """A row per curve: settings, errors, observed order, what an error of 1 costs."""
+    quantity, groups = quantity_of(problem), groups_of(problem, points)
+    orders = cost.orders(points, quantity, problem["uncertainty"][quantity])
+    calls = cost.reaches(points, quantity, 1.0, "force calls")
+    seconds = cost.reaches(points, quantity, 1.0, "seconds")
+    rows = tuple(
+        (_plain(curve), str(len(own)), f"{own[0].setting.label()} to {own[-1].setting.label()}",
+         f"{own[0].errors[quantity]:.2g} to {own[-1].errors[quantity]:.2g}", _order(orders[curve]),
+         _declared(own[0].setting), _number(calls.get(curve), 1, ",.0f"), _number(seconds.get(curve), 1e3, ".3g"),
+         named(curve, groups).partition(" = ")[2] or "-")
+        for curve, own in by_curve(points).items())  # fmt: skip
+    unit = problem["units"][quantity]
+    note = (f"Order: slope of the error over the step on the three finest settings whose error exceeds {HOLLOW:g} times "
+            "the uncertainty of the reference; for adaptive methods over 1 / force calls, where loose tolerances are still "
+            "ruled by stability. Curves coincide if their errors agree to 1 % at every common setting.")  # fmt: skip
+    heads = ("curve", "settings", "from, to", f"{quantity} error [{unit}]", "observed order", "declared",
+             f"force calls for 1 {unit}", f"ms for 1 {unit}", "coincides with")  # fmt: skip
+    return Table("Every integrator that each engine offers", note, heads, rows)
+
+
+def _order(found: float) -> str:
+    return "-" if math.isnan(found) else f"{found:.2f}"
+
+
+def _declared(setting: Setting) -> str:
+    return str(setting.order) if setting.order else "varies"
+
+
+def _number(one: Reach | None, scale: float, form: str) -> str:
+    if one is None:
+        return "not met"
+    return format(scale * one.cost, form) + (" (coarsest)" if one.how == "coarsest" else "")
+
+
+def failures(points: list[Point]) -> Table:
+    """Everything that gave no answer, with what was said."""
+    found: dict[tuple[str, str, str], list[str]] = defaultdict(list)
+    for p in points:
+        if p.status != "ok":
+            found[_plain(p.setting.curve), p.status, p.reason].append(p.setting.label())
+    rows = tuple((curve, ", ".join(labels), status, reason) for (curve, status, reason), labels in found.items())
+    note = ("refused: not run, because the answer would be wrong; raised: the run failed and said so; SILENT: a wrong "
+            "answer came back as a result, of which there must be none.")  # fmt: skip
+    return Table("Settings that gave no answer", note, ("curve", "setting", "status", "what was said"), rows)

@@ -1,0 +1,94 @@
+"""What a work-precision curve says: its order, which curves coincide, and what an error costs on it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+HOLLOW = 10.0
+"""A point is hollow if its error is below this many times the uncertainty of the reference."""
+FINEST = 3
+"""How many of the finest points an observed order is fitted to: the coarse end is not asymptotic yet."""
+SAME = 0.01
+"""Errors within this part of each other count as the same."""
+
+
+def slope(sizes: Sequence[float], errors: Sequence[float]) -> float:
+    """Least-squares slope of log error over log size; not a number for fewer than two points."""
+    if len(sizes) < 2:
+        return float("nan")
+    return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
+
+
+def observed_order(sizes: Sequence[float], errors: Sequence[float], floor: float) -> float:
+    """Slope over the finest points that stand clear of the floor (in the unit of the errors)."""
+    clear = sorted((h, e) for h, e in zip(sizes, errors, strict=True) if e >= floor)[:FINEST]
+    return slope(*zip(*clear, strict=True)) if len(clear) > 1 else float("nan")
+
+
+def coinciding(curves: Mapping[str, Mapping[float, float]], tolerance: float = SAME) -> list[tuple[str, ...]]:
+    """Groups of curves (name -> {setting: error}) whose errors at all common settings agree to ``tolerance``.
+
+    At least three settings must be common: two curves that merely cross are not the same.
+    """
+    groups: list[list[str]] = []
+    for name, curve in curves.items():
+        home = next((group for group in groups if _same(curve, curves[group[0]], tolerance)), None)
+        groups.append([name]) if home is None else home.append(name)
+    return [tuple(group) for group in groups if len(group) > 1]
+
+
+def _same(a: Mapping[float, float], b: Mapping[float, float], tolerance: float) -> bool:
+    common = set(a) & set(b)
+    return len(common) >= 3 and all(abs(a[x] - b[x]) <= tolerance * max(a[x], b[x]) for x in common)
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What it takes to meet a tolerance: cost, the setting's value, and how both were found.
+
+    "tried" : the first setting that does, nothing in between; "coarsest" : already the coarsest setting
+    does; "extrapolated" : not even the finest does.
+    """
+
+    cost: float
+    value: float
+    how: Literal["interpolated", "tried", "coarsest", "extrapolated"]
+
+
+def reach(values: Sequence[float], errors: Sequence[float], costs: Sequence[float], target: float,
+          order: int = 0, extrapolate: bool = False) -> Reach | None:  # fmt: skip
+    """Cost at which a curve meets ``target`` and stays below it.
+
+    Points are taken from coarse to fine by ``values``. With the declared ``order`` of a fixed-step method the
+    answer is interpolated log-log between two settings, and, with ``extrapolate``, carried beyond the finest
+    one. Order 0 stands for adaptive methods, whose error is no smooth function of their tolerance: there only
+    settings that were tried count. None where the target is not met.
+    """
+    table = np.array(sorted(zip(values, errors, costs, strict=True), reverse=True))
+    above = np.flatnonzero(table[:, 1] > target)
+    if not len(above):
+        return Reach(float(table[0, 2]), float(table[0, 0]), "coarsest")
+    last = int(above[-1])
+    if last + 1 < len(table) and not order:
+        return Reach(float(table[last + 1, 2]), float(table[last + 1, 0]), "tried")
+    if last + 1 < len(table):
+        logs = np.log(table[last : last + 2])
+        part = (logs[0, 1] - np.log(target)) / (logs[0, 1] - logs[1, 1])
+        value, _, cost = np.exp(logs[0] + part * (logs[1] - logs[0]))
+        return Reach(float(cost), float(value), "interpolated")
+    if not (extrapolate and order):
+        return None
+    finer = (table[-1, 1] / target) ** (1 / order)
+    return Reach(float(table[-1, 2] * finer), float(table[-1, 0] / finer), "extrapolated")
+
+
+def pareto(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
+    """Indices of the points that no other one beats in both cost and error, by rising cost."""
+    order = sorted(range(len(costs)), key=lambda i: (costs[i], errors[i]))
+    front: list[int] = []
+    for i in order:
+        if not front or errors[i] < (1 - SAME) * errors[front[-1]]:
+            front.append(i)
+    return front

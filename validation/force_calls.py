@@ -1,0 +1,56 @@
+"""Force evaluations counted from outside: by Exudyn's own calls of a load, and by MuJoCo's own timers.
+
+What an adapter says about its cost would otherwise be checked against itself.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+from unittest.mock import patch
+
+from models.assembly import Assembly
+from models.engines.protocol import Settings, build
+
+AT_START = {"VelocityVerlet": 1, "GeneralizedAlpha": 1, "TrapezoidalIndex2": 1}
+"""Evaluations before the first step, for the accelerations that a method starts from; not in the reports."""
+
+
+@contextmanager
+def _counted_loads() -> Iterator[list[int]]:
+    """Count the calls of the first load of every Exudyn model that is built in the block."""
+    from models.engines import exudyn
+
+    calls = [0]
+
+    class CountingClock(exudyn.Clock):
+        def reader(self, column: int, scale: float) -> Any:
+            read = super().reader(column, scale)
+            if column:
+                return read
+
+            def counted(mbs: Any, t: float, load: float) -> float:
+                calls[0] += 1
+                return read(mbs, t, load)
+
+            return counted
+
+    with patch.object(exudyn, "Clock", CountingClock):
+        yield calls
+
+
+def _mujoco_calls(model: Any) -> int:
+    """Evaluations of the forces that MuJoCo's timers have seen."""
+    import mujoco
+
+    return int(model.data.timer[mujoco.mjtTimer.mjTIMER_ACTUATION].number)
+
+
+def counted(engine: str, assembly: Assembly, settings: Settings) -> tuple[int, int]:
+    """Force calls of one run in Exudyn or MuJoCo as (counted from outside, said by the adapter)."""
+    if engine == "mujoco":
+        model: Any = build(engine, assembly, settings)
+        said = model.run().counts["force calls"]
+        return _mujoco_calls(model), said
+    with _counted_loads() as calls:
+        said = build(engine, assembly, settings).run().counts["force calls"]
+    return calls[0] - AT_START.get(settings.integrator, 0), said

@@ -1,0 +1,85 @@
+"""Problems of the work-precision runner: one file each, with what is computed and how its error is taken.
+
+A problem knows its reference solution and that solution's own uncertainty; ``validation.cost`` does the
+rest. A new system adds a file here whose class fulfils ``Problem``.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One way to solve a problem.
+
+    engine, method : together the name of a work-precision curve
+    value : step in s, or relative tolerance where ``adaptive``
+    order : declared order of the method, 0 if it varies
+    stages : force evaluations per step, 0 where they are not fixed
+    default : whose default setting this is, "" for no one's
+    """
+
+    engine: str
+    method: str
+    value: float
+    order: int
+    adaptive: bool = False
+    stages: int = 0
+    default: str = ""
+
+    @property
+    def curve(self) -> str:
+        """Name of the curve that the setting lies on."""
+        return f"{self.engine} {self.method}"
+
+    def label(self) -> str:
+        """The setting as a reader names it: a step with its unit, or a tolerance."""
+        return f"tolerance {self.value:.3g}" if self.adaptive else f"{1e3 * self.value:.4g} ms"
+
+
+class Solved(Protocol):
+    """What a run gives back: its cost in counts, and whatever the problem needs to take its error."""
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """At least "force calls" and "steps"."""
+        ...
+
+
+class Solver(Protocol):
+    """A model that is built and can be run."""
+
+    def run(self) -> Any:
+        """Solve; raises RunFailed rather than give a wrong answer."""
+        ...
+
+
+class Problem(Protocol):
+    """What the runner asks of a problem.
+
+    key : part of the rows' names; title : what is computed; units : unit of each error, the quantity that
+    tolerances are set on first; reference : how the reference was made, in words; uncertainty : largest
+    difference between its solvers, per quantity; bound : an error above it is not an answer any more;
+    tolerances : for the table of cheapest settings.
+    """
+
+    key: str
+    title: str
+    units: dict[str, str]
+    reference: str
+    uncertainty: dict[str, float]
+    bound: float
+    tolerances: tuple[float, ...]
+
+    def settings(self, quick: bool) -> tuple[Setting, ...]:
+        """All settings to try, or the named small share of them."""
+        ...
+
+    def build(self, setting: Setting) -> Solver:
+        """A model ready to run; raises Refused where the engine would answer wrongly."""
+        ...
+
+    def errors(self, solution: Any) -> dict[str, float]:
+        """Largest error per quantity over the run, in the units of ``units``."""
+        ...

@@ -1,0 +1,183 @@
+"""Problem A: the pitch-plane vehicle over the study road, nonlinear in pitch.
+
+Quantities of interest: the largest error of a wheel force, which is what durability work reads, and the
+largest error of any state, over every instant that an integrator returns. The road fades in over its
+first 40 m, so the second half of the 2 s at 20 m/s runs on nearly full roughness.
+"""
+
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.integrate import OdeSolution, solve_ivp
+
+from models.assembly import Assembly, assemble
+from models.engines.catalogue import CATALOGUE
+from models.engines.protocol import Model, Settings, Trajectory, build
+from models.engines.reference import derivative_of
+from models.scene import build as build_scene
+from validation.problems import Setting
+
+DURATION, SPEED = 2.0, 20.0
+GRID = 1.25e-4
+"""Spacing (s) of the stored reference; every fixed step is a multiple of it."""
+ADAPTIVE_STEP = {"exudyn": 5e-3, "reference": 1e-3}
+"""Largest step of Exudyn's adaptive solvers, which they also begin with, and the spacing of scipy's output (s)."""
+STAGES = {
+    "RK44": 4, "RK67": 7, "RK33": 3, "ExplicitMidpoint": 2, "ExplicitEuler": 1, "VelocityVerlet": 1,
+    "RK4": 4, "Euler": 1, "implicit": 1, "implicitfast": 1, "discrete": 1,
+}  # fmt: skip
+"""Force evaluations per step, from the methods' tableaux. Newton iterations are not fixed."""
+RADII = {"GeneralizedAlpha 0.9": 0.9, "GeneralizedAlpha 0.6": 0.6}
+DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Euler", 2e-3): "MuJoCo"}
+"""What the engines do if not told otherwise: Exudyn 100 steps in 1 s, MuJoCo a timestep of 2 ms."""
+
+MS = 1e-3
+_STEPS = (5 * MS, 4 * MS, 2.5 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS)
+_TIGHT = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+FULL: dict[tuple[str, str], tuple[float, ...]] = {
+    ("reference", "RK4"): _STEPS,
+    ("reference", "DOP853"): (*_TIGHT, 1e-9, 1e-10),
+    ("reference", "Radau"): (1e-2, *_TIGHT[:-1]),
+    ("reference", "LSODA"): (*_TIGHT, 1e-9, 1e-10),
+    ("exudyn", "RK44"): _STEPS,
+    ("exudyn", "RK67"): (5 * MS, 4 * MS, 2.5 * MS, 2 * MS, 1.25 * MS, 1 * MS, 0.625 * MS),
+    ("exudyn", "RK33"): (5 * MS, 4 * MS, 2.5 * MS, 2 * MS, 1.25 * MS, 1 * MS, 0.5 * MS, 0.25 * MS),
+    ("exudyn", "ExplicitMidpoint"): _STEPS,
+    ("exudyn", "ExplicitEuler"): _STEPS,
+    ("exudyn", "VelocityVerlet"): _STEPS,
+    ("exudyn", "GeneralizedAlpha 0.9"): (10 * MS, *_STEPS),
+    ("exudyn", "GeneralizedAlpha 0.6"): (10 * MS, *_STEPS),
+    ("exudyn", "TrapezoidalIndex2"): (10 * MS, *_STEPS),
+    ("exudyn", "DOPRI5"): (1e-2, *_TIGHT),
+    ("exudyn", "DVERK6"): (1e-6,),
+    ("exudyn", "ODE23"): (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7),
+    ("mujoco", "RK4"): _STEPS,
+    ("mujoco", "Euler"): _STEPS,
+    ("mujoco", "implicit"): _STEPS,
+    ("mujoco", "implicitfast"): _STEPS,
+    ("mujoco", "discrete"): _STEPS,
+}
+QUICK: dict[tuple[str, str], tuple[float, ...]] = {
+    ("reference", "RK4"): (4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS),
+    ("reference", "LSODA"): (1e-3, 1e-4, 1e-6),
+    ("exudyn", "RK44"): (5 * MS, 4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS),
+    ("exudyn", "ExplicitEuler"): (5 * MS, 1 * MS, 0.5 * MS, 0.25 * MS),
+    ("exudyn", "GeneralizedAlpha 0.9"): (10 * MS, 2 * MS, 1 * MS, 0.5 * MS),
+    ("exudyn", "DOPRI5"): (1e-3, 1e-4),
+    ("exudyn", "DVERK6"): (1e-6,),
+    ("mujoco", "RK4"): (4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS),
+    ("mujoco", "Euler"): (5 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS),
+    ("mujoco", "implicit"): (2 * MS, 1 * MS, 0.5 * MS),
+    ("mujoco", "implicitfast"): (2 * MS, 1 * MS, 0.5 * MS),
+}
+"""The named share of FULL that the quick report takes: each engine's default and fourth-order method, one
+adaptive solver, one that is unstable, one that is refused."""
+
+SOLVERS = {True: (("DOP853", 1e-13), ("LSODA", 1e-13)), False: (("DOP853", 1e-13), ("Radau", 1e-11), ("LSODA", 1e-13))}
+"""Reference solvers with their relative tolerances, by ``quick``: an explicit Runge-Kutta method, a multistep
+one, and in the full run an implicit Runge-Kutta method (which takes 5 s)."""
+
+
+def scene(duration: float = DURATION):
+    """The scene of the problem."""
+    return build_scene({
+        "title": "pitch-plane vehicle on the study road", "vehicle": {"parameters": "itwm_drift"},
+        "run": {"duration": duration, "step": 1e-3}, "effects": {"road": {"source": "study", "speed": SPEED}},
+    })  # fmt: skip
+
+
+def settings_of(setting: Setting, duration: float = DURATION) -> Settings:
+    """A setting as the engines take it."""
+    integrator = setting.method.split()[0]
+    radius = RADII.get(setting.method, 0.6)
+    if setting.adaptive:
+        return Settings(integrator, ADAPTIVE_STEP[setting.engine], duration, setting.value, radius)
+    return Settings(integrator, setting.value, duration, spectral_radius=radius)
+
+
+def setting(engine: str, method: str, value: float) -> Setting:
+    """A setting of this problem, with what the catalogue declares about its method."""
+    known = CATALOGUE[engine][method.split()[0]]
+    order = 0 if method == "LSODA" else known.order
+    default = DEFAULTS.get((engine, method, value), "")
+    return Setting(engine, method, value, order, known.adaptive, STAGES.get(method, 0), default)
+
+
+def _dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
+    """A scipy solution of the paper's equations at any time, restarted where the road is only C2."""
+    derivative, p = derivative_of("road", assembly.vehicle.geometry), assembly.parameters.array()
+    assert assembly.input is not None
+    at = assembly.input.at
+    edges = [0.0, *assembly.input.knots(DURATION), DURATION]
+    times, pieces, y = [0.0], list[Any](), assembly.initial
+    for start, end in pairwise(edges):
+        part = solve_ivp(lambda t, y: derivative(y, at(t), p), (start, end), y, method=method, dense_output=True,
+                         rtol=tolerance, atol=1e-2 * tolerance)  # fmt: skip
+        times += list(part.t[1:])
+        pieces += part.sol.interpolants
+        y = part.y[:, -1]
+    return OdeSolution(times, pieces)
+
+
+class RoadExcited:
+    """The problem with its reference; see ``validation.problems.Problem``."""
+
+    key = "road"
+
+    def __init__(self, quick: bool) -> None:
+        steps = [1e3 * one.value for one in self.settings(quick) if not one.adaptive]
+        self.title = (f"Pitch-plane vehicle on the study road, {DURATION:g} s at {SPEED:g} m/s, "
+                      f"fixed steps of {min(steps):g} to {max(steps):g} ms")  # fmt: skip
+        self.units = {"wheel force": "N", "state": "m, rad, m/s, rad/s"}
+        self.tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1, 0.01)
+        self.assembly = assemble(scene())
+        solvers = SOLVERS[quick]
+        self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
+        self._solution = _dense(self.assembly, *solvers[0])
+        times = GRID * np.arange(round(DURATION / GRID) + 1)
+        self._states = self._solution(times).T
+        others = [_dense(self.assembly, *solver)(times).T for solver in solvers[1:]]
+        differences = [self._largest(other - self._states) for other in others]
+        self.uncertainty = {name: max(found[name] for found in differences) for name in self.units}
+        self.bound = 10 * self._largest_force(times)
+
+    def settings(self, quick: bool) -> tuple[Setting, ...]:
+        """FULL, or its named share QUICK."""
+        chosen = QUICK if quick else FULL
+        return tuple(setting(*curve, value) for curve, values in chosen.items() for value in values)
+
+    def build(self, setting: Setting) -> Model:
+        """The vehicle in one engine."""
+        return build(setting.engine, self.assembly, settings_of(setting))
+
+    def errors(self, solution: Trajectory) -> dict[str, float]:
+        """Largest error of a wheel force (N) and of a state, at the integrator's own instants."""
+        return self._largest(solution.states - self._at(solution.times))
+
+    def _at(self, times: np.ndarray) -> np.ndarray:
+        """Reference states (n, 8): stored where the times lie on the grid, else the solver's own interpolant."""
+        index = np.rint(times / GRID).astype(int)
+        if np.abs(times - GRID * index).max() < 1e-12:
+            return self._states[index]
+        return self._solution(times).T
+
+    def _largest(self, off: np.ndarray) -> dict[str, float]:
+        """Largest force and state error from the states' differences (n, 8); the road cancels."""
+        p = self.assembly.parameters
+        forces = off[:, :2] * [p.k1, p.k2] + off[:, 4:6] * [p.d1, p.d2]
+        return {"wheel force": float(np.abs(forces).max()), "state": float(np.abs(off).max())}
+
+    def _largest_force(self, times: np.ndarray) -> float:
+        """Largest wheel force of the reference, N."""
+        assert self.assembly.input is not None
+        road, p = self.assembly.input.sample(0.0, GRID, len(times)), self.assembly.parameters
+        off = self._states[:, [0, 1, 4, 5]] - road
+        return float(np.abs(off[:, :2] * [p.k1, p.k2] + off[:, 2:] * [p.d1, p.d2]).max())
+
+
+@cache
+def problem(quick: bool) -> RoadExcited:
+    """The problem, its reference computed once per process."""
+    return RoadExcited(quick)

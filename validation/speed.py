@@ -1,0 +1,46 @@
+"""Two claims about seconds: what a compiled callback costs in MuJoCo, and how fast the reference runs."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from models.assembly import Assembly, assemble
+from models.engines.protocol import Settings, build
+from models.scene import build as build_scene
+from validation.timing import describe, interleave, paired_ratio
+
+STEP = 1e-3
+
+
+def callback_cost(driven: Assembly, duration: float, integrator: str, rounds: int) -> dict[str, Any]:
+    """Paired ratios of one MuJoCo model in three states: without forces, with its springs and dampers, driven.
+
+    driven : a vehicle on a road, whose input enters through a compiled callback.
+    Values are (ratio, low, high) with a bootstrap 95 % interval, and medians in s.
+    """
+    flat = assemble(build_scene({"title": "no input", "run": {"duration": duration, "step": STEP}}))
+    bare = replace(flat, vehicle=replace(flat.vehicle, struts=()))
+    settings = Settings(integrator, STEP, duration)
+    models = [build("mujoco", assembly, settings) for assembly in (bare, flat, driven)]
+    seconds = interleave([model.run for model in models], rounds)
+    names = ("without forces", "springs and dampers", "with callback")
+    return {
+        "callbacks": [model.plan()["callbacks"] for model in models],
+        "seconds": {name: describe(own) for name, own in zip(names, seconds, strict=True)},
+        "to no forces": paired_ratio(seconds[2], seconds[0]),
+        "to no callback": paired_ratio(seconds[2], seconds[1]),
+    }
+
+
+def real_time(driven: Assembly, duration: float, rounds: int) -> dict[str, Any]:
+    """How many times faster than real time the reference runs at 1 ms, with and without making its road table.
+
+    The road is timed by itself beside the run and subtracted within each round.
+    """
+    signal, steps = driven.input, round(duration / STEP)
+    assert signal is not None
+    model = build("reference", driven, Settings("RK4", STEP, duration))
+    run, table = interleave([model.run, lambda: signal.sample(0.0, STEP / 2, 2 * steps + 1)], rounds)
+    return {"with table": duration / float(np.median(run)), "without table": duration / float(np.median(run - table)),
+            "seconds": describe(run)}  # fmt: skip

@@ -1,0 +1,68 @@
+"""Seconds: interleaved, repeated, and only ever compared within a round.
+
+Seconds wander by a fifth on a shared machine. Jobs are therefore timed in rounds, in a random order that
+differs from round to round, and two jobs are compared by the median of their ratios within the rounds.
+"""
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+SEED = 20
+RESAMPLES = 1000
+
+
+def interleave(jobs: Sequence[Callable[[], Any]], rounds: int, least: float = 0.02, seed: int = SEED) -> np.ndarray:
+    """Seconds of every job in every round, shape (jobs, rounds); single thread, warmed up.
+
+    least : a job is repeated within its turn until it lasts about this long (s); seed : of the order.
+    """
+    repeats = [_repeats(job, least) for job in jobs]
+    order = np.random.default_rng(seed)
+    seconds = np.empty((len(jobs), rounds))
+    for i in range(rounds):
+        for j in order.permutation(len(jobs)):
+            seconds[j, i] = _timed(jobs[j], repeats[j])
+    return seconds
+
+
+def _repeats(job: Callable[[], Any], least: float) -> int:
+    """How often a job fits into a turn: timed on the warm-up, or after it where that was short."""
+    if _timed(job, 1) >= least:
+        return 1
+    return max(1, math.ceil(0.9 * least / max(_timed(job, 1), 1e-9)))
+
+
+def _timed(job: Callable[[], Any], repeats: int) -> float:
+    start = time.perf_counter()
+    for _ in range(repeats):
+        job()
+    return (time.perf_counter() - start) / repeats
+
+
+def describe(seconds: Sequence[float]) -> dict[str, float]:
+    """Median, median absolute deviation and minimum (s)."""
+    values = np.asarray(seconds)
+    middle = float(np.median(values))
+    return {"median": middle, "mad": float(np.median(np.abs(values - middle))), "min": float(values.min())}
+
+
+def interval(samples: np.ndarray) -> tuple[float, float, float]:
+    """A value and its 95 % interval from bootstrapped ones: median, 2.5 % and 97.5 % quantile."""
+    low, middle, high = np.quantile(samples, (0.025, 0.5, 0.975))
+    return float(middle), float(low), float(high)
+
+
+def resamples(rounds: int, count: int = RESAMPLES, seed: int = SEED) -> np.ndarray:
+    """Rounds drawn with replacement, shape (count, rounds): one set for all jobs keeps the pairs together."""
+    return np.random.default_rng(seed).integers(rounds, size=(count, rounds))
+
+
+def paired_ratio(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:
+    """Ratio a / b as the median of the paired log ratios, with its bootstrap 95 % interval."""
+    logs = np.log(np.asarray(a) / np.asarray(b))
+    _, low, high = interval(np.median(logs[resamples(len(logs))], axis=1))
+    return math.exp(float(np.median(logs))), math.exp(low), math.exp(high)
