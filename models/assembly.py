@@ -78,7 +78,9 @@ def _ordered(scene: Scene) -> list[str]:
                 raise InputError(scene.file, f"effects.{name}", None, f"needs the effect {needed!r}: name it too")
         for other in module.EXCLUDES:
             if other in modules:
-                raise InputError(scene.file, f"effects.{name}", None, f"cannot stand beside {other!r}: drop one of them")
+                raise InputError(
+                    scene.file, f"effects.{name}", None, f"cannot stand beside {other!r}: drop one of them"
+                )
     done: list[str] = []
     waiting = list(modules)
     while waiting:

@@ -1,6 +1,7 @@
 """The two errors that a user can meet: an input that cannot be used, and a run that failed."""
 
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,15 @@ def suggestion(name: object, choices: tuple[str, ...]) -> str:
     lower = {choice.casefold(): choice for choice in choices}
     match = get_close_matches(str(name).casefold(), lower, n=1, cutoff=0.6)
     return f"; did you mean {lower[match[0]]!r}?" if match else ""
+
+
+def similar_file(path: Path) -> str:
+    """Phrase that offers the file of the same kind in the same folder whose name is most like that of ``path``."""
+    try:
+        stems = tuple(p.stem for p in path.parent.iterdir() if p.suffix == path.suffix and p.is_file())
+    except OSError:
+        return ""
+    return suggestion(path.stem, stems).replace("'?", f"{path.suffix}'?")
 
 
 class RunFailed(RuntimeError):

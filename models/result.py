@@ -86,6 +86,7 @@ def provenance(command: str = "") -> dict[str, Any]:
 
 def _commit() -> str:
     """Commit of the checkout that runs, with a mark if it was changed since."""
+
     def ask(*arguments: str) -> str:
         here = Path(__file__).parent
         done = subprocess.run(["git", *arguments], cwd=here, capture_output=True, text=True, timeout=10, check=False)

@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from models.engines.catalogue import CATALOGUE, RECOMMENDED
-from models.errors import InputError, suggestion
+from models.engines.catalogue import CATALOGUE, MISSING, RECOMMENDED
+from models.errors import InputError, similar_file
 from models.steps import MOST_STEPS, divides, fitting
 from models.strict import Strict, quantity, read
 from models.vehicles import pitch_plane
@@ -112,10 +112,11 @@ def _existing(name: str, folder: Path, file: str, place: str) -> Path:
     try:
         if path.is_file():
             return path
-        beside = tuple(p.name for p in path.parent.iterdir() if p.suffix == path.suffix)
-    except OSError:
-        beside = ()
-    raise InputError(file, place, name, f"no such file in the folder {str(folder)!r}{suggestion(path.name, beside)}")
+        if path.is_dir():
+            raise InputError(file, place, name, "is a folder: name a file")
+    except OSError:  # such as a name that is too long
+        pass
+    raise InputError(file, place, name, f"no such file, looked for as {str(path)!r}{similar_file(path)}")
 
 
 def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
@@ -125,8 +126,8 @@ def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
     except (ValueError, ArithmeticError):  # the sine of the pitch beyond 1
         rest = np.full(8, np.nan)
     if not np.isfinite(rest).all():
-        raise InputError(scene.file, "vehicle", None, "the vehicle has no static equilibrium with these parameters: "
-                         "its springs k1 to k4 are too soft for its weight")
+        raise InputError(scene.file, "vehicle", None, "no static equilibrium with these parameters: "
+                         "the springs k1 to k4 are too soft for the weight")
 
 
 def parse(path: Path) -> dict[str, Any]:
@@ -134,8 +135,7 @@ def parse(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
-        beside = tuple(p.name for p in path.parent.glob("*.toml"))
-        raise InputError(path, "", None, f"no such file{suggestion(path.name, beside)}") from None
+        raise InputError(path, "", None, f"no such file{similar_file(path)}") from None
     except OSError as error:
         raise InputError(path, "", None, f"cannot be read as a file: {error.strerror}") from None
     except UnicodeDecodeError as error:
@@ -146,8 +146,9 @@ def parse(path: Path) -> dict[str, Any]:
 
 def _not_toml(path: Path, error: Exception) -> InputError:
     """Message with the line at which reading stopped."""
-    if isinstance(error, RecursionError):
-        return InputError(path, "", None, "not valid TOML: nested too deeply")
+    if not isinstance(error, tomllib.TOMLDecodeError):
+        reason = "nested too deeply" if isinstance(error, RecursionError) else "a number has too many digits"
+        return InputError(path, "", None, f"not valid TOML: {reason}")
     what, line, column = _WHERE.fullmatch(str(error)).groups()  # type: ignore[union-attr]
     if line is None:
         return InputError(path, "", None, f"not valid TOML: {what}")
@@ -192,12 +193,14 @@ def _check_engine(name: str, scene: Scene) -> None:
     given, place = scene.engines[name], f"engines.{name}"
     integrator = str(scene.settings(name).integrator)
     if integrator not in CATALOGUE[name]:
-        raise InputError(scene.file, f"{place}.integrator", integrator, "no such integrator", tuple(CATALOGUE[name]))
+        names = tuple(key for key in CATALOGUE[name] if (name, key) not in MISSING)
+        raise InputError(scene.file, f"{place}.integrator", integrator, "no such integrator", names)
     if "spectral_radius" in given.model_fields_set and integrator != "GeneralizedAlpha":
         allowed = f"has no meaning for {integrator}: it belongs to exudyn's GeneralizedAlpha"
         raise InputError(scene.file, f"{place}.spectral_radius", given.spectral_radius, allowed)
     if "tolerance" in given.model_fields_set and not CATALOGUE[name][integrator].adaptive:
-        adaptive = " or ".join(key for key, value in CATALOGUE[name].items() if value.adaptive) or "other engines"
+        adaptive = " or ".join(key for key, value in CATALOGUE[name].items()
+                               if value.adaptive and (name, key) not in MISSING) or "other engines"
         allowed = f"has no meaning for {integrator}, which takes steps of fixed length: it belongs to {adaptive}"
         raise InputError(scene.file, f"{place}.tolerance", given.tolerance, allowed)
 
@@ -216,8 +219,8 @@ def _check_times(scene: Scene) -> None:
 def _check_step(scene: Scene, place: str, step: float) -> None:
     length, wanted = scene.run.duration, scene.run.output_step
     if length / step > MOST_STEPS:
-        allowed = f"makes {length / step:.3g} steps of the duration {length:g} s; at most {MOST_STEPS:.0e} are possible"
-        raise InputError(scene.file, place, step, allowed)
+        allowed = f"needs {length / step:.3g} steps of {place} = {step:g} s; at most {MOST_STEPS:,} are possible"
+        raise InputError(scene.file, "run.duration", length, allowed)
     if not divides(step, length):
         allowed = f"must divide run.duration = {length:g} s; use for example {fitting(step, length)}"
         raise InputError(scene.file, place, step, allowed)

@@ -18,9 +18,20 @@ Interpolation = Literal["held", "linear", "smooth"]
 class Signal(Protocol):
     """What an engine may ask of an input."""
 
-    channels: int
-    period: float | None
-    held: bool
+    @property
+    def channels(self) -> int:
+        """Number of columns."""
+        ...
+
+    @property
+    def period(self) -> float | None:
+        """Sampling period (s), None for a signal that is not made of samples."""
+        ...
+
+    @property
+    def held(self) -> bool:
+        """True if it is constant over each period."""
+        ...
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values at start + i step, shape (count, channels)."""

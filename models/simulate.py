@@ -45,8 +45,10 @@ def _label(assembly: Assembly, engine: str, settings: Settings, run: Trajectory,
     channels = outputs(assembly, run)
     rows = slice(None, None, keep)
     data = xr.Dataset(
-        {name: ("time", values[rows], {"units": unit, "long_name": meaning})
-         for name, (unit, meaning, values) in channels.items()},
+        {
+            name: ("time", values[rows], {"units": unit, "long_name": meaning})
+            for name, (unit, meaning, values) in channels.items()
+        },
         coords={"time": ("time", run.times[rows], {"units": "s", "long_name": "time"})},
     )
     data.attrs = {
@@ -59,7 +61,12 @@ def _label(assembly: Assembly, engine: str, settings: Settings, run: Trajectory,
 
 def outputs(assembly: Assembly, run: Trajectory) -> Channels:
     """All channels of a run as name -> (unit, meaning, values): states, forces, and what its effects add."""
-    names = {"z1": "front wheel, down", "z2": "rear wheel, down", "z3": "chassis heave, down", "pitch": "pitch, nose up"}
+    names = {
+        "z1": "front wheel, down",
+        "z2": "rear wheel, down",
+        "z3": "chassis heave, down",
+        "pitch": "pitch, nose up",
+    }
     channels: Channels = {}
     for i, (name, meaning) in enumerate(names.items()):
         unit = "rad" if name == "pitch" else "m"
@@ -124,6 +131,11 @@ def state_names() -> tuple[str, ...]:
 
 def summary(result: Result) -> dict[str, Any]:
     """Largest magnitude and rms of every channel, with its unit."""
-    return {str(name): {"unit": channel.attrs["units"], "max": float(np.abs(channel.values).max()),
-                        "rms": float(np.sqrt(np.mean(channel.values**2)))}
-            for name, channel in result.data.data_vars.items()}
+    return {
+        str(name): {
+            "unit": channel.attrs["units"],
+            "max": float(np.abs(channel.values).max()),
+            "rms": float(np.sqrt(np.mean(channel.values**2))),
+        }
+        for name, channel in result.data.data_vars.items()
+    }

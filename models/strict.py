@@ -42,9 +42,10 @@ def _message(error: ValidationError, model: type[BaseModel], file: object, place
     first, *others = sorted(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
     keys = _keys(first)
     value = None if first["type"] == "missing" else first["input"]
-    rest = [_dotted(place, _keys(found)) for found in others]
+    said = _phrase(first, keys, _owner(model, keys))
+    rest = [_dotted(place, _keys(found)) for found in others if f"mean {_keys(found)[-1]!r}" not in said]
     more = f"; also wrong: {', '.join(rest[:5])}{', ...' if len(rest) > 5 else ''}" if rest else ""
-    return InputError(file, _dotted(place, keys), value, _phrase(first, keys, _owner(model, keys)) + more)
+    return InputError(file, _dotted(place, keys), value, said + more)
 
 
 def _keys(found: Any) -> tuple[str, ...]:
@@ -103,10 +104,10 @@ WORDS = {
     "tuple_type": "must be a list in [ ]",
     "dict_type": "must be a table of keys and values",
     "model_type": "must be a table of keys and values",
-    "greater_than": "must be above {gt}",
-    "greater_than_equal": "must be {ge} or more",
-    "less_than": "must be below {lt}",
-    "less_than_equal": "must be at most {le}",
+    "greater_than": "must be above {gt:g}",
+    "greater_than_equal": "must be {ge:g} or more",
+    "less_than": "must be below {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
 }
 """What each kind of error of the library means to a person who writes a file."""
 

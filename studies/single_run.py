@@ -40,8 +40,13 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 def _line(result: Result) -> dict[str, Any]:
     attributes = result.data.attrs
-    return {"integrator": attributes["integrator"], "step": attributes["step"], "seconds": attributes["seconds"],
-            "counts": result.counts(), "channels": summary(result)}
+    return {
+        "integrator": attributes["integrator"],
+        "step": attributes["step"],
+        "seconds": attributes["seconds"],
+        "counts": result.counts(),
+        "channels": summary(result),
+    }
 
 
 def agreement(results: dict[str, Result]) -> dict[str, float]:
@@ -63,21 +68,30 @@ def difference(one: Result, other: Result) -> float:
 def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
     from studies.figures import COLOURS, LABELS, plt, save
 
-    panels = [("z3", "heave of the chassis, down [m]", 1.0), ("pitch", "pitch, nose up [rad]", 1.0),
-              ("f1", "front wheel force [kN]", 1e-3)]
+    panels = [
+        ("z3", "heave of the chassis, down [m]", 1.0),
+        ("pitch", "pitch, nose up [rad]", 1.0),
+        ("f1", "front wheel force [kN]", 1e-3),
+    ]
     if all("enforced_moment" in result.data for result in results.values()):
         panels.append(("enforced_moment", "enforced moment [N m]", 1.0))
     rows = len(panels) + (1 if len(results) > 1 else 0)
     figure, axes = plt.subplots(rows, 1, figsize=(8.5, 1.9 * rows + 0.6), sharex=True)
     for axis, (channel, label, scale) in zip(axes, panels, strict=False):
         for i, (engine, result) in enumerate(results.items()):
-            axis.plot(result.times, scale * result[channel], color=COLOURS[engine], label=LABELS[engine],
-                      linewidth=2.4 - 0.8 * i, alpha=0.9)
+            axis.plot(
+                result.times,
+                scale * result[channel],
+                color=COLOURS[engine],
+                label=LABELS[engine],
+                linewidth=2.4 - 0.8 * i,
+                alpha=0.9,
+            )
         axis.set_title(label)
     if len(results) > 1:
         _differences(axes[-1], results)
     axes[-1].set_xlabel("time [s]")
-    axes[0].legend(loc="upper right", ncols=len(results))
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=len(results))
     figure.suptitle(scene.title, x=0.01, ha="left", fontweight="bold")
     save(figure, path)
 
@@ -90,8 +104,9 @@ def _differences(axis: Any, results: dict[str, Result]) -> None:
     for engine, result in others:
         if len(result.times) == len(first.times):
             gap = np.abs(result.states - first.states).max(axis=1)
-            axis.semilogy(result.times, np.maximum(gap, 1e-18), color=COLOURS[engine],
-                          label=f"{LABELS[engine]} - {LABELS[base]}")
+            axis.semilogy(
+                result.times, np.maximum(gap, 1e-18), color=COLOURS[engine], label=f"{LABELS[engine]} - {LABELS[base]}"
+            )
     axis.set_title(f"largest difference of the {len(state_names())} states [m, rad, m/s, rad/s]")
     axis.legend(loc="lower right", ncols=2)
 

@@ -33,7 +33,9 @@ class Options(Strict):
     """[options] of this study."""
 
     sampling_rate: float = quantity("Hz", "rate at which forces and pitch are measured", default=1000.0)
-    noise_fraction: float = quantity("", "standard deviation of the noise by the largest force", default=0.002, zero=True)
+    noise_fraction: float = quantity(
+        "", "standard deviation of the noise by the largest force", default=0.002, zero=True
+    )
     noise_samples: int = Field(5, ge=1, description="number of noise samples")
     perturbed_models: int = Field(5, ge=0, description="number of random models beside the paper's")
     seed: int = Field(1, ge=0, description="seed of noise and models")
@@ -57,8 +59,14 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     (folder / "table.txt").write_text("\n".join(text(table, options, deviation)) + "\n")
     progress("figures", 1.0)
     _figures(measured, runs[engines[0]], folder)
-    return {"scene": scene.title, "folder": str(folder), "sampling rate": options.sampling_rate,
-            "noise deviation": deviation, "rows": table, "table": text(table, options, deviation)}
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "sampling rate": options.sampling_rate,
+        "noise deviation": deviation,
+        "rows": table,
+        "table": text(table, options, deviation),
+    }
 
 
 def _write_measurement(measured: Result, options: Options, folder: Path) -> float:
@@ -76,8 +84,9 @@ def _scenes(scene: Scene, options: Options, folder: Path, deviation: float) -> d
     base = scene.vehicle_parameters()
     paper = {name: getattr(base, name) * factor for name, factor in PAPER.items()}
     make = _maker(scene, folder)
-    noises = [{"force_noise": {"deviation": deviation, "seed": 1000 * options.seed + i}}
-              for i in range(options.noise_samples)]
+    noises = [
+        {"force_noise": {"deviation": deviation, "seed": 1000 * options.seed + i}} for i in range(options.noise_samples)
+    ]
     scenes = {"undisturbed": make({}, {})}
     scenes |= {f"noisy {i + 1}": make({}, noise) for i, noise in enumerate(noises)}
     scenes["perturbed"] = make(paper, {})
@@ -101,9 +110,18 @@ def _maker(scene: Scene, folder: Path) -> Callable[[dict[str, float], dict[str, 
     def make(override: dict[str, float], effects: dict[str, Any]) -> Scene:
         forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}}
         vehicle = scene.vehicle.model_dump() | {"override": scene.vehicle.override | override}
-        return build({"title": scene.title, "vehicle": vehicle, "run": scene.run.model_dump(), "start": start,
-                      "engines": {name: table.model_dump() for name, table in scene.engines.items()},
-                      "effects": forces | effects}, scene.file, folder)
+        return build(
+            {
+                "title": scene.title,
+                "vehicle": vehicle,
+                "run": scene.run.model_dump(),
+                "start": start,
+                "engines": {name: table.model_dump() for name, table in scene.engines.items()},
+                "effects": forces | effects,
+            },
+            scene.file,
+            folder,
+        )
 
     return make
 
@@ -128,8 +146,11 @@ def rows(engine: str, measured: Result, runs: dict[str, Result]) -> list[dict[st
         row["heave error"] = float(np.abs(result["z3"] - measured["z3"]).max())
         if "enforced_moment" in result.data:
             moment, inertia = result["enforced_moment"], result["inertia_term"]
-            row |= {"moment rms": float(np.sqrt(np.mean(moment**2))), "moment max": float(np.abs(moment).max()),
-                    "inertia max": float(np.abs(inertia).max())}
+            row |= {
+                "moment rms": float(np.sqrt(np.mean(moment**2))),
+                "moment max": float(np.abs(moment).max()),
+                "inertia max": float(np.abs(inertia).max()),
+            }
         table.append(row)
     return table
 
@@ -143,16 +164,23 @@ PUBLISHED = {
 
 def text(table: list[dict[str, Any]], options: Options, deviation: float) -> list[str]:
     """The table as lines of text."""
-    lines = [f"  sampled at {options.sampling_rate:g} Hz, linear in between; noise {deviation:.1f} N; "
-             f"drifted off when the pitch is {DRIFT} rad wrong",
-             f"  {'engine':<10} {'run':<20} {'drift-off':>9} {'heave error':>12} {'moment rms':>11} {'max':>7} "
-             f"{'I beta max':>11}   paper"]
+    lines = [
+        f"  sampled at {options.sampling_rate:g} Hz, linear in between; noise {deviation:.1f} N; "
+        f"drifted off when the pitch is {DRIFT} rad wrong",
+        f"  {'engine':<10} {'run':<20} {'drift-off':>9} {'heave error':>12} {'moment rms':>11} {'max':>7} "
+        f"{'I beta max':>11}   paper",
+    ]
     for row in table:
         when = "never" if row["drift-off"] is None else f"{row['drift-off']:.2f} s"
-        moment = f"{row['moment rms']:>7.1f} N m {row['moment max']:>7.0f} {row['inertia max'] / 1e3:>6.1f} kN m" \
-            if "moment rms" in row else " " * 31
-        lines.append(f"  {row['engine']:<10} {row['run']:<20} {when:>9} {row['heave error']:>10.2e} m {moment}   "
-                     f"{PUBLISHED.get(row['run'], '')}".rstrip())
+        moment = (
+            f"{row['moment rms']:>7.1f} N m {row['moment max']:>7.0f} {row['inertia max'] / 1e3:>6.1f} kN m"
+            if "moment rms" in row
+            else " " * 31
+        )
+        lines.append(
+            f"  {row['engine']:<10} {row['run']:<20} {when:>9} {row['heave error']:>10.2e} m {moment}   "
+            f"{PUBLISHED.get(row['run'], '')}".rstrip()
+        )
     return lines
 
 
@@ -161,12 +189,21 @@ def _figures(measured: Result, runs: dict[str, Result], folder: Path) -> None:
     from studies.figures import save
 
     save(_figure_measurement(measured), folder / "fig4_measurement.png")
-    main = {"virtual measurement": measured, "undisturbed": runs["undisturbed"], "noisy": runs["noisy 1"],
-            "perturbed model": runs["perturbed"], "both": runs["both"]}
-    save(_figure_drift(main, "Force-excited runs beside the measurement: heave stays, pitch runs away"),
-         folder / "fig5_drift.png")
-    for prefix, title, name in (("noisy", "noise samples", "fig6_noise_samples"),
-                                ("model", "perturbed models", "fig7_perturbed_models")):
+    main = {
+        "virtual measurement": measured,
+        "undisturbed": runs["undisturbed"],
+        "noisy": runs["noisy 1"],
+        "perturbed model": runs["perturbed"],
+        "both": runs["both"],
+    }
+    save(
+        _figure_drift(main, "Force-excited runs beside the measurement: heave stays, pitch runs away"),
+        folder / "fig5_drift.png",
+    )
+    for prefix, title, name in (
+        ("noisy", "noise samples", "fig6_noise_samples"),
+        ("model", "perturbed models", "fig7_perturbed_models"),
+    ):
         chosen = {"virtual measurement": measured} | {key: run for key, run in runs.items() if key.startswith(prefix)}
         save(_figure_drift(chosen, f"Force-excited runs: {len(chosen) - 1} {title}"), folder / f"{name}.png")
     save(_figure_moment(runs["guided, both"]), folder / "fig8_enforced_moment.png")
@@ -177,8 +214,9 @@ def _figure_measurement(measured: Result) -> Any:
 
     figure, axes = plt.subplots(2, 2, figsize=(10, 5), width_ratios=(2, 1))
     detail = (measured.times >= 20) & (measured.times <= 21)
-    for row, (channels, label, scale) in enumerate(((("zeta1", "zeta2"), "road under the wheels, up [m]", -1.0),
-                                                    (("f1", "f2"), "wheel force [kN]", 1e-3))):
+    for row, (channels, label, scale) in enumerate(
+        ((("zeta1", "zeta2"), "road under the wheels, up [m]", -1.0), (("f1", "f2"), "wheel force [kN]", 1e-3))
+    ):
         for channel, name in zip(channels, ("front", "rear"), strict=True):
             axes[row, 0].plot(measured.times, scale * measured[channel], label=name, linewidth=0.7)
             axes[row, 1].plot(measured.times[detail], scale * measured[channel][detail], label=name)
@@ -219,8 +257,12 @@ def _figure_moment(result: Result) -> Any:
     axes[1].set_title("enforced moment [N m]")
     for axis in axes:
         axis.set_xlabel("time [s]")
-    figure.suptitle("Pitch prescribed, perturbed model and noisy forces: what the guidance takes", x=0.01, ha="left",
-                    fontweight="bold")
+    figure.suptitle(
+        "Pitch prescribed, perturbed model and noisy forces: what the guidance takes",
+        x=0.01,
+        ha="left",
+        fontweight="bold",
+    )
     return figure
 
 

@@ -24,15 +24,26 @@ def forces(tmp_path):
 
 def scene(folder, effects, parameters="asymmetric_twin", interpolation="linear", geometry="exact", **forces):
     own = {"wheel_forces": {"file": "f.csv", "interpolation": interpolation, **forces}, **effects}
-    return build({"title": "test", "vehicle": {"parameters": parameters, "geometry": geometry},
-                  "run": {"duration": 0.5, "step": 5e-4}, "effects": own}, "", folder)
+    return build(
+        {
+            "title": "test",
+            "vehicle": {"parameters": parameters, "geometry": geometry},
+            "run": {"duration": 0.5, "step": 5e-4},
+            "effects": own,
+        },
+        "",
+        folder,
+    )
 
 
 @pytest.mark.parametrize("geometry", ["exact", "linear"])
 @pytest.mark.parametrize("frame", ["inertial", "body"])
 @pytest.mark.parametrize("interpolation", ["held", "linear", "smooth"])
-@pytest.mark.parametrize("extra", [{}, {"pitch_spring": {"stiffness": 5e3, "damping": 80.0}},
-                                   {"force_noise": {"deviation": 40.0, "seed": 3}}], ids=["plain", "spring", "noise"])
+@pytest.mark.parametrize(
+    "extra",
+    [{}, {"pitch_spring": {"stiffness": 5e3, "damping": 80.0}}, {"force_noise": {"deviation": 40.0, "seed": 3}}],
+    ids=["plain", "spring", "noise"],
+)
 def test_three_implementations_agree_in_every_combination(forces, geometry, frame, interpolation, extra):
     own = scene(forces, extra, interpolation=interpolation, geometry=geometry, frame=frame)
     truth = simulate(own, "reference").states
@@ -91,12 +102,24 @@ def test_contact_points_are_channels_and_never_feed_back(forces):
 
 def test_contact_points_find_the_road_that_made_the_forces(tmp_path):
     """Virtual measurement on a road, then forces alone: the contact points draw the road again."""
-    road = build({"title": "test", "run": {"duration": 2.0, "step": 5e-4},
-                  "effects": {"road": {"source": "hills", "speed": 20.0}}})
+    road = build(
+        {
+            "title": "test",
+            "run": {"duration": 2.0, "step": 5e-4},
+            "effects": {"road": {"source": "hills", "speed": 20.0}},
+        }
+    )
     measured = simulate(road, "reference")
     write_time_series(tmp_path / "f.csv", {"front": ("N", measured["f1"]), "rear": ("N", measured["f2"])}, 5e-4)
-    own = build({"title": "test", "run": {"duration": 2.0, "step": 5e-4}, "effects": {
-        "wheel_forces": {"file": "f.csv", "interpolation": "smooth"}, "contact_points": {}}}, "", tmp_path)
+    own = build(
+        {
+            "title": "test",
+            "run": {"duration": 2.0, "step": 5e-4},
+            "effects": {"wheel_forces": {"file": "f.csv", "interpolation": "smooth"}, "contact_points": {}},
+        },
+        "",
+        tmp_path,
+    )
     found = simulate(own, "reference")
     # linear interpolation inside the filter over 0.5 ms and half a digit of drift in heave
     assert np.abs(found["zeta1"] - measured["zeta1"]).max() < 1e-6

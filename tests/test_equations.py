@@ -53,7 +53,9 @@ def test_road_excitation_is_equation_38(p):
         stiff[1, 1] -= p.k2
         damp[0, 0] -= p.d1
         damp[1, 1] -= p.d2
-        load = np.array([p.m1 * p.g + p.k1 * u[0] + p.d1 * u[2], p.m2 * p.g + p.k2 * u[1] + p.d2 * u[3], p.m3 * p.g, 0.0])
+        load = np.array(
+            [p.m1 * p.g + p.k1 * u[0] + p.d1 * u[2], p.m2 * p.g + p.k2 * u[1] + p.d2 * u[3], p.m3 * p.g, 0.0]
+        )
         expected = (stiff @ y[:4] + damp @ y[4:] + load) / mass
         found = derivative_of("road", "exact")(y, u, p.array())[4:]
         assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()

@@ -72,6 +72,12 @@ def _judged(problem: Problem, errors: dict[str, float]) -> tuple[Status, str]:
     return "ok", ""
 
 
+def describe(problem: Problem, rounds: int) -> dict[str, Any]:
+    """What tables and figures need to know of a problem, as JSON keeps it."""
+    names = ("key", "title", "note", "units", "reference", "uncertainty", "bound", "tolerances", "duration")
+    return {**{name: getattr(problem, name) for name in names}, "rounds": rounds}
+
+
 def miscounted(points: list[Point], duration: float) -> list[str]:
     """Settings with fixed stages whose force calls are not stages times steps."""
     wrong = []

@@ -49,8 +49,8 @@ def cheapest(problem: dict[str, Any], points: list[Point]) -> Table:
         seconds = cost.reaches(points, quantity, target, "seconds")
         rows.append((f"{target:g}", _won(points, calls, "", "calls", groups), *(
             _won(points, seconds, among, "ms") for among in ("", "exudyn", "mujoco"))))  # fmt: skip
-    note = ("Fixed steps are interpolated log-log between neighbouring settings, adaptive methods count at the loosest "
-            "tolerance tried that does; \"coarsest\" is the coarsest setting tried. Nothing is extrapolated. Force calls "
+    note = ("Fixed steps are interpolated log-log between neighbouring settings; adaptive methods count at the loosest "
+            "tolerance tried that does; 'coarsest' is the coarsest setting tried. Nothing is extrapolated. Force calls "
             "are exact and the same on every machine; seconds are those of one run on this one, model and input tables "
             "built anew, and wander.")  # fmt: skip
     heads = (f"{quantity} error at most [{unit}]", "fewest force calls", "fewest seconds", "fewest in Exudyn",

@@ -3,7 +3,9 @@
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-System = Literal["pitch-plane", "drift", "contact", "ride", "rolling-vehicle", "anti-lock", "hard-cases", "cost", "effects"]
+System = Literal[
+    "pitch-plane", "drift", "contact", "ride", "rolling-vehicle", "anti-lock", "hard-cases", "cost", "effects"
+]
 Independence = Literal["native", "shared kernel", "closed form", "published", "none"]
 """How far the two sides are apart: separate force laws, the same force code, an exact answer, a published
 figure, or no second side."""
@@ -61,7 +63,9 @@ def behaves(id: str, system: System, quantity: str, found: str, expected: str, w
     """Row for a behaviour, such as "refused": passes if found and expected are the same word."""
     passed = found == expected
     reason = "" if passed else f"found {found!r}"
-    return Row(id, system, quantity, found, "", expected, None, why, independence, "passed" if passed else "failed", reason)
+    return Row(
+        id, system, quantity, found, "", expected, None, why, independence, "passed" if passed else "failed", reason
+    )
 
 
 def finding(id: str, system: System, quantity: str, value: float, unit: str, expected: float | str, why: str,

@@ -64,8 +64,10 @@ def _say(rows: list[Row], seconds: float, page: Path) -> int:
     """Print the verdict and every row that did not pass."""
     failed = [row for row in rows if row.status == "failed"]
     skipped = [row for row in rows if row.status == "not run"]
-    print(f"{len(rows)} rows: {len(rows) - len(failed) - len(skipped)} passed, {len(failed)} failed, "
-          f"{len(skipped)} not run, {seconds:.0f} s")
+    print(
+        f"{len(rows)} rows: {len(rows) - len(failed) - len(skipped)} passed, {len(failed)} failed, "
+        f"{len(skipped)} not run, {seconds:.0f} s"
+    )
     for row in failed + skipped:
         print(f"  {row.status}: {row.id}: {row.quantity}: {row.reason}")
     print(f"report: {page}")

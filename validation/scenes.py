@@ -19,8 +19,16 @@ COURSE = "detrended_rms_course_2in.crg"
 def road_scene(parameters: str = "itwm_drift", step: float = 1e-3, duration: float = 2.0,
                road: dict[str, Any] | None = None, folder: Path = Path()) -> Scene:  # fmt: skip
     """The vehicle on a road, the study road unless another is given."""
-    return build({"title": "validation", "vehicle": {"parameters": parameters},
-                  "run": {"duration": duration, "step": step}, "effects": {"road": road or STUDY_ROAD}}, "", folder)
+    return build(
+        {
+            "title": "validation",
+            "vehicle": {"parameters": parameters},
+            "run": {"duration": duration, "step": step},
+            "effects": {"road": road or STUDY_ROAD},
+        },
+        "",
+        folder,
+    )
 
 
 def force_scene(folder: Path, parameters: str = "itwm_drift", step: float = 1e-3, duration: float = 2.0,
@@ -28,15 +36,25 @@ def force_scene(folder: Path, parameters: str = "itwm_drift", step: float = 1e-3
                 effects: dict[str, Any] | None = None) -> Scene:  # fmt: skip
     """The vehicle driven by the forces that ``write_forces`` left in the folder."""
     forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": interpolation}}
-    return build({"title": "validation", "vehicle": {"parameters": parameters, "override": override or {}},
-                  "run": {"duration": duration, "step": step}, "effects": forces | (effects or {})}, "", folder)
+    return build(
+        {
+            "title": "validation",
+            "vehicle": {"parameters": parameters, "override": override or {}},
+            "run": {"duration": duration, "step": step},
+            "effects": forces | (effects or {}),
+        },
+        "",
+        folder,
+    )
 
 
 def write_forces(measured: Result, folder: Path, period: float) -> None:
     """Wheel forces and pitch of a road-excited run as the files that force-excited scenes read."""
     every = round(period / float(measured.times[1] - measured.times[0]))
     columns = {name: measured[name][::every] for name in ("f1", "f2", "pitch")}
-    write_time_series(folder / "wheel_forces.csv", {"front": ("N", columns["f1"]), "rear": ("N", columns["f2"])}, period)
+    write_time_series(
+        folder / "wheel_forces.csv", {"front": ("N", columns["f1"]), "rear": ("N", columns["f2"])}, period
+    )
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", columns["pitch"])}, period)
 
 

@@ -31,7 +31,7 @@ class Parameters(Strict):
     speed: float = quantity("m/s", "constant speed of the vehicle")
     gd: float | None = quantity("m^3", "study: one-sided roughness at 0.1 1/m", default=None)
     road_class: Literal["A", "B", "C", "D", "E", "F", "G", "H"] | None = Field(None, description="iso8608: class")
-    seed: int | None = Field(None, description="iso8608: seed of the phases")
+    seed: int | None = Field(None, ge=0, lt=2**128, description="iso8608: seed of the phases")
     level: Literal["one-sided", "two-sided"] | None = Field(None, description="iso8608: how the class's level is read")
     file: str | None = Field(None, description="opencrg, csv: the measured road")
     track: Literal["left", "right", "mean", "centre"] | None = Field(None, description="opencrg, csv: which track")
@@ -60,8 +60,9 @@ def _check_keys(file: str, p: Parameters) -> None:
                              f"has no meaning for source = {p.source!r}, which takes {own}")
     for name in NEEDED.get(p.source, ()):
         if name not in given:
-            raise InputError(file, f"effects.road.{name}", None, f"missing: source = {p.source!r} needs it: "
-                             f"{type(p).model_fields[name].description}")
+            meaning = str(type(p).model_fields[name].description).partition(": ")[2]
+            raise InputError(file, f"effects.road.{name}", None,
+                             f"is missing: source = {p.source!r} needs it ({meaning})")
 
 
 def _profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[float, ...]]:
@@ -94,6 +95,18 @@ def _measured(scene: Any, p: Parameters, distance: float) -> Any:
         from models.road.csv_road import read_csv_road
 
         raw = read_csv_road(path, track)
+    _check_length(scene, p, raw, distance, length)
     longer = continued(raw, str(p.beyond_end), distance, path)
     assert isinstance(longer, type(raw))
     return run_in(longer, length)
+
+
+def _check_length(scene: Any, p: Parameters, raw: Any, distance: float, run_in: float) -> None:
+    """Refuse in the scene's own words what the road's file makes impossible."""
+    total = raw.end - raw.start
+    if run_in > total:
+        raise InputError(scene.file, "effects.road.run_in", run_in, f"the road {p.file} is only {total:g} m long")
+    if p.beyond_end == "refused" and distance > total * (1 + 1e-9):
+        raise InputError(scene.file, "effects.road.beyond_end", "refused",
+                         f"the road {p.file} ends at {total:g} m and the run needs {distance:g} m: shorten "
+                         "run.duration, lower effects.road.speed or set this to 'mirrored'")

@@ -245,7 +245,8 @@ class ExudynModel:
         solver.ComputeMassMatrix(self.built.mbs)
         solver.ComputeODE2RHS(self.built.mbs)
         count = solver.GetODE2size()
-        mass, residual = solver.GetSystemMassMatrix()[:count, :count], solver.GetSystemResidual()[:count]
+        mass = np.asarray(solver.GetSystemMassMatrix(), dtype=float)[:count, :count]
+        residual = np.asarray(solver.GetSystemResidual(), dtype=float)[:count]
         solver.FinalizeSolver(self.built.mbs, options)
         self._set_state(self.assembly.initial)
         return np.linalg.solve(mass, residual)[self._columns]

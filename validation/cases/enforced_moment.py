@@ -13,19 +13,21 @@ from models.scene import build as build_scene
 from models.simulate import simulate
 from models.time_series import write_time_series
 from models.vehicles.pitch_plane import equilibrium
-from validation.rows import Row, Table, at_most, finding
+from validation.rows import Row, System, Table, at_most, finding
 from validation.scenes import VEHICLES, force_scene, road_scene, write_forces
 
 TITLE = "Enforced moment of a prescribed pitch"
-SYSTEM = "pitch-plane"
+SYSTEM: System = "pitch-plane"
 DURATION = 4.0
 PERIOD = 1e-3
 STEP = 1e-3
 BOUND = 1e-4
 GUIDE = {"prescribed_pitch": {"file": "pitch.csv"}}
 PERTURBED = {"k3": 1.05e5, "k4": 0.95e5, "d3": 0.95e4, "d4": 1.05e4, "I": 475.0}
-BEST = {"exudyn": Settings("GeneralizedAlpha", STEP, DURATION, spectral_radius=0.6),
-        "mujoco": Settings("RK4", STEP, DURATION)}  # fmt: skip
+BEST = {
+    "exudyn": Settings("GeneralizedAlpha", STEP, DURATION, spectral_radius=0.6),
+    "mujoco": Settings("RK4", STEP, DURATION),
+}
 
 
 def manoeuvre(folder: Path, parameters: str, abrupt: bool = False) -> None:
@@ -34,7 +36,9 @@ def manoeuvre(folder: Path, parameters: str, abrupt: bool = False) -> None:
     It begins in the vehicle's own equilibrium with zero angular acceleration; ``abrupt`` begins with
     4.4 rad/s^2 at once.
     """
-    p = build_scene({"title": TITLE, "vehicle": {"parameters": parameters}, "run": {"duration": 1.0}}).vehicle_parameters()
+    p = build_scene(
+        {"title": TITLE, "vehicle": {"parameters": parameters}, "run": {"duration": 1.0}}
+    ).vehicle_parameters()
     rest = equilibrium(p)
     t = PERIOD * np.arange(round(DURATION / PERIOD) + 1)
     s = np.clip(t / 1.0, 0, 1)
@@ -84,21 +88,35 @@ def _manoeuvre(folder: Path) -> list[Row]:
             rows.append(_uncertainty(scene, true))
         for engine, settings in BEST.items():
             route = "Lagrange multiplier" if engine == "exudyn" else "reduced model and inverse dynamics"
-            rows.append(at_most(
-                f"moment.{engine}.{parameters}", SYSTEM,
-                f"enforced moment at 1 ms, {engine} {settings.integrator} ({route}), {parameters}",
-                relative(moment(scene, engine, settings), true), "of its rms", BOUND,
-                f"the rms is {np.sqrt(np.mean(true**2)):.0f} N m; a second-order scheme at 1 ms leaves (2 pi f h)^2 / 12, "
-                "which is 2e-5 at 2.7 Hz", "native"))  # fmt: skip
+            rows.append(
+                at_most(
+                    f"moment.{engine}.{parameters}",
+                    SYSTEM,
+                    f"enforced moment at 1 ms, {engine} {settings.integrator} ({route}), {parameters}",
+                    relative(moment(scene, engine, settings), true),
+                    "of its rms",
+                    BOUND,
+                    f"the rms is {np.sqrt(np.mean(true**2)):.0f} N m; a second-order scheme leaves (2 pi f h)^2 / 12, "
+                    "which is 2e-5 at 2.7 Hz and 1 ms",
+                    "native",
+                )
+            )
     return rows
 
 
 def _uncertainty(scene: Scene, true: np.ndarray) -> Row:
     """The eliminated form by a solver of another family, adaptive at a tolerance of 1e-11."""
     other = moment(scene, "reference", Settings("DOP853", PERIOD, DURATION, 1e-11))
-    return at_most("moment.reference", SYSTEM, "uncertainty of the eliminated form: Runge-Kutta at 1/16 ms against "
-                   "Dormand-Prince 8 at 1e-11", relative(other, true), "of its rms", BOUND / 100,
-                   "a hundredth of the bound that it has to judge", "shared kernel")
+    return at_most(
+        "moment.reference",
+        SYSTEM,
+        "uncertainty of the eliminated form: Runge-Kutta at 1/16 ms against Dormand-Prince 8 at 1e-11",
+        relative(other, true),
+        "of its rms",
+        BOUND / 100,
+        "a hundredth of the bound that it has to judge",
+        "shared kernel",
+    )
 
 
 def _ringing(folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -111,17 +129,33 @@ def _ringing(folder: Path) -> tuple[list[Row], dict[str, Any]]:
     for radius in (0.6, 0.9):
         settings = Settings("GeneralizedAlpha", STEP, DURATION, spectral_radius=radius)
         paths[f"inconsistent start, spectral radius {radius}"] = (_inconsistent(scene, settings) - true)[first].tolist()
-        paths[f"consistent start, spectral radius {radius}"] = (moment(scene, "exudyn", settings) - true)[first].tolist()
+        paths[f"consistent start, spectral radius {radius}"] = (moment(scene, "exudyn", settings) - true)[
+            first
+        ].tolist()
     peak = {name: float(np.abs(path).max()) for name, path in paths.items() if name != "time"}
     rows = [
-        finding("moment.ringing", SYSTEM, "largest error of Exudyn's multiplier in the first 0.1 s, left to its own "
-                "initial accelerations, spectral radius 0.6 (0.9 beside it)", peak["inconsistent start, spectral radius 0.6"],
-                "N m", f"{peak['inconsistent start, spectral radius 0.9']:.3g}",
-                "Exudyn starts without the constraint's own acceleration, I beta'' = 2,221 N m here", "native"),
-        at_most("moment.consistent", SYSTEM, "the same with the accelerations that belong to the pitch",
-                peak["consistent start, spectral radius 0.6"], "N m", 2.221,
-                "a thousandth of the moment that the start demands", "native"),
-    ]  # fmt: skip
+        finding(
+            "moment.ringing",
+            SYSTEM,
+            "largest error of Exudyn's multiplier in the first 0.1 s, left to its own "
+            "initial accelerations, spectral radius 0.6 (0.9 beside it)",
+            peak["inconsistent start, spectral radius 0.6"],
+            "N m",
+            f"{peak['inconsistent start, spectral radius 0.9']:.3g}",
+            "Exudyn starts without the constraint's own acceleration, I beta'' = 2,221 N m here",
+            "native",
+        ),
+        at_most(
+            "moment.consistent",
+            SYSTEM,
+            "the same with the accelerations that belong to the pitch",
+            peak["consistent start, spectral radius 0.6"],
+            "N m",
+            2.221,
+            "a thousandth of the moment that the start demands",
+            "native",
+        ),
+    ]
     return rows, paths
 
 
@@ -139,26 +173,44 @@ def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list
     """The paper's guided run on the study road: what each step leaves, relative to rms of moment and of I beta''."""
     measured = simulate(road_scene(step=PERIOD, duration=DURATION + 0.1), "reference")
     write_forces(measured, folder, PERIOD)
-    scene = force_scene(folder, step=PERIOD, duration=DURATION, interpolation="smooth", override=PERTURBED, effects=GUIDE)
+    scene = force_scene(
+        folder, step=PERIOD, duration=DURATION, interpolation="smooth", override=PERTURBED, effects=GUIDE
+    )
     true = truth(scene)
-    table = []
+    table: list[list[Any]] = []
     for engine, best in BEST.items():
         for step in steps:
             settings = Settings(best.integrator, step, DURATION, spectral_radius=best.spectral_radius)
             table.append([engine, best.integrator, step, relative(moment(scene, engine, settings)[20:], true[20:])])
-    rows = [finding(f"moment.rough.{engine}", SYSTEM, f"the same on the study road at 1 ms, {engine}, perturbed model",
-                    next(row[3] for row in table if row[0] == engine and row[2] == STEP), "of its rms", BOUND,
-                    "40 Hz of roughness at 1 ms: (2 pi f h)^2 / 12 is 5e-3 of I beta'', twenty times the moment; the "
-                    "table shows the step that it takes", "native") for engine in BEST]  # fmt: skip
+    rows = [
+        finding(
+            f"moment.rough.{engine}",
+            SYSTEM,
+            f"the same on the study road at 1 ms, {engine}, perturbed model",
+            next(row[3] for row in table if row[0] == engine and row[2] == STEP),
+            "of its rms",
+            BOUND,
+            "40 Hz of roughness at 1 ms: (2 pi f h)^2 / 12 is 5e-3 of I beta'', twenty times the moment; the "
+            "table shows the step that it takes",
+            "native",
+        )
+        for engine in BEST
+    ]
     return rows, table
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Error by step on the study road."""
     rows = tuple((engine, name, f"{1e3 * step:g}", f"{error:.1e}") for engine, name, step, error in data["table"])
-    return [Table("Enforced moment on the study road, perturbed model, after the first 20 ms",
-                  "Rms of the error by the rms of the moment. The rows above use a manoeuvre of up to 2.7 Hz; roughness "
-                  "of 40 Hz needs a smaller step.", ("engine", "integrator", "step [ms]", "relative error"), rows)]
+    return [
+        Table(
+            "Enforced moment on the study road, perturbed model, after the first 20 ms",
+            "Rms of the error by the rms of the moment. The rows above use a manoeuvre of up to 2.7 Hz; roughness "
+            "of 40 Hz needs a smaller step.",
+            ("engine", "integrator", "step [ms]", "relative error"),
+            rows,
+        )
+    ]
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
@@ -169,11 +221,22 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     paths = data["ringing"]
     for i, (name, path) in enumerate((name, path) for name, path in paths.items() if name != "time"):
         consistent = name.startswith("consistent")
-        axis.plot([1e3 * t for t in paths["time"]], path, label=name, color=f"C{i // 2}",
-                  linestyle="--" if consistent else "-", linewidth=2 if consistent else 1)
+        axis.plot(
+            [1e3 * t for t in paths["time"]],
+            path,
+            label=name,
+            color=f"C{i // 2}",
+            linestyle="--" if consistent else "-",
+            linewidth=2 if consistent else 1,
+        )
     axis.set_xlabel("time [ms]")
     axis.set_ylabel("error of the moment [N m]")
     axis.set_title("Exudyn's enforced moment after an abrupt start, against the eliminated form")
     axis.legend()
-    return [("A start whose accelerations do not belong to the constraint makes the multiplier ring; it dies out "
-             "with the spectral radius, and is gone with consistent accelerations.", figure)]
+    return [
+        (
+            "A start whose accelerations do not belong to the constraint makes the multiplier ring; it dies out "
+            "with the spectral radius, and is gone with consistent accelerations.",
+            figure,
+        )
+    ]

@@ -7,16 +7,16 @@ import numpy as np
 
 from models.engines.protocol import Settings
 from models.simulate import simulate
-from validation.rows import Row, Table, within
+from validation.rows import Row, System, Table, within
 from validation.scenes import road_scene
 
 TITLE = "Observed order of the largest state error over the first 2 s on the study road"
-SYSTEM = "pitch-plane"
+SYSTEM: System = "pitch-plane"
 DURATION = 2.0
 GRID = 1e-3
 """Coarse grid (s) on which all runs are compared."""
 
-FAMILIES = (
+FAMILIES: tuple[tuple[str, str, dict[str, float], float, float], ...] = (
     ("reference", "RK4", {}, 4.0, 0.15),
     ("exudyn", "RK44", {}, 4.0, 0.15),
     ("mujoco", "RK4", {}, 4.0, 0.15),
@@ -41,8 +41,9 @@ def errors(engine: str, integrator: str, options: dict[str, float], truth: np.nd
     """Largest state error at each step, on the common grid."""
     found = []
     for step in steps:
-        run = simulate(road_scene(step=step, duration=DURATION), engine,
-                       Settings(integrator, step, DURATION, **options))
+        run = simulate(
+            road_scene(step=step, duration=DURATION), engine, Settings(integrator, step, DURATION, **options)
+        )
         found.append(float(np.abs(run.states[:: round(GRID / step)] - truth).max()))
     return found
 
@@ -54,14 +55,27 @@ def fitted(steps: tuple[float, ...], found: list[float]) -> float:
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """A row per family; the reference solution is DOP853 at a tolerance of 1e-13."""
-    truth = simulate(road_scene(step=GRID, duration=DURATION), "reference", Settings("DOP853", GRID, DURATION, 1e-13)).states
+    truth = simulate(
+        road_scene(step=GRID, duration=DURATION), "reference", Settings("DOP853", GRID, DURATION, 1e-13)
+    ).states
     steps = STEPS[:3] if quick else STEPS
     rows, table = [], []
     for engine, integrator, options, order, band in FAMILIES:
         found = errors(engine, integrator, options, truth, steps)
         name = " ".join([integrator, *(f"{value:g}" for value in options.values())])
-        rows.append(within(f"order.{engine}.{name}", SYSTEM, f"order of {name} in {engine}", fitted(steps, found), "",
-                           order, band, WHY, "closed form"))
+        rows.append(
+            within(
+                f"order.{engine}.{name}",
+                SYSTEM,
+                f"order of {name} in {engine}",
+                fitted(steps, found),
+                "",
+                order,
+                band,
+                WHY,
+                "closed form",
+            )
+        )
         table.append([engine, name, *found])
     return rows, {"table": table, "steps": steps}
 
@@ -70,4 +84,6 @@ def tables(data: dict[str, Any]) -> list[Table]:
     """Largest state error by step."""
     heads = ("engine", "integrator", *(f"{1e3 * step:g} ms" for step in data["steps"]))
     rows = tuple((engine, name, *(f"{value:.2e}" for value in found)) for engine, name, *found in data["table"])
-    return [Table(TITLE, "Largest error of any state (m, rad, m/s, rad/s). Equal rows are the same method.", heads, rows)]
+    return [
+        Table(TITLE, "Largest error of any state (m, rad, m/s, rad/s). Equal rows are the same method.", heads, rows)
+    ]

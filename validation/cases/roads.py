@@ -12,11 +12,11 @@ from models.road.opencrg import read_opencrg, write_opencrg
 from models.road.profile import Profile
 from models.road.study import study_road
 from models.simulate import simulate
-from validation.rows import Row, at_most, not_run, within
+from validation.rows import Row, System, at_most, not_run, within
 from validation.scenes import COURSE, data_folder, gap, road_scene
 
 TITLE = "Roads: formula, class, OpenCRG and CSV"
-SYSTEM = "pitch-plane"
+SYSTEM: System = "pitch-plane"
 LENGTH, INCREMENT = 60.0, 0.05
 
 
@@ -34,16 +34,42 @@ def _round_trips(folder: Path) -> list[Row]:
     back = {"OpenCRG": read_opencrg(folder / "study.crg"), "CSV": read_csv_road(folder / "study.csv")}
     station = INCREMENT * np.arange(round(LENGTH / INCREMENT) + 1)
     true = road.height_and_slope(station)[0]
-    rows = [at_most(f"roads.{kind}.round-trip", SYSTEM, f"heights of the study road written to {kind} and read back",
-                    float(np.abs(profile.height_and_slope(station)[0] - true).max()), "m", 1e-14,
-                    "both formats keep doubles; only the unit conversion rounds", "closed form")
-            for kind, profile in back.items()]
-    paths = [simulate(road_scene(duration=2.5, road={"source": source, "file": f"study.{suffix}", "speed": 20.0,
-                                                     "beyond_end": "refused"}, folder=folder), "reference")
-             for source, suffix in (("opencrg", "crg"), ("csv", "csv"))]
-    rows.append(at_most("roads.same-run", SYSTEM, "the vehicle's states over the OpenCRG road against the CSV road",
-                        gap(*paths), "m, rad, m/s, rad/s", 1e-11, "the same heights to 1e-14 through the same springs",
-                        "shared kernel"))
+    rows = [
+        at_most(
+            f"roads.{kind}.round-trip",
+            SYSTEM,
+            f"heights of the study road written to {kind} and read back",
+            float(np.abs(profile.height_and_slope(station)[0] - true).max()),
+            "m",
+            1e-14,
+            "both formats keep doubles; only the unit conversion rounds",
+            "closed form",
+        )
+        for kind, profile in back.items()
+    ]
+    paths = [
+        simulate(
+            road_scene(
+                duration=2.5,
+                road={"source": source, "file": f"study.{suffix}", "speed": 20.0, "beyond_end": "refused"},
+                folder=folder,
+            ),
+            "reference",
+        )
+        for source, suffix in (("opencrg", "crg"), ("csv", "csv"))
+    ]
+    rows.append(
+        at_most(
+            "roads.same-run",
+            SYSTEM,
+            "the vehicle's states over the OpenCRG road against the CSV road",
+            gap(*paths),
+            "m, rad, m/s, rad/s",
+            1e-11,
+            "the same heights to 1e-14 through the same springs",
+            "shared kernel",
+        )
+    )
     return rows
 
 
@@ -51,16 +77,30 @@ def _write_csv(road: Profile, path: Path) -> None:
     """Heights up in mm, as a surveyor would hand them over."""
     station = INCREMENT * np.arange(round(LENGTH / INCREMENT) + 1)
     up = -1e3 * road.height_and_slope(station)[0]
-    np.savetxt(path, np.column_stack([station, up, up]), fmt="%.17g", delimiter=",",
-               header="s [m],left [mm],right [mm]", comments="")
+    np.savetxt(
+        path,
+        np.column_stack([station, up, up]),
+        fmt="%.17g",
+        delimiter=",",
+        header="s [m],left [mm],right [mm]",
+        comments="",
+    )
 
 
 def _recurrence() -> Row:
     road = study_road()
     station = 300.0 + 0.01 * np.arange(4000)
     error = np.abs(road.sample_uniform(300.0, 0.01, 4000)[0] - road.height_and_slope(station)[0]).max()
-    return at_most("roads.recurrence", SYSTEM, "study road sampled by rotation against the formula", float(error), "m", 1e-13,
-                   "64 rotations of a unit vector lose 64 roundings before they start anew", "closed form")
+    return at_most(
+        "roads.recurrence",
+        SYSTEM,
+        "study road sampled by rotation against the formula",
+        float(error),
+        "m",
+        1e-13,
+        "64 rotations of a unit vector lose 64 roundings before they start anew",
+        "closed form",
+    )
 
 
 def _class_variance() -> Row:
@@ -69,9 +109,17 @@ def _class_variance() -> Row:
     road = iso8608_road("C", seed=3, n_min=low, n_max=high, waves=80, window_length=0.0)
     height = road.sample_uniform(0.0, 0.05, 400_000)[0]
     expected = CLASSES["C"] * 0.1**2 * (1 / low - 1 / high)
-    return within("roads.iso8608", SYSTEM, "variance of a class C road over 20 km, one-sided density 0.05 to 2 1/m",
-                  float(np.var(height) / expected), "of the integral", 1.0, 0.01,
-                  "sines of unequal wavelength are uncorrelated to 1 over the number of waves in 20 km", "closed form")
+    return within(
+        "roads.iso8608",
+        SYSTEM,
+        "variance of a class C road over 20 km, one-sided density 0.05 to 2 1/m",
+        float(np.var(height) / expected),
+        "of the integral",
+        1.0,
+        0.01,
+        "sines of unequal wavelength are uncorrelated to 1 over the number of waves in 20 km",
+        "closed form",
+    )
 
 
 def _measured() -> list[Row]:
@@ -83,13 +131,28 @@ def _measured() -> list[Row]:
     heights = [profile.height_and_slope(station)[0] for profile in (left, right)]
     undulated = heights[0][(station >= 100) & (station <= 404.8)]
     return [
-        at_most("roads.course.tracks", SYSTEM, "measured course: left track against right track",
-                float(np.abs(heights[0] - heights[1]).max()), "m", 0.0, "its owners say that they are identical", "published"),
-        within("roads.course.rms", SYSTEM, "measured course: rms of the undulated part, detrended",
-               float(_detrended(undulated).std()), "m", 1.7441 * 0.0254, 0.002,
-               "the file's header says 1.7441 in; how it was detrended is not said, which moves it by some percent",
-               "published"),
-    ]  # fmt: skip
+        at_most(
+            "roads.course.tracks",
+            SYSTEM,
+            "measured course: left track against right track",
+            float(np.abs(heights[0] - heights[1]).max()),
+            "m",
+            0.0,
+            "its owners say that they are identical",
+            "published",
+        ),
+        within(
+            "roads.course.rms",
+            SYSTEM,
+            "measured course: rms of the undulated part, detrended",
+            float(_detrended(undulated).std()),
+            "m",
+            1.7441 * 0.0254,
+            0.002,
+            "the file's header says 1.7441 in; how it was detrended is not said, which moves it by some percent",
+            "published",
+        ),
+    ]
 
 
 def _detrended(values: np.ndarray) -> np.ndarray:

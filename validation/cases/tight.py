@@ -5,11 +5,11 @@ from typing import Any
 
 from models.engines.protocol import Settings
 from models.simulate import simulate
-from validation.rows import Row, at_most
+from validation.rows import Independence, Row, System, at_most
 from validation.scenes import gap, road_scene
 
 TITLE = "Road-excited run at the recommended setting against a tight-tolerance solution"
-SYSTEM = "pitch-plane"
+SYSTEM: System = "pitch-plane"
 DURATION = 20.0
 QUICK_DURATION = 5.0
 STEP = 2.5e-4
@@ -21,13 +21,32 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     scene = road_scene(step=STEP, duration=duration)
     tight = simulate(scene, "reference", Settings("DOP853", STEP, duration, 1e-12))
     other = simulate(scene, "reference", Settings("LSODA", STEP, duration, 1e-12))
-    rows = [at_most("tight.reference", SYSTEM, "uncertainty of the tight solution: Dormand-Prince 8 against Adams/BDF",
-                    gap(tight, other), "m, rad, m/s, rad/s", 1e-7, "a tenth of the bound that it has to judge",
-                    "shared kernel")]
-    for engine, independence in (("reference", "shared kernel"), ("exudyn", "native"), ("mujoco", "native")):
+    rows = [
+        at_most(
+            "tight.reference",
+            SYSTEM,
+            "uncertainty of the tight solution: Dormand-Prince 8 against Adams/BDF",
+            gap(tight, other),
+            "m, rad, m/s, rad/s",
+            1e-7,
+            "a tenth of the bound that it has to judge",
+            "shared kernel",
+        )
+    ]
+    for engine in ("reference", "exudyn", "mujoco"):
+        independence: Independence = "shared kernel" if engine == "reference" else "native"
         run = simulate(scene, engine)
         name = run.data.attrs["integrator"]
-        rows.append(at_most(f"tight.{engine}", SYSTEM, f"states over {duration:g} s, {engine} {name} at {1e3 * STEP:g} ms",
-                            gap(run, tight), "m, rad, m/s, rad/s", 1e-6,
-                            "a thousandth of a millimetre: far below what a road survey resolves", independence))
+        rows.append(
+            at_most(
+                f"tight.{engine}",
+                SYSTEM,
+                f"states over {duration:g} s, {engine} {name} at {1e3 * STEP:g} ms",
+                gap(run, tight),
+                "m, rad, m/s, rad/s",
+                1e-6,
+                "a thousandth of a millimetre: far below what a road survey resolves",
+                independence,
+            )
+        )
     return rows, {}

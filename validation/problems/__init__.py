@@ -58,7 +58,8 @@ class Solver(Protocol):
 class Problem(Protocol):
     """What the runner asks of a problem.
 
-    key : part of the rows' names; title : what is computed; units : unit of each error, the quantity that
+    key : part of the rows' names; title : what is computed; note : what a reader of its figure must know;
+    duration : of the run, s; units : unit of each error, the quantity that
     tolerances are set on first; reference : how the reference was made, in words; uncertainty : largest
     difference between its solvers, per quantity; bound : an error above it is not an answer any more;
     tolerances : for the table of cheapest settings.
@@ -66,6 +67,8 @@ class Problem(Protocol):
 
     key: str
     title: str
+    note: str
+    duration: float
     units: dict[str, str]
     reference: str
     uncertainty: dict[str, float]
@@ -74,6 +77,10 @@ class Problem(Protocol):
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """All settings to try, or the named small share of them."""
+        ...
+
+    def setting(self, engine: str, method: str, value: float) -> Setting:
+        """A setting of this problem by its curve and its step (s) or tolerance."""
         ...
 
     def build(self, setting: Setting) -> Solver:

@@ -125,6 +125,9 @@ class RoadExcited:
     """The problem with its reference; see ``validation.problems.Problem``."""
 
     key = "road"
+    duration = DURATION
+    note = ("Exudyn's RK33, RK67 and adaptive methods read the road anew at every stage, in Python: their seconds show "
+            "it, their force calls do not.")  # fmt: skip
 
     def __init__(self, quick: bool) -> None:
         steps = [1e3 * one.value for one in self.settings(quick) if not one.adaptive]
@@ -147,6 +150,10 @@ class RoadExcited:
         """FULL, or its named share QUICK."""
         chosen = QUICK if quick else FULL
         return tuple(setting(*curve, value) for curve, values in chosen.items() for value in values)
+
+    def setting(self, engine: str, method: str, value: float) -> Setting:
+        """A setting of this problem by its curve and its step (s) or tolerance."""
+        return setting(engine, method, value)
 
     def build(self, setting: Setting) -> Model:
         """The vehicle in one engine."""
