@@ -5,6 +5,7 @@ import os
 import platform
 import subprocess
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +24,8 @@ PACKAGES = ("exudyn", "mujoco", "numpy", "scipy", "numba")
 class Result:
     """One run: ``data`` is an xarray Dataset over ``time`` (s), each channel with its unit and meaning.
 
-    Its attributes hold engine, integrator, step, status, counts, seconds and provenance as text or numbers.
+    Its attributes hold engine, integrator, step, status, counts, seconds, the scene and the provenance, as text
+    (JSON) or numbers.
     """
 
     data: "xr.Dataset"
@@ -84,6 +86,7 @@ def provenance(command: str = "") -> dict[str, Any]:
     }
 
 
+@cache
 def _commit() -> str:
     """Commit of the checkout that runs, with a mark if it was changed since."""
 

@@ -9,7 +9,7 @@ import numpy as np
 from models.assembly import Assembly, assemble
 from models.engines.protocol import Settings, Trajectory, build, settings_of
 from models.errors import InputError
-from models.result import Result
+from models.result import Result, provenance
 from models.scene import Scene
 from models.vehicles import pitch_plane
 
@@ -55,6 +55,7 @@ def _label(assembly: Assembly, engine: str, settings: Settings, run: Trajectory,
         "title": assembly.scene.title, "scene": assembly.scene.file, "system": assembly.scene.system,
         "mode": assembly.mode, "engine": engine, "integrator": settings.integrator, "step": settings.step,
         "status": "complete", "counts": json.dumps(run.counts), "seconds": seconds,
+        "scene_table": json.dumps(assembly.scene.table()), "provenance": json.dumps(provenance()),
     }  # fmt: skip
     return Result(data)
 

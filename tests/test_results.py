@@ -1,0 +1,57 @@
+"""Results: labelled, with units, saved whole, and enough in them to run the scene again."""
+
+import json
+
+import numpy as np
+import pytest
+
+from models.errors import InputError
+from models.result import load
+from models.scene import build
+from models.simulate import simulate
+
+ROAD = {"title": "test", "run": {"duration": 0.5, "step": 1e-3}, "effects": {"road": {"source": "study", "speed": 15.0}}}
+
+
+def test_every_channel_has_unit_and_meaning(tmp_path):
+    result = simulate(build(ROAD), "reference")
+    result.save(tmp_path / "run.nc")
+    back = load(tmp_path / "run.nc")
+    for channel in back.data.data_vars.values():
+        assert channel.attrs["units"] and channel.attrs["long_name"]
+    assert np.array_equal(back.states, result.states)
+    assert list(tmp_path.iterdir()) == [tmp_path / "run.nc"]
+
+
+def test_the_saved_scene_gives_the_same_numbers(tmp_path):
+    first = simulate(build(ROAD), "mujoco")
+    table = json.loads(first.data.attrs["scene_table"])
+    del table["file"]
+    again = simulate(build({key: value for key, value in table.items() if value is not None}), "mujoco")
+    assert np.array_equal(first.states, again.states)
+
+
+@pytest.mark.parametrize("engine", ["reference", "exudyn", "mujoco"])
+def test_a_run_repeats_bit_for_bit(engine):
+    assert np.array_equal(simulate(build(ROAD), engine).states, simulate(build(ROAD), engine).states)
+
+
+def test_output_step_thins_the_rows():
+    whole = simulate(build(ROAD), "exudyn")
+    thin = simulate(build(ROAD | {"run": {"duration": 0.5, "step": 1e-3, "output_step": 0.01}}), "exudyn")
+    assert len(thin.times) == 51 and np.array_equal(thin.states, whole.states[::10])
+
+
+def test_wheel_forces_carry_the_vehicle_on_average():
+    """Over a road the mean of f1 + f2 is the weight, but for the change of momentum."""
+    y = simulate(build(ROAD | {"run": {"duration": 4.0, "step": 1e-3}}), "reference")
+    momentum = 750 * y["z3_rate"] + 15 * (y["z1_rate"] + y["z2_rate"])
+    impulse = np.trapezoid(780 * 9.81 - y["f1"] - y["f2"], y.times)
+    # trapezoid of forces with 40 Hz content at 1 ms
+    assert momentum[-1] - momentum[0] == pytest.approx(impulse, abs=0.5)
+
+
+def test_a_file_that_is_no_result_is_named(tmp_path):
+    (tmp_path / "x.nc").write_text("hello")
+    with pytest.raises(InputError, match="not a saved result"):
+        load(tmp_path / "x.nc")
