@@ -83,6 +83,14 @@ class Scene(Strict):
         _check_rest(p, self)
         return p
 
+    def table(self) -> dict[str, Any]:
+        """The scene as nested tables of plain values, defaults included: enough to run it again."""
+        plain = self.model_dump(exclude={"effects", "engines"}, exclude_none=True)
+        return plain | {
+            "effects": {name: values.model_dump(exclude_none=True) for name, values in self.effects.items()},
+            "engines": {name: values.model_dump(exclude_unset=True) for name, values in self.engines.items()},
+        }
+
     def path(self, name: str, place: str = "") -> Path:
         """A file that the scene names at ``place``, relative to the scene's own folder; it must be there."""
         return _existing(name, Path(self.folder), self.file, place)
@@ -119,8 +127,15 @@ def _existing(name: str, folder: Path, file: str, place: str) -> Path:
     raise InputError(file, place, name, f"no such file, looked for as {str(path)!r}{similar_file(path)}")
 
 
+SMALLEST = 1e-9
+"""No parameter of a vehicle is smaller in SI units, but for a gravity of 0."""
+
+
 def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
     """Every run begins from the static equilibrium, so there must be one."""
+    for name, value in p:
+        if 0 < value < SMALLEST:
+            raise InputError(scene.file, f"vehicle.override.{name}", value, f"too small for a vehicle: at least {SMALLEST:g}")
     try:
         rest = pitch_plane.equilibrium(p, scene.vehicle.geometry)
     except (ValueError, ArithmeticError):  # the sine of the pitch beyond 1
