@@ -135,7 +135,8 @@ def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
     """Every run begins from the static equilibrium, so there must be one."""
     for name, value in p:
         if 0 < value < SMALLEST:
-            raise InputError(scene.file, f"vehicle.override.{name}", value, f"too small for a vehicle: at least {SMALLEST:g}")
+            allowed = f"too small for a vehicle: at least {SMALLEST:g}"
+            raise InputError(scene.file, f"vehicle.override.{name}", value, allowed)
     try:
         rest = pitch_plane.equilibrium(p, scene.vehicle.geometry)
     except (ValueError, ArithmeticError):  # the sine of the pitch beyond 1

@@ -9,7 +9,7 @@ MOST_STEPS = 20_000_000
 def divides(step: float, length: float) -> bool:
     """Whether ``length`` is a whole number of steps, 1 or more, to the rounding of decimal input."""
     ratio = length / step
-    return ratio >= 0.5 and abs(ratio - round(ratio)) <= 1e-6 * max(1.0, ratio * 1e-3)
+    return 0.5 <= ratio < math.inf and abs(ratio - round(ratio)) <= 1e-6 * max(1.0, ratio * 1e-3)
 
 
 def fitting(step: float, length: float) -> str:

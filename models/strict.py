@@ -15,10 +15,14 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
+LARGEST = 1e15
+"""No quantity of a vehicle is larger in SI units; products of two such values are still finite."""
+
+
 def quantity(unit: str, meaning: str, *, default: Any = ..., zero: bool = False, signed: bool = False) -> Any:
-    """Field of a physical quantity in SI: positive, or from zero on, or of either sign."""
-    above, least = (None, None) if signed else (None, 0) if zero else (0, None)
-    return Field(default, description=meaning, json_schema_extra={"unit": unit}, gt=above, ge=least)
+    """Field of a physical quantity in SI: positive, or from zero on, or of either sign, and not beyond all measure."""
+    above, least = (None, -LARGEST) if signed else (None, 0) if zero else (0, None)
+    return Field(default, description=meaning, json_schema_extra={"unit": unit}, gt=above, ge=least, le=LARGEST)
 
 
 Model = TypeVar("Model", bound=BaseModel)

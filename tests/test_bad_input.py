@@ -3,6 +3,7 @@
 The table of wrong inputs is in ``bad_inputs.py``. ``python tests/test_bad_input.py`` prints every message.
 """
 
+import itertools
 import os
 import re
 import subprocess
@@ -20,6 +21,7 @@ from models.plan import check
 from models.road.opencrg import write_opencrg
 from models.road.study import study_road
 from models.scene import load
+from models.vehicles.pitch_plane import Parameters
 from studies import command_line
 
 JARGON = ("Traceback", "pydantic", "Input should", "dictionary", "validation error", "instance of", "NoneType")
@@ -125,8 +127,8 @@ def test_the_installed_command_says_the_same(case, folder, capsys):
     assert done.stdout == "" and tree(folder) == before
 
 
-NASTY = ["nan", "inf", "-1", "0", "1e308", "1e-308", "-0.0", "true", '""', "[]", "{}", '"x"', "[[", "=", "\n", "\r", "#", "\x00",
-         "\ufeff", "999999999999999999999", "1979-05-27", ".", ",", "'"]
+NASTY = ["nan", "inf", "-1", "0", "1e308", "1e-308", "-0.0", "true", '""', "[]", "{}", '"x"', "[[", "=", "\n", "\r",
+         "#", "\x00", "\ufeff", "999999999999999999999", "1979-05-27", ".", ",", "'"]
 """Pieces that readers stumble over."""
 
 
@@ -157,21 +159,35 @@ step = 0.0005
 """
 
 
-def accepted_or_refused(path):
+def accepted_or_refused(path, *changes):
     """Read and check a scene as ``run`` does before it runs; an error that is not the user's passes through."""
     try:
-        check(load(path), command_line.ENGINES)
+        check(load(path, changes), command_line.ENGINES)
     except InputError as error:
         assert str(error) and "\n" not in str(error)
 
 
-@pytest.mark.parametrize("extra", ["", FORCED[len(FREE) :], GUIDED[len(FREE) :], ON_ROAD[len(FREE) :], ON_CSV[len(FREE) :]])
+@pytest.mark.parametrize("scene", [FREE, FORCED, GUIDED, ON_ROAD, ON_CSV], ids=lambda text: str(len(text)))
 @FUZZ
 @given(data=st.data())
-def test_no_scene_text_ends_in_a_traceback(extra, data, folder_of_good_files):
+def test_no_scene_text_ends_in_a_traceback(scene, data, folder_of_good_files):
     path = folder_of_good_files / "ride.toml"
-    path.write_bytes(data.draw(mutations(FULL + extra)).encode("utf-8", "surrogatepass"))
+    path.write_bytes(data.draw(mutations(FULL + scene[len(FREE) :])).encode("utf-8", "surrogatepass"))
     accepted_or_refused(path)
+
+
+EXTREME = (1e308, 1e-308, 5e-324, 1e40, 1e15, 1e-15, 1e-20, -1, 0, 123456789012345678901234567890)
+
+
+@pytest.mark.parametrize("scene", [FREE, GUIDED, ON_CSV], ids=["free", "guided", "csv"])
+def test_no_number_ends_in_a_traceback(scene, folder):
+    """Every number of a scene made huge or tiny: accepted or refused, without an overflow on the way."""
+    (folder / "ride.toml").write_text(scene)
+    parameters = [f"vehicle.override.{name}" for name in Parameters.model_fields]
+    others = ["run.step", "run.duration", "run.output_step", "engines.exudyn.step", "effects.road.speed",
+              "effects.road.run_in", "start.z3", "start.pitch_rate", "effects.pitch_spring.stiffness"]
+    for key, value in itertools.product([*parameters, *others], EXTREME):
+        accepted_or_refused(folder / "ride.toml", f"{key}={value!r}")
 
 
 @pytest.mark.parametrize("name", ["forces.csv", "pitch.csv", "road.csv", "mine.toml"])
