@@ -119,9 +119,10 @@ def every_curve(problem: dict[str, Any], points: list[Point]) -> Table:
          named(curve, groups).partition(" = ")[2] or "-")
         for curve, own in by_curve(points).items())  # fmt: skip
     unit = problem["units"][quantity]
-    note = (f"Order: slope of the error over the step on the three finest settings whose error exceeds {HOLLOW:g} times "
-            "the uncertainty of the reference; for adaptive methods over 1 / force calls, where loose tolerances are still "
-            "ruled by stability. Curves coincide if their errors agree to 1 % at every common setting.")  # fmt: skip
+    note = (f"Order: slope of the error over the step on the three finest settings whose error exceeds {HOLLOW:g} "
+            "times the uncertainty of the reference; for adaptive methods over 1 / force calls, where loose tolerances "
+            "are still ruled by stability. Curves coincide if their errors agree to 1 % at every common "
+            "setting.")  # fmt: skip
     heads = ("curve", "settings", "from, to", f"{quantity} error [{unit}]", "observed order", "declared",
              f"force calls for 1 {unit}", f"ms for 1 {unit}", "coincides with")  # fmt: skip
     return Table("Every integrator that each engine offers", note, heads, rows)

@@ -13,7 +13,7 @@ from validation.timing import describe, interleave, paired_ratio
 STEP = 1e-3
 
 
-def callback_cost(driven: Assembly, duration: float, integrator: str, rounds: int) -> dict[str, Any]:
+def callback_cost(driven: Assembly, duration: float, integrator: str, rounds: int, least: float) -> dict[str, Any]:
     """Paired ratios of one MuJoCo model in three states: without forces, with its springs and dampers, driven.
 
     driven : a vehicle on a road, whose input enters through a compiled callback.
@@ -23,7 +23,7 @@ def callback_cost(driven: Assembly, duration: float, integrator: str, rounds: in
     bare = replace(flat, vehicle=replace(flat.vehicle, struts=()))
     settings = Settings(integrator, STEP, duration)
     models = [build("mujoco", assembly, settings) for assembly in (bare, flat, driven)]
-    seconds = interleave([model.run for model in models], rounds)
+    seconds = interleave([model.run for model in models], rounds, least)
     names = ("without forces", "springs and dampers", "with callback")
     return {
         "callbacks": [model.plan()["callbacks"] for model in models],
@@ -33,7 +33,7 @@ def callback_cost(driven: Assembly, duration: float, integrator: str, rounds: in
     }
 
 
-def real_time(driven: Assembly, duration: float, rounds: int) -> dict[str, Any]:
+def real_time(driven: Assembly, duration: float, rounds: int, least: float) -> dict[str, Any]:
     """How many times faster than real time the reference runs at 1 ms, with and without making its road table.
 
     The road is timed by itself beside the run and subtracted within each round.
@@ -41,6 +41,6 @@ def real_time(driven: Assembly, duration: float, rounds: int) -> dict[str, Any]:
     signal, steps = driven.input, round(duration / STEP)
     assert signal is not None
     model = build("reference", driven, Settings("RK4", STEP, duration))
-    run, table = interleave([model.run, lambda: signal.sample(0.0, STEP / 2, 2 * steps + 1)], rounds)
+    run, table = interleave([model.run, lambda: signal.sample(0.0, STEP / 2, 2 * steps + 1)], rounds, least)
     return {"with table": duration / float(np.median(run)), "without table": duration / float(np.median(run - table)),
             "seconds": describe(run)}  # fmt: skip

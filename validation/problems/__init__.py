@@ -35,7 +35,7 @@ class Setting:
 
     def label(self) -> str:
         """The setting as a reader names it: a step with its unit, or a tolerance."""
-        return f"tolerance {self.value:.3g}" if self.adaptive else f"{1e3 * self.value:.4g} ms"
+        return f"tolerance {self.value:.3g}" if self.adaptive else f"{1e3 * self.value:.3g} ms"
 
 
 class Solved(Protocol):

@@ -1,0 +1,231 @@
+"""Work-precision runner: its analysis on curves whose answer is known, and planted solvers that lie."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from models.errors import Refused, RunFailed
+from validation import cost, curves
+from validation.cost_rows import rows_of
+from validation.cost_tables import tables
+from validation.problems import Setting
+from validation.timing import describe, interleave, paired_ratio
+
+STEPS = (8e-3, 4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)
+
+
+@dataclass
+class Solution:
+    error: float
+    counts: dict[str, int]
+
+
+@dataclass
+class Planted:
+    """A solver with error = scale h^order, ``stages`` calls a step, and one vice."""
+
+    setting: Setting
+    scale: float
+    vice: str
+
+    def run(self):
+        h = self.setting.value
+        if self.vice == "raises":
+            raise RunFailed("planted", "the state became infinite", 0.5)
+        error = {"huge": 1e9, "nan": math.nan}.get(self.vice, self.scale * h**self.setting.order)
+        steps = round(1.0 / h)
+        calls = self.setting.stages * steps + (1 if self.vice == "miscounts" else 0)
+        return Solution(error, {"steps": steps, "force calls": calls})
+
+
+class PlantedProblem:
+    """Order 4 with 4 stages against order 1 with 1, both with error 1 N at 8 ms."""
+
+    key, title, note, duration, reference, bound = "planted", "planted", "", 1.0, "closed form", 1e6
+    units, uncertainty, tolerances = {"force": "N"}, {"force": 1e-9}, (0.1, 0.01, 1e-3)
+
+    def __init__(self, vice="none", at=1e-3):
+        self.vice, self.at = vice, at
+
+    def setting(self, engine, method, value):
+        order = {"fourth": 4, "first": 1}[method]
+        return Setting(engine, method, value, order, stages=order, default="planted" if method == "first" else "")
+
+    def settings(self, quick):
+        return tuple(self.setting("exudyn", method, h) for method in ("fourth", "first") for h in STEPS)
+
+    def build(self, setting):
+        bad = setting.method == "fourth" and setting.value == self.at
+        if bad and self.vice == "refuses":
+            raise Refused("planted", "it would answer wrongly")
+        return Planted(setting, (1 / STEPS[0]) ** setting.order, self.vice if bad else "none")
+
+    def errors(self, solution):
+        return {"force": solution.error}
+
+
+def points_of(problem):
+    return cost.measure(problem, False, 3, 0.0)
+
+
+def test_order_of_synthetic_curves():
+    steps = np.array(STEPS)
+    for order in (1, 2, 4):
+        assert curves.slope(steps, 7 * steps**order) == pytest.approx(order, abs=1e-12)
+
+
+def test_hollow_points_do_not_enter_the_order():
+    """A floor of 1e-6 bends a fourth-order curve; the points above it still say 4."""
+    steps = np.array(STEPS)
+    errors = np.maximum(1e6 * steps**4, 1e-6)
+    assert curves.observed_order(steps, errors, floor=1e-5) == pytest.approx(4, abs=1e-12)
+    assert curves.observed_order(steps, errors, floor=0.0) < 3
+    assert math.isnan(curves.observed_order(steps, errors, floor=1e9))
+
+
+def test_coinciding_curves_are_named():
+    base = {h: h**4 for h in STEPS}
+    found = curves.coinciding({
+        "a": base, "b": {h: 1.009 * e for h, e in base.items()}, "c": {h: 1.05 * e for h, e in base.items()},
+        "two points": {h: base[h] for h in STEPS[:2]},
+    })  # fmt: skip
+    assert found == [("a", "b")], "1 % is the same, 5 % is not, two common points prove nothing"
+
+
+def test_cheapest_setting_is_interpolated():
+    """error = h^2, calls = 1 / h: 1e-5 needs h = 10^-2.5 and 10^2.5 calls, between the settings tried."""
+    steps = [1e-1, 1e-2, 1e-3]
+    found = curves.reach(steps, [h**2 for h in steps], [1 / h for h in steps], 1e-5, order=2)
+    assert found.how == "interpolated"
+    assert (found.cost, found.value) == pytest.approx((10**2.5, 10**-2.5), rel=1e-12)
+
+
+def test_beyond_the_finest_setting():
+    steps = [1e-1, 1e-2]
+    table = steps, [h**2 for h in steps], [1 / h for h in steps]
+    assert curves.reach(*table, 1e-6, order=2) is None
+    found = curves.reach(*table, 1e-6, order=2, extrapolate=True)
+    assert (found.cost, found.how) == (pytest.approx(1000, rel=1e-12), "extrapolated")
+    assert curves.reach(*table, 1.0, order=2).how == "coarsest"
+
+
+def test_adaptive_methods_count_only_where_tried():
+    found = curves.reach([1e-2, 1e-4], [1.0, 1e-3], [10.0, 20.0], 0.1, order=0)
+    assert (found.cost, found.value, found.how) == (20.0, 1e-4, "tried")
+    assert curves.reach([1e-2, 1e-4], [1.0, 1e-3], [10.0, 20.0], 1e-4, order=0, extrapolate=True) is None
+
+
+def test_a_lucky_coarse_setting_does_not_count():
+    """The curve dips below 0.1 at 0.4 and comes back: only the last crossing promises anything."""
+    found = curves.reach([0.8, 0.4, 0.2, 0.1], [1.0, 0.05, 0.2, 0.01], [1.0, 2.0, 4.0, 8.0], 0.1, order=1)
+    assert 4.0 < found.cost < 8.0
+
+
+def test_pareto_front():
+    assert curves.pareto([1, 2, 3, 4], [10, 20, 1, 0.999]) == [0, 2], "0.1 % better is not better"
+
+
+@pytest.mark.parametrize(("vice", "status"), [("huge", "SILENT"), ("nan", "SILENT"), ("raises", "raised"),
+                                              ("refuses", "refused"), ("none", "ok")])  # fmt: skip
+def test_status(vice, status):
+    problem = PlantedProblem(vice)
+    point = cost.attempt(problem, problem.setting("exudyn", "fourth", 1e-3))
+    assert point.status == status
+    assert bool(point.reason) == (status != "ok")
+
+
+@pytest.mark.parametrize(("vice", "row"), [("huge", "silent"), ("nan", "silent"), ("miscounts", "counts.said")])
+def test_a_lying_solver_fails_its_row(vice, row):
+    for planted, expected in (("none", "passed"), (vice, "failed")):
+        problem = PlantedProblem(planted)
+        rows = {one.id: one for one in rows_of(problem, points_of(problem), quick=False)}
+        assert rows[f"price.planted.{row}"].status == expected
+    assert "exudyn fourth 1 ms" in rows[f"price.planted.{row}"].quantity, "the row names the offender"
+
+
+def test_a_wrong_order_fails_its_row():
+    problem = PlantedProblem()
+    points = [p if p.setting.method == "first" else
+              cost.Point(p.setting, p.status, "", {"force": p.setting.value**3}, p.counts, p.seconds)
+              for p in points_of(problem)]  # fmt: skip
+    rows = {one.id: one for one in rows_of(problem, points, quick=True)}
+    assert rows["price.planted.order.force.exudyn-fourth"].status == "failed"
+    assert rows["price.planted.order.force.exudyn-first"].status == "passed"
+
+
+def test_what_a_default_loses():
+    """1e-3 N: first order needs 1000 times 125 calls, fourth order 1000^(1/4) times 500: 44.5 times."""
+    found = cost.loss(points_of(PlantedProblem()), "force", 1e-3, "force calls", "exudyn first")
+    assert found.how == "extrapolated"
+    assert found.factor == pytest.approx(125_000 / (500 * 1000**0.25), rel=1e-9)
+    assert found.low == found.high == found.factor, "counts have no interval"
+
+
+def test_tables_come_from_saved_points():
+    problem = PlantedProblem("raises")
+    points = [cost.point(p.as_dict()) for p in points_of(problem)]
+    found = {table.title: table for table in tables(cost.describe(problem, 3), points)}
+    cheapest = found["Cheapest setting that meets the tolerance"].rows[0]
+    assert cheapest[0] == "0.1"
+    assert cheapest[1].startswith("Exudyn fourth, 4.5 ms"), "0.1^(1/4) 8 ms = 4.499 ms"
+    assert found["Settings that gave no answer"].rows[0][:3] == ("Exudyn fourth", "1 ms", "raised")
+    for table in found.values():
+        assert all(len(row) == len(table.headings) for row in table.rows)
+
+
+def test_interval_of_a_paired_ratio_covers_it():
+    """Two jobs in a ratio of 1.5, sharing the drift of the machine, 10 % noise of their own: 200 experiments.
+
+    A 95 % bootstrap interval of a median of 15 covers in 93 to 97 %; 178 of 200 would be 4 standard errors low.
+    """
+    random = np.random.default_rng(3)
+    covered = 0
+    for _ in range(200):
+        drift = np.exp(random.normal(0, 0.5, 15))
+        a, b = 1.5 * drift * np.exp(random.normal(0, 0.1, 15)), drift * np.exp(random.normal(0, 0.1, 15))
+        ratio, low, high = paired_ratio(a, b)
+        assert low <= ratio <= high
+        covered += low <= 1.5 <= high
+    assert 178 <= covered <= 200
+
+
+def test_interleaving_runs_every_job_in_every_round():
+    calls = []
+    seconds = interleave([lambda i=i: calls.append(i) for i in range(3)], rounds=20, least=0.0)
+    assert seconds.shape == (3, 20)
+    assert (seconds >= 0).all()
+    rounds = np.array(calls[-60:]).reshape(20, 3)
+    assert (np.sort(rounds, axis=1) == [0, 1, 2]).all()
+    assert len({tuple(one) for one in rounds}) == 6, "all orders of three jobs occur in 20 rounds"
+
+
+def test_description_of_seconds():
+    assert describe([3.0, 1.0, 2.0, 10.0, 2.0]) == {"median": 2.0, "mad": 1.0, "min": 1.0}
+
+
+def test_force_calls_seen_from_outside():
+    """Each adapter's counts against MuJoCo's timers and Exudyn's own calls of a load, 50 steps each."""
+    from models.assembly import assemble
+    from validation.force_calls import counted
+    from validation.problems.road_excited import scene, setting, settings_of
+
+    assembly = assemble(scene())
+    for engine, method, stages in (("mujoco", "RK4", 4), ("mujoco", "Euler", 1), ("exudyn", "RK44", 4),
+                                   ("exudyn", "RK67", 7), ("exudyn", "VelocityVerlet", 1)):  # fmt: skip
+        assert counted(engine, assembly, settings_of(setting(engine, method, 1e-3), 0.05)) == (50 * stages, 50 * stages)
+    outside, said = counted("exudyn", assembly, settings_of(setting("exudyn", "GeneralizedAlpha 0.9", 1e-3), 0.05))
+    assert outside == said > 50
+
+
+def test_every_integrator_of_the_catalogue_is_tried():
+    from models.engines.catalogue import CATALOGUE
+    from validation.problems.road_excited import DEFAULTS, FULL, QUICK
+
+    tried = {(engine, method.split()[0]) for engine, method in FULL}
+    assert tried == {(engine, name) for engine, names in CATALOGUE.items() for name in names}
+    for (engine, method, value) in DEFAULTS:
+        assert value in FULL[engine, method], "a default is left out of the full sweep"
+        assert value in QUICK[engine, method], "a default is left out of the quick one"
+    assert all(set(values) <= set(FULL[curve]) for curve, values in QUICK.items())

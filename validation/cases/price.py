@@ -1,0 +1,120 @@
+"""What accuracy costs: work and precision of every integrator, cheapest settings, and what defaults lose.
+
+Another system joins by a problem in ``validation/problems`` and its name in ``PROBLEMS``.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from models.assembly import Assembly
+from validation import cost, speed
+from validation.cost_figure import draw as draw_figure
+from validation.cost_rows import rows_of
+from validation.cost_tables import tables as cost_tables
+from validation.force_calls import counted
+from validation.problems import Problem, Setting, road_excited
+from validation.rows import Row, System, Table, behaves, finding, within
+
+TITLE = "What accuracy costs"
+SYSTEM: System = "cost"
+PROBLEMS: tuple[Callable[[bool], Problem], ...] = (road_excited.problem,)
+ROUNDS = {True: 5, False: 15}
+"""Interleaved rounds of timing, by ``quick``."""
+LEAST = {True: 0.004, False: 0.02}
+"""A short run is repeated until its turn lasts this long (s), by ``quick``."""
+COUNTED = 0.2
+"""Length (s) of the runs whose force calls are counted from outside."""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows of all problems, of the force calls, and of two claims about speed."""
+    rows, saved = [], []
+    for problem in (make(quick) for make in PROBLEMS):
+        points = cost.measure(problem, quick, ROUNDS[quick], LEAST[quick])
+        saved.append({"problem": cost.describe(problem, ROUNDS[quick]), "points": [p.as_dict() for p in points]})
+        rows += rows_of(problem, points, quick)
+    road = road_excited.problem(quick)
+    data = {"problems": saved, **_speeds(road.assembly, 2 * ROUNDS[quick], 2 * LEAST[quick])}
+    settings = list(dict.fromkeys(_at_1_ms(one) for one in road.settings(quick) if one.method != "DVERK6"))
+    return rows + _road_rows(saved[0]) + _counts(settings, road.assembly) + _speed_rows(data), data
+
+
+def _speeds(assembly: Assembly, rounds: int, least: float) -> dict[str, Any]:
+    duration = road_excited.DURATION
+    return {
+        "callback": {name: speed.callback_cost(assembly, duration, name, rounds, least) for name in ("RK4", "Euler")},
+        "real time": speed.real_time(assembly, duration, rounds, least),
+    }
+
+
+def _road_rows(saved: dict[str, Any]) -> list[Row]:
+    """What must coincide on the road, and what Exudyn names without having it."""
+    points = [cost.point(one) for one in saved["points"]]
+    quantity, limits = "wheel force", saved["problem"]["uncertainty"]
+    found = [" = ".join(sorted(group)) for group in cost.same(points, quantity, limits[quantity])]
+    expected = {
+        "rk4": ("exudyn RK44 = mujoco RK4 = reference RK4", "the same tableau at the same step"),
+        "implicit": ("mujoco implicit = mujoco implicitfast", "they differ in Coriolis terms, which are absent here"),
+    }
+    rows = [behaves(f"price.road.coincide.{name}", SYSTEM, "curves that agree to 1 % at every common setting",
+                    next((one for one in found if one == group), "; ".join(found)), group, why, "native")
+            for name, (group, why) in expected.items()]  # fmt: skip
+    missing = [p for p in points if p.setting.method == "DVERK6"]
+    return rows + [behaves("price.road.status.DVERK6", SYSTEM, "Exudyn DVERK6", p.status, "refused",
+                           "Exudyn names the method but has not implemented it") for p in missing]  # fmt: skip
+
+
+def _at_1_ms(one: Setting) -> Setting:
+    """One setting per fixed-step method; adaptive methods keep theirs."""
+    return one if one.adaptive else road_excited.setting(one.engine, one.method, 1e-3)
+
+
+def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
+    """What the adapters say about their force calls against calls counted from outside."""
+    rows = []
+    for engine, how in (("exudyn", "calls of one load"), ("mujoco", "MuJoCo's own timers")):
+        pairs = [counted(engine, assembly, road_excited.settings_of(one, COUNTED)) for one in settings
+                 if one.engine == engine]  # fmt: skip
+        worst = max(abs(outside - said) for outside, said in pairs)
+        what = f"force calls counted from outside ({how}) against those reported, {len(pairs)} runs, largest difference"
+        rows.append(within(f"price.road.counts.{engine}", SYSTEM, what, worst, "calls", 0, 0,
+                           "exact; the one evaluation before the first step of methods that start from accelerations "
+                           "is left out", "native"))  # fmt: skip
+    return rows
+
+
+def _speed_rows(data: dict[str, Any]) -> list[Row]:
+    """Targets about seconds: reported with their intervals, never judged."""
+    why = "a target about seconds, which are reported and never gated"
+    rows = []
+    for integrator, found in data["callback"].items():
+        for key, words in (("to no callback", "the same model without its callback"),
+                           ("to no forces", "the same bodies without springs, dampers and callback")):  # fmt: skip
+            ratio, low, high = found[key]
+            what = f"MuJoCo {integrator}, driven through a compiled callback, by {words}: paired seconds"
+            rows.append(finding(f"price.callback.{integrator}.{key.replace(' ', '-')}", SYSTEM, what, ratio, "times",
+                                f"at most 1.2; 95 % interval {low:.3f} to {high:.3f}", why, "none"))  # fmt: skip
+    for key, factor in ((key, data["real time"][key]) for key in ("with table", "without table")):
+        what = f"reference RK4 at 1 ms, {key.replace('table', 'making its road table')}"
+        rows.append(finding(f"price.real-time.{key.replace(' ', '-')}", SYSTEM, what, factor, "times real time",
+                            "at least 1,000", why, "none"))  # fmt: skip
+    return rows
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Cheapest settings, losses, curves and failures of every problem."""
+    return [table for one in data["problems"]
+            for table in cost_tables(one["problem"], [cost.point(saved) for saved in one["points"]])]  # fmt: skip
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """A work-precision figure per problem."""
+    return [(_caption(one["problem"]), draw_figure(one["problem"], [cost.point(saved) for saved in one["points"]]))
+            for one in data["problems"]]  # fmt: skip
+
+
+def _caption(problem: dict[str, Any]) -> str:
+    return (f"{problem['title']}: error over force calls and over seconds. Reference: {problem['reference']}. "
+            "Colour is the engine, marker the method, line its order (solid from 4 up, dashed 2, dotted 1). "
+            f"{problem['note']}")  # fmt: skip
