@@ -1,0 +1,86 @@
+"""How the report writes numbers: four significant digits, engineering notation beyond, a margin as a share."""
+
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from markupsafe import Markup, escape
+
+PLAIN = (1e-3, 1e5)
+"""Magnitudes that are written without a power of ten."""
+
+
+def number(value: Any, digits: int = 4) -> Markup:
+    """A number with ``digits`` significant ones, powers of ten in threes; text stays text, None a dash."""
+    if value is None or value == "":
+        return Markup("–")
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return escape(value)
+    if not math.isfinite(value):
+        return Markup("not a number") if math.isnan(value) else Markup("infinite" if value > 0 else "-infinite")
+    if value == 0 or (isinstance(value, int) and abs(value) < 10**7):
+        return Markup(_minus(f"{value:d}" if isinstance(value, int) else "0"))
+    if PLAIN[0] <= abs(value) < PLAIN[1]:
+        return Markup(_minus(_significant(value, digits)))
+    power = _power(value, digits)
+    return Markup(f"{_minus(_significant(value / 10.0**power, digits))}&thinsp;·&thinsp;10<sup>{_minus(str(power))}</sup>")
+
+
+def _power(value: float, digits: int) -> int:
+    """The multiple of three below the magnitude of the rounded value."""
+    exponent = int(f"{value:.{digits - 1}e}".split("e")[1])
+    return 3 * (exponent // 3)
+
+
+def _significant(value: float, digits: int) -> str:
+    """Fixed notation with so many significant digits, without trailing zeros."""
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    text = f"{value:.{decimals}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def _minus(text: str) -> str:
+    return text.replace("-", "−")
+
+
+def margin(row: dict[str, Any]) -> float | None:
+    """|value - expected| over tolerance; None where a row has no tolerance or it is exactly zero."""
+    value, expected, tolerance = row["value"], row["expected"], row["tolerance"]
+    numeric = all(isinstance(x, int | float) and not isinstance(x, bool) for x in (value, expected, tolerance))
+    if not numeric or tolerance <= 0:
+        return None
+    return abs(value - expected) / tolerance
+
+
+def share(value: float | None) -> Markup:
+    """A margin in per cent of its tolerance."""
+    if value is None:
+        return Markup("–")
+    if not math.isfinite(value):
+        return Markup("infinite")
+    return Markup("&lt; 0.01 %") if 0 < value < 1e-4 else Markup(f"{_significant(100 * value, 2) if value else '0'} %")
+
+
+def duration(seconds: float) -> str:
+    """Seconds, or minutes and seconds."""
+    whole = round(seconds)
+    return f"{seconds:.1f} s" if seconds < 10 else f"{whole} s" if whole < 120 else f"{whole // 60} min {whole % 60} s"
+
+
+POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]\d+)(?![\w.])")
+NUMERIC = re.compile(r"[-−+±<>≤≥~ ]*\d[\d,]*(\.\d+)?(e[+-]?\d+)?( ?(%|s|ms|x))?|[-–]?|never|refused")
+"""A cell of a table that reads as a number, or as the absence of one."""
+
+
+def powers(cell: Any) -> Markup:
+    """Text with numbers such as 2e-06 written with a power of ten."""
+    text = str(escape(cell))
+    return Markup(POWER.sub(lambda found: f"{_minus(found[1])}&thinsp;·&thinsp;10<sup>{_minus(str(int(found[2])))}</sup>", text))
+
+
+def numeric_columns(rows: Sequence[Sequence[Any]]) -> list[bool]:
+    """Which columns of a table hold numbers, and go to the right."""
+    columns = list(zip(*rows, strict=False))
+    return [all(NUMERIC.fullmatch(str(cell).strip()) for cell in column) and any(str(cell)[-1:].isdigit() for cell in column)
+            for column in columns] + [False] * 99  # fmt: skip
