@@ -206,7 +206,8 @@ def _print(summary: dict[str, Any]) -> None:
         print(f"  {pair}: states differ by at most {gap:.1e}")
     for line in summary.get("table", []):
         print(line)
-    print(f"  results in {summary['folder']}")
+    kept = Path(summary["folder"]).exists()
+    print(f"  results in {summary['folder']}" if kept else "  nothing was saved")
 
 
 def study(scene: str) -> None:
