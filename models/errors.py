@@ -2,9 +2,10 @@
 
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+if TYPE_CHECKING:  # the command line imports this file before it knows whether it will compute anything
+    import numpy as np
 
 LONGEST = 80
 """Characters of an offending value that a message shows."""
@@ -33,7 +34,7 @@ def _shown(value: Any) -> str:
     """Return `` = value`` as a scene file would hold it, cut to a readable length."""
     if value is None:
         return ""
-    plain = value.item() if isinstance(value, np.generic) else value
+    plain = value.item() if hasattr(value, "item") else value
     text = str(plain).lower() if isinstance(plain, bool) else repr(plain)
     return f" = {text if len(text) <= LONGEST else text[: LONGEST - 3] + '...'}"
 
@@ -70,7 +71,7 @@ class RunFailed(RuntimeError):
     state : the last good state, shape (8,) or None
     """
 
-    def __init__(self, engine: str, reason: str, time: float | None = None, state: np.ndarray | None = None) -> None:
+    def __init__(self, engine: str, reason: str, time: float | None = None, state: "np.ndarray | None" = None) -> None:
         self.engine, self.reason, self.time, self.state = engine, reason, time, state
         since = "" if time is None else f" (last good state at t = {time:.6g} s)"
         super().__init__(f"{engine}: {reason}{since}")

@@ -266,14 +266,17 @@ def _figure_measurement(measured: Result) -> Any:
 
 
 def _figure_drift(results: dict[str, Result], title: str) -> Any:
+    """Heave error on a logarithmic scale, and pitch; the first result is the measurement."""
     from studies.figures import plt
 
     figure, axes = plt.subplots(1, 2, figsize=(10, 3.8))
-    for i, (name, result) in enumerate(results.items()):
-        style = {"color": "black", "linewidth": 1.8, "zorder": 9} if i == 0 else {"color": f"C{i - 1}"}
-        axes[0].plot(result.times, -result["z3"], label=name, **style)
-        axes[1].plot(result.times, result["pitch"], label=name, **style)
-    axes[0].set_title("heave of the chassis, up [m]")
+    (name, measured), *runs = results.items()
+    axes[1].plot(measured.times, measured["pitch"], label=name, color="black", linewidth=1.8, zorder=9)
+    for i, (name, run) in enumerate(runs):
+        axes[0].semilogy(run.times, np.abs(_error(measured, run, "z3")) + 1e-12, color=f"C{i}", linewidth=0.8)
+        axes[1].plot(run.times, run["pitch"], label=name, color=f"C{i}")
+    axes[0].set_title("error of the chassis' heave [m]")
+    axes[0].set_ylim(1e-9, 10)
     axes[1].set_title("pitch, nose up [rad]")
     axes[1].set_ylim(-1, 1)
     for axis in axes:

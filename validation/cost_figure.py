@@ -35,7 +35,7 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
     _failures(axes[0], points, top)
     quantity = quantity_of(problem)
     axes[0].set_ylabel(f"largest {quantity} error over the run [{problem['units'][quantity]}]")
-    axes[0].set_ylim(0.3 * problem["uncertainty"][quantity], 3 * top)
+    axes[0].set_ylim(0.3 * problem["uncertainty"][quantity], 12 * top)
     alike = "; ".join(named(group[0], [group]) for group in groups_of(problem, points))
     figure.suptitle(f"What accuracy costs. {problem['title']}\n", x=0.01, ha="left", fontsize=12)
     figure.text(0.011, 0.945, f"Same error at the same step: {alike}." if alike else "", fontsize=9, color="#333333")
@@ -103,10 +103,11 @@ def _defaults(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str)
                 zorder=5)  # fmt: skip
         ax.annotate(f"{owner} default:\n{p.setting.method}, {p.setting.label()}", place, fontsize=8.5,
                     xytext=text, textcoords="axes fraction", ha="left", va="center", zorder=6,
-                    arrowprops={"arrowstyle": "-", "color": "#111111", "linewidth": 0.7, "shrinkB": 7})  # fmt: skip
+                    arrowprops={"arrowstyle": "-", "color": "#111111", "linewidth": 0.7, "shrinkB": 7,
+                                "relpos": (0.12, 1) if kind == "force calls" else (1, 0.5)})  # fmt: skip
 
 
-PLACES = {"force calls": ((0.02, 0.46), (0.02, 0.37)), "seconds": ((0.02, 0.88), (0.02, 0.96))}
+PLACES = {"force calls": ((0.015, 0.36), (0.17, 0.46)), "seconds": ((0.02, 0.88), (0.02, 0.96))}
 """Where the defaults are named, in fractions of the panel: the corner that accuracy leaves empty."""
 
 
@@ -116,10 +117,11 @@ def _failures(ax: Axes, points: list[Point], top: float) -> None:
     for p in failed:
         calls = _expected(p, points)
         if calls:
-            ax.plot(calls, top, "x", color=COLOURS.get(p.setting.engine, "#777777"), markersize=7, markeredgewidth=1.6)
+            ax.plot(calls, top, "x", color=COLOURS.get(p.setting.engine, "#777777"), markersize=1.4 * SIZES.get(p.setting.engine, 5),
+                    markeredgewidth=1.6)  # fmt: skip
     if failed:
         text = "; ".join(f"{status}: {_who(failed, status)}" for status in dict.fromkeys(p.status for p in failed))
-        ax.annotate(text, (0.995, top), xycoords=("axes fraction", "data"), ha="right", va="center", fontsize=8)
+        ax.annotate(text, (0.995, 0.99), xycoords="axes fraction", ha="right", va="top", fontsize=8)
 
 
 def _expected(p: Point, points: list[Point]) -> float:
