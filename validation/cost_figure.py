@@ -11,7 +11,10 @@ from validation import cost, curves
 from validation.cost import Point, by_curve
 from validation.cost_tables import groups_of, named, quantity_of
 
-MARKERS = "osD^v<>PXhp*8dH"
+SHARED = {"RK4": "o", "RK44": "o", "Euler": "D", "ExplicitEuler": "D"}
+"""Markers of methods that several engines have."""
+MARKERS = "s^v<>PXhp*d"
+"""Markers of the others, in turn within each engine."""
 STYLES = {1: ":", 2: "--", 3: "-.", 4: "-"}
 SIZES = {"reference": 8.5, "exudyn": 6.5, "mujoco": 4.5}
 """Coinciding curves show as rings within each other."""
@@ -20,7 +23,7 @@ AXES = {"force calls": "force calls in the run", "seconds": "seconds for the run
 
 def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
     """Two panels that share the error axis; failures stand above the first, whose axis they have a place on."""
-    figure, axes = plt.subplots(1, 2, figsize=(12.5, 7.6), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(12.5, 8.4), sharey=True)
     styles = _styles(points)
     top = _top(problem, points)
     for ax, kind in zip(axes, cost.COSTS, strict=True):
@@ -38,23 +41,22 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
     axes[0].set_ylim(0.3 * problem["uncertainty"][quantity], 12 * top)
     alike = "; ".join(named(group[0], [group]) for group in groups_of(problem, points))
     figure.suptitle(f"What accuracy costs. {problem['title']}\n", x=0.01, ha="left", fontsize=12)
-    figure.text(0.011, 0.945, f"Same error at the same step: {alike}." if alike else "", fontsize=9, color="#333333")
-    figure.legend(handles=_legend(points, styles), loc="outside lower center", ncols=4, fontsize=8.5, handlelength=3.2)
+    figure.text(0.011, 0.95, f"Same error at the same step: {alike}." if alike else "", fontsize=9, color="#333333")
+    figure.legend(handles=_legend(points, styles), loc="outside lower center", ncols=5, fontsize=8.5, handlelength=3.2)
     return figure
 
 
 def _styles(points: list[Point]) -> dict[str, dict[str, Any]]:
     """Colour by engine, marker by method, line by declared order (solid from 4 up)."""
-    methods = list(dict.fromkeys(_family(p) for p in points))
-    return {p.setting.curve: {
-        "color": COLOURS.get(p.setting.engine, "#777777"), "marker": MARKERS[methods.index(_family(p)) % len(MARKERS)],
-        "linestyle": STYLES.get(p.setting.order, "-"), "markersize": SIZES.get(p.setting.engine, 5),
-    } for p in points}  # fmt: skip
-
-
-def _family(p: Point) -> str:
-    """Methods of one name in several engines share a marker."""
-    return {"RK44": "RK4", "ExplicitEuler": "Euler"}.get(p.setting.method, p.setting.method)
+    found: dict[str, dict[str, Any]] = {}
+    for own in by_curve(points).values():
+        one = own[0].setting
+        colour = COLOURS.get(one.engine, "grey")
+        used = {style["marker"] for style in found.values() if style["color"] == colour}
+        marker = SHARED.get(one.method) or next((m for m in MARKERS if m not in used), ".")
+        found[one.curve] = {"color": colour, "marker": marker, "linestyle": STYLES.get(one.order, "-"),
+                            "markersize": SIZES.get(one.engine, 5)}  # fmt: skip
+    return found
 
 
 def _top(problem: dict[str, Any], points: list[Point]) -> float:
@@ -79,8 +81,8 @@ def _floor(ax: Axes, problem: dict[str, Any]) -> None:
     unit = problem["units"][quantity_of(problem)]
     ax.axhspan(1e-30, own, color="#bbbbbb", alpha=0.6, zorder=0, linewidth=0)
     ax.axhspan(own, curves.HOLLOW * own, color="#bbbbbb", alpha=0.25, zorder=0, linewidth=0)
-    ax.text(0.985, curves.HOLLOW * own, f"reference known to {own:.1g} {unit} (dark); below ten times that: hollow",
-            transform=ax.get_yaxis_transform(), ha="right", va="bottom", fontsize=8, color="#555555")  # fmt: skip
+    ax.text(0.015, curves.HOLLOW * own, f"reference known to {own:.1g} {unit} (dark);\nbelow ten times that: hollow",
+            transform=ax.get_yaxis_transform(), ha="left", va="bottom", fontsize=8, color="#555555")  # fmt: skip
 
 
 def _front(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> None:
@@ -101,13 +103,13 @@ def _defaults(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str)
         place = (p.cost(kind), p.errors[quantity_of(problem)])
         ax.plot(*place, "o", markersize=15, markerfacecolor="none", markeredgecolor="#111111", markeredgewidth=1.4,
                 zorder=5)  # fmt: skip
-        ax.annotate(f"{owner} default:\n{p.setting.method}, {p.setting.label()}", place, fontsize=8.5,
+        ax.annotate(f"{owner} default:\n{p.setting.method},\n{p.setting.label()}", place, fontsize=8.5,
                     xytext=text, textcoords="axes fraction", ha="left", va="center", zorder=6,
                     arrowprops={"arrowstyle": "-", "color": "#111111", "linewidth": 0.7, "shrinkB": 7,
                                 "relpos": (0.12, 1) if kind == "force calls" else (1, 0.5)})  # fmt: skip
 
 
-PLACES = {"force calls": ((0.015, 0.36), (0.17, 0.46)), "seconds": ((0.02, 0.88), (0.02, 0.96))}
+PLACES = {"force calls": ((0.015, 0.36), (0.17, 0.46)), "seconds": ((0.015, 0.85), (0.015, 0.95))}
 """Where the defaults are named, in fractions of the panel: the corner that accuracy leaves empty."""
 
 
@@ -117,8 +119,8 @@ def _failures(ax: Axes, points: list[Point], top: float) -> None:
     for p in failed:
         calls = _expected(p, points)
         if calls:
-            ax.plot(calls, top, "x", color=COLOURS.get(p.setting.engine, "#777777"), markersize=1.4 * SIZES.get(p.setting.engine, 5),
-                    markeredgewidth=1.6)  # fmt: skip
+            size = 1.4 * SIZES.get(p.setting.engine, 5)
+            ax.plot(calls, top, "x", color=COLOURS.get(p.setting.engine, "grey"), markersize=size, markeredgewidth=1.6)
     if failed:
         text = "; ".join(f"{status}: {_who(failed, status)}" for status in dict.fromkeys(p.status for p in failed))
         ax.annotate(text, (0.995, 0.99), xycoords="axes fraction", ha="right", va="top", fontsize=8)

@@ -4,12 +4,15 @@ import math
 from collections import defaultdict
 from typing import Any
 
+import numpy as np
+
 from studies.figures import LABELS
 from validation import cost
 from validation.cost import Loss, Point, by_curve
 from validation.curves import HOLLOW, Reach
 from validation.problems import Setting
 from validation.rows import Table
+from validation.timing import describe
 
 
 def tables(problem: dict[str, Any], points: list[Point]) -> list[Table]:
@@ -52,10 +55,16 @@ def cheapest(problem: dict[str, Any], points: list[Point]) -> Table:
     note = ("Fixed steps are interpolated log-log between neighbouring settings; adaptive methods count at the loosest "
             "tolerance tried that does; 'coarsest' is the coarsest setting tried. Nothing is extrapolated. Force calls "
             "are exact and the same on every machine; seconds are those of one run on this one, model and input tables "
-            "built anew, and wander.")  # fmt: skip
+            f"built anew, and wander (median absolute deviation {100 * _spread(points):.0f} %).")  # fmt: skip
     heads = (f"{quantity} error at most [{unit}]", "fewest force calls", "fewest seconds", "fewest in Exudyn",
              "fewest in MuJoCo")  # fmt: skip
     return Table("Cheapest setting that meets the tolerance", note, heads, tuple(rows))
+
+
+def _spread(points: list[Point]) -> float:
+    """Median over all settings of the relative median absolute deviation of the seconds."""
+    found = [describe(p.seconds) for p in points if p.seconds]
+    return float(np.median([one["mad"] / one["median"] for one in found]))
 
 
 def _won(points: list[Point], found: dict[str, Reach], among: str, unit: str,
