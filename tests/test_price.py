@@ -229,3 +229,16 @@ def test_every_integrator_of_the_catalogue_is_tried():
         assert value in FULL[engine, method], "a default is left out of the full sweep"
         assert value in QUICK[engine, method], "a default is left out of the quick one"
     assert all(set(values) <= set(FULL[curve]) for curve, values in QUICK.items())
+
+
+def test_defaults_are_those_of_the_installed_engines():
+    import exudyn
+    import mujoco
+
+    from validation.problems.road_excited import DEFAULTS, RADII
+
+    ti, option = exudyn.SimulationSettings().timeIntegration, mujoco.MjOption()
+    assert DEFAULTS["exudyn", "GeneralizedAlpha 0.9", ti.endTime / ti.numberOfSteps] == "Exudyn"
+    assert RADII["GeneralizedAlpha 0.9"] == ti.generalizedAlpha.spectralRadius
+    assert DEFAULTS["mujoco", "Euler", option.timestep] == "MuJoCo"
+    assert option.integrator == mujoco.mjtIntegrator.mjINT_EULER
