@@ -1,0 +1,146 @@
+"""What an effect leaves behind where a scene does not name it: looked for, counted, never assumed.
+
+Everything here observes a run from outside: the modules of a fresh process, Exudyn's own items, MuJoCo's
+global callbacks, the Python frames that are entered while an engine marches, the memory it takes.
+"""
+
+import json
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+from unittest import mock
+
+from models.engines.protocol import Model
+
+CALLBACKS = ("act_bias", "act_dyn", "act_gain", "contactfilter", "control", "passive", "sensor", "time")
+"""MuJoCo's callbacks, all global to the process."""
+
+PROBE = """
+import json, sys
+from models.assembly import assemble
+from models.engines.protocol import build, settings_of
+from models.scene import build as build_scene
+from models.simulate import outputs
+scene = build_scene(json.loads(sys.argv[1]), "probe", sys.argv[2])
+states = {}
+for engine in ("reference", "exudyn", "mujoco"):
+    assembly = assemble(scene)
+    trajectory = build(engine, assembly, settings_of(scene, engine)).run()
+    states[engine] = trajectory.states.tobytes().hex()
+    outputs(assembly, trajectory)
+reference = sys.modules["models.engines.reference"]
+print(json.dumps({
+    "modules": sorted(sys.modules),
+    "states": states,
+    "marches": [list(key) for key, march in reference._FIXED.items() if march.signatures],
+    "derivatives": [list(key) for key in reference._SINGLE],
+}))
+"""
+"""Runs a scene in all engines in a process of its own and says what it imported, compiled and found."""
+
+
+def probe(table: Mapping[str, Any], folder: str = ".", **options: Any) -> dict[str, Any]:
+    """Modules, compiled kernels and states (as hexadecimal bytes) after a run in a fresh process."""
+    command = [sys.executable, "-c", PROBE, json.dumps(table), folder]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, **options)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def belongs_to_effects(module: str) -> bool:
+    """Whether a module exists for the sake of an effect: none of these may be imported for a bare scene."""
+    owners = ("models.effects.", "models.road", "models.contact", "models.tyre", "models.brake", "models.sensors",
+              "models.time_series", "models.tables", "models.engines.mujoco_callback", "models.engines.mujoco_layout",
+              "pyopencrg")  # fmt: skip
+    return module.startswith(owners)
+
+
+@dataclass
+class March:
+    """What was seen while an engine marched.
+
+    frames : Python functions entered, by the engine's own wrapper or from inside the march
+    memory : bytes that Python and numpy took at most, beyond what the march returned
+    callbacks : MuJoCo callbacks that were installed
+    """
+
+    frames: int = 0
+    memory: int = 0
+    callbacks: int = 0
+
+
+def installed() -> int:
+    """Number of MuJoCo callbacks that are installed in this process."""
+    import mujoco
+
+    return sum(getattr(mujoco, f"get_mjcb_{name}")() is not None for name in CALLBACKS)
+
+
+def march(engine: str, model: Model) -> March:
+    """Run a model once and watch its engine march; the guard and the results around it are not counted."""
+    seen = March()
+    with _entry(engine, seen):
+        model.run()
+    return seen
+
+
+@contextmanager
+def _entry(engine: str, seen: March) -> Iterator[None]:
+    """Put a watch around the one function in which an engine spends its time."""
+    if engine == "reference":
+        from models.engines import reference
+
+        real = reference.march_of
+        patch = mock.patch.object(reference, "march_of", lambda *key: _watched(real(*key), seen))
+    elif engine == "mujoco":
+        from mujoco import rollout
+
+        patch = mock.patch.object(rollout, "rollout", _watched(rollout.rollout, seen))
+    else:
+        import exudyn as exu
+
+        patch = mock.patch.object(exu.MainSystem, "SolveDynamic", _watched(exu.MainSystem.SolveDynamic, seen))
+    with patch:
+        yield
+
+
+def _watched(function: Callable[..., Any], seen: March) -> Callable[..., Any]:
+    """The function, with frames, memory and callbacks added to ``seen``."""
+
+    def call(*args: Any, **options: Any) -> Any:
+        seen.callbacks = max(seen.callbacks, installed())
+        tracemalloc.start()
+        sys.setprofile(lambda frame, event, argument: _count(seen, event))
+        try:
+            result = function(*args, **options)
+        finally:
+            sys.setprofile(None)
+            peak = tracemalloc.get_traced_memory()[1]
+            tracemalloc.stop()
+        seen.memory += peak - _size(result)
+        return result
+
+    return call
+
+
+def _count(seen: March, event: str) -> None:
+    seen.frames += event == "call"
+
+
+def _size(result: Any) -> int:
+    """Bytes of the arrays that a march returned."""
+    parts = result if isinstance(result, tuple) else (result,)
+    return sum(getattr(part, "nbytes", 0) for part in parts)
+
+
+def user_functions(mbs: Any) -> int:
+    """Number of user functions in an Exudyn system, counted over all of its items."""
+    system = mbs.systemData
+    kinds = (("Node", system.NumberOfNodes()), ("Object", system.NumberOfObjects()),
+             ("Marker", system.NumberOfMarkers()), ("Load", system.NumberOfLoads()),
+             ("Sensor", system.NumberOfSensors()))  # fmt: skip
+    items = [getattr(mbs, f"Get{kind}")(i) for kind, count in kinds for i in range(count)]
+    return sum("UserFunction" in key and bool(value) for item in items for key, value in item.items())

@@ -1,0 +1,223 @@
+"""An effect that a scene does not name is not there; one that it names adds what it says, at this price."""
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.assembly import assemble
+from models.engines.protocol import Model, build, settings_of
+from models.scene import Scene
+from models.scene import build as build_scene
+from models.simulate import outputs
+from models.time_series import write_time_series
+from validation.absence import belongs_to_effects, installed, march, probe, user_functions
+from validation.hand_built import exudyn_run, mujoco_run
+from validation.rows import Row, System, Table, at_most, behaves, finding
+from validation.timing import describe, interleave, paired_ratio
+
+TITLE = "What is not named is not computed, and what the rest costs"
+SYSTEM: System = "effects"
+ENGINES = ("reference", "exudyn", "mujoco")
+STEP = 1e-3
+START = {"pitch": 0.1, "z3": -0.1}
+"""m, rad: the vehicle moves, so that nothing is compared at rest."""
+
+FORCES = {"wheel_forces": {"file": "forces.csv", "interpolation": "held"}}
+GUIDED = {"integrator": "GeneralizedAlpha"}
+"""The one integrator of Exudyn that solves for a prescribed pitch; its neighbour without one takes it, too."""
+
+PRICED: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, dict[str, int]]]] = {
+    "road": ({}, {"source": "study", "speed": 20.0},
+             {"exudyn": {"native items": 4, "callbacks": 4}, "mujoco": {"callbacks": 1}, "all": {"channels": 2}}),
+    "pitch_spring": ({}, {"stiffness": 2e4, "damping": 1e3},
+                     {"exudyn": {"native items": 1}, "mujoco": {"native items": 1}}),
+    "wheel_forces": ({}, FORCES["wheel_forces"], {"exudyn": {"callbacks": 3}}),
+    "force_noise": (FORCES, {"deviation": 8.0}, {}),
+    "contact_points": (FORCES, {}, {"all": {"channels": 2}}),
+    "prescribed_pitch": (FORCES, {"file": "pitch.csv"},
+                         {"exudyn": {"native items": 1, "callbacks": 2},
+                          "mujoco": {"degrees of freedom": -1, "native items": 0, "callbacks": 1},
+                          "all": {"channels": 2}}),
+}  # fmt: skip
+"""Effect -> the effects that it is added to, what the scene says of it, and what it must change: nothing else.
+
+wheel_forces takes two tyres away and puts two forces in their place, so its native items are as many as
+before; held forces take one callback before each of Exudyn's steps beside one per wheel, and none in MuJoCo.
+"""
+
+
+def scene(effects: dict[str, Any], steps: int, folder: Path, guided: bool = False) -> Scene:
+    """The asymmetric vehicle with some effects, released from a tilted start."""
+    return build_scene({
+        "title": TITLE, "vehicle": {"parameters": "asymmetric_twin"}, "run": {"duration": steps * STEP, "step": STEP},
+        "start": START, "effects": effects, "engines": {"exudyn": GUIDED} if guided else {},
+    }, "absent", folder)  # fmt: skip
+
+
+def write_files(folder: Path) -> None:
+    """Two seconds of wheel forces and of a pitch that both start smoothly."""
+    t = STEP * np.arange(2001)
+    wave = np.sin(np.pi * t) ** 2
+    write_time_series(folder / "forces.csv", {"front": ("N", 4e3 + 300 * wave), "rear": ("N", 3e3 - 200 * wave)}, STEP)
+    write_time_series(folder / "pitch.csv", {"pitch": ("rad", 0.02 * wave)}, STEP)
+
+
+def model(own: Scene, engine: str) -> Model:
+    """A scene built in an engine."""
+    return build(engine, assemble(own), settings_of(own, engine))
+
+
+def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
+    """The same scene without and with one effect."""
+    base, values, _ = PRICED[effect]
+    guided = effect == "prescribed_pitch"
+    return scene(base, steps, folder, guided), scene({**base, effect: values}, steps, folder, guided)
+
+
+def counts(own: Scene, engine: str) -> dict[str, int]:
+    """What a scene builds in an engine, and how many channels it saves."""
+    assembly = assemble(own)
+    built = build(engine, assembly, settings_of(own, engine))
+    return {**built.plan(), "channels": len(outputs(assembly, built.run()))}
+
+
+def change(effect: str, engine: str, folder: Path) -> dict[str, int]:
+    """What an effect adds to the counts, without the zeros."""
+    before, after = (counts(own, engine) for own in pair(effect, 20, folder))
+    return {key: after[key] - before[key] for key in after if after[key] != before[key]}
+
+
+def declared(effect: str, engine: str) -> dict[str, int]:
+    """What it must add."""
+    table = PRICED[effect][2]
+    return {key: value for key, value in {**table.get("all", {}), **table.get(engine, {})}.items() if value}
+
+
+def hand_built(engine: str, own: Scene) -> Any:
+    """The bare vehicle written directly for an engine."""
+    assembly, settings = assemble(own), settings_of(own, engine)
+    run = {"exudyn": exudyn_run, "mujoco": mujoco_run}[engine]
+    return run(assembly.parameters, assembly.initial, settings.step, settings.steps)
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Counts of absence, the ratio to hand-built models, and the price list."""
+    with tempfile.TemporaryDirectory() as name:
+        place = Path(name)
+        write_files(place)
+        rows = [*_imports(), *(row for engine in ENGINES for row in _absence(engine, place))]
+        rows += [_control(effect, place) for effect in PRICED]
+        ratios = {engine: _ratio(engine, place, 15 if quick else 60) for engine in ("exudyn", "mujoco")}
+        price = [line for effect in PRICED for line in _price(effect, place, 7 if quick else 25)]
+    rows += [row for engine, ratio in ratios.items() for row in _machinery(engine, ratio)]
+    return rows, {"price": price, "ratios": ratios}
+
+
+def _imports() -> list[Row]:
+    """Modules and compiled kernels of a fresh process that ran a bare scene in all engines."""
+    found = probe({"title": TITLE, "run": {"duration": 20 * STEP, "step": STEP}, "start": START})
+    foreign = [name for name in found["modules"] if belongs_to_effects(name)]
+    why = "a fresh process ran a scene without effects in all engines; counted in its list of modules"
+    kernels = len(found["marches"]) + len(found["derivatives"])
+    return [
+        at_most("absent.imports", SYSTEM, "modules of effects that a bare scene imports", len(foreign), "", 0, why,
+                "none"),
+        at_most("absent.kernels", SYSTEM, "kernels that a bare scene compiles beyond its own march", kernels - 1, "", 0,
+                "the same process; the reference compiles one march per kind of scene, when first asked", "none"),
+    ]  # fmt: skip
+
+
+def _absence(engine: str, folder: Path) -> list[Row]:
+    """Frames, memory and callbacks of a bare march, short and long."""
+    for own in (scene({}, steps, folder) for steps in (20, 20)):  # wrappers cache on their first calls
+        march(engine, model(own, engine))
+    short, long = (march(engine, model(scene({}, steps, folder), engine)) for steps in (20, 2000))
+    callbacks = max(short.callbacks, installed())
+    if engine == "exudyn":
+        callbacks += user_functions(getattr(model(scene({}, 20, folder), engine), "built").mbs)  # noqa: B009
+    why = "20 steps against 2,000 steps of a bare scene, watched around the engine's own march"
+    return [
+        at_most(f"absent.frames.{engine}", SYSTEM, f"{engine}: Python functions entered by 1,980 more steps",
+                long.frames - short.frames, "", 0, why, "none"),
+        at_most(f"absent.memory.{engine}", SYSTEM, f"{engine}: memory that 1,980 more steps take beside their result",
+                long.memory - short.memory, "B", 1980, f"{why}; less than a byte per step is a wrapper's own", "none"),
+        at_most(f"absent.callbacks.{engine}", SYSTEM, f"{engine}: callbacks of a bare scene", callbacks, "", 0,
+                "counted over all items, and in the engine's globals before, during and after the march", "none"),
+    ]  # fmt: skip
+
+
+def _control(effect: str, folder: Path) -> Row:
+    """Positive control: each effect changes the counts of every engine by exactly what it declares."""
+    found = {engine: change(effect, engine, folder) for engine in ENGINES}
+    wanted = {engine: declared(effect, engine) for engine in ENGINES}
+    return behaves(f"absent.present.{effect}", SYSTEM, f"what {effect} adds", _text(found), _text(wanted),
+                   "positive control: the counts that are zero above do move, and by as much as they should")
+
+
+def _text(table: dict[str, dict[str, int]]) -> str:
+    parts = [f"{engine} {_changes(own)}" for engine, own in table.items() if own]
+    return "; ".join(parts) or "nothing"
+
+
+def _changes(own: dict[str, int]) -> str:
+    return ", ".join(f"{value:+d} {key}" for key, value in sorted(own.items()))
+
+
+def _ratio(engine: str, folder: Path, rounds: int) -> dict[str, Any]:
+    """Seconds of the machinery without effects against the hand-built model, and whether they agree."""
+    own = scene({}, 2000, folder)
+    ours, theirs = model(own, engine), hand_built(engine, own)
+    gap = float(np.abs(ours.run().states - theirs()).max())
+    seconds = interleave([ours.run, theirs], rounds)
+    return {"ratio": paired_ratio(seconds[0], seconds[1]), "gap": gap, "seconds": [describe(own) for own in seconds]}
+
+
+def _machinery(engine: str, found: dict[str, Any]) -> list[Row]:
+    value, low, high = found["ratio"]
+    why = ("interleaved runs of 2,000 steps, median of paired ratios with a bootstrap interval; the machinery checks "
+           "its results and labels them, the hand-built model does not; seconds are reported, never judged")
+    return [
+        at_most(f"absent.same.{engine}", SYSTEM, f"{engine}: states of a bare scene against a hand-built model",
+                found["gap"], "m, rad, m/s, rad/s", 0.0, "the same items in the same order give the same numbers",
+                "native"),
+        finding(f"absent.ratio.{engine}", SYSTEM, f"{engine}: time of a bare scene by that of a hand-built model, 95 % "
+                f"interval {low:.3f} to {high:.3f}", value, "", "at most 1.03", why, "native"),
+    ]  # fmt: skip
+
+
+def _price(effect: str, folder: Path, rounds: int) -> list[dict[str, Any]]:
+    """One line of the price list per engine."""
+    lines = []
+    for engine in ENGINES:
+        scenes = pair(effect, 500, folder)
+        seconds = interleave([_job(own, engine) for own in scenes], rounds, 5e-3)
+        added = (seconds[1] - seconds[0]) / 500 * 1e6
+        lines.append({"effect": effect, "engine": engine, "adds": _changes(change(effect, engine, folder)) or "nothing",
+                      "step": float(np.median(seconds[0])) / 500 * 1e6, "us": describe(added),
+                      "ratio": paired_ratio(seconds[1], seconds[0])})
+    return lines
+
+
+def _job(own: Scene, engine: str) -> Any:
+    """A run with its channels, built beforehand."""
+    assembly = assemble(own)
+    built = build(engine, assembly, settings_of(own, engine))
+    return lambda: outputs(assembly, built.run())
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """The price list of effects."""
+    note = ("Each effect is added to the scene without it: wheel_forces, road and pitch_spring to the bare vehicle, "
+            "the others to the vehicle under wheel forces. Counts are exact; microseconds per step of 1 ms, channels "
+            "included, are the median of paired differences with their median deviation, the factor is the median of "
+            "paired ratios with a 95 % interval. An effect that is not named costs nothing: see the rows above.")
+    headings = ("effect", "engine", "adds", "without it, us per step", "adds, us per step", "factor")
+    return [Table("Price list of effects", note, headings, tuple(_line(entry) for entry in data["price"]))]
+
+
+def _line(entry: dict[str, Any]) -> tuple[str, ...]:
+    value, low, high = entry["ratio"]
+    return (entry["effect"], entry["engine"], entry["adds"], f"{entry['step']:.2f}",
+            f"{entry['us']['median']:+.2f} +/- {entry['us']['mad']:.2f}", f"{value:.2f} ({low:.2f} to {high:.2f})")

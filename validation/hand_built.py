@@ -1,0 +1,117 @@
+"""The pitch-plane vehicle written directly for each engine, as someone would who has never heard of twinrig.
+
+No description, no assembly, no effects: the paper's symbols straight into Exudyn's items and MuJoCo's XML,
+free on its tyres over a flat road. What twinrig's machinery costs where nothing is asked of it is measured
+against these.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from models.vehicles.pitch_plane import Parameters
+
+Run = Callable[[], np.ndarray]
+"""One run from the start state; returns the states (steps + 1, 8)."""
+
+
+def exudyn_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run:
+    """Runge-Kutta 4 in Exudyn; x is counted backward in its plane."""
+    import exudyn as exu
+    import exudyn.itemInterface as items
+
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    ground = mbs.AddObject(items.ObjectGround())
+    nodes = [mbs.AddNode(items.NodePoint2D(initialCoordinates=[0, start[i]], initialVelocities=[0, start[4 + i]]))
+             for i in (0, 1)]  # fmt: skip
+    nodes.append(mbs.AddNode(items.NodeRigidBody2D(initialCoordinates=[0, start[2], start[3]],
+                                                   initialVelocities=[0, start[6], start[7]])))  # fmt: skip
+    wheels = [mbs.AddObject(items.MassPoint2D(nodeNumber=node, physicsMass=mass))
+              for node, mass in zip(nodes, (p.m1, p.m2), strict=False)]  # fmt: skip
+    chassis = mbs.AddObject(items.RigidBody2D(nodeNumber=nodes[2], physicsMass=p.m3, physicsInertia=p.I))
+    for node, mass in zip(nodes, (p.m1, p.m2, p.m3), strict=True):
+        heave = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=1))
+        mbs.AddLoad(items.LoadCoordinate(markerNumber=heave, load=mass * p.g))
+
+    def spring(upper, upper_x, lower, stiffness, damping):
+        ends = [mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=body, localPosition=[-x, 0, 0]))
+                for body, x in ((lower, 0.0), (upper, upper_x))]  # fmt: skip
+        mbs.AddObject(items.CartesianSpringDamper(
+            markerNumbers=ends, stiffness=[0, stiffness, 0], damping=[0, damping, 0]))  # fmt: skip
+
+    spring(wheels[0], 0.0, ground, p.k1, p.d1)
+    spring(wheels[1], 0.0, ground, p.k2, p.d2)
+    spring(chassis, p.b, wheels[0], p.k3, p.d3)
+    spring(chassis, -p.a, wheels[1], p.k4, p.d4)
+    kinds = exu.OutputVariableType
+    sensors = [mbs.AddSensor(items.SensorNode(
+        nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind))
+        for kind in (kinds.Coordinates, kinds.Coordinates_t) for node in nodes]  # fmt: skip
+    mbs.Assemble()
+    options = exu.SimulationSettings()
+    options.solution.file.write = False
+    options.solution.sensors.writePeriod = step
+    ti = options.timeIntegration
+    ti.numberOfSteps, ti.endTime, ti.verboseMode = steps, step * steps, 0
+    ti.explicit.computeEndOfStepAccelerations = False
+
+    def run(owner=container) -> np.ndarray:  # the system lives as long as its container
+        mbs.SolveDynamic(options, solverType=exu.DynamicSolverType.RK44)
+        read: list[Any] = [mbs.GetSensorStoredData(sensor) for sensor in sensors]
+        return np.column_stack([read[0][:, 2], read[1][:, 2], read[2][:, 2], read[2][:, 3],
+                                read[3][:, 2], read[4][:, 2], read[5][:, 2], read[5][:, 3]])  # fmt: skip
+
+    return run
+
+
+def mujoco_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run:
+    """Runge-Kutta 4 in MuJoCo, from its own XML; z is down, the hinge lifts the front."""
+    import mujoco
+    from mujoco import rollout
+
+    model = mujoco.MjModel.from_xml_string(MJCF.format(**{**p.model_dump(), "minus_a": -p.a, "step": repr(step)}))
+    data = mujoco.MjData(model)
+    state = np.concatenate(([0.0], start))
+
+    def run() -> np.ndarray:
+        path, _ = rollout.rollout(model, data, state[None, :], nstep=steps)
+        return np.vstack([start, path[0, :, 1:9]])
+
+    return run
+
+
+MJCF = """
+<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="{step}" gravity="0 0 {g!r}" integrator="RK4">
+    <flag autoreset="disable" contact="disable" constraint="disable"/>
+  </option>
+  <worldbody>
+    <body pos="{b!r} 0 0">
+      <inertial pos="0 0 0" mass="{m1!r}" diaginertia="1 1 1"/>
+      <joint type="slide" axis="0 0 1" stiffness="{k1!r}" damping="{d1!r}"/>
+      <site name="front wheel"/>
+    </body>
+    <body pos="{minus_a!r} 0 0">
+      <inertial pos="0 0 0" mass="{m2!r}" diaginertia="1 1 1"/>
+      <joint type="slide" axis="0 0 1" stiffness="{k2!r}" damping="{d2!r}"/>
+      <site name="rear wheel"/>
+    </body>
+    <body>
+      <inertial pos="0 0 0" mass="{m3!r}" diaginertia="{I!r} {I!r} {I!r}"/>
+      <joint type="slide" axis="0 0 1"/>
+      <joint type="hinge" axis="0 1 0"/>
+      <site name="front" pos="{b!r} 0 0"/>
+      <site name="rear" pos="{minus_a!r} 0 0"/>
+    </body>
+  </worldbody>
+  <actuator>
+    <general site="front" refsite="front wheel" gear="0 0 1 0 0 0"
+             gainprm="0" biastype="affine" biasprm="0 -{k3!r} -{d3!r}"/>
+    <general site="rear" refsite="rear wheel" gear="0 0 1 0 0 0"
+             gainprm="0" biastype="affine" biasprm="0 -{k4!r} -{d4!r}"/>
+  </actuator>
+</mujoco>
+"""
