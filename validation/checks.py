@@ -41,8 +41,12 @@ def accelerations(make: Make, assembly: Assembly, settings: Settings, states: np
 def acceleration_gap(make: Make, assembly: Assembly, settings: Settings, count: int = 100) -> float:
     """Largest difference to the equations of the paper, relative to the largest acceleration."""
     states = random_states(count)
-    hand = accelerations(engine("reference"), assembly, _by_hand(settings), states)
-    found = accelerations(make, assembly, settings, states)
+    hand = accelerations(engine("reference"), assembly, by_hand(settings), states)
+    return relative(accelerations(make, assembly, settings, states), hand)
+
+
+def relative(found: np.ndarray, hand: np.ndarray) -> float:
+    """Largest difference by the largest magnitude."""
     return float(np.abs(found - hand).max() / np.abs(hand).max())
 
 
@@ -59,7 +63,7 @@ def trajectory_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
 
     The reference integrates with RK4, so this is a check to rounding for engines that do the same.
     """
-    hand = engine("reference")(assembly, _by_hand(settings)).run()
+    hand = engine("reference")(assembly, by_hand(settings)).run()
     return state_gap(run(make, assembly, settings), hand)
 
 
@@ -131,10 +135,11 @@ def moment_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
     found = run(make, assembly, settings)
     if found is None or found.moment is None:
         return float("inf")
-    hand = engine("reference")(assembly, _by_hand(settings)).run().moment
+    hand = engine("reference")(assembly, by_hand(settings)).run().moment
     assert hand is not None
     return float(np.sqrt(np.mean((found.moment - hand) ** 2) / np.mean(hand**2)))
 
 
-def _by_hand(settings: Settings) -> Settings:
+def by_hand(settings: Settings) -> Settings:
+    """The same step and duration for the reference's Runge-Kutta."""
     return replace(settings, integrator=RECOMMENDED["reference"])

@@ -114,6 +114,11 @@ def misprinted_row(original: Any) -> Any:
     return guidance
 
 
+def not_installed(original: Any) -> Any:
+    """The block of an installed callback without the callback."""
+    return lambda law: nullcontext()
+
+
 def negative(original: Any) -> Any:
     """A method's result with the other sign, where it has one."""
 

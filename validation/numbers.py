@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any
 
 from markupsafe import Markup, escape
@@ -24,7 +25,11 @@ def number(value: Any, digits: int = 4) -> Markup:
     if PLAIN[0] <= abs(value) < PLAIN[1]:
         return Markup(_minus(_significant(value, digits)))
     power = _power(value, digits)
-    return Markup(f"{_minus(_significant(value / 10.0**power, digits))}&thinsp;·&thinsp;10<sup>{_minus(str(power))}</sup>")
+    return Markup(_scientific(_significant(value / 10.0**power, digits), power))
+
+
+def _scientific(mantissa: str, power: int) -> str:
+    return f"{_minus(mantissa)}&thinsp;·&thinsp;10<sup>{_minus(str(power))}</sup>"
 
 
 def _power(value: float, digits: int) -> int:
@@ -54,12 +59,14 @@ def margin(row: dict[str, Any]) -> float | None:
 
 
 def share(value: float | None) -> Markup:
-    """A margin in per cent of its tolerance."""
-    if value is None:
+    """A margin in per cent of its tolerance, or how many times over it is."""
+    if value is None or math.isnan(value):
         return Markup("–")
-    if not math.isfinite(value):
-        return Markup("infinite")
-    return Markup("&lt; 0.01 %") if 0 < value < 1e-4 else Markup(f"{_significant(100 * value, 2) if value else '0'} %")
+    if value > 10:
+        return number(value, 2) + Markup(" times")
+    if 0 < value < 1e-4:
+        return Markup("&lt; 0.01 %")
+    return Markup(f"{_significant(100 * value, 2) if value else '0'} %")
 
 
 def duration(seconds: float) -> str:
@@ -74,13 +81,17 @@ NUMERIC = re.compile(r"[-−+±<>≤≥~ ]*\d[\d,]*(\.\d+)?(e[+-]?\d+)?( ?(%|s|m
 
 
 def powers(cell: Any) -> Markup:
-    """Text with numbers such as 2e-06 written with a power of ten."""
-    text = str(escape(cell))
-    return Markup(POWER.sub(lambda found: f"{_minus(found[1])}&thinsp;·&thinsp;10<sup>{_minus(str(int(found[2])))}</sup>", text))
+    """Text with numbers such as 2e-06 written with a power of ten, which does not break across lines."""
+
+    def written(found: re.Match[str]) -> str:
+        if int(found[2]) in (0, 1):
+            return _minus(f"{float(found[0]):g}")
+        return f'<span class="nowrap">{_scientific(found[1], int(found[2]))}</span>'
+
+    return Markup(POWER.sub(written, str(escape(cell))))
 
 
-def numeric_columns(rows: Sequence[Sequence[Any]]) -> list[bool]:
-    """Which columns of a table hold numbers, and go to the right."""
-    columns = list(zip(*rows, strict=False))
-    return [all(NUMERIC.fullmatch(str(cell).strip()) for cell in column) and any(str(cell)[-1:].isdigit() for cell in column)
-            for column in columns] + [False] * 99  # fmt: skip
+def numeric_columns(rows: Sequence[Sequence[Any]], count: int) -> list[bool]:
+    """Which columns of a table, ``count`` or more, hold numbers and go to the right."""
+    columns = [[str(cell).strip() for cell in column] for column in zip_longest([""] * count, *rows, fillvalue="")]
+    return [all(map(NUMERIC.fullmatch, column)) and any(cell[-1:].isdigit() for cell in column) for column in columns]

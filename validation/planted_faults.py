@@ -133,7 +133,7 @@ ADAPTER = (
     Fault("chassis row of eq. (39) with the other sign", MUJOCO,
           inside=attribute("models.engines.mujoco:_guidance", patches.misprinted_row)),
     Fault("callback never installed", MUJOCO,
-          inside=attribute("models.engines.mujoco_callback:installed", lambda original: lambda law: patches.nullcontext())),
+          inside=attribute("models.engines.mujoco_callback:installed", patches.not_installed)),
 )  # fmt: skip
 """In the code of an engine's adapter."""
 

@@ -14,6 +14,8 @@ from validation import report_content as content
 from validation.numbers import duration, margin, number, numeric_columns, powers, share
 
 TEMPLATE = "report.html.jinja"
+BLANK: dict[str, Any] = {"quick": False, "command": "", "versions": {}, "seconds": {}}
+"""What a page needs of its provenance, where the results do not hold it."""
 
 
 def write(folder: Path) -> Path:
@@ -30,7 +32,7 @@ def _read(path: Path) -> dict[str, Any]:
     """Saved results; raises InputError if the file is not one."""
     try:
         results = json.loads(path.read_text(encoding="utf-8"))
-        return {"provenance": dict(results["provenance"]), "rows": list(results["rows"])}
+        return {"provenance": {**BLANK, **results["provenance"]}, "rows": list(results["rows"])}
     except FileNotFoundError:
         raise InputError(path, "", None, "no such file: `twinrig validate` writes it") from None
     except (ValueError, KeyError, TypeError) as error:

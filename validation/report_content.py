@@ -40,7 +40,7 @@ def verdict(results: Results) -> dict[str, Any]:
         "failed": [row for row in rows if row["status"] == "failed"],
         "not_run": [row for row in rows if row["status"] == "not run"],
         "worst": worst,
-        "seconds": sum(results["provenance"].get("seconds", {}).values()),
+        "seconds": sum(results["provenance"]["seconds"].values()),
     }
 
 
@@ -79,7 +79,7 @@ def _cases(rows: list[dict[str, Any]], results: Results) -> Iterator[dict[str, A
             "title": getattr(module, "TITLE", name.replace("_", " ")),
             "about": (doc or "").partition("\n\n")[0],
             "module": module,
-            "seconds": results["provenance"].get("seconds", {}).get(name),
+            "seconds": results["provenance"]["seconds"].get(name),
             "groups": [{"why": why, "rows": list(same)} for why, same in groupby(own, key=lambda row: row["why"])],
             "count": len(own),
             "failed": sum(row["status"] == "failed" for row in own),

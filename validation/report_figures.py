@@ -36,7 +36,8 @@ def _svg(figure: Any, caption: str, key: str) -> str:
 
 def _shorter(path: re.Match[str]) -> str:
     """Coordinates of a path with two decimals: a hundredth of a point."""
-    return re.sub(r"-?\d+\.\d+", lambda found: f"{float(found[0]):.2f}".rstrip("0").rstrip("."), path[0]).replace("\n", " ")
+    rounded = re.sub(r"-?\d+\.\d+", lambda found: f"{float(found[0]):.2f}".rstrip("0").rstrip("."), path[0])
+    return rounded.replace("\n", " ")
 
 
 def _png(figure: Any, caption: str) -> str:

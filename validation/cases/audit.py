@@ -7,10 +7,10 @@ from models.assembly import assemble
 from models.engines.protocol import settings_of
 from models.scene import build as build_scene
 from validation import checks
-from validation.rows import Row, at_most
+from validation.rows import Row, System, at_most
 
 TITLE = "Accelerations at 100 random states"
-SYSTEM = "pitch-plane"
+SYSTEM: System = "pitch-plane"
 STATES = 100
 
 

@@ -6,10 +6,10 @@ from typing import Any
 
 from validation.fault_bench import CHECKS, Bench, size
 from validation.planted_faults import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, Fault, planted
-from validation.rows import Row, Table, finding, within
+from validation.rows import Row, System, Table, finding, within
 
 TITLE = "Planted faults: what each check sees"
-SYSTEM = "pitch-plane"
+SYSTEM: System = "pitch-plane"
 TWIN, SYMMETRIC = "asymmetric_twin", "itwm_drift"
 DURATION, QUICK_DURATION = 0.4, 0.1
 HIDDEN = ("a and b swapped", "front and rear suspension swapped", "front and rear tyre swapped",
@@ -28,7 +28,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _record(fault: Fault, benches: list[Bench]) -> dict[str, Any]:
     """Size over tolerance of every check, by vehicle and engine; None stands for a refused or failed run."""
     ratios = {
-        bench.parameters: {engine: {name: _ratio(fault, engine, name, bench) for name in CHECKS} for engine in fault.engines}
+        bench.parameters: {
+            engine: {name: _ratio(fault, engine, name, bench) for name in CHECKS} for engine in fault.engines
+        }
         for bench in benches
     }
     return {"fault": fault.name, "place": _place(fault), "engines": fault.engines, "ratios": ratios}
@@ -61,7 +63,8 @@ def _of(record: dict[str, Any], check: str, vehicle: str) -> list[float | None]:
 
 def caught(record: dict[str, Any], vehicle: str = TWIN) -> bool:
     """Whether in every engine at least one check sees the fault."""
-    return all(any(ratio is None or ratio > 1 for ratio in ratios.values()) for ratios in record["ratios"][vehicle].values())
+    engines = record["ratios"][vehicle].values()
+    return all(any(ratio is None or ratio > 1 for ratio in ratios.values()) for ratios in engines)
 
 
 def _rows(clean: list[dict[str, Any]], found: list[dict[str, Any]]) -> list[Row]:
@@ -70,8 +73,8 @@ def _rows(clean: list[dict[str, Any]], found: list[dict[str, Any]]) -> list[Row]
     missed = {record["fault"] for record in found if not caught(record, SYMMETRIC)}
     single = [record for record in found if sum(seen(record, name) for name in CHECKS) == 1]
     return [
-        within("planted.caught", SYSTEM, "planted faults that a check catches, asymmetric vehicle", sum(map(caught, found)),
-               "faults", len(found), 0, "every one of them is a wrong model", "native"),
+        within("planted.caught", SYSTEM, "planted faults that a check catches, asymmetric vehicle",
+               sum(map(caught, found)), "faults", len(found), 0, "every one of them is a wrong model", "native"),
         within("planted.false_alarms", SYSTEM, "alarms without a fault, all checks, both vehicles, all implementations",
                alarms, "alarms", 0, 0, "a check that cries without a fault is no check", "native"),
         within("planted.hidden", SYSTEM, "planted faults that the symmetric vehicle of the paper hides", len(missed),
@@ -102,8 +105,9 @@ def _check_table(data: dict[str, Any]) -> Table:
         limits = sorted({check.tolerance(engine) for engine in ("exudyn", "mujoco")})
         lines.append((name, check.title, " / ".join(f"{limit:g}" for limit in limits), check.unit, check.why,
                       f"{worst:.2g}", f"{catches} of {len(data['faults'])}"))
-    return Table("The checks", "Worst without a fault is size over tolerance: below 1 is quiet.",
-                 ("check", "compares", "tolerance", "unit", "because", "worst without a fault", "faults seen"), tuple(lines))
+    headings = ("check", "compares", "tolerance", "unit", "because", "worst without a fault", "faults seen")
+    note = "Worst without a fault is size over tolerance: below 1 is quiet."
+    return Table("The checks", note, headings, tuple(lines))
 
 
 def _fault_table(data: dict[str, Any]) -> Table:
@@ -114,17 +118,18 @@ def _fault_table(data: dict[str, Any]) -> Table:
          "no" if caught(record, SYMMETRIC) else "yes")
         for record in data["faults"]
     )  # fmt: skip
-    note = ("Sizes on the asymmetric vehicle, in the unit of the check, the smaller one where a fault was planted in two "
-            "engines. Each check in the fourth column, had it been the only one, would have let the fault pass.")
+    note = ("Sizes on the asymmetric vehicle, in the unit of the check, the smaller one where a fault was planted in "
+            "two engines. Each check in the fourth column, had it been the only one, would have let the fault pass.")
     return Table("Every fault, one at a time", note,
-                 ("fault", "planted in", "caught by", "not seen by", "hidden by the symmetric vehicle"), lines)
+                 ("fault", "planted in", "caught by", "not seen by", "symmetric vehicle hides it"), lines)
 
 
 def _size(record: dict[str, Any], name: str) -> str:
     """The smaller size among the engines, from its ratio to the tolerance."""
     sizes = [math.inf if ratios[name] is None else ratios[name] * CHECKS[name].tolerance(engine)
              for engine, ratios in record["ratios"][TWIN].items()]  # fmt: skip
-    return "refused" if min(sizes) == math.inf else f"{min(sizes):.0e}"
+    least = min(sizes)
+    return "refused" if least == math.inf else f"{least:.0e}" if least < 0.01 else f"{least:.2g}"
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
@@ -132,9 +137,10 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     from validation.fault_map import fault_map
 
     vehicles = {TWIN: "asymmetric vehicle", SYMMETRIC: "symmetric vehicle (the paper's)"}
-    depth = {vehicle: [[least(record, name, vehicle) for name in CHECKS] for record in data["faults"]] for vehicle in vehicles}
-    marks = [not caught(record, SYMMETRIC) for record in data["faults"]]
-    figure = fault_map([record["fault"] for record in data["faults"]], tuple(CHECKS), depth, vehicles, marks)
-    caption = ("Decades between what a check finds and its tolerance; white: not seen. Left the asymmetric twin, right the "
-               f"paper's vehicle, whose equal halves hide {sum(marks)} faults from every check (marked).")
+    records = data["faults"]
+    depth = {vehicle: [[least(record, name, vehicle) for name in CHECKS] for record in records] for vehicle in vehicles}
+    marks = [not caught(record, SYMMETRIC) for record in records]
+    figure = fault_map([record["fault"] for record in records], tuple(CHECKS), depth, vehicles, marks)
+    caption = ("Decades between what a check finds and its tolerance; white: not seen. Left the asymmetric twin, right "
+               f"the paper's vehicle, whose equal halves hide {sum(marks)} faults from every check (marked).")
     return [(caption, figure)]

@@ -1,0 +1,107 @@
+"""Planted faults: every one is caught, none is left behind, and nothing is seen where there is none."""
+
+import numpy as np
+import pytest
+
+from models.engines import exudyn, mujoco, reference
+from models.vehicles import pitch_plane_equations as equations
+from validation import checks
+from validation.cases import planted_faults as case
+from validation.fault_bench import CHECKS, Bench, size
+from validation.planted_faults import CLEAN, FAULTS, planted
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """The quick case: every fault in short runs."""
+    return case.measure(True, tmp_path_factory.mktemp("faults"))
+
+
+@pytest.fixture(scope="module")
+def found(measured):
+    return {record["fault"]: record for record in measured[1]["faults"]}
+
+
+def fault(name):
+    return next(fault for fault in FAULTS if fault.name == name)
+
+
+def test_there_are_enough_and_each_has_a_name_of_its_own():
+    assert len(FAULTS) >= 16
+    assert len({fault.name for fault in FAULTS}) == len(FAULTS)
+
+
+def test_all_rows_pass(measured):
+    assert [row.reason for row in measured[0] if row.status != "passed"] == []
+
+
+def test_every_fault_is_caught_in_every_engine_that_has_it(found):
+    assert [name for name, record in found.items() if not case.caught(record)] == []
+
+
+def test_the_symmetric_vehicle_hides_exactly_what_symmetry_says(found):
+    assert {name for name, record in found.items() if not case.caught(record, case.SYMMETRIC)} == set(case.HIDDEN)
+
+
+@pytest.mark.parametrize(("name", "blind"), [
+    ("road held at the middle stages", "audit"),  # an acceleration knows no stage
+    ("start from zero heave", "audit"),  # states are given to it
+    ("held sample of the step's end", "linear twin"),
+    ("front suspension 1 % too stiff", "momentum"),  # inner forces cancel
+    ("pitch inertia about the front axle", "equilibrium"),  # nothing moves
+    ("wheel forces in kN", "road twin"),
+])  # fmt: skip
+def test_no_check_is_enough_alone(found, name, blind):
+    assert not case.seen(found[name], blind)
+    assert case.caught(found[name])
+
+
+def test_a_late_read_or_a_held_stage_loses_three_orders():
+    """Runge-Kutta of order 4 falls to 1; the check sees the difference of 3."""
+    bench = Bench("asymmetric_twin", 0.1)
+    loss = size(CHECKS["order"], bench, "mujoco", planted(fault("road held at the middle stages"), "mujoco"))
+    assert loss == pytest.approx(3.0, abs=0.2)
+
+
+def test_a_fault_lives_only_while_its_model_works():
+    watched = [(exudyn.Clock, "advance"), (exudyn.Clock, "reader"), (exudyn.ExudynModel, "_enforced"),
+               (mujoco, "_spec"), (mujoco, "_suspension"), (mujoco, "_guidance"), (equations, "suspension"),
+               (equations, "newton_euler"),
+               (reference, "njit"), (reference, "_FIXED")]  # fmt: skip
+    before = [getattr(owner, name) for owner, name in watched]
+    bench = Bench("asymmetric_twin", 0.02)
+    for own in FAULTS:
+        for engine in own.engines:
+            model = planted(own, engine)(bench.road, bench.settings(engine))
+            assert [getattr(owner, name) for owner, name in watched] == before, own.name
+            model.acceleration(0.01, np.zeros(8))
+    assert [getattr(owner, name) for owner, name in watched] == before
+
+
+def test_interpreted_equations_are_the_compiled_ones():
+    """Faults in the equations are planted into the interpreted reference: without one it is the same to rounding."""
+    bench = Bench("asymmetric_twin", 0.1)
+    assert size(CHECKS["road twin"], bench, "reference", planted(CLEAN[1], "reference")) <= 1e-15
+
+
+def test_a_run_that_fails_is_infinitely_far():
+    bench = Bench("itwm_drift", 0.1)
+
+    def refuses(assembly, settings):
+        raise checks.RunFailed("nobody", "refused")
+
+    assert checks.trajectory_gap(refuses, bench.road, bench.settings("exudyn")) == float("inf")
+    assert size(CHECKS["audit"], bench, "exudyn", refuses) == float("inf")
+
+
+def test_tables_name_every_fault_and_every_check(measured):
+    checks_table, faults_table = case.tables(measured[1])
+    assert [line[0] for line in checks_table.rows] == list(CHECKS)
+    assert [line[0] for line in faults_table.rows] == [fault.name for fault in FAULTS]
+    assert all(line[2] for line in faults_table.rows), "each is caught by something"
+
+
+def test_figure_draws_from_saved_data(measured):
+    ((caption, figure),) = case.draw(measured[1])
+    assert "5 faults" in caption
+    figure.canvas.draw()

@@ -1,0 +1,196 @@
+"""The report: self-contained, honest in its order, repeatable, and a page whatever was saved."""
+
+import csv
+import json
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from models.errors import InputError
+from validation import report
+from validation.numbers import margin, number, numeric_columns, powers, share
+from validation.rows import Row, at_most, behaves, finding, not_run, within
+from validation.run import _save
+
+ODD = '<script>alert("1")</script> & "quotes" µ'
+FAILED = at_most("audit.mujoco.broken", "pitch-plane", "acceleration of a broken model", 3e-3, "of the largest", 1e-12,
+                 "rounding", "native")  # fmt: skip
+
+
+def rows() -> list[Row]:
+    return [
+        within("order.exudyn.RK44", "pitch-plane", "order of RK44", 3.93, "", 4.0, 0.15, "theory", "closed form"),
+        at_most("audit.exudyn.twin", "pitch-plane", "acceleration", 2.5e-16, "1", 1e-12, "rounding", "native"),
+        FAILED,
+        behaves("guards.nan", "hard-cases", ODD, "raised", "raised", ODD),
+        finding("drift.noisy", "drift", "drift-off", 8.4, "s", "about 10", "one sample"),
+        not_run("roads.measured", "pitch-plane", "measured roads", "no folder named"),
+        Row("odd.<b>", "effects", "a case that nobody knows", None, "", "", None, "", "none", "failed", ODD),
+    ]
+
+
+def save(folder: Path, own: list[Row]) -> Path:
+    (folder / "data").mkdir()
+    source = {"commit": "abc", "versions": {"exudyn": "1"}, "command": "twinrig validate --quick", "quick": True,
+              "seconds": {"audit": 1.5, "order": 3.0}}  # fmt: skip
+    _save(folder, own, source)
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    save(tmp_path, rows())
+    steps = {"clean": [], "faults": []}
+    (tmp_path / "data" / "planted_faults.json").write_text(json.dumps(steps))
+    return tmp_path
+
+
+@pytest.fixture
+def page(folder: Path) -> str:
+    return report.write(folder).read_text(encoding="utf-8")
+
+
+class Outside(HTMLParser):
+    """Everything that a browser would fetch, and whether every element is closed."""
+
+    void = frozenset(("meta", "br", "img", "link", "hr", "input"))
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fetched: list[str] = []
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag, attributes):
+        self.fetched += [value for name, value in attributes
+                         if name in ("src", "href", "xlink:href", "data") and not value.startswith(("#", "data:"))]
+        self.fetched += [tag] if tag in ("link", "iframe", "object") else []
+        if tag not in self.void:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_nothing_is_fetched_and_every_element_is_closed(page):
+    parser = Outside()
+    parser.feed(page)
+    assert parser.fetched == []
+    assert parser.open == []
+    assert "@import" not in page and "url(http" not in page
+
+
+def test_verdict_comes_first_and_then_what_is_not_covered(page):
+    text = page[page.index("<main>") :]
+    before, heading, after = text.partition("<h2>What is not covered</h2>")
+    assert heading and "<h2>" not in before
+    assert "2 of 7 rows failed" in before and "nothing here is validation against a real one" in before
+    assert "<h2>Pitch-plane</h2>" in after
+
+
+def test_gaps_name_systems_without_rows_and_rows_not_run(page):
+    gaps = page[page.index('id="gaps"') : page.index('id="system-')]
+    assert "No rows yet for contact, ride, rolling-vehicle, anti-lock, cost:" in gaps
+    assert "roads.measured" in gaps and "no folder named" in gaps
+    assert "effects" not in gaps.split("No rows yet for")[1].split(":")[0], "it has a row, although a failed one"
+
+
+def test_failed_rows_stand_at_the_top_with_their_reason(page):
+    top = page[: page.index("What is not covered</h2>")]
+    assert FAILED.id in top and FAILED.quantity in top
+    assert "off by 0.003, allowed 1e-12" in top
+    assert "2 of 7 rows failed" in top
+
+
+def test_links_lead_to_places_on_the_page(page):
+    targets = set(re.findall(r' id="([^"]*)"', page))
+    assert set(re.findall(r'href="#([^"]*)"', page)) <= targets
+
+
+def test_odd_text_is_text(page):
+    assert "<script>alert" not in page
+    assert "&lt;script&gt;alert(&#34;1&#34;)&lt;/script&gt; &amp; &#34;quotes&#34; µ" in page
+
+
+def test_drawn_again_in_a_new_process_it_is_the_same_to_the_byte(folder):
+    first = report.write(folder).read_bytes()
+    done = subprocess.run([sys.executable, "-m", "validation.report", str(folder)], capture_output=True, text=True,
+                          timeout=120, check=True)  # fmt: skip
+    assert done.stdout.strip() == str(folder / "report.html")
+    assert (folder / "report.html").read_bytes() == first
+    assert not list(folder.glob(".report*"))
+
+
+def test_missing_and_damaged_data_still_give_a_page(folder):
+    own = [at_most(f"{case}.x", "pitch-plane", "q", 0.0, "", 1.0, "w", "native") for case in ("order", "planted")]
+    _save(folder, own, {"command": ""})
+    (folder / "data" / "planted_faults.json").write_text('{"faults": [{"no": "such key"}], "clean": []}')
+    text = report.write(folder).read_text(encoding="utf-8")
+    assert "data/order.json is missing or damaged" in text
+    assert "cannot be shown from data/planted_faults.json" in text
+
+
+def test_no_rows_at_all_still_give_a_page(tmp_path):
+    text = report.write(save(tmp_path, [])).read_text(encoding="utf-8")
+    assert "There are no rows" in text
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"rows": 3, "provenance": {}}'])
+def test_a_file_that_is_no_result_is_one_message(tmp_path, content):
+    (tmp_path / "results.json").write_text(content)
+    with pytest.raises(InputError, match="not the results of a validation"):
+        report.write(tmp_path)
+
+
+def test_no_results_is_one_message_and_leaves_an_earlier_page(tmp_path):
+    (tmp_path / "report.html").write_text("earlier")
+    with pytest.raises(InputError, match="no such file"):
+        report.write(tmp_path)
+    assert (tmp_path / "report.html").read_text() == "earlier"
+
+
+def test_csv_holds_the_rows_of_the_json(folder):
+    with (folder / "results.csv").open(newline="") as file:
+        found = list(csv.DictReader(file))
+    saved = json.loads((folder / "results.json").read_text())["rows"]
+    assert len(found) == len(saved) == len(rows())
+    for line, row in zip(found, saved, strict=True):
+        assert line == {key: "" if value is None else str(value) for key, value in row.items()}
+
+
+def test_every_parameter_has_its_unit_and_source(page):
+    section = page[page.index('id="parameters"') : page.index('id="provenance"')]
+    assert "kg m^2" in section and "N s/m" in section
+    assert "Fraunhofer ITWM" in section and "asymmetric_twin" in section
+
+
+@pytest.mark.parametrize(("value", "text"), [
+    (0.0, "0"), (41, "41"), (3.14159, "3.142"), (-2.5, "−2.5"), (0.001, "0.001"), (99999.0, "99999"),
+    (12345.6, "12346"), (2.5e-16, "250&thinsp;·&thinsp;10<sup>−18</sup>"),
+    (1e-12, "1&thinsp;·&thinsp;10<sup>−12</sup>"),
+    (9.99999e-7, "1&thinsp;·&thinsp;10<sup>−6</sup>"), (2e5, "200&thinsp;·&thinsp;10<sup>3</sup>"),
+    (100.0, "100"), (float("nan"), "not a number"), (None, "–"), ("<b>", "&lt;b&gt;"), (True, "True"),
+])  # fmt: skip
+def test_numbers_read_as_an_engineer_writes_them(value, text):
+    assert number(value) == text
+
+
+def test_margin_needs_numbers_and_a_tolerance():
+    assert margin(rows()[0].as_dict()) == pytest.approx(0.07 / 0.15)
+    assert margin(rows()[3].as_dict()) is None
+    assert margin(within("a.b", "cost", "q", 1, "", 1, 0, "w", "none").as_dict()) is None
+
+
+def test_shares_and_powers():
+    assert [share(x) for x in (0.0, 0.5, 1e-9, None, float("nan"))] == ["0 %", "50 %", "&lt; 0.01 %", "–", "–"]
+    assert "3&thinsp;·&thinsp;10<sup>9</sup> times" in share(3e9)
+    assert "2&thinsp;·&thinsp;10<sup>−6</sup>" in powers("within 2e-06 of it") and powers("4e+00") == "4"
+    assert powers("exudyn-1e5x") == "exudyn-1e5x", "a name is no number"
+
+
+def test_columns_of_numbers_go_to_the_right():
+    assert numeric_columns([("a", "1e-06", "never"), ("b", "–", "3.5 s")], 3) == [False, True, False]
+    assert numeric_columns([], 2) == [False, False], "a table without lines"
