@@ -21,7 +21,7 @@ SYSTEM: System = "cost"
 PROBLEMS: tuple[Callable[[bool], Problem], ...] = (road_excited.problem,)
 ROUNDS = {True: 5, False: 15}
 """Interleaved rounds of timing, by ``quick``."""
-LEAST = {True: 0.004, False: 0.02}
+LEAST = {True: 0.004, False: 0.01}
 """A short run is repeated until its turn lasts this long (s), by ``quick``."""
 COUNTED = 0.2
 """Length (s) of the runs whose force calls are counted from outside."""
