@@ -136,11 +136,16 @@ def _size(result: Any) -> int:
     return sum(getattr(part, "nbytes", 0) for part in parts)
 
 
-def user_functions(mbs: Any) -> int:
-    """Number of user functions in an Exudyn system, counted over all of its items."""
+def user_functions(model: Any) -> int:
+    """Number of user functions of an Exudyn model, counted over all items of its system.
+
+    It takes the model and not the system, which is empty without a word once its container is gone.
+    """
+    mbs = model.built.mbs
     system = mbs.systemData
     kinds = (("Node", system.NumberOfNodes()), ("Object", system.NumberOfObjects()),
              ("Marker", system.NumberOfMarkers()), ("Load", system.NumberOfLoads()),
              ("Sensor", system.NumberOfSensors()))  # fmt: skip
     items = [getattr(mbs, f"Get{kind}")(i) for kind, count in kinds for i in range(count)]
+    assert items, "the system is empty"
     return sum("UserFunction" in key and bool(value) for item in items for key, value in item.items())

@@ -28,9 +28,9 @@ def exudyn_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run
              for i in (0, 1)]  # fmt: skip
     nodes.append(mbs.AddNode(items.NodeRigidBody2D(initialCoordinates=[0, start[2], start[3]],
                                                    initialVelocities=[0, start[6], start[7]])))  # fmt: skip
-    wheels = [mbs.AddObject(items.MassPoint2D(nodeNumber=node, physicsMass=mass))
+    wheels = [mbs.AddObject(items.MassPoint2D(nodeNumber=node, mass=mass))
               for node, mass in zip(nodes, (p.m1, p.m2), strict=False)]  # fmt: skip
-    chassis = mbs.AddObject(items.RigidBody2D(nodeNumber=nodes[2], physicsMass=p.m3, physicsInertia=p.I))
+    chassis = mbs.AddObject(items.RigidBody2D(nodeNumber=nodes[2], mass=p.m3, inertia=p.I))
     for node, mass in zip(nodes, (p.m1, p.m2, p.m3), strict=True):
         heave = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=1))
         mbs.AddLoad(items.LoadCoordinate(markerNumber=heave, load=mass * p.g))
@@ -55,6 +55,7 @@ def exudyn_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run
     options.solution.sensors.writePeriod = step
     ti = options.timeIntegration
     ti.numberOfSteps, ti.endTime, ti.verboseMode = steps, step * steps, 0
+    ti.adaptiveStep = False
     ti.explicit.computeEndOfStepAccelerations = False
 
     def run(owner=container) -> np.ndarray:  # the system lives as long as its container

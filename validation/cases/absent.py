@@ -136,7 +136,7 @@ def _absence(engine: str, folder: Path) -> list[Row]:
     short, long = (march(engine, model(scene({}, steps, folder), engine)) for steps in (20, 2000))
     callbacks = max(short.callbacks, installed())
     if engine == "exudyn":
-        callbacks += user_functions(getattr(model(scene({}, 20, folder), engine), "built").mbs)  # noqa: B009
+        callbacks += user_functions(model(scene({}, 20, folder), engine))
     why = "20 steps against 2,000 steps of a bare scene, watched around the engine's own march"
     return [
         at_most(f"absent.frames.{engine}", SYSTEM, f"{engine}: Python functions entered by 1,980 more steps",

@@ -1,0 +1,157 @@
+"""An effect that a scene does not name is not imported, compiled, called, stored or paid for."""
+
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import models
+from models.assembly import assemble
+from models.scene import effect_names
+from validation.absence import belongs_to_effects, installed, march, probe, user_functions
+from validation.cases import absent
+from validation.cases.absent import ENGINES, FORCES, PRICED, change, declared, hand_built, model, scene
+
+BARE = {"title": "bare", "run": {"duration": 0.02, "step": 0.001}, "start": {"pitch": 0.1}}
+FORCED = {**BARE, "effects": FORCES}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with wheel forces and a pitch."""
+    folder = tmp_path_factory.mktemp("files")
+    absent.write_files(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bare():
+    """A scene without effects in a process of its own."""
+    return probe(BARE)
+
+
+@pytest.fixture(scope="module")
+def forced(folder):
+    """A scene with wheel forces alone in a process of its own."""
+    return probe(FORCED, str(folder))
+
+
+def test_a_bare_scene_imports_no_effect(bare):
+    assert [name for name in bare["modules"] if belongs_to_effects(name)] == []
+
+
+def test_a_scene_imports_its_own_effect_alone(forced):
+    """Positive control: the modules that must be absent above do appear, but only those of the one effect."""
+    found = {name for name in forced["modules"] if belongs_to_effects(name)}
+    assert found == {"models.effects.wheel_forces", "models.time_series", "models.tables"}
+
+
+def test_only_the_kernel_of_the_scene_is_compiled(bare, forced):
+    assert [len(found["marches"]) for found in (bare, forced)] == [1, 1]
+    assert bare["marches"] != forced["marches"]
+    assert bare["derivatives"] == forced["derivatives"] == []
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_no_python_and_no_memory_within_a_march(engine, folder):
+    """100 times as many steps enter no more Python functions and take no more memory, but for the result.
+
+    2,000 bytes over 1,980 steps: less than one byte a step is a wrapper's own doing, not the loop's.
+    """
+    for _ in range(2):  # wrappers cache on their first calls
+        march(engine, model(scene({}, 20, folder), engine))
+    short, long = (march(engine, model(scene({}, steps, folder), engine)) for steps in (20, 2000))
+    assert long.frames == short.frames <= 50
+    assert abs(long.memory - short.memory) < 2000
+    assert short.callbacks == long.callbacks == 0
+
+
+def test_the_watch_sees_callbacks_where_there_are_some(folder):
+    """Positive control: four Python callbacks at each of RK44's four stages, and one compiled one in MuJoCo."""
+    road = {"road": PRICED["road"][1]}
+    assert march("exudyn", model(scene(road, 50, folder), "exudyn")).frames >= 50 * 4 * 4
+    assert march("mujoco", model(scene(road, 50, folder), "mujoco")).callbacks == 1
+    assert installed() == 0
+
+
+def test_no_callback_before_during_and_after(folder):
+    assert installed() == 0
+    assert march("mujoco", model(scene({}, 50, folder), "mujoco")).callbacks == 0
+    assert installed() == 0
+    assert user_functions(model(scene({}, 50, folder), "exudyn")) == 0
+
+
+def test_user_functions_are_counted(folder):
+    """Positive control, over Exudyn's own items: two loads per wheel on a road; two offsets of the constraint."""
+    assert user_functions(model(scene({"road": PRICED["road"][1]}, 50, folder), "exudyn")) == 4
+    guided = {**FORCES, "prescribed_pitch": PRICED["prescribed_pitch"][1]}
+    built = model(scene(guided, 50, folder, guided=True), "exudyn")
+    assert user_functions(built) + 1 == built.plan()["callbacks"] == 5  # and the step's own, which is not an item
+
+
+def test_a_bare_scene_has_the_states_of_the_vehicle_and_no_others(folder):
+    own = scene({}, 20, folder)
+    ours, found = model(own, "exudyn"), model(own, "mujoco").model
+    system = ours.built.mbs.systemData
+    assert (found.nq, found.nv, found.na, found.nuserdata, found.nsensor, found.neq) == (4, 4, 0, 0, 0, 0)
+    assert (found.nnumeric, found.nu) == (0, 2)  # no input table; the two struts of the suspension
+    plane = 3  # Exudyn's point masses and rigid body have their horizontal coordinate as well
+    assert (system.ODE2Size(), system.ODE1Size(), system.AEsize()) == (4 + plane, 0, 0)
+    assembly = assemble(own)
+    assert (assembly.input, assembly.outputs, assembly.vehicle.pitch_springs) == (None, (), ())
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("effect", PRICED)
+def test_an_effect_changes_the_counts_by_what_it_declares(effect, engine, folder):
+    assert change(effect, engine, folder) == declared(effect, engine)
+
+
+def test_every_effect_has_its_price():
+    assert set(PRICED) == set(effect_names())
+
+
+@pytest.mark.parametrize("kept", [(), ("wheel_forces",)], ids=["bare", "forced"])
+def test_the_same_numbers_with_the_other_effects_files_removed(kept, bare, forced, folder, tmp_path):
+    """Bit for bit, in all engines, from a copy of the package without what the scene does not name."""
+    copy = tmp_path / "models"
+    shutil.copytree(Path(models.__file__).parent, copy)
+    shutil.rmtree(copy / "road")
+    for name in {*effect_names()} - {*kept}:
+        (copy / "effects" / f"{name}.py").unlink()
+    for name in ("mujoco_callback", "mujoco_layout"):
+        (copy / "engines" / f"{name}.py").unlink()
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    found = probe(FORCED if kept else BARE, str(folder), cwd=tmp_path, env=environment)
+    assert found["states"] == (forced if kept else bare)["states"]
+    assert len(bytes.fromhex(found["states"]["mujoco"])) == 21 * 8 * 8
+
+
+def test_the_copy_is_what_runs_without_the_files(folder, tmp_path):
+    """Positive control of the test above: a scene that names a removed effect is refused by the copy."""
+    copy = tmp_path / "models"
+    shutil.copytree(Path(models.__file__).parent, copy)
+    (copy / "effects" / "wheel_forces.py").unlink()
+    with pytest.raises(Exception) as caught:
+        probe(FORCED, str(folder), cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(tmp_path)})
+    assert "no such effect" in caught.value.stderr
+
+
+@pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
+def test_the_machinery_adds_nothing_to_a_hand_built_model(engine, folder):
+    """The same items in the same order give the same bits; what it costs is measured by the validation."""
+    own = scene({}, 500, folder)
+    ours, theirs = model(own, engine).run().states, hand_built(engine, own)()
+    assert np.array_equal(ours, theirs)
+    assert abs(ours[-1] - ours[0]).max() > 0.01
+
+
+def test_the_price_list_reads_as_a_table():
+    spread = {"median": 1.25, "mad": 0.1, "min": 1.0}
+    entry = {"effect": "road", "engine": "exudyn", "adds": "+4 callbacks", "step": 2.5, "us": spread,
+             "ratio": (1.5, 1.4, 1.6)}
+    (table,) = absent.tables({"price": [entry]})
+    assert table.rows == (("road", "exudyn", "+4 callbacks", "2.50", "+1.25 +/- 0.10", "1.50 (1.40 to 1.60)"),)
+    assert len(table.headings) == len(table.rows[0])
