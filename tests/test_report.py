@@ -187,10 +187,11 @@ def test_margin_needs_numbers_and_a_tolerance():
 def test_shares_and_powers():
     assert [share(x) for x in (0.0, 0.5, 1e-9, None, float("nan"))] == ["0 %", "50 %", "&lt; 0.01 %", "–", "–"]
     assert "3&thinsp;·&thinsp;10<sup>9</sup> times" in share(3e9)
-    assert "2&thinsp;·&thinsp;10<sup>−6</sup>" in powers("within 2e-06 of it") and powers("4e+00") == "4"
+    assert "2&thinsp;·&thinsp;10<sup>−6</sup>" in powers("within 2e-06 of it") and powers("1.7e+02") == "170"
     assert powers("exudyn-1e5x") == "exudyn-1e5x", "a name is no number"
 
 
 def test_columns_of_numbers_go_to_the_right():
-    assert numeric_columns([("a", "1e-06", "never"), ("b", "–", "3.5 s")], 3) == [False, True, False]
+    lines = [("1", "1e-06", "not so", "+1.5 +/- 0.2"), ("2", "–", "3", "72.4*")]
+    assert numeric_columns(lines, 4) == [False, True, False, True]
     assert numeric_columns([], 2) == [False, False], "a table without lines"

@@ -1,4 +1,4 @@
-"""How the report writes numbers: four significant digits, engineering notation beyond, a margin as a share."""
+"""How the report writes numbers and text: four significant digits, engineering notation, margins as shares."""
 
 import math
 import re
@@ -76,7 +76,8 @@ def duration(seconds: float) -> str:
 
 
 POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]\d+)(?![\w.])")
-NUMERIC = re.compile(r"[-−+±<>≤≥~ ]*\d[\d,]*(\.\d+)?(e[+-]?\d+)?( ?(%|s|ms|x))?|[-–]?|never|refused")
+NUMERIC = re.compile(r"[-−+±<>≤≥~ ]*\d[\d,]*(\.\d+)?(e[+-]?\d+)?\*?( ?(%|s|ms|x))?( (±|\+/-) [\d.]+)?"
+                     r"|[-–]?|never|refused|not met")  # fmt: skip
 """A cell of a table that reads as a number, or as the absence of one."""
 
 
@@ -84,7 +85,7 @@ def powers(cell: Any) -> Markup:
     """Text with numbers such as 2e-06 written with a power of ten, which does not break across lines."""
 
     def written(found: re.Match[str]) -> str:
-        if int(found[2]) in (0, 1):
+        if int(found[2]) in range(4):
             return _minus(f"{float(found[0]):g}")
         return f'<span class="nowrap">{_scientific(found[1], int(found[2]))}</span>'
 
@@ -92,6 +93,13 @@ def powers(cell: Any) -> Markup:
 
 
 def numeric_columns(rows: Sequence[Sequence[Any]], count: int) -> list[bool]:
-    """Which columns of a table, ``count`` or more, hold numbers and go to the right."""
+    """Which columns of a table, ``count`` or more, hold numbers and go to the right; the first one never does."""
     columns = [[str(cell).strip() for cell in column] for column in zip_longest([""] * count, *rows, fillvalue="")]
-    return [all(map(NUMERIC.fullmatch, column)) and any(cell[-1:].isdigit() for cell in column) for column in columns]
+    right = [all(map(NUMERIC.fullmatch, column)) and any(cell[-1:].isdigit() for cell in column) for column in columns]
+    return [False, *right[1:]]
+
+
+def marked(text: str) -> Markup:
+    """Text of a docstring: **strong** and ``code``."""
+    strong = re.sub(r"\*\*(.+?)\*\*", r"<b>\1</b>", str(escape(text)))
+    return Markup(re.sub(r"``(.+?)``", r"<code>\1</code>", strong))

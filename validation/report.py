@@ -11,7 +11,7 @@ from typing import Any
 
 from models.errors import InputError
 from validation import report_content as content
-from validation.numbers import duration, margin, number, numeric_columns, powers, share
+from validation.numbers import duration, margin, marked, number, numeric_columns, powers, share
 
 TEMPLATE = "report.html.jinja"
 BLANK: dict[str, Any] = {"quick": False, "command": "", "versions": {}, "seconds": {}}
@@ -46,7 +46,7 @@ def page(results: dict[str, Any], data: Path) -> str:
     loader = FileSystemLoader(Path(__file__).parent)
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined,
                               trim_blocks=True, lstrip_blocks=True)  # fmt: skip
-    environment.filters |= {"number": number, "share": share, "duration": duration, "powers": powers,
+    environment.filters |= {"number": number, "share": share, "duration": duration, "powers": powers, "marked": marked,
                             "numeric_columns": numeric_columns}  # fmt: skip
     environment.globals |= {"margin": margin, "reported": content.reported, "case_of": content.case_of}
     systems = content.systems(results)
