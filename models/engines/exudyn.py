@@ -56,7 +56,8 @@ def _exact(assembly: Assembly) -> Build:
             built.places[body.name, "pitch"] = _marker(mbs, node, 2)
         built.nodes[body.name] = node
         built.places[body.name, "z"] = _marker(mbs, node, 1)
-        mbs.AddLoad(items.LoadCoordinate(markerNumber=built.places[body.name, "z"], load=body.mass * assembly.vehicle.gravity))
+        weight = body.mass * assembly.vehicle.gravity
+        mbs.AddLoad(items.LoadCoordinate(markerNumber=built.places[body.name, "z"], load=weight))
     for strut in assembly.vehicle.struts:
         _strut(mbs, strut, lambda point: _point(built, bodies, point))
     for spring in assembly.vehicle.pitch_springs:
@@ -94,7 +95,8 @@ def _linear(assembly: Assembly) -> Build:
     mass, damping, stiffness = matrices(assembly.vehicle)
     zero = [0.0] * len(mass)
     node = mbs.AddNode(items.NodeGenericODE2(
-        referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero, numberOfODE2Coordinates=len(mass)))
+        referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero,
+        numberOfODE2Coordinates=len(mass)))
     weight = [body.mass * assembly.vehicle.gravity for body in assembly.vehicle.bodies]
     mbs.AddObject(items.ObjectGenericODE2(
         nodeNumbers=[node], massMatrix=mass, dampingMatrix=damping, stiffnessMatrix=stiffness,
@@ -276,6 +278,8 @@ class ExudynModel:
     def run(self) -> Trajectory:
         """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
         options = self._options()
+        if self.assembly.input is not None:
+            self.clock.step = 0  # a run before this one has left it at its own last sample
         if self.constraint is not None:
             self._consistent_start(options)
         note = ""
@@ -284,10 +288,13 @@ class ExudynModel:
             if not self.built.mbs.SolveDynamic(options, solverType=solver):
                 note = "; the solver reported failure"
         except (exu.ExudynError, RuntimeError, ValueError) as error:
+            if "KeyboardInterrupt" in str(error):
+                raise KeyboardInterrupt from error
             note = f"; the solver stopped: {str(error).strip().splitlines()[0]}"
         times, states = self._recorded()
-        guard("exudyn", times, states, self.settings.duration, note)
-        return Trajectory(times, states, self._enforced(), self._counts())
+        moment = self._enforced()
+        guard("exudyn", times, states, self.settings.duration, note, moment)
+        return Trajectory(times, states, moment, self._counts())
 
     def _consistent_start(self, options: Any) -> None:
         """Begin with the accelerations that belong to the prescribed pitch.

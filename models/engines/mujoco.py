@@ -183,6 +183,7 @@ class MujocoModel:
             states[:, [3, 7]] = self._signal().sample(0.0, self.settings.step, n + 1)[:, 2:4]
         guard("mujoco", times, states, self.settings.duration, self._warnings())
         moment = self._enforced(times, states) if self.guided else None
+        guard("mujoco", times, states, self.settings.duration, moment=moment)
         return Trajectory(times, states, moment, self._counts())
 
     def _advance(self, states: np.ndarray, free: list[int]) -> None:
@@ -192,7 +193,8 @@ class MujocoModel:
         for first in range(0, n, CHUNK):
             count = min(CHUNK, n - first)
             controls = None if self.drive.controls is None else self.drive.controls[first : first + count]
-            path, _ = rollout.rollout(self.model, self.data, state[None, :], control=self._padded(controls), nstep=count)
+            controls = self._padded(controls)
+            path, _ = rollout.rollout(self.model, self.data, state[None, :], control=controls, nstep=count)
             path = path[0, :, :size]
             states[first + 1 : first + 1 + count, free] = path[:, 1:]
             expected = self.settings.step * (first + 1 + np.arange(count))
@@ -222,6 +224,8 @@ class MujocoModel:
     def _callback(self):
         from contextlib import nullcontext
 
+        if mujoco.get_mjcb_control() is not None or mujoco.get_mjcb_passive() is not None:
+            raise RunFailed("mujoco", "another callback is installed in this process: its forces would act here, too")
         if self.drive.law is None:
             return nullcontext()
         from models.engines.mujoco_callback import installed
@@ -279,7 +283,8 @@ class MujocoModel:
     def plan(self) -> dict[str, int]:
         """What was built: degrees of freedom, native items, callbacks."""
         native = self.model.nu + self.model.ntendon + int((self.model.jnt_stiffness != 0).sum())
-        return {"degrees of freedom": self.model.nv, "native items": native, "callbacks": int(self.drive.law is not None)}
+        return {"degrees of freedom": self.model.nv, "native items": native,
+                "callbacks": int(self.drive.law is not None)}
 
     def _counts(self) -> dict[str, int]:
         n = self.settings.steps

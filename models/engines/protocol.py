@@ -116,19 +116,30 @@ def _whole(engine: str, step: float, whole: str, length: float) -> None:
                               f"use for example {fitting(step, length)} s")
 
 
-def guard(engine: str, times: np.ndarray, states: np.ndarray, duration: float, note: str = "") -> None:
+def guard(engine: str, times: np.ndarray, states: np.ndarray, duration: float, note: str = "",
+          moment: np.ndarray | None = None) -> None:  # fmt: skip
     """Raise RunFailed unless the run is finite, of sane size and complete in time.
 
-    times (n,), states (n, anything), duration in s; ``note`` is what the engine itself reported.
+    times (n,), states (n, anything), duration in s; ``note`` is what the engine itself reported; moment (n,)
+    in N m, where there is one, must be finite.
     """
-    sane = np.isfinite(states).all(axis=1) & (np.abs(np.where(np.isfinite(states), states, 0)) < SIZE_BOUND).all(axis=1)
+    if len(times) == 0 or len(times) != len(states):
+        raise RunFailed(engine, f"gave {len(states)} states at {len(times)} times{note}")
+    finite = np.isfinite(states).all(axis=1) & (True if moment is None else np.isfinite(moment))
+    sane = finite & (np.abs(np.where(np.isfinite(states), states, 0)) < SIZE_BOUND).all(axis=1)
     forward = np.concatenate(([True], np.diff(times) > 0))
     bad = np.flatnonzero(~(sane & forward & np.isfinite(times)))
     if len(bad):
         last = bad[0] - 1
-        reason = "time ran backwards" if sane[bad[0]] else "the state became infinite or not a number"
+        reason = _reason(bool(finite[bad[0]]), bool(sane[bad[0]]))
         raise RunFailed(engine, reason + note, times[last] if last >= 0 else None, states[last] if last >= 0 else None)
     if note:
         raise RunFailed(engine, note.lstrip("; "), times[-1], states[-1])
     if abs(times[-1] - duration) > 1e-9 * max(1.0, duration):
         raise RunFailed(engine, f"stopped at {times[-1]:.6g} s instead of {duration:.6g} s", times[-1], states[-1])
+
+
+def _reason(finite: bool, sane: bool) -> str:
+    if not finite:
+        return "the state became infinite or not a number"
+    return "time ran backwards" if sane else f"the state grew beyond {SIZE_BOUND:g}: no vehicle any more"

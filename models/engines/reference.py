@@ -1,7 +1,9 @@
 """The hand-written reference: the paper's equations, a compiled fixed-step Runge-Kutta, scipy's adaptive solvers."""
 
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -98,7 +100,9 @@ class Reference:
         adaptive = CATALOGUE["reference"][self.settings.integrator].adaptive
         times, states, counts = self._adaptive() if adaptive else self._fixed()
         guard("reference", times, states, self.settings.duration)
-        return Trajectory(times, states, self._moment(times, states), counts)
+        moment = self._moment(times, states)
+        guard("reference", times, states, self.settings.duration, moment=moment)
+        return Trajectory(times, states, moment, counts)
 
     def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
         """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,)."""
@@ -149,7 +153,7 @@ class Reference:
         knots = np.empty(0) if self.assembly.input is None else self.assembly.input.knots(self.settings.duration)
         edges = np.concatenate(([0.0], knots, [self.settings.duration]))
         steps = calls = 0
-        for start, end in zip(edges[:-1], edges[1:], strict=True):
+        for start, end in pairwise(edges):
             solution = self._piece(start, end, y)
             inside = slice(*np.searchsorted(times, (start + 1e-9 * h, end + 1e-9 * h)))
             if inside.start < inside.stop:
@@ -162,12 +166,10 @@ class Reference:
         return times, states, {"steps": steps, "force calls": calls}
 
     def _piece(self, start: float, end: float, y: np.ndarray):
-        derivative, p = derivative_of(*self._key), self._p
-        held = self._at(0.5 * (start + end)) if self._constant() else None
-        at = self._at
+        derivative, p, at = derivative_of(*self._key), self._p, self._reader(start, end)
 
         def rhs(t, y):
-            return derivative(y, at(t) if held is None else held, p)
+            return derivative(y, at(t), p)
 
         tolerance = max(self.settings.tolerance, 3e-14)
         solution = solve_ivp(rhs, (start, end), y, method=self.settings.integrator, dense_output=True,
@@ -176,8 +178,14 @@ class Reference:
             raise RunFailed("reference", solution.message, solution.t[-1], solution.y[:, -1])
         return solution
 
-    def _constant(self) -> bool:
-        return self.assembly.input is None or self.assembly.input.held
+    def _reader(self, start: float, end: float) -> Callable[[float], np.ndarray]:
+        """The input within one piece: held forces stay what they are in its middle, a prescribed pitch moves on."""
+        middle = self._at(0.5 * (start + end))
+        if self.assembly.input is None or (self.assembly.input.held and self.assembly.mode != "pitch"):
+            return lambda t: middle
+        if self.assembly.input.held:
+            return lambda t: np.concatenate((middle[:2], self._at(t)[2:]))
+        return self._at
 
     def _moment(self, times: np.ndarray, states: np.ndarray) -> np.ndarray | None:
         """Enforced moment A = I beta'' - cos(beta) (b f3 - a f4), below eq. (34)."""

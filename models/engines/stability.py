@@ -7,8 +7,8 @@ over the run. The vehicle itself never grows: its springs and dampers are passiv
 free vehicle) and weakly damped modes, which a first-order method lets grow a little, are allowed.
 
 The matrices were derived and then compared with the ones measured from the engines, column by column
-over five steps (tests/test_guards.py); they agree to 1e-11. They hold about zero pitch, where the vehicle is stiffest: a
-tilt shortens the struts' arms. What is not linear is left to the guard that follows every run.
+over five steps (tests/test_guards.py); they agree to 1e-10. They hold about zero pitch, where the vehicle
+is stiffest: a tilt shortens the struts' arms. What is not linear is left to the guard that follows every run.
 """
 
 import math
@@ -77,7 +77,7 @@ def step_matrix(integrator: str, step: float, linear: Linear) -> np.ndarray | No
         return _polynomial(polynomial, step * first_order(linear))
     if integrator == "VelocityVerlet":
         return _verlet(step, linear)
-    mass, damping, _, joint = linear
+    _, damping, _, joint = linear
     implicit = {"Euler": joint, "implicit": _within_trees(damping), "implicitfast": np.diag(damping.diagonal())}
     return _semi_implicit(step, linear, implicit[integrator]) if integrator in implicit else None
 
@@ -166,4 +166,5 @@ def _pole(linear: Linear) -> str:
     """The eigenvalue of the vehicle that lies farthest from zero, as text."""
     poles = np.linalg.eigvals(first_order(linear))
     pole = complex(poles[np.abs(poles).argmax()])
-    return f"{pole.real:.4g} 1/s" if abs(pole.imag) < 1e-9 * abs(pole) else f"{pole.real:.4g} +- {abs(pole.imag):.4g}i 1/s"
+    swing = "" if abs(pole.imag) < 1e-9 * abs(pole) else f" +- {abs(pole.imag):.4g}i"
+    return f"{pole.real:.4g}{swing} 1/s"
