@@ -80,7 +80,8 @@ def _cases(rows: list[dict[str, Any]], results: Results) -> Iterator[dict[str, A
             "about": (doc or "").partition("\n\n")[0],
             "module": module,
             "seconds": results["provenance"]["seconds"].get(name),
-            "groups": [{"why": why, "rows": list(same)} for why, same in groupby(own, key=lambda row: row["why"])],
+            "groups": [{"why": why, "rows": [row for row in own if row["why"] == why]}
+                       for why in dict.fromkeys(row["why"] for row in own)],
             "count": len(own),
             "failed": sum(row["status"] == "failed" for row in own),
         }
