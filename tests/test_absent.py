@@ -13,6 +13,7 @@ from models.scene import effect_names
 from validation.absence import belongs_to_effects, installed, march, probe, user_functions
 from validation.cases import absent
 from validation.cases.absent import ENGINES, FORCES, PRICED, change, declared, hand_built, model, scene
+from validation.hand_built import mujoco_model
 
 BARE = {"title": "bare", "run": {"duration": 0.02, "step": 0.001}, "start": {"pitch": 0.1}}
 FORCED = {**BARE, "effects": FORCES}
@@ -146,6 +147,17 @@ def test_the_machinery_adds_nothing_to_a_hand_built_model(engine, folder):
     ours, theirs = model(own, engine).run().states, hand_built(engine, own)()
     assert np.array_equal(ours, theirs)
     assert abs(ours[-1] - ours[0]).max() > 0.01
+
+
+def test_mujoco_compiles_the_same_model_from_the_description_and_by_hand(folder):
+    """Every array of bodies, joints, sites and actuators: places, masses, inertias, frames, what is left out."""
+    own = scene({}, 20, folder)
+    ours, theirs = model(own, "mujoco").model, mujoco_model(own.vehicle_parameters(), absent.STEP)
+    kinds = ("body_", "dof_", "jnt_", "site_", "actuator_", "tendon_", "eq_", "geom_", "qpos")
+    fields = [name for name in dir(ours) if name.startswith(kinds) and isinstance(getattr(ours, name), np.ndarray)]
+    assert len(fields) > 100
+    different = [name for name in fields if not np.array_equal(getattr(ours, name), getattr(theirs, name))]
+    assert different == []
 
 
 def test_the_price_list_reads_as_a_table():

@@ -67,12 +67,19 @@ def exudyn_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run
     return run
 
 
+def mujoco_model(p: Parameters, step: float) -> Any:
+    """The vehicle in MuJoCo, from its own XML; z is down, the hinge lifts the front."""
+    import mujoco
+
+    return mujoco.MjModel.from_xml_string(MJCF.format(**{**p.model_dump(), "minus_a": -p.a, "step": repr(step)}))
+
+
 def mujoco_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run:
-    """Runge-Kutta 4 in MuJoCo, from its own XML; z is down, the hinge lifts the front."""
+    """Runge-Kutta 4 in MuJoCo."""
     import mujoco
     from mujoco import rollout
 
-    model = mujoco.MjModel.from_xml_string(MJCF.format(**{**p.model_dump(), "minus_a": -p.a, "step": repr(step)}))
+    model = mujoco_model(p, step)
     data = mujoco.MjData(model)
     state = np.concatenate(([0.0], start))
 

@@ -43,7 +43,7 @@ def _spec(vehicle: Vehicle, settings: Settings, guided: bool) -> mujoco.MjSpec:
     places = {axle.wheel: axle.x for axle in vehicle.axles}
     for body in vehicle.bodies:
         own = spec.worldbody.add_body(name=body.name, pos=[places.get(body.name, 0.0), 0, 0], mass=body.mass,
-                                      inertia=[body.pitch_inertia or 1.0] * 3, explicitinertial=True)
+                                      ipos=[0, 0, 0], inertia=[body.pitch_inertia or 1.0] * 3, explicitinertial=True)
         own.add_joint(name=f"{body.name} z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
         if body.pitch_inertia is not None and not guided:
             own.add_joint(name=f"{body.name} pitch", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
