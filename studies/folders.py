@@ -8,6 +8,10 @@ from pathlib import Path
 from models.errors import InputError
 
 
+RESULTS = Path("results")
+"""Where results go unless the user says otherwise, within the folder in which the command runs."""
+
+
 def new_folder(wanted: Path | None, name: str) -> Path:
     """The folder that the user names, if it is empty, or the first free one under ``results/``.
 
@@ -30,12 +34,14 @@ def drop_if_empty(folder: Path) -> None:
     """Leave no trace of a run that saved nothing."""
     with suppress(OSError):
         folder.rmdir()
+        if folder.parent == RESULTS:
+            RESULTS.rmdir()
 
 
 def _candidates(name: str) -> Iterator[Path]:
-    yield Path("results") / name
+    yield RESULTS / name
     for i in count(2):
-        yield Path("results") / f"{name}-{i}"
+        yield RESULTS / f"{name}-{i}"
 
 
 def _make(path: Path) -> Path:

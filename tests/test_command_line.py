@@ -146,7 +146,7 @@ def test_a_failed_run_keeps_the_others(monkeypatch, capsys):
 def test_runs_that_all_fail_leave_no_folder(capfd):
     assert twinrig("run", "release", *SHORT, "--set", "start.z3=1e200", "--json") == 1
     assert set(json.loads(capfd.readouterr().out)["failed"]) == set(ENGINES)
-    assert not Path("results/release").exists()
+    assert not Path("results").exists()
 
 
 def test_an_interrupted_run_keeps_what_was_finished(monkeypatch, capsys):
@@ -163,7 +163,7 @@ def test_an_interrupted_run_keeps_what_was_finished(monkeypatch, capsys):
 def test_an_interrupt_before_the_first_result_leaves_no_folder(monkeypatch):
     monkeypatch.setattr(single_run, "simulate", _failing("reference", KeyboardInterrupt()))
     assert twinrig("run", "release", *SHORT) == 130
-    assert not Path("results/release").exists()
+    assert not Path("results").exists()
 
 
 @pytest.mark.parametrize("error", [MemoryError(), OSError(28, "No space left on device")], ids=["memory", "disk"])
