@@ -7,7 +7,6 @@ from pathlib import Path
 
 from models.errors import InputError
 
-
 RESULTS = Path("results")
 """Where results go unless the user says otherwise, within the folder in which the command runs."""
 
