@@ -126,3 +126,29 @@ def test_a_nose_up_moment_lifts_the_front(p):
     assert derivative_of("force", "exact")(y, np.array([p.k1 * y[0], p.k2 * y[1]]), p.array())[7] < 0
     y[0] -= 0.02
     assert derivative_of("force", "exact")(y, np.array([p.k1 * y[0], p.k2 * y[1]]), p.array())[7] > 0
+
+
+@pytest.mark.parametrize("interpolation", ["held", "linear", "smooth"])
+@pytest.mark.parametrize("guided", [False, True])
+def test_accelerations_agree_at_any_sample(tmp_path, interpolation, guided):
+    """The audit of force-excited scenes: every implementation reads the sample of the asked time."""
+    from models.assembly import assemble
+    from models.engines.protocol import build, settings_of
+    from models.scene import build as build_scene
+    from models.time_series import write_time_series
+
+    t = 1e-3 * np.arange(301)
+    write_time_series(tmp_path / "f.csv", {"front": ("N", 4e3 + 3e6 * t**2), "rear": ("N", 3e3 - 1e4 * t)}, 1e-3)
+    write_time_series(tmp_path / "p.csv", {"pitch": ("rad", 0.1 * np.sin(9 * t))}, 1e-3)
+    effects = {"wheel_forces": {"file": "f.csv", "interpolation": interpolation}}
+    effects |= {"prescribed_pitch": {"file": "p.csv"}} if guided else {}
+    scene = build_scene({"title": "test", "run": {"duration": 0.3, "step": 1e-3}, "effects": effects}, "", tmp_path)
+    assembly = assemble(scene)
+    models = [build(engine, assembly, settings_of(scene, engine)) for engine in ("reference", "exudyn", "mujoco")]
+    for time in (0.0, 0.1, 0.2):
+        y = RANDOM.uniform(-0.3, 0.3, 8)
+        if guided:
+            y[[3, 7]] = assembly.input.at(time)[2:4]
+        first, *others = (model.acceleration(time, y) for model in models)
+        for found in others:
+            assert np.abs(found - first).max() <= 1e-12 * np.abs(first).max()

@@ -7,8 +7,8 @@ from models.engines import exudyn, mujoco, reference
 from models.vehicles import pitch_plane_equations as equations
 from validation import checks
 from validation.cases import planted_faults as case
-from validation.fault_bench import CHECKS, Bench, size
-from validation.planted_faults import CLEAN, FAULTS, planted
+from validation.faults.bench import CHECKS, Bench, size
+from validation.faults.planting import CLEAN, FAULTS, planted
 
 
 @pytest.fixture(scope="module")

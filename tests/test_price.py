@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from models.errors import Refused, RunFailed
-from validation import cost, curves
-from validation.cost_rows import rows_of
-from validation.cost_tables import tables
-from validation.problems import Setting
+from validation.price import curves
+from validation.price import runner as cost
+from validation.price.problems import Setting
+from validation.price.rows import rows_of
+from validation.price.tables import tables
 from validation.timing import describe, interleave, paired_ratio
 
 STEPS = (8e-3, 4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)
@@ -208,8 +209,8 @@ def test_description_of_seconds():
 def test_force_calls_seen_from_outside():
     """Each adapter's counts against MuJoCo's timers and Exudyn's own calls of a load, 50 steps each."""
     from models.assembly import assemble
-    from validation.force_calls import counted
-    from validation.problems.road_excited import scene, setting, settings_of
+    from validation.price.force_calls import counted
+    from validation.price.problems.road_excited import scene, setting, settings_of
 
     assembly = assemble(scene())
     for engine, method, stages in (("mujoco", "RK4", 4), ("mujoco", "Euler", 1), ("exudyn", "RK44", 4),
@@ -221,7 +222,7 @@ def test_force_calls_seen_from_outside():
 
 def test_every_integrator_of_the_catalogue_is_tried():
     from models.engines.catalogue import CATALOGUE
-    from validation.problems.road_excited import DEFAULTS, FULL, QUICK
+    from validation.price.problems.road_excited import DEFAULTS, FULL, QUICK
 
     tried = {(engine, method.split()[0]) for engine, method in FULL}
     assert tried == {(engine, name) for engine, names in CATALOGUE.items() for name in names}
@@ -235,7 +236,7 @@ def test_defaults_are_those_of_the_installed_engines():
     import exudyn
     import mujoco
 
-    from validation.problems.road_excited import DEFAULTS, RADII
+    from validation.price.problems.road_excited import DEFAULTS, RADII
 
     ti, option = exudyn.SimulationSettings().timeIntegration, mujoco.MjOption()
     assert DEFAULTS["exudyn", "GeneralizedAlpha 0.9", ti.endTime / ti.numberOfSteps] == "Exudyn"

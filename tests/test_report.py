@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from models.errors import InputError
-from validation import report
-from validation.numbers import margin, number, numeric_columns, powers, share
+from validation.report import page as report
+from validation.report.numbers import margin, number, numeric_columns, powers, share
 from validation.rows import Row, at_most, behaves, finding, not_run, within
 from validation.run import _save
 

@@ -10,7 +10,8 @@ from models.result import load
 from models.scene import build
 from models.simulate import simulate
 
-ROAD = {"title": "test", "run": {"duration": 0.5, "step": 1e-3}, "effects": {"road": {"source": "study", "speed": 15.0}}}
+STUDY = {"road": {"source": "study", "speed": 15.0}}
+ROAD = {"title": "test", "run": {"duration": 0.5, "step": 1e-3}, "effects": STUDY}
 
 
 def test_every_channel_has_unit_and_meaning(tmp_path):

@@ -32,7 +32,7 @@ def validate(folder: Path, quick: bool, command: str) -> int:
             seconds[name] = time.perf_counter() - start
             bar.advance(task)
     _save(folder, rows, {**provenance(command), "quick": quick, "seconds": seconds})
-    from validation.report import write
+    from validation.report.page import write
 
     page = write(folder)
     return _say(rows, sum(seconds.values()), page)
@@ -40,12 +40,12 @@ def validate(folder: Path, quick: bool, command: str) -> int:
 
 def _measure(name: str, quick: bool, folder: Path) -> list[Row]:
     """Rows of one case; a case that breaks is a failed row, not the end of the report."""
-    case = import_module(f"validation.cases.{name}")
     try:
+        case = import_module(f"validation.cases.{name}")
         rows, data = case.measure(quick, folder)
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
-        return [Row(f"{name}.broken", case.SYSTEM, case.TITLE, None, "", "", None, "", "none", "failed", reason)]
+        return [Row(f"{name}.broken", "pitch-plane", f"case {name}", None, "", "", None, "", "none", "failed", reason)]
     (folder / "data" / f"{name}.json").write_text(json.dumps(data))
     return rows
 

@@ -129,6 +129,7 @@ class Clock:
         if not self.held and nodes != "any":
             self.table = signal.sample(0.0, h / 2, 2 * n + 1).T.tolist()
         self.signal = signal
+        self.latest = (-1.0, np.empty(0))
 
     def reader(self, column: int, scale: float) -> Callable[[Any, float, float], float]:
         """Callback (mbs, t, load) -> scale times one channel."""
@@ -138,8 +139,13 @@ class Clock:
         if self.table:
             values, per_time = [scale * value for value in self.table[column]], self.per_time
             return lambda mbs, t, load: values[round(t * per_time)]
-        at = self.signal.at
-        return lambda mbs, t, load: scale * at(t)[column]
+        return lambda mbs, t, load: scale * self.at(t)[column]
+
+    def at(self, t: float) -> np.ndarray:
+        """All channels at one time; the loads of one stage ask for the same time one after another."""
+        if t != self.latest[0]:
+            self.latest = (t, self.signal.at(t))
+        return self.latest[1]
 
     def advance(self, mbs: Any, t: float) -> bool:
         """Before each step: t is its end, so the step is the one before it."""
@@ -164,7 +170,7 @@ def _drive(built: Build, assembly: Assembly, clock: Clock) -> None:
             _load(built, (axle.wheel, "z"), clock.reader(i, -1.0))
 
 
-def _load(built: Build, place: tuple[str, str], function: Callable[[Any, float, float], float]) -> None:
+def _load(built: Build, place: tuple[str, str], function: Any) -> None:
     built.mbs.AddLoad(items.LoadCoordinate(markerNumber=built.places[place], load=0.0, loadUserFunction=function))
     built.callbacks += 1
 
@@ -240,8 +246,18 @@ class ExudynModel:
 
     def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
         """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,), from Exudyn's own residual and mass matrix."""
+        found = self._free_acceleration(time, state)
+        if self.constraint is not None and self.assembly.input is not None:
+            found[3] = self.assembly.input.at(time)[4]
+        return found
+
+    def _free_acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
+        """The same with no moment on the pitch, where the pitch is prescribed."""
         self._set_state(state)
-        solver, options = exu.MainSolverImplicitSecondOrder(), self._options()
+        if self.assembly.input is not None:
+            self.clock.step = min(int(time / self.settings.step + 1e-6), self.settings.steps - 1)
+        solver: Any = exu.MainSolverImplicitSecondOrder()
+        options = self._options()
         options.timeIntegration.startTime = time
         solver.InitializeSolver(self.built.mbs, options)
         solver.ComputeMassMatrix(self.built.mbs)
@@ -304,7 +320,7 @@ class ExudynModel:
         """
         signal = self.assembly.input
         assert signal is not None
-        acceleration, wanted = self.acceleration(0.0, self.assembly.initial), signal.at(0.0)[4]
+        acceleration, wanted = self._free_acceleration(0.0, self.assembly.initial), signal.at(0.0)[4]
         self._first_moment = self.assembly.parameters.I * (wanted - acceleration[3])
         acceleration[3] = wanted
         data, initial = self.built.mbs.systemData, exu.ConfigurationType.Initial

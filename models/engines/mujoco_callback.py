@@ -8,6 +8,7 @@ copies of the model, and holds no address that could go stale in numba's cache.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import llvmlite.ir as ir
 import mujoco
@@ -19,9 +20,10 @@ from models.engines.mujoco_layout import offset
 
 HEADER = 6
 DOUBLES = types.CPointer(types.float64)
+_intrinsic: Any = intrinsic
 
 
-@intrinsic
+@_intrinsic
 def _double_at(typing_context, base, shift):
     """Pointer to the double that lies ``shift`` bytes after ``base``."""
 
@@ -32,7 +34,7 @@ def _double_at(typing_context, base, shift):
     return DOUBLES(types.voidptr, types.intp), generate
 
 
-@intrinsic
+@_intrinsic
 def _array_at(typing_context, base, shift):
     """The double pointer that is stored ``shift`` bytes after ``base``."""
 

@@ -4,8 +4,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from validation.fault_bench import CHECKS, Bench, size
-from validation.planted_faults import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, Fault, planted
+from validation.faults.bench import CHECKS, Bench, size
+from validation.faults.planting import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, Fault, planted
 from validation.rows import Row, System, Table, finding, within
 
 TITLE = "Planted faults: what each check sees"
@@ -134,7 +134,7 @@ def _size(record: dict[str, Any], name: str) -> str:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """How far above its tolerance each check stands, fault by fault, on both vehicles."""
-    from validation.fault_map import fault_map
+    from validation.faults.figure import fault_map
 
     vehicles = {TWIN: "asymmetric vehicle", SYMMETRIC: "symmetric vehicle (the paper's)"}
     records = data["faults"]

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from models.assembly import Assembly
-from validation import cost, speed
-from validation.cost_figure import draw as draw_figure
-from validation.cost_rows import rows_of
-from validation.cost_tables import tables as cost_tables
-from validation.force_calls import counted
-from validation.problems import Problem, Setting, road_excited
+from validation.price import runner as cost
+from validation.price import speed
+from validation.price.figure import draw as draw_figure
+from validation.price.force_calls import counted
+from validation.price.problems import Problem, Setting, road_excited
+from validation.price.rows import rows_of
+from validation.price.tables import tables as cost_tables
 from validation.rows import Row, System, Table, behaves, finding, within
 
 TITLE = "What accuracy costs"

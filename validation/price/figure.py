@@ -7,9 +7,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from studies.figures import COLOURS, plt
-from validation import cost, curves
-from validation.cost import Point, by_curve
-from validation.cost_tables import groups_of, named, quantity_of
+from validation.price import curves
+from validation.price import runner as cost
+from validation.price.runner import Point, by_curve
+from validation.price.tables import groups_of, named, quantity_of
 
 SHARED = {"RK4": "o", "RK44": "o", "Euler": "D", "ExplicitEuler": "D"}
 """Markers of methods that several engines have."""

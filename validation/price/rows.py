@@ -1,10 +1,10 @@
 """Rows that every work-precision problem answers for."""
 
-from validation import cost
-from validation.cost import Point
-from validation.cost_tables import named
-from validation.curves import Reach
-from validation.problems import Problem, Setting
+from validation.price import runner as cost
+from validation.price.curves import Reach
+from validation.price.problems import Problem, Setting
+from validation.price.runner import Point
+from validation.price.tables import named
 from validation.rows import Row, System, at_most, finding, within
 
 SYSTEM: System = "cost"

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from studies.figures import LABELS
-from validation import cost
-from validation.cost import Loss, Point, by_curve
-from validation.curves import HOLLOW, Reach
-from validation.problems import Setting
+from validation.price import runner as cost
+from validation.price.curves import HOLLOW, Reach
+from validation.price.problems import Setting
+from validation.price.runner import Loss, Point, by_curve
 from validation.rows import Table
 from validation.timing import describe
 

@@ -12,11 +12,11 @@ import numpy as np
 
 from models.assembly import Assembly
 from models.engines.protocol import Model, Settings, Trajectory, build
-from validation import fault_changes as change
-from validation import fault_patches as patches
 from validation.checks import Make
-from validation.fault_changes import Change
-from validation.fault_patches import Context, Patch, attribute, rewritten
+from validation.faults import changes as change
+from validation.faults import patches
+from validation.faults.changes import Change
+from validation.faults.patches import Context, Patch, attribute, rewritten
 
 BOTH = ("exudyn", "mujoco")
 EXUDYN, MUJOCO, HAND = ("exudyn",), ("mujoco",), ("reference",)

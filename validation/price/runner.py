@@ -15,8 +15,8 @@ from typing import Any, Literal
 import numpy as np
 
 from models.errors import InputError, RunFailed
-from validation import curves
-from validation.problems import Problem, Setting
+from validation.price import curves
+from validation.price.problems import Problem, Setting
 from validation.timing import interleave, interval, resamples
 
 Status = Literal["ok", "raised", "refused", "SILENT"]

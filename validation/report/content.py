@@ -11,7 +11,7 @@ from itertools import groupby
 from types import ModuleType
 from typing import Any, get_args
 
-from validation.numbers import margin
+from validation.report.numbers import margin
 from validation.rows import Independence, System
 from validation.run import CASES
 

@@ -5,15 +5,14 @@
 
 import json
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
 from models.errors import InputError
-from validation import report_content as content
-from validation.numbers import duration, margin, marked, number, numeric_columns, powers, share
+from validation.report import content
+from validation.report.numbers import duration, margin, marked, number, numeric_columns, powers, share
 
-TEMPLATE = "report.html.jinja"
+TEMPLATE = "page.html.jinja"
 BLANK: dict[str, Any] = {"quick": False, "command": "", "versions": {}, "seconds": {}}
 """What a page needs of its provenance, where the results do not hold it."""
 
@@ -87,22 +86,7 @@ def _tables(module: Any, saved: Any, name: str) -> list[Any]:
 def _figures(module: Any, saved: Any, name: str) -> list[tuple[str, Any]]:
     if not hasattr(module, "draw"):
         return []
-    from validation.report_figures import inline
+    from validation.report.figures import inline
 
     drawn = module.draw(saved)
     return [(caption, inline(figure, caption, f"{name}-{i}")) for i, (caption, figure) in enumerate(drawn)]
-
-
-def main() -> None:
-    """``python -m validation.report FOLDER``."""
-    if len(sys.argv) != 2:
-        sys.exit("usage: python -m validation.report FOLDER")
-    try:
-        print(write(Path(sys.argv[1])))
-    except InputError as error:
-        print(f"twinrig: {error}", file=sys.stderr)
-        sys.exit(2)
-
-
-if __name__ == "__main__":
-    main()

@@ -17,7 +17,7 @@ from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Model, Settings, Trajectory, build
 from models.engines.reference import derivative_of
 from models.scene import build as build_scene
-from validation.problems import Setting
+from validation.price.problems import Setting
 
 DURATION, SPEED = 2.0, 20.0
 GRID = 1.25e-4
@@ -122,7 +122,7 @@ def _dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
 
 
 class RoadExcited:
-    """The problem with its reference; see ``validation.problems.Problem``."""
+    """The problem with its reference; see ``validation.price.problems.Problem``."""
 
     key = "road"
     duration = DURATION
