@@ -29,10 +29,10 @@ class Parameters(Strict):
     k2: float = quantity("N/m", "rear tyre stiffness")
     k3: float = quantity("N/m", "front suspension stiffness")
     k4: float = quantity("N/m", "rear suspension stiffness")
-    d1: float = quantity("N s/m", "front tyre damping")
-    d2: float = quantity("N s/m", "rear tyre damping")
-    d3: float = quantity("N s/m", "front suspension damping")
-    d4: float = quantity("N s/m", "rear suspension damping")
+    d1: float = quantity("N s/m", "front tyre damping", zero=True)
+    d2: float = quantity("N s/m", "rear tyre damping", zero=True)
+    d3: float = quantity("N s/m", "front suspension damping", zero=True)
+    d4: float = quantity("N s/m", "rear suspension damping", zero=True)
     g: float = quantity("m/s^2", "gravity, acting down", default=9.81, zero=True)
 
     def array(self) -> np.ndarray:

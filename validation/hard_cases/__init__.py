@@ -1,0 +1,17 @@
+"""Hard cases: what is hard, the invariant or exact answer, and what each implementation makes of it.
+
+One file per family, each with ``CASES``. A case is judged per implementation as **right** (its error is
+within the tolerance), **refused** (before the run, with a reason), **raised** (the run failed and said so)
+or **SILENT**: a finite wrong answer without a word, which is never accepted.
+"""
+
+from importlib import import_module
+
+from validation.hard_cases.case import Case
+
+FAMILIES = ("stepping", "sampled_input", "contact_points", "prescribed_pitch", "invariants", "extremes")
+
+
+def all_cases() -> tuple[Case, ...]:
+    """Every case of every family, in the order of the table."""
+    return tuple(case for family in FAMILIES for case in import_module(f"validation.hard_cases.{family}").CASES)

@@ -1,0 +1,59 @@
+"""What a hard case is, and how an implementation's answer to it is judged."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from models.errors import InputError, RunFailed
+
+Word = Literal["right", "refused", "raised", "SILENT"]
+IMPLEMENTATIONS = ("reference", "exudyn", "mujoco")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One hard case.
+
+    Attributes
+    ----------
+    hard : what makes it hard; check : the invariant or the exact answer, as a phrase
+    unit, tolerance, why : of the error, and the reason for the tolerance
+    error : (implementation, folder for input files) -> the measured error
+    expected : the outcome where it is not "right"
+    naive : measures what an obvious build without the guard or rule does, as a phrase; None if nothing is shown
+    """
+
+    name: str
+    hard: str
+    check: str
+    unit: str
+    tolerance: float
+    why: str
+    error: Callable[[str, Path], float]
+    expected: Mapping[str, Word] = field(default_factory=dict)
+    naive: Callable[[Path], str] | None = None
+
+    def wanted(self, implementation: str) -> Word:
+        """The outcome that this case must have in one implementation."""
+        return self.expected.get(implementation, "right")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """word : how it ended; error : in the case's unit, None where there is no answer; message : what was said."""
+
+    word: Word
+    error: float | None = None
+    message: str = ""
+
+
+def judge(case: Case, implementation: str, folder: Path) -> Outcome:
+    """Outcome of a case in one implementation; any error but the project's own passes through."""
+    try:
+        error = float(case.error(implementation, folder))
+    except InputError as refusal:
+        return Outcome("refused", message=str(refusal))
+    except RunFailed as failure:
+        return Outcome("raised", message=str(failure))
+    return Outcome("right" if error <= case.tolerance else "SILENT", error)

@@ -1,0 +1,107 @@
+"""Massless contact points: first-order states with a time constant of 1 ms, or of none at all."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from models.assembly import Assembly
+from models.effects.contact_points import contact_points
+from models.engines.protocol import Trajectory
+from models.signals import Sampled
+from validation.hard_cases import setups
+from validation.hard_cases.case import Case
+
+STEPS = (1e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
+LOAD = 1000.0
+
+
+def _compressions(assembly: Assembly, found: Trajectory) -> np.ndarray:
+    """Tyre compression (n, 2) in m along a run."""
+    channels = contact_points(assembly, found.times, found.states)
+    return found.states[:, :2] - np.column_stack([channels["zeta1"][1], channels["zeta2"][1]])
+
+
+def step_answer(engine: str, folder: Path) -> float:
+    """A force from 0 to 1 kN, steps from a tenth to twenty times the time constant."""
+    base = setups.vehicle()
+    values = np.zeros((10, 2))
+    values[1:] = LOAD
+    p, worst = base.parameters, 0.0
+    for step in STEPS:
+        assembly = setups.driven(base, Sampled(values, 2e-2, held=True))
+        found = setups.run(engine, assembly, step, 0.1, setups.IMPLICIT[engine])
+        since = np.maximum(found.times - 2e-2, 0.0)
+        truth = -LOAD / p.k1 * np.expm1(-since * p.k1 / p.d1)
+        worst = max(worst, setups.largest(_compressions(assembly, found)[:, 0] - truth) / (LOAD / p.k1))
+    return worst
+
+
+def step_answer_naive(folder: Path) -> str:
+    """The same state as a native MuJoCo activation with its usual filter."""
+    ends = []
+    for integrator in ("Euler", "RK4"):
+        model = mujoco.MjModel.from_xml_string(
+            f'<mujoco><option timestep="0.0055" integrator="{integrator}"/><worldbody><body><joint name="j"/>'
+            '<geom size="1"/></body></worldbody><actuator><general joint="j" dyntype="filter" dynprm="0.001" '
+            'gainprm="0"/></actuator></mujoco>')
+        data = mujoco.MjData(model)
+        data.ctrl[0] = 1.0
+        mujoco.mj_step(model, data, nstep=20)
+        ends.append(f"{abs(data.act[0]):.0e} ({integrator})")
+    return f"a native MuJoCo activation at 5.5 ms reaches {', '.join(ends)} times its load in 20 steps, unwarned"
+
+
+def linear_load(engine: str, folder: Path) -> float:
+    """A ramp of 1 kN in 20 ms: the compression lags by exactly what has not arrived."""
+    base = setups.vehicle()
+    values = LOAD * np.minimum(np.arange(6.0), 1.0)[:, None] * np.ones(2)
+    assembly = setups.driven(base, Sampled(values, 2e-2, held=False))
+    p, worst = base.parameters, 0.0
+    for step in (1e-3, 5e-3, 2e-2):
+        found = setups.run(engine, assembly, step, 0.1, setups.IMPLICIT[engine])
+        worst = max(worst, setups.largest(_compressions(assembly, found)[:, 0] - _ramp(found.times, p.k1, p.d1)))
+    return worst / (LOAD / p.k1)
+
+
+def _ramp(times: np.ndarray, stiffness: float, damping: float) -> np.ndarray:
+    """Compression (n,) under a load that rises to LOAD in 20 ms: two ramps, one of them late."""
+    lag = damping / stiffness
+
+    def one(t: np.ndarray) -> np.ndarray:
+        return np.where(t > 0, t + lag * np.expm1(-np.maximum(t, 0) / lag), 0.0)
+
+    return LOAD / stiffness / 2e-2 * (one(times) - one(times - 2e-2))
+
+
+def stamps(engine: str, folder: Path) -> float:
+    """The same ramp along an adaptive run, whose rows lie anywhere."""
+    name = {"reference": "DOP853", "exudyn": "DOPRI5"}.get(engine, "RK4")
+    base = setups.vehicle()
+    values = LOAD * np.minimum(np.arange(6.0), 1.0)[:, None] * np.ones(2)
+    assembly = setups.driven(base, Sampled(values, 2e-2, held=False))
+    found = setups.run(engine, assembly, 1e-3, 0.1, name)
+    p = base.parameters
+    return setups.largest(_compressions(assembly, found)[:, 0] - _ramp(found.times, p.k1, p.d1)) / (LOAD / p.k1)
+
+
+def undamped(engine: str, folder: Path) -> float:
+    """A tyre without damping: the contact point has no state and follows its force at once."""
+    base = setups.vehicle(d1=0.0, d2=0.0)
+    values = LOAD * np.random.default_rng(4).standard_normal((100, 2))
+    assembly = setups.driven(base, Sampled(values, 1e-3, held=True))
+    found = setups.run(engine, assembly, 1e-3, 0.1)
+    return setups.largest(_compressions(assembly, found)[:100] - values / base.parameters.k1) / (LOAD / base.parameters.k1)
+
+
+CASES = (
+    Case("contact point under a sudden force", "a state with a time constant of 1 ms beside a step of up to 20 ms",
+         "-f/k (1 - exp(-t k/d)) at steps of 0.1 to 20 ms", "of f/k", 1e-12, "an exact filter: rounding only",
+         step_answer, {}, step_answer_naive),
+    Case("contact point under a ramp", "a linear force within each step", "the ramp's closed form at 1, 5 and 20 ms",
+         "of f/k", 1e-12, "an exact filter: rounding only", linear_load),
+    Case("contact point along an adaptive run", "rows that do not lie on the samples' grid",
+         "the ramp's closed form at each row's own time", "of f/k", 1e-12, "an exact filter: rounding only", stamps),
+    Case("contact point without damping", "d = 0 makes the differential equation an algebraic one", "f/k at once",
+         "of f/k", 1e-12, "one division", undamped),
+)  # fmt: skip

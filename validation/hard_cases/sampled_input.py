@@ -1,0 +1,206 @@
+"""Sampled input: which sample is read when, held against linear, roads with kinks, damaged files."""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from models.engines.stability import first_order, linearised
+from models.errors import InputError
+from models.road.polyline import PolylineProfile
+from models.road.profile import SplineProfile
+from models.road.signal import RoadUnderWheels
+from models.scene import build as build_scene
+from models.signals import Sampled
+from models.simulate import simulate
+from models.time_series import write_time_series
+from validation.hard_cases import setups
+from validation.hard_cases.case import Case
+
+
+def momentum_error(engine: str, interpolation: str, values: np.ndarray, period: float, step: float) -> float:
+    """Largest error of sum m z' against the exact impulse of the forces, relative to the largest impulse."""
+    base = setups.vehicle("asymmetric_twin")
+    forces = Sampled(values, period, held=interpolation == "held")
+    steps = round((len(values) - 1) * period / step)
+    found = setups.run(engine, setups.driven(base, forces), step, steps * step)
+    p, every = base.parameters, round(period / step)
+    masses = np.array([p.m1, p.m2, p.m3])
+    total = values.sum(axis=1)
+    held = np.concatenate(([0.0], np.cumsum(total[:-1] * period)))
+    impulse = held if forces.held else held + period * (total - total[0]) / 2
+    truth = masses.sum() * p.g * period * np.arange(len(values)) - impulse
+    return setups.largest(found.states[::every, 4:7] @ masses - truth) / setups.largest(impulse)
+
+
+def ramp(engine: str, folder: Path) -> float:
+    """Forces that rise by 1 N per sample: a sample read too early or too late shows at once."""
+    values = np.add.outer(np.arange(1001.0), np.array([0.0, 100.0]))
+    return max(momentum_error(engine, "held", values, period, period) for period in (1e-3, 2e-3))
+
+
+def ramp_naive(folder: Path) -> str:
+    """Share of steps that read the wrong sample when accumulated time is truncated."""
+    shares = []
+    for step in (1e-3, 2e-3, 5.5e-3):
+        times = np.cumsum(np.full(2000, step)) - step
+        shares.append(np.mean((times / step).astype(int) != np.arange(2000)))
+    return "int(t / dt) with accumulated t reads the wrong sample in " + ", ".join(f"{x:.0%}" for x in shares) + \
+        " of the steps of 1, 2 and 5.5 ms"
+
+
+def impulse(engine: str, folder: Path) -> float:
+    """Noise, held and linear, at two steps per sample: sum f dt is conserved."""
+    values = 3800.0 + 800.0 * np.random.default_rng(3).standard_normal((251, 2))
+    return max(momentum_error(engine, rule, values, 2e-3, 1e-3) for rule in ("held", "linear"))
+
+
+def impulse_naive(folder: Path) -> str:
+    """How far the two rules are apart in pitch."""
+    base = setups.vehicle()
+    values = setups.static_forces(base, 1002, 2e-3, noise=800.0).values
+    ends = [setups.run("reference", setups.driven(base, Sampled(values, 2e-3, held)), 1e-3, 2.0).states[-1, 3]
+            for held in (True, False)]
+    return f"held and linear end {abs(ends[0] - ends[1]) / abs(ends[0]):.1%} apart in pitch: half a sample of shift"
+
+
+def halved(engine: str, folder: Path) -> float:
+    """Held noise at 2 ms, steps of 1 and 0.5 ms, against the matrix exponential on the samples."""
+    base = setups.vehicle(geometry="linear")
+    forces = setups.static_forces(base, 250, 2e-3, noise=500.0)
+    truth = setups.exact(setups.driven(base, forces), 2e-3, 250, forces.values)
+    coarse, fine = (setups.run(engine, setups.driven(base, forces), h, 0.5).states for h in (1e-3, 5e-4))
+    return setups.largest(fine[::4] - truth) / setups.largest(coarse[::2] - truth)
+
+
+@dataclass(frozen=True)
+class ByTime(Sampled):
+    """Held samples that every stage looks up at its own time: the last stage reads the next sample."""
+
+    def sample(self, start: float, step: float, count: int) -> np.ndarray:
+        """Values at start + i step."""
+        index, _ = self._place((start + step * np.arange(count)) / self.period)
+        return self.values[index]
+
+
+def halved_naive(folder: Path) -> str:
+    """The same with a force that is looked up at each stage's time."""
+    base = setups.vehicle(geometry="linear")
+    values = setups.static_forces(base, 251, 2e-3, noise=500.0).values
+    truth = setups.exact(setups.driven(base, Sampled(values, 2e-3, True)), 2e-3, 250, values[:250])
+    forces = ByTime(values, 2e-3, held=False)
+    errors = [setups.largest(setups.run("reference", setups.driven(base, forces), h, 0.5).states[:: round(2e-3 / h)]
+                             - truth) for h in (1e-3, 5e-4)]
+    return f"looked up at each stage's time: error {errors[0]:.1e} at 1 ms, {errors[1]:.1e} at 0.5 ms, order 1"
+
+
+@cache
+def _points() -> tuple[np.ndarray, np.ndarray]:
+    """A smooth road measured every 0.237 m: no knot falls on a step."""
+    s = 0.237 * np.arange(-20, 100)
+    rise = np.clip(s / 3.0, 0, 1) ** 3
+    return s, -0.02 * rise * np.sin(1.7 * s) - 0.004 * rise * np.sin(7.1 * s)
+
+
+def order(engine: str, profile: SplineProfile) -> float:
+    """Observed order over steps of 2, 1 and 0.5 ms, from the largest state difference over 1 s."""
+    base = setups.vehicle()
+    road = base.with_input("road", RoadUnderWheels(profile, 20.0, 2.0))
+    runs = [setups.run(engine, road, h, 1.0).states for h in (2e-3, 1e-3, 5e-4)]
+    first, second = runs[1][::2] - runs[0], runs[2][::4] - runs[1][::2]
+    return float(np.log2(setups.largest(first) / setups.largest(second)))
+
+
+def c2_road(engine: str, folder: Path) -> float:
+    """Order on the C2 road through the points."""
+    return max(0.0, 4.0 - order(engine, SplineProfile.through(*_points())))
+
+
+def polyline_naive(folder: Path) -> str:
+    """Order on straight lines through the same points."""
+    return f"straight lines through the same points: order {order('reference', PolylineProfile.through(*_points())):.1f}"
+
+
+def noise_adaptive(engine: str, folder: Path) -> float:
+    """An adaptive solver on held noise: restarted at each sample, or refused."""
+    name = {"reference": "DOP853"}.get(engine, "DOPRI5")
+    build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
+    base = setups.vehicle(geometry="linear")
+    forces = setups.static_forces(base, 200, 1e-3, noise=500.0)
+    found = setups.run(engine, setups.driven(base, forces), 1e-3, 0.2, name)
+    return setups.largest(found.states - setups.exact(setups.driven(base, forces), 1e-3, 200, forces.values))
+
+
+def noise_adaptive_naive(folder: Path) -> str:
+    """scipy's RK45 straight across the jumps."""
+    base = setups.vehicle(geometry="linear")
+    forces = setups.static_forces(base, 200, 1e-3, noise=500.0)
+    driven = setups.driven(base, forces)
+    linear = linearised(driven.vehicle, guided=False)
+    a, masses, g = first_order(linear), linear[0].diagonal(), base.parameters.g
+
+    def rhs(t: float, y: np.ndarray) -> np.ndarray:
+        u = forces.values[min(int(t / 1e-3), 199)]
+        return a @ y + np.array([0, 0, 0, 0, g - u[0] / masses[0], g - u[1] / masses[1], g, 0])
+
+    found = solve_ivp(rhs, (0, 0.2), base.initial, rtol=1e-4, atol=1e-6)
+    error = setups.largest(found.y[:, -1] - setups.exact(driven, 1e-3, 200, forces.values)[-1])
+    return f"RK45 straight across the jumps: {found.nfev} force calls for 200 samples, error {error:.0e}"
+
+
+def damaged(engine: str, folder: Path) -> float:
+    """A NaN in the 58th sample of a force file; the message must name its line."""
+    values = np.full(301, 3825.9)
+    values[57] = np.nan
+    write_time_series(folder / "forces.csv", {"front": ("N", values), "rear": ("N", values)}, 1e-3)
+    scene = build_scene({"title": "", "run": {"duration": 0.2}, "effects": {
+        "wheel_forces": {"file": "forces.csv", "interpolation": "held"}}}, "scene.toml", folder)
+    try:
+        return setups.largest(simulate(scene, engine).states)
+    except InputError as error:
+        if "line 59" not in str(error):
+            raise AssertionError(f"the line is not named: {error}") from error
+        raise
+
+
+def damaged_past_reader(engine: str, folder: Path) -> float:
+    """The same NaN given past the reader: the guard after the run must see it."""
+    base = setups.vehicle()
+    forces = setups.static_forces(base, 200, 1e-3)
+    forces.values[57, 0] = np.nan
+    return setups.largest(setups.run(engine, setups.driven(base, forces), 1e-3, 0.2).states)
+
+
+def uneven(engine: str, folder: Path) -> float:
+    """Samples every 1 ms, steps of 0.7 ms."""
+    base = setups.vehicle()
+    forces = setups.static_forces(base, 211, 1e-3, noise=500.0)
+    return setups.largest(setups.run(engine, setups.driven(base, forces), 0.7e-3, 0.21).states)
+
+
+REFUSED = {"reference": "refused", "exudyn": "refused", "mujoco": "refused"}
+
+CASES = (
+    Case("replay of a ramp", "time accumulates rounding, so a truncated index slips by one sample",
+         "sum m z' equals the impulse of the samples at every step", "of the impulse", 1e-12,
+         "a thousand additions of doubles", ramp, {}, ramp_naive),
+    Case("held against linear", "the two rules differ by half a sample; each must conserve its own impulse",
+         "sum m z' equals the impulse at every sample", "of the impulse", 1e-12, "a thousand additions of doubles",
+         impulse, {}, impulse_naive),
+    Case("samples belong to the recorder", "held samples must not move when the step is halved",
+         "matrix exponential on the samples: the error falls with the step", "of the error at the double step", 0.1,
+         "order 4 gives 1/16; a force that is looked up per stage gives 1/2", halved, {}, halved_naive),
+    Case("measured road between its points", "straight lines have a slope that jumps", "observed order 4 on the C2 road",
+         "orders lost", 0.5, "the third derivative still jumps at each point", c2_road, {}, polyline_naive),
+    Case("adaptive solver on held noise", "every sample is a jump that an error estimate takes for its own",
+         "matrix exponential on the samples", "m, rad, m/s, rad/s", 1e-6, "tolerance 1e-9, restarted at each sample",
+         noise_adaptive, {"exudyn": "refused", "mujoco": "refused"}, noise_adaptive_naive),
+    Case("NaN in a force file", "numpy reads it and the solvers carry it on", "refused with its line", "", 0.0,
+         "there is no answer", damaged, REFUSED),
+    Case("NaN past the reader", "Exudyn's explicit solvers end 'successfully' with it", "raised", "", 0.0,
+         "there is no answer", damaged_past_reader, {"reference": "raised", "exudyn": "raised", "mujoco": "raised"}),
+    Case("step that does not divide the sampling period", "a held sample would change within a step", "refused", "",
+         0.0, "there is no answer", uneven, REFUSED),
+)  # fmt: skip

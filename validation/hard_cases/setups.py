@@ -1,0 +1,107 @@
+"""Vehicles, inputs and exact answers that the hard cases share."""
+
+from dataclasses import replace
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm
+
+from models.assembly import Assembly, Mode, assemble
+from models.engines.catalogue import RECOMMENDED
+from models.engines.protocol import Settings, Trajectory, build
+from models.engines.stability import first_order, linearised
+from models.scene import build as build_scene
+from models.signals import Sampled, Signal, Smooth, Stacked
+
+IMPLICIT = {"reference": "Radau", "exudyn": "GeneralizedAlpha", "mujoco": "discrete"}
+"""For each implementation an integrator that no step makes unstable."""
+CONSTRAINED = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
+
+
+def vehicle(parameters: str = "itwm_drift", geometry: str = "exact", initial: np.ndarray | None = None,
+            effects: dict[str, Any] | None = None, **override: float) -> Assembly:  # fmt: skip
+    """The vehicle at rest on the flat road, or in the state (8,) that is given."""
+    scene = build_scene({
+        "title": "hard case", "vehicle": {"parameters": parameters, "geometry": geometry, "override": override},
+        "run": {"duration": 1.0}, "effects": effects or {},
+    })  # fmt: skip
+    assembly = assemble(scene)
+    return assembly if initial is None else replace(assembly, initial=np.array(initial, dtype=float))
+
+
+def driven(base: Assembly, forces: Signal, mode: Mode = "force") -> Assembly:
+    """The vehicle cut off the road and driven by two wheel forces (N)."""
+    return base.without_tyres().with_input(mode, forces)
+
+
+def guided(base: Assembly, forces: Signal, pitch: Signal) -> Assembly:
+    """The driven vehicle whose pitch follows a signal with its two derivatives; it starts consistently."""
+    start = base.initial.copy()
+    start[[3, 7]] = pitch.at(0.0)[:2]
+    return replace(base.without_tyres().with_input("pitch", Stacked((forces, pitch))), initial=start)
+
+
+def smooth_pitch(angles: np.ndarray, period: float) -> Smooth:
+    """Samples of a pitch angle (rad) as a scene reads them: a quintic spline with two derivatives."""
+    return Smooth(angles[:, None], period, derivatives=2, degree=5)
+
+
+def static_forces(base: Assembly, count: int, period: float, held: bool = True, noise: float = 0.0,
+                  seed: int = 1) -> Sampled:  # fmt: skip
+    """Wheel forces (N) that carry the vehicle, with independent noise of a standard deviation (N) per sample."""
+    p, z = base.parameters, base.initial
+    carried = np.array([p.k1 * z[0], p.k2 * z[1]])
+    return Sampled(carried + noise * np.random.default_rng(seed).standard_normal((count, 2)), period, held)
+
+
+def settings(engine: str, step: float, duration: float, integrator: str = "", **other: float) -> Settings:
+    """Settings with the recommended integrator unless another is named."""
+    return Settings(integrator or RECOMMENDED[engine], step, duration, **other)
+
+
+def run(engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **other: float) -> Trajectory:
+    """A run as a user gets it: refused where it must be."""
+    return build(engine, assembly, settings(engine, step, duration, integrator, **other)).run()
+
+
+def unchecked(engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "",
+              **other: float) -> Trajectory:  # fmt: skip
+    """The same past the checks before a run, so that only the guard after it stands."""
+    own = settings(engine, step, duration, integrator, **other)
+    return import_module(f"models.engines.{engine}").build(assembly, own).run()
+
+
+def tight(assembly: Assembly, step: float, duration: float) -> Trajectory:
+    """The independent solution: the paper's equations, order 8, relative tolerance 1e-12, rows every ``step``."""
+    return run("reference", assembly, step, duration, "DOP853", tolerance=1e-12)
+
+
+def exact(assembly: Assembly, step: float, count: int, forces: np.ndarray | None = None) -> np.ndarray:
+    """States (count + 1, 8) of the linearised vehicle, exact by the matrix exponential.
+
+    forces (count, 2) in N are held over each step; None is the vehicle on the flat road.
+    """
+    linear = linearised(assembly.vehicle, guided=False)
+    push = np.zeros((count, 4))
+    push[:, :3] = [body.mass * assembly.vehicle.gravity for body in assembly.vehicle.bodies]
+    if forces is not None:
+        push[:, :2] -= forces
+    block = np.zeros((16, 16))
+    block[:8, :8], block[:8, 8:] = first_order(linear), np.eye(8)
+    moved = expm(block * step)
+    states = [assembly.initial]
+    for row in push:
+        rate = np.concatenate((np.zeros(4), row / linear[0].diagonal()))
+        states.append(moved[:8, :8] @ states[-1] + moved[:8, 8:] @ rate)
+    return np.array(states)
+
+
+def largest(difference: np.ndarray) -> float:
+    """Largest magnitude of any entry."""
+    return float(np.abs(difference).max())
+
+
+def rms(values: np.ndarray) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))

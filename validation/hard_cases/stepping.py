@@ -1,0 +1,187 @@
+"""Steps: at the edge of stability and beyond it, resets, sudden loads, repeats, restarts, adaptive stamps."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import exudyn as exu
+import mujoco
+import numpy as np
+
+from models.engines import exudyn as exudyn_engine
+from models.engines import mujoco as mujoco_engine
+from models.engines.protocol import build
+from models.scene import build as build_scene
+from models.signals import Sampled
+from validation.hard_cases import setups
+from validation.hard_cases.case import Case
+
+ROAD = {"road": {"source": "study", "speed": 20.0}}
+EULER = {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}
+
+
+def _pushed(geometry: str = "linear"):
+    """One wheel 1 mm off its equilibrium."""
+    base = setups.vehicle(geometry=geometry)
+    return replace(base, initial=base.initial + np.array([1e-3, 0, 0, 0, 0, 0, 0, 0]))
+
+
+def inside_limit(engine: str, folder: Path) -> float:
+    """RK4 at 3.9 ms for 300 steps: the fastest mode must have died."""
+    assembly = _pushed()
+    found = setups.run(engine, assembly, 3.9e-3, 1.17)
+    return setups.largest(found.states[-1] - setups.exact(assembly, 3.9e-3, 300)[-1]) / 1e-3
+
+
+def beyond_limit(engine: str, folder: Path) -> float:
+    """RK4 at 5 ms over 40 ms: eight steps, all values small and finite."""
+    assembly = setups.vehicle(effects=ROAD)
+    found = setups.run(engine, assembly, 5e-3, 0.04)
+    return _against_tight(assembly, found.states, 5e-3)
+
+
+def _against_tight(assembly, states, step: float) -> float:
+    """Error of the states relative to the motion of the tight solution."""
+    truth = setups.tight(assembly, step, (len(states) - 1) * step).states
+    return setups.largest(states - truth) / setups.largest(truth - truth[0])
+
+
+def beyond_limit_naive(folder: Path) -> str:
+    """The same run without the check."""
+    assembly = setups.vehicle(effects=ROAD)
+    found = setups.unchecked("exudyn", assembly, 5e-3, 0.04)
+    share = _against_tight(assembly, found.states, 5e-3)
+    return f"unchecked, all three answer with a finite error of {share:.0%} of the motion, which doubles every step"
+
+
+def reset(engine: str, folder: Path) -> float:
+    """RK4 at 8 ms past the checks: only the guard after the run is left."""
+    assembly = setups.vehicle(effects=ROAD)
+    return _against_tight(assembly, setups.unchecked(engine, assembly, 8e-3, 2.0).states, 8e-3)
+
+
+def reset_naive(folder: Path) -> str:
+    """MuJoCo as it comes: the state is reset and time begins again."""
+    model = mujoco_engine.MujocoModel(_pushed("exact"), setups.settings("mujoco", 8e-3, 2.0)).model
+    model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    data = mujoco.MjData(model)
+    data.qpos[:] = _pushed("exact").initial[:4]
+    resets, before = 0, 0.0
+    for _ in range(250):
+        mujoco.mj_step(model, data)
+        resets, before = resets + (data.time <= before), data.time
+    return f"MuJoCo resets itself {resets} times, ends at t = {data.time:.3f} s of 2 s, all finite, no exception"
+
+
+def huge(engine: str, folder: Path) -> float:
+    """A first-order explicit run at 5 ms past the checks."""
+    assembly = setups.vehicle(effects=ROAD)
+    return _against_tight(assembly, setups.unchecked(engine, assembly, 5e-3, 2.0, EULER[engine]).states, 5e-3)
+
+
+def huge_naive(folder: Path) -> str:
+    """Exudyn's own verdict and the largest finite state."""
+    assembly = setups.vehicle(geometry="linear", initial=_pushed().initial)
+    model = exudyn_engine.build(assembly, setups.settings("exudyn", 5e-3, 2.0, "ExplicitEuler"))
+    said = model.built.mbs.SolveDynamic(model._options(), solverType=exu.DynamicSolverType.ExplicitEuler)
+    _, states = model._recorded()
+    return f"Exudyn returns {said} with states of up to {setups.largest(states[np.isfinite(states)]):.0e}"
+
+
+def sudden(engine: str, folder: Path) -> float:
+    """Front force up by 1 kN from one sample to the next, 1 ms steps."""
+    assembly, forces = _step_force()
+    found = setups.run(engine, assembly, 1e-3, 0.2)
+    truth = setups.exact(assembly, 1e-3, 200, forces.sample(0.0, 1e-3, 200))
+    return setups.largest(found.states - truth) / setups.largest(truth[:, 4])
+
+
+def _step_force():
+    base = setups.vehicle(geometry="linear")
+    values = setups.static_forces(base, 20, 10e-3).values.copy()
+    values[5:, 0] += 1000.0
+    forces = Sampled(values, 10e-3, held=True)
+    return setups.driven(base, forces), forces
+
+
+def sudden_naive(folder: Path) -> str:
+    """Generalised-alpha with a step that does not see the fast pole."""
+    assembly, forces = _step_force()
+    found = setups.run("exudyn", assembly, 10e-3, 0.2, "GeneralizedAlpha", spectral_radius=0.9)
+    truth = setups.exact(assembly, 10e-3, 20, forces.values)
+    off = (found.states - truth)[6:9, 4]
+    return ("Exudyn's default at 10 ms overshoots: front wheel velocity off by "
+            f"{', '.join(f'{value:+.3f}' for value in off)} m/s (peak {setups.largest(truth[:, 4]):.3f})")
+
+
+def repeat(engine: str, folder: Path) -> float:
+    """The same model run twice, asked for an acceleration in between: the same bits."""
+    base = setups.vehicle()
+    forces = setups.static_forces(base, 200, 1e-3, noise=500.0)
+    worst = 0.0
+    for integrator in ("", setups.IMPLICIT[engine]):
+        model = build(engine, setups.driven(base, forces), setups.settings(engine, 1e-3, 0.2, integrator))
+        first = model.run().states
+        model.acceleration(0.05, first[50])
+        worst = max(worst, setups.largest(model.run().states - first))
+    return worst
+
+
+def restart(engine: str, folder: Path) -> float:
+    """Stopped after half the time and continued from the saved state."""
+    base = setups.vehicle()
+    forces = setups.static_forces(base, 400, 1e-3, noise=500.0)
+    whole = setups.run(engine, setups.driven(base, forces), 1e-3, 0.4).states
+    rest = setups.driven(replace(base, initial=whole[200].copy()), Sampled(forces.values[200:], 1e-3, True))
+    return setups.largest(setups.run(engine, rest, 1e-3, 0.2).states - whole[200:])
+
+
+def stamps(engine: str, folder: Path) -> float:
+    """An adaptive run, each row compared at its own time."""
+    name = {"reference": "DOP853"}.get(engine, "DOPRI5")
+    build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
+    assembly = _pushed()
+    found = setups.run(engine, assembly, 1e-3, 0.2, name)
+    steps = np.diff(found.times)
+    truth = [assembly.initial]
+    for i, step in enumerate(steps):
+        truth.append(setups.exact(replace(assembly, initial=truth[i]), step, 1)[1])
+    return setups.largest(found.states - np.array(truth))
+
+
+def stamps_naive(folder: Path) -> str:
+    """Rows taken for times."""
+    assembly = _pushed()
+    found = setups.run("exudyn", assembly, 1e-3, 0.2, "DOPRI5")
+    off = np.abs(found.times - 1e-3 * np.arange(len(found.times)))
+    truth = setups.exact(assembly, 1e-3, len(found.times) - 1)
+    return (f"Exudyn's rows lie up to {off.max() * 1e3:.2g} ms off the grid: compared row by row the same run "
+            f"shows an error of {setups.largest(found.states - truth):.0e}")
+
+
+REFUSED = {"reference": "refused", "exudyn": "refused", "mujoco": "refused"}
+RAISED = {"reference": "raised", "exudyn": "raised", "mujoco": "raised"}
+
+CASES = (
+    Case("stiff damper, step just inside the limit", "a 10 kN s/m damper on a 15 kg wheel: fastest pole -691 1/s, RK4 "
+         "is stable up to 4.03 ms", "matrix exponential after 300 steps of 3.9 ms", "of the push", 1e-4,
+         "the fast mode has shrunk by 0.87 per step; what is left is RK4's error of the slow ones", inside_limit),
+    Case("stiff damper, step just beyond the limit", "RK4 at 5 ms over eight steps: everything is still small and finite",
+         "refused with the limit named, before the run", "of the motion", 0.1, "a tenth of the motion is no answer",
+         beyond_limit, REFUSED, beyond_limit_naive),
+    Case("automatic reset", "an unstable MuJoCo run starts again from t = 0 and goes on", "time rises to n h",
+         "of the motion", 0.1, "a tenth of the motion is no answer", reset, RAISED, reset_naive),
+    Case("finite but huge states", "explicit runs end 'successfully' far beyond any vehicle", "size bound of 1e4",
+         "of the motion", 0.1, "a tenth of the motion is no answer", huge, RAISED, huge_naive),
+    Case("sudden load", "a force jumps from one sample to the next; the wheel answers within 1.5 ms",
+         "matrix exponential with held forces", "of the peak wheel velocity", 5e-3,
+         "RK4 at 1 ms meets the pole -691 1/s with h lambda = 0.7: (0.7)^5 / 120 = 1.4e-3 per step at the jump",
+         sudden, {}, sudden_naive),
+    Case("repeated run", "solvers and callbacks keep state between runs", "the same bits", "m, rad, m/s, rad/s", 0.0,
+         "the same operations in the same order", repeat),
+    Case("restart from a saved state", "a continued run must not differ from an uninterrupted one",
+         "the uninterrupted run", "m, rad, m/s, rad/s", 1e-12, "times are counted anew: only rounding may differ",
+         restart),
+    Case("adaptive output stamps", "an adaptive engine's rows do not lie where they were asked for",
+         "matrix exponential at the returned times", "m, rad, m/s, rad/s", 1e-6,
+         "tolerance 1e-9 per step; DOP853 reads its rows from a polynomial between steps, two digits worse", stamps, {"mujoco": "refused"}, stamps_naive),
+)  # fmt: skip
