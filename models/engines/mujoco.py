@@ -7,6 +7,8 @@ constraints are soft (a fifth of the enforced moment is lost), so a prescribed p
 without that joint, and inverse dynamics of the full one for the moment.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,6 +85,17 @@ def _held(spec: mujoco.MjSpec, vehicle: Vehicle, gear: float) -> None:
     for axle in vehicle.axles:
         spec.add_actuator(name=f"{axle.name} force", target=f"{axle.wheel} z", trntype=mujoco.mjtTrn.mjTRN_JOINT,
                           gear=[gear, 0, 0, 0, 0, 0], gainprm=[1.0 if gear else 0.0, *[0] * 9])
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep MuJoCo from printing warnings and writing a log into the user's folder: the guard reports them."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 @dataclass
@@ -176,7 +189,7 @@ class MujocoModel:
         states = np.empty((n + 1, 8))
         free = [0, 1, 2, 4, 5, 6] if self.guided else list(range(8))
         states[0] = self.assembly.initial
-        with self._callback():
+        with self._callback(), _quiet():
             self._advance(states, free)
         times = self.settings.step * np.arange(n + 1)
         if self.guided:
@@ -222,8 +235,6 @@ class MujocoModel:
         return f"; MuJoCo warned {', '.join(found)}" if found else ""
 
     def _callback(self):
-        from contextlib import nullcontext
-
         if mujoco.get_mjcb_control() is not None or mujoco.get_mjcb_passive() is not None:
             raise RunFailed("mujoco", "another callback is installed in this process: its forces would act here, too")
         if self.drive.law is None:
