@@ -243,3 +243,16 @@ def test_defaults_are_those_of_the_installed_engines():
     assert RADII["GeneralizedAlpha 0.9"] == ti.generalizedAlpha.spectralRadius
     assert DEFAULTS["mujoco", "Euler", option.timestep] == "MuJoCo"
     assert option.integrator == mujoco.mjtIntegrator.mjINT_EULER
+
+
+def test_every_force_in_one_callback_gives_the_native_path():
+    from models.assembly import assemble
+    from models.engines.protocol import Settings, build
+    from validation.price.compiled_forces import CompiledForces
+    from validation.scenes import VEHICLES, road_scene
+
+    settings = Settings("RK4", 1e-3, 0.5)
+    for parameters in VEHICLES:
+        assembly = assemble(road_scene(parameters, duration=0.5))
+        native = build("mujoco", assembly, settings).run().states
+        assert np.abs(CompiledForces(assembly, settings).run() - native).max() < 1e-12

@@ -15,7 +15,7 @@ from validation.price.force_calls import counted
 from validation.price.problems import Problem, Setting, road_excited
 from validation.price.rows import rows_of
 from validation.price.tables import tables as cost_tables
-from validation.rows import Row, System, Table, behaves, finding, within
+from validation.rows import Row, System, Table, at_most, behaves, finding, within
 
 TITLE = "What accuracy costs"
 SYSTEM: System = "cost"
@@ -24,6 +24,12 @@ ROUNDS = {True: 5, False: 15}
 """Interleaved rounds of timing, by ``quick``."""
 LEAST = {True: 0.004, False: 0.01}
 """A short run is repeated until its turn lasts this long (s), by ``quick``."""
+CALLBACKS = {
+    "all compiled to no forces": "every force in one compiled callback, by the same model without forces",
+    "to no callback": "native springs and a compiled callback for the road, by the same without its callback",
+    "to no forces": "native springs and a compiled callback for the road, by the bodies without any force",
+}
+"""Ratios of seconds and what they compare."""
 COUNTED = 0.2
 """Length (s) of the runs whose force calls are counted from outside."""
 
@@ -88,13 +94,14 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
 def _speed_rows(data: dict[str, Any]) -> list[Row]:
     """Targets about seconds: reported with their intervals, never judged."""
     why = "a target about seconds, which are reported and never gated"
-    rows = []
+    gap = data["callback"]["RK4"]["gap"]
+    rows = [at_most("price.callback.gap", SYSTEM, "MuJoCo RK4: every force in one compiled callback against native springs",
+                    gap, "m, rad, m/s, rad/s", 1e-12, "the same forces at the same stages, written twice", "native")]
     for integrator, found in data["callback"].items():
-        for key, words in (("to no callback", "the same model without its callback"),
-                           ("to no forces", "the same bodies without springs, dampers and callback")):  # fmt: skip
+        for key, words in CALLBACKS.items():
             ratio, low, high = found[key]
-            what = f"MuJoCo {integrator}, driven through a compiled callback, by {words}: paired seconds"
-            rows.append(finding(f"price.callback.{integrator}.{key.replace(' ', '-')}", SYSTEM, what, ratio, "times",
+            rows.append(finding(f"price.callback.{integrator}.{key.replace(' ', '-')}", SYSTEM,
+                                f"MuJoCo {integrator}, {words}: paired seconds", ratio, "times",
                                 f"at most 1.2; 95 % interval {low:.3f} to {high:.3f}", why, "none"))  # fmt: skip
     for key, factor in ((key, data["real time"][key]) for key in ("with table", "without table")):
         what = f"reference RK4 at 1 ms, {key.replace('table', 'making its road table')}"

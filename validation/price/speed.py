@@ -1,5 +1,6 @@
 """Two claims about seconds: what a compiled callback costs in MuJoCo, and how fast the reference runs."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -8,24 +9,30 @@ import numpy as np
 from models.assembly import Assembly, assemble
 from models.engines.protocol import Settings, build
 from models.scene import build as build_scene
+from validation.price.compiled_forces import CompiledForces
 from validation.timing import describe, interleave, paired_ratio
 
 STEP = 1e-3
 
 
 def callback_cost(driven: Assembly, duration: float, integrator: str, rounds: int, least: float) -> dict[str, Any]:
-    """Paired ratios of one MuJoCo model in three states: without forces, with its springs and dampers, driven.
+    """Paired ratios of one MuJoCo model: bare, with native springs and dampers, driven, all in one callback.
 
     driven : a vehicle on a road, whose input enters through a compiled callback.
-    Values are (ratio, low, high) with a bootstrap 95 % interval, and medians in s.
+    Values are (ratio, low, high) with a bootstrap 95 % interval, and medians in s. ``gap`` is the largest
+    difference of states between the native route and the one with every force in the callback.
     """
     flat = assemble(build_scene({"title": "no input", "run": {"duration": duration, "step": STEP}}))
     bare = replace(flat, vehicle=replace(flat.vehicle, struts=()))
     settings = Settings(integrator, STEP, duration)
     models = [build("mujoco", assembly, settings) for assembly in (bare, flat, driven)]
-    seconds = interleave([model.run for model in models], rounds, least)
-    names = ("without forces", "springs and dampers", "with callback")
+    compiled = CompiledForces(driven, settings)
+    runs: list[Callable[[], Any]] = [model.run for model in models]
+    seconds = interleave([*runs, compiled.coast, compiled.run], rounds, least)
+    names = ("without forces", "springs and dampers", "with callback", "bare", "all in the callback")
     return {
+        "gap": float(np.abs(compiled.run() - models[2].run().states).max()),
+        "all compiled to no forces": paired_ratio(seconds[4], seconds[3]),
         "callbacks": [model.plan()["callbacks"] for model in models],
         "seconds": {name: describe(own) for name, own in zip(names, seconds, strict=True)},
         "to no forces": paired_ratio(seconds[2], seconds[0]),

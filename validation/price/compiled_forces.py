@@ -1,0 +1,80 @@
+"""The vehicle in MuJoCo with every force in one compiled callback, beside the adapter's native springs.
+
+Written once more from eqs (35) and (36): an independent route, and the price of compiled callbacks.
+"""
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+from numba import carray, cfunc, types
+
+from models.assembly import Assembly
+from models.engines import mujoco as adapter
+from models.engines.mujoco_callback import _array_at, _double_at, _offsets, installed
+from models.engines.protocol import Settings
+
+PARAMETERS = 17
+"""Rows per second and number of rows, before the vehicle's fifteen parameters."""
+
+
+def _compile(numeric, passive, time, position, velocity):
+    @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
+    def law(model, data):
+        header = carray(_array_at(model, numeric), (PARAMETERS,))
+        row = int(np.rint(carray(_double_at(data, time), (1,))[0] * header[0]))
+        if not 0 <= row < int(header[1]):
+            return
+        road = carray(_array_at(model, numeric), (PARAMETERS + 4 * int(header[1]),))
+        q, v = carray(_array_at(data, position), (4,)), carray(_array_at(data, velocity), (4,))
+        force = carray(_array_at(data, passive), (4,))
+        at = PARAMETERS + 4 * row
+        a, b = header[2], header[3]
+        sine, cosine = np.sin(q[3]), np.cos(q[3])
+        f1 = header[8] * (q[0] - road[at]) + header[12] * (v[0] - road[at + 2])
+        f2 = header[9] * (q[1] - road[at + 1]) + header[13] * (v[1] - road[at + 3])
+        f3 = header[10] * (q[2] - q[0] - b * sine) + header[14] * (v[2] - v[0] - b * v[3] * cosine)
+        f4 = header[11] * (q[2] - q[1] + a * sine) + header[15] * (v[2] - v[1] + a * v[3] * cosine)
+        force[0] += f3 - f1
+        force[1] += f4 - f2
+        force[2] -= f3 + f4
+        force[3] += cosine * (b * f3 - a * f4)
+
+    return law
+
+
+@cache
+def law() -> Any:
+    """The callback, compiled when first asked for."""
+    return _compile(*_offsets("numeric_data", "qfrc_passive", "time", "qpos", "qvel"))
+
+
+class CompiledForces:
+    """A road-excited assembly as bare MuJoCo bodies and one compiled callback."""
+
+    def __init__(self, assembly: Assembly, settings: Settings) -> None:
+        self.assembly, self.settings = assembly, settings
+        bare = replace(assembly.vehicle, struts=())
+        spec = adapter._spec(bare, settings, guided=False)
+        assert assembly.input is not None
+        table = assembly.input.sample(0.0, settings.step / 2, 2 * settings.steps + 1)
+        header = [2.0 / settings.step, len(table), *assembly.parameters.array()]
+        content = np.concatenate((header, table.ravel()))
+        spec.add_numeric(name="input", size=len(content), data=[0.0])
+        self.model = spec.compile()
+        self.model.numeric_data[:] = content
+        self.data = mujoco.MjData(self.model)
+
+    def run(self) -> np.ndarray:
+        """States (n + 1, 8); without guards, for comparison and timing only."""
+        with installed(law()):
+            return self.coast()
+
+    def coast(self) -> np.ndarray:
+        """The same model with no forces but its weight."""
+        start = np.concatenate(([0.0], self.assembly.initial))
+        path, _ = rollout.rollout(self.model, self.data, start[None, :], nstep=self.settings.steps)
+        return np.vstack([self.assembly.initial, path[0, :, 1:9]])
