@@ -17,6 +17,8 @@ from models.errors import InputError, RunFailed
 from models.vehicles import pitch_plane
 
 Make = Callable[[Assembly, Settings], Model]
+SEED = 20
+"""Of the random states."""
 SPREAD = np.array([0.5, 0.5, 0.5, 0.6, 3.0, 3.0, 3.0, 3.0])
 """Half-width of the random states (m, rad, m/s, rad/s): pitch up to 34 degrees, far beyond any road."""
 
@@ -28,7 +30,7 @@ def engine(name: str) -> Make:
 
 def random_states(count: int = 100) -> np.ndarray:
     """The states (count, 8) of the audit, the same ones every time."""
-    return np.random.default_rng(20).uniform(-1, 1, (count, 8)) * SPREAD
+    return np.random.default_rng(SEED).uniform(-1, 1, (count, 8)) * SPREAD
 
 
 def accelerations(make: Make, assembly: Assembly, settings: Settings, states: np.ndarray) -> np.ndarray:

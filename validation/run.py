@@ -31,7 +31,7 @@ def validate(folder: Path, quick: bool, command: str) -> int:
             rows += _measure(name, quick, folder)
             seconds[name] = time.perf_counter() - start
             bar.advance(task)
-    _save(folder, rows, {**provenance(command), "quick": quick, "seconds": seconds})
+    _save(folder, rows, {**provenance(command), "seeds": seeds(), "quick": quick, "seconds": seconds})
     from validation.report.page import write
 
     page = write(folder)
@@ -48,6 +48,16 @@ def _measure(name: str, quick: bool, folder: Path) -> list[Row]:
         return [Row(f"{name}.broken", "pitch-plane", f"case {name}", None, "", "", None, "", "none", "failed", reason)]
     (folder / "data" / f"{name}.json").write_text(json.dumps(data))
     return rows
+
+
+def seeds() -> dict[str, int]:
+    """Every seed that the rows depend on; with them and the versions all counts and states repeat exactly."""
+    from studies.six_runs import Options
+    from validation import checks, timing
+    from validation.cases import roads
+
+    return {"random states": checks.SEED, "class C road": roads.SEED, "six runs": Options().seed,
+            "order of timing": timing.SEED}  # fmt: skip
 
 
 def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:

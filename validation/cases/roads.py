@@ -18,6 +18,8 @@ from validation.scenes import COURSE, data_folder, gap, road_scene
 TITLE = "Roads: formula, class, OpenCRG and CSV"
 SYSTEM: System = "pitch-plane"
 LENGTH, INCREMENT = 60.0, 0.05
+SEED = 3
+"""Of the class C road's phases."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -106,7 +108,7 @@ def _recurrence() -> Row:
 def _class_variance() -> Row:
     """Variance of a class C road against the integral of its density over the band."""
     low, high = 0.05, 2.0
-    road = iso8608_road("C", seed=3, n_min=low, n_max=high, waves=80, window_length=0.0)
+    road = iso8608_road("C", seed=SEED, n_min=low, n_max=high, waves=80, window_length=0.0)
     height = road.sample_uniform(0.0, 0.05, 400_000)[0]
     expected = CLASSES["C"] * 0.1**2 * (1 / low - 1 / high)
     return within(
