@@ -14,7 +14,7 @@ import numpy as np
 
 from models.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import Settings, Trajectory, guard
+from models.engines.protocol import Settings, Trajectory, balanced, guard
 from models.vehicles.description import PitchSpring, Point, Strut
 from models.vehicles.linear import matrices
 
@@ -310,7 +310,16 @@ class ExudynModel:
         times, states = self._recorded()
         moment = self._enforced()
         guard("exudyn", times, states, self.settings.duration, note, moment)
-        return Trajectory(times, states, moment, self._counts())
+        counts = self._counts()
+        if moment is not None:
+            balanced("exudyn", times, moment, lambda i: self._balance(times[i], states[i]))
+        return Trajectory(times, states, moment, counts)
+
+    def _balance(self, time: float, state: np.ndarray) -> tuple[float, float]:
+        """Moment that the prescribed pitch takes at one row of a run, and the inertia term (N m)."""
+        assert self.assembly.input is not None
+        inertia, wanted = self.assembly.parameters.I, float(self.assembly.input.at(time)[4])
+        return inertia * (wanted - float(self._free_acceleration(time, state)[3])), inertia * wanted
 
     def _consistent_start(self, options: Any) -> None:
         """Begin with the accelerations that belong to the prescribed pitch.

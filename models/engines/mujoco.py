@@ -176,6 +176,9 @@ class MujocoModel:
         self.assembly, self.settings = assembly, settings
         self.guided = assembly.mode == "pitch"
         self.drive = _drive(assembly, settings)
+        for table in (self.drive.table, self.drive.controls):  # the discrete integrator skips a force that is no number
+            if table is not None and not np.isfinite(table).all():
+                raise RunFailed("mujoco", "the input holds an infinite value or one that is not a number")
         self.model = _compiled(assembly, settings, self.drive, self.guided)
         self.data = mujoco.MjData(self.model)
         if self.drive.law is not None:

@@ -4,6 +4,7 @@ An engine is a module with ``build(assembly, settings) -> Model``. A model runs 
 and can be asked for its acceleration at any state, for the build audit.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Protocol
@@ -19,6 +20,11 @@ if TYPE_CHECKING:
     from models.assembly import Assembly
     from models.scene import Scene
 
+BALANCE_ROWS, BALANCE_START, BALANCE_BOUND = 60, 50, 0.05
+"""Rows at which a multiplier is checked, rows at the start that may ring, and the accepted share of its rms.
+
+Sixty rows cost 5 ms. Clean data are met to 1e-4; white noise on the data that is differentiated over a
+step of one sample comes out 10 times too large, a constant wrong multiplier 0.2 to 1 times."""
 SIZE_BOUND = 1e4
 """A state above this (m, rad, m/s, rad/s) is not a vehicle any more: 1e303 is finite, too."""
 
@@ -143,3 +149,20 @@ def _reason(finite: bool, sane: bool) -> str:
     if not finite:
         return "the state became infinite or not a number"
     return "time ran backwards" if sane else f"the state grew beyond {SIZE_BOUND:g}: no vehicle any more"
+
+
+def balanced(engine: str, times: np.ndarray, moment: np.ndarray,
+             balance: Callable[[int], tuple[float, float]]) -> None:  # fmt: skip
+    """Raise RunFailed unless a multiplier (n,) in N m agrees with the balance of moments.
+
+    ``balance`` gives, for a row, the moment that is needed and the inertia term I beta'' (N m), beside which
+    the error is judged where the needed moment is small. A solver can follow a prescribed motion perfectly
+    with a multiplier that is wrong for ever.
+    """
+    rows = np.unique(np.linspace(min(BALANCE_START, len(times) - 1), len(times) - 1, BALANCE_ROWS).astype(int))
+    wanted, inertia = np.array([balance(int(row)) for row in rows]).T
+    size = float(np.sqrt(max(np.mean(wanted**2), np.mean(inertia**2))))
+    off = float(np.sqrt(np.mean((moment[rows] - wanted) ** 2)))
+    if not off <= BALANCE_BOUND * size + 1e-3:
+        raise RunFailed(engine, f"the enforced moment misses the balance of moments by {off:.3g} N m (rms) of "
+                                f"{size:.3g}: the pitch is too rough for this step; smooth its data or shorten it")

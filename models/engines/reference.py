@@ -1,5 +1,6 @@
 """The hand-written reference: the paper's equations, a compiled fixed-step Runge-Kutta, scipy's adaptive solvers."""
 
+import math
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -169,7 +170,10 @@ class Reference:
         derivative, p, at = derivative_of(*self._key), self._p, self._reader(start, end)
 
         def rhs(t, y):
-            return derivative(y, at(t), p)
+            dy = derivative(y, at(t), p)
+            if not math.isfinite(dy.sum()):  # scipy's explicit solvers would halve their step for ever
+                raise RunFailed("reference", "the derivative became infinite or not a number", start)
+            return dy
 
         tolerance = max(self.settings.tolerance, 3e-14)
         solution = solve_ivp(rhs, (start, end), y, method=self.settings.integrator, dense_output=True,

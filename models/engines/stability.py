@@ -169,5 +169,6 @@ def _pole(linear: Linear) -> str:
     """The eigenvalue of the vehicle that lies farthest from zero, as text."""
     poles = np.linalg.eigvals(first_order(linear))
     pole = complex(poles[np.abs(poles).argmax()])
+    real = 0.0 if abs(pole.real) < 1e-9 * abs(pole) else pole.real
     swing = "" if abs(pole.imag) < 1e-9 * abs(pole) else f" +- {abs(pole.imag):.4g}i"
-    return f"{pole.real:.4g}{swing} 1/s"
+    return f"{real:.4g}{swing} 1/s"
