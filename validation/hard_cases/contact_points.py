@@ -44,7 +44,8 @@ def step_answer_naive(folder: Path) -> str:
         model = mujoco.MjModel.from_xml_string(
             f'<mujoco><option timestep="0.0055" integrator="{integrator}"/><worldbody><body><joint name="j"/>'
             '<geom size="1"/></body></worldbody><actuator><general joint="j" dyntype="filter" dynprm="0.001" '
-            'gainprm="0"/></actuator></mujoco>')
+            'gainprm="0"/></actuator></mujoco>'
+        )
         data = mujoco.MjData(model)
         data.ctrl[0] = 1.0
         mujoco.mj_step(model, data, nstep=20)
@@ -91,17 +92,47 @@ def undamped(engine: str, folder: Path) -> float:
     values = LOAD * np.random.default_rng(4).standard_normal((100, 2))
     assembly = setups.driven(base, Sampled(values, 1e-3, held=True))
     found = setups.run(engine, assembly, 1e-3, 0.1)
-    return setups.largest(_compressions(assembly, found)[:100] - values / base.parameters.k1) / (LOAD / base.parameters.k1)
+    stiffness = base.parameters.k1
+    return setups.largest(_compressions(assembly, found)[:100] - values / stiffness) / (LOAD / stiffness)
 
 
 CASES = (
-    Case("contact point under a sudden force", "a state with a time constant of 1 ms beside a step of up to 20 ms",
-         "-f/k (1 - exp(-t k/d)) at steps of 0.1 to 20 ms", "of f/k", 1e-12, "an exact filter: rounding only",
-         step_answer, {}, step_answer_naive),
-    Case("contact point under a ramp", "a linear force within each step", "the ramp's closed form at 1, 5 and 20 ms",
-         "of f/k", 1e-12, "an exact filter: rounding only", linear_load),
-    Case("contact point along an adaptive run", "rows that do not lie on the samples' grid",
-         "the ramp's closed form at each row's own time", "of f/k", 1e-12, "an exact filter: rounding only", stamps),
-    Case("contact point without damping", "d = 0 makes the differential equation an algebraic one", "f/k at once",
-         "of f/k", 1e-12, "one division", undamped),
-)  # fmt: skip
+    Case(
+        "contact point under a sudden force",
+        "a state with a time constant of 1 ms beside a step of up to 20 ms",
+        "-f/k (1 - exp(-t k/d)) at steps of 0.1 to 20 ms",
+        "of f/k",
+        1e-12,
+        "an exact filter: rounding only",
+        step_answer,
+        {},
+        step_answer_naive,
+    ),
+    Case(
+        "contact point under a ramp",
+        "a linear force within each step",
+        "the ramp's closed form at 1, 5 and 20 ms",
+        "of f/k",
+        1e-12,
+        "an exact filter: rounding only",
+        linear_load,
+    ),
+    Case(
+        "contact point along an adaptive run",
+        "rows that do not lie on the samples' grid",
+        "the ramp's closed form at each row's own time",
+        "of f/k",
+        1e-12,
+        "an exact filter: rounding only",
+        stamps,
+    ),
+    Case(
+        "contact point without damping",
+        "d = 0 makes the differential equation an algebraic one",
+        "f/k at once",
+        "of f/k",
+        1e-12,
+        "one division",
+        undamped,
+    ),
+)

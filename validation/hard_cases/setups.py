@@ -60,7 +60,8 @@ def settings(engine: str, step: float, duration: float, integrator: str = "", **
     return Settings(integrator or RECOMMENDED[engine], step, duration, **other)
 
 
-def run(engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **other: float) -> Trajectory:
+def run(engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "",
+        **other: float) -> Trajectory:  # fmt: skip
     """A run as a user gets it: refused where it must be."""
     return build(engine, assembly, settings(engine, step, duration, integrator, **other)).run()
 
@@ -95,6 +96,14 @@ def exact(assembly: Assembly, step: float, count: int, forces: np.ndarray | None
         rate = np.concatenate((np.zeros(4), row / linear[0].diagonal()))
         states.append(moved[:8, :8] @ states[-1] + moved[:8, 8:] @ rate)
     return np.array(states)
+
+
+def exact_decay(assembly: Assembly, times: np.ndarray) -> np.ndarray:
+    """States (n, 8) of the linearised vehicle on the flat road at any times (n,) in s."""
+    poles, shapes = np.linalg.eig(first_order(linearised(assembly.vehicle, guided=False)))
+    rest = vehicle(geometry="linear").initial
+    shares = np.linalg.solve(shapes, assembly.initial - rest)
+    return rest + ((np.exp(np.outer(times, poles)) * shares) @ shapes.T).real
 
 
 def largest(difference: np.ndarray) -> float:

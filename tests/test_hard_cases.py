@@ -1,0 +1,131 @@
+"""Every hard case in every implementation, and proof that each family can find a fault."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from models import signals
+from models.effects import contact_points as contact_effect
+from models.engines import exudyn as exudyn_engine
+from models.engines import protocol, stability
+from models.vehicles import pitch_plane
+from validation.cases import hard_cases
+from validation.hard_cases import (
+    FAMILIES,
+    all_cases,
+    contact_points,
+    extremes,
+    invariants,
+    prescribed_pitch,
+    sampled_input,
+    stepping,
+)
+from validation.hard_cases.case import IMPLEMENTATIONS, Case, judge
+
+
+@pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
+@pytest.mark.parametrize("case", all_cases(), ids=lambda case: case.name)
+def test_outcome(case, implementation, tmp_path):
+    outcome = judge(case, implementation, tmp_path)
+    assert outcome.word == case.wanted(implementation), (outcome.error, case.tolerance, outcome.message)
+
+
+def test_there_are_enough_cases_with_names_of_their_own():
+    names = Counter(case.name for case in all_cases())
+    assert len(names) >= 14 and set(names.values()) == {1}
+    assert all(case.why and case.hard and case.check for case in all_cases())
+
+
+def found(module, name: str, implementation: str, folder) -> str:
+    """Outcome of one case of a family."""
+    return judge(next(case for case in module.CASES if case.name == name), implementation, folder).word
+
+
+@pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
+def test_without_the_step_check_a_short_unstable_run_is_silent(implementation, monkeypatch, tmp_path):
+    monkeypatch.setattr(protocol, "check_step", lambda *_: None)
+    assert found(stepping, "stiff damper, step just beyond the limit", implementation, tmp_path) == "SILENT"
+
+
+def test_without_the_guard_a_huge_run_is_silent(monkeypatch, tmp_path):
+    monkeypatch.setattr(exudyn_engine, "guard", lambda *_, **__: None)
+    assert found(stepping, "finite but huge states", "exudyn", tmp_path) == "SILENT"
+
+
+def test_a_clock_that_keeps_its_last_sample_is_found(monkeypatch, tmp_path):
+    class Stale(exudyn_engine.Clock):
+        def __setattr__(self, name, value):
+            if not (name == "step" and value == 0 and getattr(self, "step", 0) > 0):
+                super().__setattr__(name, value)
+
+    monkeypatch.setattr(exudyn_engine, "Clock", Stale)
+    assert found(stepping, "repeated run", "exudyn", tmp_path) == "SILENT"
+
+
+@pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
+def test_a_sample_read_one_late_is_found(implementation, monkeypatch, tmp_path):
+    right = signals.Sampled._place
+
+    def late(self, position):
+        index, part = right(self, position)
+        return np.maximum(index - 1, 0), part
+
+    monkeypatch.setattr(signals.Sampled, "_place", late)
+    assert found(sampled_input, "replay of a ramp", implementation, tmp_path) == "SILENT"
+
+
+def test_rows_of_an_adaptive_run_taken_for_a_grid_are_found(monkeypatch, tmp_path):
+    def uniform(signal, times):
+        step = times[1] - times[0]
+        return step * np.arange(len(times)), np.arange(len(times)), signal.sample(0.0, step, len(times))
+
+    monkeypatch.setattr(contact_effect, "_grid", uniform)
+    assert found(contact_points, "contact point along an adaptive run", "exudyn", tmp_path) == "SILENT"
+
+
+def test_without_the_balance_a_noisy_multiplier_is_silent(monkeypatch, tmp_path):
+    monkeypatch.setattr(exudyn_engine, "balanced", lambda *_: None)
+    assert found(prescribed_pitch, "noise of 1e-6 rad on the pitch", "exudyn", tmp_path) == "SILENT"
+
+
+@pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
+def test_an_equilibrium_off_by_a_micrometre_is_found(implementation, monkeypatch, tmp_path):
+    right = pitch_plane.equilibrium
+    monkeypatch.setattr(pitch_plane, "equilibrium", lambda p, geometry: right(p, geometry) + 1e-6 * np.eye(8)[2])
+    assert found(invariants, "static equilibrium", implementation, tmp_path) == "SILENT"
+
+
+def test_without_the_growth_check_an_undamped_run_is_silent(monkeypatch, tmp_path):
+    monkeypatch.setattr(stability, "GROWTH", np.inf)
+    assert found(extremes, "no damping, first order", "exudyn", tmp_path) == "SILENT"
+
+
+def broken(engine, folder):
+    """Bug in a case, not an outcome."""
+    raise KeyError("no outcome")
+
+
+def test_a_bug_is_no_outcome(tmp_path):
+    case = Case("", "", "", "", 0.0, "", broken)
+    with pytest.raises(KeyError):
+        judge(case, "reference", tmp_path)
+
+
+def test_not_a_number_is_silent(tmp_path):
+    case = Case("", "", "", "", 1.0, "", lambda engine, folder: np.nan)
+    assert judge(case, "reference", tmp_path).word == "SILENT"
+
+
+def test_a_silent_case_fails_its_row_and_the_total(monkeypatch, tmp_path):
+    cases = (Case("bad", "hard", "check", "m", 1.0, "why", lambda engine, folder: 2.0, naive=lambda folder: "worse"),)
+    monkeypatch.setattr(hard_cases, "all_cases", lambda: cases)
+    rows, data = hard_cases.measure(True, tmp_path)
+    assert [row.status for row in rows] == ["failed"] * 4
+    assert rows[-1].value == 3
+    (table,) = hard_cases.tables(data)
+    assert table.rows[0][3:] == ("SILENT, 2.0e+00",) * 3 + ("worse",)
+
+
+def test_every_family_is_in_the_table():
+    assert len(FAMILIES) == 6

@@ -1,0 +1,235 @@
+"""Guards: whatever cannot be right is refused before the run or raised after it, in every implementation."""
+
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from models.assembly import Assembly
+from models.engines.catalogue import CATALOGUE, MISSING
+from models.errors import InputError, RunFailed
+from validation.hard_cases import prescribed_pitch, sampled_input, setups
+from validation.rows import Row, System, Table, at_most, behaves
+
+TITLE = "Guards against silent wrong answers"
+SYSTEM: System = "pitch-plane"
+STEPS = (2e-3, 4e-3, 5e-3, 8e-3, 1e-2)
+DURATIONS = (0.04, 0.2, 2.0)
+WRONG = 1.0
+"""A complete run is silent if its error exceeds the motion itself: 100 % wrong and no word about it."""
+Runner = Callable[..., Any]
+
+
+def ending(attempt: Callable[[], Any]) -> str:
+    """How an attempt ends: "refused", "raised" or "answered"."""
+    try:
+        attempt()
+    except InputError:
+        return "refused"
+    except RunFailed:
+        return "raised"
+    return "answered"
+
+
+def integrators(engine: str, adaptive: bool | None = None) -> list[str]:
+    """Integrators that an engine really has."""
+    return [
+        name
+        for name, facts in CATALOGUE[engine].items()
+        if (engine, name) not in MISSING and adaptive in (None, facts.adaptive)
+    ]
+
+
+def road() -> Assembly:
+    """The vehicle on the study road."""
+    return setups.vehicle(effects={"road": {"source": "study", "speed": 20.0}})
+
+
+@cache
+def _long_truth() -> np.ndarray:
+    return setups.tight(road(), 1e-3, max(DURATIONS)).states
+
+
+def _truth(step: float, duration: float) -> np.ndarray:
+    """Rows of the tight solution that lie on a run's steps."""
+    return _long_truth()[: round(duration / 1e-3) + 1 : round(step / 1e-3)]
+
+
+def unstable(engine: str, runner: Runner) -> dict[str, int]:
+    """Every fixed-step integrator at steps of 2 to 10 ms over 40 ms, 0.2 and 2 s: how the runs end."""
+    counts = {"right": 0, "refused": 0, "raised": 0, "SILENT": 0}
+    for name in integrators(engine, adaptive=False):
+        for step in STEPS:
+            for duration in DURATIONS:
+                counts[_word(engine, name, step, duration, runner)] += 1
+    return counts
+
+
+def _word(engine: str, name: str, step: float, duration: float, runner: Runner) -> str:
+    try:
+        found = runner(engine, road(), step, duration, name).states
+    except InputError:
+        return "refused"
+    except RunFailed:
+        return "raised"
+    truth = _truth(step, duration)
+    share = np.abs(found - truth).max() / np.abs(truth - truth[0]).max()
+    return "right" if share <= WRONG else "SILENT"
+
+
+def not_a_number(engine: str) -> dict[str, str]:
+    """A NaN in the force samples given past the file reader, every integrator, held and linear."""
+    base, found = setups.vehicle(), {}
+    for name in integrators(engine):
+        for held in (True, False):
+            forces = setups.static_forces(base, 102, 1e-3, held)
+            forces.values[57, 0] = np.nan
+            attempt = partial(setups.run, engine, setups.driven(base, forces), 1e-3, 0.1, name)
+            found[f"{name}, {'held' if held else 'linear'}"] = ending(attempt)
+    return found
+
+
+def constrained(engine: str) -> dict[str, str]:
+    """A prescribed pitch in every integrator that cannot solve for it."""
+    wrong = [name for name in integrators(engine) if not CATALOGUE[engine][name].constraints]
+    return {name: ending(partial(setups.run, engine, prescribed_pitch.scene(), 1e-3, 0.5, name)) for name in wrong}
+
+
+def constrained_unchecked() -> dict[str, str]:
+    """The same past the check, explicit integrators of Exudyn: the multiplier is compared with the balance."""
+    names = [name for name in integrators("exudyn", adaptive=False) if name not in setups.CONSTRAINED.values()]
+    explicit = [name for name in names if name != "TrapezoidalIndex2"]
+    scene = prescribed_pitch.scene()
+    return {name: ending(partial(setups.unchecked, "exudyn", scene, 1e-3, 0.5, name)) for name in explicit}
+
+
+def _all(found: dict[str, str], word: str) -> str:
+    """The expected word if all runs ended so, else the ones that did not."""
+    other = [f"{name}: {ended}" for name, ended in found.items() if ended != word]
+    return "; ".join(other) or word
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows per engine; all of them in both modes."""
+    rows: list[Row] = []
+    endings: dict[str, Any] = {}
+    for engine in CATALOGUE:
+        rows += _unstable_rows(engine, endings)
+        rows += _input_rows(engine)
+    for name, found in (("refused", constrained("exudyn")), ("raised", constrained_unchecked())):
+        how = "" if name == "refused" else ", past the check"
+        rows.append(
+            behaves(
+                f"guard.constraint.exudyn.{name}",
+                SYSTEM,
+                f"an integrator that ignores the active constraint, exudyn, all {len(found)}{how}",
+                _all(found, name),
+                name,
+                "Exudyn's explicit solvers freeze or free the pitch without a word",
+            )
+        )
+    rows += [_reduced_row(engine) for engine in ("reference", "mujoco")]
+    return rows, {"unstable": endings}
+
+
+def _unstable_rows(engine: str, endings: dict[str, Any]) -> list[Row]:
+    """No silent answer with the check; past it, long runs are caught by the guard after the run."""
+    checked = unstable(engine, setups.run)
+    past = unstable(engine, setups.unchecked)
+    endings[engine] = {"checked": checked, "unchecked": past}
+    total = sum(checked.values())
+    return [
+        at_most(
+            f"guard.unstable.{engine}",
+            SYSTEM,
+            f"silent answers of {total} runs at 2 to 10 ms, every fixed-step integrator, {engine}",
+            checked["SILENT"],
+            "runs",
+            0.0,
+            "a step beyond the stability limit is refused with the limit named",
+            "native",
+        ),
+        behaves(
+            f"guard.unstable.{engine}.unchecked",
+            SYSTEM,
+            f"RK4 at 5 ms over 2 s past the check, {engine}",
+            ending(lambda: setups.unchecked(engine, road(), 5e-3, 2.0)),
+            "raised",
+            "finite, size and time are checked after every run",
+        ),
+    ]
+
+
+def _input_rows(engine: str) -> list[Row]:
+    numbers = not_a_number(engine)
+    caught = {name: "caught" if ended in ("raised", "refused") else ended for name, ended in numbers.items()}
+    with TemporaryDirectory() as own:
+        file = ending(lambda: sampled_input.damaged(engine, Path(own)))
+    return [
+        behaves(
+            f"guard.nan-file.{engine}",
+            SYSTEM,
+            f"NaN in a force file, {engine}",
+            file,
+            "refused",
+            "the reader names the line",
+        ),
+        behaves(
+            f"guard.nan.{engine}",
+            SYSTEM,
+            f"NaN past the reader, all {len(numbers)} integrators and rules, {engine}",
+            _all(caught, "caught"),
+            "caught",
+            "Exudyn's explicit solvers return True with NaN",
+        ),
+        behaves(
+            f"guard.step-sampling.{engine}",
+            SYSTEM,
+            f"step that does not divide the sampling period, {engine}",
+            ending(lambda: sampled_input.uneven(engine, Path())),
+            "refused",
+            "a held sample would change in a step",
+        ),
+        behaves(
+            f"guard.step-duration.{engine}",
+            SYSTEM,
+            f"step that does not divide the duration, {engine}",
+            ending(lambda: setups.run(engine, setups.vehicle(), 3e-4, 1.0)),
+            "refused",
+            "the run would end elsewhere",
+        ),
+    ]
+
+
+def _reduced_row(engine: str) -> Row:
+    """Reference and MuJoCo have no constraint in the model: an explicit solver is right there."""
+    error = prescribed_pitch.explicit(engine, Path())
+    return at_most(
+        f"guard.constraint.{engine}",
+        SYSTEM,
+        f"enforced moment by an explicit solver, {engine}: the pitch is an input, no constraint is active",
+        error,
+        "of its rms",
+        1e-4,
+        "the project's bound at 1 ms",
+        "closed form",
+    )
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """How the runs at unstable and stable steps end, with the check and past it."""
+    words = ("right", "refused", "raised", "SILENT")
+    rows = tuple(
+        (engine, how, *(str(counts[word]) for word in words))
+        for engine, both in data["unstable"].items()
+        for how, counts in both.items()
+    )
+    note = (
+        f"Every fixed-step integrator at steps of {', '.join(f'{1e3 * step:g}' for step in STEPS)} ms over "
+        f"{', '.join(f'{duration:g}' for duration in DURATIONS)} s on the study road. Silent: a complete run that is "
+        "wrong by more than the motion itself. Past the check, short unstable runs are finite, small and wrong."
+    )
+    return [Table("Runs at too long steps", note, ("engine", "", *words), rows)]

@@ -1,0 +1,147 @@
+"""Extreme parameters: no damping, mass ratios of 1e6, stiffnesses of 1e9 N/m."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from models.assembly import Assembly
+from validation.hard_cases import setups
+from validation.hard_cases.case import Case, Word
+
+IMPLICIT = {**setups.IMPLICIT, "reference": "LSODA"}
+"""Radau takes minutes here: its error estimate chases the rounding of kN on a wheel of a gram."""
+TOLERANCE = 1e-7
+
+
+def _off(base: Assembly) -> Assembly:
+    """The vehicle with its chassis 10 mm above its equilibrium."""
+    return replace(base, initial=base.initial - np.array([0, 0, 0.01, 0, 0, 0, 0, 0]))
+
+
+def _settled(engine: str, base: Assembly, integrator: str = "") -> float:
+    """Distance from the equilibrium after 3 s, relative to the start's."""
+    end = setups.run(engine, _off(base), 1e-3, 3.0, integrator, tolerance=TOLERANCE).states[-1]
+    return setups.largest(end - base.initial) / 0.01
+
+
+def undamped(engine: str, folder: Path) -> float:
+    """No damper at all, 1 s, against the matrix exponential."""
+    base = _off(setups.vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
+    found = setups.run(engine, base, 1e-3, 1.0).states
+    truth = setups.exact(base, 1e-3, 1000)
+    return setups.largest(found - truth) / setups.largest(truth - base.initial)
+
+
+def undamped_naive(folder: Path) -> str:
+    """Explicit Euler past the check: every mode grows."""
+    base = _off(setups.vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
+    found = setups.unchecked("exudyn", base, 1e-3, 1.0, "ExplicitEuler").states
+    truth = setups.exact(base, 1e-3, 1000)
+    return (
+        f"Exudyn's explicit Euler past the check: {setups.largest(found - base.initial):.2g} where the truth "
+        f"stays below {setups.largest(truth - base.initial):.2g}, finite and unwarned"
+    )
+
+
+def undamped_euler(engine: str, folder: Path) -> float:
+    """The same with a first-order explicit method."""
+    base = _off(setups.vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
+    name = {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine]
+    found, truth = setups.run(engine, base, 1e-3, 1.0, name).states, setups.exact(base, 1e-3, 1000)
+    return setups.largest(found - truth) / setups.largest(truth - base.initial)
+
+
+def light_wheel(engine: str, folder: Path) -> float:
+    """Wheels of 0.75 g under 750 kg at the recommended setting: poles of -1.4e7 1/s."""
+    return _settled(engine, setups.vehicle(m1=7.5e-4, m2=7.5e-4))
+
+
+def light_wheel_implicit(engine: str, folder: Path) -> float:
+    """The same with an implicit integrator."""
+    return _settled(engine, setups.vehicle(m1=7.5e-4, m2=7.5e-4), IMPLICIT[engine])
+
+
+def stiff_tyre(engine: str, folder: Path) -> float:
+    """Tyres of 1e9 N/m at the recommended setting: wheels at 8,200 rad/s."""
+    return _settled(engine, setups.vehicle(k1=1e9, k2=1e9))
+
+
+def stiff_tyre_implicit(engine: str, folder: Path) -> float:
+    """The same with an implicit integrator."""
+    return _settled(engine, setups.vehicle(k1=1e9, k2=1e9), IMPLICIT[engine])
+
+
+def stiff_tyre_naive(folder: Path) -> str:
+    """Two steps past the check."""
+    base = setups.vehicle(k1=1e9, k2=1e9)
+    end = setups.unchecked("mujoco", _off(base), 1e-3, 2e-3).states[-1]
+    return f"MuJoCo past the check: {setups.largest(end - base.initial):.0f} m/s after 2 ms, finite and unwarned"
+
+
+REFUSED: dict[str, Word] = {"reference": "refused", "exudyn": "refused", "mujoco": "refused"}
+AT_REST = "the vehicle is back in its equilibrium after 3 s"
+GONE = "the slowest mode, -10 1/s, has shrunk to 1e-13; first-order steps damp it a little less"
+
+CASES = (
+    Case(
+        "no damping",
+        "poles on the imaginary axis: nothing forgives a method that adds energy",
+        "matrix exponential, 1 s",
+        "of the motion",
+        1e-3,
+        "RK4 at 1 ms and 121 rad/s: a phase error of 2e-7 per step",
+        undamped,
+        {},
+        undamped_naive,
+    ),
+    Case(
+        "no damping, first order",
+        "explicit Euler adds energy at every step. The reference runs RK4; MuJoCo's Euler is symplectic here",
+        "matrix exponential, or refused",
+        "of the motion",
+        0.25,
+        "first order: h omega / 2 of 121 rad/s is a phase of 6 %",
+        undamped_euler,
+        {"exudyn": "refused"},
+    ),
+    Case(
+        "mass ratio 1e6",
+        "a light wheel on a stiff damper: poles at -1.4e7 1/s",
+        AT_REST,
+        "of the push",
+        1e-6,
+        GONE,
+        light_wheel,
+        REFUSED,
+    ),
+    Case(
+        "mass ratio 1e6, implicit",
+        "one step spans 14,000 time constants",
+        AT_REST,
+        "of the push",
+        1e-6,
+        GONE,
+        light_wheel_implicit,
+    ),
+    Case(
+        "stiffness 1e9",
+        "wheels at 8,200 rad/s",
+        AT_REST,
+        "of the push",
+        1e-6,
+        GONE,
+        stiff_tyre,
+        REFUSED,
+        stiff_tyre_naive,
+    ),
+    Case(
+        "stiffness 1e9, implicit",
+        "one step spans 1.3 periods of the wheel",
+        AT_REST,
+        "of the push",
+        1e-6,
+        GONE,
+        stiff_tyre_implicit,
+    ),
+)

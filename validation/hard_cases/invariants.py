@@ -1,0 +1,253 @@
+"""Invariants: rest, signs, momentum, free motion, tumbling, the frame of the forces."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from models.assembly import Assembly, Mode
+from models.engines.protocol import build
+from models.result import Result
+from models.scene import build as build_scene
+from models.signals import Sampled
+from models.simulate import outputs, simulate
+from validation.hard_cases import setups
+from validation.hard_cases.case import Case
+
+VEHICLES = ("itwm_drift", "asymmetric_twin")
+G = 9.81
+
+
+def rest(engine: str, folder: Path) -> float:
+    """Both vehicles, exact and linear geometry, 2 s from their static equilibrium."""
+    worst = 0.0
+    for parameters in VEHICLES:
+        for geometry in ("exact", "linear"):
+            base = setups.vehicle(parameters, geometry)
+            worst = max(worst, setups.largest(setups.run(engine, base, 1e-3, 2.0).states - base.initial))
+    return worst
+
+
+def rest_naive(folder: Path) -> str:
+    """What a start at zero, the unstressed vehicle, does."""
+    base = setups.vehicle(initial=np.zeros(8))
+    fall = setups.largest(setups.run("reference", base, 1e-3, 2.0).states[:, 4:7])
+    return f"a start from the coordinates' zero falls at up to {fall:.2f} m/s"
+
+
+def down(engine: str, folder: Path) -> float:
+    """Tyre loads of the vehicle at rest: half of (750 + 30) kg each, and by the lever for the twin."""
+    worst = 0.0
+    for parameters in VEHICLES:
+        base = setups.vehicle(parameters)
+        p = base.parameters
+        found = setups.run(engine, base, 1e-3, 0.1)
+        channels = outputs(base, found)
+        front = (p.m3 * p.a / (p.a + p.b) + p.m1) * G
+        rear = (p.m3 * p.b / (p.a + p.b) + p.m2) * G
+        for name, load in (("f1", front), ("f2", rear)):
+            worst = max(worst, setups.largest(channels[name][2] - load))
+    return worst
+
+
+def nose_up(engine: str, folder: Path) -> float:
+    """Accelerations at rest with the nose 0.01 rad up, written out by hand for the linear geometry."""
+    base, tilt = setups.vehicle("asymmetric_twin", "linear"), 0.01
+    p, state = base.parameters, base.initial.copy()
+    state[3] += tilt
+    found = build(engine, base, setups.settings(engine, 1e-3, 0.1)).acceleration(0.0, state)
+    front, rear = -p.k3 * p.b * tilt, p.k4 * p.a * tilt  # the front strut is pulled, the rear one pressed
+    hand = np.array([front / p.m1, rear / p.m2, -(front + rear) / p.m3, (p.b * front - p.a * rear) / p.I])
+    if not (found[0] < 0 < found[1] and found[3] < 0):
+        return np.inf
+    return setups.largest(found - hand) / setups.largest(hand)
+
+
+def raised_front(engine: str, folder: Path) -> float:
+    """More force under the front wheel, for 50 ms: the front must rise, the pitch grow."""
+    base = setups.vehicle("asymmetric_twin")
+    forces = setups.static_forces(base, 51, 1e-3)
+    forces.values[:, 0] += 500.0
+    end = setups.run(engine, setups.driven(base, forces), 1e-3, 0.05).states[-1] - base.initial
+    truth = setups.tight(setups.driven(base, forces), 1e-3, 0.05).states[-1] - base.initial
+    if not (end[3] > 0 and end[0] < 0 and end[2] - base.parameters.b * np.sin(end[3]) < 0):
+        return np.inf
+    return setups.largest(end - truth) / setups.largest(truth)
+
+
+def momentum(engine: str, folder: Path) -> float:
+    """I b' - m1 b z1' + m2 a z2' and sum m z', linear geometry, held noise, whatever the springs do."""
+    base = setups.vehicle("asymmetric_twin", "linear")
+    p = base.parameters
+    forces = setups.static_forces(base, 1000, 1e-3, noise=800.0)
+    rates = setups.run(engine, setups.driven(base, forces), 1e-3, 1.0).states[:, 4:]
+    t = 1e-3 * np.arange(1001)[:, None]
+    pushed = np.vstack((np.zeros(2), np.cumsum(forces.values * 1e-3, axis=0)))
+    angular = rates @ np.array([-p.m1 * p.b, p.m2 * p.a, 0.0, p.I])
+    linear = rates @ np.array([p.m1, p.m2, p.m3, 0.0])
+    turned = pushed @ np.array([p.b, -p.a]) + (p.a * p.m2 - p.b * p.m1) * p.g * t[:, 0]
+    fallen = (p.m1 + p.m2 + p.m3) * p.g * t[:, 0] - pushed.sum(axis=1)
+    return max(
+        setups.largest(angular - turned) / setups.largest(turned - turned[0]),
+        setups.largest(linear - fallen) / setups.largest(pushed),
+    )
+
+
+def free_heave(engine: str, folder: Path) -> float:
+    """Centre-of-mass acceleration at 50 random states, pitch up to 3 rad, against the external forces."""
+    base = setups.vehicle("asymmetric_twin")
+    p = base.parameters
+    forces = setups.static_forces(base, 100, 1e-3, noise=2000.0)
+    model = build(engine, setups.driven(base, forces), setups.settings(engine, 1e-3, 0.1))
+    masses, worst, size = np.array([p.m1, p.m2, p.m3]), 0.0, 0.0
+    for i, state in enumerate(np.random.default_rng(6).uniform(-1, 1, (50, 8)) * [0.5, 0.5, 0.5, 3, 3, 3, 3, 3]):
+        found = model.acceleration(2 * i * 1e-3, state)[:3]
+        wanted = p.g - forces.values[2 * i].sum() / masses.sum()
+        worst, size = max(worst, abs(found @ masses / masses.sum() - wanted)), max(size, setups.largest(found))
+    return worst / size
+
+
+def _spun(geometry: str) -> Assembly:
+    """The twin under its own weight, turning at 6 rad/s."""
+    base = setups.vehicle("asymmetric_twin", geometry)
+    start = base.initial.copy()
+    start[7] = 6.0
+    return setups.driven(replace(base, initial=start), setups.static_forces(base, 2, 2.0, held=False))
+
+
+@cache
+def _tumbled() -> np.ndarray:
+    return setups.tight(_spun("exact"), 2.5e-4, 1.0).states
+
+
+def tumbling(engine: str, folder: Path) -> float:
+    """Over its roof: 6 rad/s under its own weight, 1 s at 0.25 ms, against order 8."""
+    found = setups.run(engine, _spun("exact"), 2.5e-4, 1.0).states
+    truth = _tumbled()
+    if truth[:, 3].max() < np.pi / 2:
+        return np.inf
+    return setups.largest(found - truth)
+
+
+def tumbling_naive(folder: Path) -> str:
+    """The linear geometry in the same scene."""
+    ends = [setups.run("reference", _spun(geometry), 1e-3, 1.0).states[-1, 3] for geometry in ("exact", "linear")]
+    return f"exact geometry turns to {ends[0]:.2f} rad, the linear one says {ends[1]:.2f} rad"
+
+
+DRIVE = 8.0
+
+
+@cache
+def _measured() -> Sampled:
+    """Wheel forces (N) of a drive over the study road, sampled at 1 kHz."""
+    scene = build_scene(
+        {"title": "", "run": {"duration": DRIVE}, "effects": {"road": {"source": "study", "speed": 20.0}}}
+    )
+    result: Result = simulate(scene, "reference")
+    return Sampled(np.column_stack([result["f1"], result["f2"]]), 1e-3, held=False)
+
+
+def growth(engine: str, mode: Mode) -> float:
+    """How a pitch error of 1e-6 rad at the start has grown at the end of the drive."""
+    base = setups.vehicle()
+    start = base.initial.copy()
+    start[3] += 1e-6
+    ends = [
+        setups.run(engine, setups.driven(replace(base, initial=y), _measured(), mode), 1e-3, DRIVE).states[-1, 3]
+        for y in (base.initial, start)
+    ]
+    return abs(ends[1] - ends[0]) / 1e-6
+
+
+def body_frame(engine: str, folder: Path) -> float:
+    """Forces along the chassis' own axis: an error of the pitch stays what it is."""
+    return growth(engine, "force-body")
+
+
+def body_frame_naive(folder: Path) -> str:
+    """The same forces, vertical in the inertial frame."""
+    return f"vertical forces let the error grow {growth('reference', 'force'):.0f}-fold in {DRIVE:.0f} s"
+
+
+CASES = (
+    Case(
+        "static equilibrium",
+        "gravity, preload and the zero of the coordinates must fit together",
+        "nothing moves for 2 s, both vehicles and geometries",
+        "m, rad, m/s, rad/s",
+        1e-12,
+        "rounding of kN on kg: 1e-13 m/s^2 held down by the dampers",
+        rest,
+        {},
+        rest_naive,
+    ),
+    Case(
+        "+z is down",
+        "engines think z up; a wrong sign mirrors the vehicle",
+        "static tyre loads, 3825.9 N each",
+        "N",
+        1e-8,
+        "rounding of 4 kN",
+        down,
+    ),
+    Case(
+        "nose up",
+        "sign of pitch, places of the axles",
+        "accelerations of a tilted vehicle written out by hand",
+        "of the largest",
+        1e-11,
+        "a preload of 4 kN cancels to 10 N",
+        nose_up,
+    ),
+    Case(
+        "more force in front",
+        "a moment that lifts the nose must lift it",
+        "front up, pitch up, and the tight solution",
+        "of the motion",
+        1e-4,
+        "RK4 at 1 ms over the jump at the start",
+        raised_front,
+    ),
+    Case(
+        "momentum",
+        "both momenta ignore springs and dampers, so a stiff error cannot hide",
+        "impulse of the forces",
+        "of the impulse",
+        1e-12,
+        "a thousand additions of doubles",
+        momentum,
+    ),
+    Case(
+        "unconstrained heave",
+        "a free vehicle has four zero eigenvalues; hidden damping would look like stability",
+        "centre of mass: sum of external forces / mass",
+        "of the largest acceleration",
+        1e-12,
+        "internal forces of 1e5 N cancel",
+        free_heave,
+    ),
+    Case(
+        "tumbling",
+        "pitch far beyond 90 degrees: sin and cos, signs of the arms",
+        "order 8, tolerance 1e-12",
+        "m, rad, m/s, rad/s",
+        1e-3,
+        "RK4 at 0.25 ms; the wheels start 8 m/s off the struts' ends and are caught within 1.5 ms",
+        tumbling,
+        {},
+        tumbling_naive,
+    ),
+    Case(
+        "forces in the body's frame",
+        "vertical forces at rotating arms make the pitch unstable; body-fixed ones do not",
+        "a pitch error of 1e-6 rad does not double in 8 s",
+        "growth",
+        2.0,
+        "exactly 1 for massless wheels; wheels of 15 kg leave a weak term, J / I = 0.06",
+        body_frame,
+        {},
+        body_frame_naive,
+    ),
+)
