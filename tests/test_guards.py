@@ -7,12 +7,15 @@ import mujoco
 import numpy as np
 import pytest
 
+from models.assembly import assemble
 from models.engines import exudyn as exudyn_engine
 from models.engines import protocol, stability
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, balanced, build, guard
-from models.errors import Refused, RunFailed
+from models.errors import InputError, Refused, RunFailed
+from models.scene import build as build_scene
 from models.signals import Smooth
+from models.time_series import write_time_series
 from validation.cases import guards
 from validation.hard_cases import setups
 
@@ -188,3 +191,14 @@ def test_held_forces_beside_a_prescribed_pitch_do_not_hold_the_pitch():
     fine = setups.run("reference", assembly, 1.25e-4, 0.2).states[::8]
     adaptive = setups.run("reference", assembly, 1e-3, 0.2, "DOP853").states
     assert np.abs(fine - adaptive).max() < 1e-6  # RK4 at 1/8 of the step; holding the pitch would give 1e-4
+
+
+def test_a_start_that_a_prescribed_pitch_would_override_is_refused(tmp_path):
+    forces = {"front": ("N", np.full(20, 3825.9)), "rear": ("N", np.full(20, 3825.9))}
+    write_time_series(tmp_path / "forces.csv", forces, 0.1)
+    write_time_series(tmp_path / "pitch.csv", {"pitch": ("rad", np.zeros(20))}, 0.1)
+    held = {"file": "forces.csv", "interpolation": "held"}
+    effects = {"wheel_forces": held, "prescribed_pitch": {"file": "pitch.csv"}}
+    table = {"title": "", "run": {"duration": 1.0}, "start": {"pitch": 0.1}, "effects": effects}
+    with pytest.raises(InputError, match=r"start\.pitch = 0\.1: the pitch is prescribed"):
+        assemble(build_scene(table, "scene.toml", tmp_path))

@@ -30,6 +30,10 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     if scene.effects["wheel_forces"].frame == "body":
         raise InputError(scene.file, "effects.wheel_forces.frame", "body",
                          "a prescribed pitch makes the frame a matter of the file: use 'inertial'")
+    for name in ("pitch", "pitch_rate"):
+        if name in scene.start:
+            raise InputError(scene.file, f"start.{name}", scene.start[name],
+                             "the pitch is prescribed, and its file says where it starts: drop this key")
     values, period = read_time_series(scene.path(p.file, "effects.prescribed_pitch.file"), {"pitch": RADIANS})
     pitch = Smooth(values, period, derivatives=2, degree=5)
     if pitch.end < scene.run.duration * (1 - 1e-9):

@@ -43,7 +43,8 @@ def _row(case: Case, implementation: str, outcome: Outcome) -> Row:
     id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{implementation}"
     quantity = f"{case.name}, {implementation}: {case.check}"
     if case.wanted(implementation) == "right" and outcome.error is not None:
-        return at_most(id, SYSTEM, quantity, outcome.error, case.unit, case.tolerance, case.why, "closed form")
+        error, judged = outcome.error, case.independence(implementation)
+        return at_most(id, SYSTEM, quantity, error, case.unit, case.tolerance, case.why, judged)
     return behaves(id, SYSTEM, quantity, outcome.word, case.wanted(implementation), case.hard)
 
 

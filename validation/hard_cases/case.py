@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from models.errors import InputError, RunFailed
+from validation.rows import Independence
 
 Word = Literal["right", "refused", "raised", "SILENT"]
 IMPLEMENTATIONS = ("reference", "exudyn", "mujoco")
@@ -21,6 +22,7 @@ class Case:
     unit, tolerance, why : of the error, and the reason for the tolerance
     error : (implementation, folder for input files) -> the measured error
     expected : the outcome where it is not "right"
+    against : how far the answer it is judged by is from the implementations
     naive : measures what an obvious build without the guard or rule does, as a phrase; None if nothing is shown
     """
 
@@ -33,10 +35,15 @@ class Case:
     error: Callable[[str, Path], float]
     expected: Mapping[str, Word] = field(default_factory=dict)
     naive: Callable[[Path], str] | None = None
+    against: Independence = "closed form"
 
     def wanted(self, implementation: str) -> Word:
         """The outcome that this case must have in one implementation."""
         return self.expected.get(implementation, "right")
+
+    def independence(self, implementation: str) -> Independence:
+        """The tight solution has the equations of the reference: to it alone they are shared."""
+        return "shared kernel" if self.against == "native" and implementation == "reference" else self.against
 
 
 @dataclass(frozen=True)

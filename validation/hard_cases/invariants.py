@@ -209,6 +209,7 @@ CASES = (
         1e-4,
         "RK4 at 1 ms over the jump at the start",
         raised_front,
+        against="native",
     ),
     Case(
         "momentum",
@@ -238,6 +239,7 @@ CASES = (
         tumbling,
         {},
         tumbling_naive,
+        against="native",
     ),
     Case(
         "forces in the body's frame",
@@ -249,5 +251,6 @@ CASES = (
         body_frame,
         {},
         body_frame_naive,
+        against="none",
     ),
 )

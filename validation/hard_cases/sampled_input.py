@@ -242,6 +242,7 @@ CASES = (
         c2_road,
         {},
         polyline_naive,
+        against="none",
     ),
     Case(
         "adaptive solver on held noise",
