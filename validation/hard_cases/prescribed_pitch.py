@@ -236,7 +236,8 @@ def explicit_naive(folder: Path) -> str:
     found = as_it_comes(scene(), 1e-3, "RK44")
     assert found.moment is not None
     off = setups.largest(found.states[:, 3] - angle(found.times))
-    return f"Exudyn RK44 ends without a word: moment {setups.largest(found.moment[1:]):.1f} N m, pitch off by {off:.3f} rad"
+    moment = setups.largest(found.moment[1:])
+    return f"Exudyn RK44 ends without a word: moment {moment:.1f} N m, pitch off by {off:.3f} rad"
 
 
 def fed_back(engine: str, folder: Path) -> float:
