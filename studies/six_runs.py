@@ -122,7 +122,8 @@ def _maker(scene: Scene, folder: Path) -> Callable[[dict[str, float], dict[str, 
     """Builder of a force-excited scene from overrides and further effects; it starts where the measurement did."""
     from models.vehicles.pitch_plane import STATES, equilibrium
 
-    start = dict(zip(STATES, equilibrium(scene.vehicle_parameters()).tolist(), strict=False))
+    rest = equilibrium(scene.vehicle_parameters())
+    heave = dict(zip(STATES[:3], rest.tolist(), strict=False))
 
     def make(override: dict[str, float], effects: dict[str, Any]) -> Scene:
         forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}}
@@ -132,7 +133,7 @@ def _maker(scene: Scene, folder: Path) -> Callable[[dict[str, float], dict[str, 
                 "title": scene.title,
                 "vehicle": vehicle,
                 "run": scene.run.model_dump(),
-                "start": start,
+                "start": heave if "prescribed_pitch" in effects else heave | {"pitch": float(rest[3])},
                 "engines": {name: table.model_dump(exclude_unset=True) for name, table in scene.engines.items()},
                 "effects": forces | effects,
             },

@@ -59,5 +59,6 @@ def test_linear_perturbed_run_does_not_drift(tmp_path):
 
 
 def test_sampling_rate_must_fit_the_step(tmp_path):
+    scene = load(SCENES / "six_runs.toml", ["options.sampling_rate=700.0"])
     with pytest.raises(InputError, match="sampling_rate"):
-        run(load(SCENES / "six_runs.toml", ["options.sampling_rate=700.0"]), ("reference",), tmp_path, lambda t, p: None)
+        run(scene, ("reference",), tmp_path, lambda text, part: None)
