@@ -52,9 +52,10 @@ before; held forces take one callback before each of Exudyn's steps beside one p
 
 def scene(effects: dict[str, Any], steps: int, folder: Path, guided: bool = False) -> Scene:
     """The asymmetric vehicle with some effects, released from a tilted start."""
+    start = {name: value for name, value in START.items() if not guided or name != "pitch"}
     return build_scene({
         "title": TITLE, "vehicle": {"parameters": "asymmetric_twin"}, "run": {"duration": steps * STEP, "step": STEP},
-        "start": START, "effects": effects, "engines": {"exudyn": GUIDED} if guided else {},
+        "start": start, "effects": effects, "engines": {"exudyn": GUIDED} if guided else {},
     }, "absent", folder)  # fmt: skip
 
 

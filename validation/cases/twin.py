@@ -14,6 +14,8 @@ TITLE = "Same tableau and step: whole paths against the reference"
 SYSTEM: System = "pitch-plane"
 STEPS = (2e-3, 1e-3, 5e-4)
 BOUND = 1e-12
+ROUGH = 4_800
+"""Samples of 0.5 ms before the course's rough part is well under both wheels."""
 OTHER_ROADS = (("belgian_block.crg", 6.0, "mirrored"), ("Horstwalde.crg", 20.0, "refused"))
 """Further measured roads: file, speed (m/s), how they go on beyond their end."""
 WHY = "RK4 with the same stages differs only by the order of additions: 1e-16 a step over at most 20,000 steps"
@@ -41,15 +43,15 @@ def _forces(parameters: str, where: str, measured: Result) -> list[Row]:
 
 
 def _course(parameters: str) -> list[Row]:
-    """The measured course, 500 m at 50 m/s, and force-excited by the forces of its rough part."""
+    """The measured course, 250 m at 50 m/s, and force-excited by the forces of its rough part."""
     data = data_folder()
     if data is None or not (data / COURSE).exists():
         reason = "TWINRIG_DATA names no folder with the measured course"
         return [not_run(f"twin.course.{parameters}", SYSTEM, f"paths on the measured course, {parameters}", reason)]
     road = {"source": "opencrg", "file": COURSE, "speed": 50.0, "beyond_end": "refused"}
-    scenes = [road_scene(parameters, step, 10.0, road, data) for step in STEPS]
+    scenes = [road_scene(parameters, step, 5.0, road, data) for step in STEPS]
     measured = simulate(scenes[-1], "reference")
-    rough = Result(measured.data.isel(time=slice(10_000, None)).assign_coords(time=measured.data.time[:-10_000]))
+    rough = Result(measured.data.isel(time=slice(ROUGH, None)).assign_coords(time=measured.data.time[:-ROUGH]))
     rows = _compare(f"measured course, {parameters}", scenes) + _forces(parameters, "measured course", rough)
     for name, speed, rule in OTHER_ROADS:
         road = {"source": "opencrg", "file": name, "speed": speed, "beyond_end": rule, "track": "left"}
