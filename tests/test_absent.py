@@ -10,10 +10,10 @@ import pytest
 import models
 from models.assembly import assemble
 from models.scene import effect_names
-from validation.absence import belongs_to_effects, installed, march, probe, user_functions
+from validation.absence.hand_built import mujoco_model
+from validation.absence.probes import belongs_to_effects, installed, march, probe, user_functions
 from validation.cases import absent
 from validation.cases.absent import ENGINES, FORCES, PRICED, change, declared, hand_built, model, scene
-from validation.hand_built import mujoco_model
 
 BARE = {"title": "bare", "run": {"duration": 0.02, "step": 0.001}, "start": {"pitch": 0.1}}
 FORCED = {**BARE, "effects": FORCES}

@@ -36,7 +36,7 @@ def test_the_runner_names_every_case_file():
 
 
 def test_row_ids_are_unique(tmp_path):
-    ids = [row.id for name in ("audit", "twin", "roads") for row in
+    ids = [row.id for name in ("audit", "tight", "roads", "enforced_moment") for row in
            import_module(f"validation.cases.{name}").measure(True, tmp_path)[0]]  # fmt: skip
     assert len(set(ids)) == len(ids)
 

@@ -12,8 +12,8 @@ from models.scene import Scene
 from models.scene import build as build_scene
 from models.simulate import outputs
 from models.time_series import write_time_series
-from validation.absence import belongs_to_effects, installed, march, probe, user_functions
-from validation.hand_built import exudyn_run, mujoco_run
+from validation.absence.hand_built import exudyn_run, mujoco_run
+from validation.absence.probes import belongs_to_effects, installed, march, probe, user_functions
 from validation.rows import Row, System, Table, at_most, behaves, finding
 from validation.timing import describe, interleave, paired_ratio
 

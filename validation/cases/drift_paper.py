@@ -85,8 +85,8 @@ def tables(data: dict[str, Any]) -> list[Table]:
     if data["rates"]:
         rates = tuple((f"{rate:g}", _cell(when, ".1f") or "never", f"{most:.1f}") for rate, when, most in data["rates"])
         note = "Undisturbed forces, linear between the samples. The paper's 70 N m fits a rate of about 400 Hz."
-        heads = ("sampling rate [Hz]", "drift-off [s]", "moment max [N m]")
-        found.append(Table("What the sampling rate does", note, heads, rates))
+        columns = ("sampling rate [Hz]", "drift-off [s]", "moment max [N m]")
+        found.append(Table("What the sampling rate does", note, columns, rates))
     return found
 
 

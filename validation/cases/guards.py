@@ -123,7 +123,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         how = "" if name == "refused" else ", past the check"
         rows.append(
             behaves(
-                f"guard.constraint.exudyn.{name}",
+                f"guards.constraint.exudyn.{name}",
                 SYSTEM,
                 f"an integrator that ignores the active constraint, exudyn, all {len(found)}{how}",
                 _all(found, name),
@@ -143,7 +143,7 @@ def _unstable_rows(engine: str, endings: dict[str, Any]) -> list[Row]:
     total = sum(checked.values())
     return [
         at_most(
-            f"guard.unstable.{engine}",
+            f"guards.unstable.{engine}",
             SYSTEM,
             f"silent answers of {total} runs at 2 to 10 ms, every fixed-step integrator, {engine}",
             checked["SILENT"],
@@ -153,7 +153,7 @@ def _unstable_rows(engine: str, endings: dict[str, Any]) -> list[Row]:
             "native",
         ),
         behaves(
-            f"guard.unstable.{engine}.unchecked",
+            f"guards.unstable.{engine}.unchecked",
             SYSTEM,
             f"RK4 at 5 ms over 2 s past the check, {engine}",
             ending(lambda: setups.unchecked(engine, road(), 5e-3, 2.0)),
@@ -170,7 +170,7 @@ def _input_rows(engine: str) -> list[Row]:
         file = ending(lambda: sampled_input.damaged(engine, Path(own)))
     return [
         behaves(
-            f"guard.nan-file.{engine}",
+            f"guards.nan-file.{engine}",
             SYSTEM,
             f"NaN in a force file, {engine}",
             file,
@@ -178,7 +178,7 @@ def _input_rows(engine: str) -> list[Row]:
             "the reader names the line",
         ),
         behaves(
-            f"guard.nan.{engine}",
+            f"guards.nan.{engine}",
             SYSTEM,
             f"NaN past the reader, all {len(numbers)} integrators and rules, {engine}",
             _all(caught, "caught"),
@@ -186,7 +186,7 @@ def _input_rows(engine: str) -> list[Row]:
             "Exudyn's explicit solvers return True with NaN",
         ),
         behaves(
-            f"guard.step-sampling.{engine}",
+            f"guards.step-sampling.{engine}",
             SYSTEM,
             f"step that does not divide the sampling period, {engine}",
             ending(lambda: sampled_input.uneven(engine, Path())),
@@ -194,7 +194,7 @@ def _input_rows(engine: str) -> list[Row]:
             "a held sample would change in a step",
         ),
         behaves(
-            f"guard.step-duration.{engine}",
+            f"guards.step-duration.{engine}",
             SYSTEM,
             f"step that does not divide the duration, {engine}",
             ending(lambda: setups.run(engine, setups.vehicle(), 3e-4, 1.0)),
@@ -208,7 +208,7 @@ def _reduced_row(engine: str) -> Row:
     """Reference and MuJoCo have no constraint in the model: an explicit solver is right there."""
     error = prescribed_pitch.explicit(engine, Path())
     return at_most(
-        f"guard.constraint.{engine}",
+        f"guards.constraint.{engine}",
         SYSTEM,
         f"enforced moment by an explicit solver, {engine}: the pitch is an input, no constraint is active",
         error,

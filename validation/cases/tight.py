@@ -23,7 +23,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     other = simulate(scene, "reference", Settings("LSODA", STEP, duration, 1e-12))
     rows = [
         at_most(
-            "tight.reference",
+            "tight.uncertainty",
             SYSTEM,
             "uncertainty of the tight solution: Dormand-Prince 8 against Adams/BDF",
             gap(tight, other),

@@ -91,7 +91,7 @@ def losses(problem: dict[str, Any], points: list[Point]) -> Table:
         _lost(cost.loss(points, quantity, target, kind, own.setting.curve, among))
         for own in owners.values() for among in (own.setting.engine, "") for kind in cost.COSTS))
         for target in problem["tolerances"]]  # fmt: skip
-    heads = tuple(f"{owner} default by the cheapest of {among}, {kind}"
+    heads = tuple(f"{owner} by best of {among}: {kind}"
                   for owner in owners for among in (owner, "all") for kind in cost.COSTS)  # fmt: skip
     as_is = "; ".join(f"{owner}: {own.setting.method} at {own.setting.label()}, which by itself gives "
                       f"{own.errors[quantity]:.3g} {problem['units'][quantity]}" for owner, own in owners.items()
