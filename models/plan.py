@@ -68,8 +68,10 @@ def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:
 
 def _channels(assembly: Assembly) -> list[str]:
     names = ["states", "f1", "f2", "f3", "f4", "suspension_moment"]
+    names += ["zeta1", "zeta2"] if assembly.mode == "road" else []
     names += ["inertia_term", "enforced_moment"] if assembly.mode == "pitch" else []
-    return names + [output.__name__ for output in assembly.outputs]
+    modules = [import_module(f"models.effects.{name}") for name in assembly.scene.effects]
+    return names + [channel for module in modules for channel in getattr(module, "CHANNELS", ())]
 
 
 def _effects(scene: Scene) -> list[str]:

@@ -227,9 +227,18 @@ def _check_times(scene: Scene) -> None:
         own = name in scene.engines and scene.engines[name].step is not None
         _check_step(scene, f"engines.{name}.step" if own else "run.step", float(scene.settings(name).step or 0))
     wanted = scene.run.output_step
+    _check_rows(scene)
     if wanted is not None and wanted > scene.run.duration * (1 + 1e-9):
         allowed = f"must be at most run.duration = {scene.run.duration:g} s"
         raise InputError(scene.file, "run.output_step", wanted, allowed)
+
+
+def _check_rows(scene: Scene) -> None:
+    """An engine that picks its own steps saves its rows where they end."""
+    name = str(scene.settings("exudyn").integrator)
+    if scene.run.output_step is not None and "exudyn" in scene.engines and CATALOGUE["exudyn"][name].adaptive:
+        allowed = f"has no meaning for exudyn's {name}, whose rows lie where its own steps end: drop one of the two"
+        raise InputError(scene.file, "run.output_step", scene.run.output_step, allowed)
 
 
 def _check_step(scene: Scene, place: str, step: float) -> None:

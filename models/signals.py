@@ -33,6 +33,11 @@ class Signal(Protocol):
         """True if it is constant over each period."""
         ...
 
+    @property
+    def resolution(self) -> float:
+        """Longest step (s) that an adaptive solver may take without stepping over something."""
+        ...
+
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values at start + i step, shape (count, channels)."""
         ...
@@ -67,6 +72,17 @@ class Sampled:
     def end(self) -> float:
         """Last time (s) at which the signal is defined."""
         return (len(self.values) - (0 if self.held else 1)) * self.period
+
+    @property
+    def resolution(self) -> float:
+        """The sampling period (s)."""
+        return self.period
+
+    def polynomials(self) -> np.ndarray:
+        """Coefficients (powers, periods, channels), lowest power first, in the time since each sample."""
+        if self.held:
+            return self.values[None]
+        return np.stack([self.values[:-1], np.diff(self.values, axis=0) / self.period])
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values at start + i step, shape (count, channels)."""
@@ -124,6 +140,15 @@ class Smooth:
         """Last time (s) at which the signal is defined."""
         return (len(self.values) - 1) * self.period
 
+    @property
+    def resolution(self) -> float:
+        """The sampling period (s)."""
+        return self.period
+
+    def polynomials(self) -> np.ndarray:
+        """Coefficients (powers, periods, value columns), lowest power first, in the time since each sample."""
+        return self._pieces
+
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values and derivatives at start + i step, shape (count, channels)."""
         from models.piecewise import evaluate
@@ -166,6 +191,11 @@ class Stacked:
     def held(self) -> bool:
         """True if any part is constant over each step."""
         return any(part.held for part in self.parts)
+
+    @property
+    def resolution(self) -> float:
+        """The finest one of all parts (s)."""
+        return min(part.resolution for part in self.parts)
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values of all parts at start + i step, shape (count, channels)."""

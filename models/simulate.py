@@ -76,8 +76,7 @@ def outputs(assembly: Assembly, run: Trajectory) -> Channels:
     inputs = _inputs(assembly, run.times)
     channels |= _forces(assembly, run, inputs)
     for output in assembly.outputs:
-        for name, (unit, values) in output(assembly, run.times, run.states).items():
-            channels[name] = (unit, name, values)
+        channels |= output(assembly, run.times, run.states)
     return channels
 
 

@@ -1,6 +1,7 @@
 """Studies: one script per question, run as ``python studies/NAME.py`` or ``twinrig run SCENE``.
 
 A study is a module with ``run(scene, engines, folder, progress) -> summary``: it writes results and
-figures into the folder and returns what ``--json`` prints. Scenes are in ``scenes/``; a scene's
+figures into the folder and returns what ``--json`` prints. If it has ``Options``, a scene may set them; if it
+has ``check(scene, engines)``, that is called before anything is written. Scenes are in ``scenes/``; a scene's
 ``study`` key names the study that runs it.
 """

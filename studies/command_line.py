@@ -143,6 +143,8 @@ def _finish(scene: Any, engines: tuple[str, ...], out: Path | None, as_json: boo
 
     module = _study(scene)
     check(scene, engines)
+    if hasattr(module, "check"):
+        module.check(scene, engines)
     folder = new_folder(out, Path(scene.file).stem)
     try:
         with _progress(as_json) as progress:

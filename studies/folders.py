@@ -1,5 +1,6 @@
 """Where results go: a new folder each time, so that nothing earlier is overwritten or lost."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from itertools import count
@@ -7,6 +8,8 @@ from pathlib import Path
 
 from models.errors import InputError
 
+COMMAND = "command.txt"
+"""First file of a folder that the user named: what made the others."""
 RESULTS = Path("results")
 """Where results go unless the user says otherwise, within the folder in which the command runs."""
 
@@ -14,24 +17,38 @@ RESULTS = Path("results")
 def new_folder(wanted: Path | None, name: str) -> Path:
     """The folder that the user names, if it is empty, or the first free one under ``results/``.
 
-    Raises InputError if the named folder holds anything or cannot be made.
+    Raises InputError if the named folder holds anything or cannot be made. Two runs at the same time never
+    get the same folder: it is made, or its first file is, in one step that only one of them can take.
     """
     if wanted is None:
-        return _make(next(path for path in _candidates(name) if not path.exists()))
+        return next(path for path in _candidates(name) if _made(path))
     try:
         if wanted.exists() and not wanted.is_dir():
             raise InputError("--out", "", str(wanted), "is a file: name a folder")
-        if wanted.exists() and any(wanted.iterdir()):
-            allowed = "holds files already and is left as it is: name a new or empty folder"
-            raise InputError("--out", "", str(wanted), allowed)
+        free = _made(wanted) or not any(wanted.iterdir())
     except OSError as error:
         raise InputError("--out", "", str(wanted), f"cannot be used: {error.strerror}") from None
-    return _make(wanted)
+    if not free or not _marked(wanted):
+        allowed = "holds files already and is left as it is: name a new or empty folder"
+        raise InputError("--out", "", str(wanted), allowed)
+    return wanted
+
+
+def _marked(folder: Path) -> bool:
+    """Put the command into the folder as its first file; False if another run was faster."""
+    try:
+        with (folder / COMMAND).open("x") as file:
+            file.write(" ".join(sys.argv) + "\n")
+    except FileExistsError:
+        return False
+    return True
 
 
 def drop_if_empty(folder: Path) -> None:
     """Leave no trace of a run that saved nothing."""
     with suppress(OSError):
+        if [path.name for path in folder.iterdir()] == [COMMAND]:
+            (folder / COMMAND).unlink()
         folder.rmdir()
         if folder.parent == RESULTS:
             RESULTS.rmdir()
@@ -43,9 +60,12 @@ def _candidates(name: str) -> Iterator[Path]:
         yield RESULTS / f"{name}-{i}"
 
 
-def _make(path: Path) -> Path:
+def _made(path: Path) -> bool:
+    """Make a folder; False if it is there already."""
     try:
-        path.mkdir(parents=True, exist_ok=True)
+        path.mkdir(parents=True)
+    except FileExistsError:
+        return False
     except OSError as error:
         raise InputError("--out", "", str(path), f"cannot be made: {error.strerror}") from None
-    return path
+    return True

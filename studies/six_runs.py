@@ -12,10 +12,13 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from models.assembly import assemble
+from models.engines.catalogue import CATALOGUE
+from models.engines.protocol import Settings
 from models.errors import InputError, RunFailed
 from models.result import Result
 from models.scene import Scene, build
-from models.simulate import simulate
+from models.simulate import simulate, state_names
 from models.strict import Strict, quantity, read
 from models.time_series import write_time_series
 
@@ -26,6 +29,8 @@ PAPER = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
 DRIFT = 0.05
 """A run has drifted off when its pitch is this far (rad) from the measured one."""
 
+LEAST = 8
+"""Samples that a spline through the measured pitch needs."""
 KEPT = 0.01
 """Spacing (s) of the saved runs; the table is made from every step."""
 
@@ -39,14 +44,15 @@ class Options(Strict):
     )
     noise_samples: int = Field(5, ge=1, description="number of noise samples")
     perturbed_models: int = Field(5, ge=0, description="number of random models beside the paper's")
-    seed: int = Field(1, ge=0, description="seed of noise and models")
+    seed: int = Field(1, ge=0, lt=2**63, description="seed of noise and models")
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """All six runs in each engine; saves every result, five figures and ``table.txt``."""
+    check(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     every = _stride(scene, options)
-    measured = simulate(scene, "reference")
+    measured = simulate(scene, "reference", Settings("RK4", scene.run.step, scene.run.duration))
     measured.save(folder / "measurement.nc")
     deviation = _write_measurement(measured, options, every, folder)
     scenes = _scenes(scene, options, folder, deviation)
@@ -76,6 +82,34 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "failed": failed,
         "table": table,
     }
+
+
+def check(scene: Scene, engines: tuple[str, ...]) -> None:
+    """Refuse, before anything is written, a scene that this study cannot follow through all its runs."""
+    options = read(Options, scene.options, scene.file, "options")
+    for name in scene.effects:
+        if name != "road":
+            raise InputError(scene.file, f"effects.{name}", None, "this study measures on a road and names the effects "
+                             "of the other runs itself: drop it")
+    if "road" not in scene.effects:
+        raise InputError(scene.file, "effects.road", None, "is missing: this study measures on a road")
+    if scene.run.output_step is not None:
+        raise InputError(scene.file, "run.output_step", scene.run.output_step, f"this study saves rows {KEPT} s apart "
+                         "and makes its table from every step: drop this key")
+    _stride(scene, options)
+    if scene.run.duration * options.sampling_rate < LEAST:
+        allowed = f"must last at least {LEAST} samples, {LEAST / options.sampling_rate:g} s"
+        raise InputError(scene.file, "run.duration", scene.run.duration, allowed)
+    for engine in engines:
+        _check_integrator(scene, engine)
+
+
+def _check_integrator(scene: Scene, engine: str) -> None:
+    """The guided runs need an integrator that solves for a prescribed pitch."""
+    given = scene.engines[engine].integrator if engine in scene.engines else None
+    if given is not None and not CATALOGUE[engine][given].constraints:
+        allowed = "the last runs prescribe the pitch, which this integrator does not solve for: drop this key"
+        raise InputError(scene.file, f"engines.{engine}.integrator", given, allowed)
 
 
 def _stride(scene: Scene, options: Options) -> int:
@@ -120,26 +154,22 @@ def _scenes(scene: Scene, options: Options, folder: Path, deviation: float) -> d
 
 def _maker(scene: Scene, folder: Path) -> Callable[[dict[str, float], dict[str, Any]], Scene]:
     """Builder of a force-excited scene from overrides and further effects; it starts where the measurement did."""
-    from models.vehicles.pitch_plane import STATES, equilibrium
-
-    rest = equilibrium(scene.vehicle_parameters())
-    heave = dict(zip(STATES[:3], rest.tolist(), strict=False))
+    initial = dict(zip(state_names(), assemble(scene).initial.tolist(), strict=True))
+    parameters = scene.vehicle_parameters().model_dump()
 
     def make(override: dict[str, float], effects: dict[str, Any]) -> Scene:
         forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}}
-        vehicle = scene.vehicle.model_dump() | {"override": scene.vehicle.override | override}
-        return build(
-            {
-                "title": scene.title,
-                "vehicle": vehicle,
-                "run": scene.run.model_dump(),
-                "start": heave if "prescribed_pitch" in effects else heave | {"pitch": float(rest[3])},
-                "engines": {name: table.model_dump(exclude_unset=True) for name, table in scene.engines.items()},
-                "effects": forces | effects,
-            },
-            scene.file,
-            folder,
-        )
+        vehicle = {"geometry": scene.vehicle.geometry, "override": parameters | override}
+        free = "prescribed_pitch" not in effects
+        table = {
+            "title": scene.title,
+            "vehicle": vehicle,
+            "run": {"duration": scene.run.duration, "step": scene.run.step},
+            "start": {name: value for name, value in initial.items() if free or not name.startswith("pitch")},
+            "engines": {name: own.model_dump(exclude_unset=True) for name, own in scene.engines.items()},
+            "effects": forces | effects,
+        }
+        return build(table, scene.file, folder)
 
     return make
 
@@ -234,7 +264,7 @@ def _figures(measured: Result, runs: dict[str, Result], folder: Path) -> None:
         "both": runs["both"],
     }
     save(
-        _figure_drift(main, "Force-excited runs beside the measurement: heave stays, pitch runs away"),
+        _figure_drift(main, "Force-excited runs beside the measurement"),
         folder / "fig5_drift.png",
     )
     for prefix, title, name in (
@@ -252,7 +282,8 @@ def _figure_measurement(measured: Result) -> Any:
     from studies.figures import plt
 
     figure, axes = plt.subplots(2, 2, figsize=(10, 5), width_ratios=(2, 1))
-    detail = (measured.times >= 20) & (measured.times <= 21)
+    middle = round(float(measured.times[-1]) / 2, 1)
+    detail = (measured.times >= middle) & (measured.times <= middle + 1)
     for row, (channels, label, scale) in enumerate(
         ((("zeta1", "zeta2"), "road under the wheels, up [m]", -1.0), (("f1", "f2"), "wheel force [kN]", 1e-3))
     ):
@@ -260,11 +291,11 @@ def _figure_measurement(measured: Result) -> Any:
             axes[row, 0].plot(measured.times, scale * measured[channel], label=name, linewidth=0.7)
             axes[row, 1].plot(measured.times[detail], scale * measured[channel][detail], label=name)
         axes[row, 0].set_title(label)
-        axes[row, 1].set_title("detail, 20 to 21 s")
+        axes[row, 1].set_title(f"detail, from {middle:g} s on")
     axes[0, 0].legend(ncols=2, loc="upper right")
     for axis in axes[1]:
         axis.set_xlabel("time [s]")
-    figure.suptitle("Virtual measurement: the vehicle on the study road", x=0.01, ha="left", fontweight="bold")
+    figure.suptitle("Virtual measurement: road and wheel forces", x=0.01, ha="left", fontweight="bold")
     return figure
 
 

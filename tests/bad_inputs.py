@@ -18,7 +18,7 @@ FORCED = FREE + """
 file = "forces.csv"
 interpolation = "held"
 """
-GUIDED = FORCED + """
+GUIDED = FORCED.replace("held", "linear") + """
 [effects.prescribed_pitch]
 file = "pitch.csv"
 """
@@ -197,6 +197,8 @@ FORCES = [
     _set("adaptive steps over held samples", "engines.exudyn.integrator=DOPRI5", "DOPRI5", "cannot hold", scene=FORCED),
     _set("a road and wheel forces", "effects.road={source='study',speed=3}", "'road'", "drop one", scene=FORCED),
     _set("pitch without forces", "effects.prescribed_pitch.file=pitch.csv", "prescribed_pitch", "needs the effect 'wheel_forces'"),
+    _set("held samples beside a prescribed pitch", "effects.wheel_forces.interpolation=held", "exudyn",
+         "half a step late", "linear", scene=GUIDED),
     _set("contact points on nothing", "effects.contact_points={}", "contact_points", "needs the effect 'wheel_forces'"),
     _set("pitch spring and prescribed pitch", "effects.pitch_spring.stiffness=9", "pitch_spring", "drop one", scene=GUIDED),
     _set("prescribed pitch and body frame", "effects.wheel_forces.frame=body", "frame = 'body'", "'inertial'", scene=GUIDED),

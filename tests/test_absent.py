@@ -13,7 +13,7 @@ from models.scene import effect_names
 from validation.absence.hand_built import mujoco_model
 from validation.absence.probes import belongs_to_effects, installed, march, probe, user_functions
 from validation.cases import absent
-from validation.cases.absent import ENGINES, FORCES, PRICED, change, declared, hand_built, model, scene
+from validation.cases.absent import ENGINES, FORCES, LINEAR, PRICED, change, declared, hand_built, model, scene
 
 BARE = {"title": "bare", "run": {"duration": 0.02, "step": 0.001}, "start": {"pitch": 0.1}}
 FORCED = {**BARE, "effects": FORCES}
@@ -87,9 +87,11 @@ def test_no_callback_before_during_and_after(folder):
 def test_user_functions_are_counted(folder):
     """Positive control, over Exudyn's own items: two loads per wheel on a road; two offsets of the constraint."""
     assert user_functions(model(scene({"road": PRICED["road"][1]}, 50, folder), "exudyn")) == 4
-    guided = {**FORCES, "prescribed_pitch": PRICED["prescribed_pitch"][1]}
+    guided = {**LINEAR, "prescribed_pitch": PRICED["prescribed_pitch"][1]}
     built = model(scene(guided, 50, folder, guided=True), "exudyn")
-    assert user_functions(built) + 1 == built.plan()["callbacks"] == 5  # and the step's own, which is not an item
+    assert user_functions(built) == built.plan()["callbacks"] == 4
+    built = model(scene(FORCES, 50, folder), "exudyn")
+    assert user_functions(built) + 1 == built.plan()["callbacks"] == 3  # and the step's own, which is not an item
 
 
 def test_a_bare_scene_has_the_states_of_the_vehicle_and_no_others(folder):

@@ -144,7 +144,9 @@ def test_accelerations_agree_at_any_sample(tmp_path, interpolation, guided):
     effects |= {"prescribed_pitch": {"file": "p.csv"}} if guided else {}
     scene = build_scene({"title": "test", "run": {"duration": 0.3, "step": 1e-3}, "effects": effects}, "", tmp_path)
     assembly = assemble(scene)
-    models = [build(engine, assembly, settings_of(scene, engine)) for engine in ("reference", "exudyn", "mujoco")]
+    # Exudyn's generalised-alpha refuses held samples, and a prescribed pitch has no other integrator there
+    engines = ("reference", "mujoco") if guided and interpolation == "held" else ("reference", "exudyn", "mujoco")
+    models = [build(engine, assembly, settings_of(scene, engine)) for engine in engines]
     for time in (0.0, 0.1, 0.2):
         y = RANDOM.uniform(-0.3, 0.3, 8)
         if guided:

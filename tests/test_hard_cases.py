@@ -75,12 +75,8 @@ def test_a_sample_read_one_late_is_found(implementation, monkeypatch, tmp_path):
     assert found(sampled_input, "replay of a ramp", implementation, tmp_path) == "SILENT"
 
 
-def test_rows_of_an_adaptive_run_taken_for_a_grid_are_found(monkeypatch, tmp_path):
-    def uniform(signal, times):
-        step = times[1] - times[0]
-        return step * np.arange(len(times)), np.arange(len(times)), signal.sample(0.0, step, len(times))
-
-    monkeypatch.setattr(contact_effect, "_grid", uniform)
+def test_a_contact_point_that_forgets_its_past_is_found(monkeypatch, tmp_path):
+    monkeypatch.setattr(contact_effect, "_starts", lambda particular, first, period, tau: particular[0])
     assert found(contact_points, "contact point along an adaptive run", "exudyn", tmp_path) == "SILENT"
 
 

@@ -10,6 +10,8 @@ Independence = Literal["native", "shared kernel", "closed form", "published", "n
 """How far the two sides are apart: separate force laws, the same force code, an exact answer, a published
 figure, or no second side."""
 Status = Literal["passed", "failed", "not run"]
+REPORTED = "reported, not judged"
+"""Reason of a row that stands beside a figure without being judged by it."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ def behaves(id: str, system: System, quantity: str, found: str, expected: str, w
 def finding(id: str, system: System, quantity: str, value: float, unit: str, expected: float | str, why: str,
             independence: Independence = "published") -> Row:  # fmt: skip
     """Row that reports a figure beside a published one without judging it; it passes by being measured."""
-    return Row(id, system, quantity, value, unit, expected, None, why, independence, "passed", "reported, not judged")
+    return Row(id, system, quantity, value, unit, expected, None, why, independence, "passed", REPORTED)
 
 
 def not_run(id: str, system: System, quantity: str, reason: str) -> Row:

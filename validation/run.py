@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from models.result import provenance
-from validation.rows import Row
+from validation.rows import REPORTED, Row
 
 CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "hard_cases",
          "planted_faults", "absent", "price")  # fmt: skip
@@ -74,8 +74,10 @@ def _say(rows: list[Row], seconds: float, page: Path) -> int:
     """Print the verdict and every row that did not pass."""
     failed = [row for row in rows if row.status == "failed"]
     skipped = [row for row in rows if row.status == "not run"]
+    told = [row for row in rows if row.reason == REPORTED]
+    passed = len(rows) - len(failed) - len(skipped) - len(told)
     print(
-        f"{len(rows)} rows: {len(rows) - len(failed) - len(skipped)} passed, {len(failed)} failed, "
+        f"{len(rows)} rows: {passed} passed, {len(told)} reported without being judged, {len(failed)} failed, "
         f"{len(skipped)} not run, {seconds:.0f} s"
     )
     for row in failed + skipped:

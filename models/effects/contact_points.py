@@ -1,22 +1,28 @@
 """Where the massless contact points of a force-excited vehicle are (rows 9 and 10 of eq. 37).
 
 With e = z - zeta each obeys d e' + k e = f alone: it feels the vehicle's force and never feeds back. So
-it is not a state of any engine but an exact filter over the run's own time steps.
+it is not a state of any engine but an exact filter over the samples of the force, whatever the run's steps.
 """
 
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from models.assembly import Assembly
-from models.signals import Signal
+from models.errors import InputError
+from models.signals import Sampled, Smooth, Stacked
 from models.strict import Strict
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("road",)
-AFTER = ("wheel_forces", "prescribed_pitch")
+AFTER = ("wheel_forces", "force_noise", "prescribed_pitch")
 COST = "two exact first-order filters after the run; no state in any engine"
+
+Channels = dict[str, tuple[str, str, np.ndarray]]
+"""Name -> unit, meaning, values."""
+CHANNELS = ("zeta1", "zeta2")
 
 
 class Parameters(Strict):
@@ -25,48 +31,59 @@ class Parameters(Strict):
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The assembly with the contact points among its results."""
+    if assembly.mode == "force-body":
+        raise InputError(assembly.scene.file, "effects.contact_points", None,
+                         "contact points move vertically: use frame = 'inertial' for the wheel forces")
     return replace(assembly, outputs=(*assembly.outputs, contact_points))
 
 
-def contact_points(assembly: Assembly, times: np.ndarray, states: np.ndarray) -> dict[str, tuple[str, np.ndarray]]:
+def contact_points(assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
     """Channels zeta1, zeta2 (m, down), starting with the tyres at rest under the first force."""
     p, signal = assembly.parameters, assembly.input
-    assert signal is not None
-    grid, rows, forces = _grid(signal, times)
-    pairs = ((p.k1, p.d1), (p.k2, p.d2))
-    springs = [compression(forces[:, i], k, d, np.diff(grid), signal.held)[rows] for i, (k, d) in enumerate(pairs)]
-    return {f"zeta{i + 1}": ("m", states[:, i] - springs[i]) for i in range(2)}
+    forces = signal.parts[0] if isinstance(signal, Stacked) else signal
+    assert isinstance(forces, Sampled | Smooth)
+    pieces = forces.polynomials()
+    tyres = (("front", p.k1, p.d1), ("rear", p.k2, p.d2))
+    return {
+        f"zeta{i + 1}": ("m", f"contact point under the {name} wheel, down",
+                         states[:, i] - compression(pieces[:, :, i], forces.period, stiffness, damping, times))
+        for i, (name, stiffness, damping) in enumerate(tyres)
+    }  # fmt: skip
 
 
-def _grid(signal: Signal, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times over whose steps the force is held or linear, which of them are the run's own, and the forces.
+def compression(pieces: np.ndarray, period: float, stiffness: float, damping: float, times: np.ndarray) -> np.ndarray:
+    """Tyre compression e (n,) in m of d e' + k e = f at any times (n,) in s, exact for a polynomial f.
 
-    Fixed steps divide the sampling period. An adaptive engine's do not: the samples are put in between.
+    pieces : (powers, periods), the force (N) in the time since each sample, lowest power first.
+    On each piece e = P(t) + (e_0 - P(0)) exp(-t / tau) with tau = d / k and the particular solution
+    P = (f - tau f' + tau^2 f'' - ...) / k, which ends because f is a polynomial.
     """
-    step = float(times[1] - times[0])
-    if np.allclose(np.diff(times), step, rtol=1e-6, atol=0):
-        uniform = step * np.arange(len(times))
-        return uniform, np.arange(len(times)), signal.sample(0.0, step, len(times))
-    grid = np.unique(np.concatenate((times, signal.knots(times[-1]))))
-    return grid, np.searchsorted(grid, times), np.array([signal.at(time) for time in grid])
+    tau = damping / stiffness
+    particular = _particular(pieces, tau) / stiffness
+    piece = np.clip(np.floor(times / period + 1e-9).astype(int), 0, pieces.shape[1] - 1)
+    since = np.maximum(times - piece * period, 0.0)
+    found = sum(particular[power, piece] * since**power for power in range(len(particular)))
+    if tau == 0.0:
+        return np.asarray(found)
+    starts = _starts(particular, pieces[0, 0] / stiffness, period, tau)
+    return found + (starts - particular[0])[piece] * np.exp(-since / tau)
 
 
-def compression(force: np.ndarray, stiffness: float, damping: float, steps: np.ndarray | float,
-                held: bool) -> np.ndarray:  # fmt: skip
-    """Tyre compression e (n,) in m of d e' + k e = f, exact for a force that is held or linear over each step.
+def _particular(pieces: np.ndarray, tau: float) -> np.ndarray:
+    """Coefficients of f - tau f' + tau^2 f'' - ..., shape as ``pieces``."""
+    total, derivative = np.zeros_like(pieces), pieces.copy()
+    for order in range(len(pieces)):
+        total += (-tau) ** order * derivative
+        derivative = np.vstack([derivative[1:] * np.arange(1, len(pieces))[:, None], np.zeros_like(pieces[:1])])
+    return total
 
-    force (n,) in N at the ends of the steps, one or (n - 1,) in s; stiffness in N/m, damping in N s/m.
-    The update is e_1 = r e_0 + (1 - r) f / k for a held force, r = exp(-k h / d); a linear one adds the
-    part of its change that has arrived, 1 - (1 - r) d / (k h).
-    """
-    if damping == 0.0:
-        return force / stiffness
-    x = stiffness * np.broadcast_to(steps, len(force) - 1) / damping
-    decay, gained = np.exp(-x), -np.expm1(-x)
-    arrived = np.zeros_like(x) if held else 1.0 - gained / x
-    out = np.empty_like(force)
-    out[0] = force[0] / stiffness
-    for i in range(len(force) - 1):
-        rise = arrived[i] * (force[i + 1] - force[i])
-        out[i + 1] = decay[i] * out[i] + (gained[i] * force[i] + rise) / stiffness
-    return out
+
+def _starts(particular: np.ndarray, first: float, period: float, tau: float) -> np.ndarray:
+    """Compression at the start of each piece (m): that of the end of the one before it."""
+    powers = period ** np.arange(len(particular))
+    gained = powers @ particular - particular[0] * math.exp(-period / tau)
+    starts = np.empty(particular.shape[1])
+    starts[0] = first
+    for i in range(len(starts) - 1):
+        starts[i + 1] = gained[i] + starts[i] * math.exp(-period / tau)
+    return starts

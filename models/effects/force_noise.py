@@ -24,7 +24,7 @@ class Parameters(Strict):
     """[effects.force_noise]."""
 
     deviation: float = quantity("N", "standard deviation of each sample", zero=True)
-    seed: int = Field(0, ge=0, description="whole number that names the noise")
+    seed: int = Field(0, ge=0, lt=2**128, description="whole number that names the noise")
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:

@@ -8,13 +8,18 @@ Nodes = Literal["start", "half-steps", "any"]
 
 @dataclass(frozen=True)
 class Integrator:
-    """order : of its global error; nodes : when within a step it reads the input; adaptive : picks its steps;
-    constraints : gives correct multipliers of a prescribed motion; compliant : stiff-stable (no step limit)."""
+    """What is known of one integrator.
+
+    order : of its global error; nodes : when within a step it reads the input; adaptive : picks its own
+    steps; constraints : gives correct moments of a prescribed pitch; holds : takes a held sample as constant
+    over its step (Newmark methods blend it with the one before it, half a step late).
+    """
 
     order: int
     nodes: Nodes = "half-steps"
     adaptive: bool = False
     constraints: bool = False
+    holds: bool = True
 
 
 CATALOGUE: dict[str, dict[str, Integrator]] = {
@@ -30,9 +35,9 @@ CATALOGUE: dict[str, dict[str, Integrator]] = {
         "RK33": Integrator(3, "any"),
         "ExplicitMidpoint": Integrator(2),
         "ExplicitEuler": Integrator(1),
-        "VelocityVerlet": Integrator(1),
-        "GeneralizedAlpha": Integrator(2, constraints=True),
-        "TrapezoidalIndex2": Integrator(2),
+        "VelocityVerlet": Integrator(1, holds=False),
+        "GeneralizedAlpha": Integrator(2, constraints=True, holds=False),
+        "TrapezoidalIndex2": Integrator(2, holds=False),
         "DOPRI5": Integrator(5, "any", adaptive=True),
         "DVERK6": Integrator(6, "any", adaptive=True),
         "ODE23": Integrator(3, "any", adaptive=True),

@@ -99,6 +99,9 @@ def check(engine: str, assembly: "Assembly", settings: Settings) -> None:
     signal = assembly.input
     if signal is not None and signal.period is not None:
         _sampling(engine, integrator, settings, signal.period, signal.held)
+    if signal is not None and integrator.adaptive and engine != "reference" and settings.step > signal.resolution:
+        raise Refused(engine, f"{settings.integrator} may take steps of {settings.step:g} s and miss details of the "
+                              f"input, which are {signal.resolution:.3g} s long: use a step of at most that")
     check_step(engine, assembly, settings)
 
 
@@ -112,6 +115,9 @@ def _sampling(engine: str, integrator: Integrator, settings: Settings, period: f
             raise Refused(engine, f"{settings.integrator} picks its own steps and cannot hold samples over them; "
                                   "use a fixed-step integrator")
         return
+    if held and not integrator.holds:
+        raise Refused(engine, f"{settings.integrator} reads a held sample half a step late, which costs it its order: "
+                              "use interpolation = 'linear' or 'smooth', or an explicit Runge-Kutta integrator")
     if not integrator.adaptive:
         _whole(engine, settings.step, "the sampling period", period)
 

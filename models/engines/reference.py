@@ -111,7 +111,7 @@ class Reference:
 
     def plan(self) -> dict[str, int]:
         """What was built."""
-        return {"degrees of freedom": 4, "native items": 0, "callbacks": 0}
+        return {"degrees of freedom": 3 if self.assembly.mode == "pitch" else 4, "native items": 0, "callbacks": 0}
 
     def _at(self, time: float) -> np.ndarray:
         return NO_INPUT[0] if self.assembly.input is None else self.assembly.input.at(time)
@@ -176,8 +176,9 @@ class Reference:
             return dy
 
         tolerance = max(self.settings.tolerance, 3e-14)
+        longest = math.inf if self.assembly.input is None else self.assembly.input.resolution
         solution = solve_ivp(rhs, (start, end), y, method=self.settings.integrator, dense_output=True,
-                             rtol=tolerance, atol=tolerance * 1e-2)
+                             rtol=tolerance, atol=tolerance * 1e-2, max_step=longest)
         if not solution.success:
             raise RunFailed("reference", solution.message, solution.t[-1], solution.y[:, -1])
         return solution

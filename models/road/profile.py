@@ -35,6 +35,11 @@ class Profile(Protocol):
         """First and last arc length (m) at which the road is defined; infinite where it has no end."""
         ...
 
+    @property
+    def finest(self) -> float:
+        """Length (m) of its finest detail: an adaptive solver must not step farther."""
+        ...
+
     def height_and_slope(self, s: ArrayLike) -> Samples:
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
         ...
@@ -83,6 +88,11 @@ class SineProfile:
     def extent(self) -> tuple[float, float]:
         """Without end on both sides."""
         return -math.inf, math.inf
+
+    @property
+    def finest(self) -> float:
+        """A quarter (m) of the shortest wave."""
+        return float(0.5 * math.pi / np.abs(self.wavenumber).max())
 
     def height_and_slope(self, s: ArrayLike) -> Samples:
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
@@ -170,6 +180,11 @@ class SplineProfile:
     def extent(self) -> tuple[float, float]:
         """First and last arc length (m); a road with a window is flat for ever before its start."""
         return (-math.inf if self.window_length > 0.0 else self.start), self.end
+
+    @property
+    def finest(self) -> float:
+        """The smallest distance (m) of two stations."""
+        return float(np.diff(self.station).min())
 
     @property
     def points(self) -> Samples:

@@ -23,6 +23,11 @@ class RoadUnderWheels:
     period: None = None
     held: bool = False
 
+    @property
+    def resolution(self) -> float:
+        """Time (s) to pass the finest detail of the road: a station's spacing or a quarter of a wave."""
+        return self.profile.finest / self.speed
+
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values at start + i step, shape (count, 4)."""
         out = np.empty((count, 4))

@@ -27,6 +27,7 @@ START = {"pitch": 0.1, "z3": -0.1}
 """m, rad: the vehicle moves, so that nothing is compared at rest."""
 
 FORCES = {"wheel_forces": {"file": "forces.csv", "interpolation": "held"}}
+LINEAR = {"wheel_forces": {"file": "forces.csv", "interpolation": "linear"}}
 GUIDED = {"integrator": "GeneralizedAlpha"}
 """The one integrator of Exudyn that solves for a prescribed pitch; its neighbour without one takes it, too."""
 
@@ -38,9 +39,9 @@ PRICED: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, dict[str, int]
     "wheel_forces": ({}, FORCES["wheel_forces"], {"exudyn": {"callbacks": 3}}),
     "force_noise": (FORCES, {"deviation": 8.0}, {}),
     "contact_points": (FORCES, {}, {"all": {"channels": 2}}),
-    "prescribed_pitch": (FORCES, {"file": "pitch.csv"},
-                         {"exudyn": {"native items": 1, "callbacks": 2},
-                          "mujoco": {"degrees of freedom": -1, "native items": 0, "callbacks": 1},
+    "prescribed_pitch": (LINEAR, {"file": "pitch.csv"},
+                         {"reference": {"degrees of freedom": -1}, "exudyn": {"native items": 1, "callbacks": 2},
+                          "mujoco": {"degrees of freedom": -1},
                           "all": {"channels": 2}}),
 }  # fmt: skip
 """Effect -> the effects that it is added to, what the scene says of it, and what it must change: nothing else.

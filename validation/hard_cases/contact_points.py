@@ -19,7 +19,7 @@ LOAD = 1000.0
 def _compressions(assembly: Assembly, found: Trajectory) -> np.ndarray:
     """Tyre compression (n, 2) in m along a run."""
     channels = contact_points(assembly, found.times, found.states)
-    return found.states[:, :2] - np.column_stack([channels["zeta1"][1], channels["zeta2"][1]])
+    return found.states[:, :2] - np.column_stack([channels["zeta1"][2], channels["zeta2"][2]])
 
 
 def step_answer(engine: str, folder: Path) -> float:
@@ -30,7 +30,10 @@ def step_answer(engine: str, folder: Path) -> float:
     p, worst = base.parameters, 0.0
     for step in STEPS:
         assembly = setups.driven(base, Sampled(values, 2e-2, held=True))
-        found = setups.run(engine, assembly, step, 0.1, setups.IMPLICIT[engine])
+        if engine == "exudyn":  # its implicit integrators refuse held samples
+            found = setups.run(engine, assembly, min(step, 2e-3), 0.1)
+        else:
+            found = setups.run(engine, assembly, step, 0.1, setups.IMPLICIT[engine])
         since = np.maximum(found.times - 2e-2, 0.0)
         truth = -LOAD / p.k1 * np.expm1(-since * p.k1 / p.d1)
         worst = max(worst, setups.largest(_compressions(assembly, found)[:, 0] - truth) / (LOAD / p.k1))

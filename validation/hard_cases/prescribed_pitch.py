@@ -190,6 +190,11 @@ class Straight:
     channels: int = 3
     held: bool = False
 
+    @property
+    def resolution(self) -> float:
+        """The sampling period (s)."""
+        return self.period
+
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Angle, rate and 0 at start + i step."""
         place = np.round((start + step * np.arange(count)) / self.period, 9)

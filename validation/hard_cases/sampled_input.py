@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from models.engines.protocol import build
 from models.engines.stability import first_order, linearised
 from models.errors import InputError
+from models.road.continuation import run_in
 from models.road.polyline import PolylineProfile
 from models.road.profile import SplineProfile
 from models.road.signal import RoadUnderWheels
@@ -198,6 +200,37 @@ def uneven(engine: str, folder: Path) -> float:
 REFUSED: dict[str, Word] = {"reference": "refused", "exudyn": "refused", "mujoco": "refused"}
 RAISED: dict[str, Word] = {"reference": "raised", "exudyn": "raised", "mujoco": "raised"}
 
+@cache
+def _bump() -> RoadUnderWheels:
+    """A bump 50 mm high and 0.3 m long after 200 m of flat road, at 20 m/s."""
+    station = 0.1 * np.arange(2300)
+    height = -0.05 * np.exp(-(((station - 200.0) / 0.15) ** 2))
+    return RoadUnderWheels(run_in(SplineProfile.through(station, height, "bump")), 20.0, 2.0)
+
+
+def bump(engine: str, folder: Path) -> float:
+    """An adaptive solver (MuJoCo has none) that has seen nothing for ten seconds must not step over the bump."""
+    name = {"reference": "LSODA", "exudyn": "DOPRI5", "mujoco": "RK4"}[engine]
+    assembly = setups.vehicle().with_input("road", _bump())
+    found = setups.run(engine, assembly, 1e-3, 10.5, name)
+    truth = setups.run("reference", assembly, 5e-4, 10.5).states[:, 3]
+    return abs(setups.largest(found.states[:, 3]) - setups.largest(truth)) / setups.largest(truth)
+
+
+def bump_naive(folder: Path) -> str:
+    """scipy's LSODA as it comes."""
+    assembly = setups.vehicle().with_input("road", _bump())
+    model = build("reference", assembly, setups.settings("reference", 5e-4, 10.5))
+    solution = solve_ivp(lambda t, y: np.concatenate((y[4:], model.acceleration(t, y))), (0.0, 10.5),
+                         assembly.initial, "LSODA", rtol=1e-6, atol=1e-9)  # fmt: skip
+    return f"LSODA ends 'successfully' after {len(solution.t) - 1} steps with a pitch of {largest_pitch(solution.y)}"
+
+
+def largest_pitch(states: np.ndarray) -> str:
+    """Largest pitch of states (8, n) as text."""
+    return f"{np.abs(states[3]).max():.0e} rad"
+
+
 CASES = (
     Case(
         "replay of a ramp",
@@ -254,6 +287,17 @@ CASES = (
         noise_adaptive,
         {"exudyn": "refused", "mujoco": "refused"},
         noise_adaptive_naive,
+    ),
+    Case(
+        "bump after a long flat road",
+        "an adaptive solver's steps grow while nothing happens, and it steps over what comes",
+        "largest pitch of the reference at 0.5 ms",
+        "of it",
+        1e-2,
+        "rows of an adaptive run miss the very peak; a bump that is missed is off by 1",
+        bump,
+        {},
+        bump_naive,
     ),
     Case(
         "NaN in a force file",
