@@ -1,0 +1,55 @@
+"""Result folders: no two runs ever share one, and none of an earlier run is touched."""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from models.errors import InputError
+from models.scene import build
+from models.simulate import simulate
+from studies.folders import COMMAND, drop_if_empty, new_folder
+from studies.single_run import difference
+
+
+def test_many_runs_at_once_get_a_folder_each(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with ThreadPoolExecutor(8) as pool:
+        for _ in range(20):
+            folders = list(pool.map(lambda _: new_folder(None, "x"), range(8)))
+            assert len(set(folders)) == 8
+
+
+def test_one_named_folder_goes_to_one_run_alone(tmp_path):
+    def take(folder):
+        try:
+            return new_folder(folder, "x")
+        except InputError:
+            return None
+
+    with ThreadPoolExecutor(8) as pool:
+        for i in range(20):
+            taken = list(pool.map(take, [tmp_path / f"same{i}"] * 8))
+            assert sum(folder is not None for folder in taken) == 1
+
+
+def test_a_run_that_saved_nothing_leaves_nothing(tmp_path):
+    folder = new_folder(tmp_path / "empty", "x")
+    assert [path.name for path in folder.iterdir()] == [COMMAND]
+    drop_if_empty(folder)
+    assert not folder.exists()
+
+
+def test_rows_at_other_times_are_compared_at_their_own():
+    """Exudyn's adaptive rows lie off the grid; read row by row they would differ by 1e-3."""
+    table = {
+        "title": "test",
+        "run": {"duration": 1.0, "step": 1e-3},
+        "effects": {"road": {"source": "study", "speed": 20.0}},
+        "engines": {"exudyn": {"integrator": "DOPRI5", "tolerance": 1e-9}},
+    }
+    scene = build(table, "", Path())
+    grid, adaptive = simulate(scene, "reference"), simulate(scene, "exudyn")
+    assert not np.allclose(adaptive.times, grid.times[: len(adaptive.times)], rtol=0, atol=1e-6)
+    # RK4 at 1 ms is right to some 1e-5 here; the spline between its rows adds less
+    assert difference(grid, adaptive) < 1e-4
