@@ -6,8 +6,8 @@ import pytest
 
 from validation.run import CASES, seeds
 
-QUICK = ("audit", "twin", "order", "tight", "enforced_moment", "roads")
-"""Cases that no other test file runs."""
+QUICK = ("audit", "twin", "order", "tight", "enforced_moment", "roads", "guards", "hard_cases")
+"""Cases whose rows no other test file runs as a whole."""
 
 
 @pytest.mark.parametrize("name", QUICK)

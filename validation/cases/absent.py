@@ -1,6 +1,7 @@
 """An effect that a scene does not name is not there; one that it names adds what it says, at this price."""
 
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from models.scene import build as build_scene
 from models.simulate import outputs
 from models.time_series import write_time_series
 from validation.absence.hand_built import exudyn_run, mujoco_run
-from validation.absence.probes import belongs_to_effects, installed, march, probe, user_functions
+from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, user_functions
 from validation.rows import Row, System, Table, at_most, behaves, finding
 from validation.timing import describe, interleave, paired_ratio
 
@@ -137,7 +138,7 @@ def _absence(engine: str, folder: Path) -> list[Row]:
     """Frames, memory and callbacks of a bare march, short and long."""
     for own in (scene({}, steps, folder) for steps in (20, 20)):  # wrappers cache on their first calls
         march(engine, model(own, engine))
-    short, long = (march(engine, model(scene({}, steps, folder), engine)) for steps in (20, 2000))
+    short, long = (quietest(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000))
     callbacks = max(short.callbacks, installed())
     if engine == "exudyn":
         callbacks += user_functions(model(scene({}, 20, folder), engine))
