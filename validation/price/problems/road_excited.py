@@ -39,7 +39,7 @@ _TIGHT = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 FULL: dict[tuple[str, str], tuple[float, ...]] = {
     ("reference", "RK4"): _STEPS,
     ("reference", "DOP853"): (*_TIGHT, 1e-9, 1e-10),
-    ("reference", "Radau"): (1e-2, *_TIGHT[:-1]),
+    ("reference", "Radau"): (1e-2, *_TIGHT),
     ("reference", "LSODA"): (*_TIGHT, 1e-9, 1e-10),
     ("exudyn", "RK44"): _STEPS,
     ("exudyn", "RK67"): (5 * MS, 4 * MS, 2.5 * MS, 2 * MS, 1.25 * MS, 1 * MS, 0.625 * MS),
