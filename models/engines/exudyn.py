@@ -25,14 +25,12 @@ exu.config.printToConsole = False
 class Build:
     """Handles of what was put into Exudyn's system.
 
-    places maps (body, "z" or "pitch") to a coordinate marker; columns are the places of the vehicle's
-    four coordinates within Exudyn's vector.
+    places maps (body, "z" or "pitch") to a coordinate marker, nodes a body's name to its node.
     """
 
     container: Any
     mbs: Any
     places: dict[tuple[str, str], Any] = field(default_factory=dict)
-    columns: list[int] = field(default_factory=list)
     nodes: dict[str, Any] = field(default_factory=dict)
     ground: Any = None
     callbacks: int = 0

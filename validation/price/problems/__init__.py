@@ -4,7 +4,6 @@ A problem knows its reference solution and that solution's own uncertainty; ``va
 rest. A new system adds a file here whose class fulfils ``Problem``.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -36,15 +35,6 @@ class Setting:
     def label(self) -> str:
         """The setting as a reader names it: a step with its unit, or a tolerance."""
         return f"tolerance {self.value:.3g}" if self.adaptive else f"{1e3 * self.value:.3g} ms"
-
-
-class Solved(Protocol):
-    """What a run gives back: its cost in counts, and whatever the problem needs to take its error."""
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """At least "force calls" and "steps"."""
-        ...
 
 
 class Solver(Protocol):
