@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from models.effects.contact_points import compression
-from models.effects.force_noise import noise
 from models.engines.protocol import Settings
+from models.noise import normal
 from models.scene import build
 from models.simulate import simulate
 from models.time_series import write_time_series
@@ -150,8 +150,9 @@ def test_contact_points_find_the_road_that_made_the_forces(tmp_path):
 
 
 def test_noise_is_named_by_its_seed_and_independent_of_the_step(forces):
-    assert np.array_equal(noise((5, 2), 1.0, 4), noise((5, 2), 1.0, 4))
-    assert not np.array_equal(noise((5, 2), 1.0, 4), noise((5, 2), 1.0, 5))
+    long = normal(4, 0, 9000, 2)
+    assert np.array_equal(normal(4, 0, 300, 2, first=4000), long[4000:4300])  # across a block's edge
+    assert not np.array_equal(long[:5], normal(5, 0, 5, 2)) and not np.array_equal(long[:5], normal(4, 1, 5, 2))
     own = scene(forces, {"force_noise": {"deviation": 40.0}}, interpolation="held")
     fine = own.model_copy(update={"run": own.run.model_copy(update={"step": 1.25e-4})})
     coarse, finer = simulate(own, "reference").states, simulate(fine, "reference").states[::4]

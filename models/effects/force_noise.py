@@ -7,10 +7,10 @@ forces in every engine and at every step.
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 from pydantic import Field
 
 from models.assembly import Assembly
+from models.noise import normal
 from models.signals import Sampled, Smooth
 from models.strict import Strict, quantity
 
@@ -24,17 +24,13 @@ class Parameters(Strict):
     """[effects.force_noise]."""
 
     deviation: float = quantity("N", "standard deviation of each sample", zero=True)
-    seed: int = Field(0, ge=0, lt=2**128, description="whole number that names the noise")
+    seed: int = Field(0, ge=0, lt=2**64, description="whole number that names the noise")
+    path: int = Field(0, ge=0, lt=2**64, description="number of the path within an ensemble of this seed")
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The assembly with noise on both forces."""
     signal = assembly.input
     assert isinstance(signal, Sampled | Smooth)
-    noisy = signal.values + noise(signal.values.shape, p.deviation, p.seed)
+    noisy = signal.values + p.deviation * normal(p.seed, p.path, len(signal.values), 2)
     return replace(assembly, input=replace(signal, values=noisy))
-
-
-def noise(shape: tuple[int, ...], deviation: float, seed: int) -> np.ndarray:
-    """Gaussian samples (n, 2) in N from a counter-based stream that the seed names."""
-    return deviation * np.random.Generator(np.random.Philox(key=seed)).standard_normal(shape)

@@ -1,0 +1,27 @@
+"""Counter-based noise: any block of any stream can be made alone, in any order, on any worker.
+
+A stream is named by (seed, path); its samples are made in blocks of BLOCK that the counter numbers, so sample
+i of path j is the same number whoever asks for it and whatever was asked for before.
+"""
+
+import numpy as np
+
+BLOCK = 4096
+"""Samples per block; part of what names a sample, so it never changes."""
+
+
+def normal_block(seed: int, path: int, block: int, channels: int) -> np.ndarray:
+    """Standard normal samples (BLOCK, channels) of one block: samples BLOCK block and following of a stream.
+
+    seed : 0 to 2**64 - 1; path : 0 to 2**64 - 1; block : 0 to 2**64 - 1. Philox with the key (seed, path) and
+    the block in the counter's third word, so that blocks never overlap.
+    """
+    bits = np.random.Philox(key=[seed, path], counter=[0, 0, block, 0])
+    return np.random.Generator(bits).standard_normal((BLOCK, channels))
+
+
+def normal(seed: int, path: int, count: int, channels: int, first: int = 0) -> np.ndarray:
+    """Standard normal samples (count, channels) of a stream from sample ``first`` on."""
+    start, end = first // BLOCK, -(-(first + count) // BLOCK)
+    blocks = [normal_block(seed, path, block, channels) for block in range(start, end)]
+    return np.concatenate(blocks)[first - start * BLOCK :][:count] if blocks else np.empty((0, channels))

@@ -1,0 +1,1 @@
+"""Accelerometers and inertial units: what they would read, and the motion that follows from their readings."""
