@@ -1,0 +1,164 @@
+"""Orientation of a rigid body: unit quaternions, their exact step under a turning rate, and Cardan angles.
+
+S (3, 3) turns local (body) components into global ones: x_global = S x_local (eq. 21). A quaternion
+q = (q1, q2, q3, q4) has its scalar first; q and -q are the same orientation. Rates are **local** and in rad/s:
+S' = S skew(w), q' = q (0, w) / 2 (eq. 22). Axes as everywhere: x forward, y right, z down.
+"""
+
+from typing import Literal
+
+import numpy as np
+from numba import njit
+from scipy.spatial.transform import Rotation
+
+Rule = Literal["held", "mean", "cubic"]
+"""How a rate runs between its samples; order 1, 2, 4 of the orientation in the sampling period."""
+LOCK = 1e-6
+"""Cosine of pitch below which roll and yaw turn about the same axis: their errors grow as 1 / cosine, so that
+rounding alone would reach 1e-10 rad and a sensor's 1e-3 rad any angle at all."""
+SKEWED = 1e-6
+"""Largest departure of S^T S from the identity that still counts as a rotation."""
+
+
+class GimbalLock(ValueError):
+    """Cardan angles were asked for where roll and yaw cannot be told apart; quaternions go on without harm.
+
+    sample : index of the first such orientation; pitch : its pitch (rad).
+    """
+
+    def __init__(self, sample: int, pitch: float) -> None:
+        self.sample, self.pitch = sample, pitch
+        super().__init__(f"gimbal lock at sample {sample}: at a pitch of {np.degrees(pitch):.6g} degrees roll and yaw "
+                         "turn about the same axis and only their sum is defined; use the quaternion or the matrix")
+
+
+def skew(v: np.ndarray) -> np.ndarray:
+    """Matrices (..., 3, 3) of the vector product, skew(v) x = v x x, eq. (19); v (..., 3)."""
+    found = np.zeros((*v.shape, 3))
+    found[..., 2, 1], found[..., 0, 2], found[..., 1, 0] = np.moveaxis(v, -1, 0)
+    return found - np.swapaxes(found, -1, -2)
+
+
+def product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Quaternion product p q (..., 4): first the rotation q, then p; S(p q) = S(p) S(q)."""
+    scalar = p[..., :1] * q[..., :1] - np.sum(p[..., 1:] * q[..., 1:], axis=-1, keepdims=True)
+    vector = p[..., :1] * q[..., 1:] + q[..., :1] * p[..., 1:] + np.cross(p[..., 1:], q[..., 1:])
+    return np.concatenate([scalar, vector], axis=-1)
+
+
+def conjugate(q: np.ndarray) -> np.ndarray:
+    """Quaternions (..., 4) of the inverse rotations."""
+    return q * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def exponential(turn: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4) of rotation vectors (..., 3) in rad; exact to rounding, at no angle singular."""
+    half = 0.5 * np.linalg.norm(turn, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * turn], axis=-1)
+
+
+def logarithm(q: np.ndarray) -> np.ndarray:
+    """Rotation vectors (..., 3) in rad, of length 0 to pi, of unit quaternions (..., 4)."""
+    near = np.where(q[..., :1] < 0, -q, q)  # the shorter way round
+    size = np.linalg.norm(near[..., 1:], axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(size, near[..., :1])
+    return near[..., 1:] * np.divide(angle, size, out=np.full_like(size, 2.0), where=size > 0)
+
+
+def turns(rates: np.ndarray, period: float, rule: Rule = "cubic") -> np.ndarray:
+    """Rotation vectors (n - 1, ..., 3) in rad from each sample of local rates (n, ..., 3) in rad/s to the next one.
+
+    "held" : the rate of the sample before, h w0, which is exact for rates that are constant over a period;
+    "mean" : the mean of both neighbours; "cubic" : the integral of the cubic through four neighbours and the
+    second Magnus term h^2/12 (w0 x w1), the part of the turning that comes from a turning axis. Needs 2 samples,
+    for "cubic" 4. Raises ValueError for fewer, and for a rate that is not finite.
+    """
+    if len(rates) < (needed := 4 if rule == "cubic" else 2):
+        raise ValueError(f"{len(rates)} samples of the angular velocity: the rule {rule!r} needs at least {needed}")
+    if not np.isfinite(rates).all():
+        where = np.argwhere(~np.isfinite(rates))[0]
+        raise ValueError(f"sample {where[0]} of the angular velocity is not a finite number")
+    before, after = rates[:-1], rates[1:]
+    if rule == "held":
+        return period * before
+    if rule == "mean":
+        return 0.5 * period * (before + after)
+    return integrals(rates, period) + period**2 / 12 * np.cross(before, after)
+
+
+def integrals(values: np.ndarray, period: float) -> np.ndarray:
+    """Integrals (n - 1, ...) over each period of the cubics through four neighbouring samples (n, ...), n >= 4."""
+    inner = -values[:-3] + 13 * values[1:-2] + 13 * values[2:-1] - values[3:]
+    first = 9 * values[0] + 19 * values[1] - 5 * values[2] + values[3]
+    last = 9 * values[-1] + 19 * values[-2] - 5 * values[-3] + values[-4]
+    return period / 24 * np.concatenate([first[None], inner, last[None]])
+
+
+def integrate(rates: np.ndarray, period: float, start: np.ndarray, rule: Rule = "cubic") -> np.ndarray:
+    """Quaternions (n, ..., 4) at the samples of local rates (n, ..., 3) in rad/s, eq. (22); start (..., 4).
+
+    Each step is the exact exponential of its rotation vector (``turns``), and each result is divided by its
+    norm, which therefore stays 1 within rounding for ever. Several bodies stand side by side in the middle axes.
+    """
+    steps = exponential(turns(rates, period, rule))
+    count, middle = len(steps), steps.shape[1:-1]
+    first = np.broadcast_to(np.asarray(start, dtype=float), (*middle, 4)).reshape(-1, 4)
+    flat = np.ascontiguousarray(steps.reshape(count, -1, 4))
+    return _chain(np.ascontiguousarray(first), flat).reshape(count + 1, *middle, 4)
+
+
+@njit(cache=True)
+def _chain(start, steps):
+    """Normalised running products start steps[0] steps[1] ..., shapes (m, 4) and (n, m, 4) -> (n + 1, m, 4)."""
+    found = np.empty((steps.shape[0] + 1, steps.shape[1], 4))
+    for j in range(steps.shape[1]):
+        a, b, c, d = start[j]
+        found[0, j] = start[j]
+        for i in range(steps.shape[0]):
+            e, f, g, h = steps[i, j]
+            a, b, c, d = (a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
+                          a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e)  # fmt: skip
+            size = np.sqrt(a * a + b * b + c * c + d * d)
+            a, b, c, d = a / size, b / size, c / size, d / size
+            found[i + 1, j, 0], found[i + 1, j, 1], found[i + 1, j, 2], found[i + 1, j, 3] = a, b, c, d
+    return found
+
+
+def matrix(q: np.ndarray) -> np.ndarray:
+    """Matrices S (..., 3, 3), local to global, of unit quaternions (..., 4), eq. (21)."""
+    a, v = q[..., 0, None, None], q[..., 1:]
+    outer = v[..., :, None] * v[..., None, :]
+    square = np.trace(outer, axis1=-2, axis2=-1)[..., None, None]
+    return (a * a - square) * np.eye(3) + 2 * outer + 2 * a * skew(v)
+
+
+def from_matrix(s: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4), scalar 0 or more, of matrices (..., 3, 3); raises ValueError if one is no rotation."""
+    off = np.abs(np.swapaxes(s, -1, -2) @ s - np.eye(3)).max()
+    if not off < SKEWED or not (np.linalg.det(s) > 0).all():
+        raise ValueError(f"not a rotation: S^T S departs from the identity by {off:.3g}, or S turns left into right")
+    return Rotation.from_matrix(s).as_quat(canonical=True, scalar_first=True)
+
+
+def from_cardan(roll: np.ndarray, pitch: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4) of S = Rz(yaw) Ry(pitch) Rx(roll), all in rad."""
+    axes = np.eye(3)
+    parts = [exponential(np.asarray(angle, dtype=float)[..., None] * axes[i])
+             for i, angle in enumerate((roll, pitch, yaw))]  # fmt: skip
+    return product(product(parts[2], parts[1]), parts[0])
+
+
+def cardan(q: np.ndarray) -> np.ndarray:
+    """Roll, pitch, yaw (..., 3) in rad of unit quaternions (..., 4): the sequence z-y'-x'' of vehicles (ISO 8855).
+
+    S = Rz(yaw) Ry(pitch) Rx(roll); pitch lies within +-pi/2 and is positive nose up, roll and yaw within +-pi.
+    Raises GimbalLock where cos(pitch) < LOCK.
+    """
+    s = matrix(q)
+    cosine = np.hypot(s[..., 0, 0], s[..., 1, 0])
+    pitch = np.arctan2(-s[..., 2, 0], cosine)
+    locked = np.flatnonzero(cosine < LOCK)
+    if len(locked):
+        raise GimbalLock(int(locked[0]), float(pitch.ravel()[locked[0]]))
+    roll, yaw = np.arctan2(s[..., 2, 1], s[..., 2, 2]), np.arctan2(s[..., 1, 0], s[..., 0, 0])
+    return np.stack([roll, pitch, yaw], axis=-1)
