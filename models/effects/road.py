@@ -14,14 +14,16 @@ AFTER: tuple[str, ...] = ()
 COST = "height and slope under each wheel, read from a table of half steps"
 
 OWN = {
-    "study": ("gd",),
-    "hills": (),
-    "iso8608": ("road_class", "seed", "level"),
+    "study": ("gd", "grade"),
+    "hills": ("grade",),
+    "iso8608": ("road_class", "seed", "level", "grade"),
     "opencrg": ("file", "track", "offset", "beyond_end", "run_in"),
     "csv": ("file", "track", "beyond_end", "run_in"),
 }
-"""Which keys belong to which source."""
+"""Which keys belong to which source; a measured road has a grade of its own, which no key may change."""
 NEEDED = {"iso8608": ("road_class",), "opencrg": ("file", "beyond_end"), "csv": ("file", "beyond_end")}
+STEEPEST = 0.5
+"""Slope angles (rad) stay below this: beyond it the vehicle, whose wheels move vertically, is no model any more."""
 
 
 class Parameters(Strict):
@@ -30,6 +32,9 @@ class Parameters(Strict):
     source: Literal["study", "hills", "iso8608", "opencrg", "csv"] = Field(description="where the road comes from")
     speed: float = quantity("m/s", "constant speed of the vehicle")
     gd: float | None = quantity("m^3", "study: one-sided roughness at 0.1 1/m", default=None)
+    grade: float | None = Field(
+        None, gt=-STEEPEST, lt=STEEPEST, json_schema_extra={"unit": "rad"},
+        description="study, hills, iso8608: slope angle that the road comes to after its fade-in, positive uphill")
     road_class: Literal["A", "B", "C", "D", "E", "F", "G", "H"] | None = Field(None, description="iso8608: class")
     seed: int | None = Field(None, ge=0, lt=2**128, description="iso8608: seed of the phases")
     level: Literal["one-sided", "two-sided"] | None = Field(None, description="iso8608: how the class's level is read")
@@ -79,7 +84,17 @@ def _profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[flo
         from models.road.study import STUDY_GD, hills_road, study_road
 
         profile = hills_road() if p.source == "hills" else study_road(STUDY_GD if p.gd is None else p.gd)
-    return profile, (0.0, profile.window_length)
+    return _graded(profile, p.grade)
+
+
+def _graded(profile: Any, grade: float | None) -> tuple[Any, tuple[float, ...]]:
+    """The profile, on a grade where one is named, and the stations (m) at which it is only C2."""
+    faded_in = profile.window_length
+    if grade is None:
+        return profile, (0.0, faded_in)
+    from models.road.grade import TRANSITION, Graded
+
+    return Graded(profile, grade, faded_in), (0.0, faded_in, faded_in + TRANSITION)
 
 
 def _measured(scene: Any, p: Parameters, distance: float) -> Any:

@@ -1,0 +1,72 @@
+"""A hill without a top: a road that comes to climb, or to fall, at a constant slope angle."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from models.road.profile import Profile, Samples
+
+TRANSITION = 40.0
+"""Length (m) over which the slope grows from 0 to its full value."""
+
+
+@dataclass(frozen=True, eq=False)
+class Graded:
+    """A profile on a grade: zeta(s) = profile(s) - tan(grade) TRANSITION W((s - start) / TRANSITION).
+
+    W is the integral of the quintic smoothstep: 0 before 0, x^6 - 3 x^5 + 5/2 x^4 up to 1, x - 1/2 beyond. So
+    the slope grows monotonically and without a jump up to its second derivative, and beyond the transition the
+    grade adds exactly -tan(grade) (s - start - TRANSITION / 2) to the height.
+
+    Parameters
+    ----------
+    profile : the road without its grade
+    grade : slope angle in rad, positive where the road rises (heights are positive down)
+    start : arc length (m) at which the slope begins to grow
+    """
+
+    profile: Profile
+    grade: float
+    start: float
+
+    @property
+    def name(self) -> str:
+        """The profile's, and the grade."""
+        return f"{self.profile.name}, grade {self.grade:g} rad"
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """That of the profile (m)."""
+        return self.profile.extent
+
+    @property
+    def finest(self) -> float:
+        """Length (m) of the finest detail: the profile's, or a quarter of the transition."""
+        return min(self.profile.finest, TRANSITION / 4.0)
+
+    def height_and_slope(self, s: ArrayLike) -> Samples:
+        """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
+        height, slope = self.profile.height_and_slope(s)
+        more = self._climb(np.asarray(s, dtype=float))
+        return height + more[0], slope + more[1]
+
+    def sample_uniform(self, start: float, step: float, count: int) -> Samples:
+        """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
+        height, slope = self.profile.sample_uniform(start, step, count)
+        more = self._climb(start + step * np.arange(count))
+        return height + more[0], slope + more[1]
+
+    def height_slope_at(self, s: float) -> tuple[float, float]:
+        """Height (m, positive down) and slope at one arc length ``s`` (m)."""
+        height, slope = self.profile.height_slope_at(s)
+        more = self._climb(np.asarray(s, dtype=float))
+        return height + float(more[0]), slope + float(more[1])
+
+    def _climb(self, s: np.ndarray) -> Samples:
+        """What the grade adds to heights (m) and slopes."""
+        beyond = (s - self.start) / TRANSITION
+        x, steepness = np.clip(beyond, 0.0, 1.0), math.tan(self.grade)
+        risen = x**4 * (2.5 - x * (3.0 - x)) + np.maximum(beyond - 1.0, 0.0)
+        return -steepness * TRANSITION * risen, -steepness * x**3 * (10.0 - x * (15.0 - 6.0 * x))
