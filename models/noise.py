@@ -1,7 +1,8 @@
 """Counter-based noise: any block of any stream can be made alone, in any order, on any worker.
 
-A stream is named by (seed, path); its samples are made in blocks of BLOCK that the counter numbers, so sample
-i of path j is the same number whoever asks for it and whatever was asked for before.
+A stream is named by (seed, path, source); its samples are made in blocks of BLOCK that the counter numbers, so
+sample i of path j is the same number whoever asks for it and whatever was asked for before. The source says whose
+noise it is: an engineer who gives one seed to forces and gyro still gets independent noise.
 """
 
 import numpy as np
@@ -10,18 +11,22 @@ BLOCK = 4096
 """Samples per block; part of what names a sample, so it never changes."""
 
 
-def normal_block(seed: int, path: int, block: int, channels: int) -> np.ndarray:
+FORCES, GYRO, GYRO_BIAS, PITCH_SENSOR = range(4)
+"""Sources of noise; a new one takes the next number."""
+
+
+def normal_block(seed: int, path: int, block: int, channels: int, source: int = FORCES) -> np.ndarray:
     """Standard normal samples (BLOCK, channels) of one block: samples BLOCK block and following of a stream.
 
-    seed : 0 to 2**64 - 1; path : 0 to 2**64 - 1; block : 0 to 2**64 - 1. Philox with the key (seed, path) and
-    the block in the counter's third word, so that blocks never overlap.
+    seed : 0 to 2**64 - 1; path : 0 to 2**64 - 1; block : 0 to 2**64 - 1. Philox with the key (seed, path), the
+    block in the counter's third word and the source in its fourth, so that blocks never overlap.
     """
-    bits = np.random.Philox(key=[seed, path], counter=[0, 0, block, 0])
+    bits = np.random.Philox(key=[seed, path], counter=[0, 0, block, source])
     return np.random.Generator(bits).standard_normal((BLOCK, channels))
 
 
-def normal(seed: int, path: int, count: int, channels: int, first: int = 0) -> np.ndarray:
+def normal(seed: int, path: int, count: int, channels: int, first: int = 0, source: int = FORCES) -> np.ndarray:
     """Standard normal samples (count, channels) of a stream from sample ``first`` on."""
     start, end = first // BLOCK, -(-(first + count) // BLOCK)
-    blocks = [normal_block(seed, path, block, channels) for block in range(start, end)]
+    blocks = [normal_block(seed, path, block, channels, source) for block in range(start, end)]
     return np.concatenate(blocks)[first - start * BLOCK :][:count] if blocks else np.empty((0, channels))
