@@ -26,6 +26,8 @@ class Assembly:
     mode : which equations hold; "free" is the vehicle on its tyres over a flat road
     input : signal of that mode (see ``pitch_plane_equations``), None if nothing drives the vehicle
     initial : state at t = 0, shape (8,)
+    moment : added pitch moment on the chassis of a force-excited vehicle, one channel in N m, nose up, read at
+        each stage's time (never held); None if there is none
     outputs : functions of the run that add channels to its result, one per effect that asks for any
     """
 
@@ -36,10 +38,16 @@ class Assembly:
     input: Signal | None
     initial: np.ndarray
     outputs: tuple[Any, ...] = ()
+    moment: Signal | None = None
 
     def with_input(self, mode: Mode, signal: Signal) -> "Assembly":
         """The same, driven by ``signal``."""
         return replace(self, mode=mode, input=signal)
+
+    def with_moment(self, signal: Signal) -> "Assembly":
+        """The same, with a pitch moment added on the chassis; it stands beside any forces, held ones too."""
+        assert self.mode in ("force", "force-body") and signal.channels == 1 and not signal.held
+        return replace(self, moment=signal)
 
     def without_tyres(self) -> "Assembly":
         """The same, cut off the road."""

@@ -5,7 +5,7 @@ import sys
 
 from models.engines.reference import derivative_of, march_of
 
-MODES = (("road", "exact", False), ("road", "linear", False), ("force", "exact", False), ("force-body", "exact", False))
+MODES = (("road", "exact"), ("road", "linear"), ("force", "exact"), ("force-body", "exact"), ("force", "exact", "moment"))
 
 
 def test_no_two_kernels_share_a_cache_file():

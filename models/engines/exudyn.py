@@ -15,6 +15,7 @@ import numpy as np
 from models.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, Trajectory, balanced, guard
+from models.signals import Signal
 from models.vehicles.description import PitchSpring, Point, Strut
 from models.vehicles.linear import matrices
 
@@ -111,11 +112,10 @@ def _marker(mbs: Any, node: Any, coordinate: int) -> Any:
 
 
 class Clock:
-    """The input as Exudyn's callbacks read it: by step, by half step or at any time."""
+    """A signal as Exudyn's callbacks read it: by step, by half step or at any time."""
 
-    def __init__(self, assembly: Assembly, settings: Settings) -> None:
-        signal, h, n = assembly.input, settings.step, settings.steps
-        assert signal is not None
+    def __init__(self, signal: Signal, settings: Settings) -> None:
+        h, n = settings.step, settings.steps
         self.per_time = 2.0 / h
         self.step = 0
         nodes = CATALOGUE["exudyn"][settings.integrator].nodes
@@ -207,8 +207,10 @@ class ExudynModel:
         self.assembly, self.settings = assembly, settings
         self.built = _exact(assembly) if assembly.vehicle.geometry == "exact" else _linear(assembly)
         if assembly.input is not None:
-            self.clock = Clock(assembly, settings)
+            self.clock = Clock(assembly.input, settings)
             _drive(self.built, assembly, self.clock)
+        if assembly.moment is not None:
+            _load(self.built, ("chassis", "pitch"), Clock(assembly.moment, settings).reader(0, 1.0))
         self.constraint = _prescribe(self.built, assembly, settings) if assembly.mode == "pitch" else None
         self._sensors = self._add_sensors()
         self.built.mbs.Assemble()

@@ -53,7 +53,8 @@ def _spec(vehicle: Vehicle, settings: Settings, guided: bool) -> mujoco.MjSpec:
         _tyre(spec, strut) if strut.lower.body is None else _suspension(spec, vehicle, strut, guided)
     for spring in vehicle.pitch_springs:
         joint = spec.joint(f"{spring.body} pitch")
-        joint.stiffness[0], joint.damping[0] = spring.stiffness, spring.damping
+        joint.stiffness[0] += spring.stiffness
+        joint.damping[0] += spring.damping
     return spec
 
 
@@ -113,29 +114,32 @@ def _drive(assembly: Assembly, settings: Settings) -> Drive:
     if signal is None:
         return Drive()
     held = signal.sample(0.0, h, n)[:, :2] if signal.held else None
-    if held is not None and assembly.mode == "force":
+    if held is not None and assembly.mode == "force" and assembly.moment is None:
         return Drive(controls=held)
     from models.engines.mujoco_callback import body_fixed_law, table_law
 
     inputs = signal.sample(0.0, h / 2, 2 * n + 1)
+    moment = np.empty((2 * n + 1, 0)) if assembly.moment is None else assembly.moment.sample(0.0, h / 2, 2 * n + 1)
     if assembly.mode == "force-body":
         arms = np.array([axle.x for axle in assembly.vehicle.axles])
-        return Drive(None if signal.held else inputs, held, arms, body_fixed_law())
-    return Drive(_generalised(assembly, inputs), held, None, table_law())
+        return Drive(np.hstack([inputs[:, : 0 if signal.held else 2], moment]), held, arms, body_fixed_law())
+    forces = _generalised(assembly, inputs)
+    if assembly.moment is not None:
+        forces = np.column_stack([forces, np.zeros(len(forces)), moment])
+    return Drive(forces, held, None, table_law())
 
 
 def _generalised(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
-    """Forces (rows, 2 or 3) on the heave coordinates that the input stands for."""
+    """Forces (rows, 2 or 3) on the heave coordinates that the input stands for; held ones are left to the motors."""
     if assembly.mode == "road":
         tyres = [strut for strut in assembly.vehicle.struts if strut.lower.body is None]
         return np.column_stack([tyre.stiffness * inputs[:, i] + tyre.damping * inputs[:, 2 + i]
                                 for i, tyre in enumerate(tyres)])
+    held = assembly.input is not None and assembly.input.held
+    forces = np.zeros((len(inputs), 2)) if held else -inputs[:, :2]
     if assembly.mode != "pitch":
-        return -inputs[:, :2]
-    forces = np.zeros((len(inputs), 3))
-    if not (assembly.input is not None and assembly.input.held):
-        forces[:, :2] -= inputs[:, :2]
-    return forces + _guidance(assembly, inputs[:, 2], inputs[:, 3])
+        return forces
+    return np.column_stack([forces, np.zeros(len(inputs))]) + _guidance(assembly, inputs[:, 2], inputs[:, 3])
 
 
 def _guidance(assembly: Assembly, pitch: np.ndarray, rate: np.ndarray) -> np.ndarray:

@@ -62,24 +62,30 @@ def _compile_table(numeric, passive, time):
 
 
 def _compile_body_fixed(numeric, passive, time, position, control):
-    """Forces along the chassis' vertical axis, from the table or, where they are held, from the controls."""
+    """Forces along the chassis' vertical axis, from the table or, where they are held, from the controls.
+
+    A column of the table beyond those of the forces is a moment on the chassis.
+    """
 
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
     def law(model, data):
         header = carray(_array_at(model, numeric), (HEADER,))
-        rows, motors = int(header[2]), int(header[3])
+        columns, rows, motors = int(header[1]), int(header[2]), int(header[3])
         row = int(np.rint(carray(_double_at(data, time), (1,))[0] * header[0]))
-        if motors < 0 and not 0 <= row < rows:
+        if columns > 0 and not 0 <= row < rows:
             return
-        table = carray(_array_at(model, numeric), (HEADER + 2 * rows,))
+        table = carray(_array_at(model, numeric), (HEADER + columns * rows,))
         controls = carray(_array_at(data, control), (max(motors, 0) + 2,))
         pitch = carray(_array_at(data, position), (4,))[3]
         force = carray(_array_at(data, passive), (4,))
         sine, cosine = np.sin(pitch), np.cos(pitch)
+        first, forces = HEADER + columns * row, 2 if motors < 0 else 0
         for i in range(2):
-            f = controls[motors + i] if motors >= 0 else table[HEADER + 2 * row + i]
+            f = controls[motors + i] if motors >= 0 else table[first + i]
             force[i] -= f * cosine
             force[3] += header[4 + i] * f * sine * sine
+        if columns > forces:
+            force[3] += table[first + forces]
 
     return law
 

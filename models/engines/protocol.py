@@ -14,6 +14,7 @@ import numpy as np
 from models.engines.catalogue import CATALOGUE, MISSING, Integrator
 from models.engines.stability import check_step
 from models.errors import Refused, RunFailed
+from models.signals import Signal
 from models.steps import divides, fitting
 
 if TYPE_CHECKING:
@@ -96,17 +97,22 @@ def check(engine: str, assembly: "Assembly", settings: Settings) -> None:
     if assembly.mode == "pitch" and settings.integrator == "GeneralizedAlpha" and settings.spectral_radius > 0.95:
         raise Refused(engine, f"a spectral radius of {settings.spectral_radius} never damps the error of the enforced "
                               "moment at the start; use at most 0.95 (0.6 is recommended)")
-    signal = assembly.input
-    if signal is not None and signal.period is not None:
-        _sampling(engine, integrator, settings, signal.period, signal.held)
-    if signal is not None and integrator.adaptive and engine != "reference" and settings.step > signal.resolution:
-        raise Refused(engine, f"{settings.integrator} may take steps of {settings.step:g} s and miss details of the "
-                              f"input, which are {signal.resolution:.3g} s long: use a step of at most that")
+    for signal in (assembly.input, assembly.moment):
+        if signal is not None:
+            _reading(engine, integrator, settings, signal)
     check_step(engine, assembly, settings)
 
 
 def _constrained(engine: str) -> str:
     return " or ".join(name for name, integrator in CATALOGUE[engine].items() if integrator.constraints)
+
+
+def _reading(engine: str, integrator: Integrator, settings: Settings, signal: Signal) -> None:
+    if signal.period is not None:
+        _sampling(engine, integrator, settings, signal.period, signal.held)
+    if integrator.adaptive and engine != "reference" and settings.step > signal.resolution:
+        raise Refused(engine, f"{settings.integrator} may take steps of {settings.step:g} s and miss details of the "
+                              f"input, which are {signal.resolution:.3g} s long: use a step of at most that")
 
 
 def _sampling(engine: str, integrator: Integrator, settings: Settings, period: float, held: bool) -> None:

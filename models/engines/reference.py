@@ -4,6 +4,7 @@ import math
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,9 @@ from models.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, Trajectory, guard
 from models.errors import RunFailed
+from models.signals import Stacked
 from models.vehicles import pitch_plane_equations
-from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, pitch_spring
+from models.vehicles.pitch_plane_equations import ADDED, RIGHT_HAND_SIDES
 
 NO_INPUT = np.zeros((1, 4))
 """The flat road."""
@@ -73,11 +75,11 @@ def _compile_single(rhs, key):
     return _compiled(derivative, key)
 
 
-def _sum(rhs, moment):
+def _sum(rhs, added):
     @register_jitable
     def total(y, u, p, dy):
         rhs(y, u, p, dy)
-        moment(y, p, dy)
+        added(y, u, p, dy)
 
     return total
 
@@ -90,11 +92,13 @@ class Reference:
     settings: Settings
 
     def __post_init__(self) -> None:
-        springs = self.assembly.vehicle.pitch_springs
-        self._key = ("road" if self.assembly.mode == "free" else self.assembly.mode,
-                     self.assembly.vehicle.geometry, bool(springs))
+        own = self.assembly
+        springs = own.vehicle.pitch_springs
+        self._added = (*(("springs",) if springs else ()), *(("moment",) if own.moment is not None else ()))
+        self._key = ("road" if own.mode == "free" else own.mode, own.vehicle.geometry, *self._added)
+        self._input = own.input if own.input is None or own.moment is None else Stacked((own.input, own.moment))
         extra = [value for spring in springs for value in (spring.stiffness, spring.damping)]
-        self._p = np.concatenate((self.assembly.parameters.array(), extra))
+        self._p = np.concatenate((own.parameters.array(), extra))
 
     def run(self) -> Trajectory:
         """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
@@ -114,16 +118,16 @@ class Reference:
         return {"degrees of freedom": 3 if self.assembly.mode == "pitch" else 4, "native items": 0, "callbacks": 0}
 
     def _at(self, time: float) -> np.ndarray:
-        return NO_INPUT[0] if self.assembly.input is None else self.assembly.input.at(time)
+        return NO_INPUT[0] if self._input is None else self._input.at(time)
 
     def _inputs(self) -> tuple[np.ndarray, tuple[int, int, int]]:
         """Input table, and how many rows lie from a step's start to its middle, its end and the next step."""
-        signal, h, n = self.assembly.input, self.settings.step, self.settings.steps
+        signal, h, n = self._input, self.settings.step, self.settings.steps
         if signal is None:
             return NO_INPUT, (0, 0, 0)
         if not signal.held:
             return signal.sample(0.0, h / 2, 2 * n + 1), (1, 2, 2)
-        if self.assembly.mode != "pitch":
+        if signal.channels == 2:
             return signal.sample(0.0, h, n), (0, 0, 1)
         stages = signal.sample(0.0, h / 2, 2 * n + 1)
         table = np.stack([stages[0:-1:2], stages[1::2], stages[2::2]], axis=1)
@@ -151,7 +155,7 @@ class Reference:
         times = h * np.arange(n + 1)
         states = np.empty((n + 1, 8))
         y = states[0] = self.assembly.initial
-        knots = np.empty(0) if self.assembly.input is None else self.assembly.input.knots(self.settings.duration)
+        knots = np.empty(0) if self._input is None else self._input.knots(self.settings.duration)
         edges = np.concatenate(([0.0], knots, [self.settings.duration]))
         steps = calls = 0
         for start, end in pairwise(edges):
@@ -176,7 +180,7 @@ class Reference:
             return dy
 
         tolerance = max(self.settings.tolerance, 3e-14)
-        longest = math.inf if self.assembly.input is None else self.assembly.input.resolution
+        longest = math.inf if self._input is None else self._input.resolution
         solution = solve_ivp(rhs, (start, end), y, method=self.settings.integrator, dense_output=True,
                              rtol=tolerance, atol=tolerance * 1e-2, max_step=longest)
         if not solution.success:
@@ -184,11 +188,11 @@ class Reference:
         return solution
 
     def _reader(self, start: float, end: float) -> Callable[[float], np.ndarray]:
-        """The input within one piece: held forces stay what they are in its middle, a prescribed pitch moves on."""
+        """The input within one piece: held forces stay what they are in its middle, all beside them moves on."""
         middle = self._at(0.5 * (start + end))
-        if self.assembly.input is None or (self.assembly.input.held and self.assembly.mode != "pitch"):
+        if self._input is None or (self._input.held and self._input.channels == 2):
             return lambda t: middle
-        if self.assembly.input.held:
+        if self._input.held:
             return lambda t: np.concatenate((middle[:2], self._at(t)[2:]))
         return self._at
 
@@ -207,22 +211,21 @@ _FIXED: dict[tuple, Any] = {}
 _SINGLE: dict[tuple, Any] = {}
 
 
-def _right_hand_side(mode: str, geometry: str, spring: bool):
-    rhs = RIGHT_HAND_SIDES[mode, geometry]
-    return _sum(rhs, pitch_spring) if spring else rhs
+def _right_hand_side(mode: str, geometry: str, *added: str):
+    return reduce(_sum, (ADDED[name] for name in added), RIGHT_HAND_SIDES[mode, geometry])
 
 
-def march_of(mode: str, geometry: str, spring: bool = False):
-    """The compiled fixed-step solver of one mode, made when first asked for."""
-    key = (mode, geometry, spring)
+def march_of(mode: str, geometry: str, *added: str):
+    """The compiled fixed-step solver of one mode with the terms that are ADDED to it, made when first asked for."""
+    key = (mode, geometry, *added)
     if key not in _FIXED:
         _FIXED[key] = _compile_fixed(_right_hand_side(*key), key)
     return _FIXED[key]
 
 
-def derivative_of(mode: str, geometry: str, spring: bool = False):
+def derivative_of(mode: str, geometry: str, *added: str):
     """The compiled right-hand side of one mode, made when first asked for: (y, u, p) -> dy (8,)."""
-    key = (mode, geometry, spring)
+    key = (mode, geometry, *added)
     if key not in _SINGLE:
         _SINGLE[key] = _compile_single(_right_hand_side(*key), key)
     return _SINGLE[key]

@@ -122,6 +122,17 @@ RIGHT_HAND_SIDES = {
 
 
 @register_jitable
-def pitch_spring(y, p, dy):
-    """A rotational spring and damper to the ground, p[15] in N m/rad and p[16] in N m s/rad."""
-    dy[7] -= (p[15] * y[3] + p[16] * y[7]) / p[5]
+def pitch_springs(y, u, p, dy):
+    """Rotational springs and dampers to the ground: from p[15] on, N m/rad and N m s/rad of each."""
+    for i in range(15, len(p), 2):
+        dy[7] -= (p[i] * y[3] + p[i + 1] * y[7]) / p[5]
+
+
+@register_jitable
+def pitch_moment(y, u, p, dy):
+    """A moment on the chassis (N m, nose up), the last channel of the input."""
+    dy[7] += u[-1] / p[5]
+
+
+ADDED = {"springs": pitch_springs, "moment": pitch_moment}
+"""Terms that a right-hand side may be followed by."""
