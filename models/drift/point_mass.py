@@ -1,0 +1,101 @@
+"""The paper's Section 2: what white noise on a measured force does to a point mass that is driven by it.
+
+m x'' = -eta m x' + f, with an error on each sample of f of standard deviation ``deviation`` (N), held over the
+sampling period ``step`` (s). Two results, each the covariance (2, 2) of the errors of position (m) and velocity
+(m/s): of the stochastic differential equation (4) with the intensity deviation^2 step (eqs 8, 11 to 13), and of
+the explicit Euler scheme (3) itself. They differ by O(1/n) after n steps.
+
+The printed variances of position subtract numbers of size t that leave one of size eta^2 t^3; below SMALL the
+same functions are summed as their power series, so that every digit is good at any damping.
+"""
+
+import math
+
+import numpy as np
+from scipy.signal import lfilter
+
+from models.noise import normal
+
+SMALL = 1.0
+"""Damping times time below which a series is used: 20 terms there, and no digit lost by the closed form above."""
+
+
+def continuous(time: float, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0) -> np.ndarray:
+    """Covariance after ``time`` (s) of eq. (4); ``damping`` eta in 1/s, zero or more.
+
+    Raises ValueError where the closed form does not hold (see ``_check``).
+    """
+    _check(deviation, step, mass, damping, time)
+    intensity, decayed = deviation**2 * step / mass**2, damping * time
+    position = intensity * time**3 * _bracket(decayed)
+    mixed = intensity * time**2 / 2 * _relative(decayed) ** 2
+    velocity = intensity * time * _relative(2 * decayed)
+    return np.array([[position, mixed], [mixed, velocity]])
+
+
+def _relative(x: float) -> float:
+    """(1 - exp(-x)) / x."""
+    return -math.expm1(-x) / x if x else 1.0
+
+
+def _bracket(x: float) -> float:
+    """The bracket of eq. (11) by t^3 eta^2: (x + (1 - exp(-2x))/2 - 2 (1 - exp(-x))) / x^3, 1/3 at x = 0."""
+    if x > SMALL:
+        return (x - math.expm1(-2 * x) / 2 + 2 * math.expm1(-x)) / x**3
+    return math.fsum((2 ** (k - 1) - 2) / math.factorial(k) * (-1) ** (k + 1) * x ** (k - 3) for k in range(3, 26))
+
+
+def discrete(steps: int, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0) -> np.ndarray:
+    """Covariance after ``steps`` steps of the explicit Euler scheme (3), exactly.
+
+    With h = eta step, r = 1 - h and the sums S1, S2 of r^i and r^(2i): Var v = q S2, Cov = q step (S1 - S2) / h,
+    Var x = q step^2 (n - 2 S1 + S2) / h^2, where q = (deviation step / mass)^2. Raises ValueError where the
+    scheme is unstable, h >= 2.
+    """
+    _check(deviation, step, mass, damping, steps)
+    h = damping * step
+    if h >= 2:
+        raise ValueError(f"damping times step is {h:g}: the explicit Euler scheme is unstable from 2 on")
+    kick = (deviation * step / mass) ** 2
+    last, before = _gone(h, steps), _gone(h, steps - 1)
+    mixed = (1 - h) * last * before / (2 - h) if h else steps * (steps - 1) / 2
+    velocity = _gone(h * (2 - h), steps)
+    return kick * np.array([[step**2 * _squares(h, steps), step * mixed], [step * mixed, velocity]])
+
+
+def _gone(h: float, n: int) -> float:
+    """(1 - (1 - h)^n) / h: the sum of (1 - h)^i over i < n."""
+    if h == 0 or n <= 0:
+        return float(max(n, 0))
+    return -math.expm1(n * math.log1p(-h)) / h if h < 0.5 else (1 - (1 - h) ** n) / h
+
+
+def _squares(h: float, n: int) -> float:
+    """Sum over i < n of ((1 - (1 - h)^i) / h)^2, that is (n - 2 S1 + S2) / h^2.
+
+    For small h the binomial expansion of (2 - h) (n - 2 S1 + S2): its terms up to h^1 vanish, and the exact
+    integers of the others are divided by powers of n before they become floating-point numbers.
+    """
+    if n == 0:
+        return 0.0
+    if n * h > SMALL:
+        return (n - 2 * _gone(h, n) + _gone(h * (2 - h), n)) / h**2
+    terms = range(2, 40)
+    whole = ((math.comb(2 * n, k + 1) - 4 * math.comb(n, k + 1) - 2 * math.comb(n, k), n ** (k + 1)) for k in terms)
+    return n**3 / (2 - h) * math.fsum(c / d * (-n * h) ** (k - 2) for k, (c, d) in zip(terms, whole, strict=True))
+
+
+def _check(deviation: float, step: float, mass: float, damping: float, length: float) -> None:
+    """Deviation, damping and length are zero or more, step and mass above zero, and all finite."""
+    finite = all(map(math.isfinite, (deviation, step, mass, damping, length)))
+    if not finite or min(deviation, damping, length) < 0 or min(step, mass) <= 0:
+        raise ValueError(f"no point mass has deviation {deviation:g}, step {step:g}, mass {mass:g}, "
+                         f"damping {damping:g} over {length:g} s or steps")
+
+
+def paths(count: int, steps: int, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0,
+          seed: int = 0) -> np.ndarray:  # fmt: skip
+    """Monte Carlo: errors (count, 2) of position (m) and velocity (m/s) of Euler paths after ``steps`` steps."""
+    kicks = deviation * step / mass * normal(seed, 0, count * steps, 1).reshape(count, steps)
+    velocity = lfilter([1.0], [1.0, damping * step - 1.0], kicks, axis=1)
+    return np.column_stack([step * velocity[:, :-1].sum(axis=1), velocity[:, -1]])

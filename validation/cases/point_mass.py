@@ -1,0 +1,156 @@
+"""The point mass of the paper's Section 2: covariances to the last digit, and by Monte Carlo."""
+
+from collections.abc import Sequence
+from decimal import Decimal, localcontext
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.drift.point_mass import continuous, discrete, paths
+from validation.bands import mean_square
+from validation.rows import Row, System, Table, at_most, within
+
+TITLE = "A point mass driven by a noisy force"
+SYSTEM: System = "drift"
+SEED = 20
+DIGITS = 60
+DEVIATION, STEP, MASS = 32.0, 1e-3, 780.0
+"""N, s, kg: the paper's noise on the paper's vehicle."""
+DAMPED = (0.0, 1e-8, 1e-4, 1e-2, 1.0, 100.0)
+"""Damping times time."""
+LENGTHS = (10, 1_000_000)
+TIME = 10.0
+BOUND = 1e-10
+
+Matrix = list[list[Decimal]]
+WHY = ("the linear equation of the covariance itself, stepped by squaring its matrix in 60 decimal digits: no sum, no "
+       "integral and no digit shared with the closed form")  # fmt: skip
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows for both covariances against many digits, for their difference, and for Monte Carlo."""
+    exact = {"continuous": [_continuous_error(x) for x in DAMPED],
+             **{f"{n} steps": [_discrete_error(x, n) for x in DAMPED] for n in LENGTHS}}  # fmt: skip
+    rows = [at_most(f"point_mass.{name.replace(' ', '_')}.{x:g}", SYSTEM,
+                    f"covariance, {name}, damping times time {x:g}: worst relative error", error, "", BOUND, WHY,
+                    "closed form")
+            for name, errors in exact.items() for x, error in zip(DAMPED, errors, strict=True)]  # fmt: skip
+    differences = [[n, *(_difference(x, n) for x in (0.0, 1.0, 10.0))] for n in (10, 100, 1000, 10_000, 100_000)]
+    rows.append(within("point_mass.order", SYSTEM, "discrete by continuous variance of position, no damping, n = 1000",
+                       1 - differences[2][1], "", 7.4888 / 7.5, 1e-5, "1 - 3/(2n): 7.4888 against 7.5", "closed form"))
+    for x in (0.0, 3.0):
+        rows += _monte_carlo(x, 2000 if quick else 10_000)
+    return rows, {"errors": exact, "differences": differences}
+
+
+def _power(matrix: Matrix, n: int) -> Matrix:
+    """A matrix to a whole power, by squaring."""
+    size = range(len(matrix))
+    found = [[Decimal(int(i == j)) for j in size] for i in size]
+    while n:
+        if n % 2:
+            found = _times(found, matrix)
+        matrix, n = _times(matrix, matrix), n // 2
+    return found
+
+
+def _times(a: Matrix, b: Matrix) -> Matrix:
+    return [[sum((x * y for x, y in zip(row, column, strict=True)), Decimal(0)) for column in zip(*b, strict=True)]
+            for row in a]  # fmt: skip
+
+
+def _exponential(matrix: Matrix) -> Matrix:
+    """Exponential by a Taylor series of the matrix divided by 2^20, squared 20 times."""
+    small = [[value / 2**20 for value in row] for row in matrix]
+    term = found = _power(small, 0)
+    for k in range(1, 25):
+        term = [[value / k for value in row] for row in _times(term, small)]
+        found = [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(found, term, strict=True)]
+    return _power(found, 2**20)
+
+
+def _continuous_error(damped: float) -> float:
+    """Of d/dt (Pxx, Pxv, Pvv) = (2 Pxv, Pvv - eta Pxv, s^2 - 2 eta Pvv)."""
+    eta = damped / TIME
+    with localcontext(prec=DIGITS):
+        e, t = Decimal(eta), Decimal(TIME)
+        gain = Decimal(DEVIATION) ** 2 * Decimal(STEP) / Decimal(MASS) ** 2
+        rates: Matrix = [[Decimal(0), 2 * t, Decimal(0), Decimal(0)], [Decimal(0), -e * t, t, Decimal(0)],
+                         [Decimal(0), Decimal(0), -2 * e * t, gain * t], [Decimal(0)] * 4]  # fmt: skip
+        truth = [row[3] for row in _exponential(rates)]
+        return _worst(continuous(TIME, DEVIATION, STEP, MASS, eta), truth)
+
+
+def _discrete_error(damped: float, steps: int) -> float:
+    """Of the covariance recursion of one Euler step; the step is such that ``steps`` of them make TIME."""
+    step = TIME / steps
+    eta = min(damped / TIME, 1.9 / step)
+    with localcontext(prec=DIGITS):
+        d = Decimal(step)
+        r, kick = 1 - Decimal(eta) * d, (Decimal(DEVIATION) * d / Decimal(MASS)) ** 2
+        recursion: Matrix = [[Decimal(1), 2 * d, d * d, Decimal(0)], [Decimal(0), r, d * r, Decimal(0)],
+                             [Decimal(0), Decimal(0), r * r, kick], [Decimal(0)] * 3 + [Decimal(1)]]  # fmt: skip
+        truth = [row[3] for row in _power(recursion, steps)]
+        return _worst(discrete(steps, DEVIATION, step, MASS, eta), truth)
+
+
+def _worst(found: np.ndarray, truth: Sequence[Decimal]) -> float:
+    return max(float(abs(Decimal(float(value)) / true - 1))
+               for value, true in zip(found[[0, 0, 1], [0, 1, 1]], truth, strict=False))  # fmt: skip
+
+
+def _difference(damped: float, steps: int) -> float:
+    """1 - discrete by continuous variance of position."""
+    step = TIME / steps
+    own = (DEVIATION, step, MASS, damped / TIME)
+    return 1 - float(discrete(steps, *own)[0, 0] / continuous(TIME, *own)[0, 0])
+
+
+def _monte_carlo(damped: float, count: int) -> list[Row]:
+    """Position alone, and position and velocity together by their squared distance in the law's own metric."""
+    steps = 1000
+    own = (DEVIATION, STEP, MASS, damped / (steps * STEP))
+    law, found = discrete(steps, *own), paths(count, steps, *own, seed=SEED)
+    distance = float(np.mean(np.sum(found * np.linalg.solve(law, found.T).T, axis=1))) / 2
+    why = f"{count:,} paths of {steps} explicit Euler steps, seed {SEED}"
+    return [
+        mean_square(f"point_mass.position.{damped:g}", SYSTEM, f"variance of position, damping times time {damped:g}, "
+                    "by Monte Carlo", float(np.mean(found[:, 0] ** 2)), float(law[0, 0]), count, "m^2", why),
+        mean_square(f"point_mass.joint.{damped:g}", SYSTEM, f"whole covariance, damping times time {damped:g}, by "
+                    "Monte Carlo: half the mean squared distance", distance, 1.0, 2 * count, "", why),
+    ]  # fmt: skip
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Relative errors of both covariances."""
+    rows = tuple((name, *(f"{error:.1e}" for error in errors)) for name, errors in data["errors"].items())
+    note = (f"Worst entry of the covariance against {DIGITS} digits, over damping times time. Ten steps cannot be "
+            "stable at 100: there the damping is that of 1.9 per step.")
+    return [Table("Relative error of the covariances", note, ("", *(f"{x:g}" for x in DAMPED)), rows)]
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Standard deviations over time, and how the Euler scheme nears them."""
+    from studies.figures import plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(10, 3.8))
+    times = np.geomspace(0.01, 100.0, 81)
+    for i, eta in enumerate((0.0, 0.1, 1.0)):
+        exact = [continuous(t, DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for t in times]
+        whole = np.unique(np.geomspace(10, 1e5, 13).astype(int))
+        euler = [discrete(int(n), DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for n in whole]
+        axes[0].loglog(times, exact, color=f"C{i}", label=f"damping {eta:g} 1/s")
+        axes[0].loglog(whole * STEP, euler, "o", color=f"C{i}", markersize=3.5)
+    axes[0].set(title="error of position, standard deviation [m]", xlabel="time [s]")
+    axes[0].legend(title="line: eq. (11); dots: Euler scheme", loc="upper left")
+    steps, *columns = np.array(data["differences"]).T
+    for x, column in zip((0, 1, 10), columns, strict=True):
+        axes[1].loglog(steps, np.abs(column), "o-", markersize=3.5, label=f"damping times time {x}")
+    axes[1].loglog(steps, 1.5 / steps, color="black", linestyle=":", label="3 / (2n)")
+    axes[1].set(title="Euler scheme against the limit, relative", xlabel="steps n")
+    axes[1].legend()
+    figure.suptitle("A point mass under white force noise: 32 N at 1 kHz on 780 kg", x=0.01, ha="left",
+                    fontweight="bold")  # fmt: skip
+    return [("Error of a point mass's position over time, continuous and in Euler steps; the two differ by O(1/n).",
+             figure)]
