@@ -7,6 +7,8 @@ under the same one. The Woehler exponent ``slope`` is 5 unless another is named.
 
 import numpy as np
 
+from models.errors import InputError
+
 SLOPE = 5.0
 """Woehler exponent used where none is named."""
 CONVENTION = "rainflow after ASTM E1049-85, residue as half cycles"
@@ -24,16 +26,22 @@ def turning_points(load: np.ndarray) -> np.ndarray:
 def pseudo_damage(load: np.ndarray, slope: float = SLOPE) -> float:
     """Sum of count times range^slope over the rainflow cycles of ``load`` (n,); unit: that of the load, to ``slope``.
 
-    Raises ValueError if the load holds a value that is not finite: damage of a broken run is not a number to
-    compare.
+    A load that never turns has none. Raises InputError for a load without a sample, or with one that is not
+    finite: damage of a broken run is not a number to compare.
     """
     from rainflow import extract_cycles
 
-    if not np.isfinite(load).all():
-        raise ValueError("the load holds a value that is not finite")
-    return float(sum(count * span**slope for span, _, count, _, _ in extract_cycles(turning_points(load).tolist())))
+    if not len(load) or not np.isfinite(load).all():
+        found = f"{np.count_nonzero(~np.isfinite(load))} of {len(load)} samples are not finite"
+        raise InputError("", "load", None, f"{found}: damage needs at least one sample, and all of them finite")
+    turns = turning_points(load).tolist()
+    turns.append(turns[-1])  # changes no count, but the library drops the half cycle of two points alone
+    return float(sum(count * span**slope for span, _, count, _, _ in extract_cycles(turns)))
 
 
 def damage_ratio(load: np.ndarray, truth: np.ndarray, slope: float = SLOPE) -> float:
-    """Pseudo-damage of a load by that of the true one."""
-    return pseudo_damage(load, slope) / pseudo_damage(truth, slope)
+    """Pseudo-damage of a load (n,) by that of the true one (m,); raises InputError if the true one never varies."""
+    whole = pseudo_damage(truth, slope)
+    if whole == 0.0:
+        raise InputError("", "true load", None, "never varies, so it does no damage to which another could be compared")
+    return pseudo_damage(load, slope) / whole

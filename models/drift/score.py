@@ -1,0 +1,249 @@
+"""What a stabilised run is worth: what it costs by itself, how wrong it is beside the true one, and a verdict.
+
+Two kinds of figures are kept apart, because an engineer has only one of them.
+
+`Own` needs the run alone: the artificial moment, that is the part of I pitch'' that no suspension force explains,
+and what the run cost. `Errors` needs the true run, which only a virtual measurement has: pseudo-damage of the
+body-frame section forces, rms error of these forces, pitch error. The vertical suspension force is kept among
+them as a warning: f3 = f1 - m1 g + m1 z1'' holds at every pitch, so it calls a tumbling vehicle good.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from models.damage import SLOPE, damage_ratio
+from models.errors import InputError
+from models.result import Result
+from models.section_forces import CHANNELS, section_forces
+from models.strict import Strict
+from models.vehicles.pitch_plane import Parameters
+
+BAND = 15.0
+"""Upper edge (Hz) of the band in which the artificial moment is judged: what bends a chassis."""
+ORDER = 4
+"""Order of the Butterworth low-pass, run forwards and backwards (``scipy.signal.sosfiltfilt``): no phase, -6 dB at
+BAND."""
+TUMBLED = 0.5
+"""Pitch (rad) beyond which no road is that steep."""
+MEASURED = ("prescribed_pitch", "prescribed_heave_and_pitch", "kalman_filter")
+"""Effects that hold the pitch to a measured one."""
+LEVEL = ("pitch_spring", "high_pass")
+"""Effects that hold it near zero, whatever the road does."""
+
+LEAST, COARSEST = 100, 5e-3
+"""Rows and spacing (s) that a balance of moments over each step takes: a quarter of a wave at 50 Hz."""
+
+Word = Literal["accepted", "rejected", "stabilise"]
+
+
+class Limits(Strict):
+    """[options.limits]: from where on a run is not good enough; chosen by whoever uses its forces."""
+
+    damage_error: float = Field(0.05, gt=0, description="largest |damage ratio - 1| of a body-frame section force")
+    pitch_error: float = Field(0.02, gt=0, description="largest pitch error", json_schema_extra={"unit": "rad"})
+    artificial_share: float = Field(
+        0.15, gt=0, description="rms of the artificial moment by that of I pitch'', and of the artificial vertical "
+        "force by that of m3 z3'', both up to 15 Hz")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Own:
+    """What a run says of itself.
+
+    Attributes
+    ----------
+    moment_rms, moment_max : artificial moment in N m, all frequencies
+    moment_share, moment_share_band : its rms by that of I pitch'', over all frequencies and up to BAND
+    force_share_band : the same for the vertical force on the chassis, by m3 z3''
+    pitch_max : largest |pitch| in rad
+    seconds, force_calls, steps : what it cost
+    """
+
+    moment_rms: float
+    moment_max: float
+    moment_share: float
+    moment_share_band: float
+    force_share_band: float
+    pitch_max: float
+    seconds: float
+    force_calls: int
+    steps: int
+
+
+@dataclass(frozen=True)
+class Errors:
+    """What a run is beside the true one.
+
+    Attributes
+    ----------
+    damage : pseudo-damage by the true one, per body-frame section force (models/section_forces.py), with the
+        exponent and the residue convention of models/damage.py
+    force_rms : rms error of each in N
+    vertical_damage : the same ratio for the vertical forces f3, f4: blind to the pitch, never judged
+    pitch_max, pitch_rms : pitch error in rad; heave_max : error of the chassis' heave in m
+    """
+
+    damage: dict[str, float]
+    force_rms: dict[str, float]
+    vertical_damage: dict[str, float]
+    pitch_max: float
+    pitch_rms: float
+    heave_max: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A word and the reason for it."""
+
+    word: Word
+    reason: str
+
+
+def own_figures(run: Result, p: Parameters) -> Own:
+    """Figures of a run with the vehicle's parameters p; raises InputError if its rows are not a uniform fine grid.
+
+    The artificial moment is the mean over each step of I pitch'' less the suspension's moment, so it counts whatever
+    acts on the chassis beside its springs and dampers, by whichever effect, in whichever engine.
+    """
+    step = _step(run)
+    inertia, heave = p.I * np.diff(run["pitch_rate"]) / step, p.m3 * np.diff(run["z3_rate"]) / step
+    moment = inertia - _means(_natural_moment(run, p), step)
+    force = heave - _means(p.m3 * p.g - run["f3"] - run["f4"], step)
+    band = {name: low_pass(values, step) for name, values in
+            (("moment", moment), ("inertia", inertia), ("force", force), ("heave", heave))}  # fmt: skip
+    counts = run.counts()
+    return Own(
+        moment_rms=rms(moment), moment_max=float(np.abs(moment).max()), moment_share=_share(moment, inertia),
+        moment_share_band=_share(band["moment"], band["inertia"]),
+        force_share_band=_share(band["force"], band["heave"]),
+        pitch_max=float(np.abs(run["pitch"]).max()), seconds=float(run.data.attrs["seconds"]),
+        force_calls=counts.get("force calls", 0), steps=counts.get("steps", 0),
+    )  # fmt: skip
+
+
+def errors(run: Result, truth: Result, slope: float = SLOPE) -> Errors:
+    """Errors of a run beside the true one, both with rows at the same times; ``slope`` is the Woehler exponent.
+
+    Raises InputError if the rows lie at different times, or if a load of the truth never turns.
+    """
+    if len(run.times) != len(truth.times) or np.abs(run.times - truth.times).max() > 1e-9:
+        raise InputError("", "times", None, "the run and the true one need rows at the same times")
+    loads, true = (section_forces(one["f3"], one["f4"], one["pitch"]) for one in (run, truth))
+    pitch = run["pitch"] - truth["pitch"]
+    return Errors(
+        damage={name: damage_ratio(loads[name], true[name], slope) for name in CHANNELS},
+        force_rms={name: rms(loads[name] - true[name]) for name in CHANNELS},
+        vertical_damage={name: damage_ratio(run[name], truth[name], slope) for name in ("f3", "f4")},
+        pitch_max=float(np.abs(pitch).max()), pitch_rms=rms(pitch),
+        heave_max=float(np.abs(run["z3"] - truth["z3"]).max()),
+    )  # fmt: skip
+
+
+def verdict(own: Own, found: Errors, effects: Iterable[str], limits: Limits) -> Verdict:
+    """The verdict of a virtual measurement, by damage, pitch error and artificial moment.
+
+    ``accepted``: all within the limits. ``stabilise``: a run without any stabiliser (none of MEASURED or LEVEL among
+    the scene's ``effects``) that is outside them but has not tumbled. ``rejected``: all else.
+    """
+    if own.pitch_max > TUMBLED:
+        return _tumbled(own)
+    wrong = [*_beyond(found, limits), *_burden(own, limits)]
+    if not wrong:
+        return Verdict("accepted", f"damage ratios within {limits.damage_error:.0%} of 1")
+    stabilised = not set(effects).isdisjoint((*MEASURED, *LEVEL))
+    return Verdict("rejected" if stabilised else "stabilise", "; ".join(wrong))
+
+
+def blind_verdict(own: Own, effects: Iterable[str], duration: float, limits: Limits, trusted: float | None = None,
+                  consistent: bool | None = None) -> Verdict:  # fmt: skip
+    """The verdict of an engineer, who has no true run: by the run's own figures alone. Damage is not among them.
+
+    ``accepted``: the pitch is held to a measured one (MEASURED), the artificial moment is within its limit and the
+    filter, where there is one, is ``consistent`` with its measurement (NIS within its band); or a free run ends before
+    the ``trusted`` time (s) predicted for it. ``stabilise``: a longer free run, or one that is held near zero
+    (LEVEL): that is wrong on a grade, and nothing in the run shows it. ``rejected``: all else.
+
+    effects : names of the scene's effects; duration : of the run in s; ``trusted`` and ``consistent`` None: not known.
+    """
+    named = set(effects)
+    if own.pitch_max > TUMBLED:
+        return _tumbled(own)
+    if named.isdisjoint((*MEASURED, *LEVEL)):
+        return _free(duration, trusted)
+    wrong = _burden(own, limits) + (["NIS outside its band"] if consistent is False else [])
+    if wrong:
+        return Verdict("rejected", "; ".join(wrong))
+    if named.isdisjoint(MEASURED):
+        return Verdict("stabilise", "held near zero, not to a measured pitch: wrong on a grade, unseen in the run")
+    return Verdict("accepted", f"held to the measured pitch by {own.moment_share_band:.1%} of I pitch''")
+
+
+def _tumbled(own: Own) -> Verdict:
+    return Verdict("rejected", f"tumbled: pitch of {own.pitch_max:.2g} rad; none of its forces mean anything")
+
+
+def _free(duration: float, trusted: float | None) -> Verdict:
+    if trusted is None:
+        return Verdict("stabilise", "free, and nothing predicts how long it can be trusted")
+    if duration <= trusted:
+        return Verdict("accepted", f"free, and trusted for {trusted:.3g} s")
+    return Verdict("stabilise", f"free, and trusted for {trusted:.3g} s of {duration:.3g} s")
+
+
+def _beyond(found: Errors, limits: Limits) -> list[str]:
+    """What the true run shows to be wrong."""
+    damage = [f"damage of {name} x {ratio:.3g}" for name, ratio in found.damage.items()
+              if not abs(ratio - 1.0) <= limits.damage_error]  # fmt: skip
+    return damage + ([] if found.pitch_max <= limits.pitch_error else [f"pitch wrong by {found.pitch_max:.2g} rad"])
+
+
+def _burden(own: Own, limits: Limits) -> list[str]:
+    """What the run itself shows to be wrong."""
+    shares = {"moment": (own.moment_share_band, "I pitch''"), "force": (own.force_share_band, "m3 z3''")}
+    return [f"artificial {name} {share:.0%} of {whole}" for name, (share, whole) in shares.items()
+            if not share <= limits.artificial_share]  # fmt: skip
+
+
+def rms(values: np.ndarray) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def low_pass(values: np.ndarray, step: float) -> np.ndarray:
+    """Samples (n,) spaced ``step`` (s) with what lies above BAND taken out, without phase."""
+    from scipy.signal import butter, sosfiltfilt
+
+    return sosfiltfilt(butter(ORDER, BAND, fs=1.0 / step, output="sos"), values)
+
+
+def _share(part: np.ndarray, whole: np.ndarray) -> float:
+    """Rms of a part by that of the whole; nothing of nothing is nothing."""
+    own, all_of_it = rms(part), rms(whole)
+    return own / all_of_it if all_of_it > 0 else (np.inf if own > 0 else 0.0)
+
+
+def _means(values: np.ndarray, step: float) -> np.ndarray:
+    """Mean over each step of sampled values (n,): the trapezoidal rule with its end correction, order 4."""
+    slope = np.gradient(values, step, edge_order=2)
+    return (values[1:] + values[:-1]) / 2.0 - step / 12.0 * np.diff(slope)
+
+
+def _natural_moment(run: Result, p: Parameters) -> np.ndarray:
+    """Pitch moment (n,) in N m that suspension and body-fixed wheel forces put on the chassis."""
+    moment = run["suspension_moment"]
+    if run.data.attrs["mode"] != "force-body":
+        return moment
+    return moment + np.sin(run["pitch"]) ** 2 * (p.b * run["f1"] - p.a * run["f2"])
+
+
+def _step(run: Result) -> float:
+    """Spacing (s) of the rows."""
+    steps = np.diff(run.times)
+    if len(steps) < LEAST or np.ptp(steps) > 1e-6 * steps[0] or steps[0] > COARSEST:
+        raise InputError("", "times", None, f"the score needs {LEAST} rows or more, equally spaced by {COARSEST:g} s "
+                         "or less: leave run.output_step out")
+    return float(steps.mean())

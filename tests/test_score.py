@@ -1,0 +1,173 @@
+"""The score: exact figures of made-up runs, what each verdict judges by, and that a tumbling run is rejected."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.damage import damage_ratio, pseudo_damage, turning_points
+from models.drift.score import Errors, Limits, Own, blind_verdict, errors, low_pass, own_figures, rms, verdict
+from models.errors import InputError
+from models.result import Result
+from models.section_forces import CHANNELS
+from models.simulate import simulate
+from validation.scenes import force_scene, road_scene, write_forces
+
+DURATION = 4.0
+OWN = Own(moment_rms=1.0, moment_max=3.0, moment_share=0.5, moment_share_band=0.1, force_share_band=0.0,
+          pitch_max=0.1, seconds=1.0, force_calls=4, steps=1)  # fmt: skip
+ERRORS = Errors(damage=dict.fromkeys(CHANNELS, 1.01), force_rms={}, vertical_damage={"f3": 1.0, "f4": 1.0},
+                pitch_max=0.01, pitch_rms=0.005, heave_max=0.0)  # fmt: skip
+GUIDED, SPRUNG, FREE = ("wheel_forces", "prescribed_pitch"), ("wheel_forces", "pitch_spring"), ("wheel_forces",)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("score")
+    truth = simulate(road_scene(duration=DURATION), "reference")
+    write_forces(truth, folder, 1e-3)
+    return folder, truth
+
+
+def run(folder, effects=None, engine="reference", **override):
+    scene = force_scene(folder, duration=DURATION, override=override, effects=effects)
+    return simulate(scene, engine), scene.vehicle_parameters()
+
+
+def test_a_run_scored_against_itself_is_perfect(place):
+    _, truth = place
+    found = errors(truth, truth)
+    assert set(found.damage.values()) | set(found.vertical_damage.values()) == {1.0}
+    assert {*found.force_rms.values(), found.pitch_max, found.pitch_rms, found.heave_max} == {0.0}
+
+
+@pytest.mark.parametrize("engine", ["reference", "exudyn", "mujoco"])
+def test_artificial_moment_is_the_multiplier_of_a_guided_run(engine, place):
+    folder, _ = place
+    found, p = run(folder, {"prescribed_pitch": {"file": "pitch.csv"}}, engine, I=580.0)
+    # generalised-alpha's multiplier and states err by 1e-3 of I pitch'', 4 N m in 150; the others by less
+    assert own_figures(found, p).moment_rms == pytest.approx(rms(found["enforced_moment"]), rel=0.03)
+
+
+@pytest.mark.parametrize("engine", ["reference", "exudyn", "mujoco"])
+def test_artificial_moment_is_that_of_the_spring(engine, place):
+    folder, _ = place
+    found, p = run(folder, {"pitch_spring": {"stiffness": 300.0, "damping": 50.0}}, engine)
+    spring = 300.0 * found["pitch"] + 50.0 * found["pitch_rate"]
+    # the balance over a step errs by some 1e-4 of I pitch'', 0.3 N m in 15
+    assert own_figures(found, p).moment_rms == pytest.approx(rms(spring), rel=0.02)
+
+
+@pytest.mark.parametrize("frame", ["inertial", "body"])
+def test_a_free_run_has_no_artificial_moment(frame, place):
+    folder, _ = place
+    scene = force_scene(folder, duration=DURATION)
+    wheels = scene.effects["wheel_forces"].model_copy(update={"frame": frame})
+    found = simulate(scene.model_copy(update={"effects": {"wheel_forces": wheels}}), "reference")
+    own = own_figures(found, scene.vehicle_parameters())
+    # rounding of the balance's order-4 rule on forces that are linear between samples
+    assert own.moment_share_band < 1e-4 and own.force_share_band < 1e-4
+
+
+def test_the_band_ends_at_15_hz():
+    t = 1e-3 * np.arange(20_000)
+    ratios = [rms(low_pass(np.sin(2 * np.pi * f * t), 1e-3)[5000:-5000]) * 2**0.5 for f in (5.0, 15.0, 30.0)]
+    # Butterworth of order 4 run twice: 1 / (1 + (f / 15 Hz)^8), within the ripple of frequency warping
+    assert ratios == pytest.approx([1.0, 0.5, 1 / 257], rel=0.02)
+
+
+def test_a_drifting_heave_leaves_body_frame_forces_alone(place):
+    _, truth = place
+    moved = Result(truth.data.copy())
+    for name in ("z1", "z2", "z3"):
+        moved.data[name] = truth.data[name] + 3.0 * truth.data["time"]
+    found = errors(moved, truth)
+    assert found.heave_max == pytest.approx(3.0 * DURATION) and set(found.damage.values()) == {1.0}
+
+
+def test_vertical_forces_are_blind_to_a_pitch_of_any_size(place):
+    _, truth = place
+    turned = Result(truth.data.copy())
+    turned.data["pitch"] = truth.data["pitch"] + 1.0
+    found = errors(turned, truth)
+    assert set(found.vertical_damage.values()) == {1.0}
+    assert min(found.damage["f3x"], found.damage["f4x"]) > 1e3
+
+
+@pytest.mark.parametrize(("own", "wrong", "effects", "word"), [
+    ({}, {}, GUIDED, "accepted"),
+    ({}, {}, SPRUNG, "accepted"),
+    ({}, {"damage": {**ERRORS.damage, "f4x": 1.06}}, GUIDED, "rejected"),
+    ({}, {"damage": {**ERRORS.damage, "f3z": float("nan")}}, GUIDED, "rejected"),
+    ({}, {"damage": {**ERRORS.damage, "f4x": 0.9}}, FREE, "stabilise"),
+    ({}, {"pitch_max": 0.03}, SPRUNG, "rejected"),
+    ({"moment_share_band": 0.2}, {}, GUIDED, "rejected"),
+    ({"force_share_band": 0.2}, {}, GUIDED, "rejected"),
+    ({"pitch_max": 5.9}, {}, FREE, "rejected"),
+    ({"pitch_max": 5.9}, {}, GUIDED, "rejected"),
+])  # fmt: skip
+def test_verdict_with_the_truth(own, wrong, effects, word):
+    assert verdict(replace(OWN, **own), replace(ERRORS, **wrong), effects, Limits()).word == word
+
+
+@pytest.mark.parametrize(("own", "effects", "more", "word"), [
+    ({}, GUIDED, {}, "accepted"),
+    ({}, (*FREE, "kalman_filter"), {"consistent": True}, "accepted"),
+    ({}, (*FREE, "kalman_filter"), {"consistent": False}, "rejected"),
+    ({"moment_share_band": 0.2}, GUIDED, {}, "rejected"),
+    ({"moment_share_band": 0.2}, SPRUNG, {}, "rejected"),
+    ({}, SPRUNG, {}, "stabilise"),
+    ({}, (*FREE, "high_pass"), {"trusted": 100.0}, "stabilise"),
+    ({}, FREE, {}, "stabilise"),
+    ({}, FREE, {"trusted": 5.0}, "stabilise"),
+    ({}, FREE, {"trusted": 10.0}, "accepted"),
+    ({"pitch_max": 5.9}, FREE, {"trusted": 100.0}, "rejected"),
+])  # fmt: skip
+def test_verdict_without_the_truth(own, effects, more, word):
+    assert blind_verdict(replace(OWN, **own), effects, 10.0, Limits(), **more).word == word
+
+
+def test_reasons_name_what_is_wrong():
+    found = verdict(replace(OWN, moment_share_band=0.2), replace(ERRORS, pitch_max=0.3), GUIDED, Limits())
+    assert found.reason == "pitch wrong by 0.3 rad; artificial moment 20% of I pitch''"
+
+
+@pytest.mark.parametrize("spacing", [0.01, 0.5])
+def test_rows_that_are_too_far_apart_are_refused(spacing, place):
+    _, truth = place
+    with pytest.raises(InputError, match="output_step"):
+        own_figures(truth.every(spacing), road_scene().vehicle_parameters())
+
+
+def test_runs_at_other_times_are_refused(place):
+    _, truth = place
+    with pytest.raises(InputError, match="same times"):
+        errors(truth.every(2e-3), truth)
+
+
+@pytest.mark.parametrize("load", [np.array([]), np.array([1.0, np.nan, 2.0]), np.array([1.0, np.inf])])
+def test_broken_loads_are_refused(load):
+    with pytest.raises(InputError, match="finite"):
+        pseudo_damage(load)
+
+
+def test_a_constant_load_does_no_damage_and_is_no_truth():
+    assert pseudo_damage(np.full(9, 3.0)) == 0.0
+    with pytest.raises(InputError, match="never varies"):
+        damage_ratio(np.array([0.0, 1.0, 0.0]), np.full(9, 3.0))
+
+
+def test_damage_counts_astm_half_cycles():
+    """The example of ASTM E1049-85, figure 6: ranges 3, 4, 4, 6, 8, 8, 9, counted 0.5, 1.5 (twice 4), 0.5, 1, 0.5."""
+    load = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
+    assert pseudo_damage(load, 1.0) == 0.5 * 3 + 1.5 * 4 + 0.5 * 6 + 1.0 * 8 + 0.5 * 9
+    # residue as half cycles: a single rise is half of a cycle
+    assert pseudo_damage(np.array([0.0, 2.0])) == 0.5 * 2.0**5
+
+
+def test_turning_points_change_no_count():
+    from rainflow import extract_cycles
+
+    load = np.round(np.random.default_rng(4).standard_normal(3000).cumsum(), 0)  # plateaus among them
+    whole = sum(count * span**5 for span, _, count, _, _ in extract_cycles(load.tolist()))
+    assert len(turning_points(load)) < 2000 and pseudo_damage(load) == pytest.approx(whole, rel=1e-12)
