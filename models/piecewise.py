@@ -1,4 +1,4 @@
-"""Compiled evaluation of piecewise polynomials on a uniform grid, with their derivatives."""
+"""Compiled evaluation of piecewise polynomials, with their derivatives, and of lines between samples."""
 
 import numpy as np
 from numba import njit
@@ -26,4 +26,17 @@ def evaluate(coefficients, period, start, step, count, derivatives):
                         factor *= power - i
                     value = value * since + factor * coefficients[power, piece, column]
                 out[row, order * columns + column] = value
+    return out
+
+
+@njit(cache=True, nogil=True)
+def interpolate(values, index, part):
+    """Values (n, columns) the given parts of a period after the samples ``index``, linear up to the next sample."""
+    rows, columns = values.shape
+    out = np.empty((len(index), columns))
+    for i in range(len(index)):
+        row = index[i]
+        after = min(row + 1, rows - 1)
+        for column in range(columns):
+            out[i, column] = values[row, column] + part[i] * (values[after, column] - values[row, column])
     return out

@@ -89,8 +89,9 @@ class Sampled:
         index, part = self._place((start + step * np.arange(count)) / self.period)
         if self.held:
             return self.values[index]
-        after = np.minimum(index + 1, len(self.values) - 1)
-        return self.values[index] + part[:, None] * (self.values[after] - self.values[index])
+        from models.piecewise import interpolate
+
+        return interpolate(self.values, index, part)
 
     def at(self, time: float) -> np.ndarray:
         """Values at one time (s), shape (channels,)."""

@@ -143,18 +143,29 @@ def guard(engine: str, times: np.ndarray, states: np.ndarray, duration: float, n
     """
     if len(times) == 0 or len(times) != len(states):
         raise RunFailed(engine, f"gave {len(states)} states at {len(times)} times{note}")
-    finite = np.isfinite(states).all(axis=1) & (True if moment is None else np.isfinite(moment))
-    sane = finite & (np.abs(np.where(np.isfinite(states), states, 0)) < SIZE_BOUND).all(axis=1)
-    forward = np.concatenate(([True], np.diff(times) > 0))
-    bad = np.flatnonzero(~(sane & forward & np.isfinite(times)))
-    if len(bad):
-        last = bad[0] - 1
-        reason = _reason(bool(finite[bad[0]]), bool(sane[bad[0]]))
-        raise RunFailed(engine, reason + note, times[last] if last >= 0 else None, states[last] if last >= 0 else None)
+    if not _sound(times, states, moment):
+        _fail(engine, times, states, note, moment)
     if note:
         raise RunFailed(engine, note.lstrip("; "), times[-1], states[-1])
     if abs(times[-1] - duration) > 1e-9 * max(1.0, duration):
         raise RunFailed(engine, f"stopped at {times[-1]:.6g} s instead of {duration:.6g} s", times[-1], states[-1])
+
+
+def _sound(times: np.ndarray, states: np.ndarray, moment: np.ndarray | None) -> bool:
+    """Whether nothing is wrong, quickly: a run may be one of ten thousand. What is no number passes no comparison."""
+    sane = states.max() < SIZE_BOUND and states.min() > -SIZE_BOUND
+    forward = np.isfinite(times).all() and (np.diff(times) > 0).all()
+    return bool(sane and forward and (moment is None or np.isfinite(moment).all()))
+
+
+def _fail(engine: str, times: np.ndarray, states: np.ndarray, note: str, moment: np.ndarray | None) -> None:
+    """Raise RunFailed with the last state before the first one that is wrong."""
+    finite = np.isfinite(states).all(axis=1) & (True if moment is None else np.isfinite(moment))
+    sane = finite & (np.abs(np.where(np.isfinite(states), states, 0)) < SIZE_BOUND).all(axis=1)
+    forward = np.concatenate(([True], np.diff(times) > 0))
+    first = np.flatnonzero(~(sane & forward & np.isfinite(times)))[0]
+    reason, last = _reason(bool(finite[first]), bool(sane[first])), first - 1
+    raise RunFailed(engine, reason + note, times[last] if last >= 0 else None, states[last] if last >= 0 else None)
 
 
 def _reason(finite: bool, sane: bool) -> str:

@@ -36,7 +36,7 @@ def _compiled(function: Any, key: tuple) -> Any:
     stand in another file; so the name of the cache file carries their checksum.
     """
     function.__qualname__ = "_".join([function.__name__, *(str(part) for part in key), f"{EQUATIONS:08x}"])
-    return njit(cache=True)(function)
+    return njit(cache=True, nogil=True, error_model="numpy")(function)  # no check for masses of zero: there are none
 
 
 def _compile_fixed(rhs, key):
