@@ -28,7 +28,7 @@ EQUATIONS = zlib.crc32(Path(pitch_plane_equations.__file__).read_bytes())
 """Checksum of the equations' source."""
 
 
-def _compiled(function: Any, key: tuple) -> Any:
+def compiled(function: Any, key: tuple) -> Any:
     """Compile a closure with a cache file of its own.
 
     Closures of one factory would share numba's index, and two processes that compile different ones at the
@@ -63,7 +63,7 @@ def _compile_fixed(rhs, key):
                 y[j] += step / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j])
             states[i + 1] = y
 
-    return _compiled(march, key)
+    return compiled(march, key)
 
 
 def _compile_single(rhs, key):
@@ -72,7 +72,7 @@ def _compile_single(rhs, key):
         rhs(copy, u, p, dy)
         return dy
 
-    return _compiled(derivative, key)
+    return compiled(derivative, key)
 
 
 def _sum(rhs, added):
