@@ -10,8 +10,8 @@ from typing import Any
 from models.result import provenance
 from validation.rows import REPORTED, Row
 
-CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "point_mass", "hard_cases",
-         "planted_faults", "absent", "price")  # fmt: skip
+CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "point_mass",
+         "hard_cases", "planted_faults", "absent", "price")  # fmt: skip
 """Case modules in the order of the report."""
 
 
