@@ -178,7 +178,7 @@ def _study(scene: Any) -> Any:
     return module
 
 
-NOT_STUDIES = ("__init__", "command_line", "figures", "folders")
+NOT_STUDIES = ("__init__", "command_line", "figures", "folders", "virtual_measurement")
 
 
 @contextmanager

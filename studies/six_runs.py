@@ -12,25 +12,18 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.assembly import assemble
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import Settings
 from models.errors import InputError, RunFailed
 from models.result import Result
-from models.scene import Scene, build
-from models.simulate import simulate, state_names
+from models.scene import Scene
+from models.simulate import simulate
 from models.strict import Strict, quantity, read
-from models.time_series import write_time_series
+from studies.virtual_measurement import PAPER, check_road, follower, measure, stride, write_measurement
 
 Progress = Callable[[str, float], None]
 
-PAPER = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
-"""The perturbed model of Appendix B, as factors on the parameters."""
 DRIFT = 0.05
 """A run has drifted off when its pitch is this far (rad) from the measured one."""
-
-LEAST = 8
-"""Samples that a spline through the measured pitch needs."""
 KEPT = 0.01
 """Spacing (s) of the saved runs; the table is made from every step."""
 
@@ -51,10 +44,10 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     """All six runs in each engine; saves every result, five figures and ``table.txt``."""
     check(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
-    every = _stride(scene, options)
-    measured = simulate(scene, "reference", Settings("RK4", scene.run.step, scene.run.duration))
+    every = stride(scene, options.sampling_rate)
+    measured = measure(scene)
     measured.save(folder / "measurement.nc")
-    deviation = _write_measurement(measured, options, every, folder)
+    deviation = options.noise_fraction * write_measurement(measured, options.sampling_rate, every, folder)
     scenes = _scenes(scene, options, folder, deviation)
     runs: dict[str, dict[str, Result]] = {engine: {} for engine in engines}
     failed: dict[str, str] = {}
@@ -87,19 +80,10 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 def check(scene: Scene, engines: tuple[str, ...]) -> None:
     """Refuse, before anything is written, a scene that this study cannot follow through all its runs."""
     options = read(Options, scene.options, scene.file, "options")
-    for name in scene.effects:
-        if name != "road":
-            raise InputError(scene.file, f"effects.{name}", None, "this study measures on a road and names the effects "
-                             "of the other runs itself: drop it")
-    if "road" not in scene.effects:
-        raise InputError(scene.file, "effects.road", None, "is missing: this study measures on a road")
+    check_road(scene, options.sampling_rate)
     if scene.run.output_step is not None:
         raise InputError(scene.file, "run.output_step", scene.run.output_step, f"this study saves rows {KEPT} s apart "
                          "and makes its table from every step: drop this key")
-    _stride(scene, options)
-    if scene.run.duration * options.sampling_rate < LEAST:
-        allowed = f"must last at least {LEAST} samples, {LEAST / options.sampling_rate:g} s"
-        raise InputError(scene.file, "run.duration", scene.run.duration, allowed)
     for engine in engines:
         _check_integrator(scene, engine)
 
@@ -112,29 +96,11 @@ def _check_integrator(scene: Scene, engine: str) -> None:
         raise InputError(scene.file, f"engines.{engine}.integrator", given, allowed)
 
 
-def _stride(scene: Scene, options: Options) -> int:
-    """Steps of the measurement from one sample to the next."""
-    ratio = 1.0 / (options.sampling_rate * scene.run.step)
-    if ratio < 0.5 or abs(ratio - round(ratio)) > 1e-6 * ratio:
-        allowed = f"the sampling period must be a multiple of run.step = {scene.run.step:g} s"
-        raise InputError(scene.file, "options.sampling_rate", options.sampling_rate, allowed)
-    return round(ratio)
-
-
-def _write_measurement(measured: Result, options: Options, every: int, folder: Path) -> float:
-    """Forces and pitch as files at the sampling rate; returns the noise's standard deviation (N)."""
-    period = 1.0 / options.sampling_rate
-    front, rear, pitch = (measured[name][::every] for name in ("f1", "f2", "pitch"))
-    write_time_series(folder / "wheel_forces.csv", {"front": ("N", front), "rear": ("N", rear)}, period)
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, period)
-    return options.noise_fraction * float(max(np.abs(front).max(), np.abs(rear).max()))
-
-
 def _scenes(scene: Scene, options: Options, folder: Path, deviation: float) -> dict[str, Scene]:
     """The runs that follow the measurement, by name."""
     base = scene.vehicle_parameters()
     paper = {name: getattr(base, name) * factor for name, factor in PAPER.items()}
-    make = _maker(scene, folder)
+    make = follower(scene, folder)
     noises = [
         {"force_noise": {"deviation": deviation, "seed": 1000 * options.seed + i}} for i in range(options.noise_samples)
     ]
@@ -150,28 +116,6 @@ def _scenes(scene: Scene, options: Options, folder: Path, deviation: float) -> d
     scenes["guided, perturbed"] = make(paper, guide)
     scenes["guided, both"] = make(paper, noises[0] | guide)
     return scenes
-
-
-def _maker(scene: Scene, folder: Path) -> Callable[[dict[str, float], dict[str, Any]], Scene]:
-    """Builder of a force-excited scene from overrides and further effects; it starts where the measurement did."""
-    initial = dict(zip(state_names(), assemble(scene).initial.tolist(), strict=True))
-    parameters = scene.vehicle_parameters().model_dump()
-
-    def make(override: dict[str, float], effects: dict[str, Any]) -> Scene:
-        forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}}
-        vehicle = {"geometry": scene.vehicle.geometry, "override": parameters | override}
-        free = "prescribed_pitch" not in effects
-        table = {
-            "title": scene.title,
-            "vehicle": vehicle,
-            "run": {"duration": scene.run.duration, "step": scene.run.step},
-            "start": {name: value for name, value in initial.items() if free or not name.startswith("pitch")},
-            "engines": {name: own.model_dump(exclude_unset=True) for name, own in scene.engines.items()},
-            "effects": forces | effects,
-        }
-        return build(table, scene.file, folder)
-
-    return make
 
 
 def _random_model(base: Any, seed: int, index: int) -> dict[str, float]:

@@ -1,0 +1,88 @@
+"""A virtual measurement: a run on a road, the files that it leaves, and scenes that follow it on these files."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.assembly import assemble
+from models.engines.protocol import Settings
+from models.errors import InputError
+from models.result import Result
+from models.scene import Scene, build
+from models.simulate import simulate, state_names
+from models.time_series import write_time_series
+
+PAPER = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
+"""The perturbed model of Appendix B, as factors on the parameters."""
+LEAST = 8
+"""Samples that a spline through the measured pitch needs."""
+
+Follow = Callable[[dict[str, float], dict[str, Any]], Scene]
+"""Builder of a force-excited scene from overrides of parameters and further effects."""
+
+
+def measure(scene: Scene) -> Result:
+    """The run on the road, in the reference by Runge-Kutta steps."""
+    return simulate(scene, "reference", Settings("RK4", scene.run.step, scene.run.duration))
+
+
+def check_road(scene: Scene, sampling_rate: float) -> None:
+    """Refuse a scene that is no virtual measurement, or whose steps do not fit ``sampling_rate`` (Hz)."""
+    for name in scene.effects:
+        if name != "road":
+            raise InputError(scene.file, f"effects.{name}", None, "this study measures on a road and names the effects "
+                             "of the other runs itself: drop it")
+    if "road" not in scene.effects:
+        raise InputError(scene.file, "effects.road", None, "is missing: this study measures on a road")
+    stride(scene, sampling_rate)
+    if scene.run.duration * sampling_rate < LEAST:
+        allowed = f"must last at least {LEAST} samples, {LEAST / sampling_rate:g} s"
+        raise InputError(scene.file, "run.duration", scene.run.duration, allowed)
+
+
+def stride(scene: Scene, sampling_rate: float) -> int:
+    """Steps of the measurement from one sample to the next."""
+    ratio = 1.0 / (sampling_rate * scene.run.step)
+    if ratio < 0.5 or abs(ratio - round(ratio)) > 1e-6 * ratio:
+        allowed = f"the sampling period must be a multiple of run.step = {scene.run.step:g} s"
+        raise InputError(scene.file, "options.sampling_rate", sampling_rate, allowed)
+    return round(ratio)
+
+
+def write_measurement(measured: Result, sampling_rate: float, every: int, folder: Path) -> float:
+    """``wheel_forces.csv`` and ``pitch.csv`` at ``sampling_rate`` (Hz); returns the largest force (N)."""
+    front, rear, pitch = (measured[name][::every] for name in ("f1", "f2", "pitch"))
+    period = 1.0 / sampling_rate
+    write_time_series(folder / "wheel_forces.csv", {"front": ("N", front), "rear": ("N", rear)}, period)
+    write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, period)
+    return float(max(np.abs(front).max(), np.abs(rear).max()))
+
+
+def follower(scene: Scene, folder: Path) -> Follow:
+    """Builder of scenes on the files in ``folder``; they start where the measurement did."""
+    initial = dict(zip(state_names(), assemble(scene).initial.tolist(), strict=True))
+    parameters = scene.vehicle_parameters().model_dump()
+
+    def follow(override: dict[str, float], effects: dict[str, Any]) -> Scene:
+        forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}}
+        prescribed = _prescribed(effects)
+        table = {
+            "title": scene.title,
+            "vehicle": {"geometry": scene.vehicle.geometry, "override": parameters | override},
+            "run": {"duration": scene.run.duration, "step": scene.run.step},
+            "start": {name: value for name, value in initial.items() if name not in prescribed},
+            "engines": {name: own.model_dump(exclude_unset=True) for name, own in scene.engines.items()},
+            "effects": forces | effects,
+        }
+        return build(table, scene.file, folder)
+
+    return follow
+
+
+def _prescribed(effects: dict[str, Any]) -> set[str]:
+    """States that an effect takes from its own file."""
+    if "prescribed_heave_and_pitch" in effects:
+        return {"z3", "z3_rate", "pitch", "pitch_rate"}
+    return {"pitch", "pitch_rate"} if "prescribed_pitch" in effects else set()
