@@ -60,7 +60,7 @@ def assemble(scene: Scene) -> Assembly:
     p = scene.vehicle_parameters()
     vehicle = pitch_plane.describe(p, scene.vehicle.geometry)
     assembly = Assembly(scene, vehicle, p, "free", None, _initial(scene, p))
-    for name in _ordered(scene):
+    for name in ordered(scene):
         module = import_module(f"models.effects.{name}")
         assembly = module.extend(assembly, scene.effects[name])
     return assembly
@@ -77,7 +77,7 @@ def _initial(scene: Scene, p: pitch_plane.Parameters) -> np.ndarray:
     return state
 
 
-def _ordered(scene: Scene) -> list[str]:
+def ordered(scene: Scene) -> list[str]:
     """The scene's effects, each after those that it needs; refuses illegal combinations."""
     modules = {name: import_module(f"models.effects.{name}") for name in scene.effects}
     for name, module in modules.items():

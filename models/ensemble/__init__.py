@@ -1,0 +1,1 @@
+"""Many paths of one scene: a runner over any executor, and the jobs that it runs."""

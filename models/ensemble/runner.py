@@ -1,0 +1,197 @@
+"""Many paths on any executor: progress, finished blocks kept, resumed with the same bits.
+
+A job is called with a range of path numbers and gives named arrays whose first axis is these paths. It must
+depend on the numbers alone, so that the result does not depend on who computes which block, or when. The paths are
+cut into blocks of fixed size; each finished block is saved whole, and all of them are put together in the order of
+their numbers.
+"""
+
+import math
+import os
+import signal
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass, field
+from itertools import islice
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from models.ensemble.store import Arrays, Store
+from models.errors import RunFailed
+
+BLOCK = 50
+"""Paths per block: half a second of work of the pitch plane over 60 s, which a killed run may lose."""
+AHEAD = 64
+"""Blocks under way at once, so that the memory for results on their way stays bounded."""
+
+
+class Job(Protocol):
+    """What an ensemble computes; it must survive pickling to run in other processes."""
+
+    def __call__(self, paths: range) -> Arrays:
+        """Named arrays of these paths, first axis len(paths)."""
+        ...
+
+    def facts(self) -> dict[str, Any]:
+        """Everything that the result depends on: numbers, text, arrays, and dictionaries of these."""
+        ...
+
+
+class PathFailed(RuntimeError):
+    """A path that could not be computed, by its number; a job raises it, so that the message can name the path."""
+
+    def __init__(self, path: int, reason: str) -> None:
+        super().__init__(path, reason)
+
+    def __str__(self) -> str:
+        return f"path {self.args[0]}: {self.args[1]}"
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far an ensemble is: paths done of all, paths per second, seconds left (infinite before the first block)."""
+
+    done: int
+    paths: int
+    rate: float
+    left: float
+
+    def __str__(self) -> str:
+        left = f", {self.left:.0f} s left" if self.rate else ""
+        return f"{self.done} of {self.paths} paths, {self.rate:.3g} per second{left}"
+
+
+@dataclass(frozen=True)
+class _Failure:
+    """What a worker says instead of an answer: many exceptions do not survive the way between processes."""
+
+    reason: str
+
+
+@dataclass
+class _Memory:
+    """Blocks that are not saved anywhere."""
+
+    blocks: dict[int, Arrays] = field(default_factory=dict)
+
+    def has(self, block: int) -> bool:
+        return block in self.blocks
+
+    def save(self, block: int, arrays: Arrays) -> None:
+        self.blocks[block] = arrays
+
+    def load(self, block: int) -> Arrays:
+        return self.blocks.pop(block)
+
+
+def run(job: Job, paths: int, folder: Path | None = None, executor: Executor | None = None, block: int = BLOCK,
+        progress: Callable[[Progress], None] = lambda state: None) -> Arrays:  # fmt: skip
+    """Arrays of all paths 0 to ``paths`` - 1, the same bits on any executor, in any order and after any interruption.
+
+    folder : keeps every finished block; one that holds blocks of the same job is resumed, one of another job is
+    an InputError that names the difference; None keeps them in memory. executor : a process pool
+    (``processes``), a thread pool, a Dask ``Client.get_executor()``; None computes here. A block that fails does
+    not stop the others: RunFailed then names the blocks and paths, and what is finished is kept.
+    """
+    store: Store | _Memory = _Memory()
+    if folder is not None:
+        store = Store(folder)
+        store.claim({"paths": paths, "paths per block": block, **job.facts()})
+    cut = [range(first, min(first + block, paths)) for first in range(0, paths, block)]
+    failed = _compute(job, cut, store, executor, progress)
+    if failed:
+        kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
+        raise RunFailed("ensemble", "; ".join(failed) + kept)
+    return _together([store.load(i) for i in range(len(cut))])
+
+
+def _compute(job: Job, cut: list[range], store: Store | _Memory, executor: Executor | None,
+             progress: Callable[[Progress], None]) -> list[str]:  # fmt: skip
+    """Compute and save the missing blocks; returns what failed."""
+    missing = [i for i in range(len(cut)) if not store.has(i)]
+    paths = sum(map(len, cut))
+    done = before = paths - sum(len(cut[i]) for i in missing)
+    start, failed = time.perf_counter(), []
+    progress(Progress(done, paths, 0.0, math.inf if missing else 0.0))
+    for i, answer in _answers(job, cut, missing, executor):
+        if isinstance(answer, _Failure):
+            failed.append(f"block {i} (paths {cut[i][0]} to {cut[i][-1]}): {answer.reason}")
+            continue
+        store.save(i, answer)
+        done += len(cut[i])
+        rate = (done - before) / (time.perf_counter() - start)
+        progress(Progress(done, paths, rate, (paths - done) / rate))
+    return failed
+
+
+def _answers(job: Job, cut: list[range], missing: list[int],
+             executor: Executor | None) -> Iterator[tuple[int, Arrays | _Failure]]:  # fmt: skip
+    """Blocks and their answers, as they come."""
+    if executor is None:
+        yield from ((i, _attempt(job, cut[i])) for i in missing)
+        return
+    queue, waiting = iter(missing), dict[Future, int]()
+
+    def submit(blocks: Iterable[int]) -> None:
+        for i in blocks:
+            waiting[_submitted(executor, job, cut[i])] = i
+
+    submit(islice(queue, AHEAD))
+    try:
+        while waiting:
+            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                error = future.exception()
+                yield waiting.pop(future), future.result() if error is None else _said(error)
+                submit(islice(queue, 1))
+    finally:
+        for future in waiting:
+            future.cancel()
+
+
+def _submitted(executor: Executor, job: Job, paths: range) -> Future:
+    """A block on its way; on a pool that has lost its workers, a future that says so."""
+    try:
+        return executor.submit(_attempt, job, paths)
+    except BrokenExecutor as error:
+        lost: Future = Future()
+        lost.set_exception(error)
+        return lost
+
+
+def _attempt(job: Job, paths: range) -> Arrays | _Failure:
+    """One block, in the worker."""
+    try:
+        arrays = job(paths)
+    except Exception as error:
+        return _said(error)
+    short = [name for name, values in arrays.items() if len(values) != len(paths)]
+    return _Failure(f"{short[0]!r} has not one row per path") if short else arrays
+
+
+def _said(error: BaseException) -> _Failure:
+    if isinstance(error, BrokenExecutor):
+        return _Failure("its worker died: killed, or out of memory")
+    return _Failure(str(error) if isinstance(error, PathFailed | RunFailed) else f"{type(error).__name__}: {error}")
+
+
+def _together(blocks: list[Arrays]) -> Arrays:
+    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+
+
+def processes(workers: int) -> ProcessPoolExecutor:
+    """A process pool whose workers start fresh: engines and compilers keep threads that no fork survives."""
+    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_ignore_interrupt)
+
+
+def _ignore_interrupt() -> None:
+    """Ctrl-C belongs to the process that keeps the blocks; its workers finish the one they are at."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def workers_here() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
