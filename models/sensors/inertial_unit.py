@@ -1,0 +1,97 @@
+"""The paper's Section 3.2: what white noise on measured angular rates does to the attitude integrated from them.
+
+A gyro's sample errs by ``deviation`` (rad/s) on each axis, white at the sampling rate; over many samples that is a
+random walk of the angle with s = deviation / sqrt(rate) in rad per sqrt(s). S and S~ are the true and the measured
+attitude (local to global, local rates), and E = S~ S^T is the error rotation, in global components.
+
+Ito and Stratonovich. The kinematic equation with noise, S~' = S~ skew(w + noise), means Stratonovich: samples are
+real numbers held over a period, and every step is a rotation. Read after Ito, eq. (25) loses the correction term: the
+quaternion then grows, by exp(k s^2 t / 8) for k noisy axes, as eq. (28) has it, while its direction is the same. So
+    normalised quaternion, or steps by the exponential: E[q] = exp(-sum of s^2 t / 8) q_true, laws of E as below;
+    not normalised, explicit Euler or Ito: E[q] = q_true, but the matrix of eq. (21) is a rotation times |q|^2.
+"""
+
+import numpy as np
+from scipy.linalg import expm
+
+from models.noise import GYRO, normal
+from models.sensors.rotations import conjugate, integrate, matrix, product, skew
+
+
+def random_walk(deviation: float, rate: float) -> float:
+    """Angle random walk s (rad per sqrt(s)) of samples with ``deviation`` (rad/s) at ``rate`` (Hz), eq. (5)."""
+    return deviation / rate**0.5
+
+
+def measured_attitude(rates: np.ndarray, period: float, deviation: np.ndarray, start: np.ndarray, paths: range,
+                      seed: int = 0) -> np.ndarray:  # fmt: skip
+    """Quaternions (n + 1, paths, 4) that noisy rates give, held over each period and integrated by exact rotations.
+
+    rates : true local rates (n, 3) in rad/s, one for each period (s); deviation : (3,) in rad/s per sample, each axis
+    its own; start : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
+    """
+    noise = np.stack([normal(seed, path, len(rates), 3, source=GYRO) for path in paths], axis=1)
+    noisy = rates[:, None, :] + deviation * noise
+    return integrate(np.concatenate([noisy, noisy[-1:]]), period, start, "held")
+
+
+def error_rotation(measured: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Quaternions (..., 4) of E = S~ S^T: what turns the true attitude into the measured one, in global components."""
+    return product(measured, conjugate(true))
+
+
+def mean_scalar(walks: np.ndarray, time: float) -> float:
+    """E[q1] of the error rotation after ``time`` (s): exp(-sum of s^2 t / 8), on any true motion.
+
+    walks : (k,) in rad per sqrt(s). It holds for unequal noise and on a turning body alike, because the squares of
+    the three matrices of eq. (26) are all -1: the quaternion's mean cannot see which axis is the noisy one.
+    """
+    return float(np.exp(-np.sum(np.square(walks)) * time / 8))
+
+
+def mean_trace(walk: float, time: float) -> float:
+    """E[tr E] = 3 exp(-s^2 t) for three axes of equal noise, on any true motion: beyond the paper, and exact.
+
+    Equal noise is the same in every frame, so that E is the Brownian motion of the rotation group itself.
+    """
+    return float(3 * np.exp(-(walk**2) * time))
+
+
+def mean_error(walks: np.ndarray, rates: np.ndarray, period: float, start: np.ndarray) -> np.ndarray:
+    """E[E] (3, 3) for unequal noise on a turning body: the mean rotation matrix of the error.
+
+    From Stratonovich to Ito the noise leaves 1/2 sum s_i^2 G_i^2, with G_i the generator of a turn about local axis
+    i, and therefore
+        d E[E] / dt = E[E] S (1/2 sum s_i^2 G_i^2) S^T,
+    turned by the true motion S; or, for the measured attitude itself, d E[S~] / dt = E[S~] (skew(w) + 1/2 sum s_i^2
+    G_i^2). The latter has constant coefficients over each period and is stepped by its matrix exponential: exact for
+    rates that are held. walks : (3,) in rad per sqrt(s); rates (n, 3) in rad/s, local; period s; start (4,).
+    """
+    steps = expm((skew(rates) + spread(walks)) * period)
+    mean, true = matrix(start), matrix(start)
+    for step, turn in zip(steps, expm(skew(rates) * period), strict=True):
+        mean, true = mean @ step, true @ turn
+    return mean @ true.T
+
+
+def spread(walks: np.ndarray) -> np.ndarray:
+    """1/2 sum s_i^2 G_i^2 (3, 3) in 1/s: what the noise takes from the mean rotation, in local components."""
+    return 0.5 * np.diag(np.square(walks) - np.sum(np.square(walks)))
+
+
+def ito_norm(walks: np.ndarray, time: float) -> float:
+    """|q| of eq. (28) after ``time`` (s): exp(sum of s^2 t / 8), without any scatter."""
+    return 1 / mean_scalar(walks, time)
+
+
+def euler_mean_square(walk: float, axes: int, period: float, steps: int) -> float:
+    """E[|q|^2] of explicit Euler on eq. (25) at rest: (1 + k s^2 D / 4)^n, exactly."""
+    return float(np.exp(steps * np.log1p(axes * walk**2 * period / 4)))
+
+
+def euler_quaternions(turns: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Explicit Euler on eq. (25), never normalised: quaternions (paths, 4) after turns (n, paths, 3) in rad."""
+    q = np.broadcast_to(np.asarray(start, dtype=float), (turns.shape[1], 4))
+    for turn in turns:
+        q = q + 0.5 * product(q, np.concatenate([np.zeros((len(q), 1)), turn], axis=1))
+    return q
