@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.engines.catalogue import CATALOGUE
-from models.errors import InputError, RunFailed
+from models.errors import RunFailed
 from models.result import Result
 from models.scene import Scene
 from models.simulate import simulate
@@ -80,20 +79,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 def check(scene: Scene, engines: tuple[str, ...]) -> None:
     """Refuse, before anything is written, a scene that this study cannot follow through all its runs."""
     options = read(Options, scene.options, scene.file, "options")
-    check_road(scene, options.sampling_rate)
-    if scene.run.output_step is not None:
-        raise InputError(scene.file, "run.output_step", scene.run.output_step, f"this study saves rows {KEPT} s apart "
-                         "and makes its table from every step: drop this key")
-    for engine in engines:
-        _check_integrator(scene, engine)
-
-
-def _check_integrator(scene: Scene, engine: str) -> None:
-    """The guided runs need an integrator that solves for a prescribed pitch."""
-    given = scene.engines[engine].integrator if engine in scene.engines else None
-    if given is not None and not CATALOGUE[engine][given].constraints:
-        allowed = "the last runs prescribe the pitch, which this integrator does not solve for: drop this key"
-        raise InputError(scene.file, f"engines.{engine}.integrator", given, allowed)
+    check_road(scene, engines, options.sampling_rate)
 
 
 def _scenes(scene: Scene, options: Options, folder: Path, deviation: float) -> dict[str, Scene]:

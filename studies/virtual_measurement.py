@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.assembly import assemble
+from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings
 from models.errors import InputError
 from models.result import Result
@@ -28,18 +29,31 @@ def measure(scene: Scene) -> Result:
     return simulate(scene, "reference", Settings("RK4", scene.run.step, scene.run.duration))
 
 
-def check_road(scene: Scene, sampling_rate: float) -> None:
-    """Refuse a scene that is no virtual measurement, or whose steps do not fit ``sampling_rate`` (Hz)."""
+def check_road(scene: Scene, engines: tuple[str, ...], sampling_rate: float) -> None:
+    """Refuse a scene that is no virtual measurement, or that cannot be followed through all runs on its files."""
     for name in scene.effects:
         if name != "road":
             raise InputError(scene.file, f"effects.{name}", None, "this study measures on a road and names the effects "
                              "of the other runs itself: drop it")
     if "road" not in scene.effects:
         raise InputError(scene.file, "effects.road", None, "is missing: this study measures on a road")
+    if scene.run.output_step is not None:
+        raise InputError(scene.file, "run.output_step", scene.run.output_step, "this study makes its table from every "
+                         "step, and chooses the rows that it saves: drop this key")
     stride(scene, sampling_rate)
     if scene.run.duration * sampling_rate < LEAST:
         allowed = f"must last at least {LEAST} samples, {LEAST / sampling_rate:g} s"
         raise InputError(scene.file, "run.duration", scene.run.duration, allowed)
+    for engine in engines:
+        _check_integrator(scene, engine)
+
+
+def _check_integrator(scene: Scene, engine: str) -> None:
+    """The guided runs need an integrator that solves for a prescribed pitch."""
+    given = scene.engines[engine].integrator if engine in scene.engines else None
+    if given is not None and not CATALOGUE[engine][given].constraints:
+        allowed = "some runs prescribe the pitch, which this integrator does not solve for: drop this key"
+        raise InputError(scene.file, f"engines.{engine}.integrator", given, allowed)
 
 
 def stride(scene: Scene, sampling_rate: float) -> int:
