@@ -89,7 +89,7 @@ def _held(spec: mujoco.MjSpec, vehicle: Vehicle, gear: float) -> None:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Keep MuJoCo from printing warnings and writing a log into the user's folder: the guard reports them."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: None)
@@ -196,12 +196,12 @@ class MujocoModel:
         states = np.empty((n + 1, 8))
         free = [0, 1, 2, 4, 5, 6] if self.guided else list(range(8))
         states[0] = self.assembly.initial
-        with self._callback(), _quiet():
+        with self.callback(), quiet():
             self._advance(states, free)
         times = self.settings.step * np.arange(n + 1)
         if self.guided:
             states[:, [3, 7]] = self._signal().sample(0.0, self.settings.step, n + 1)[:, 2:4]
-        guard("mujoco", times, states, self.settings.duration, self._warnings())
+        guard("mujoco", times, states, self.settings.duration, self.warnings())
         moment = self._enforced(times, states) if self.guided else None
         guard("mujoco", times, states, self.settings.duration, moment=moment)
         return Trajectory(times, states, moment, self._counts())
@@ -213,22 +213,22 @@ class MujocoModel:
         for first in range(0, n, CHUNK):
             count = min(CHUNK, n - first)
             controls = None if self.drive.controls is None else self.drive.controls[first : first + count]
-            controls = self._padded(controls)
+            controls = self.padded(controls)
             path, _ = rollout.rollout(self.model, self.data, state[None, :], control=controls, nstep=count)
             path = path[0, :, :size]
             states[first + 1 : first + 1 + count, free] = path[:, 1:]
             expected = self.settings.step * (first + 1 + np.arange(count))
             late = np.abs(path[:, 0] - expected) > 1e-6 * self.settings.step * n
-            if late.any() or self._warnings():
+            if late.any() or self.warnings():
                 self._fail(states, first + int(np.argmax(late)) if late.any() else first + count)
             state = path[-1]
 
     def _fail(self, states: np.ndarray, last: int) -> None:
         """Raise for a run that MuJoCo stopped or reset; the guard names a worse reason if there is one."""
         guard("mujoco", self.settings.step * np.arange(last + 1), states[: last + 1], last * self.settings.step)
-        raise RunFailed("mujoco", f"the engine gave up{self._warnings()}", last * self.settings.step, states[last])
+        raise RunFailed("mujoco", f"the engine gave up{self.warnings()}", last * self.settings.step, states[last])
 
-    def _padded(self, controls: np.ndarray | None) -> np.ndarray | None:
+    def padded(self, controls: np.ndarray | None) -> np.ndarray | None:
         """Controls of all actuators: springs take none, the wheels' motors come last."""
         if controls is None:
             return None
@@ -236,12 +236,13 @@ class MujocoModel:
         padded[0, :, self.model.nu - 2 :] = controls
         return padded
 
-    def _warnings(self) -> str:
+    def warnings(self) -> str:
         """What MuJoCo itself noticed, as a phrase; empty if nothing."""
         found = [mujoco.mjtWarning(i).name for i in range(len(self.data.warning)) if self.data.warning[i].number]
         return f"; MuJoCo warned {', '.join(found)}" if found else ""
 
-    def _callback(self):
+    def callback(self):
+        """Context in which the model's law is installed; refused where another callback is."""
         if mujoco.get_mjcb_control() is not None or mujoco.get_mjcb_passive() is not None:
             raise RunFailed("mujoco", "another callback is installed in this process: its forces would act here, too")
         if self.drive.law is None:
@@ -261,7 +262,7 @@ class MujocoModel:
         if self.drive.controls is not None:
             row = min(round(time / self.settings.step), len(self.drive.controls) - 1)
             self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[row]
-        with self._callback():
+        with self.callback():
             mujoco.mj_forward(self.model, self.data)
         out = np.empty(4)
         out[free] = self.data.qacc
@@ -288,7 +289,7 @@ class MujocoModel:
         """Accelerations (n, 4) along a guided run."""
         signal = self._signal().sample(0.0, self.settings.step, len(times))
         out = np.empty((len(times), 4))
-        with self._callback():
+        with self.callback():
             for i, time in enumerate(times):
                 self.data.time, self.data.qpos[:], self.data.qvel[:] = time, states[i, :3], states[i, 4:7]
                 if self.drive.controls is not None:

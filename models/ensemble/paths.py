@@ -6,6 +6,7 @@ whatever an engine can run can be an ensemble. The reference takes some 200 ns p
 noise.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
@@ -32,7 +33,7 @@ class NoisePaths:
     Attributes
     ----------
     base : the scene as far as all paths share it
-    rest : names and parameters of the effects that follow, the first of which has a ``path``
+    rest : names and parameters of the effects that have a ``path``, and of those that follow one
     rows : steps whose states are kept, shape (rows,)
     truth : pitch (rad) of the true path at every step, shape (steps + 1,)
     threshold : drift-off, rad
@@ -58,6 +59,16 @@ class NoisePaths:
         """The whole run of one path; raises RunFailed if it leaves all bounds."""
         return build(self.engine, self.assembly(path), self.settings).run()
 
+    def runs(self, paths: range) -> Iterator[Trajectory | RunFailed]:
+        """Every path's run, or why it failed; raises PathFailed for what is no failure of physics."""
+        for path in paths:
+            try:
+                yield self.trajectory(path)
+            except RunFailed as error:
+                yield error
+            except Exception as error:
+                raise PathFailed(path, f"{type(error).__name__}: {error}") from error
+
     def __call__(self, paths: range) -> Arrays:
         """Arrays of a block.
 
@@ -65,17 +76,13 @@ class NoisePaths:
         from the truth, infinite if never; ``failed`` (n,): last good time (s) of a path that left all bounds, whose
         states are then nan and whose drift-off is at the latest that time; nan for all others.
         """
-        found = [self._measured(path) for path in paths]
+        found = [self._kept(run) for run in self.runs(paths)]
         return {name: np.stack([one[name] for one in found]) for name in found[0]}
 
-    def _measured(self, path: int) -> Arrays:
-        try:
-            run = self.trajectory(path)
-        except RunFailed as error:
-            last = 0.0 if error.time is None else error.time
+    def _kept(self, run: Trajectory | RunFailed) -> Arrays:
+        if isinstance(run, RunFailed):
+            last = 0.0 if run.time is None else run.time
             return _labelled(np.full((len(self.rows), 8), np.nan), last, last)
-        except Exception as error:
-            raise PathFailed(path, f"{type(error).__name__}: {error}") from error
         far = np.abs(run.states[:, 3] - self.truth) > self.threshold
         first = far.argmax()
         return _labelled(run.states[self.rows], run.times[first] if far[first] else np.inf, np.nan)
@@ -116,11 +123,14 @@ def noise_paths(scene: Scene, times: np.ndarray, truth: np.ndarray | None = None
 
 
 def _split(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
-    """The part of a scene that all paths share, and the effects from the first that has a path on."""
-    names = ordered(scene)
-    first = next(i for i, name in enumerate(names) if "path" in type(scene.effects[name]).model_fields)
-    shared = scene.model_copy(update={"effects": {name: scene.effects[name] for name in names[:first]}})
-    return replace(assemble(shared), scene=scene), tuple((name, scene.effects[name]) for name in names[first:])
+    """The part of a scene that all paths share, and the effects that have a path or follow one that has."""
+    names, own = ordered(scene), list[str]()
+    for name in names:
+        module = import_module(f"models.effects.{name}")
+        if "path" in type(scene.effects[name]).model_fields or set(own) & {*module.NEEDS, *module.AFTER}:
+            own.append(name)
+    shared = scene.model_copy(update={"effects": {name: scene.effects[name] for name in names if name not in own}})
+    return replace(assemble(shared), scene=scene), tuple((name, scene.effects[name]) for name in own)
 
 
 def _quiet_pitch(scene: Scene) -> np.ndarray:

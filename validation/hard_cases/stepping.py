@@ -68,7 +68,7 @@ def reset_naive(folder: Path) -> str:
     data = mujoco.MjData(model)
     data.qpos[:] = _pushed("exact").initial[:4]
     resets, before = 0, 0.0
-    with mujoco_engine._quiet():
+    with mujoco_engine.quiet():
         for _ in range(250):
             mujoco.mj_step(model, data)
             resets, before = resets + (data.time <= before), data.time
