@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 from numba import njit
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 Rule = Literal["held", "mean", "cubic"]
@@ -140,7 +141,7 @@ def from_matrix(s: np.ndarray) -> np.ndarray:
     return Rotation.from_matrix(s).as_quat(canonical=True, scalar_first=True)
 
 
-def from_cardan(roll: np.ndarray, pitch: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+def from_cardan(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> np.ndarray:
     """Unit quaternions (..., 4) of S = Rz(yaw) Ry(pitch) Rx(roll), all in rad."""
     axes = np.eye(3)
     parts = [exponential(np.asarray(angle, dtype=float)[..., None] * axes[i])

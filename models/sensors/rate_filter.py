@@ -1,0 +1,80 @@
+"""Angular velocity from accelerometers without drift: the symmetric part of M as a measurement of the rates.
+
+Integration alone lets the rates drift as the square root of time. The symmetric part w w^T - |w|^2 I needs no
+integration and holds the size of the rates for ever; the sign comes from the integration (filterpy's extended
+Kalman filter, state w, quadratic measurement). It sees nothing while the body does not turn, and an error that
+outgrows the rates themselves can settle on the wrong sign.
+"""
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
+
+from models.errors import InputError
+from models.sensors.rigid_body_motion import Spin, own_acceleration
+
+PAIRS = ((0, 0), (1, 1), (0, 1), (2, 2), (0, 2), (1, 2))
+"""Entries of the symmetric part; in a plane the first three alone are known."""
+EYE = np.eye(3)
+
+
+class _Rates(ExtendedKalmanFilter):
+    """The filter whose prediction follows the angular acceleration instead of a matrix."""
+
+    def predict_x(self, u: np.ndarray) -> None:
+        """Advance w by the increment of this period."""
+        self.x += u
+
+
+def filter_rates(found: Spin, period: float, start: np.ndarray, noise: float,
+                 deviation: float = 0.0) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Local rates (n, 3) in rad/s and their stated standard deviations (n, 3).
+
+    start : (3,) rad/s at the first sample, known to ``deviation`` (rad/s); noise : standard deviation of each
+    reading (m/s^2), white. The same readings make the prediction and the measurement, two correlations that the
+    filter leaves out: between neighbouring predictions, and between a prediction and the measurement after it.
+    """
+    if not noise > 0:
+        raise InputError("", "noise", noise, "the standard deviation of the readings must be above 0 (m/s^2): it "
+                         "weighs integration against measurement")
+    frame, planar = found.array.frame, found.array.planar
+    pairs = PAIRS[: 3 if planar else 6]
+    indices = tuple(np.array(pairs).T)
+    filter_ = _Rates(3, len(pairs))
+    filter_.x, filter_.P = np.asarray(start) @ frame, deviation**2 * EYE
+    filter_.Q = np.diag((period * noise * found.array.own_gains(planar)) ** 2)
+    filter_.R = np.diag([(noise * _spread(found, pair)) ** 2 for pair in pairs])
+    values = np.column_stack([0.5 * (found.gradient[:, i, j] + found.gradient[:, j, i]) for i, j in pairs])
+    known, rows = own_acceleration(found, np.zeros((1, 3))), [(filter_.x.copy(), filter_.P)]
+    for i in range(1, len(values)):
+        _predict(filter_, 0.5 * (known[i - 1] + known[i]), period, planar)
+        filter_.update(values[i], _jacobian, _entries, args=indices, hx_args=indices)
+        rows.append((filter_.x.copy(), filter_.P))
+    rates, covariances = (np.array(part) for part in zip(*rows, strict=True))
+    return rates @ frame.T, np.sqrt(np.einsum("ij,njk,ik->ni", frame, covariances, frame))
+
+
+def _spread(found: Spin, pair: tuple[int, int]) -> float:
+    """Noise of one entry of the symmetric part per unit of the readings' (1/m)."""
+    inverse, (i, j) = found.array.inverse_squares, pair
+    return float(np.sqrt(inverse[i] if i == j else (inverse[i] + inverse[j]) / 4))
+
+
+def _predict(filter_: _Rates, alpha: np.ndarray, period: float, planar: bool) -> None:
+    """One period with the mean acceleration; in a plane w1 and w2 turn about the normal besides."""
+    slope, change = np.zeros((3, 3)), alpha
+    if planar:
+        w = filter_.x + 0.5 * period * alpha  # the middle of the period
+        slope = np.array([[0.0, -w[2], -w[1]], [w[2], 0.0, w[0]], [0.0, 0.0, 0.0]])
+        change = alpha + np.array([-w[1] * w[2], w[0] * w[2], 0.0])
+    filter_.F = EYE + period * slope
+    filter_.predict(period * change)
+
+
+def _entries(w: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Entries of skew(w)^2 = w w^T - |w|^2 I."""
+    return w[one] * w[other] - (one == other) * (w @ w)
+
+
+def _jacobian(w: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Their derivatives (entries, 3) by w."""
+    return w[one, None] * EYE[other] + w[other, None] * EYE[one] - 2 * (one == other)[:, None] * w

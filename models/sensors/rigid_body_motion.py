@@ -1,0 +1,280 @@
+"""Motion of a rigid body from the readings of tri-axial accelerometers on it (eqs 15 to 23).
+
+A reading is specific force in the body's axes, f = S^T (x'' - g e) with e pointing down (z): at rest and level it
+is -g along z. Relative readings A follow from relative positions R by A = M R with M = skew(alpha) + skew(w)^2, so
+M = A R^+ (18). Its skew part is the angular acceleration, its symmetric part w w^T - |w|^2 I (20), which no
+integration enters. Both are taken relative to their mean instead of the last sensor, so that all count alike.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.errors import InputError
+from models.sensors.high_pass import high_pass
+from models.sensors.rotations import cardan, from_cardan, integrals, integrate, matrix, skew
+from models.sensors.sensor_array import SensorArray, sensor_array
+
+LIMIT = 0.05
+"""Share of the relative accelerations that a rigid body may leave unexplained: a mount at 10 times the frequency of
+the motion moves by 1 % of it, one at twice by a third."""
+NOISE_FACTOR = 1.5
+"""Times the misfit that the readings' noise alone leaves, below which nothing is held against the body."""
+
+
+@dataclass(frozen=True)
+class Spin:
+    """What relative accelerations tell at each instant, in the array's own axes e1, e2, n.
+
+    gradient : (n, 3, 3) in 1/s^2, M of eq. (18); for sensors in a plane (n, 3, 2), without its column along n
+    relative : (n, 3, sensors) in m/s^2, readings less their mean
+    """
+
+    array: SensorArray
+    gradient: np.ndarray
+    relative: np.ndarray
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How well a rigid body explains the readings.
+
+    misfit : (n,) in m/s^2, rms over all sensors and axes of what no rigid motion explains, at each sample
+    share : its rms over the record by that of the relative accelerations
+    expected : what the stated noise of the readings alone would leave (m/s^2)
+    redundancy : equations per sample behind it; 0 means that nothing can be said
+    suspect : the sensor without which the body is rigid; "" if there is no single one
+    """
+
+    misfit: np.ndarray
+    share: float
+    expected: float
+    redundancy: int
+    suspect: str = ""
+
+    @property
+    def rigid(self) -> bool | None:
+        """Whether the body passes for rigid; None where no equation is left over to tell."""
+        if self.redundancy == 0:
+            return None
+        return self.share <= LIMIT or float(np.sqrt(np.mean(self.misfit**2))) <= NOISE_FACTOR * self.expected
+
+
+@dataclass(frozen=True)
+class Start:
+    """State at the first sample: local rates (rad/s), quaternion, velocity (m/s) and position (m), global."""
+
+    rates: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """alpha (rad/s^2) and rates (rad/s) local, quaternions, and the reference point's acceleration (m/s^2),
+    velocity (m/s) and position (m) in global axes, all (n, 3) but quaternions (n, 4)."""
+
+    alpha: np.ndarray
+    rates: np.ndarray
+    orientation: np.ndarray
+    acceleration: np.ndarray
+    velocity: np.ndarray
+    position: np.ndarray
+
+    def angles(self) -> np.ndarray:
+        """Roll, pitch, yaw (n, 3) in rad; raises GimbalLock where they are not defined."""
+        return cardan(self.orientation)
+
+    def point(self, place: np.ndarray) -> np.ndarray:
+        """Positions (n, 3) in m, global, of a point at local (3,) m of the body, eq. (15)."""
+        return self.position + matrix(self.orientation) @ np.asarray(place)
+
+
+def spin(array: SensorArray, readings: np.ndarray) -> Spin:
+    """Relative accelerations and M of readings (n, sensors, 3) in m/s^2; gravity cancels, whatever the attitude.
+
+    Raises InputError for a reading that is not a finite number, and for a wrong number of sensors.
+    """
+    if readings.ndim != 3 or readings.shape[1:] != array.positions.shape:
+        raise InputError("", "readings", str(readings.shape), f"must have the shape (n, {len(array.names)}, 3)")
+    if not np.isfinite(readings).all():
+        sample, sensor, axis = np.argwhere(~np.isfinite(readings))[0]
+        raise InputError("", f"sensor {array.names[sensor]}, sample {sample} along {'xyz'[axis]}",
+                         float(readings[sample, sensor, axis]),
+                         "must be a finite number: repair it or leave the sensor out")
+    local = readings - readings.mean(axis=1, keepdims=True)
+    relative = np.einsum("ji,nsj->nis", array.frame, local)
+    return Spin(array, relative @ array.weights, relative)
+
+
+def angular_acceleration(found: Spin, rates: np.ndarray) -> np.ndarray:
+    """Local angular acceleration (n, 3) in rad/s^2, eq. (20); rates (n, 3) in rad/s, local.
+
+    The rates are read by the formula for a plane alone: alpha_1 = n.M e2 - w2 w3, alpha_2 = -n.M e1 + w1 w3.
+    """
+    return own_acceleration(found, rates @ found.array.frame) @ found.array.frame.T
+
+
+def own_acceleration(found: Spin, w: np.ndarray) -> np.ndarray:
+    """Angular acceleration (n, 3) in the array's axes; w (n, 3) in them too."""
+    m = found.gradient
+    about_normal = 0.5 * (m[:, 1, 0] - m[:, 0, 1])
+    if found.array.planar:
+        one, two = m[:, 2, 1] - w[:, 1] * w[:, 2], -m[:, 2, 0] + w[:, 0] * w[:, 2]
+    else:
+        one, two = 0.5 * (m[:, 2, 1] - m[:, 1, 2]), 0.5 * (m[:, 0, 2] - m[:, 2, 0])
+    return np.column_stack([one, two, about_normal])
+
+
+def rates_up_to_sign(found: Spin) -> np.ndarray:
+    """Local rates (n, 3) in rad/s from the symmetric part alone: no integration, no drift, but no sign.
+
+    w w^T = M+ - (tr M+ / 2) I, of which the nearest matrix of rank one is taken. For sensors in a plane the part
+    along the normal has a sign of its own, apart from that of the other two.
+    """
+    unsigned = _unsigned_in_plane if found.array.planar else _unsigned_in_space
+    return unsigned(found.gradient) @ found.array.frame.T
+
+
+def _unsigned_in_space(m: np.ndarray) -> np.ndarray:
+    """Rates (n, 3) up to one sign: the largest eigenvalue of w w^T and its direction."""
+    symmetric = 0.5 * (m + np.swapaxes(m, 1, 2))
+    half = 0.5 * np.trace(symmetric, axis1=1, axis2=2)[:, None, None]
+    sizes, directions = np.linalg.eigh(symmetric - half * np.eye(3))
+    return np.sqrt(np.maximum(sizes[:, 2:], 0.0)) * directions[:, :, 2]
+
+
+def _unsigned_in_plane(m: np.ndarray) -> np.ndarray:
+    """The same from what e1 and e2 tell, (w.w) I - (w1, w2) (w1, w2)^T, whose smaller eigenvalue is w3^2."""
+    flat = m[:, :2, :2]
+    sizes, directions = np.linalg.eigh(-0.5 * (flat + np.swapaxes(flat, 1, 2)))
+    about_normal = np.sqrt(np.maximum(sizes[:, :1], 0.0))
+    within = np.sqrt(np.maximum(sizes[:, 1:], 0.0) - about_normal**2) * directions[:, :, 0]
+    return np.hstack([within, about_normal])
+
+
+def unexplained(found: Spin) -> np.ndarray:
+    """Relative accelerations (n, 3, sensors) in m/s^2 that no rigid motion explains, in the array's axes.
+
+    Of the rates that space and plane offer, with each sign about the normal, those that leave least at each sample.
+    """
+    flat = _unsigned_in_plane(found.gradient)
+    offers = [flat, flat * [1.0, 1.0, -1.0]]
+    offers += [] if found.array.flat else [_unsigned_in_space(found.gradient)]
+    left = np.stack([found.relative - _nearest_rigid(found, w) for w in offers])
+    least = np.argmin(np.sum(left**2, axis=(2, 3)), axis=0)
+    return left[least, np.arange(len(least))]
+
+
+def _nearest_rigid(found: Spin, w: np.ndarray) -> np.ndarray:
+    """Relative accelerations (n, 3, sensors) of the rates w with the angular acceleration that fits best.
+
+    By least squares: each pair of entries counts with the squared spreads of the sensors that it comes from.
+    """
+    array, square = found.array, skew(w) @ skew(w)
+    weights = np.where(np.arange(3) < array.weights.shape[1], array.spreads, 0.0) ** 2
+    rest = np.zeros_like(square)
+    rest[:, :, : array.weights.shape[1]] = found.gradient
+    moment = weights * (rest - square)
+    turned = (moment - np.swapaxes(moment, 1, 2)) / (weights[:, None] + weights + np.eye(3))  # no 0 / 0
+    return (turned + square) @ ((array.positions - array.positions.mean(axis=0)) @ array.frame).T
+
+
+def quality(array: SensorArray, readings: np.ndarray, noise: float = 0.0) -> Quality:
+    """How rigid the body is that these readings (n, sensors, 3) come from; ``noise`` is their standard deviation.
+
+    Where it does not pass and sensors are left over, each is left out in turn to find the one that does not belong.
+    """
+    whole = _judged(array, readings, noise)
+    if whole.rigid is not False:
+        return whole
+    without = {name: _without(array, readings, name, noise) for name in array.names}
+    told = {name: other.share for name, other in without.items() if other is not None and other.rigid}
+    return replace(whole, suspect=min(told, key=lambda name: told[name])) if told else whole
+
+
+def _judged(array: SensorArray, readings: np.ndarray, noise: float) -> Quality:
+    found = spin(array, readings)
+    left = unexplained(found)
+    count = 3 * len(array.names)
+    size = float(np.sqrt(np.mean(found.relative**2)))
+    misfit = np.sqrt(np.sum(left**2, axis=(1, 2)) / count)
+    share = float(np.sqrt(np.mean(misfit**2))) / size if size > 0 else 0.0
+    return Quality(misfit, share, noise * float(np.sqrt(array.redundancy / count)), array.redundancy)
+
+
+def _without(array: SensorArray, readings: np.ndarray, name: str, noise: float) -> Quality | None:
+    """Quality of the other sensors; None where they do not make an array."""
+    keep = [i for i, other in enumerate(array.names) if other != name]
+    try:
+        rest = sensor_array({array.names[i]: array.positions[i].tolist() for i in keep})
+    except InputError:
+        return None
+    return _judged(rest, readings[:, keep], noise)
+
+
+def integrated(values: np.ndarray, period: float, start: np.ndarray) -> np.ndarray:
+    """start + the integral of values (n, ...), by the cubic through four neighbours: order 4 in the period."""
+    return start + np.concatenate([np.zeros_like(values[:1]), np.cumsum(integrals(values, period), axis=0)])
+
+
+def integrate_rates(found: Spin, period: float, start: np.ndarray) -> np.ndarray:
+    """Local rates (n, 3) in rad/s by integration (20), from (3,) at the first sample; they drift with every error.
+
+    In a plane alpha_1 and alpha_2 depend on the rates: c = w1 + i w2 obeys c' = mu + i w3 c with
+    mu = n.M e2 - i n.M e1, which w3 solves by quadratures alone.
+    """
+    if len(found.gradient) < 4:
+        raise InputError("", "readings", len(found.gradient), "at least four samples are needed to integrate them")
+    first = np.asarray(start) @ found.array.frame
+    if not found.array.planar:
+        return integrated(own_acceleration(found, np.zeros((1, 3))), period, first) @ found.array.frame.T
+    m = found.gradient
+    w3 = integrated(0.5 * (m[:, 1, 0] - m[:, 0, 1]), period, first[2])
+    turn = np.exp(1j * integrated(w3, period, np.array(0.0)))
+    c = turn * integrated((m[:, 2, 1] - 1j * m[:, 2, 0]) / turn, period, first[0] + 1j * first[1])
+    return np.column_stack([c.real, c.imag, w3]) @ found.array.frame.T
+
+
+def motion(array: SensorArray, readings: np.ndarray, period: float, start: Start | None = None, gravity: float = 9.81,
+           zeroed: bool = False, rates: np.ndarray | None = None, turning_cut_off: float | None = None,
+           position_cut_off: float | None = None) -> Motion:  # fmt: skip
+    """Motion of the body's reference point and axes, steps 1 to 6 of the paper.
+
+    readings : (n, sensors, 3) in m/s^2, local; specific force, or with ``zeroed`` set to zero at rest on level
+    ground, as sensors with a correction for gravity give it (17); period : s
+    rates : (n, 3) in rad/s, local, from a gyro or a filter, in the place of the integrated ones
+    turning_cut_off : high-pass (Hz) on the rates and again on the angles, which takes true grades away, too
+    position_cut_off : high-pass (Hz) on velocity and on position
+    Raises InputError for unusable readings, GimbalLock if angles are filtered where they are not defined.
+    """
+    start = start or Start()
+    found = spin(array, readings)
+    w = integrate_rates(found, period, np.array(start.rates)) if rates is None else rates
+    w = w if turning_cut_off is None else high_pass(w, period, turning_cut_off)
+    orientation = integrate(w, period, np.array(start.orientation))
+    if turning_cut_off is not None:
+        orientation = from_cardan(*high_pass(np.unwrap(cardan(orientation), axis=0), period, turning_cut_off).T)
+    alpha = angular_acceleration(found, w)
+    down = np.array([0.0, 0.0, gravity])
+    acceleration = reference_acceleration(array, readings - down if zeroed else readings, orientation, alpha, w, down)
+    velocity = _filtered(integrated(acceleration, period, np.array(start.velocity)), period, position_cut_off)
+    position = _filtered(integrated(velocity, period, np.array(start.position)), period, position_cut_off)
+    return Motion(alpha, w, orientation, acceleration, velocity, position)
+
+
+def reference_acceleration(array: SensorArray, readings: np.ndarray, orientation: np.ndarray, alpha: np.ndarray,
+                           rates: np.ndarray, down: np.ndarray) -> np.ndarray:  # fmt: skip
+    """Acceleration (n, 3) in m/s^2, global, of the reference point: the mean over all sensors, eq. (23)."""
+    lever = (skew(alpha) + skew(rates) @ skew(rates)) @ array.positions.mean(axis=0)
+    return np.einsum("nij,nj->ni", matrix(orientation), readings.mean(axis=1) - lever) + down
+
+
+def _filtered(values: np.ndarray, period: float, cut_off: float | None) -> np.ndarray:
+    return values if cut_off is None else high_pass(values, period, cut_off)
+
+
+def tilt_displacement(tilt: float, times: np.ndarray, gravity: float = 9.81) -> np.ndarray:
+    """False horizontal displacement (n,) in m of a constant tilt error (rad), by gravity: g sin(tilt) t^2 / 2."""
+    return 0.5 * gravity * np.sin(tilt) * times**2

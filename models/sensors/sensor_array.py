@@ -1,0 +1,116 @@
+"""Where tri-axial accelerometers sit on a body, and what such an arrangement can and cannot tell."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from models.errors import InputError
+
+Formula = Literal["auto", "spatial", "plane"]
+LINE = 1e-3
+"""Second spread by the first one below which sensors lie on a line: on a car some millimetres, no better known."""
+FLAT = 0.1
+"""Third spread by the second one below which "auto" takes the formula for sensors in a plane."""
+PLANE = 1e-6
+"""The same below which they lie in a plane to rounding, and there is no choice."""
+
+
+@dataclass(frozen=True)
+class SensorArray:
+    """Sensors on a body, fixed and known.
+
+    Attributes
+    ----------
+    names : of the sensors; positions : (sensors, 3) in m, local components from the body's reference point
+    frame : (3, 3), its columns are the principal directions e1, e2, n, right-handed; n is the normal of the plane
+        in which the sensors lie, or nearly lie
+    spreads : (3,) in m, root of the sum of squared distances from the mean position along e1, e2, n
+    planar : True where the formula for sensors in a plane is used: it does not need what n would tell
+    weights : (sensors, 3) in 1/m, the pseudo-inverse of the relative positions (R^+ of eq. 18), along e1, e2, n;
+        (sensors, 2) where the sensors lie in a plane, which tells nothing along n
+    """
+
+    names: tuple[str, ...]
+    positions: np.ndarray
+    frame: np.ndarray
+    spreads: np.ndarray
+    planar: bool
+    weights: np.ndarray
+
+    @property
+    def redundancy(self) -> int:
+        """Equations per sample that a rigid body must fulfil and that are left over to check it."""
+        return 3 * (len(self.names) - 1) - 6
+
+    @property
+    def flat(self) -> bool:
+        """True where the sensors lie in a plane to rounding."""
+        return self.weights.shape[1] == 2
+
+    def gains(self, planar: bool | None = None) -> np.ndarray:
+        """Standard deviation (3,) of the angular acceleration about x, y, z per unit of the readings', in 1/m.
+
+        For independent noise, the same on all axes of all sensors; the plain formula's are infinite in a plane.
+        """
+        own = self.own_gains(self.planar if planar is None else planar) ** 2
+        shares = np.where(np.abs(self.frame) > PLANE, self.frame**2, 0.0)  # infinity times a rounding error
+        return np.sqrt(np.multiply(shares, own, out=np.zeros((3, 3)), where=shares > 0).sum(axis=1))
+
+    def own_gains(self, planar: bool) -> np.ndarray:
+        """The same about e1, e2, n."""
+        one, two, three = self.inverse_squares
+        return np.sqrt([two, one, (one + two) / 4] if planar else np.array([two + three, one + three, one + two]) / 4)
+
+    @property
+    def inverse_squares(self) -> np.ndarray:
+        """1 / spreads^2 (3,) in 1/m^2: variances of the columns of M per unit of the readings'."""
+        return np.append(1 / self.spreads[:2] ** 2, np.inf if self.flat else 1 / self.spreads[2] ** 2)
+
+    def describe(self) -> list[str]:
+        """What an engineer should know of the arrangement, as sentences."""
+        normal = ", ".join(f"{value:.3g}" for value in np.round(self.frame[:, 2], 12) + 0.0)
+        flatness = self.spreads[2] / self.spreads[1]
+        spreads = ", ".join(f"{value:.3g}" for value in self.spreads)
+        lines = [f"{len(self.names)} sensors, spread {spreads} m along their principal directions"]
+        if self.planar:
+            lies = "lie in a plane" if self.flat else f"lie nearly in a plane (flatness {flatness:.2g})"
+            lines += [f"the sensors {lies} with the normal ({normal}): about axes in that plane the plain formula "
+                      f"{'gives half the angular acceleration plus a bias' if self.flat else self._amplified()}; "
+                      "the formula for a plane is used, integrated together with the rates"]  # fmt: skip
+        gains = ", ".join(f"{value:.2f}" for value in self.gains())
+        lines += [f"noise of 1 m/s^2 in the readings gives ({gains}) rad/s^2 in roll, pitch and yaw acceleration"]
+        if self.redundancy == 0:
+            lines += ["three sensors leave nothing over to check that the body is rigid: a loose one is not found"]
+        return lines
+
+    def _amplified(self) -> str:
+        return f"amplifies noise {max(self.gains(False) / self.gains(True)):.1f} times as much"
+
+
+def sensor_array(positions: Mapping[str, Sequence[float]], formula: Formula = "auto") -> SensorArray:
+    """The array of named sensors at local positions (3,) in m.
+
+    ``formula`` "spatial" is eq. (18) as it stands, "plane" the one that leaves the normal out, which is exact for
+    any arrangement and the less noisy one where the sensors lie nearly in a plane. Raises InputError for fewer than
+    three sensors, for sensors on a line, and for "spatial" where they lie in a plane.
+    """
+    names, places = tuple(positions), np.array([list(place) for place in positions.values()], dtype=float)
+    if len(names) < 3:
+        raise InputError("", "sensors", len(names), "at least three sensors that are not on a line are needed")
+    if places.shape != (len(names), 3) or not np.isfinite(places).all():
+        raise InputError("", "sensors", None, "each position must be three finite numbers x, y, z in m")
+    frame, spreads, rows = np.linalg.svd((places - places.mean(axis=0)).T, full_matrices=False)
+    if not spreads[1] > LINE * spreads[0]:
+        raise InputError("", "sensors", None, "the sensors lie on a line, about which the body could turn unseen: "
+                         "put one of them elsewhere")
+    flat, near = (spreads[2] < limit * spreads[1] for limit in (PLANE, FLAT))
+    if formula == "spatial" and flat:
+        raise InputError("", "formula", formula, "the sensors lie in a plane, where this formula gives half of the "
+                         "angular acceleration plus a bias without a word: use 'auto' or 'plane'")
+    up = np.copysign(1.0, frame[np.abs(frame[:, 2]).argmax(), 2])  # the normal along its axis, not against it
+    hand = np.array([1.0, up * np.linalg.det(frame), up])  # e1, e2, n right-handed
+    weights = (rows.T * hand / np.where(spreads > 0, spreads, 1.0))[:, : 2 if flat else 3]
+    planar = flat or formula == "plane" or (formula == "auto" and near)
+    return SensorArray(names, places, frame * hand, spreads, bool(planar), weights)

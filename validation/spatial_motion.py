@@ -1,0 +1,82 @@
+"""A motion in space whose every derivative is known, and what accelerometers on it read: no vehicle, no engine."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.sensors.rigid_body_motion import Start
+from models.sensors.rotations import from_cardan, matrix, skew
+
+GRAVITY = np.array([0.0, 0.0, 9.81])
+Places = dict[str, tuple[float, float, float]]
+
+
+@dataclass(frozen=True)
+class Path:
+    """alpha, rates (n, 3) local; orientation (n, 4); acceleration, position (n, 3) global; start; period (s)."""
+
+    alpha: np.ndarray
+    rates: np.ndarray
+    orientation: np.ndarray
+    acceleration: np.ndarray
+    position: np.ndarray
+    start: Start
+    period: float
+
+
+def path(count: int = 2001, period: float = 1e-3) -> Path:
+    """Roll, pitch and yaw of some tenths of a radian at different frequencies, and a reference point that moves.
+
+    Rates follow from the Cardan angles by the closed form w = E(roll, pitch) (roll', pitch', yaw'), and alpha by its
+    derivative: nothing of the algorithm under test is used.
+    """
+    t = period * np.arange(count)
+    angles, speeds, changes = _waves(t, np.array([[0.3, 1.7, 0.2], [0.25, 2.3, 0.9], [0.6, 0.8, 0.4]]))
+    (roll, pitch, yaw), (droll, dpitch, _) = angles.T, speeds.T
+    ones, none = np.ones_like(t), np.zeros_like(t)
+    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
+    turn = np.moveaxis(np.array([[ones, none, -sp], [none, cr, sr * cp], [none, -sr, cr * cp]]), 2, 0)
+    change = np.moveaxis(np.array([[none, none, -cp * dpitch],
+                                   [none, -sr * droll, cr * cp * droll - sr * sp * dpitch],
+                                   [none, -cr * droll, -sr * cp * droll - cr * sp * dpitch]]), 2, 0)  # fmt: skip
+    rates = np.einsum("nij,nj->ni", turn, speeds)
+    alpha = np.einsum("nij,nj->ni", change, speeds) + np.einsum("nij,nj->ni", turn, changes)
+    orientation = from_cardan(roll, pitch, yaw)
+    places, velocities, accelerations = _waves(t, np.array([[1.0, 1.1, 0.0], [0.5, 1.9, 0.7], [0.1, 5.0, 0.3]]))
+    rows = (tuple(values[0].tolist()) for values in (rates, orientation, velocities, places))
+    return Path(alpha, rates, orientation, accelerations, places, Start(*rows), period)
+
+
+def _waves(t: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sine waves (n, 3) of amplitude, angular frequency and phase, a row each, with two derivatives."""
+    size, speed, phase = shapes.T
+    angle = np.outer(t, speed) + phase
+    return size * np.sin(angle), size * speed * np.cos(angle), -size * speed**2 * np.sin(angle)
+
+
+PATH = path()
+
+
+def readings(places: np.ndarray, moved: Path = PATH) -> np.ndarray:
+    """Specific forces (n, sensors, 3) in m/s^2 at local places (sensors, 3) in m, by eqs (16) and (17)."""
+    lever = skew(moved.alpha) + skew(moved.rates) @ skew(moved.rates)
+    felt = np.einsum("nji,nj->ni", matrix(moved.orientation), moved.acceleration - GRAVITY)
+    return felt[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(places))
+
+
+def tilted(height: float, turn: np.ndarray) -> Places:
+    """Four sensors at the corners of a floor of 2 m by 1.2 m and a fifth above its middle, turned and moved."""
+    floor = np.array([[1, 0.6, 0], [1, -0.6, 0], [-1, 0.6, 0], [-1, -0.6, 0], [0, 0, -height]])
+    return {f"s{i + 1}": (float(x), float(y), float(z)) for i, (x, y, z) in enumerate(floor @ turn.T)}
+
+
+TURN = matrix(from_cardan(0.3, 0.4, 0.5))
+ARRAYS: dict[str, Places] = {
+    "4": {"s1": (1, 0.6, 0), "s2": (1, -0.6, 0.5), "s3": (-1, 0.6, 0), "s4": (-1, -0.6, -0.5)},
+    "5, one 1 m up": tilted(1.0, np.eye(3)),
+    "5 in a plane": tilted(0.0, np.eye(3)),
+    "5 in a tilted plane": tilted(0.0, TURN),
+    "5, one 3 cm up": tilted(0.03, np.eye(3)),
+    "3": {"s1": (1.1, 0, -0.2), "s2": (-0.9, 0.6, -0.2), "s3": (-0.9, -0.6, 0.3)},
+}
+"""Arrangements that the exact rows and tests go through."""
