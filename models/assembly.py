@@ -12,7 +12,10 @@ from models.signals import Signal
 from models.vehicles import pitch_plane
 from models.vehicles.description import Vehicle
 
-Mode = Literal["free", "road", "force", "force-body", "pitch"]
+Mode = Literal["free", "road", "force", "force-body", "pitch", "heave-pitch"]
+GUIDED: dict[str, tuple[int, ...]] = {"pitch": (3,), "heave-pitch": (2, 3)}
+"""Coordinates that a mode's input prescribes, by their place in the state. The input is then the two wheel forces,
+these coordinates, their rates and their second derivatives."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,7 @@ class Assembly:
     moment : added pitch moment on the chassis of a force-excited vehicle, one channel in N m, nose up, read at
         each stage's time (never held); None if there is none
     outputs : functions of the run that add channels to its result, one per effect that asks for any
+    sensors : the same, of the run and of the model that made it, for effects that read accelerations
     """
 
     scene: Scene
@@ -39,6 +43,12 @@ class Assembly:
     initial: np.ndarray
     outputs: tuple[Any, ...] = ()
     moment: Signal | None = None
+    sensors: tuple[Any, ...] = ()
+
+    @property
+    def guided(self) -> tuple[int, ...]:
+        """Coordinates that the input prescribes; empty for most modes."""
+        return GUIDED.get(self.mode, ())
 
     def with_input(self, mode: Mode, signal: Signal) -> "Assembly":
         """The same, driven by ``signal``."""

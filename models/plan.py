@@ -16,6 +16,7 @@ MODES = {
     "force": "excited by wheel forces in the inertial frame (eq. 37)",
     "force-body": "excited by wheel forces in the chassis' frame",
     "pitch": "excited by wheel forces, pitch prescribed (eq. 39)",
+    "heave-pitch": "excited by wheel forces, heave and pitch of the chassis prescribed",
 }
 
 
@@ -59,7 +60,8 @@ def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:
         ends = f"{strut.upper.body} - {strut.lower.body or 'ground'}"
         lines.append(_line("  strut", f"{strut.name:<12} {strut.stiffness:g} N/m, {strut.damping:g} N s/m, {ends}"))
     for spring in vehicle.pitch_springs:
-        text = f"{spring.body:<12} {spring.stiffness:g} N m/rad, {spring.damping:g} N m s/rad, to the ground"
+        band = f", beyond {spring.dead_band:g} rad" if spring.dead_band else ""
+        text = f"{spring.body:<12} {spring.stiffness:g} N m/rad, {spring.damping:g} N m s/rad, to the ground{band}"
         lines.append(_line("  spring", text))
     values = zip(state_names(), assembly.initial, strict=True)
     start = ", ".join(f"{name} {value:.4g}" for name, value in values if value)
@@ -69,7 +71,8 @@ def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:
 def _channels(assembly: Assembly) -> list[str]:
     names = ["states", "f1", "f2", "f3", "f4", "suspension_moment"]
     names += ["zeta1", "zeta2"] if assembly.mode == "road" else []
-    names += ["inertia_term", "enforced_moment"] if assembly.mode == "pitch" else []
+    names += ["enforced_force"] if assembly.mode == "heave-pitch" else []
+    names += ["inertia_term", "enforced_moment"] if assembly.guided else []
     modules = [import_module(f"models.effects.{name}") for name in assembly.scene.effects]
     return names + [channel for module in modules for channel in getattr(module, "CHANNELS", ())]
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.assembly import Assembly, assemble
-from models.engines.protocol import Settings, Trajectory, build, settings_of
+from models.engines.protocol import Model, Settings, Trajectory, build, settings_of
 from models.errors import InputError
 from models.result import Result, provenance
 from models.scene import Scene
@@ -25,7 +25,7 @@ def simulate(scene: Scene, engine: str, settings: Settings | None = None) -> Res
     start = time.perf_counter()
     trajectory = model.run()
     seconds = time.perf_counter() - start
-    return _label(assembly, engine, own, trajectory, keep, seconds)
+    return _label(assembly, engine, own, trajectory, outputs(assembly, trajectory, model), keep, seconds)
 
 
 def _keep_every(scene: Scene, settings: Settings) -> int:
@@ -39,10 +39,10 @@ def _keep_every(scene: Scene, settings: Settings) -> int:
     return round(ratio)
 
 
-def _label(assembly: Assembly, engine: str, settings: Settings, run: Trajectory, keep: int, seconds: float) -> Result:
+def _label(assembly: Assembly, engine: str, settings: Settings, run: Trajectory, channels: Channels, keep: int,
+           seconds: float) -> Result:  # fmt: skip
     import xarray as xr
 
-    channels = outputs(assembly, run)
     rows = slice(None, None, keep)
     data = xr.Dataset(
         {
@@ -60,8 +60,11 @@ def _label(assembly: Assembly, engine: str, settings: Settings, run: Trajectory,
     return Result(data)
 
 
-def outputs(assembly: Assembly, run: Trajectory) -> Channels:
-    """All channels of a run as name -> (unit, meaning, values): states, forces, and what its effects add."""
+def outputs(assembly: Assembly, run: Trajectory, model: Model | None = None) -> Channels:
+    """All channels of a run as name -> (unit, meaning, values): states, forces, and what its effects add.
+
+    ``model`` is the one that made the run, and is asked where an effect reads accelerations.
+    """
     names = {
         "z1": "front wheel, down",
         "z2": "rear wheel, down",
@@ -77,6 +80,9 @@ def outputs(assembly: Assembly, run: Trajectory) -> Channels:
     channels |= _forces(assembly, run, inputs)
     for output in assembly.outputs:
         channels |= output(assembly, run.times, run.states)
+    for sensor in assembly.sensors:
+        assert model is not None
+        channels |= sensor(assembly, run, model)
     return channels
 
 
@@ -107,9 +113,11 @@ def _forces(assembly: Assembly, run: Trajectory, inputs: np.ndarray | None) -> C
     if assembly.mode == "road" and inputs is not None:
         channels["zeta1"] = ("m", "road under the front wheel, down", inputs[:, 0])
         channels["zeta2"] = ("m", "road under the rear wheel, down", inputs[:, 1])
+    if run.force is not None:
+        channels["enforced_force"] = ("N", "force on the chassis, down, that the prescribed heave takes", run.force)
     if run.moment is not None and inputs is not None:
-        channels["inertia_term"] = ("N m", "I beta''", p.I * inputs[:, 4])
-        channels["enforced_moment"] = ("N m", "moment that the prescribed pitch takes", run.moment)
+        channels["inertia_term"] = ("N m", "I beta''", p.I * inputs[:, -1])
+        channels["enforced_moment"] = ("N m", "moment, nose up, that the prescribed pitch takes", run.moment)
     return channels
 
 

@@ -5,7 +5,8 @@ import sys
 
 from models.engines.reference import derivative_of, march_of
 
-MODES = (("road", "exact"), ("road", "linear"), ("force", "exact"), ("force-body", "exact"), ("force", "exact", "moment"))
+MODES = (("road", "exact"), ("road", "linear"), ("force", "exact"), ("force-body", "exact"),
+         ("force", "exact", "springs"))
 
 
 def test_no_two_kernels_share_a_cache_file():

@@ -20,7 +20,7 @@ from validation.cases import guards
 from validation.hard_cases import setups
 
 LIMITED = [(engine, name) for engine, names in CATALOGUE.items() for name in names
-           if stability.step_matrix(name, 1e-3, stability.linearised(setups.vehicle().vehicle, False)) is not None]
+           if stability.step_matrix(name, 1e-3, stability.linearised(setups.vehicle().vehicle)) is not None]
 
 
 def measured(engine: str, integrator: str, geometry: str, steps: int, guided: bool) -> np.ndarray:
@@ -40,7 +40,7 @@ def measured(engine: str, integrator: str, geometry: str, steps: int, guided: bo
 @pytest.mark.parametrize("geometry", ["exact", "linear"])
 @pytest.mark.parametrize(("engine", "integrator"), LIMITED)
 def test_step_matrix_is_what_the_engine_does(engine, integrator, geometry):
-    linear = stability.linearised(setups.vehicle("asymmetric_twin").vehicle, guided=False)
+    linear = stability.linearised(setups.vehicle("asymmetric_twin").vehicle)
     matrix = stability.step_matrix(integrator, 1e-3, linear)
     power = np.linalg.matrix_power(matrix, 5)
     if integrator == "VelocityVerlet":  # it begins with the acceleration of the start
@@ -52,7 +52,7 @@ def test_step_matrix_is_what_the_engine_does(engine, integrator, geometry):
 @pytest.mark.parametrize(("engine", "integrator"), [("reference", "RK4"), ("mujoco", "RK4"), ("mujoco", "Euler")])
 def test_step_matrix_of_the_guided_vehicle(engine, integrator):
     base = setups.vehicle("asymmetric_twin").without_tyres()
-    matrix = stability.step_matrix(integrator, 1e-3, stability.linearised(base.vehicle, guided=True))
+    matrix = stability.step_matrix(integrator, 1e-3, stability.linearised(base.vehicle, (3,)))
     found = measured(engine, integrator, "linear", 5, guided=True)[np.ix_([0, 1, 2, 4, 5, 6], [0, 1, 2, 4, 5, 6])]
     assert np.abs(np.linalg.matrix_power(matrix, 5) - found).max() < 1e-10
 
@@ -62,7 +62,7 @@ def test_step_matrix_of_the_guided_vehicle(engine, integrator):
     ("ExplicitEuler", 2 / 690.8), ("ExplicitMidpoint", 2 / 690.8), ("RK33", 2.512745326618 / 690.8),
 ])  # fmt: skip
 def test_limits_are_the_textbook_ones(integrator, limit):
-    linear = stability.linearised(setups.vehicle().vehicle, guided=False)
+    linear = stability.linearised(setups.vehicle().vehicle)
     assert stability.limit(integrator, 0.1, 1000.0, linear) == pytest.approx(limit, rel=2e-4)
 
 
@@ -70,7 +70,7 @@ def test_limits_are_the_textbook_ones(integrator, limit):
 def test_the_limit_separates_decay_from_growth(engine, integrator):
     assembly = setups.vehicle()
     pushed = replace(assembly, initial=assembly.initial + 1e-6)
-    linear = stability.linearised(assembly.vehicle, guided=False)
+    linear = stability.linearised(assembly.vehicle)
     limit = stability.limit(integrator, 0.1, 300.0, linear)
     below, above = (float(f"{limit * part:.3g}") for part in (0.97, 1.03))
     end = setups.unchecked(engine, pushed, below, 400 * below, integrator).states[-1]
@@ -143,14 +143,14 @@ def test_the_guard_names_what_it_found(times, states, reason):
 
 def test_a_moment_that_is_no_number_fails_the_run():
     with pytest.raises(RunFailed, match="not a number"):
-        guard("engine", np.array([0.0, 1.0]), np.zeros((2, 8)), 1.0, moment=np.array([0.0, np.nan]))
+        guard("engine", np.array([0.0, 1.0]), np.zeros((2, 8)), 1.0, enforced=np.array([[0.0], [np.nan]]))
 
 
 def test_a_multiplier_may_be_small_beside_the_inertia_term():
     times = np.linspace(0, 1, 101)
-    balanced("engine", times, np.full(101, 10.0), lambda row: (0.0, 1000.0))
+    balanced("engine", times, np.full((101, 1), 10.0), lambda row: (np.zeros(1), np.full(1, 1000.0)))
     with pytest.raises(RunFailed, match="balance"):
-        balanced("engine", times, np.full(101, 100.0), lambda row: (0.0, 1000.0))
+        balanced("engine", times, np.full((101, 1), 100.0), lambda row: (np.zeros(1), np.full(1, 1000.0)))
 
 
 @pytest.mark.parametrize("place", ["passive", "control"])

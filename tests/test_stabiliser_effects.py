@@ -8,6 +8,7 @@ import pytest
 from models.assembly import Assembly, assemble
 from models.engines.catalogue import RECOMMENDED
 from models.engines.protocol import Settings, build
+from models.errors import InputError
 from models.scene import build as build_scene
 from models.signals import sampled
 from models.time_series import write_time_series
@@ -96,3 +97,152 @@ def test_two_springs_are_both_there(forces):
         found = [model(engine, replace(own, vehicle=replace(own.vehicle, pitch_springs=springs))).acceleration(0, STATE)
                  for springs in ((one, two), (both,))]
         np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
+
+
+def banded(folder, interpolation="linear", frame="inertial", geometry="exact") -> Assembly:
+    """The driven vehicle on a spring with a dead band of 0.22 rad, which it leaves and comes back to."""
+    return driven(folder, interpolation, frame, geometry,
+                  pitch_spring={"stiffness": 5e4, "damping": 300.0, "dead_band": 0.22})
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_dead_band_is_slack_within_and_counts_from_its_edge(forces, engine):
+    own, p = banded(forces), driven(forces).parameters
+    bare, taut = model(engine, driven(forces)), model(engine, own)
+    for pitch in (0.1, -0.2, 0.3, -0.4):
+        state = STATE.copy()
+        state[3] = pitch
+        beyond = max(abs(pitch) - 0.22, 0.0)
+        moment = -(5e4 * np.copysign(beyond, pitch) + 300.0 * state[7]) if beyond else 0.0
+        gained = taut.acceleration(0.0, state) - bare.acceleration(0.0, state)
+        np.testing.assert_allclose(gained, [0, 0, 0, moment / p.I], atol=1e-10)  # accelerations of 1e3: rounding 1e-13
+
+
+@pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
+@pytest.mark.parametrize(("frame", "interpolation", "geometry"), [
+    ("inertial", "held", "exact"), ("inertial", "linear", "exact"), ("body", "held", "exact"),
+    ("inertial", "smooth", "linear"),
+])  # fmt: skip
+def test_engines_agree_on_a_dead_band(forces, engine, frame, interpolation, geometry):
+    """The same stages see the same side of the edge: rounding, although the moment jumps by 150 N m there."""
+    own = banded(forces, interpolation, frame, geometry)
+    path = model("reference", own).run().states[:, 3]
+    assert (np.abs(path) < 0.22).any() and (np.abs(path) > 0.22).any()
+    assert checks.trajectory_gap(checks.engine(engine), own, Settings(RECOMMENDED[engine], STEP, DURATION)) < 1e-12
+
+
+def test_a_dead_band_stands_in_a_vehicle_without_any_input(tmp_path):
+    """On its tyres, over a flat road: the law is there although there is no table to read."""
+    effects = {"pitch_spring": {"stiffness": 5e4, "damping": 300.0, "dead_band": 0.05}}
+    scene = build_scene({"title": "t", "run": {"duration": DURATION, "step": STEP}, "start": {"pitch": 0.1},
+                         "effects": effects}, "t", tmp_path)  # fmt: skip
+    paths = [model(engine, assemble(scene)).run().states for engine in ENGINES]
+    assert np.abs(paths[1] - paths[0]).max() < 1e-12 > np.abs(paths[2] - paths[0]).max()
+
+
+def test_a_high_pass_is_the_spring_of_its_corner(forces):
+    """k = (I + J) wc^2 and d = 2 zeta (I + J) wc with J = m1 b^2 + m2 a^2: the wheels move with the pitch."""
+    p = driven(forces).parameters
+    inertia, corner = p.I + p.m1 * p.b**2 + p.m2 * p.a**2, 2 * np.pi * 0.5
+    (spring,) = driven(forces, high_pass={"cut_off": 0.5, "damping_ratio": 0.6}).vehicle.pitch_springs
+    assert (spring.stiffness, spring.damping) == pytest.approx((inertia * corner**2, 1.2 * inertia * corner))
+
+
+def test_a_high_pass_decays_as_declared(forces):
+    """The slow pair of poles of the force-excited vehicle is that of the filter, softened by the struts by 1 %."""
+    from models.engines.stability import first_order, linearised
+
+    vehicle = driven(forces, geometry="linear", high_pass={"cut_off": 0.5, "damping_ratio": 0.6}).vehicle
+    poles = np.linalg.eigvals(first_order(linearised(vehicle)))
+    slow = poles[np.abs(np.abs(poles) - np.pi) < 1.0]
+    assert np.abs(slow) == pytest.approx([np.pi, np.pi], rel=0.01)
+    assert -slow.real == pytest.approx([0.6 * np.pi, 0.6 * np.pi], rel=0.01)
+
+
+@pytest.fixture
+def guided(forces):
+    """The folder with a motion of heave and pitch beside the forces."""
+    t = np.arange(0, DURATION + SAMPLING / 2, SAMPLING)
+    write_time_series(forces / "motion.csv", {"z3": ("m", 0.06 + 0.02 * np.sin(23.0 * t + 0.4)),
+                                              "pitch": ("rad", 0.1 * np.sin(17.0 * t + 1.0))}, SAMPLING)
+    return forces
+
+
+def on_rails(folder, interpolation="smooth", geometry="exact", **values):
+    """The asymmetric vehicle whose heave and pitch are prescribed."""
+    scene = {"vehicle": {"parameters": "asymmetric_twin", "geometry": geometry}, "title": "t",
+             "run": {"duration": DURATION, "step": STEP}, "effects": {
+                 "wheel_forces": {"file": "forces.csv", "interpolation": interpolation},
+                 "prescribed_heave_and_pitch": {"file": "motion.csv", **values}}}
+    return assemble(build_scene(scene, "t", folder))
+
+
+@pytest.mark.parametrize("geometry", ["exact", "linear"])
+@pytest.mark.parametrize("interpolation", ["held", "linear", "smooth"])
+def test_mujoco_and_the_reference_agree_on_rails(guided, geometry, interpolation):
+    own = on_rails(guided, interpolation, geometry)
+    one, other = (model(engine, own).run() for engine in ("reference", "mujoco"))
+    assert np.abs(one.states - other.states).max() < 1e-12
+    assert np.abs(one.enforced - other.enforced).max() < 1e-12 * np.abs(one.enforced).max()
+
+
+def test_exudyn_multipliers_on_rails(guided):
+    """Second order: (2 pi f h)^2 / 12 of m3 z3'' and I beta'', 4e-5 at 23 rad/s and 1 ms; its start has died out."""
+    own = on_rails(guided)
+    one, other = (model(engine, own, integrator=name).run()
+                  for engine, name in (("reference", "RK4"), ("exudyn", "GeneralizedAlpha")))
+    assert np.abs(one.states - other.states)[:, [2, 3]].max() < 1e-12  # it stays where it is put
+    off = np.abs(one.enforced - other.enforced)[50:].max(axis=0) / np.abs(one.enforced).max(axis=0)
+    assert (off < 1e-3).all()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_accelerations_on_rails_are_those_of_the_file(guided, engine):
+    own = on_rails(guided)
+    name = "GeneralizedAlpha" if engine == "exudyn" else "RK4"
+    motion = own.input.at(0.1)
+    state = np.concatenate((STATE[:2], motion[2:4], STATE[4:6], motion[4:6]))
+    found = [model(e, own, integrator=n).acceleration(0.1, state) for e, n in ((engine, name), ("reference", "RK4"))]
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
+    np.testing.assert_allclose(found[0][2:], motion[6:], rtol=1e-12)
+
+
+def noisy_pitch(folder, rng=0):
+    """0.1 sin(4 t) sampled at 1 kHz with white noise of 0.1 degrees; returns what is true."""
+    t = np.arange(0, 2.0005, 1e-3)
+    true = 0.1 * np.sin(4.0 * t)
+    noise = np.deg2rad(0.1) * np.random.default_rng(rng).standard_normal(len(t))
+    write_time_series(folder / "pitch.csv", {"pitch": ("rad", true + noise)}, 1e-3)
+    write_time_series(folder / "forces.csv", {"front": ("N", 0 * t + 4e3), "rear": ("N", 0 * t + 3e3)}, 1e-3)
+    return true
+
+
+def measured(folder, **values):
+    scene = {"title": "t", "run": {"duration": 2.0, "step": 1e-3}, "effects": {
+        "wheel_forces": {"file": "forces.csv", "interpolation": "linear"},
+        "prescribed_pitch": {"file": "pitch.csv", **values}}}
+    return assemble(build_scene(scene, "scene.toml", folder))
+
+
+def test_bandwidth_takes_the_noise_and_leaves_the_motion(tmp_path):
+    """White noise through a zero-phase low-pass keeps 2 B T (0.92) of its variance; a late one would follow late."""
+    true = noisy_pitch(tmp_path)
+    left = measured(tmp_path, bandwidth=5.0).input.sample(0.0, 1e-3, len(true))[:, 2] - true
+    assert 0.5 < np.std(left[200:-200]) / (np.deg2rad(0.1) * np.sqrt(2 * 5.0 * 1e-3 * 0.92)) < 1.7  # 18 free values
+    rough, smooth = (measured(tmp_path, **own).input.sample(0.0, 1e-3, len(true))[:, 4] * 500.0 for own in
+                     ({}, {"bandwidth": 5.0}))
+    assert np.std(rough) > 1e6 > 1e3 > np.std(smooth[200:-200])  # N m, with I = 500 kg m^2
+
+
+def test_bandwidth_has_no_phase_and_half_the_amplitude_at_its_corner(tmp_path):
+    t = np.arange(0, 4.0005, 1e-3)
+    write_time_series(tmp_path / "pitch.csv", {"pitch": ("rad", 0.1 * np.cos(2 * np.pi * 5.0 * t))}, 1e-3)
+    write_time_series(tmp_path / "forces.csv", {"front": ("N", 0 * t + 4e3), "rear": ("N", 0 * t + 3e3)}, 1e-3)
+    found = measured(tmp_path, bandwidth=5.0).input.sample(0.0, 1e-3, 2001)[:, 2]
+    np.testing.assert_allclose(found[800:1200], 0.05 * np.cos(2 * np.pi * 5.0 * t[800:1200]), atol=1e-5)  # the ends
+
+
+def test_a_bandwidth_beyond_half_the_sampling_rate_is_refused(tmp_path):
+    noisy_pitch(tmp_path)
+    with pytest.raises(InputError, match=r"prescribed_pitch\.bandwidth = 500\.0: must be below 500 Hz"):
+        measured(tmp_path, bandwidth=500.0)

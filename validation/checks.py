@@ -132,14 +132,14 @@ def _impulse(assembly: Assembly, settings: Settings) -> np.ndarray:
     return np.concatenate(([0.0], np.cumsum(h * part)))
 
 
-def moment_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
-    """Rms difference of the enforced pitch moment to the eliminated form, relative to its rms."""
+def enforced_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
+    """Rms difference of the enforced moment (or force, if worse) to the eliminated form, relative to its rms."""
     found = run(make, assembly, settings)
-    if found is None or found.moment is None:
+    if found is None or found.enforced is None:
         return float("inf")
-    hand = engine("reference")(assembly, by_hand(settings)).run().moment
+    hand = engine("reference")(assembly, by_hand(settings)).run().enforced
     assert hand is not None
-    return float(np.sqrt(np.mean((found.moment - hand) ** 2) / np.mean(hand**2)))
+    return float(np.sqrt(np.mean((found.enforced - hand) ** 2, axis=0) / np.mean(hand**2, axis=0)).max())
 
 
 def by_hand(settings: Settings) -> Settings:

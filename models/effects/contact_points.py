@@ -17,7 +17,7 @@ from models.strict import Strict
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("road",)
-AFTER = ("wheel_forces", "force_noise", "prescribed_pitch")
+AFTER = ("wheel_forces", "force_noise", "prescribed_pitch", "prescribed_heave_and_pitch")
 COST = "two exact first-order filters after the run; no state in any engine"
 
 Channels = dict[str, tuple[str, str, np.ndarray]]

@@ -8,9 +8,9 @@ from models.strict import Strict, quantity
 from models.vehicles.description import PitchSpring
 
 NEEDS: tuple[str, ...] = ()
-EXCLUDES = ("prescribed_pitch",)
+EXCLUDES = ("prescribed_pitch", "prescribed_heave_and_pitch")
 AFTER: tuple[str, ...] = ()
-COST = "one native spring-damper"
+COST = "one native spring-damper; with a dead band a law of its own, compiled in MuJoCo and in Python in Exudyn"
 
 
 class Parameters(Strict):
@@ -18,10 +18,11 @@ class Parameters(Strict):
 
     stiffness: float = quantity("N m/rad", "rotational stiffness to the ground")
     damping: float = quantity("N m s/rad", "rotational damping to the ground", default=0.0, zero=True)
+    dead_band: float = quantity("rad", "no moment within this pitch to either side of zero", default=0.0, zero=True)
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The assembly with the spring on its chassis."""
-    spring = PitchSpring("chassis", p.stiffness, p.damping)
+    spring = PitchSpring("chassis", p.stiffness, p.damping, p.dead_band)
     vehicle = replace(assembly.vehicle, pitch_springs=(*assembly.vehicle.pitch_springs, spring))
     return replace(assembly, vehicle=vehicle)

@@ -4,6 +4,7 @@ Exudyn's plane is x-y with rotation from x to y. The description's x forward, z 
 becomes x **backward**, y down: then a positive rotation lifts the front, as it should.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -82,8 +83,24 @@ def _pitch_spring(built: Build, spring: PitchSpring) -> None:
         nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
     built.mbs.AddObject(items.CoordinateSpringDamper(
         markerNumbers=[ground, built.places[spring.body, "pitch"]],
-        stiffness=spring.stiffness, damping=spring.damping,
+        stiffness=spring.stiffness, damping=spring.damping, **_dead_band(built, spring),
     ))  # fmt: skip
+
+
+def _dead_band(built: Build, spring: PitchSpring) -> dict[str, Any]:
+    """A law for a spring with a dead band, nothing for one without.
+
+    Exudyn has limit stops, but decides once per step whether one is touched: 1e-3 off where a step is 1 ms.
+    """
+    if not spring.dead_band:
+        return {}
+
+    def moment(mbs: Any, t: float, item: int, angle: float, rate: float, k: float, d: float, offset: float) -> float:
+        beyond = abs(angle) - spring.dead_band
+        return k * math.copysign(beyond, angle) + d * rate if beyond >= 0 else 0.0
+
+    built.callbacks += 1
+    return {"springForceUserFunction": moment}
 
 
 def _linear(assembly: Assembly) -> Build:
@@ -104,6 +121,8 @@ def _linear(assembly: Assembly) -> Build:
     for i, place in enumerate(assembly.vehicle.coordinates()):
         built.places[place] = _marker(mbs, node, i)
     built.nodes = {"vehicle": node}
+    for spring in (spring for spring in assembly.vehicle.pitch_springs if spring.dead_band):
+        _pitch_spring(built, spring)
     return built
 
 
@@ -184,18 +203,24 @@ def _body_fixed(built: Build, wheel: str, x: float, force: Callable[[Any, float,
     _load(built, ("chassis", "pitch"), lambda mbs, t, load: x * force(mbs, t, load) * np.sin(pitch(mbs)) ** 2)
 
 
-def _prescribe(built: Build, assembly: Assembly, settings: Settings) -> Any:
-    """Pitch as a constraint with its Lagrange multiplier; returns the constraint."""
-    signal = assembly.input
-    assert signal is not None
-    table = signal.sample(0.0, settings.step / 2, 2 * settings.steps + 1)
-    angle, rate, per_time = table[:, 2].tolist(), table[:, 3].tolist(), 2.0 / settings.step
+def _prescribe(built: Build, assembly: Assembly, settings: Settings) -> list[Any]:
+    """Prescribed coordinates as constraints with their Lagrange multipliers; returns the constraints."""
+    if not assembly.guided or assembly.input is None:
+        return []
+    table = assembly.input.sample(0.0, settings.step / 2, 2 * settings.steps + 1).T.tolist()
+    places = [assembly.vehicle.coordinates()[i] for i in assembly.guided]
+    return [_constraint(built, place, table[2 + i], table[2 + len(places) + i], 2.0 / settings.step)
+            for i, place in enumerate(places)]
+
+
+def _constraint(built: Build, place: tuple[str, str], path: list[float], rate: list[float], per_time: float) -> Any:
+    """A coordinate that follows a path given at half steps."""
     ground = built.mbs.AddMarker(items.MarkerNodeCoordinate(
         nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
     built.callbacks += 2
     return built.mbs.AddObject(items.CoordinateConstraint(
-        markerNumbers=[ground, built.places["chassis", "pitch"]],
-        offsetUserFunction=lambda mbs, t, item, offset: angle[round(t * per_time)],
+        markerNumbers=[ground, built.places[place]],
+        offsetUserFunction=lambda mbs, t, item, offset: path[round(t * per_time)],
         offsetUserFunction_t=lambda mbs, t, item, offset: rate[round(t * per_time)],
     ))  # fmt: skip
 
@@ -211,7 +236,9 @@ class ExudynModel:
             _drive(self.built, assembly, self.clock)
         if assembly.moment is not None:
             _load(self.built, ("chassis", "pitch"), Clock(assembly.moment, settings).reader(0, 1.0))
-        self.constraint = _prescribe(self.built, assembly, settings) if assembly.mode == "pitch" else None
+        self.constraints = _prescribe(self.built, assembly, settings)
+        p = assembly.parameters
+        self._inertia = np.array([p.m1, p.m2, p.m3, p.I])[list(assembly.guided)]
         self._sensors = self._add_sensors()
         self.built.mbs.Assemble()
         self._columns = self._find_columns()
@@ -224,10 +251,9 @@ class ExudynModel:
                 nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind))
         nodes = self.built.nodes.values()
         sensors = [(sensor(node, kinds.Coordinates), sensor(node, kinds.Coordinates_t)) for node in nodes]
-        if self.constraint is not None:
-            moment = self.built.mbs.AddSensor(items.SensorObject(
-                objectNumber=self.constraint, storeInternal=True, writeToFile=False, outputVariableType=kinds.Force))
-            self._moment = moment
+        self._multipliers = [self.built.mbs.AddSensor(items.SensorObject(
+            objectNumber=constraint, storeInternal=True, writeToFile=False, outputVariableType=kinds.Force))
+            for constraint in self.constraints]  # fmt: skip
         return sensors
 
     def _find_columns(self) -> list[int]:
@@ -247,12 +273,16 @@ class ExudynModel:
     def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
         """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,), from Exudyn's own residual and mass matrix."""
         found = self._free_acceleration(time, state)
-        if self.constraint is not None and self.assembly.input is not None:
-            found[3] = self.assembly.input.at(time)[4]
+        found[list(self.assembly.guided)] = self._wanted(time)
         return found
 
+    def _wanted(self, time: float) -> np.ndarray:
+        """Accelerations of the prescribed coordinates, if any."""
+        guided = self.assembly.guided
+        return np.empty(0) if not guided or self.assembly.input is None else self.assembly.input.at(time)[-len(guided):]
+
     def _free_acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
-        """The same with no moment on the pitch, where the pitch is prescribed."""
+        """The same with nothing enforced on prescribed coordinates."""
         self._set_state(state)
         if self.assembly.input is not None:
             self.clock.step = min(int(time / self.settings.step + 1e-6), self.settings.steps - 1)
@@ -296,7 +326,7 @@ class ExudynModel:
         options = self._options()
         if self.assembly.input is not None:
             self.clock.step = 0  # a run before this one has left it at its own last sample
-        if self.constraint is not None:
+        if self.constraints:
             self._consistent_start(options)
         note = ""
         try:
@@ -308,33 +338,28 @@ class ExudynModel:
                 raise KeyboardInterrupt from error
             note = f"; the solver stopped: {str(error).strip().splitlines()[0]}"
         times, states = self._recorded()
-        moment = self._enforced()
-        guard("exudyn", times, states, self.settings.duration, note, moment)
+        enforced = self._enforced()
+        guard("exudyn", times, states, self.settings.duration, note, enforced)
         counts = self._counts()
-        if moment is not None:
-            balanced("exudyn", times, moment, lambda i: self._balance(times[i], states[i]))
-        return Trajectory(times, states, moment, counts)
+        if enforced is not None:
+            balanced("exudyn", times, enforced, lambda i: self._balance(times[i], states[i]))
+        return Trajectory(times, states, enforced, counts)
 
-    def _balance(self, time: float, state: np.ndarray) -> tuple[float, float]:
-        """Moment that the prescribed pitch takes at one row of a run, and the inertia term (N m)."""
-        assert self.assembly.input is not None
-        inertia, wanted = self.assembly.parameters.I, float(self.assembly.input.at(time)[4])
-        return inertia * (wanted - float(self._free_acceleration(time, state)[3])), inertia * wanted
+    def _balance(self, time: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the prescribed coordinates take at one row of a run, and their inertia terms (N, N m)."""
+        wanted, free = self._wanted(time), self._free_acceleration(time, state)[list(self.assembly.guided)]
+        return self._inertia * (wanted - free), self._inertia * wanted
 
     def _consistent_start(self, options: Any) -> None:
-        """Begin with the accelerations that belong to the prescribed pitch.
+        """Begin with the accelerations that belong to the prescribed coordinates.
 
         Exudyn leaves the constraint's own acceleration out of its initial values; the multiplier then
         rings, or never forgets the error.
         """
-        signal = self.assembly.input
-        assert signal is not None
-        acceleration, wanted = self._free_acceleration(0.0, self.assembly.initial), signal.at(0.0)[4]
-        self._first_moment = self.assembly.parameters.I * (wanted - acceleration[3])
-        acceleration[3] = wanted
+        self._first = self._balance(0.0, self.assembly.initial)[0]
         data, initial = self.built.mbs.systemData, exu.ConfigurationType.Initial
         all_of_them = np.zeros(data.ODE2Size())
-        all_of_them[self._columns] = acceleration
+        all_of_them[self._columns] = self.acceleration(0.0, self.assembly.initial)
         data.SetODE2Coordinates_tt(all_of_them, initial)
         options.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
         options.timeIntegration.generalizedAlpha.resetAccelerations = False
@@ -357,15 +382,16 @@ class ExudynModel:
         return counted if np.allclose(times, counted, rtol=0, atol=1e-9 * max(1.0, self.settings.duration)) else times
 
     def _enforced(self) -> np.ndarray | None:
-        """Enforced pitch moment (n,): the multiplier, with the sign of a moment on the chassis.
+        """Enforced force and moment (n, constraints): the multipliers, with the sign of loads on the chassis.
 
-        Exudyn has no multiplier at t = 0 yet; that one follows from the accelerations of the start.
+        Exudyn has no multipliers at t = 0 yet; those follow from the accelerations of the start.
         """
-        if self.constraint is None:
+        if not self.constraints:
             return None
-        moment = -self.built.mbs.GetSensorStoredData(self._moment)[:, 1]
-        moment[0] = self._first_moment
-        return moment
+        read = self.built.mbs.GetSensorStoredData
+        enforced = -np.column_stack([read(sensor)[:, 1] for sensor in self._multipliers])
+        enforced[0] = self._first
+        return enforced
 
     def _counts(self) -> dict[str, int]:
         """Steps and evaluations of the forces, from the solver's own counters."""

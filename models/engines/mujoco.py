@@ -7,7 +7,7 @@ constraints are soft (a fifth of the enforced moment is lost), so a prescribed p
 without that joint, and inverse dynamics of the full one for the moment.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
@@ -33,8 +33,8 @@ CHUNK = 4096
 """Steps between two looks at the guard."""
 
 
-def _spec(vehicle: Vehicle, settings: Settings, guided: bool) -> mujoco.MjSpec:
-    """Bodies and joints; ``guided`` leaves the pitch out."""
+def _spec(vehicle: Vehicle, settings: Settings, guided: Collection[int] = ()) -> mujoco.MjSpec:
+    """Bodies and joints without those of ``guided`` coordinates, which stand still at zero."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = [0, 0, vehicle.gravity]
@@ -43,15 +43,17 @@ def _spec(vehicle: Vehicle, settings: Settings, guided: bool) -> mujoco.MjSpec:
     off = mujoco.mjtDisableBit
     spec.option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT
     places = {axle.wheel: axle.x for axle in vehicle.axles}
+    joints = {place for i, place in enumerate(vehicle.coordinates()) if i not in guided}
     for body in vehicle.bodies:
         own = spec.worldbody.add_body(name=body.name, pos=[places.get(body.name, 0.0), 0, 0], mass=body.mass,
                                       ipos=[0, 0, 0], inertia=[body.pitch_inertia or 1.0] * 3, explicitinertial=True)
-        own.add_joint(name=f"{body.name} z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
-        if body.pitch_inertia is not None and not guided:
+        if (body.name, "z") in joints:
+            own.add_joint(name=f"{body.name} z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
+        if (body.name, "pitch") in joints:
             own.add_joint(name=f"{body.name} pitch", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
     for strut in vehicle.struts:
-        _tyre(spec, strut) if strut.lower.body is None else _suspension(spec, vehicle, strut, guided)
-    for spring in vehicle.pitch_springs:
+        _tyre(spec, strut) if strut.lower.body is None else _suspension(spec, vehicle, strut, joints)
+    for spring in (spring for spring in vehicle.pitch_springs if not spring.dead_band):
         joint = spec.joint(f"{spring.body} pitch")
         joint.stiffness[0] += spring.stiffness
         joint.damping[0] += spring.damping
@@ -63,14 +65,15 @@ def _tyre(spec: mujoco.MjSpec, strut: Strut) -> None:
     joint.stiffness[0], joint.damping[0] = strut.stiffness, strut.damping
 
 
-def _suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, guided: bool) -> None:
+def _suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, joints: set[tuple[str, str]]) -> None:
     if vehicle.geometry == "linear":
         tendon = spec.add_tendon(name=strut.name, springlength=[0, 0])
         tendon.stiffness[0], tendon.damping[0] = strut.stiffness, strut.damping
-        tendon.wrap_joint(f"{strut.upper.body} z", 1.0)
-        tendon.wrap_joint(f"{strut.lower.body} z", -1.0)
-        if not guided:
-            tendon.wrap_joint(f"{strut.upper.body} pitch", -strut.upper.x)
+        upper, lower = strut.upper.body, strut.lower.body
+        arms = {(upper, "z"): 1.0, (lower, "z"): -1.0, (upper, "pitch"): -strut.upper.x}
+        for (body, kind), arm in arms.items():
+            if (body, kind) in joints:
+                tendon.wrap_joint(f"{body} {kind}", arm)
         return
     spec.body(strut.upper.body).add_site(name=f"{strut.name} upper", pos=[strut.upper.x, 0, 0])
     spec.body(strut.lower.body).add_site(name=f"{strut.name} lower")
@@ -110,14 +113,17 @@ class Drive:
 
 
 def _drive(assembly: Assembly, settings: Settings) -> Drive:
+    """The input, and a law where the model's own items cannot do it: tables, turning forces, dead bands."""
     signal, h, n = assembly.input, settings.step, settings.steps
-    if signal is None:
-        return Drive()
-    held = signal.sample(0.0, h, n)[:, :2] if signal.held else None
-    if held is not None and assembly.mode == "force" and assembly.moment is None:
+    slack = any(spring.dead_band for spring in assembly.vehicle.pitch_springs)
+    held = signal.sample(0.0, h, n)[:, :2] if signal is not None and signal.held else None
+    native = signal is None or (held is not None and assembly.mode == "force" and assembly.moment is None)
+    if native and not slack:
         return Drive(controls=held)
     from models.engines.mujoco_callback import body_fixed_law, table_law
 
+    if native or signal is None:
+        return Drive(None, held, None, table_law())
     inputs = signal.sample(0.0, h / 2, 2 * n + 1)
     moment = np.empty((2 * n + 1, 0)) if assembly.moment is None else assembly.moment.sample(0.0, h / 2, 2 * n + 1)
     if assembly.mode == "force-body":
@@ -130,33 +136,39 @@ def _drive(assembly: Assembly, settings: Settings) -> Drive:
 
 
 def _generalised(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
-    """Forces (rows, 2 or 3) on the heave coordinates that the input stands for; held ones are left to the motors."""
+    """Forces (rows, 2 or 3) on the free heave coordinates that the input stands for; motors apply held ones."""
     if assembly.mode == "road":
         tyres = [strut for strut in assembly.vehicle.struts if strut.lower.body is None]
         return np.column_stack([tyre.stiffness * inputs[:, i] + tyre.damping * inputs[:, 2 + i]
                                 for i, tyre in enumerate(tyres)])
     held = assembly.input is not None and assembly.input.held
     forces = np.zeros((len(inputs), 2)) if held else -inputs[:, :2]
-    if assembly.mode != "pitch":
+    if not assembly.guided:
         return forces
-    return np.column_stack([forces, np.zeros(len(inputs))]) + _guidance(assembly, inputs[:, 2], inputs[:, 3])
+    guidance = _guidance(assembly, inputs)
+    guidance[:, :2] += forces
+    return guidance
 
 
-def _guidance(assembly: Assembly, pitch: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """What the prescribed pitch adds to the strut forces on the heave coordinates, shape (rows, 3)."""
+def _guidance(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
+    """What prescribed coordinates add to the strut forces on the free heave coordinates, shape (rows, 2 or 3)."""
+    count = len(assembly.guided)
+    path, rate = (inputs[:, 2 + i * count : 2 + (i + 1) * count] for i in range(2))
+    z, pitch, dz, turn = (path[:, 0], path[:, 1], rate[:, 0], rate[:, 1]) if count == 2 else (
+        0.0, path[:, 0], 0.0, rate[:, 0])
     exact = assembly.vehicle.geometry == "exact"
     sine, cosine = (np.sin(pitch), np.cos(pitch)) if exact else (pitch, np.ones_like(pitch))
-    forces = np.zeros((len(pitch), 3))
+    forces = np.zeros((len(inputs), 3))
     names = [body.name for body in assembly.vehicle.bodies]
     for strut in assembly.vehicle.struts:
-        force = -strut.upper.x * (strut.stiffness * sine + strut.damping * rate * cosine)
+        force = strut.stiffness * (z - strut.upper.x * sine) + strut.damping * (dz - strut.upper.x * turn * cosine)
         forces[:, names.index(str(strut.upper.body))] -= force
         forces[:, names.index(str(strut.lower.body))] += force
-    return forces
+    return forces[:, : 4 - count]
 
 
-def _compiled(assembly: Assembly, settings: Settings, drive: Drive, guided: bool) -> mujoco.MjModel:
-    """The model with its input table in its numeric data."""
+def _compiled(assembly: Assembly, settings: Settings, drive: Drive, guided: Collection[int] = ()) -> mujoco.MjModel:
+    """The model with its input table in its numeric data, behind what ``mujoco_callback`` reads before it."""
     spec = _spec(assembly.vehicle, settings, guided)
     if drive.controls is not None:
         _held(spec, assembly.vehicle, 0.0 if drive.arms is not None else -1.0)
@@ -165,7 +177,9 @@ def _compiled(assembly: Assembly, settings: Settings, drive: Drive, guided: bool
     arms = (0.0, 0.0) if drive.arms is None else drive.arms
     table = np.empty((0, 2)) if drive.table is None else drive.table
     motors = len(spec.actuators) - 2 if drive.controls is not None else -1
-    header = [2.0 / settings.step, table.shape[1], len(table), motors, *arms]
+    slack = [spring for spring in assembly.vehicle.pitch_springs if spring.dead_band]
+    springs = [value for spring in slack for value in (spring.stiffness, spring.damping, spring.dead_band)]
+    header = [2.0 / settings.step, table.shape[1], len(table), motors, *arms, len(springs), *springs]
     content = np.concatenate((header, table.ravel()))
     spec.add_numeric(name="input", size=len(content), data=[0.0])
     model = spec.compile()
@@ -178,7 +192,8 @@ class MujocoModel:
 
     def __init__(self, assembly: Assembly, settings: Settings) -> None:
         self.assembly, self.settings = assembly, settings
-        self.guided = assembly.mode == "pitch"
+        self.guided = list(assembly.guided)
+        self.free = [i for i in range(4) if i not in self.guided]
         self.drive = _drive(assembly, settings)
         for table in (self.drive.table, self.drive.controls):  # the discrete integrator skips a force that is no number
             if table is not None and not np.isfinite(table).all():
@@ -194,17 +209,17 @@ class MujocoModel:
         """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
         n = self.settings.steps
         states = np.empty((n + 1, 8))
-        free = [0, 1, 2, 4, 5, 6] if self.guided else list(range(8))
         states[0] = self.assembly.initial
         with self.callback(), quiet():
-            self._advance(states, free)
+            self._advance(states, [*self.free, *(4 + i for i in self.free)])
         times = self.settings.step * np.arange(n + 1)
         if self.guided:
-            states[:, [3, 7]] = self._signal().sample(0.0, self.settings.step, n + 1)[:, 2:4]
+            inputs = self._signal().sample(0.0, self.settings.step, n + 1)
+            states[:, [*self.guided, *(4 + i for i in self.guided)]] = inputs[:, 2 : 2 + 2 * len(self.guided)]
         guard("mujoco", times, states, self.settings.duration, self.warnings())
-        moment = self._enforced(times, states) if self.guided else None
-        guard("mujoco", times, states, self.settings.duration, moment=moment)
-        return Trajectory(times, states, moment, self._counts())
+        enforced = self._enforced(times, states) if self.guided else None
+        guard("mujoco", times, states, self.settings.duration, enforced=enforced)
+        return Trajectory(times, states, enforced, self._counts())
 
     def _advance(self, states: np.ndarray, free: list[int]) -> None:
         """March in chunks, so that a run that has failed is not carried to its end."""
@@ -257,33 +272,32 @@ class MujocoModel:
 
     def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
         """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,)."""
-        free = [0, 1, 2] if self.guided else [0, 1, 2, 3]
-        self.data.time, self.data.qpos[:], self.data.qvel[:] = time, state[:4][free], state[4:][free]
+        self.data.time, self.data.qpos[:], self.data.qvel[:] = time, state[:4][self.free], state[4:][self.free]
         if self.drive.controls is not None:
             row = min(round(time / self.settings.step), len(self.drive.controls) - 1)
             self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[row]
         with self.callback():
             mujoco.mj_forward(self.model, self.data)
         out = np.empty(4)
-        out[free] = self.data.qacc
+        out[self.free] = self.data.qacc
         if self.guided:
-            out[3] = self._signal().at(time)[4]
+            out[self.guided] = self._signal().at(time)[-len(self.guided) :]
         return out
 
     def _enforced(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """Moment (n,) that the prescribed motion takes: inverse dynamics of the vehicle with its pitch joint.
+        """Force and moment (n, guided) that the prescribed motion takes: inverse dynamics with all joints.
 
-        Wheel forces and motors act on heave coordinates only, so the pitch row needs neither.
+        Wheel forces and motors act on the wheels' heave only, so the rows of the chassis need neither.
         """
-        full = _compiled(self.assembly, self.settings, Drive(), guided=False)
-        data, moment = mujoco.MjData(full), np.empty(len(times))
+        full = _compiled(self.assembly, self.settings, Drive())
+        data, enforced = mujoco.MjData(full), np.empty((len(times), len(self.guided)))
         accelerations = self._accelerations(times, states)
         for i, state in enumerate(states):
             data.qpos[:], data.qvel[:], data.qacc[:] = state[:4], state[4:], accelerations[i]
             mujoco.mj_inverse(full, data)
             mujoco.mj_fwdActuation(full, data)
-            moment[i] = data.qfrc_inverse[3] - data.qfrc_actuator[3]
-        return moment
+            enforced[i] = data.qfrc_inverse[self.guided] - data.qfrc_actuator[self.guided]
+        return enforced
 
     def _accelerations(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
         """Accelerations (n, 4) along a guided run."""
@@ -291,12 +305,13 @@ class MujocoModel:
         out = np.empty((len(times), 4))
         with self.callback():
             for i, time in enumerate(times):
-                self.data.time, self.data.qpos[:], self.data.qvel[:] = time, states[i, :3], states[i, 4:7]
+                positions, rates = np.split(states[i], 2)
+                self.data.time, self.data.qpos[:], self.data.qvel[:] = time, positions[self.free], rates[self.free]
                 if self.drive.controls is not None:
                     self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[min(i, len(self.drive.controls) - 1)]
                 mujoco.mj_forward(self.model, self.data)
-                out[i, :3] = self.data.qacc
-        out[:, 3] = signal[:, 4]
+                out[i, self.free] = self.data.qacc
+        out[:, self.guided] = signal[:, -len(self.guided) :]
         return out
 
     def plan(self) -> dict[str, int]:

@@ -1,9 +1,10 @@
 """Compiled MuJoCo callbacks: input tables added to the passive forces at every stage of a step.
 
 The table lives in the model's own numeric data, behind a header: rows per second, columns, rows, place of
-the wheels' motors among the controls (-1: no held forces) and the two wheels' arms. So one
-compiled function serves every model in the process, adds nothing to a model without a table, survives
-copies of the model, and holds no address that could go stale in numba's cache.
+the wheels' motors among the controls (-1: no held forces), the two wheels' arms, and how many numbers of
+pitch springs with a dead band follow (stiffness, damping and band of each). So one compiled function serves
+every model in the process, adds nothing to a model without a table, survives copies of the model, and holds
+no address that could go stale in numba's cache.
 """
 
 from collections.abc import Iterator
@@ -14,11 +15,12 @@ import llvmlite.ir as ir
 import mujoco
 import numpy as np
 from numba import carray, cfunc, types
-from numba.extending import intrinsic
+from numba.extending import intrinsic, register_jitable
 
 from models.engines.mujoco_layout import offset
 
-HEADER = 6
+HEADER = 7
+"""Numbers before those of the springs."""
 DOUBLES = types.CPointer(types.float64)
 _intrinsic: Any = intrinsic
 
@@ -46,22 +48,32 @@ def _array_at(typing_context, base, shift):
     return DOUBLES(types.voidptr, types.intp), generate
 
 
-def _compile_table(numeric, passive, time):
+@register_jitable
+def _springs(header, force, pitch, rate):
+    """Add the moments of the springs whose dead band the pitch has left."""
+    for i in range(HEADER, HEADER + int(header[6]), 3):
+        beyond = abs(pitch[3]) - header[i + 2]
+        if beyond >= 0.0:
+            force[3] -= header[i] * np.copysign(beyond, pitch[3]) + header[i + 1] * rate[3]
+
+
+def _compile_table(numeric, passive, time, position, velocity):
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
     def law(model, data):
         header = carray(_array_at(model, numeric), (HEADER,))
-        columns = int(header[1])
+        columns, rows, springs = int(header[1]), int(header[2]), int(header[6])
+        numbers = carray(_array_at(model, numeric), (HEADER + springs + columns * rows,))
+        force = carray(_array_at(data, passive), (4,))
         row = int(np.rint(carray(_double_at(data, time), (1,))[0] * header[0]))
-        if 0 <= row < int(header[2]):
-            table = carray(_array_at(model, numeric), (HEADER + columns * int(header[2]),))
-            force = carray(_array_at(data, passive), (columns,))
+        if 0 <= row < rows:
             for i in range(columns):
-                force[i] += table[HEADER + row * columns + i]
+                force[i] += numbers[HEADER + springs + row * columns + i]
+        _springs(numbers, force, carray(_array_at(data, position), (4,)), carray(_array_at(data, velocity), (4,)))
 
     return law
 
 
-def _compile_body_fixed(numeric, passive, time, position, control):
+def _compile_body_fixed(numeric, passive, time, position, velocity, control):
     """Forces along the chassis' vertical axis, from the table or, where they are held, from the controls.
 
     A column of the table beyond those of the forces is a moment on the chassis.
@@ -70,22 +82,23 @@ def _compile_body_fixed(numeric, passive, time, position, control):
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
     def law(model, data):
         header = carray(_array_at(model, numeric), (HEADER,))
-        columns, rows, motors = int(header[1]), int(header[2]), int(header[3])
+        columns, rows, motors, springs = int(header[1]), int(header[2]), int(header[3]), int(header[6])
         row = int(np.rint(carray(_double_at(data, time), (1,))[0] * header[0]))
         if columns > 0 and not 0 <= row < rows:
             return
-        table = carray(_array_at(model, numeric), (HEADER + columns * rows,))
+        numbers = carray(_array_at(model, numeric), (HEADER + springs + columns * rows,))
         controls = carray(_array_at(data, control), (max(motors, 0) + 2,))
-        pitch = carray(_array_at(data, position), (4,))[3]
+        pitch = carray(_array_at(data, position), (4,))
         force = carray(_array_at(data, passive), (4,))
-        sine, cosine = np.sin(pitch), np.cos(pitch)
-        first, forces = HEADER + columns * row, 2 if motors < 0 else 0
+        sine, cosine = np.sin(pitch[3]), np.cos(pitch[3])
+        first, forces = HEADER + springs + columns * row, 2 if motors < 0 else 0
         for i in range(2):
-            f = controls[motors + i] if motors >= 0 else table[first + i]
+            f = controls[motors + i] if motors >= 0 else numbers[first + i]
             force[i] -= f * cosine
             force[3] += header[4 + i] * f * sine * sine
         if columns > forces:
-            force[3] += table[first + forces]
+            force[3] += numbers[first + forces]
+        _springs(numbers, force, pitch, carray(_array_at(data, velocity), (4,)))
 
     return law
 
@@ -94,16 +107,17 @@ _COMPILED: dict[str, object] = {}
 
 
 def table_law():
-    """Callback that adds the table's row at the stage's time to the first passive forces."""
+    """Callback that adds the table's row at the stage's time to the first passive forces, and the springs."""
     if "table" not in _COMPILED:
-        _COMPILED["table"] = _compile_table(*_offsets("numeric_data", "qfrc_passive", "time"))
+        _COMPILED["table"] = _compile_table(*_offsets("numeric_data", "qfrc_passive", "time", "qpos", "qvel"))
     return _COMPILED["table"]
 
 
 def body_fixed_law():
     """Callback for wheel forces that turn with the chassis: from the table or the controls."""
     if "body" not in _COMPILED:
-        _COMPILED["body"] = _compile_body_fixed(*_offsets("numeric_data", "qfrc_passive", "time", "qpos", "ctrl"))
+        fields = ("numeric_data", "qfrc_passive", "time", "qpos", "qvel", "ctrl")
+        _COMPILED["body"] = _compile_body_fixed(*_offsets(*fields))
     return _COMPILED["body"]
 
 

@@ -48,12 +48,26 @@ class Settings:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """times (n,), states (n, 8), enforced pitch moment (n,) in N m or None, and what the run cost in counts."""
+    """times (n,), states (n, 8), and what the run cost in counts.
+
+    enforced (n, guided coordinates): force on the chassis (N, down), where its heave is prescribed, and moment
+    (N m, nose up); None where nothing is.
+    """
 
     times: np.ndarray
     states: np.ndarray
-    moment: np.ndarray | None = None
+    enforced: np.ndarray | None = None
     counts: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def moment(self) -> np.ndarray | None:
+        """Moment (n,) in N m that the prescribed pitch takes."""
+        return None if self.enforced is None else self.enforced[:, -1]
+
+    @property
+    def force(self) -> np.ndarray | None:
+        """Force (n,) in N, positive down, that the prescribed heave takes; None where the pitch alone is prescribed."""
+        return None if self.enforced is None or self.enforced.shape[1] < 2 else self.enforced[:, 0]
 
 
 class Model(Protocol):
@@ -91,10 +105,10 @@ def check(engine: str, assembly: "Assembly", settings: Settings) -> None:
     if (engine, settings.integrator) in MISSING:
         raise Refused(engine, MISSING[engine, settings.integrator])
     _whole(engine, settings.step, "the duration", settings.duration)
-    if assembly.mode == "pitch" and not integrator.constraints:
+    if assembly.guided and not integrator.constraints:
         raise Refused(engine, f"{settings.integrator} does not solve for a prescribed pitch: its enforced moment would "
                               f"be wrong without a word; use {_constrained(engine)}")
-    if assembly.mode == "pitch" and settings.integrator == "GeneralizedAlpha" and settings.spectral_radius > 0.95:
+    if assembly.guided and settings.integrator == "GeneralizedAlpha" and settings.spectral_radius > 0.95:
         raise Refused(engine, f"a spectral radius of {settings.spectral_radius} never damps the error of the enforced "
                               "moment at the start; use at most 0.95 (0.6 is recommended)")
     for signal in (assembly.input, assembly.moment):
@@ -135,32 +149,32 @@ def _whole(engine: str, step: float, whole: str, length: float) -> None:
 
 
 def guard(engine: str, times: np.ndarray, states: np.ndarray, duration: float, note: str = "",
-          moment: np.ndarray | None = None) -> None:  # fmt: skip
+          enforced: np.ndarray | None = None) -> None:  # fmt: skip
     """Raise RunFailed unless the run is finite, of sane size and complete in time.
 
-    times (n,), states (n, anything), duration in s; ``note`` is what the engine itself reported; moment (n,)
-    in N m, where there is one, must be finite.
+    times (n,), states (n, anything), duration in s; ``note`` is what the engine itself reported; ``enforced``
+    (n, anything) in N or N m, where there is some, must be finite.
     """
     if len(times) == 0 or len(times) != len(states):
         raise RunFailed(engine, f"gave {len(states)} states at {len(times)} times{note}")
-    if not _sound(times, states, moment):
-        _fail(engine, times, states, note, moment)
+    if not _sound(times, states, enforced):
+        _fail(engine, times, states, note, enforced)
     if note:
         raise RunFailed(engine, note.lstrip("; "), times[-1], states[-1])
     if abs(times[-1] - duration) > 1e-9 * max(1.0, duration):
         raise RunFailed(engine, f"stopped at {times[-1]:.6g} s instead of {duration:.6g} s", times[-1], states[-1])
 
 
-def _sound(times: np.ndarray, states: np.ndarray, moment: np.ndarray | None) -> bool:
+def _sound(times: np.ndarray, states: np.ndarray, enforced: np.ndarray | None) -> bool:
     """Whether nothing is wrong, quickly: a run may be one of ten thousand. What is no number passes no comparison."""
     sane = states.max() < SIZE_BOUND and states.min() > -SIZE_BOUND
     forward = np.isfinite(times).all() and (np.diff(times) > 0).all()
-    return bool(sane and forward and (moment is None or np.isfinite(moment).all()))
+    return bool(sane and forward and (enforced is None or np.isfinite(enforced).all()))
 
 
-def _fail(engine: str, times: np.ndarray, states: np.ndarray, note: str, moment: np.ndarray | None) -> None:
+def _fail(engine: str, times: np.ndarray, states: np.ndarray, note: str, enforced: np.ndarray | None) -> None:
     """Raise RunFailed with the last state before the first one that is wrong."""
-    finite = np.isfinite(states).all(axis=1) & (True if moment is None else np.isfinite(moment))
+    finite = np.isfinite(states).all(axis=1) & (True if enforced is None else np.isfinite(enforced).all(axis=1))
     sane = finite & (np.abs(np.where(np.isfinite(states), states, 0)) < SIZE_BOUND).all(axis=1)
     forward = np.concatenate(([True], np.diff(times) > 0))
     first = np.flatnonzero(~(sane & forward & np.isfinite(times)))[0]
@@ -174,18 +188,19 @@ def _reason(finite: bool, sane: bool) -> str:
     return "time ran backwards" if sane else f"the state grew beyond {SIZE_BOUND:g}: no vehicle any more"
 
 
-def balanced(engine: str, times: np.ndarray, moment: np.ndarray,
-             balance: Callable[[int], tuple[float, float]]) -> None:  # fmt: skip
-    """Raise RunFailed unless a multiplier (n,) in N m agrees with the balance of moments.
+def balanced(engine: str, times: np.ndarray, enforced: np.ndarray,
+             balance: Callable[[int], tuple[np.ndarray, np.ndarray]]) -> None:  # fmt: skip
+    """Raise RunFailed unless multipliers (n, 1 or 2) agree with the balance of moments (the last) and of forces.
 
-    ``balance`` gives, for a row, the moment that is needed and the inertia term I beta'' (N m), beside which
-    the error is judged where the needed moment is small. A solver can follow a prescribed motion perfectly
-    with a multiplier that is wrong for ever.
+    ``balance`` gives, for a row, what is needed and the inertia terms m3 z3'' and I beta'' (N, N m), beside which
+    the error is judged where little is needed. A solver can follow a prescribed motion perfectly with a
+    multiplier that is wrong for ever.
     """
     rows = np.unique(np.linspace(min(BALANCE_START, len(times) - 1), len(times) - 1, BALANCE_ROWS).astype(int))
-    wanted, inertia = np.array([balance(int(row)) for row in rows]).T
-    size = float(np.sqrt(max(np.mean(wanted**2), np.mean(inertia**2))))
-    off = float(np.sqrt(np.mean((moment[rows] - wanted) ** 2)))
-    if not off <= BALANCE_BOUND * size + 1e-3:
-        raise RunFailed(engine, f"the enforced moment misses the balance of moments by {off:.3g} N m (rms) of "
-                                f"{size:.3g}: the pitch is too rough for this step; smooth its data or shorten it")
+    wanted, inertia = (np.array(part) for part in zip(*(balance(int(row)) for row in rows), strict=True))
+    size = np.sqrt(np.maximum(np.mean(wanted**2, axis=0), np.mean(inertia**2, axis=0)))
+    off = np.sqrt(np.mean((enforced[rows] - wanted) ** 2, axis=0))
+    for i in np.flatnonzero(~(off <= BALANCE_BOUND * size + 1e-3))[::-1]:
+        what, unit, data = ("moment", "N m", "pitch") if i == len(size) - 1 else ("force", "N", "heave")
+        raise RunFailed(engine, f"the enforced {what} misses the balance of {what}s by {off[i]:.3g} {unit} (rms) of "
+                                f"{size[i]:.3g}: the {data} is too rough for this step; smooth its data or shorten it")

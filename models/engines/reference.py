@@ -20,7 +20,7 @@ from models.engines.protocol import Settings, Trajectory, guard
 from models.errors import RunFailed
 from models.signals import Stacked
 from models.vehicles import pitch_plane_equations
-from models.vehicles.pitch_plane_equations import ADDED, RIGHT_HAND_SIDES
+from models.vehicles.pitch_plane_equations import ADDED, RIGHT_HAND_SIDES, numbers
 
 NO_INPUT = np.zeros((1, 4))
 """The flat road."""
@@ -97,17 +97,16 @@ class Reference:
         self._added = (*(("springs",) if springs else ()), *(("moment",) if own.moment is not None else ()))
         self._key = ("road" if own.mode == "free" else own.mode, own.vehicle.geometry, *self._added)
         self._input = own.input if own.input is None or own.moment is None else Stacked((own.input, own.moment))
-        extra = [value for spring in springs for value in (spring.stiffness, spring.damping)]
-        self._p = np.concatenate((own.parameters.array(), extra))
+        self._p = numbers(own.parameters, own.vehicle)
 
     def run(self) -> Trajectory:
         """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
         adaptive = CATALOGUE["reference"][self.settings.integrator].adaptive
         times, states, counts = self._adaptive() if adaptive else self._fixed()
         guard("reference", times, states, self.settings.duration)
-        moment = self._moment(times, states)
-        guard("reference", times, states, self.settings.duration, moment=moment)
-        return Trajectory(times, states, moment, counts)
+        enforced = self._enforced(times, states)
+        guard("reference", times, states, self.settings.duration, enforced=enforced)
+        return Trajectory(times, states, enforced, counts)
 
     def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
         """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,)."""
@@ -115,7 +114,7 @@ class Reference:
 
     def plan(self) -> dict[str, int]:
         """What was built."""
-        return {"degrees of freedom": 3 if self.assembly.mode == "pitch" else 4, "native items": 0, "callbacks": 0}
+        return {"degrees of freedom": 4 - len(self.assembly.guided), "native items": 0, "callbacks": 0}
 
     def _at(self, time: float) -> np.ndarray:
         return NO_INPUT[0] if self._input is None else self._input.at(time)
@@ -140,14 +139,15 @@ class Reference:
         inputs, rows = self._inputs()
         march = march_of(*self._key)
         march(self.assembly.initial.copy(), self.settings.step, n, inputs, rows, self._p, states)
-        if self.assembly.mode == "pitch":
-            self._guide(states)
+        self._guide(states)
         return self.settings.step * np.arange(n + 1), states, {"steps": n, "force calls": 4 * n}
 
     def _guide(self, states: np.ndarray) -> None:
-        """Put the prescribed pitch and its rate into the states."""
-        assert self.assembly.input is not None
-        states[:, [3, 7]] = self.assembly.input.sample(0.0, self.settings.step, len(states))[:, 2:4]
+        """Put the prescribed coordinates and their rates, if any, into the states."""
+        guided = self.assembly.guided
+        if guided and self.assembly.input is not None:
+            inputs = self.assembly.input.sample(0.0, self.settings.step, len(states))
+            states[:, [*guided, *(4 + i for i in guided)]] = inputs[:, 2 : 2 + 2 * len(guided)]
 
     def _adaptive(self) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
         """Piecewise between the knots of the input, so that each piece is smooth."""
@@ -166,8 +166,7 @@ class Reference:
             y = solution.y[:, -1]
             steps, calls = steps + len(solution.t) - 1, calls + solution.nfev
         states[-1] = y
-        if self.assembly.mode == "pitch":
-            self._guide(states)
+        self._guide(states)
         return times, states, {"steps": steps, "force calls": calls}
 
     def _piece(self, start: float, end: float, y: np.ndarray):
@@ -196,15 +195,16 @@ class Reference:
             return lambda t: np.concatenate((middle[:2], self._at(t)[2:]))
         return self._at
 
-    def _moment(self, times: np.ndarray, states: np.ndarray) -> np.ndarray | None:
-        """Enforced moment A = I beta'' - cos(beta) (b f3 - a f4), below eq. (34)."""
-        if self.assembly.mode != "pitch" or self.assembly.input is None:
+    def _enforced(self, times: np.ndarray, states: np.ndarray) -> np.ndarray | None:
+        """Enforced moment A = I beta'' - cos(beta) (b f3 - a f4), below eq. (34), and force m3 (z3'' - g) + f3 + f4."""
+        guided = self.assembly.guided
+        if not guided or self.assembly.input is None:
             return None
-        p = self.assembly.parameters
+        inertia = np.array([self.assembly.parameters.m3, self.assembly.parameters.I])[-len(guided) :]
         free = derivative_of("force", *self._key[1:])
         inputs = self.assembly.input.sample(0.0, self.settings.step, len(times))
-        without = np.array([free(y, u[:2].copy(), self._p)[7] for y, u in zip(states, inputs, strict=True)])
-        return p.I * (inputs[:, 4] - without)
+        without = np.array([free(y, u[:2].copy(), self._p) for y, u in zip(states, inputs, strict=True)])
+        return inertia * (inputs[:, -len(guided) :] - without[:, [4 + i for i in guided]])
 
 
 _FIXED: dict[tuple, Any] = {}

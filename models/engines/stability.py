@@ -12,6 +12,7 @@ is stiffest: a tilt shortens the struts' arms. What is not linear is left to the
 """
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -25,8 +26,9 @@ if TYPE_CHECKING:
     from models.assembly import Assembly
     from models.engines.protocol import Settings
 
-Linear = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""M, D, K and the part of D that sits on single joints (tyres, pitch springs), (n, n) each."""
+Linear = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""M, D, K, the part of D that an engine knows of (no callbacks) and the part of that which sits on single joints
+(tyres, pitch springs), (n, n) each."""
 
 GROWTH = 2.0
 """How much a mode may grow over a run. Rounding moves the double eigenvalue 1 of a free vehicle by 1e-7,
@@ -51,19 +53,20 @@ def coefficients(integrator: str) -> list[float] | None:
     return None
 
 
-def linearised(vehicle: Vehicle, guided: bool) -> Linear:
-    """The vehicle's matrices about zero pitch; ``guided`` leaves the pitch out."""
+def linearised(vehicle: Vehicle, guided: Collection[int] = ()) -> Linear:
+    """The vehicle's matrices about zero pitch without ``guided`` coordinates, springs as beyond their dead bands."""
     grounded = tuple(strut for strut in vehicle.struts if strut.lower.body is None)
-    mass, damping, stiffness = matrices(vehicle)
-    joint = matrices(replace(vehicle, struts=grounded))[1]
-    kept = [i for i, (_, kind) in enumerate(vehicle.coordinates()) if not (guided and kind == "pitch")]
+    taut = tuple(replace(spring, dead_band=0.0) for spring in vehicle.pitch_springs)
+    mass, damping, stiffness = matrices(replace(vehicle, pitch_springs=taut))
+    native, joint = matrices(vehicle)[1], matrices(replace(vehicle, struts=grounded))[1]
+    kept = [i for i in range(len(mass)) if i not in guided]
     pick = np.ix_(kept, kept)
-    return mass[pick], damping[pick], stiffness[pick], joint[pick]
+    return mass[pick], damping[pick], stiffness[pick], native[pick], joint[pick]
 
 
 def first_order(linear: Linear) -> np.ndarray:
     """A (2n, 2n) of y' = A y, y = (q, q')."""
-    mass, damping, stiffness, _ = linear
+    mass, damping, stiffness, *_ = linear
     n = len(mass)
     inverse = np.diag(1 / mass.diagonal())
     return np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ damping]])
@@ -80,8 +83,8 @@ def step_matrix(integrator: str, step: float, linear: Linear) -> np.ndarray | No
         return _polynomial(polynomial, step * first_order(linear))
     if integrator == "VelocityVerlet":
         return _verlet(step, linear)
-    _, damping, _, joint = linear
-    implicit = {"Euler": joint, "implicit": _within_trees(damping), "implicitfast": np.diag(damping.diagonal())}
+    *_, native, joint = linear
+    implicit = {"Euler": joint, "implicit": _within_trees(native), "implicitfast": np.diag(native.diagonal())}
     return _semi_implicit(step, linear, implicit[integrator]) if integrator in implicit else None
 
 
@@ -109,7 +112,7 @@ def _verlet(step: float, linear: Linear) -> np.ndarray:
 
 def _semi_implicit(step: float, linear: Linear, implicit: np.ndarray) -> np.ndarray:
     """MuJoCo's single steps: velocities with part of the damping implicit, then positions with the new ones."""
-    mass, damping, stiffness, _ = linear
+    mass, damping, stiffness, *_ = linear
     n = len(mass)
     q, v = np.eye(2 * n)[:n], np.eye(2 * n)[n:]
     after = v - step * np.linalg.solve(mass + step * implicit, stiffness @ q + damping @ v)
@@ -149,7 +152,7 @@ def limit(integrator: str, step: float, duration: float, linear: Linear) -> floa
 
 def check_step(engine: str, assembly: "Assembly", settings: "Settings") -> None:
     """Refuse a step at which a mode of the vehicle would grow, naming the limit and the fastest pole."""
-    linear = linearised(assembly.vehicle, guided=assembly.mode == "pitch")
+    linear = linearised(assembly.vehicle, assembly.guided)
     grown = growth(settings.integrator, settings.step, settings.duration, linear)
     if grown <= math.log(GROWTH):
         return

@@ -47,11 +47,16 @@ class Strut:
 
 @dataclass(frozen=True)
 class PitchSpring:
-    """A rotational spring and damper between a body and the ground (N m/rad, N m s/rad)."""
+    """A rotational spring and damper between a body and the ground (N m/rad, N m s/rad).
+
+    Within ``dead_band`` (rad) to either side of zero pitch there is neither; beyond it the spring counts from the
+    band's edge, and the damper acts, so that the moment jumps by damping times rate at the edge.
+    """
 
     body: str
     stiffness: float
     damping: float
+    dead_band: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from models.vehicles.description import Point, Vehicle
 def matrices(vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """M, D, K of M q'' + D q' + K q = f, each (n, n) in the order of ``vehicle.coordinates()``.
 
-    Units kg, N s/m and N/m for heave rows; pitch rows are moments (N m). Gravity is not in K.
+    Units kg, N s/m and N/m for heave rows; pitch rows are moments (N m). Gravity is not in K, nor a spring with
+    a dead band, which is slack about zero pitch.
     """
     coordinates = vehicle.coordinates()
     inertias = {(body.name, "z"): body.mass for body in vehicle.bodies}
@@ -19,7 +20,7 @@ def matrices(vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         row = _vertical(strut.upper, coordinates) - _vertical(strut.lower, coordinates)
         damping += strut.damping * np.outer(row, row)
         stiffness += strut.stiffness * np.outer(row, row)
-    for spring in vehicle.pitch_springs:
+    for spring in (spring for spring in vehicle.pitch_springs if not spring.dead_band):
         at = coordinates.index((spring.body, "pitch"))
         damping[at, at] += spring.damping
         stiffness[at, at] += spring.stiffness

@@ -9,11 +9,22 @@ into a caller, which keeps them cacheable.
 | road | zeta1, zeta2, zeta1', zeta2' | (38) |
 | force | f1, f2 | (37) |
 | pitch | f1, f2, beta, beta', beta'' | (39) |
+| heave-pitch | f1, f2, z3, beta, z3', beta', z3'', beta'' | (39) without its row of the chassis |
 """
 
 import math
 
+import numpy as np
 from numba.extending import register_jitable
+
+from models.vehicles.description import Vehicle
+from models.vehicles.pitch_plane import Parameters
+
+
+def numbers(p: Parameters, vehicle: Vehicle) -> np.ndarray:
+    """What the compiled equations read: the parameters (15,), then stiffness, damping and dead band of each spring."""
+    springs = [(spring.stiffness, spring.damping, spring.dead_band) for spring in vehicle.pitch_springs]
+    return np.concatenate((p.array(), *springs))
 
 
 @register_jitable
@@ -109,6 +120,25 @@ def pitch_linear(y, u, p, dy):
     dy[7] = u[4]
 
 
+@register_jitable
+def heave_pitch_exact(y, u, p, dy):
+    """Two wheels under a chassis whose heave and pitch are prescribed, read from u."""
+    sine, cosine = math.sin(u[3]), math.cos(u[3])
+    y[2], y[3], y[6], y[7] = u[2], u[3], u[4], u[5]
+    f3, f4 = suspension(y, p, sine, cosine)
+    newton_euler(y, u[0], u[1], f3, f4, cosine, p, dy)
+    dy[6], dy[7] = u[6], u[7]
+
+
+@register_jitable
+def heave_pitch_linear(y, u, p, dy):
+    """The same, linearised about zero pitch."""
+    y[2], y[3], y[6], y[7] = u[2], u[3], u[4], u[5]
+    f3, f4 = suspension(y, p, u[3], 1.0)
+    newton_euler(y, u[0], u[1], f3, f4, 1.0, p, dy)
+    dy[6], dy[7] = u[6], u[7]
+
+
 RIGHT_HAND_SIDES = {
     ("road", "exact"): road_exact,
     ("road", "linear"): road_linear,
@@ -117,15 +147,19 @@ RIGHT_HAND_SIDES = {
     ("force-body", "exact"): force_body,
     ("pitch", "exact"): pitch_exact,
     ("pitch", "linear"): pitch_linear,
+    ("heave-pitch", "exact"): heave_pitch_exact,
+    ("heave-pitch", "linear"): heave_pitch_linear,
 }
 """By mode and geometry; linearised, a body-fixed force is a vertical one."""
 
 
 @register_jitable
 def pitch_springs(y, u, p, dy):
-    """Rotational springs and dampers to the ground: from p[15] on, N m/rad and N m s/rad of each."""
-    for i in range(15, len(p), 2):
-        dy[7] -= (p[i] * y[3] + p[i + 1] * y[7]) / p[5]
+    """Rotational springs and dampers to the ground: from p[15] on, N m/rad, N m s/rad and dead band (rad) of each."""
+    for i in range(15, len(p), 3):
+        beyond = abs(y[3]) - p[i + 2]
+        if beyond >= 0.0:
+            dy[7] -= (p[i] * math.copysign(beyond, y[3]) + p[i + 1] * y[7]) / p[5]
 
 
 @register_jitable

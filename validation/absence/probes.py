@@ -53,8 +53,8 @@ def probe(table: Mapping[str, Any], folder: str = ".", **options: Any) -> dict[s
 def belongs_to_effects(module: str) -> bool:
     """Whether a module exists for the sake of an effect: none of these may be imported for a bare scene."""
     owners = ("models.effects.", "models.road", "models.contact", "models.tyre", "models.brake", "models.sensors",
-              "models.time_series", "models.tables", "models.engines.mujoco_callback", "models.engines.mujoco_layout",
-              "pyopencrg")  # fmt: skip
+              "models.time_series", "models.tables", "models.prescribed", "models.engines.mujoco_callback",
+              "models.engines.mujoco_layout", "pyopencrg")  # fmt: skip
     return module.startswith(owners)
 
 

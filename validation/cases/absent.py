@@ -43,10 +43,15 @@ PRICED: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, dict[str, int]
     "gyro": ({}, {"sampling_rate": 200.0, "deviation": 0.1}, {"all": {"channels": 1}}),
     "gyro_bias": ({"gyro": {"sampling_rate": 200.0, "deviation": 0.1}}, {"turn_on": 1.0}, {"all": {"channels": 1}}),
     "pitch_sensor": ({}, {"sampling_rate": 200.0, "deviation": 0.01}, {"all": {"channels": 1}}),
+    "high_pass": (FORCES, {"cut_off": 0.5}, {"exudyn": {"native items": 1}, "mujoco": {"native items": 1}}),
     "prescribed_pitch": (LINEAR, {"file": "pitch.csv"},
                          {"reference": {"degrees of freedom": -1}, "exudyn": {"native items": 1, "callbacks": 2},
                           "mujoco": {"degrees of freedom": -1},
                           "all": {"channels": 2}}),
+    "prescribed_heave_and_pitch": (LINEAR, {"file": "motion.csv"},
+                                   {"reference": {"degrees of freedom": -2},
+                                    "exudyn": {"native items": 2, "callbacks": 4},
+                                    "mujoco": {"degrees of freedom": -2}, "all": {"channels": 3}}),
 }  # fmt: skip
 """Effect -> the effects that it is added to, what the scene says of it, and what it must change: nothing else.
 
@@ -57,7 +62,7 @@ before; held forces take one callback before each of Exudyn's steps beside one p
 
 def scene(effects: dict[str, Any], steps: int, folder: Path, guided: bool = False) -> Scene:
     """The asymmetric vehicle with some effects, released from a tilted start."""
-    start = {name: value for name, value in START.items() if not guided or name != "pitch"}
+    start = {} if guided else START
     return build_scene({
         "title": TITLE, "vehicle": {"parameters": "asymmetric_twin"}, "run": {"duration": steps * STEP, "step": STEP},
         "start": start, "effects": effects, "engines": {"exudyn": GUIDED} if guided else {},
@@ -69,7 +74,9 @@ def write_files(folder: Path) -> None:
     t = STEP * np.arange(2001)
     wave = np.sin(np.pi * t) ** 2
     write_time_series(folder / "forces.csv", {"front": ("N", 4e3 + 300 * wave), "rear": ("N", 3e3 - 200 * wave)}, STEP)
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", 0.02 * wave)}, STEP)
+    pitch = {"pitch": ("rad", 0.02 * wave)}
+    write_time_series(folder / "pitch.csv", pitch, STEP)
+    write_time_series(folder / "motion.csv", {"z3": ("m", 0.06 + 0.01 * wave), **pitch}, STEP)
 
 
 def model(own: Scene, engine: str) -> Model:
@@ -80,7 +87,7 @@ def model(own: Scene, engine: str) -> Model:
 def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
     """The same scene without and with one effect."""
     base, values, _ = PRICED[effect]
-    guided = effect == "prescribed_pitch"
+    guided = effect.startswith("prescribed")
     return scene(base, steps, folder, guided), scene({**base, effect: values}, steps, folder, guided)
 
 
@@ -88,7 +95,7 @@ def counts(own: Scene, engine: str) -> dict[str, int]:
     """What a scene builds in an engine, and how many channels it saves."""
     assembly = assemble(own)
     built = build(engine, assembly, settings_of(own, engine))
-    return {**built.plan(), "channels": len(outputs(assembly, built.run()))}
+    return {**built.plan(), "channels": len(outputs(assembly, built.run(), built))}
 
 
 def change(effect: str, engine: str, folder: Path) -> dict[str, int]:
@@ -217,7 +224,7 @@ def _job(own: Scene, engine: str) -> Any:
     """A run with its channels, built beforehand."""
     assembly = assemble(own)
     built = build(engine, assembly, settings_of(own, engine))
-    return lambda: outputs(assembly, built.run())
+    return lambda: outputs(assembly, built.run(), built)
 
 
 def tables(data: dict[str, Any]) -> list[Table]:

@@ -162,7 +162,7 @@ def _ringing(folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _inconsistent(scene: Scene, settings: Settings) -> np.ndarray:
     """Exudyn's multiplier (n,) as it comes when nobody sets its initial accelerations."""
     model: Any = build("exudyn", assemble(scene), settings)
-    model._first_moment = 0.0
+    model._first = 0.0
     model._consistent_start = lambda options: None
     found = model.run().moment
     assert found is not None

@@ -1,4 +1,4 @@
-"""The bench on which an engine is judged with and without a fault: one vehicle in five small situations.
+"""The bench on which an engine is judged with and without a fault: one vehicle in seven small situations.
 
 Inputs are closed forms that start at rest in the static equilibrium, with different frequencies front
 and rear, so that nothing cancels by accident. Forces are sampled at 500 Hz and stepped at 1 kHz: a sample
@@ -17,6 +17,7 @@ from models.errors import InputError, RunFailed
 from models.scene import Scene
 from models.scene import build as build_scene
 from models.signals import Sampled, Smooth, Stacked
+from models.vehicles.description import PitchSpring
 from validation import checks
 from validation.checks import Make
 
@@ -71,6 +72,22 @@ class Bench:
         pitch = Smooth((start[3] + 0.05 * self._swell(7.0))[:, None], PERIOD, derivatives=2, degree=5)
         forces = Smooth(self._forces(), PERIOD)
         return self.road.without_tyres().with_input("pitch", Stacked((forces, pitch)))
+
+    @cached_property
+    def on_rails(self) -> Assembly:
+        """Under wheel forces, with heave and pitch prescribed."""
+        start = self.road.initial
+        motion = start[2:4] + np.column_stack([0.01 * self._swell(9.0), 0.05 * self._swell(7.0)])
+        parts = (Smooth(self._forces(), PERIOD), Smooth(motion, PERIOD, derivatives=2, degree=5))
+        return self.road.without_tyres().with_input("heave-pitch", Stacked(parts))
+
+    @cached_property
+    def stabilised(self) -> Assembly:
+        """Under held wheel forces, with an added moment and a spring whose dead band the pitch leaves."""
+        moment = Sampled(3e3 * self._swell(31.0)[:, None], PERIOD, held=False)
+        spring = PitchSpring("chassis", 5e4, 500.0, 2e-3)
+        vehicle = replace(self.held.vehicle, pitch_springs=(spring,))
+        return replace(self.held, vehicle=vehicle).with_moment(moment)
 
     @cached_property
     def truth(self) -> Trajectory:
@@ -131,9 +148,11 @@ def _momentum(bench: Bench, engine: str, make: Make) -> float:
     return max(checks.momentum_gap(make, assembly, bench.settings(engine)) for assembly in (bench.linear, bench.held))
 
 
-def _moment(bench: Bench, engine: str, make: Make) -> float:
-    own = replace(bench.settings(engine), integrator=CONSTRAINED[engine], step=STEP / 2)
-    return checks.moment_gap(make, bench.guided, own)
+def _enforced(situation: str) -> Callable[[Bench, str, Make], float]:
+    """How far enforced moment and force are from the eliminated form."""
+    return lambda bench, engine, make: checks.enforced_gap(
+        make, getattr(bench, situation),
+        replace(bench.settings(engine), integrator=CONSTRAINED[engine], step=STEP / 2))  # fmt: skip
 
 
 def _twin(situation: str) -> Callable[[Bench, str, Make], float]:
@@ -151,6 +170,8 @@ CHECKS: dict[str, Check] = {
     "road twin": Check("path on the road", "SI", _rounding, "same tableau, same step: rounding", _twin("road")),
     "linear twin": Check("path under linear forces", "SI", _rounding, "the same", _twin("linear")),
     "held twin": Check("path under held forces", "SI", _rounding, "the same", _twin("held")),
+    "stabilised twin": Check("path with an added moment and a dead band", "SI", _rounding, "the same",
+                             _twin("stabilised")),
     "order": Check("observed order against the declared one", "", lambda engine: 0.15,
                    "the stiff wheels still bend it by 0.06 at these steps", _order),
     "equilibrium": Check("drift off the static equilibrium", "SI", _rounding, "the closed form is exact",
@@ -159,7 +180,10 @@ CHECKS: dict[str, Check] = {
                       "Runge-Kutta integrates such forces exactly", _momentum),
     "moment": Check("enforced moment against the eliminated form", "of its rms",
                     lambda engine: 1e-4 if engine == "exudyn" else ROUNDING,
-                    "generalised-alpha at 0.5 ms leaves 4e-5; MuJoCo's inverse dynamics is exact", _moment),
+                    "generalised-alpha at 0.5 ms leaves 4e-5; MuJoCo's inverse dynamics is exact",
+                    _enforced("guided")),
+    "rails": Check("enforced force and moment against the eliminated form", "of their rms",
+                   lambda engine: 1e-4 if engine == "exudyn" else ROUNDING, "the same", _enforced("on_rails")),
 }  # fmt: skip
 """What every fault is put to, in the order of the table."""
 

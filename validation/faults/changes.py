@@ -8,7 +8,7 @@ import numpy as np
 
 from models.assembly import Assembly
 from models.road.iso8608 import iso8608_road
-from models.vehicles.description import Body, Point, Strut, Vehicle
+from models.vehicles.description import Body, PitchSpring, Point, Strut, Vehicle
 
 Change = Callable[[Assembly], Assembly]
 
@@ -191,9 +191,26 @@ def times(factors: dict[int, float]) -> Values:
     return change
 
 
+def springs(change: Callable[[PitchSpring], PitchSpring]) -> Change:
+    """Every pitch spring replaced."""
+    return vehicle(lambda own: replace(own, pitch_springs=tuple(change(spring) for spring in own.pitch_springs)))
+
+
 def front_twice(values: np.ndarray) -> np.ndarray:
     """The rear channel filled from the front one."""
     return values[:, [0, 0, *range(2, values.shape[1])]]
+
+
+def moment(periods: float, change: Values = lambda values: values) -> Change:
+    """The added moment late by a part of its sampling period, and its values changed."""
+
+    def changed(assembly: Assembly) -> Assembly:
+        signal = assembly.moment
+        if signal is None:
+            return assembly
+        return replace(assembly, moment=Altered(signal, periods * (signal.period or 0.0), change))
+
+    return changed
 
 
 def late(periods: float, step: float = 1e-3) -> Change:

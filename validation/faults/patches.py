@@ -95,8 +95,8 @@ def weightless_wheel(original: Any) -> Any:
 def turning_reference(original: Any) -> Any:
     """Struts measured along the axis of the chassis: the reference site sits on the body that rotates."""
 
-    def suspension(spec: Any, vehicle: Any, strut: Any, guided: bool) -> None:
-        original(spec, vehicle, strut, guided)
+    def suspension(spec: Any, vehicle: Any, strut: Any, joints: Any) -> None:
+        original(spec, vehicle, strut, joints)
         own = spec.actuator(strut.name)
         own.target, own.refsite = own.refsite, own.target
 
@@ -108,7 +108,7 @@ def misprinted_row(original: Any) -> Any:
 
     def guidance(*arguments: Any) -> np.ndarray:
         forces = original(*arguments)
-        forces[:, 2] *= -1.0
+        forces[:, 2:] *= -1.0
         return forces
 
     return guidance

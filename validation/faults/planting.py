@@ -94,6 +94,8 @@ DESCRIPTION = (
     Fault("gravity upward", BOTH, change.vehicle(lambda v: replace(v, gravity=-v.gravity))),
     Fault("gravity 9.80665 for 9.81", BOTH, change.vehicle(lambda v: replace(v, gravity=9.80665))),
     Fault("start from zero heave", BOTH, change.unstressed_start),
+    Fault("dead band missing", BOTH, change.springs(lambda spring: replace(spring, dead_band=0.0))),
+    Fault("dead band counted as a width", BOTH, change.springs(lambda s: replace(s, dead_band=s.dead_band / 2))),
 )
 """In the description that an engine is built from."""
 
@@ -113,6 +115,11 @@ INPUT = (
     Fault("prescribed pitch in degrees", BOTH, change.channels(
         ("pitch",), change.times(dict.fromkeys((2, 3, 4), 180 / math.pi)))),
     Fault("rate of the prescribed pitch missing", MUJOCO, change.channels(("pitch",), change.times({3: 0.0}))),
+    Fault("rate of the prescribed heave missing", MUJOCO, change.channels(("heave-pitch",), change.times({4: 0.0}))),
+    Fault("prescribed heave upward", BOTH, change.channels(
+        ("heave-pitch",), change.times(dict.fromkeys((2, 4, 6), -1.0)))),
+    Fault("added moment with the other sign", BOTH, change.moment(0.0, change.times({0: -1.0}))),
+    Fault("added moment half a sample late", BOTH, change.moment(0.5)),
     Fault("Euler where Runge-Kutta was asked for", BOTH, settings=_euler),
 )  # fmt: skip
 """In the input or the settings that an engine is run with."""

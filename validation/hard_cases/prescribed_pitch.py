@@ -93,7 +93,7 @@ def soft_naive(folder: Path) -> str:
 def _soft_error(step: float) -> float:
     """Rms error (N m) of the moment of a soft equality constraint on the pitch joint."""
     assembly, count = scene(), round(DURATION / step)
-    spec = _spec(assembly.vehicle, setups.settings("mujoco", step, DURATION, "Euler"), False)
+    spec = _spec(assembly.vehicle, setups.settings("mujoco", step, DURATION, "Euler"))
     spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1="chassis pitch", name2="", data=[0.0] * 12)
     model = spec.compile()
@@ -120,20 +120,20 @@ def undamped_multiplier(engine: str, folder: Path) -> float:
 class AsItComes(exudyn_engine.ExudynModel):
     """Exudyn without our checks of its multiplier."""
 
-    def _balance(self, time: float, state: np.ndarray) -> tuple[float, float]:
-        return self._multiplier[round(time / self.settings.step)], 0.0
+    def _balance(self, time: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self._found[round(time / self.settings.step)], np.zeros(1)
 
     def _enforced(self) -> np.ndarray | None:
-        moment = super()._enforced()
-        self._multiplier = np.zeros(0) if moment is None else moment
-        return moment
+        enforced = super()._enforced()
+        self._found = np.zeros((0, 1)) if enforced is None else enforced
+        return enforced
 
 
 class Inconsistent(AsItComes):
     """The same with its own start: the constraint's acceleration is not among the initial values."""
 
     def _consistent_start(self, options: object) -> None:
-        self._first_moment = 0.0
+        self._first = np.zeros(1)
 
 
 def as_it_comes(assembly: Assembly, step: float, integrator: str = "GeneralizedAlpha") -> Trajectory:

@@ -148,7 +148,7 @@ def noise_adaptive_naive(folder: Path) -> str:
     base = setups.vehicle(geometry="linear")
     forces = setups.static_forces(base, 200, 1e-3, noise=500.0)
     driven = setups.driven(base, forces)
-    linear = linearised(driven.vehicle, guided=False)
+    linear = linearised(driven.vehicle)
     a, masses, g = first_order(linear), linear[0].diagonal(), base.parameters.g
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:

@@ -83,7 +83,7 @@ def exact(assembly: Assembly, step: float, count: int, forces: np.ndarray | None
 
     forces (count, 2) in N are held over each step; None is the vehicle on the flat road.
     """
-    linear = linearised(assembly.vehicle, guided=False)
+    linear = linearised(assembly.vehicle)
     push = np.zeros((count, 4))
     push[:, :3] = [body.mass * assembly.vehicle.gravity for body in assembly.vehicle.bodies]
     if forces is not None:
@@ -100,7 +100,7 @@ def exact(assembly: Assembly, step: float, count: int, forces: np.ndarray | None
 
 def exact_decay(assembly: Assembly, times: np.ndarray) -> np.ndarray:
     """States (n, 8) of the linearised vehicle on the flat road at any times (n,) in s."""
-    poles, shapes = np.linalg.eig(first_order(linearised(assembly.vehicle, guided=False)))
+    poles, shapes = np.linalg.eig(first_order(linearised(assembly.vehicle)))
     rest = vehicle(geometry="linear").initial
     shares = np.linalg.solve(shapes, assembly.initial - rest)
     return rest + ((np.exp(np.outer(times, poles)) * shares) @ shapes.T).real
