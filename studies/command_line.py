@@ -25,6 +25,9 @@ Changes = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key, e.g. run.step=5e-4; repeatable.")
 ]
 Out = Annotated[Path | None, typer.Option(help="Folder for the results; it must be new or empty.")]
+Resume = Annotated[
+    Path | None, typer.Option(help="Folder of a killed run that keeps finished blocks (ensemble): go on with it.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON and nothing else.")]
 
 
@@ -91,12 +94,13 @@ def run(
     scene: SceneName,
     engine: Annotated[str, typer.Option(help="exudyn, mujoco, reference or all")] = "all",
     out: Out = None,
+    resume: Resume = None,
     changes: Changes = None,
     as_json: AsJson = False,
 ) -> None:
     """Run a scene and save its results and figures."""
     loaded = _load(scene, changes)
-    _finish(loaded, _engines(engine), out, as_json)
+    _finish(loaded, _engines(engine), out, resume, as_json)
 
 
 @app.command()
@@ -136,16 +140,16 @@ def _engines(name: str) -> tuple[str, ...]:
     return (name,)
 
 
-def _finish(scene: Any, engines: tuple[str, ...], out: Path | None, as_json: bool) -> None:
+def _finish(scene: Any, engines: tuple[str, ...], out: Path | None, resume: Path | None, as_json: bool) -> None:
     """Check everything, then run the scene's study with a progress bar and print its summary."""
     from models.plan import check
-    from studies.folders import drop_if_empty, new_folder
+    from studies.folders import drop_if_empty
 
     module = _study(scene)
     check(scene, engines)
     if hasattr(module, "check"):
         module.check(scene, engines)
-    folder = new_folder(out, Path(scene.file).stem)
+    folder = _folder(module, scene, out, resume)
     try:
         with _progress(as_json) as progress:
             summary = module.run(scene, engines, folder, progress)
@@ -159,6 +163,20 @@ def _finish(scene: Any, engines: tuple[str, ...], out: Path | None, as_json: boo
         _print(summary)
     if summary.get("failed"):
         sys.exit(1)
+
+
+def _folder(module: Any, scene: Any, out: Path | None, resume: Path | None) -> Path:
+    """Where the results go: a new folder, or that of a killed run whose study keeps finished blocks."""
+    from models.errors import InputError
+    from studies.folders import new_folder, resumed_folder
+
+    if resume is None:
+        return new_folder(out, Path(scene.file).stem)
+    if out is not None:
+        raise InputError("--resume", "", str(resume), "goes on in its own folder: leave out --out")
+    if not hasattr(module, "BLOCKS"):
+        raise InputError("--resume", "", str(resume), f"the study {scene.study!r} keeps nothing that can be resumed")
+    return resumed_folder(resume, module.BLOCKS)
 
 
 def _study(scene: Any) -> Any:
@@ -178,7 +196,7 @@ def _study(scene: Any) -> Any:
     return module
 
 
-NOT_STUDIES = ("__init__", "command_line", "figures", "folders", "virtual_measurement")
+NOT_STUDIES = ("__init__", "command_line", "figures", "folders", "stabiliser_figures", "virtual_measurement")
 
 
 @contextmanager

@@ -34,6 +34,14 @@ def new_folder(wanted: Path | None, name: str) -> Path:
     return wanted
 
 
+def resumed_folder(wanted: Path, blocks: str) -> Path:
+    """The folder of an earlier run, which must hold finished work in its folder ``blocks``; else InputError."""
+    if not (wanted / blocks).is_dir():
+        allowed = f"holds no unfinished run: name a folder with {blocks!r} in it, or leave out --resume"
+        raise InputError("--resume", "", str(wanted), allowed)
+    return wanted
+
+
 def _marked(folder: Path) -> bool:
     """Put the command into the folder as its first file; False if another run was faster."""
     try:

@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 
 from models.engines.protocol import Trajectory, build, guard
-from models.ensemble.paths import NoisePaths
+from models.ensemble.paths import DRIFT, NoisePaths, noise_paths
+from models.ensemble.store import Arrays
 from models.errors import InputError, RunFailed
+from models.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -62,3 +64,22 @@ class MujocoThreads(NoisePaths):
     def facts(self) -> dict[str, Any]:
         """As of all noise paths."""
         return {**super().facts(), "way": "threads"}
+
+
+def mujoco_threads(scene: Scene, times: np.ndarray, truth: np.ndarray | None = None, threshold: float = DRIFT,
+                   threads: int = 2) -> MujocoThreads:  # fmt: skip
+    """The job of ``noise_paths`` in MuJoCo's threads."""
+    return MujocoThreads(**vars(noise_paths(scene, times, truth, threshold, "mujoco")), threads=threads)
+
+
+def gap(reference: Arrays, other: Arrays, times: np.ndarray) -> float:
+    """Largest difference of any state before both paths' drift-off, by the reference's largest state there.
+
+    reference, other : arrays of ``NoisePaths`` of which the second may hold fewer paths; times (rows,) in s. After
+    drift-off a rounding error is as large as the run, and no comparison says anything.
+    """
+    count = len(other["states"])
+    until = np.minimum(reference["drift_off"][:count], other["drift_off"])
+    one = np.where((times < until[:, None])[:, :, None], reference["states"][:count], 0.0)
+    two = np.where((times < until[:, None])[:, :, None], other["states"], 0.0)
+    return float(np.abs(one - two).max() / np.abs(one).max())

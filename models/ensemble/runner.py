@@ -88,8 +88,8 @@ class _Memory:
         return self.blocks.pop(block)
 
 
-def run(job: Job, paths: int, folder: Path | None = None, executor: Executor | None = None, block: int = BLOCK,
-        progress: Callable[[Progress], None] = lambda state: None) -> Arrays:  # fmt: skip
+def run_paths(job: Job, paths: int, folder: Path | None = None, executor: Executor | None = None,
+              block: int = BLOCK, progress: Callable[[Progress], None] = lambda state: None) -> Arrays:  # fmt: skip
     """Arrays of all paths 0 to ``paths`` - 1, the same bits on any executor, in any order and after any interruption.
 
     folder : keeps every finished block; one that holds blocks of the same job is resumed, one of another job is

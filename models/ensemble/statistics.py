@@ -1,0 +1,34 @@
+"""Statistics of an ensemble with their own errors."""
+
+import math
+
+import numpy as np
+
+ERRORS_95 = 1.959964
+"""Standard errors on either side of a 95 % interval."""
+
+
+def deviation(values: np.ndarray) -> tuple[float, float]:
+    """Standard deviation of values (n,) and its standard error, for any law of finite fourth moment.
+
+    By Var(s^2) = (mu4 - sigma^4) / n to first order; 1/sqrt(2 n) of it for a normal law. Not a number if any
+    value is none.
+    """
+    centred = values - values.mean()
+    second, fourth = np.mean(centred**2), np.mean(centred**4)
+    spread = math.sqrt(second * len(values) / (len(values) - 1))
+    if spread == 0.0:
+        return 0.0, 0.0
+    return spread, math.sqrt(max(fourth - second**2, 0.0) / len(values)) / (2 * math.sqrt(second))
+
+
+def quantile(values: np.ndarray, level: float) -> tuple[float, float, float]:
+    """Quantile of values (n,), some of which may be infinite, and the ends of its 95 % interval.
+
+    Order statistics, so no law is assumed; the ranks of the interval by the normal limit of the binomial.
+    """
+    ordered, count = np.sort(values), len(values)
+    half = ERRORS_95 * math.sqrt(count * level * (1 - level))
+    ranks = (math.ceil(count * level) - 1, math.floor(count * level - half) - 1, math.ceil(count * level + half) - 1)
+    found = [float(ordered[min(max(rank, 0), count - 1)]) for rank in ranks]
+    return found[0], found[1], found[2]

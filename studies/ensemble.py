@@ -1,0 +1,201 @@
+"""How noisy forces scatter the run of a vehicle: thousands of noise paths, when they drift off, how wide they spread.
+
+A virtual measurement on a road gives wheel forces; every path is driven by them with its own white noise. Finished
+blocks of paths are kept in the folder ``blocks``, so that ``twinrig run ensemble --resume FOLDER`` goes on with a run
+that was killed, to the same bits. Each other engine repeats the first paths on the same noise samples.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.engines.catalogue import CATALOGUE
+from models.ensemble.engines import gap, mujoco_threads
+from models.ensemble.paths import NoisePaths, noise_paths
+from models.ensemble.runner import Progress as Done
+from models.ensemble.runner import processes, run_paths
+from models.ensemble.statistics import deviation, quantile
+from models.ensemble.store import Arrays
+from models.errors import InputError
+from models.result import Result, provenance
+from models.scene import Scene
+from models.simulate import state_names
+from models.steps import divides
+from models.strict import Strict, quantity, read
+from studies.virtual_measurement import check_road, follower, measure, stride, write_measurement
+
+Progress = Callable[[str, float], None]
+
+BLOCKS = "blocks"
+"""Folder of the finished blocks, within that of the results; a study that has one can be resumed."""
+QUANTILES = (0.05, 0.5, 0.95)
+FAN = (5, 25, 50, 75, 95)
+"""Percentiles of the figure."""
+
+
+class Options(Strict):
+    """[options] of this study."""
+
+    paths: int = Field(500, ge=2, le=1_000_000, description="number of noise paths in the reference")
+    engine_paths: int = Field(4, ge=1, le=10_000, description="number of the first paths that other engines repeat")
+    seed: int = Field(1, ge=0, lt=2**64, description="seed of the noise")
+    workers: int = Field(2, ge=1, le=256, description="processes that compute; the results do not depend on it")
+    rows: float = quantity("s", "spacing of the saved states", default=0.5)
+    times: list[float] = Field([1.0, 2.0, 5.0, 10.0, 15.0], description="times (s) of the table, on saved rows")
+    threshold: float = quantity("rad", "pitch error at which a path has drifted off", default=0.05)
+    sampling_rate: float = quantity("Hz", "rate at which forces are measured", default=1000.0)
+    noise_fraction: float = quantity("", "standard deviation of the noise by the largest force", default=0.002)
+
+
+def check(scene: Scene, engines: tuple[str, ...]) -> None:
+    """Refuse, before anything is written, a scene that this study cannot follow."""
+    options = read(Options, scene.options, scene.file, "options")
+    check_road(scene, engines, options.sampling_rate)
+    for engine in {"reference", *engines}:
+        settings = scene.settings(engine)
+        if CATALOGUE[engine][str(settings.integrator)].adaptive or settings.step != scene.run.step:
+            raise InputError(scene.file, f"engines.{engine}", None, "an ensemble compares states at the fixed steps of "
+                             "run.step: name no adaptive integrator and no other step")
+    if not (divides(scene.run.step, options.rows) and divides(options.rows, scene.run.duration)):
+        allowed = f"must be a multiple of run.step = {scene.run.step:g} s and divide run.duration"
+        raise InputError(scene.file, "options.rows", options.rows, allowed)
+    for time in options.times:
+        if not 0 < time <= scene.run.duration or not divides(options.rows, time):
+            allowed = f"each must be a multiple of options.rows = {options.rows:g} s within the run"
+            raise InputError(scene.file, "options.times", time, allowed)
+
+
+def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """All paths in the reference, the first ones in the other engines; saves ``ensemble.nc``, table and figure."""
+    check(scene, engines)
+    options = read(Options, scene.options, scene.file, "options")
+    measured = measure(scene)
+    every = stride(scene, options.sampling_rate)
+    times = options.rows * np.arange(round(scene.run.duration / options.rows) + 1)
+
+    def tell(done: Done) -> None:
+        progress(f"reference: {done}", done.done / done.paths)
+
+    with TemporaryDirectory() as name, processes(options.workers) as pool:
+        noisy = _noisy(scene, options, measured, every, Path(name))
+        truth = measured["pitch"]
+        job = noise_paths(noisy, times, truth, options.threshold)
+        found = run_paths(job, options.paths, folder / BLOCKS, pool, progress=tell)
+        gaps = {}
+        for engine in (engine for engine in engines if engine != "reference"):
+            progress(f"{engine}: {options.engine_paths} of the same paths", 1.0)
+            gaps[engine] = gap(found, _in_engine(engine, noisy, times, truth, options, pool), times)
+    write_measurement(measured, options.sampling_rate, every, folder)
+    true = measured.states[np.rint(times / scene.run.step).astype(int)]
+    _save(folder, scene, job, times, found)
+    rows = _rows(options, times, found["states"] - true)
+    table = text(options, scene, rows, found, gaps)
+    (folder / "table.txt").write_text("\n".join(table) + "\n")
+    _figure(times, found["states"][:, :, 3] - true[:, 3], found["drift_off"], options, folder)
+    return {"scene": scene.title, "folder": str(folder), "paths": options.paths, "rows": rows, "gaps": gaps,
+            "failed": {}, "table": table}  # fmt: skip
+
+
+def _noisy(scene: Scene, options: Options, measured: Result, every: int, folder: Path) -> Scene:
+    """The force-excited scene of all paths; its forces lie in ``folder``."""
+    largest = write_measurement(measured, options.sampling_rate, every, folder)
+    noise = {"deviation": options.noise_fraction * largest, "seed": options.seed}
+    return follower(scene, folder)({}, {"force_noise": noise})
+
+
+def _in_engine(engine: str, noisy: Scene, times: np.ndarray, truth: np.ndarray, options: Options, pool: Any) -> Arrays:
+    """The first paths in MuJoCo's threads, or in processes."""
+    if engine == "mujoco":
+        threads = mujoco_threads(noisy, times, truth, options.threshold, options.workers)
+        return run_paths(threads, options.engine_paths)
+    return run_paths(noise_paths(noisy, times, truth, options.threshold, engine), options.engine_paths, executor=pool,
+                     block=1)  # fmt: skip
+
+
+def _save(folder: Path, scene: Scene, job: NoisePaths, times: np.ndarray, found: Arrays) -> None:
+    """All saved states and drift-off times, labelled."""
+    import json
+
+    import xarray as xr
+
+    data = xr.Dataset(
+        {"states": (("path", "time", "state"), found["states"], {"units": "m, rad, m/s, rad/s"}),
+         "drift_off": ("path", found["drift_off"], {"units": "s", "long_name": "drift-off, infinite if never"}),
+         "failed": ("path", found["failed"], {"units": "s", "long_name": "last good time of a path that failed"})},
+        coords={"time": ("time", times, {"units": "s"}), "state": list(state_names())},
+    )  # fmt: skip
+    data.attrs = {"title": scene.title, "threshold": job.threshold, "scene_table": json.dumps(job.base.scene.table()),
+                  "provenance": json.dumps(provenance())}  # fmt: skip
+    Result(data).save(folder / "ensemble.nc")
+
+
+def _rows(options: Options, times: np.ndarray, errors: np.ndarray) -> list[dict[str, float]]:
+    """Standard deviation and its standard error of pitch and heave at the asked times."""
+    rows = []
+    for time in options.times:
+        row = round(time / options.rows)
+        (pitch, pitch_error), (heave, heave_error) = deviation(errors[:, row, 3]), deviation(errors[:, row, 2])
+        rows.append({"time": float(times[row]), "pitch": pitch, "pitch error": pitch_error, "heave": heave,
+                     "heave error": heave_error})  # fmt: skip
+    return rows
+
+
+def text(options: Options, scene: Scene, rows: list[dict[str, float]], found: Arrays,
+         gaps: dict[str, float]) -> list[str]:  # fmt: skip
+    """The table as lines of text."""
+    lines = [f"  {options.paths} paths of {scene.run.duration:g} s, forces at {options.sampling_rate:g} Hz, noise "
+             f"{100 * options.noise_fraction:g} % of the largest force",
+             "  time [s]   sd of pitch [rad]         sd of heave [m]"]  # fmt: skip
+    lines += [f"  {row['time']:8g}   {row['pitch']:.3e} +- {row['pitch error']:.0e}   "
+              f"{row['heave']:.3e} +- {row['heave error']:.0e}" for row in rows]  # fmt: skip
+    lines.append(f"  Drift-off ({options.threshold:g} rad), quantiles with their 95 % intervals [s]")
+    for level in QUANTILES:
+        value, low, high = quantile(found["drift_off"], level)
+        lines.append(f"  {100 * level:7g} %   {_time(value)}   ({_time(low)} to {_time(high)})")
+    lost = int(np.isfinite(found["failed"]).sum())
+    lines += [f"  {lost} paths left all bounds and count as drifted off by then"] if lost else []
+    lines += [f"  {engine}: {options.engine_paths} of these paths differ by at most {worst:.0e} of the largest state "
+              "before drift-off" for engine, worst in gaps.items()]  # fmt: skip
+    return lines
+
+
+def _time(value: float) -> str:
+    return f"{value:.2f}" if np.isfinite(value) else "never"
+
+
+def _figure(times: np.ndarray, errors: np.ndarray, drift_off: np.ndarray, options: Options, folder: Path) -> None:
+    """Percentiles of the pitch error over time, and a histogram of the drift-off times."""
+    from studies.figures import plt, save
+
+    figure, (fan, histogram) = plt.subplots(1, 2, figsize=(10, 3.8), width_ratios=(3, 2))
+    low, quarter, middle, three, high = np.nanpercentile(np.abs(errors[:, 1:]), FAN, axis=0)
+    fan.fill_between(times[1:], low, high, alpha=0.2, color="C0", linewidth=0, label="5 to 95 %")
+    fan.fill_between(times[1:], quarter, three, alpha=0.4, color="C0", linewidth=0, label="25 to 75 %")
+    fan.semilogy(times[1:], middle, color="C0", label="median")
+    fan.axhline(options.threshold, color="black", linestyle="--", linewidth=0.8,
+                label=f"drift-off, {options.threshold:g} rad")
+    fan.set_title("magnitude of the pitch error [rad]")
+    fan.legend(loc="lower right")
+    drifted = drift_off[np.isfinite(drift_off)]
+    histogram.hist(drifted, bins=40, color="C0", alpha=0.6)
+    for level, style in zip(QUANTILES, (":", "-", ":"), strict=True):
+        value = quantile(drift_off, level)[0]
+        if np.isfinite(value):
+            histogram.axvline(value, color="black", linestyle=style, label=f"{100 * level:g} %: {value:.1f} s")
+    histogram.set_title(f"drift-off time, paths ({len(drift_off) - len(drifted)} never drift off)")
+    if len(drifted):
+        histogram.legend()
+    for axis in (fan, histogram):
+        axis.set_xlabel("time [s]")
+    figure.suptitle(f"{options.paths} noise paths of one measured run", x=0.01, ha="left", fontweight="bold")
+    save(figure, folder / "ensemble.png")
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("ensemble")
