@@ -102,7 +102,7 @@ class Scene(Strict):
         return given.model_copy(update={"integrator": name, "step": given.step or self.run.step})
 
     def _constrained(self, engine: str) -> bool:
-        return engine == "exudyn" and "prescribed_pitch" in self.effects
+        return engine == "exudyn" and not {"prescribed_pitch", "prescribed_heave_and_pitch"}.isdisjoint(self.effects)
 
 
 def _parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
