@@ -31,8 +31,12 @@ def measured_attitude(rates: np.ndarray, period: float, deviation: np.ndarray, s
     its own; start : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
     """
     noise = np.stack([normal(seed, path, len(rates), 3, source=GYRO) for path in paths], axis=1)
-    noisy = rates[:, None, :] + deviation * noise
-    return integrate(np.concatenate([noisy, noisy[-1:]]), period, start, "held")
+    return true_attitude(rates[:, None, :] + deviation * noise, period, start)
+
+
+def true_attitude(rates: np.ndarray, period: float, start: np.ndarray) -> np.ndarray:
+    """Quaternions (n + 1, ..., 4) of rates (n, ..., 3) in rad/s that are constant over each period (s), exactly."""
+    return integrate(np.concatenate([rates, rates[-1:]]), period, start, "held")
 
 
 def error_rotation(measured: np.ndarray, true: np.ndarray) -> np.ndarray:
@@ -67,11 +71,10 @@ def mean_error(walks: np.ndarray, rates: np.ndarray, period: float, start: np.nd
     G_i^2). The latter has constant coefficients over each period and is stepped by its matrix exponential: exact for
     rates that are held. walks : (3,) in rad per sqrt(s); rates (n, 3) in rad/s, local; period s; start (4,).
     """
-    steps = expm((skew(rates) + spread(walks)) * period)
-    mean, true = matrix(start), matrix(start)
-    for step, turn in zip(steps, expm(skew(rates) * period), strict=True):
-        mean, true = mean @ step, true @ turn
-    return mean @ true.T
+    mean = matrix(start)
+    for step in expm((skew(rates) + spread(walks)) * period):
+        mean = mean @ step
+    return mean @ matrix(true_attitude(rates, period, start)[-1]).T
 
 
 def spread(walks: np.ndarray) -> np.ndarray:

@@ -1,0 +1,316 @@
+"""The inertial unit of the paper's Section 3.2: attitude from noisy rates, its exact laws, and a moving car."""
+
+import math
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from models.noise import GYRO, normal
+from models.section_forces import section_forces
+from models.sensors import inertial_unit as unit
+from models.sensors.gyro import DEGREES_PER_HOUR, angle_variance, bias
+from models.sensors.rotations import conjugate, exponential, integrate, logarithm, matrix, product
+from models.simulate import simulate
+from models.time_series import write_time_series
+from studies.virtual_measurement import follower, write_measurement
+from studies.virtual_measurement import measure as measure_road
+from validation import recording
+from validation.bands import mean_square
+from validation.rows import Row, System, Table, at_most, finding, not_run, within
+from validation.scenes import road_scene
+
+TITLE = "Attitude from a gyro's rates"
+SYSTEM: System = "drift"
+SEED = 30
+LEVEL = 3.3
+"""Standard errors within which a mean lies 999 times in 1,000."""
+UNEQUAL = np.array([0.1, 0.3, 0.6])
+"""Random walk of each axis, rad per sqrt(s)."""
+EQUAL = 0.5
+PERIOD, SPAN = 5e-3, 2.0
+"""s, of the Monte Carlo runs; a step's share of the law is then some 1e-4 of it."""
+CHUNK = 500
+"""Paths that stand side by side in memory."""
+TEN_MINUTES, RATE, DEVIATION = 600.0, 1000.0, 0.1
+"""s, Hz, rad/s per sample: the paper's own example."""
+START = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows for clean data, the laws, the ten minutes, the bias, the section forces and the recording."""
+    paths = 200 if quick else 4000
+    rows = [*_clean(), *_one_axis(paths), *_three_axes(paths), *_norms(paths), *_bias(paths)]
+    example, data = _ten_minutes(0 if quick else 60)
+    recorded, seen = _recording(paths)
+    return [*rows, *example, *recorded, *([] if quick else _section_forces())], {"ten minutes": data, "recording": seen}
+
+
+def turning(count: int, period: float) -> np.ndarray:
+    """Local rates (count, 3) in rad/s of a body that turns about all axes by one or two radians in two seconds."""
+    t = period * np.arange(count)
+    return np.column_stack([0.5 + 0.4 * np.sin(2.1 * t), 0.2 - 0.3 * np.cos(1.7 * t), 0.8 + 0.2 * np.cos(1.3 * t)])
+
+
+def _clean() -> list[Row]:
+    """Attitude from exact rates: about a fixed axis in steps of any length, and on a cone at 1 kHz."""
+    rate, h = np.array([0.3, -1.1, 0.7]), 1e-3
+    held = unit.true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START)
+    rates, true = cone(h * np.arange(10_001))
+    coned = integrate(rates, h, true[0])
+    return [
+        _small("clean.axis", "constant rate, 10 s at 1 kHz: largest error of the attitude",
+               _apart(held[-1], exponential(10 * rate)), "rad", "each step is the exact exponential"),
+        _small("clean.cone", "axis on a cone of 0.3 rad at 2 rad/s, 10 s at 1 kHz: largest error",
+               _apart(coned, true), "rad", "fourth order in the sampling period, without noise"),
+        _small("clean.norm", "largest departure of the quaternion's norm from 1",
+               float(np.abs(np.linalg.norm(coned, axis=1) - 1).max()), "", "normalised in each step"),
+    ]  # fmt: skip
+
+
+def _small(id: str, quantity: str, value: float, unit: str, why: str, bound: float = 1e-12) -> Row:
+    """Row for an error beside a closed form."""
+    return at_most(f"inertial_unit.{id}", SYSTEM, quantity, value, unit, bound, why, "closed form")
+
+
+def cone(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Local rates (n, 3) and attitude (n, 4) of S = Rz(W t) Rx(c) Rz(-W t), W = 2 rad/s, c = 0.3: W (S^T e_z - e_z)."""
+    spin, half = 2.0, 0.3
+    about = exponential(spin * t[:, None] * np.array([0.0, 0.0, 1.0]))
+    tilt = exponential(np.array([half, 0.0, 0.0]))
+    rates = spin * np.column_stack([-math.sin(half) * np.sin(spin * t), math.sin(half) * np.cos(spin * t),
+                                    np.full_like(t, math.cos(half) - 1)])  # fmt: skip
+    return rates, product(product(about, tilt), conjugate(about))
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> float:
+    """Largest angle (rad) between attitudes (..., 4)."""
+    return float(np.abs(logarithm(product(conjugate(one), other))).max())
+
+
+def errors(rates: np.ndarray, period: float, deviation: np.ndarray, paths: int) -> np.ndarray:
+    """Error rotations (paths, 4) at the end of noisy paths on one true motion."""
+    true = unit.true_attitude(rates, period, START)[-1]
+    chunks = [range(first, min(first + CHUNK, paths)) for first in range(0, paths, CHUNK)]
+    return np.concatenate([
+        unit.error_rotation(unit.measured_attitude(rates, period, deviation, START, chunk, SEED)[-1], true)
+        for chunk in chunks
+    ])  # fmt: skip
+
+
+def _one_axis(paths: int) -> list[Row]:
+    """Eqs (27) to (30): one noisy axis, no rotation; the angle is a Brownian motion about that axis."""
+    rows = []
+    for axis in range(3):
+        deviation = EQUAL / PERIOD**0.5 * np.eye(3)[axis]
+        turns = logarithm(errors(np.zeros((200, 3)), PERIOD, deviation, paths))
+        spill = float(np.abs(np.delete(turns, axis, axis=1)).max())
+        rows += [
+            mean_square(f"inertial_unit.one_axis.{axis + 1}", SYSTEM, f"mean square angle, axis {axis + 1} noisy",
+                        float(np.mean(turns[:, axis] ** 2)), EQUAL**2 * 200 * PERIOD, paths, "rad^2",
+                        f"s^2 t; {paths:,} paths, seed {SEED}"),
+            _small(f"one_axis.{axis + 1}.spill", "largest angle about the other two axes", spill, "rad",
+                   "eq. (30): the spurious rotation keeps to its own axis"),
+        ]  # fmt: skip
+    return rows
+
+
+def _mean(id: str, quantity: str, samples: np.ndarray, law: float, why: str) -> Row:
+    """Row for a mean that must lie within LEVEL standard errors of its law."""
+    error = float(samples.std(ddof=1) / math.sqrt(len(samples)))
+    return within(f"inertial_unit.{id}", SYSTEM, quantity, float(samples.mean()), "", law, LEVEL * error,
+                  f"{why}; {len(samples):,} paths, seed {SEED}, within {LEVEL} standard errors of {error:.2g}",
+                  "closed form")  # fmt: skip
+
+
+def _three_axes(paths: int) -> list[Row]:
+    """Equal noise: the trace; unequal noise on a turning body: the whole mean matrix, and the quaternion's mean."""
+    count = round(SPAN / PERIOD)
+    rates, root = turning(count, PERIOD), PERIOD**0.5
+    equal = errors(rates, PERIOD, EQUAL / root * np.ones(3), paths)
+    found = errors(rates, PERIOD, UNEQUAL / root, paths)
+    trace, exact = np.trace(matrix(equal), axis1=1, axis2=2), unit.mean_error(UNEQUAL, rates, PERIOD, START)
+    resting = unit.mean_error(UNEQUAL, np.zeros_like(rates), PERIOD, START)
+    all_equal = np.full(3, EQUAL)
+    same = float(np.trace(unit.mean_error(all_equal, rates, PERIOD, START)))
+    return [
+        _mean("trace", "E[tr E], three equal axes, turning body", trace, unit.mean_trace(EQUAL, SPAN), "3 exp(-s^2 t)"),
+        _mean("scalar", "E[q1] of the error, three equal axes, turning body", equal[:, 0],
+              unit.mean_scalar(all_equal, SPAN), "exp(-3 s^2 t / 8), of the normalised quaternion"),
+        _mean("scalar.unequal", "E[q1] of the error, unequal axes, turning body", found[:, 0],
+              unit.mean_scalar(UNEQUAL, SPAN), "exp(-sum of s^2 t / 8): the quaternion cannot see which axis is noisy"),
+        _small("matrix.equal", "matrix law with equal noise against 3 exp(-s^2 t)",
+               abs(same - unit.mean_trace(EQUAL, SPAN)), "", "both are exact"),
+        _small("matrix", "mean rotation matrix, unequal noise, turning body: worst entry by its standard error",
+               _standard_errors(found, exact), "", f"{paths:,} paths, seed {SEED}; entries differ from the identity by "
+               f"up to {np.abs(exact - np.eye(3)).max():.2f}", LEVEL),
+        finding("inertial_unit.matrix.resting", SYSTEM, "the same against the law of a body at rest",
+                _standard_errors(found, resting), "", f"far beyond {LEVEL}", "the rows above can tell the laws apart",
+                "closed form"),
+    ]  # fmt: skip
+
+
+def _standard_errors(found: np.ndarray, law: np.ndarray) -> float:
+    """Largest distance of an entry of the mean matrix of quaternions (n, 4) from its law, by its standard error."""
+    samples = matrix(found)
+    error = samples.std(axis=0, ddof=1) / math.sqrt(len(samples))
+    return float((np.abs(samples.mean(axis=0) - law) / error).max())
+
+
+def _norms(paths: int) -> list[Row]:
+    """Ito: the quaternion that is never normalised grows by the law, and its mean is the true one."""
+    rows, steps, span = [], 100, 4.0
+    period = span / steps
+    for axes in (1, 3):
+        noise = np.zeros((steps, paths, 3))
+        noise[:, :, :axes] = normal(SEED, axes, steps * paths, axes, source=GYRO).reshape(steps, paths, axes)
+        q = unit.euler_quaternions(EQUAL * period**0.5 * noise, START)
+        square = np.sum(q**2, axis=1)
+        law = unit.euler_mean_square(EQUAL, axes, period, steps)
+        rows += [
+            _mean(f"norm.{axes}", f"E[|q|^2] of explicit Euler, {axes} noisy axes, not normalised", square, law,
+                  "(1 + k s^2 D / 4)^n"),
+            _mean(f"mean.{axes}", f"E[q1] of the same, {axes} noisy axes", q[:, 0], 1.0,
+                  "after Ito the mean is the true quaternion"),
+            _mean(f"direction.{axes}", f"E[q1] once it is normalised, {axes} noisy axes", q[:, 0] / square**0.5,
+                  unit.mean_scalar(np.full(axes, EQUAL), span), "exp(-k s^2 t / 8), as after Stratonovich"),
+            within(f"inertial_unit.growth.{axes}", SYSTEM, f"root of the Euler law at 4e6 steps, {axes} noisy axes",
+                   unit.euler_mean_square(EQUAL, axes, 1e-6, 4_000_000) ** 0.5, "",
+                   unit.ito_norm(np.full(axes, EQUAL), span), 1e-6, "exp(k s^2 t / 8), eq. (28)", "closed form"),
+        ]  # fmt: skip
+    return rows
+
+
+def _ten_minutes(paths: int) -> tuple[list[Row], dict[str, Any]]:
+    """The paper's example: 600 s at 1 kHz, 0.1 rad/s white on each sample, on a car's motion."""
+    walk = unit.random_walk(DEVIATION, RATE)
+    axis = math.degrees(walk * TEN_MINUTES**0.5)
+    why = "s = 0.1 sqrt(1e-3) rad; the fraction that the print garbles is 180 / pi"
+    rows = [
+        within("inertial_unit.walk", SYSTEM, "random walk of the ten-minute example", math.degrees(walk),
+               "deg per sqrt(s)", 0.1812, 5e-5, why, "published"),
+        within("inertial_unit.ten_minutes.axis", SYSTEM, "its rms angle per axis at 600 s", axis, "deg", 4.44, 5e-3,
+               "s sqrt(t)", "closed form"),
+        within("inertial_unit.ten_minutes.total", SYSTEM, "its rms angle in all at 600 s", axis * 3**0.5, "deg", 7.69,
+               5e-3, "s sqrt(3 t)", "closed form"),
+    ]  # fmt: skip
+    if not paths:
+        return rows, {}
+    every = round(RATE)
+    found = np.array([_path(path, every) for path in range(paths)])
+    rows.append(mean_square("inertial_unit.ten_minutes", SYSTEM, "its mean square angle per axis by Monte Carlo",
+                            float(np.mean(found[:, -1] ** 2)), axis**2, 3 * paths, "deg^2",
+                            f"{paths} paths of 600,000 steps, seed {SEED}"))  # fmt: skip
+    return rows, {"paths": found[:8].tolist(), "rms": np.sqrt(np.mean(found**2, axis=(0, 2))).tolist(), "count": paths}
+
+
+def _path(path: int, every: int) -> np.ndarray:
+    """Error angles (601, 3) in degrees about the global axes, each second, of one noisy path."""
+    t = np.arange(round(TEN_MINUTES * RATE)) / RATE
+    rates = np.column_stack([0.05 * np.sin(5 * t), 0.08 * np.sin(7 * t), 0.1 * np.sin(0.2 * t)])  # a car on a road
+    true = unit.true_attitude(rates, 1 / RATE, START)[::every]
+    found = unit.measured_attitude(rates, 1 / RATE, DEVIATION * np.ones(3), START, range(path, path + 1), SEED)
+    return np.degrees(logarithm(unit.error_rotation(found[::every, 0], true)))
+
+
+def _bias(paths: int) -> list[Row]:
+    """Angle error of a bias that is drawn once and of one that wanders, by the process itself."""
+    rows, grade, tau = [], 10.0 * DEGREES_PER_HOUR, 100.0
+    for name, turn_on, instability, span in (("constant", grade, 0.0, 60), ("wandering", 0.0, grade, 60),
+                                             ("forgetful", 0.0, grade, 600)):  # fmt: skip
+        angles = np.array([bias(span, 1.0, turn_on, instability, tau, SEED, path).sum() for path in range(paths)])
+        law = float(angle_variance(np.array(float(span)), 0.0, turn_on, instability, tau))
+        rows.append(mean_square(f"inertial_unit.bias.{name}", SYSTEM, f"mean square angle of a bias of 10 deg/h, "
+                                f"{name}, {span} s", float(np.mean(angles**2)), law, paths, "rad^2",
+                                f"b^2 t^2 or 2 b^2 tau^2 (t/tau - 1 + exp(-t/tau)), tau = 100 s; {paths:,} paths, "
+                                f"seed {SEED}"))  # fmt: skip
+    return rows
+
+
+def _section_forces() -> list[Row]:
+    """A slow angle error turns the section forces and does nothing else: shown once, by guided runs."""
+    scene, size = road_scene(duration=10.0), 0.1
+    with TemporaryDirectory() as name:
+        place = Path(name)
+        measured = measure_road(scene)
+        write_measurement(measured, 1 / scene.run.step, 1, place)
+        true = simulate(follower(scene, place)({}, {"prescribed_pitch": {"file": "pitch.csv"}}), "reference")
+        part = measured.times / scene.run.duration
+        wrong = measured["pitch"] + size * part**3 * (10 - 15 * part + 6 * part**2)
+        write_time_series(place / "wrong.csv", {"pitch": ("rad", wrong)}, scene.run.step)
+        guided = simulate(follower(scene, place)({}, {"prescribed_pitch": {"file": "wrong.csv"}}), "reference")
+    found = section_forces(guided["f3"], guided["f4"], guided["pitch"])
+    turned = section_forces(true["f3"], true["f4"], guided["pitch"])
+    before = section_forces(true["f3"], true["f4"], true["pitch"])
+    return [
+        _small(f"section.{name}", f"{name} of a run guided by a pitch that goes wrong by {size} rad in 10 s, against "
+               "the true force turned by that angle, by the change",
+               _rms(found[name] - turned[name]) / _rms(turned[name] - before[name]), "",
+               "f3 and f4 are those of the true run: a slow angle error leaves no inertia force", 0.01)
+        for name in ("f3x", "f4x")
+    ]  # fmt: skip
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _recording(paths: int) -> tuple[list[Row], dict[str, Any]]:
+    """A minute in a real car: gyro against camera, and the noise law on its motion."""
+    path = recording.find()
+    if path is None:
+        reason = f"needs {recording.FILE} in the folder that TWINRIG_DATA names"
+        return [not_run(f"inertial_unit.recording{end}", SYSTEM, f"a minute in a real car: {what}", reason)
+                for end, what in (("", "gyro against camera"), (".law", "noise law on its motion"))], {}  # fmt: skip
+    own = recording.read(path)
+    off = np.degrees(recording.gyro_error(own))
+    rates, period = own.rates[::5], 5 * recording.PERIOD
+    deviation = np.array([0.02, 0.05, 0.1]) / period**0.5
+    found = errors(rates, period, deviation, paths)
+    law = unit.mean_error(deviation * period**0.5, rates, period, START)
+    return [
+        finding("inertial_unit.recording", SYSTEM, f"a minute in a real car: attitude of the gyro alone against the "
+                f"camera's after {recording.PERIOD * (len(off) - 1):.0f} s, own bias taken off", float(off[-1]), "deg",
+                "nothing published", f"as of a bias of {off[-1] / 60 * 3600:.0f} deg/h: a telephone's grade", "none"),
+        _small("recording.law", "mean rotation matrix of noise on its motion: worst entry by its standard error",
+               _standard_errors(found, law), "", f"the recorded rates, read each 50 ms, as the true motion; {paths:,} "
+               f"paths, seed {SEED}", LEVEL),
+    ], {"off": off[::20].tolist()}  # fmt: skip
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """The ten minutes over time."""
+    if not data["ten minutes"]:
+        return []
+    rms, walk = data["ten minutes"]["rms"], math.degrees(unit.random_walk(DEVIATION, RATE))
+    rows = tuple((f"{t}", f"{rms[t]:.2f}", f"{walk * t**0.5:.2f}") for t in (1, 10, 60, 300, 600))
+    note = f"0.1 rad/s on each sample of 1 kHz, {data['ten minutes']['count']} paths; samples are held (Stratonovich)."
+    return [Table("The ten-minute example", note, ("time [s]", "rms angle per axis [deg]", "s sqrt(t) [deg]"), rows)]
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Like the paper's Figure 2, and the recorded minute, where they were measured."""
+    from studies.figures import plt
+
+    found = []
+    if data["ten minutes"]:
+        figure, axes = plt.subplots(1, 3, figsize=(10, 3.4), sharey=True)
+        paths, walk = np.array(data["ten minutes"]["paths"]), math.degrees(unit.random_walk(DEVIATION, RATE))
+        times = np.arange(paths.shape[1])
+        for i, axis in enumerate(axes):
+            axis.plot(times, paths[:, :, i].T, color="#0072b2", linewidth=0.6)
+            for sign in (1, -1):
+                axis.plot(times, sign * walk * times**0.5, color="black", linestyle=":", label="s sqrt(t)" * (sign > 0))
+            axis.set(title=f"about the global {'xyz'[i]} axis [deg]", xlabel="time [s]")
+        axes[0].legend(loc="upper left")
+        figure.suptitle("Error of the attitude from noisy rates, 8 paths: 0.1 rad/s at 1 kHz", x=0.01, ha="left",
+                        fontweight="bold")  # fmt: skip
+        found.append(("Error angles of the ten-minute example, as in the paper's Figure 2.", figure))
+    if data["recording"]:
+        figure, axis = plt.subplots(figsize=(6, 3.2))
+        axis.plot(0.2 * np.arange(len(data["recording"]["off"])), data["recording"]["off"])
+        axis.set(title="angle between gyro and camera [deg]", xlabel="time [s]")
+        figure.suptitle("A minute in a real car: attitude from the gyro alone", x=0.01, ha="left", fontweight="bold")
+        found.append(("Attitude from a telephone's gyro against its camera's pose (comma2k19).", figure))
+    return found

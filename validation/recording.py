@@ -1,0 +1,46 @@
+"""A moving car for a minute: gyro of a telephone and pose of its camera (comma2k19, MIT licence), where it is there."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from models.sensors.rotations import conjugate, integrate, logarithm, product
+from validation.scenes import data_folder
+
+FILE = "comma2k19_example_60s.npz"
+"""Not part of the repository. Both frames are x forward, y right, z down; the pose turns them to the earth's."""
+PERIOD = 0.01
+"""s; the clock of the recording wanders by 0.6 % and is read on this one."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """rates (n, 3) in rad/s, the telephone's own bias taken off; pose (n, 4), quaternions local to global."""
+
+    rates: np.ndarray
+    pose: np.ndarray
+
+
+def find() -> Path | None:
+    """The recording, None where TWINRIG_DATA does not lead to it."""
+    folder = data_folder()
+    return folder / FILE if folder and (folder / FILE).is_file() else None
+
+
+def read(path: Path) -> Recording:
+    """Rates and pose on one clock: rates linear between their samples, poses along the shortest turn."""
+    with np.load(path) as data:
+        times, seen = data["gyro_t"], data["frame_t"]
+        clock = np.arange(max(times[0], seen[0]), min(times[-1], seen[-1]), PERIOD)
+        free = data["gyro"] - data["gyro_bias"]
+        rates = np.column_stack([np.interp(clock, times, free[:, i]) for i in range(3)])
+        pose = Slerp(seen, Rotation.from_quat(data["frame_q"], scalar_first=True))(clock)
+    return Recording(rates, pose.as_quat(scalar_first=True))
+
+
+def gyro_error(recording: Recording) -> np.ndarray:
+    """Angle (n,) in rad between the attitude that the gyro alone gives and the camera's, which starts it."""
+    found = integrate(recording.rates, PERIOD, recording.pose[0], "mean")
+    return np.linalg.norm(logarithm(product(conjugate(recording.pose), found)), axis=1)
