@@ -43,6 +43,8 @@ PRICED: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, dict[str, int]
     "gyro": ({}, {"sampling_rate": 200.0, "deviation": 0.1}, {"all": {"channels": 1}}),
     "gyro_bias": ({"gyro": {"sampling_rate": 200.0, "deviation": 0.1}}, {"turn_on": 1.0}, {"all": {"channels": 1}}),
     "pitch_sensor": ({}, {"sampling_rate": 200.0, "deviation": 0.01}, {"all": {"channels": 1}}),
+    "accelerometers": ({}, {"sampling_rate": 200.0, "sensors": {"one": {"x": 1.0, "z": 0.2}}},
+                       {"all": {"channels": 3}}),
     "high_pass": (FORCES, {"cut_off": 0.5}, {"exudyn": {"native items": 1}, "mujoco": {"native items": 1}}),
     "prescribed_pitch": (LINEAR, {"file": "pitch.csv"},
                          {"reference": {"degrees of freedom": -1}, "exudyn": {"native items": 1, "callbacks": 2},
