@@ -36,7 +36,7 @@ def describe(scene: Scene) -> str:
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
     lines += [_line("motion", _motion(scene, assembly))]
     lines += _vehicle(scene, assembly) + _effects(scene)
-    lines += [_line("channels", ", ".join(_channels(assembly))), "", *_engines(scene, assembly)]
+    lines += [_line("channels", ", ".join(_channels(assembly))), *trust_line(assembly), "", *_engines(scene, assembly)]
     return "\n".join(lines)
 
 
@@ -82,6 +82,16 @@ def _effects(scene: Scene) -> list[str]:
     lines = [_line("effect", f"{name}: {import_module(f'models.effects.{name}').COST}") for name in scene.effects]
     absent = ", ".join(name for name in effect_names() if name not in scene.effects)
     return [*lines, _line("absent", f"{absent} (not imported, not computed)")]
+
+
+def trust_line(assembly: Assembly) -> list[str]:
+    """How long the pitch of a force-excited run can be trusted, one line; none for a road or a guided run."""
+    if assembly.mode not in ("force", "force-body"):
+        return []
+    from models.drift.trust import trust
+
+    found = trust(assembly)
+    return [] if found is None else [_line("trust", str(found))]
 
 
 HEADINGS = ("engine", "integrator", "order", "step", "steps", "freedoms", "native items", "callbacks")

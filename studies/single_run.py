@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from models.assembly import assemble
 from models.errors import RunFailed
+from models.plan import trust_line
 from models.result import Result
 from models.scene import Scene
 from models.simulate import simulate, state_names, summary
@@ -35,6 +37,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "runs": {engine: _line(result) for engine, result in results.items()},
         "failed": failed,
         "largest difference of states": agreement(results),
+        "table": trust_line(assemble(scene)),
     }
 
 

@@ -21,6 +21,10 @@ from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, suspension
 STEP = 1e-3
 """Longest step (s) of the path; the fastest pole of the published vehicle, -697 1/s, needs one below 4 ms."""
 
+SMALL = 1e-6
+"""Part of a wrong model's difference that its derivative is taken over: errors of two parameters must not multiply,
+or a stiffness that is wrong together with the inertia would leave a moment that no run has."""
+
 
 @register_jitable
 def jacobian(y, u, p, body, flat, x, dx):
@@ -71,7 +75,8 @@ def _step_of(rhs, body, flat):
             rhs(stage, u, p, k[s])
             if wrong:
                 rhs(stage, u, other, off)
-                off -= k[s]
+                for q in range(8):
+                    off[q] = (off[q] - k[s, q]) / SMALL
             for j in range(columns):
                 for q in range(8):
                     stage_x[q] = x[j, q] + part * kx[s - 1, j, q]
@@ -96,7 +101,7 @@ def compile_carry(one_step, key):
         for i in range(count):
             row = i * to_next
             at = (row, row + to_middle, row + to_end)
-            one_step(y, x, step, inputs, errors, (at, at), p, other)
+            one_step(y, x, step, inputs, errors, (at, (3 * i, 3 * i + 1, 3 * i + 2)), p, other)
             states[i + 1], kept[i + 1] = y, x
 
     return compiled(carry, key)
@@ -150,16 +155,18 @@ class Path:
               other: Parameters | None = None) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
         """Path (n + 1, 8) and error columns (n + 1, m, 8) that begin as ``columns`` (m, 8).
 
-        errors : (rows, m, 2), errors of the forces (N) at the rows of ``table``; other : the parameters of a wrong
-        model, whose error forces every column.
+        errors : (3 steps, m, 2), errors of the forces (N) at the start, the middle and the end of each step; other :
+        the parameters of a wrong model, whose error forces every column.
         """
-        count, p = self.per_sample * self.samples, self.assembly.parameters
+        count = self.per_sample * self.samples
         inputs = self.table(self.forces)
-        pushes = np.zeros((len(inputs), len(columns), 2)) if errors is None else errors
+        p = self.assembly.parameters.array()
+        wrong = p if other is None else p + SMALL * (other.array() - p)
+        pushes = np.zeros((3 * count, len(columns), 2)) if errors is None else errors
         states, kept = np.empty((count + 1, 8)), np.empty((count + 1, *columns.shape))
         march = self.march(compile_carry)
         march(self.assembly.initial.copy(), np.array(columns, dtype=float), self.step, count, inputs, pushes, self.rows,
-              p.array(), (other or p).array(), states, kept)  # fmt: skip
+              p, wrong, states, kept)  # fmt: skip
         return states, kept
 
     @property
