@@ -6,6 +6,7 @@ that was killed, to the same bits. Each other engine repeats the first paths on 
 """
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -80,7 +81,8 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     def tell(done: Done) -> None:
         progress(f"reference: {done}", done.done / done.paths)
 
-    with TemporaryDirectory() as name, processes(options.workers) as pool:
+    pooled = processes(options.workers) if options.workers > 1 else nullcontext()
+    with TemporaryDirectory() as name, pooled as pool:
         noisy = _noisy(scene, options, measured, every, Path(name))
         truth = measured["pitch"]
         job = noise_paths(noisy, times, truth, options.threshold)

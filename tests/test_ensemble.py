@@ -1,0 +1,359 @@
+"""Ensembles: the same bits on any executor and after any interruption, folders that know whose they are."""
+
+import math
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.engines import protocol
+from models.ensemble import store
+from models.ensemble.engines import gap, mujoco_threads
+from models.ensemble.paths import NoisePaths, noise_paths
+from models.ensemble.runner import PathFailed, processes, run_paths
+from models.ensemble.statistics import deviation, quantile
+from models.errors import InputError, RunFailed
+from models.noise import normal
+from models.simulate import simulate
+from studies import command_line
+from validation.scenes import force_scene, road_scene, write_forces
+
+PATHS, BLOCK = 10, 3
+TIMES = np.array([0.0, 0.25, 0.5])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Forces of half a second on the study road, sampled at 1 kHz."""
+    made = tmp_path_factory.mktemp("forces")
+    write_forces(simulate(road_scene(duration=0.5), "reference"), made, 1e-3)
+    return made
+
+
+def scene(folder, seed=3, path=0, effects=None, **changes):
+    noise = {"force_noise": {"deviation": 30.0, "seed": seed, "path": path}}
+    return force_scene(folder, duration=0.5, effects=noise | (effects or {}), **changes)
+
+
+def job(folder, **changes):
+    return noise_paths(scene(folder, **changes), TIMES, threshold=2e-4)
+
+
+@pytest.fixture(scope="module")
+def expected(folder):
+    return run_paths(job(folder), PATHS)
+
+
+def same(one, other):
+    return set(one) == set(other) and all(np.array_equal(one[key], other[key], equal_nan=True) for key in one)
+
+
+class Reversed(Executor):
+    """Computes what it is given in the wrong order, when the first answer is asked for."""
+
+    def __init__(self):
+        self.waiting = []
+
+    def submit(self, function, /, *args):
+        future = Future()
+        self.waiting.append((future, function, args))
+        if len(self.waiting) == math.ceil(PATHS / BLOCK):
+            for late, work, values in reversed(self.waiting):
+                late.set_result(work(*values))
+        return future
+
+
+@pytest.mark.parametrize("changes", [{}, {"interpolation": "held"}, {"interpolation": "smooth"},
+                                     {"effects": {"pitch_spring": {"stiffness": 300.0}}}], ids=str)  # fmt: skip
+def test_a_path_is_the_scene_with_that_number_to_the_last_bit(folder, changes):
+    found = run_paths(job(folder, **changes), 3)
+    alone = simulate(scene(folder, path=2, **changes), "reference")
+    assert np.array_equal(found["states"][2], alone.states[[0, 250, 500]])
+    assert not np.array_equal(found["states"][2], found["states"][1])
+
+
+def test_drift_off_is_the_first_time_beyond_the_threshold(folder, expected):
+    noisy, quiet = (simulate(scene(folder, path=4, effects=noise), "reference")
+                    for noise in ({}, {"force_noise": {"deviation": 0.0}}))  # fmt: skip
+    far = np.abs(noisy["pitch"] - quiet["pitch"]) > 2e-4
+    assert far.any() and expected["drift_off"][4] == noisy.times[far.argmax()]
+    never = run_paths(replace(job(folder), threshold=1.0), 2)
+    assert np.isinf(never["drift_off"]).all() and np.isnan(never["failed"]).all()
+
+
+@pytest.mark.parametrize("block", [1, BLOCK, 50])
+def test_the_size_of_the_blocks_changes_nothing(folder, expected, block):
+    assert same(run_paths(job(folder), PATHS, block=block), expected)
+
+
+@pytest.mark.parametrize("make", [lambda: ThreadPoolExecutor(2), Reversed], ids=["threads", "reversed"])
+def test_threads_and_order_change_nothing(folder, expected, make):
+    with make() as executor:
+        assert same(run_paths(job(folder), PATHS, executor=executor, block=BLOCK), expected)
+
+
+def test_processes_change_nothing(folder, expected):
+    with processes(2) as executor:
+        assert same(run_paths(job(folder), PATHS, executor=executor, block=BLOCK), expected)
+
+
+def test_a_dask_cluster_changes_nothing(folder, expected):
+    from distributed import Client
+
+    with Client(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as client:
+        assert same(run_paths(job(folder), PATHS, executor=client.get_executor(), block=BLOCK), expected)
+
+
+class ByOrder(NoisePaths):
+    """The fault to be seen: noise drawn in the order of the work, as a generator that all paths share would."""
+
+    drawn = 0
+
+    def assembly(self, path):
+        ByOrder.drawn += 1
+        return super().assembly(ByOrder.drawn)
+
+
+def test_noise_drawn_by_the_order_of_work_is_seen(folder):
+    faulty = ByOrder(**vars(job(folder)))
+    one = run_paths(faulty, PATHS, block=BLOCK)
+    ByOrder.drawn = 0
+    with Reversed() as executor:
+        assert not same(run_paths(faulty, PATHS, executor=executor, block=BLOCK), one)
+
+
+def test_progress_counts_paths_and_tells_the_time_left(folder):
+    told = []
+    run_paths(job(folder), PATHS, block=BLOCK, progress=told.append)
+    assert [state.done for state in told] == [0, 3, 6, 9, 10]
+    assert all(state.left == pytest.approx((10 - state.done) / state.rate) for state in told[1:])
+    assert str(told[-1]).startswith("10 of 10 paths")
+
+
+KILLED = """
+import sys, time
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from test_ensemble import BLOCK, PATHS, job, run_paths
+run_paths(job(Path({forces!r})), PATHS, Path({blocks!r}), block=BLOCK, progress=lambda state: time.sleep(0.3))
+"""
+
+
+def test_a_killed_run_resumes_without_losing_a_block(folder, expected, tmp_path):
+    """SIGKILL leaves no time to tidy up; sleeping after each block makes sure that it strikes half-way."""
+    code = KILLED.format(tests=str(Path(__file__).parent), forces=str(folder), blocks=str(tmp_path))
+    child = subprocess.Popen([sys.executable, "-c", code])
+    while len(list(tmp_path.glob("block*.npz"))) < 2 and child.poll() is None:
+        time.sleep(0.01)
+    child.send_signal(signal.SIGKILL)
+    assert child.wait() == -signal.SIGKILL
+    kept = {path: path.stat().st_mtime_ns for path in tmp_path.glob("block*.npz")}
+    assert 2 <= len(kept) < 4
+    told = []
+    assert same(run_paths(job(folder), PATHS, tmp_path, block=BLOCK, progress=told.append), expected)
+    assert told[0].done == BLOCK * len(kept)
+    assert all(path.stat().st_mtime_ns == when for path, when in kept.items())
+
+
+def test_an_interrupt_leaves_the_finished_blocks(folder, expected, tmp_path):
+    def stop(state):
+        if state.done >= 2 * BLOCK:
+            raise KeyboardInterrupt
+
+    with ThreadPoolExecutor(1) as executor, pytest.raises(KeyboardInterrupt):
+        run_paths(job(folder), PATHS, tmp_path, executor, BLOCK, stop)
+    assert len(list(tmp_path.glob("block*.npz"))) == 2
+    assert same(run_paths(job(folder), PATHS, tmp_path, block=BLOCK), expected)
+
+
+def test_a_block_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    """A disk that is full half-way leaves no block that looks finished."""
+    monkeypatch.setattr(store.os, "fsync", lambda number: (_ for _ in ()).throw(OSError("no space left")))
+    with pytest.raises(OSError, match="no space"):
+        store.Store(tmp_path).save(0, {"x": np.zeros(3)})
+    assert not store.Store(tmp_path).has(0)
+
+
+@pytest.mark.parametrize(("change", "place"), [
+    ({"seed": 4}, "scene.effects.force_noise.seed"), ({"override": {"k3": 1.1e5}}, "scene.vehicle.override.k3"),
+    ({"interpolation": "held"}, "interpolation")], ids=str)  # fmt: skip
+def test_the_folder_of_another_job_is_refused_by_name(folder, tmp_path, change, place):
+    run_paths(job(folder), 2, tmp_path)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    with pytest.raises(InputError, match="belongs to another job") as caught:
+        run_paths(job(folder, **change), 2, tmp_path)
+    assert place in str(caught.value) and {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_other_forces_other_equations_and_other_counts_are_refused(folder, tmp_path, monkeypatch):
+    own = job(folder)
+    run_paths(own, 2, tmp_path)
+    louder = replace(own, base=replace(own.base, input=replace(own.base.input, values=2 * own.base.input.values)))
+    with pytest.raises(InputError, match="forces"):
+        run_paths(louder, 2, tmp_path)
+    with pytest.raises(InputError, match="paths = 2"):
+        run_paths(own, 3, tmp_path)
+    monkeypatch.setattr(store, "_code", lambda: "changed")
+    with pytest.raises(InputError, match="code of models"):
+        run_paths(own, 2, tmp_path)
+
+
+def test_a_damaged_block_is_named(folder, tmp_path):
+    run_paths(job(folder), 4, tmp_path, block=2)
+    damaged = store.Store(tmp_path).path(1)
+    content = bytearray(damaged.read_bytes())
+    content[200] ^= 1
+    damaged.write_bytes(content)
+    with pytest.raises(InputError, match=r"block 000001\.npz: is damaged"):
+        run_paths(job(folder), 4, tmp_path, block=2)
+
+
+class Broken(NoisePaths):
+    """Path 4 cannot be computed."""
+
+    broken = True
+
+    def trajectory(self, path):
+        if path == 4 and Broken.broken:
+            raise ZeroDivisionError("a fault of the programmer")
+        return super().trajectory(path)
+
+
+def test_a_failure_names_path_and_block_and_loses_no_other(folder, expected, tmp_path):
+    faulty = Broken(**vars(job(folder)))
+    with ThreadPoolExecutor(2) as executor, pytest.raises(RunFailed) as caught:
+        run_paths(faulty, PATHS, tmp_path, executor, BLOCK)
+    assert "block 1 (paths 3 to 5): path 4: ZeroDivisionError: a fault" in str(caught.value)
+    assert len(list(tmp_path.glob("block*.npz"))) == 3
+    Broken.broken = False
+    assert same(run_paths(faulty, PATHS, tmp_path, block=BLOCK), expected)
+
+
+class Suicide:
+    """A job whose worker dies, as one that is out of memory does."""
+
+    def __call__(self, paths):
+        import os
+
+        if paths[0] == 0:
+            time.sleep(1.0)  # let the others finish
+            os.kill(os.getpid(), signal.SIGKILL)
+        return {"x": np.arange(paths[0], paths[-1] + 1)}
+
+    def facts(self):
+        return {}
+
+
+def test_a_worker_that_dies_is_a_failure_with_a_name():
+    with processes(2) as executor, pytest.raises(RunFailed, match=r"block 0 \(paths 0 to 2\): its worker died"):
+        run_paths(Suicide(), 9, executor=executor, block=3)
+
+
+def test_path_failures_survive_the_way_between_processes():
+    import pickle
+
+    assert str(pickle.loads(pickle.dumps(PathFailed(7, "lost")))) == "path 7: lost"
+
+
+def test_a_path_beyond_all_bounds_is_flagged(folder, monkeypatch):
+    """Heave rates of 0.2 m/s are beyond a bound of 0.05: every path fails, none is silently wrong."""
+    own = job(folder)
+    monkeypatch.setattr(protocol, "SIZE_BOUND", 0.05)
+    found = run_paths(own, 2)
+    assert np.isnan(found["states"]).all() and (found["failed"] >= 0).all()
+    assert np.array_equal(found["drift_off"], found["failed"])
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "held"])
+def test_engines_repeat_the_paths(folder, interpolation):
+    """The same tableau on the same samples: rounding apart, and MuJoCo to the bit for 1 and 2 threads."""
+    own = scene(folder, interpolation=interpolation)
+    reference = run_paths(noise_paths(own, TIMES), 3)
+    one, two = (run_paths(mujoco_threads(own, TIMES, threads=threads), 3) for threads in (1, 2))
+    assert same(one, two)
+    assert gap(reference, one, TIMES) < 1e-12
+    assert gap(reference, run_paths(noise_paths(own, TIMES, engine="exudyn"), 2), TIMES) < 1e-12
+    other = run_paths(noise_paths(scene(folder, seed=4, interpolation=interpolation), TIMES), 3)
+    assert gap(reference, other, TIMES) > 1e-6
+
+
+def test_what_cannot_be_an_ensemble_is_refused(folder):
+    own = scene(folder)
+    silent = force_scene(folder, duration=0.5)
+    for wrong, place in (
+        (lambda: noise_paths(silent, TIMES), "force_noise"),
+        (lambda: noise_paths(own, np.array([0.6])), "times"),
+        (lambda: noise_paths(own, np.array([0.2505])), "times"),
+        (lambda: noise_paths(own, TIMES, truth=np.zeros(3)), "truth"),
+        (lambda: noise_paths(own.model_copy(update={"engines": {"reference": _adaptive()}}), TIMES), "DOP853"),
+    ):
+        with pytest.raises(InputError, match=place):
+            wrong()
+
+
+def _adaptive():
+    from models.scene import EngineTable
+
+    return EngineTable(integrator="DOP853")
+
+
+def test_the_standard_error_of_a_deviation_is_its_scatter():
+    """2,000 samples of 100 normal numbers: the errors' mean is within 10 % of the scatter (its own error is 1.6 %)."""
+    draws = normal(5, 0, 2000 * 100, 1).reshape(2000, 100)
+    found = np.array([deviation(row) for row in draws])
+    assert found[:, 0].std() == pytest.approx(found[:, 1].mean(), rel=0.1)
+    assert found[:, 0].mean() == pytest.approx(1.0, abs=0.01)  # E[s] = 1 - 1/(4 n) = 0.9975
+
+
+def test_the_interval_of_a_quantile_covers_it():
+    """Of 1,000 samples of 200 numbers some 950 intervals hold the true median; 4.5 binomial sd of 7 either side."""
+    draws = normal(6, 0, 1000 * 200, 1).reshape(1000, 200)
+    held = sum(low <= 0 <= high for _, low, high in (quantile(row, 0.5) for row in draws))
+    assert 920 <= held <= 980
+    assert quantile(np.array([1.0, 2.0, np.inf, np.inf]), 0.75)[0] == np.inf
+    assert quantile(np.array([1.0, 2.0, np.inf, np.inf]), 0.5)[0] == 2.0
+
+
+SHORT = ("--set", "run.duration=1", "--set", "options.times=[0.5, 1.0]", "--set", "options.paths=60",
+         "--set", "options.workers=1", "--engine", "reference")  # fmt: skip
+
+
+def twinrig(*args):
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as ended:
+        patch.setattr(sys, "argv", ["twinrig", *args])
+        command_line.main()
+    return ended.value.code
+
+
+def test_the_study_resumes_in_its_own_folder(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert twinrig("run", "ensemble", *SHORT, "--out", "first") == 0
+    said = capsys.readouterr().out
+    assert "60 paths of 1 s" in said and "50 %   never" in said
+    first, blocks = tmp_path / "first", tmp_path / "first" / "blocks"
+    table = (first / "table.txt").read_text()
+    lost = (blocks / "block 000001.npz").read_bytes()
+    for path in (blocks / "block 000001.npz", first / "ensemble.nc", first / "table.txt"):
+        path.unlink()
+    assert twinrig("run", "ensemble", *SHORT, "--resume", "first") == 0
+    assert (first / "table.txt").read_text() == table and (blocks / "block 000001.npz").read_bytes() == lost
+    capsys.readouterr()
+    forces = (first / "wheel_forces.csv").stat().st_mtime_ns
+    assert twinrig("run", "ensemble", *SHORT, "--set", "options.seed=2", "--resume", "first") == 2
+    assert "force_noise.seed" in capsys.readouterr().err and (first / "wheel_forces.csv").stat().st_mtime_ns == forces
+
+
+@pytest.mark.parametrize(("args", "said"), [
+    (("ensemble", "--resume", "nowhere"), "holds no unfinished run"),
+    (("ensemble", "--resume", "nowhere", "--out", "new"), "leave out --out"),
+    (("six_runs", "--resume", "nowhere"), "keeps nothing that can be resumed")], ids=str)  # fmt: skip
+def test_what_cannot_be_resumed_is_refused(args, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert twinrig("run", *args) == 2
+    assert said in capsys.readouterr().err and not list(tmp_path.iterdir())
