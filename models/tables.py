@@ -2,8 +2,9 @@
 
 The accepted text, in full: UTF-8; lines that start with ``#`` and empty lines are skipped; the first
 other line is the header, ``name [unit], name [unit], ...`` in any order; every further line holds one
-finite number per column, comma between columns, point as decimal sign; the last line ends with a line
-end, because without one nobody can tell a complete last number from one that was cut off.
+finite number per column (or none, or ``nan``, where the reader allows gaps), comma between columns, point
+as decimal sign; the last line ends with a line end, because without one nobody can tell a complete last
+number from one that was cut off.
 """
 
 import math
@@ -20,6 +21,11 @@ DISTANCES = {"m": 1.0, "km": 1e3}
 SECONDS = {"s": 1.0, "ms": 1e-3}
 NEWTONS = {"N": 1.0, "kN": 1e3}
 RADIANS = {"rad": 1.0, "deg": math.pi / 180.0}
+ACCELERATIONS = {"m/s^2": 1.0, "g": 9.80665}
+RADIANS_PER_SECOND = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
+
+GAPS = ("", "nan")
+"""Cells that say that nothing was measured, where that is allowed."""
 
 Columns = Mapping[str, Mapping[str, float]]
 Lines = list[tuple[int, str]]
@@ -28,7 +34,7 @@ _HEADING = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 
 
 def read_table(
-    path: str | Path, columns: Columns, *, increasing: str | None = None, least: int = 1
+    path: str | Path, columns: Columns, *, increasing: str | None = None, least: int = 1, gaps: bool = False
 ) -> dict[str, np.ndarray]:
     """Read a CSV table whose header names the unit of every column.
 
@@ -39,6 +45,7 @@ def read_table(
         ``{"time": SECONDS, "front": NEWTONS}``; the file has these columns and no others
     increasing : column whose values must rise from every row to the next one (time, arc length)
     least : smallest accepted number of rows
+    gaps : whether a cell may be empty or ``nan``, which is then NaN; never one of the increasing column
 
     Returns
     -------
@@ -50,7 +57,8 @@ def read_table(
     """
     header, rows = _header_and_rows(path)
     names, factors = _headings(path, header, columns)
-    raw = _numbers(path, rows, header[1].split(","))
+    free = [gaps and name != increasing for name in names]
+    raw = _numbers(path, rows, header[1].split(","), free)
     if len(rows) < least:
         raise InputError(path, "rows", len(rows), f"at least {least} rows of numbers are needed")
     table = {name: raw[:, i] * factors[i] for i, name in enumerate(names)}
@@ -116,15 +124,16 @@ def _wanted(columns: Columns) -> str:
     return ", ".join(f"{name} [{next(iter(units))}]" for name, units in columns.items())
 
 
-def _numbers(path: str | Path, rows: Lines, headings: list[str]) -> np.ndarray:
-    """All cells as an array of shape (rows, columns), in the units of the file."""
+def _numbers(path: str | Path, rows: Lines, headings: list[str], free: list[bool]) -> np.ndarray:
+    """All cells as an array of shape (rows, columns), in the units of the file; NaN for gaps in ``free`` columns."""
     values = np.empty((len(rows), len(headings)))
     for i, (line, row) in enumerate(rows):
         cells = row.split(",")
         if len(cells) != len(headings):
             raise InputError(path, f"line {line}", row, f"{len(headings)} values are needed, found {len(cells)}")
         for j, cell in enumerate(cells):
-            values[i, j] = _number(path, line, headings[j], cell)
+            gap = free[j] and cell.strip().lower() in GAPS
+            values[i, j] = math.nan if gap else _number(path, line, headings[j], cell)
     return values
 
 

@@ -9,13 +9,14 @@ from models.errors import InputError
 from models.tables import SECONDS, read_table
 
 
-def read_time_series(path: str | Path, columns: Mapping[str, Mapping[str, float]]) -> tuple[np.ndarray, float]:
+def read_time_series(path: str | Path, columns: Mapping[str, Mapping[str, float]], *,
+                     gaps: bool = False) -> tuple[np.ndarray, float]:  # fmt: skip
     """Values (n, columns) in SI and the sampling period (s) of a CSV file with a column ``time``.
 
     The first sample must lie at t = 0 and the period must be constant to 1e-6 of itself: a clock that
-    jitters has to be repaired by someone who knows why.
+    jitters has to be repaired by someone who knows why. Where ``gaps`` are allowed, an empty cell or ``nan`` is NaN.
     """
-    table = read_table(path, {"time": SECONDS, **columns}, increasing="time", least=8)
+    table = read_table(path, {"time": SECONDS, **columns}, increasing="time", least=8, gaps=gaps)
     time = table["time"]
     period = (time[-1] - time[0]) / (len(time) - 1)
     if abs(time[0]) > 1e-6 * period:
