@@ -1,0 +1,260 @@
+"""Motion of the chassis from accelerometers: pitch, rate and heave, how good the readings are, and what filters do.
+
+Each engine's run leaves its readings as a file; the motion is then recovered from the file alone, as from a measured
+one. A user's own file takes the place of the runs; nothing is known of the truth then.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.effects.accelerometers import Parameters, names
+from models.errors import InputError, RunFailed
+from models.scene import Scene
+from models.sensors.high_pass import check_cut_off
+from models.sensors.rate_filter import filter_rates
+from models.sensors.rigid_body_motion import LIMIT, Motion, Quality, Start, motion, quality, spin, tilt_displacement
+from models.sensors.rotations import GimbalLock, from_cardan
+from models.sensors.sampling import write
+from models.sensors.sensor_array import SensorArray, sensor_array
+from models.simulate import simulate
+from models.strict import Strict, quantity, read
+from models.tables import ACCELERATIONS
+from models.time_series import read_time_series, write_time_series
+
+Progress = Callable[[str, float], None]
+CHANNELS = {"pitch": ("pitch", "rad"), "rate": ("pitch_rate", "rad/s"), "heave": ("z3", "m")}
+"""What is compared -> the run's channel and its unit."""
+TILT = 1e-3
+"""Tilt error (rad) of the false displacement in the table."""
+SENSORS = "effects.accelerometers.sensors"
+
+
+class Options(Strict):
+    """[options] of this study."""
+
+    file: str | None = Field(None, description="CSV of measured readings: time [s], ax1 [m/s^2], ay1, az1, ax2, ...")
+    zeroed: bool = Field(False, description="true for readings set to zero at rest on level ground (eq. 17)")
+    turning_cut_off: float = quantity("Hz", "high-pass on rates and angles", default=0.2)
+    position_cut_off: float = quantity("Hz", "high-pass on velocity and position", default=0.2)
+
+
+@dataclass
+class Source:
+    """Readings (n, sensors, 3) every ``period`` (s) of one engine or file, and the truth where there is one."""
+
+    name: str
+    readings: np.ndarray
+    period: float
+    truth: dict[str, np.ndarray] = field(default_factory=dict)
+    quality: Quality | None = None
+    ways: dict[str, Motion] = field(default_factory=dict)
+
+    @property
+    def start(self) -> Start:
+        """Where the record begins: as the run did, or at rest and level."""
+        if not self.truth:
+            return Start()
+        first = {name: float(values[0]) for name, values in self.truth.items()}
+        level = tuple(from_cardan(0.0, first["pitch"], 0.0).tolist())
+        return Start((0.0, first["rate"], 0.0), level, (0.0, 0.0, first["heave rate"]), (0.0, 0.0, first["heave"]))
+
+
+def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Readings of each engine or of the file, the motion recovered in each way, a table and a figure."""
+    options, p = check(scene, engines)
+    array = _array(scene, p.positions())
+    failed: dict[str, str] = {}
+    sources: list[Source] = []
+    for i, name in enumerate(engines if options.file is None else (options.file,)):
+        progress(f"{name}: readings and motion", i / len(engines))
+        try:
+            source = _run(scene, name, folder) if options.file is None else _measured(scene, options, p)
+            _recover(source, array, options, p)
+        except (RunFailed, GimbalLock) as error:
+            failed[name] = str(error)
+            continue
+        _save(source, folder)
+        sources.append(source)
+    table = [*_on_array(array), *(line for source in sources for line in _lines(source, p)), *_closing(options)]
+    (folder / "table.txt").write_text("\n".join(table) + "\n")
+    progress("figure", 1.0)
+    if sources:
+        _figure(sources[0], folder / "motion.png")
+    return {"scene": scene.title, "folder": str(folder), "failed": failed, "table": table,
+            "rows": [_numbers(source) for source in sources]}  # fmt: skip
+
+
+def check(scene: Scene, engines: tuple[str, ...]) -> tuple[Options, Parameters]:
+    """Refuse, before anything is written, a scene whose readings could not be used."""
+    options = read(Options, scene.options, scene.file, "options")
+    if "accelerometers" not in scene.effects:
+        raise InputError(scene.file, "effects.accelerometers", None, "is missing: this study reads accelerometers")
+    p = scene.effects["accelerometers"]
+    _array(scene, p.positions())
+    if options.file is not None:
+        source = _measured(scene, options, p)
+        count, period = len(source.readings), source.period
+    else:
+        count, period = round(scene.run.duration * p.sampling_rate) + 1, 1 / p.sampling_rate
+    for name in ("turning_cut_off", "position_cut_off"):
+        check_cut_off(count, period, getattr(options, name), scene.file, f"options.{name}")
+    return options, p
+
+
+def _array(scene: Scene, positions: dict[str, tuple[float, float, float]]) -> SensorArray:
+    """The scene's sensors as an array; what is wrong with them is told under the scene's own name."""
+    try:
+        return sensor_array(positions)
+    except InputError as error:
+        raise InputError(scene.file, SENSORS, error.value, error.allowed) from None
+
+
+def _measured(scene: Scene, options: Options, p: Parameters) -> Source:
+    """Readings of the user's file, columns in the order of the scene's sensors."""
+    assert options.file is not None
+    return _from_file(options.file, scene.path(options.file, "options.file"), p)
+
+
+def _from_file(name: str, path: Path, p: Parameters) -> Source:
+    columns = {channel: ACCELERATIONS for sensor in names(p) for channel in sensor}
+    values, period = read_time_series(path, columns)
+    return Source(name, values.reshape(len(values), -1, 3), period)
+
+
+def _run(scene: Scene, engine: str, folder: Path) -> Source:
+    """One engine's run; its readings go through a file as measured ones do."""
+    p = scene.effects["accelerometers"]
+    result = simulate(scene, engine)
+    path = folder / f"{engine} readings.csv"
+    write(result, {channel: channel for sensor in names(p) for channel in sensor}, p.sampling_rate, path)
+    source = _from_file(engine, path, p)
+    rows = np.searchsorted(result.times, source.period * (np.arange(len(source.readings)) - 1e-3))
+    wanted = {name: channel for name, (channel, _) in CHANNELS.items()} | {"heave rate": "z3_rate"}
+    source.truth = {name: result[channel][rows] for name, channel in wanted.items()}
+    return source
+
+
+def _recover(source: Source, array: SensorArray, options: Options, p: Parameters) -> None:
+    """Every way from readings to motion, without a sensor that does not belong to the body."""
+    source.quality = quality(array, source.readings, p.deviation)
+    readings = source.readings
+    if source.quality.suspect:
+        keep = [name != source.quality.suspect for name in array.names]
+        array = sensor_array({name: place for name, place in p.positions().items() if name != source.quality.suspect})
+        source.ways["all sensors, integrated"] = _moved(source, sensor_array(p.positions()), readings, options)
+        readings = readings[:, keep]
+    source.ways["integrated"] = _moved(source, array, readings, options)
+    if p.deviation > 0:
+        held, _ = filter_rates(spin(array, readings), source.period, np.array(source.start.rates), p.deviation)
+        source.ways["rates held by w w^T"] = _moved(source, array, readings, options, rates=held)
+    source.ways["high-passed"] = _moved(source, array, readings, options, turning_cut_off=options.turning_cut_off,
+                                        position_cut_off=options.position_cut_off)  # fmt: skip
+
+
+def _moved(source: Source, array: SensorArray, readings: np.ndarray, options: Options, **other: Any) -> Motion:
+    return motion(array, readings, source.period, source.start, zeroed=options.zeroed, **other)
+
+
+def _values(found: Motion) -> dict[str, np.ndarray]:
+    """Pitch (rad), pitch rate (rad/s) and heave (m, down) of a recovered motion."""
+    return {"pitch": found.angles()[:, 1], "rate": found.rates[:, 1], "heave": found.position[:, 2]}
+
+
+def _save(source: Source, folder: Path) -> None:
+    """Recovered pitch, rate and heave of every way as a file each."""
+    for way, found in source.ways.items():
+        columns = {name: (CHANNELS[name][1], values) for name, values in _values(found).items()}
+        write_time_series(folder / f"{Path(source.name).stem}, {way}.csv", columns, source.period)
+
+
+def _numbers(source: Source) -> dict[str, Any]:
+    """Share, suspect, and the largest and rms error of each way; without a truth the sizes of what was found."""
+    assert source.quality is not None
+    found: dict[str, Any] = {"source": source.name, "share": source.quality.share, "rigid": source.quality.rigid,
+                             "suspect": source.quality.suspect, "ways": {}}  # fmt: skip
+    for way, moved in source.ways.items():
+        errors = {name: values - source.truth.get(name, 0.0) for name, values in _values(moved).items()}
+        found["ways"][way] = {name: [float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))]
+                              for name, error in errors.items()}  # fmt: skip
+    return found
+
+
+def _on_array(array: SensorArray) -> list[str]:
+    return ["  The sensors", *(f"    {line}" for line in array.describe())]
+
+
+def _lines(source: Source, p: Parameters) -> list[str]:
+    """Verdict on the readings, then a line per way."""
+    assert source.quality is not None
+    numbers, kind = _numbers(source), "error" if source.truth else "size"
+    head = f"largest {kind} (rms)"
+    lines = [f"  {source.name}", f"    {_verdict(source.quality)}",
+             f"    {head:<28}{'pitch [mrad]':>20}{'rate [rad/s]':>20}{'heave [m]':>20}"]  # fmt: skip
+    for way, errors in numbers["ways"].items():
+        cells = [f"{scale * errors[name][0]:.3g} ({scale * errors[name][1]:.2g})"
+                 for name, scale in (("pitch", 1e3), ("rate", 1.0), ("heave", 1.0))]  # fmt: skip
+        lines.append(f"    {way:<28}{cells[0]:>20}{cells[1]:>20}{cells[2]:>20}")
+    if p.deviation == 0:
+        lines.append("    rates held by w w^T: not made, as the scene states no noise (deviation) to weigh it with")
+    return lines
+
+
+def _verdict(found: Quality) -> str:
+    """The consistency figure in words."""
+    if found.rigid is None:
+        return "whether the body is rigid cannot be told: no sensor is left over"
+    share = f"{100 * found.share:.2g} % of the relative accelerations fit no rigid body"
+    if found.rigid:
+        return f"{share} (allowed: {100 * LIMIT:g} %, or what the noise leaves): the mounts pass for rigid"
+    if found.suspect:
+        return f"{share} (allowed: {100 * LIMIT:g} %): {found.suspect!r} does not move with the body and is left out"
+    return f"{share} (allowed: {100 * LIMIT:g} %): the body or a mount gives way, and no single sensor explains it"
+
+
+def _closing(options: Options) -> list[str]:
+    """What the filters take, and what a tilt costs."""
+    far = float(tilt_displacement(TILT, np.array([10.0]))[0])
+    return [f"  High-pass: rates and angles {options.turning_cut_off:g} Hz, velocity and position "
+            f"{options.position_cut_off:g} Hz, Butterworth of order 2 forwards and backwards;",
+            "  it takes slow errors and true grades alike, and is least sure within one period of the ends.",
+            f"  A tilt error of {1e3 * TILT:g} mrad turns gravity into a false displacement of {far:.2g} m after 10 s, "
+            "four times that after 20 s."]  # fmt: skip
+
+
+def _figure(source: Source, path: Path) -> None:
+    """Pitch, heave, error of the rate, and the misfit of the readings, of one source."""
+    from studies.figures import plt, save
+
+    times = source.period * np.arange(len(source.readings))
+    figure, axes = plt.subplots(2, 2, figsize=(11, 6.4), sharex=True)
+    panels = ((axes[0, 0], "pitch", "pitch, nose up [rad]"), (axes[0, 1], "heave", "heave, down [m]"))
+    for axis, name, label in panels:
+        if source.truth:
+            axis.plot(times, source.truth[name], color="black", linewidth=1.8, label="truth")
+        axis.set_title(label)
+    for i, (way, found) in enumerate(source.ways.items()):
+        values = _values(found)
+        for axis, name, _ in panels:
+            axis.plot(times, values[name], color=f"C{i}", linewidth=0.9, label=way)
+        axes[1, 0].plot(times, values["rate"] - source.truth.get("rate", 0.0), color=f"C{i}", linewidth=0.7)
+    axes[1, 0].set_title("error of the pitch rate [rad/s]" if source.truth else "pitch rate [rad/s]")
+    assert source.quality is not None
+    axes[1, 1].plot(times, source.quality.misfit, color="C7", linewidth=0.4)
+    axes[1, 1].set_title(f"readings that no rigid motion explains, {100 * source.quality.share:.2g} % [m/s^2]")
+    for axis in axes[1]:
+        axis.set_xlabel("time [s]")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
+    title = f"Pitch, rate and heave from accelerometers alone, {source.name}"
+    figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    save(figure, path)
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("motion")
