@@ -2,8 +2,12 @@
 
 import csv
 import json
+import os
 import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from importlib import import_module
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -15,39 +19,63 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
 """Case modules in the order of the report."""
 
 
+ALONE = ("absent", "price", "ensemble")
+"""Cases that time what they run: they begin when all others have ended, and have the machine to themselves."""
+WORKERS = 2
+"""Processes that measure the other cases."""
+
+
 def validate(folder: Path, quick: bool, command: str) -> int:
     """Measure all cases into ``folder``; returns the number of failed rows."""
     from rich.console import Console
     from rich.progress import Progress
 
-    rows: list[Row] = []
-    seconds: dict[str, float] = {}
+    start = time.perf_counter()
+    found: dict[str, tuple[list[Row], float]] = {}
     (folder / "data").mkdir(exist_ok=True)
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("validate", total=len(CASES))
-        for name in CASES:
-            bar.update(task, description=name)
-            start = time.perf_counter()
-            rows += _measure(name, quick, folder)
-            seconds[name] = time.perf_counter() - start
-            bar.advance(task)
+        for name, outcome in _outcomes(quick, folder):
+            found[name] = outcome
+            bar.update(task, description=name, advance=1)
+    rows = [row for name in CASES for row in found[name][0]]
+    seconds = {name: found[name][1] for name in CASES}
     _save(folder, rows, {**provenance(command), "seeds": seeds(), "quick": quick, "seconds": seconds})
     from validation.report.page import write
 
     page = write(folder)
-    return _say(rows, sum(seconds.values()), page)
+    return _say(rows, time.perf_counter() - start, page)
 
 
-def _measure(name: str, quick: bool, folder: Path) -> list[Row]:
-    """Rows of one case; a case that breaks is a failed row, not the end of the report."""
+def _outcomes(quick: bool, folder: Path) -> Iterator[tuple[str, tuple[list[Row], float]]]:
+    """Rows and seconds of every case, as they end: first those that may share the machine, then the others."""
+    shared = [name for name in CASES if name not in ALONE]
+    context = get_context("spawn")  # an engine's threads do not survive a fork
+    with ProcessPoolExecutor(min(WORKERS, os.cpu_count() or 1), mp_context=context) as pool:
+        jobs = {pool.submit(_measure, name, quick, folder): name for name in shared}
+        try:
+            for job in as_completed(jobs):
+                yield jobs[job], job.result()
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    for name in CASES:
+        if name in ALONE:
+            yield name, _measure(name, quick, folder)
+
+
+def _measure(name: str, quick: bool, folder: Path) -> tuple[list[Row], float]:
+    """Rows of one case and its seconds; a case that breaks is a failed row, not the end of the report."""
+    start = time.perf_counter()
     try:
         case = import_module(f"validation.cases.{name}")
         rows, data = case.measure(quick, folder)
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
-        return [Row(f"{name}.broken", "pitch-plane", f"case {name}", None, "", "", None, "", "none", "failed", reason)]
+        broken = Row(f"{name}.broken", "pitch-plane", f"case {name}", None, "", "", None, "", "none", "failed", reason)
+        return [broken], time.perf_counter() - start
     (folder / "data" / f"{name}.json").write_text(json.dumps(data))
-    return rows
+    return rows, time.perf_counter() - start
 
 
 def seeds() -> dict[str, int]:
