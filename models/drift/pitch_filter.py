@@ -22,6 +22,7 @@ from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter
 from models.assembly import Assembly
 from models.drift.pitch_step import RELATIVE, PitchStep
 from models.errors import RunFailed
+from models.vehicles.pitch_plane_equations import suspension
 
 PITCH, RATE, INERTIA, STATES = 2, 5, 6, 7
 """Where pitch, its rate and the inertia's share stand in the filter's state, and how long it is."""
@@ -176,6 +177,16 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
     found = np.zeros((8, 8))
     found[:7, :7] = np.linalg.inv(matrix[:7, :7])
     return found
+
+
+def suspension_moment(assembly: Assembly, states: np.ndarray) -> np.ndarray:
+    """Moment (n,) in N m of the suspension on the chassis, nose up, at filter states (n, 7); eqs (35) and (36)."""
+    p, (front, rear, pitch, front_rate, rear_rate, rate, _) = assembly.parameters, states.T
+    exact = assembly.vehicle.geometry == "exact"
+    sine, cosine = (np.sin(pitch), np.cos(pitch)) if exact else (pitch, np.ones_like(pitch))
+    still = np.zeros_like(pitch)
+    f3, f4 = suspension((front, rear, still, pitch, front_rate, rear_rate, still, rate), p.array(), sine, cosine)
+    return cosine * (p.b * f3 - p.a * f4)
 
 
 def _start(assembly: Assembly, turn: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:
