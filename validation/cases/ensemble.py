@@ -1,0 +1,254 @@
+"""Thousands of noise paths: the same bits whoever computes them, what they cost, and how the paths scatter."""
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from models.ensemble.engines import gap, mujoco_threads
+from models.ensemble.paths import NoisePaths, noise_paths
+from models.ensemble.runner import processes, run_paths
+from models.ensemble.statistics import deviation, quantile
+from models.ensemble.store import Arrays
+from models.scene import Scene
+from models.simulate import simulate
+from validation.rows import Row, System, Table, at_most, behaves, finding, within
+from validation.scenes import force_scene, road_scene, write_forces
+
+TITLE = "Noise paths by the thousand"
+SYSTEM: System = "drift"
+SEED = 17
+DEVIATION = 35.0
+"""Noise (N) on each sample: 0.2 % of the largest force on the study road."""
+STEP = 1e-3
+MANY, LONG = 10_000, 60.0
+"""Paths and seconds of the large ensemble."""
+SOME = 200
+"""Paths that are computed again by one worker, and by a run that is killed."""
+SECONDS, MEMORY = 120.0, 2e9
+"""Targets of the large ensemble on two cores."""
+TIMES = (1.0, 2.0, 5.0, 10.0, 15.0)
+"""Times (s) of the table of spreads."""
+SAME = "the same bits"
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Equality of bits by path, workers and interruption, agreement of engines; in full also scale and price."""
+    with TemporaryDirectory() as name:
+        forces, duration = Path(name), 1.0 if quick else LONG
+        measured = simulate(road_scene(step=STEP, duration=duration), "reference")
+        write_forces(measured, forces, STEP)
+        truth = measured["pitch"]
+        scene, times = _scene(forces, duration), np.arange(0.0, duration + 0.5)
+        job = noise_paths(scene, times, truth)
+        if quick:
+            return _quick(forces, scene, job, times), {}
+        large = _alone(_large, job, MANY, forces / "large")
+        found = large.pop("found")
+        rows = [_path_row(forces, duration, found), *_scale_rows(large)]
+        rows += [_workers_row(job, found), _killed_row(job, found, forces / "killed")]
+        with processes(2) as pool:
+            engines, prices = _engines(scene, truth, times, found, 8, pool)
+        prices = {"reference, 2 processes": large["seconds"] / large["path-steps"], **prices}
+        rows += [*engines, _half_step_row(forces), *_price_rows(prices)]
+        return rows, _data(measured.states, times, found, large, prices)
+
+
+def _scene(forces: Path, duration: float, path: int = 0, step: float = STEP) -> Scene:
+    noise = {"force_noise": {"deviation": DEVIATION, "seed": SEED, "path": path}}
+    return force_scene(forces, duration=duration, step=step, effects=noise)
+
+
+def _quick(forces: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> list[Row]:
+    """The same rows on a few paths of a second, in threads, which start at once."""
+    found = run_paths(job, 12)
+    with ThreadPoolExecutor(2) as pool:
+        two = run_paths(job, 12, executor=pool, block=3)
+    engines, _ = _engines(scene, job.truth, times, found, 2, None)
+    return [_path_row(forces, 1.0, found), _same_row("workers", "12 paths by 1 and by 2 workers", found, two),
+            _interrupted_row(job, found, forces / "stopped"), *engines]  # fmt: skip
+
+
+def _path_row(forces: Path, duration: float, found: Arrays) -> Row:
+    """Path 7 is the scene that names it."""
+    alone = simulate(_scene(forces, duration, path=7), "reference")
+    worst = float(np.abs(alone.states[:: round(1.0 / STEP)] - found["states"][7]).max())
+    return within("ensemble.path", SYSTEM, "path 7 of the ensemble against the scene with path = 7, any state", worst,
+                  "m, rad, m/s, rad/s", 0.0, 0.0, "the same samples through the same march: the same bits",
+                  "shared kernel")  # fmt: skip
+
+
+def _same_row(id: str, what: str, one: Arrays, other: Arrays) -> Row:
+    """Whether two ensembles are equal to the last bit."""
+    count = len(other["drift_off"])
+    equal = all(np.array_equal(one[name][:count], other[name], equal_nan=True) for name in one)
+    return behaves(f"ensemble.{id}", SYSTEM, what, SAME if equal else "different bits", SAME,
+                   "a sample belongs to seed, path and place alone", "shared kernel")  # fmt: skip
+
+
+def _workers_row(job: NoisePaths, found: Arrays) -> Row:
+    return _same_row("workers", f"{SOME} paths by 1 worker and by 2", found, run_paths(job, SOME))
+
+
+def _interrupted_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
+    def stop(state: Any) -> None:
+        if state.done >= 6:
+            raise KeyboardInterrupt
+
+    try:
+        run_paths(job, 12, blocks, block=3, progress=stop)
+    except KeyboardInterrupt:
+        return _same_row("resumed", "12 paths, interrupted half-way and resumed", found,
+                         run_paths(job, 12, blocks, block=3))  # fmt: skip
+    raise AssertionError("the interrupt was lost")
+
+
+def _killed_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
+    """Kill a run without warning once two of its blocks are there, then resume it."""
+    child = get_context("spawn").Process(target=_slowly, args=(job, blocks))
+    child.start()
+    while child.is_alive() and len(list(blocks.glob("block*.npz"))) < 2:
+        time.sleep(0.02)
+    child.kill()
+    child.join()
+    kept = {path: path.stat().st_mtime_ns for path in blocks.glob("block*.npz")}
+    again = run_paths(job, SOME, blocks, block=20)
+    if not kept or len(kept) == SOME // 20 or any(path.stat().st_mtime_ns != when for path, when in kept.items()):
+        raise AssertionError(f"not killed half-way, or computed again: {len(kept)} blocks were kept")
+    return _same_row("resumed", f"{SOME} paths, killed half-way and resumed: the kept blocks are not touched, the "
+                     "whole is compared with a run in one piece", found, again)  # fmt: skip
+
+
+def _slowly(job: NoisePaths, blocks: Path) -> None:
+    run_paths(job, SOME, blocks, block=20, progress=lambda state: time.sleep(0.1))
+
+
+def _alone(function: Callable[..., Any], *args: Any) -> Any:
+    """What a function gives in a process of its own, whose memory is that of nothing else."""
+    with processes(1) as pool:
+        return pool.submit(function, *args).result()
+
+
+def _large(job: NoisePaths, many: int, blocks: Path) -> dict[str, Any]:
+    """The large ensemble with everything that belongs to it: seconds, and bytes of this process and its workers."""
+    import resource
+
+    start = time.perf_counter()
+    with processes(2) as pool:
+        found = run_paths(job, many, blocks, pool)
+    seconds = time.perf_counter() - start
+    own, child = (resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return {"found": found, "seconds": seconds, "bytes": 1024 * (own + 2 * child),
+            "path-steps": len(found["drift_off"]) * job.settings.steps, "failed": int((found["failed"] >= 0).sum())}
+
+
+def _scale_rows(large: dict[str, Any]) -> list[Row]:
+    what = f"{MANY:,} paths of {LONG:g} s at 1 kHz in the reference, 2 processes"
+    return [
+        within("ensemble.scale.path-steps", SYSTEM, f"{what}: steps of all paths", float(large["path-steps"]), "",
+               MANY * LONG / STEP, 0.0, "a count", "none"),
+        within("ensemble.scale.failed", SYSTEM, f"{what}: paths that left all bounds", float(large["failed"]), "", 0.0,
+               0.0, "a tumbling vehicle stays finite", "none"),
+        at_most("ensemble.scale.seconds", SYSTEM, f"{what}: start of the processes to the last path", large["seconds"],
+                "s", SECONDS, "target on two cores", "none"),
+        at_most("ensemble.scale.memory", SYSTEM, f"{what}: largest memory of all processes together", large["bytes"],
+                "byte", MEMORY, "target; does not grow with the number of paths but for the kept states", "none"),
+    ]  # fmt: skip
+
+
+def _engines(scene: Scene, truth: np.ndarray, times: np.ndarray, found: Arrays, count: int,
+             pool: Executor | None) -> tuple[list[Row], dict[str, float]]:  # fmt: skip
+    """The first paths in both engines: rows of agreement, and seconds per path and step of each way."""
+    exudyn = noise_paths(scene, times, truth, engine="exudyn")
+    one, two = (mujoco_threads(scene, times, truth, threads=threads) for threads in (1, 2))
+    ways: dict[str, Callable[[], Arrays]] = {
+        "mujoco, 1 thread": lambda: run_paths(one, count),
+        "mujoco, 2 threads": lambda: run_paths(two, count),
+        "exudyn, 2 processes" if pool else "exudyn": lambda: run_paths(exudyn, count, executor=pool, block=1),
+    }
+    rows, prices = [], {}
+    for way, job in ways.items():
+        start = time.perf_counter()
+        paths = job()
+        prices[way] = (time.perf_counter() - start) / (count * (len(truth) - 1))
+        what = f"{count} of the reference's paths in {way}: any state before drift-off, by the largest"
+        rows.append(at_most(f"ensemble.engines.{_slug(way)}", SYSTEM, what, gap(found, paths, times), "", 1e-9,
+                            "the same tableau on the same samples: rounding, grown by the instability", "native"))
+    return rows, prices
+
+
+def _price_rows(prices: dict[str, float]) -> list[Row]:
+    return [finding(f"ensemble.price.{_slug(way)}", SYSTEM, f"wall time by paths and steps, {way}", 1e9 * price, "ns",
+                    "", "seconds are reported", "none") for way, price in prices.items()]  # fmt: skip
+
+
+def _slug(way: str) -> str:
+    return way.replace(", ", ".").replace(" ", "-")
+
+
+def _half_step_row(forces: Path) -> Row:
+    """Noise belongs to the samples: half the step changes nothing but the integrator's error."""
+    pitch = [run_paths(noise_paths(_scene(forces, 10.0, step=step), np.array([10.0])), 100)["states"][:, 0, 3]
+             for step in (STEP, STEP / 2)]  # fmt: skip
+    change = float(np.abs(pitch[0] - pitch[1]).max() / pitch[1].std())
+    return at_most("ensemble.half-step", SYSTEM, "100 paths, pitch at 10 s with steps of 1 and 0.5 ms: largest "
+                   "difference by the standard deviation", change, "", 1e-4,
+                   "the samples are the same, so only the integrator's error differs", "shared kernel")  # fmt: skip
+
+
+def _data(truth: np.ndarray, times: np.ndarray, found: Arrays, large: dict[str, Any],
+          prices: dict[str, float]) -> dict[str, Any]:  # fmt: skip
+    """What the tables and the figure show."""
+    errors = found["states"] - truth[:: round(1.0 / STEP)]
+    spreads = [[when, *deviation(errors[:, round(when), 3]), *deviation(errors[:, round(when), 2])] for when in TIMES]
+    quantiles = [[level, *quantile(found["drift_off"], level)] for level in (0.05, 0.5, 0.95)]
+    counts, edges = np.histogram(found["drift_off"], bins=np.arange(0.0, 31.0, 0.5))
+    fan = np.percentile(np.abs(errors[:, 1:, 3]), (5, 25, 50, 75, 95), axis=0)
+    return {"spreads": spreads, "quantiles": quantiles, "prices": prices, "large": large, "times": times[1:].tolist(),
+            "counts": counts.tolist(), "edges": edges.tolist(), "fan": fan.tolist()}  # fmt: skip
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Spreads, drift-off times and prices; none in the quick report."""
+    if not data:
+        return []
+    paths = f"{MANY:,} paths of {LONG:g} s, noise {DEVIATION:g} N at 1 kHz on the study road"
+    spreads = tuple((f"{when:g}", f"{pitch:.4e} +- {e:.0e}", f"{heave:.4e} +- {o:.0e}")
+                    for when, pitch, e, heave, o in data["spreads"])
+    times = tuple((f"{100 * level:g} %", f"{value:.2f}", f"{low:.2f} to {high:.2f}")
+                  for level, value, low, high in data["quantiles"])
+    prices = tuple((way, f"{1e9 * price:,.0f}", f"{price * MANY * LONG / STEP / 60:,.1f}")
+                   for way, price in data["prices"].items())
+    return [
+        Table("Spread of the paths", f"{paths}; standard deviation with its standard error.",
+              ("time [s]", "pitch [rad]", "heave [m]"), spreads),
+        Table("Drift-off times", "First time at which the pitch is 0.05 rad wrong; 95 % intervals by order statistics.",
+              ("quantile", "time [s]", "interval [s]"), times),
+        Table("Price of a path", f"Wall time on two cores; the last column is {MANY:,} paths of {LONG:g} s.",
+              ("way", "per path and step [ns]", "all of them [min]"), prices),
+    ]  # fmt: skip
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Fan of the pitch error and histogram of the drift-off times."""
+    if not data:
+        return []
+    from studies.figures import plt
+
+    figure, (fan, histogram) = plt.subplots(1, 2, figsize=(10, 3.6), width_ratios=(3, 2))
+    low, quarter, middle, three, high = data["fan"]
+    fan.fill_between(data["times"], low, high, alpha=0.2, color="C0", linewidth=0, label="5 to 95 %")
+    fan.fill_between(data["times"], quarter, three, alpha=0.4, color="C0", linewidth=0, label="25 to 75 %")
+    fan.semilogy(data["times"], middle, color="C0", label="median")
+    fan.set_title("magnitude of the pitch error [rad]")
+    fan.legend(loc="lower right")
+    histogram.stairs(data["counts"], data["edges"], fill=True, color="C0", alpha=0.6)
+    histogram.set_title("drift-off time, paths per half second")
+    for axis in (fan, histogram):
+        axis.set_xlabel("time [s]")
+    return [(f"{MANY:,} noise paths in the reference: how the pitch error spreads, and when paths drift off.", figure)]
