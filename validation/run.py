@@ -15,7 +15,8 @@ from models.result import provenance
 from validation.rows import REPORTED, Row
 
 CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "point_mass",
-         "inertial_unit", "hard_cases", "planted_faults", "absent", "price", "ensemble")  # fmt: skip
+         "inertial_unit", "motion", "stabilisers", "index_reduction", "hard_cases",
+         "planted_faults", "absent", "price", "ensemble")  # fmt: skip
 """Case modules in the order of the report."""
 
 
@@ -82,11 +83,13 @@ def seeds() -> dict[str, int]:
     """Every seed that the rows depend on; with them and the versions all counts and states repeat exactly."""
     from studies.six_runs import Options
     from validation import checks, timing
-    from validation.cases import ensemble, inertial_unit, point_mass, roads
+    from validation.cases import ensemble, index_reduction, inertial_unit, motion, point_mass, roads, stabilisers
 
     return {"random states": checks.SEED, "class C road": roads.SEED, "six runs": Options.model_fields["seed"].default,
             "order of timing": timing.SEED, "point mass": point_mass.SEED,
-            "inertial unit": inertial_unit.SEED, "noise paths": ensemble.SEED}  # fmt: skip
+            "inertial unit": inertial_unit.SEED, "noise paths": ensemble.SEED,
+            "accelerometers": motion.SEED,
+            "stabilisers": stabilisers.SEED, "index reduction": index_reduction.SEED}  # fmt: skip
 
 
 def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:

@@ -1,0 +1,211 @@
+"""Drift by index reduction beside drift by noise: which formulation has which, and what cures it."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from models.assembly import Assembly, assemble
+from models.engines.protocol import Settings, build
+from models.noise import normal
+from models.scene import Scene
+from models.simulate import simulate
+from models.time_series import write_time_series
+from validation.hard_cases.prescribed_pitch import AsItComes
+from validation.index_reduction import IndexOne, gap_law
+from validation.rows import Row, System, at_most, behaves, finding, not_run
+from validation.scenes import force_scene, road_scene, write_forces
+
+TITLE = "Drift by index reduction, and drift by noise"
+SYSTEM: System = "drift"
+STEP = 1e-3
+OFF, RATE_OFF = 1e-4, 1e-4
+"""Error of the start, rad and rad/s: what a measured start has, and what a long run's rounding adds up to."""
+ALPHA = 10.0
+"""Baumgarte's rate, 1/s: slow beside a step of 1 ms, fast beside a run."""
+SEED, FORCE_NOISE, WALK = 31, 31.0, np.deg2rad(0.2)
+"""Seed of the noise; N per sample of each force; rad per sqrt(s) of the integrated rate of a cheap gyro."""
+SMOOTH = 5.0
+"""Bandwidth (Hz) of the pitch that such a gyro gives."""
+HAND = {"index 1": {}, "index 1, Baumgarte": {"alpha": ALPHA}, "index 1, projection": {"projected": True}}
+EXUDYN = {"index 2": "TrapezoidalIndex2", "index 3": "GeneralizedAlpha"}
+LACKING = (
+    ("exudyn.1", "Exudyn at index 1", "has no formulation on the level of accelerations; its explicit solvers leave "
+     "constraints out without a word, which the adapter refuses"),
+    ("exudyn.baumgarte", "Exudyn with Baumgarte's stabilisation", "has none: its index 3 needs none"),
+    ("exudyn.projection", "Exudyn with projection", "has none between steps"),
+    ("mujoco", "MuJoCo at index 3, 2 or 1", "has no hard constraints: an equality is a spring and a damper on the "
+     "level of accelerations, so the adapter leaves the pitch out of the coordinates"),
+)  # fmt: skip
+"""Id, words, why it is not there (Exudyn 1.13, MuJoCo 4)."""
+
+
+@dataclass(frozen=True)
+class Files:
+    """A drive on the study road: its true pitch, and scenes that follow its files."""
+
+    folder: Path
+    duration: float
+    pitch: np.ndarray
+
+    def scene(self, **effects: Any) -> Scene:
+        """The vehicle under the measured forces, linear between the samples."""
+        return force_scene(self.folder, step=STEP, duration=self.duration, effects=effects)
+
+    def guided(self, file: str = "pitch.csv", **values: Any) -> Assembly:
+        """Guided by one of the files."""
+        return assemble(self.scene(prescribed_pitch={"file": file, **values}))
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Gaps from a start off the constraint by formulation, then both drifts by noise in the same formulations."""
+    with TemporaryDirectory() as name:
+        files = _drive(Path(name), 0.2 if quick else 4.0)
+        gaps, laws = _gaps(files), _laws(files)
+        walked = _walked(files)
+        loose = _loose(_drive(Path(name), 1.0 if quick else 12.0))
+    rows = [*_gap_rows(gaps, laws, files.duration), *_noise_rows(walked, loose),
+            *(not_run(f"index_reduction.{id}", SYSTEM, words, why) for id, words, why in LACKING)]  # fmt: skip
+    times = STEP * np.arange(len(next(iter(gaps.values()))))
+    return rows, {"times": times.tolist(), "gaps": {name: gap.tolist() for name, gap in gaps.items()},
+                  "walked": {name: error.tolist() for name, error in walked.items()},
+                  "loose": {name: error[::10].tolist() for name, error in loose.items()}}  # fmt: skip
+
+
+def _drive(folder: Path, duration: float) -> Files:
+    """Measure on the study road, write forces, pitch, and the pitch that a gyro's integrated rate gives."""
+    measured = simulate(road_scene(step=STEP, duration=duration), "reference")
+    write_forces(measured, folder, STEP)
+    walk = WALK * np.sqrt(STEP) * np.cumsum(normal(SEED, 0, len(measured.times), 1)[:, 0])
+    write_time_series(folder / "gyro.csv", {"pitch": ("rad", measured["pitch"] + walk)}, STEP)
+    return Files(folder, duration, measured["pitch"])
+
+
+def _paths(assembly: Assembly, duration: float) -> dict[str, np.ndarray]:
+    """Pitch (n,) by formulation, each from the assembly's initial state."""
+    found = {name: IndexOne(assembly, **values).run(STEP, duration) for name, values in HAND.items()}
+    for name, integrator in EXUDYN.items():
+        found[name] = AsItComes(assembly, Settings(integrator, STEP, duration, spectral_radius=0.6)).run().states
+    found |= {f"eliminated, {engine}": build(engine, assembly, Settings("RK4", STEP, duration)).run().states
+              for engine in ("reference", "mujoco")}  # fmt: skip
+    return {name: states[:, 3] for name, states in found.items()}
+
+
+def _gaps(files: Files) -> dict[str, np.ndarray]:
+    """Pitch minus prescribed pitch (n,) by formulation, from a start that is off by OFF and RATE_OFF."""
+    guided = files.guided()
+    start = guided.initial.copy()
+    start[[3, 7]] += OFF, RATE_OFF
+    paths = _paths(replace(guided, initial=start), files.duration)
+    return {name: path - files.pitch for name, path in paths.items()}
+
+
+def _walked(files: Files) -> dict[str, np.ndarray]:
+    """Pitch minus true pitch (n,) by formulation, guided by the gyro's pitch from a start on the constraint."""
+    paths = _paths(files.guided("gyro.csv", bandwidth=SMOOTH), files.duration)
+    return {name: path - files.pitch for name, path in paths.items()}
+
+
+def _loose(files: Files) -> dict[str, np.ndarray]:
+    """Pitch minus true pitch (n,) under noisy forces and no guidance, by the solvers of both engines."""
+    own = assemble(files.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
+    solvers = {"Exudyn's solver of index 2": ("exudyn", "TrapezoidalIndex2"),
+               "Exudyn's solver of index 3": ("exudyn", "GeneralizedAlpha"), "Runge-Kutta": ("reference", "RK4")}
+    return {name: build(engine, own, Settings(integrator, STEP, files.duration, spectral_radius=0.6)).run().states[:, 3]
+            - files.pitch for name, (engine, integrator) in solvers.items()}  # fmt: skip
+
+
+def _laws(files: Files) -> dict[str, tuple[np.ndarray, str]]:
+    """Gap (n,) in rad that a formulation must have after the wrong start, and why."""
+    times = STEP * np.arange(len(files.pitch))
+    return {
+        "index 1": (gap_law(times, OFF, RATE_OFF), "g'' = 0 keeps both errors: g = g(0) + g'(0) t"),
+        "index 1, Baumgarte": (gap_law(times, OFF, RATE_OFF, ALPHA), "g'' + 2 alpha g' + alpha^2 g = 0"),
+        "index 2": (np.append(OFF, OFF + STEP / 2 * RATE_OFF + _quadrature(files)[1:]),
+                    "g' = 0 keeps the error of the angle, and adds that of the trapezoidal rule over the rate"),
+    }  # fmt: skip
+
+
+def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str]], duration: float) -> list[Row]:
+    start = f"from a start off by {OFF:g} rad and {RATE_OFF:g} rad/s"
+    rows = [at_most(f"index_reduction.law.{_id(name)}", SYSTEM, f"{name}: gap {start} against its law",
+                    float(np.abs(gaps[name] - law).max() / OFF), "of the start's", 1e-3, why, "closed form")
+            for name, (law, why) in laws.items()]  # fmt: skip
+    none = {"index 1, projection": "each step ends on the constraint", "index 3": "the angle itself is the constraint",
+            "eliminated, reference": "the pitch is no unknown", "eliminated, mujoco": "the pitch is no unknown"}
+    rows += [at_most(f"index_reduction.none.{_id(name)}", SYSTEM, f"{name}: gap after the first step, {start}",
+                     float(np.abs(gaps[name][1:]).max()), "rad", 1e-12, why, "closed form")
+             for name, why in none.items()]  # fmt: skip
+    rows.append(finding("index_reduction.gain", SYSTEM, f"index 1: gap after {duration:g} s by that of the start",
+                        float(gaps["index 1"][-1] / OFF), "", 1 + RATE_OFF / OFF * duration, "it never stops", "none"))
+    return [*rows, _index_two_refused()]
+
+
+def _quadrature(files: Files) -> np.ndarray:
+    """Error (n,) in rad of the trapezoidal rule over the rate of the prescribed pitch."""
+    signal = files.guided().input
+    assert signal is not None
+    angle, rate = signal.sample(0.0, STEP, len(files.pitch))[:, 2:4].T
+    summed = np.concatenate(([0.0], np.cumsum(0.5 * STEP * (rate[1:] + rate[:-1]))))
+    return summed - (angle - angle[0])
+
+
+def _index_two_refused() -> Row:
+    """Exudyn's generalised-alpha with its flag for index 2."""
+    import exudyn as exu
+
+    system = exu.SystemContainer().AddSystem()
+    system.Assemble()
+    options: Any = exu.SimulationSettings()
+    options.solution.file.write = False
+    options.timeIntegration.generalizedAlpha.useIndex2Constraints = True
+    try:
+        system.SolveDynamic(options, solverType=exu.DynamicSolverType.GeneralizedAlpha)
+    except (exu.ExudynError, RuntimeError, ValueError) as error:
+        found = "refused" if "useNewmark" in str(error) else str(error)
+    else:
+        found = "answered"
+    return behaves("index_reduction.exudyn.alpha_2", SYSTEM, "Exudyn's generalised-alpha with its flag for index 2",
+                   found, "refused", "index 2 is there with the trapezoidal rule alone")  # fmt: skip
+
+
+def _noise_rows(walked: dict[str, np.ndarray], loose: dict[str, np.ndarray]) -> list[Row]:
+    """Neither drift by noise cares for the formulation."""
+    rows = []
+    guided = "guided by the integrated rate of a noisy gyro"
+    free = f"without guidance, {FORCE_NOISE:g} N of noise on each sample of the forces"
+    why = "stabilisation puts the vehicle where the data is, and the data is what drifts"
+    for id, words, errors in (("walk", guided, walked), ("force", free, loose)):
+        paths = np.array(list(errors.values()))
+        size = float(np.sqrt(np.mean(paths[-1] ** 2)))
+        rows.append(finding(f"index_reduction.{id}.size", SYSTEM, f"{words}: rms error of the pitch", size, "rad",
+                            "not zero", "noise, integrated once or twice: the data itself drifts", "none"))
+        apart = float(np.ptp(paths, axis=0).max()) / size
+        rows.append(at_most(f"index_reduction.{id}", SYSTEM, f"{words}: largest difference of the error between "
+                            f"{len(paths)} formulations, by its rms", apart, "", 0.05, why, "native"))
+    return rows
+
+
+def _id(name: str) -> str:
+    return name.replace(", ", ".").replace(" ", "_")
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Gaps from a wrong start by formulation, and errors by noise, in which all formulations lie on each other."""
+    from studies.figures import plt
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6))
+    for name, gap in data["gaps"].items():
+        if max(map(abs, gap[1:])) > 1e-12:
+            left.semilogy(data["times"], [abs(value) for value in gap], label=name)
+    left.set(xlabel="time [s]", ylabel="|pitch - prescribed pitch| [rad]", ylim=(1e-9, None),
+             title=f"Start off by {OFF:g} rad and {RATE_OFF:g} rad/s")  # fmt: skip
+    left.legend(title="projection, index 3, eliminated: 0", title_fontsize="small", fontsize="small")
+    for i, (name, error) in enumerate(data["loose"].items()):
+        right.plot([10 * STEP * j for j in range(len(error))], error, label=name, linewidth=4 - 1.5 * i)
+    right.set(xlabel="time [s]", ylabel="pitch - true pitch [rad]", title="No guidance, noise on the forces")
+    right.legend(fontsize="small")
+    return [("Drift by index reduction is the constraint's own and can be cured; drift by noise is the data's, and "
+             "no formulation and no solver sees it.", figure)]

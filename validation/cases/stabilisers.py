@@ -1,0 +1,151 @@
+"""Stabilisers of a force-excited run: the loads that a prescribed motion reveals, and effects that must be exact."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from models.assembly import Assembly, assemble
+from models.engines.protocol import Settings
+from models.engines.stability import first_order, linearised
+from models.noise import normal
+from models.result import Result
+from models.scene import Scene
+from models.signals import Sampled
+from models.simulate import simulate
+from models.time_series import write_time_series
+from models.vehicles.pitch_plane import Parameters
+from studies.virtual_measurement import Follow, follower, write_measurement
+from studies.virtual_measurement import measure as measure_road
+from validation import checks
+from validation.rows import Row, System, at_most, finding, within
+from validation.scenes import VEHICLES, road_scene
+
+TITLE = "Stabilisers"
+SYSTEM: System = "drift"
+STEP = 1e-3
+MISSING, SHIFT = 0.05, 0.02
+"""Part of the chassis that the model lacks; how far (m) ahead of the truth its centre of mass lies."""
+BOUND = 1e-3
+"""Of the predicted mean: forces linear between samples of 1 ms leave 1e-4."""
+SEED, SENSOR = 37, np.deg2rad(0.1)
+"""Seed of the noise on a measured pitch, and its standard deviation per sample (rad)."""
+BANDWIDTHS = {5.0: 3097.0, 15.0: 1333.0}
+"""Hz, with the rms moment (N m) that another zero-phase filter left on a like drive."""
+CUT_OFF = 0.25
+"""Of the high-pass, Hz."""
+RAILS = {"prescribed_heave_and_pitch": {"file": "motion.csv"}}
+CONSTRAINED = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
+EXPLICIT = {"exudyn": "RK44", "mujoco": "RK4"}
+BAND = {"pitch_spring": {"stiffness": 3e3, "damping": 200.0, "dead_band": 0.01}}
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Missing mass and misplaced centre on both vehicles; the rest on the asymmetric one."""
+    duration = 0.5 if quick else 10.0
+    rows: list[Row] = []
+    with TemporaryDirectory() as name:
+        for parameters in VEHICLES:
+            scene = road_scene(parameters, STEP, duration)
+            measured, work = measure_road(scene), Path(name) / parameters
+            work.mkdir()
+            write_measurement(measured, 1 / STEP, 1, work)
+            follow, p = follower(scene, work), scene.vehicle_parameters()
+            rows += _missing_mass(parameters, p, measured, follow, work)
+            rows += _shifted_centre(parameters, p, measured, follow, work)
+        rows += [*_exact(follow, min(duration, 4.0)), _high_pass(follow), *_bandwidth(measured, follow, work)]
+    return rows, {}
+
+
+def write_motion(measured: Result, folder: Path, ahead: float = 0.0) -> None:
+    """Heave of a point ``ahead`` (m) of the true centre of mass, and pitch, as the file that scenes follow."""
+    pitch = measured["pitch"]
+    columns = {"z3": ("m", measured["z3"] - ahead * np.sin(pitch)), "pitch": ("rad", pitch)}
+    write_time_series(folder / "motion.csv", columns, STEP)
+
+
+def guided(scene: Scene, engine: str) -> Result:
+    """A guided run by the integrator that solves for what its motion takes."""
+    return simulate(scene, engine, Settings(CONSTRAINED[engine], STEP, scene.run.duration, spectral_radius=0.6))
+
+
+def _missing_mass(parameters: str, p: Parameters, measured: Result, follow: Follow, folder: Path) -> list[Row]:
+    """The model lacks 5 % of the chassis: a force down, dm (g - z3'')."""
+    write_motion(measured, folder)
+    scene = follow({"m3": (1 - MISSING) * p.m3}, RAILS)
+    rate = measured["z3_rate"]
+    mean = (rate[-1] - rate[0]) / scene.run.duration
+    wanted = MISSING * p.m3 * (p.g - mean)
+    return [
+        within(f"stabilisers.mass.{engine}.{parameters}", SYSTEM,
+               f"{engine}, {parameters}: mean force of a prescribed heave, {MISSING:.0%} of the chassis missing "
+               f"(0.05 m3 g = {MISSING * p.m3 * p.g:.1f} N)", float(guided(scene, engine)["enforced_force"].mean()),
+               "N", wanted, BOUND * wanted, f"0.05 m3 (g - z3''), down; z3'' is {mean:.3f} m/s^2 on average here",
+               "closed form")
+        for engine in CONSTRAINED
+    ]  # fmt: skip
+
+
+def _shifted_centre(parameters: str, p: Parameters, measured: Result, follow: Follow, folder: Path) -> list[Row]:
+    """The model's centre of mass lies ahead of the true one, its struts where they are: a moment, nose up."""
+    write_motion(measured, folder, SHIFT)
+    scene = follow({"a": p.a + SHIFT, "b": p.b - SHIFT}, RAILS)
+    wanted = SHIFT * float(np.mean((measured["f3"] + measured["f4"]) * np.cos(measured["pitch"])))
+    return [
+        within(f"stabilisers.centre.{engine}.{parameters}", SYSTEM,
+               f"{engine}, {parameters}: mean moment of a prescribed pitch, centre of mass {SHIFT:g} m too far ahead "
+               f"(m3 g x = {SHIFT * p.m3 * p.g:.1f} N m)", float(guided(scene, engine)["enforced_moment"].mean()),
+               "N m", wanted, BOUND * wanted, "x (f3 + f4) cos(pitch) of the true drive, nose up", "closed form")
+        for engine in CONSTRAINED
+    ]  # fmt: skip
+
+
+def _exact(follow: Follow, duration: float) -> list[Row]:
+    """A dead band and an added moment in both engines against the reference."""
+    assembly = assemble(follow({}, BAND))
+    times = STEP * np.arange(round(duration / STEP) + 1)
+    moment = Sampled(500.0 * np.sin(30.0 * times)[:, None], STEP, held=False)
+    free = assemble(follow({}, {}))
+    laws: dict[str, tuple[Assembly, str]] = {
+        "dead_band": (assembly, "a pitch spring with a dead band of 0.01 rad"),
+        "moment": (free.with_moment(moment), "an added moment of 500 N m at 30 rad/s"),
+    }
+    return [
+        at_most(f"stabilisers.{name}.{engine}", SYSTEM, f"{engine}, {words}: largest difference of any state to the "
+                "reference", checks.trajectory_gap(checks.engine(engine), own, Settings(integrator, STEP, duration)),
+                "SI", 1e-12, "the same stages see the same side of the band and the same moment", "native")
+        for name, (own, words) in laws.items() for engine, integrator in EXPLICIT.items()
+    ]  # fmt: skip
+
+
+def _high_pass(follow: Follow) -> Row:
+    """The slow pole of the linearised vehicle, which is the filter's own."""
+    corner, ratio = 2 * np.pi * CUT_OFF, 0.7
+    vehicle = assemble(follow({}, {"high_pass": {"cut_off": CUT_OFF, "damping_ratio": ratio}})).vehicle
+    poles = np.linalg.eigvals(first_order(linearised(vehicle)))
+    wanted = corner * complex(-ratio, np.sqrt(1 - ratio**2))
+    off = float(np.abs(poles - wanted).min()) / corner
+    return at_most("stabilisers.high_pass", SYSTEM, f"high-pass at {CUT_OFF:g} Hz: distance of the vehicle's slow pole "
+                   "from that of s^2 + 2 zeta wc s + wc^2, by wc", off, "", 0.01,
+                   "k = (I + J) wc^2, d = 2 zeta (I + J) wc; the wheels follow the chassis but for (wc / 20)^2, and "
+                   "unequal ends couple heave by (b m1 - a m2)^2 / (M (I + J))", "closed form")  # fmt: skip
+
+
+def _bandwidth(measured: Result, follow: Follow, folder: Path) -> list[Row]:
+    """A pitch with the white noise of an inertial unit, raw and smoothed: what the moment becomes."""
+    noise = SENSOR * normal(SEED, 0, len(measured.times), 1)[:, 0]
+    write_time_series(folder / "measured.csv", {"pitch": ("rad", measured["pitch"] + noise)}, STEP)
+    file = {"file": "measured.csv"}
+    runs = {bandwidth: guided(follow({}, {"prescribed_pitch": file | ({"bandwidth": bandwidth} if bandwidth else {})}),
+                              "reference") for bandwidth in (None, *BANDWIDTHS)}  # fmt: skip
+    rms = {bandwidth: float(np.sqrt(np.mean(run["enforced_moment"] ** 2))) for bandwidth, run in runs.items()}
+    rows = [finding("stabilisers.bandwidth.raw", SYSTEM, "rms moment of a pitch with noise of 0.1 degrees per sample "
+                    "at 1 kHz, used as it is", rms[None], "N m", 1e6,
+                    "I s sqrt(6) / T^2 and more: differentiated twice", "published")]  # fmt: skip
+    for bandwidth, published in BANDWIDTHS.items():
+        off = float(np.abs(runs[bandwidth]["pitch"] - measured["pitch"]).max())
+        rows.append(finding(f"stabilisers.bandwidth.{bandwidth:g}", SYSTEM, f"the same smoothed to {bandwidth:g} Hz; "
+                            f"the pitch is then off by at most {off:.4f} rad", rms[bandwidth], "N m", published,
+                            "with another filter: a low one takes motion away, a high one leaves noise", "published"))
+    return rows
