@@ -43,11 +43,11 @@ Word = Literal["accepted", "rejected", "stabilise"]
 class Limits(Strict):
     """[options.limits]: from where on a run is not good enough; chosen by whoever uses its forces."""
 
-    damage_error: float = Field(0.05, gt=0, description="largest |damage ratio - 1| of a body-frame section force")
-    pitch_error: float = Field(0.02, gt=0, description="largest pitch error", json_schema_extra={"unit": "rad"})
+    damage_error: float = Field(default=0.05, gt=0, description="largest |damage ratio - 1| of any section force")
+    pitch_error: float = Field(default=0.02, gt=0, description="largest pitch error, rad")
     artificial_share: float = Field(
-        0.15, gt=0, description="rms of the artificial moment by that of I pitch'', and of the artificial vertical "
-        "force by that of m3 z3'', both up to 15 Hz")  # fmt: skip
+        default=0.15, gt=0, description="rms of the artificial moment by that of I pitch'' and of the artificial "
+        "vertical force by that of m3 z3'', both up to 15 Hz")  # fmt: skip
 
 
 @dataclass(frozen=True)

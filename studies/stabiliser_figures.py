@@ -1,0 +1,140 @@
+"""Two figures to decide from: what each stabiliser leaves, and what its stiffness or cut-off does on a grade."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.drift.score import BAND, TUMBLED, Limits
+from models.section_forces import CHANNELS
+from studies.figures import plt, save
+
+Row = dict[str, Any]
+
+ROADS = {"road": ("on the road", "#0072b2"), "grade": ("on the grade", "#d55e00")}
+WORDS = {"accepted": "#00795a", "stabilise": "#a86400", "rejected": "#b00020"}
+MARKS = dict(zip(CHANNELS, ("o", "s", "^", "D"), strict=True))
+NAMES = {"f3x": "front, along", "f3z": "front, upright", "f4x": "rear, along", "f4z": "rear, upright"}
+DAMAGE, PITCH, SHARE = (3e-3, 3e2), (1e-4, 10.0), (1e-4, 1.0)
+"""What the axes show; a mark at an edge lies beyond it."""
+TICKS = (0.01, 0.1, 0.5, 0.8, 0.9, 1.0, 1.1, 1.25, 2.0, 10.0, 100.0)
+SHARP = 0.05
+"""Damage ratios are drawn as asinh(ln(ratio) / SHARP): linear about 1, logarithmic far from it."""
+
+
+def decide(rows: list[Row], limits: Limits, grade: float | None, path: Path) -> None:
+    """One line per method: damage, pitch error, artificial moment, cost and the two verdicts."""
+    methods = list(dict.fromkeys(row["method"] for row in rows))
+    widths = (3.4, 1.9, 2.1, 3.6)
+    figure, axes = plt.subplots(1, 4, figsize=(14.5, 1.7 + 0.36 * len(methods)), sharey=True, width_ratios=widths)
+    for row in rows:
+        _marks(axes, row, methods.index(row["method"]))
+    right = (1 - limits.damage_error, 1 + limits.damage_error)
+    _panel(axes[0], DAMAGE, "pseudo-damage of the section forces,\nin the chassis' frame, by the true one", right)
+    _panel(axes[1], PITCH, "largest pitch error [rad]\n(dotted: tumbled)", (PITCH[0], limits.pitch_error))
+    _panel(axes[2], SHARE, f"artificial moment by I pitch'',\nrms to {BAND:g} Hz", (SHARE[0], limits.artificial_share))
+    axes[0].set_xscale("function", functions=(lambda x: np.arcsinh(np.log(np.maximum(x, 1e-12)) / SHARP),
+                                              lambda u: np.exp(SHARP * np.sinh(u))))  # fmt: skip
+    axes[0].set_xlim(*DAMAGE)
+    axes[0].set_xticks(TICKS, [f"{tick:g}" for tick in TICKS], fontsize=8)
+    axes[0].minorticks_off()
+    axes[1].axvline(TUMBLED, color="#b00020", linewidth=0.8, linestyle=":")
+    axes[0].set_yticks(range(len(methods)), methods)
+    axes[0].set_ylim(len(methods) - 0.5, -0.5)
+    _verdicts(axes[3], rows, methods)
+    _legend(figure, grade)
+    figure.suptitle("Which stabiliser leaves the section forces right: perturbed model, noisy wheel forces "
+                    f"({rows[0]['engine']})", x=0.01, ha="left", fontweight="bold")  # fmt: skip
+    save(figure, path)
+
+
+def _marks(axes: Any, row: Row, line: int) -> None:
+    """The marks of one run, the grade's a little lower."""
+    _, colour = ROADS[row["road"]]
+    y = line + (0.17 if row["road"] == "grade" else -0.17)
+    for channel, mark in MARKS.items():
+        if row[f"damage {channel}"] is not None:
+            place = np.clip(row[f"damage {channel}"], *DAMAGE)
+            axes[0].plot(place, y, mark, color=colour, markersize=4.5, clip_on=False, alpha=0.8)
+    if row["damage f3x"] is None:
+        axes[0].text(1.0, y, f"tumbled; its vertical f3 says {row['vertical damage f3']:.2f}", color=colour,
+                     fontsize=7.5, ha="center", va="center")  # fmt: skip
+    axes[1].plot(np.clip(row["pitch error max [rad]"], *PITCH), y, "o", color=colour, markersize=5, clip_on=False)
+    axes[2].plot(np.clip(row["moment share to 15 Hz"], *SHARE), y, "o", color=colour, markersize=5, clip_on=False)
+
+
+def _panel(axis: Any, span: tuple[float, float], title: str, good: tuple[float, float]) -> None:
+    axis.set_xscale("log")
+    axis.set_xlim(*span)
+    axis.axvspan(*good, color="#00795a", alpha=0.16, linewidth=0)
+    axis.set_title(title)
+    axis.grid(axis="y", alpha=0.25)
+
+
+def _verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
+    """Words: with the truth and without it, per road, and the price."""
+    axis.set_xlim(0, 10)
+    axis.axis("off")
+    columns = [(row["road"], key) for row in rows if row["method"] == "free" for key in ("verdict", "without truth")]
+    places = dict(zip(columns, (0.1, 2.4, 4.9, 7.2), strict=False))
+    for (road, key), x in places.items():
+        name = "by damage" if key == "verdict" else "blind"
+        axis.text(x, -0.75, f"{ROADS[road][0]},\n{name}", fontsize=8, va="bottom", color=ROADS[road][1])
+    for row in rows:
+        for key in ("verdict", "without truth"):
+            word = row[key]
+            axis.text(places[row["road"], key], methods.index(row["method"]), word, color=WORDS[word], va="center",
+                      fontsize=8.5, fontweight="bold" if word == "accepted" else "normal")  # fmt: skip
+    free = next(row["seconds"] for row in rows if row["method"] == "free")
+    axis.text(9.5, -0.75, "cost,\nx free", fontsize=8, va="bottom")
+    for row in rows:
+        if row["road"] == rows[0]["road"]:
+            axis.text(9.5, methods.index(row["method"]), f"{row['seconds'] / free:.1f}", va="center", fontsize=8.5)
+
+
+def _legend(figure: Any, grade: float | None) -> None:
+    """Marks and roads, below."""
+    marks = [plt.Line2D([], [], marker=mark, linestyle="", color="#555555", markersize=5, label=NAMES[channel])
+             for channel, mark in MARKS.items()]  # fmt: skip
+    words = {"road": "on the road as it is", "grade": f"on the same road with a grade of {grade or 0:g} rad"}
+    roads = [plt.Line2D([], [], marker="o", linestyle="", color=ROADS[road][1], label=word)
+             for road, word in words.items() if road == "road" or grade is not None]  # fmt: skip
+    good = plt.Rectangle((0, 0), 1, 1, color="#00795a", alpha=0.16, label="within the limits")
+    figure.legend(handles=[*marks, *roads, good], loc="outside lower center", ncols=7, fontsize=8.5)
+
+
+def swept(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: float | None, path: Path) -> None:
+    """Pitch error and worst damage ratio over stiffness, with the equivalent cut-off above, on every road.
+
+    sweep : per road what ``Bench.sweep`` gives; level : the bench of the road without the grade
+    """
+    figure, axes = plt.subplots(1, 2, figsize=(10, 4.2))
+    for road, found in sweep.items():
+        name, colour = ROADS[road]
+        axes[0].loglog(found[:, 0], found[:, 1], "-", color=colour, label=f"spring, {name}")
+        axes[0].loglog(found[:, 0], found[:, 2], "o", color=colour, markersize=4, label=f"high-pass, {name}")
+        held = found[:, 1] < TUMBLED
+        axes[1].loglog(found[held, 0], found[held, 3], "o-", color=colour, markersize=4, label=name)
+        tumbled = found[~held, 0]
+        axes[1].plot(tumbled, np.full(len(tumbled), DAMAGE[1]), "x", color=colour, label=f"tumbles, {name}")
+    low = limits.pitch_error / 2
+    axes[0].set_ylim(low, 3.0)
+    axes[0].axhspan(low, limits.pitch_error, color="#00795a", alpha=0.16, linewidth=0, label="allowed")
+    axes[1].axhspan(1 - limits.damage_error, 1 + limits.damage_error, color="#00795a", alpha=0.3, linewidth=0,
+                    label="allowed")  # fmt: skip
+    axes[1].set_ylim(top=1.5 * DAMAGE[1])
+    axes[0].set_title("largest pitch error [rad]")
+    axes[1].set_title("damage ratio of the worst section force")
+    for axis in axes:
+        axis.axvline(level.holding, color="#555555", linewidth=0.8, linestyle="--", label="predicted to hold from here")
+        axis.set_xlabel("stiffness of the spring to the ground [N m/rad]")
+        turning = (lambda k: np.sqrt(np.maximum(k, 0.0) / level.resisting) / (2 * math.pi),
+                   lambda f: level.resisting * (2 * math.pi * f) ** 2)  # fmt: skip
+        above = axis.secondary_xaxis("top", functions=turning)
+        above.set_xlabel("cut-off of the high-pass that is the same thing [Hz]", fontsize=8.5)
+        axis.legend(fontsize=8)
+    figure.suptitle(f"Keeping the pitch near zero: no stiffness is right, least of all on a grade of {grade or 0:g} rad"
+                    if grade is not None else "Keeping the pitch near zero: what the stiffness does",
+                    x=0.01, ha="left", fontweight="bold")  # fmt: skip
+    save(figure, path)
