@@ -5,8 +5,11 @@ import pytest
 
 from models.errors import InputError
 from models.scene import build
+from models.sensors import rigid_body_motion, sensor_array
 from models.sensors.virtual_accelerometers import on_bracket, readings
 from models.simulate import simulate
+from validation.hard_cases import accelerometers as family
+from validation.hard_cases.case import judge
 
 ENGINES = ("reference", "exudyn", "mujoco")
 SENSORS = {"front": {"x": 1.1, "y": 0.6, "z": 0.2}, "rear": {"x": -0.9, "z": -0.3}}
@@ -109,3 +112,18 @@ def test_a_stiff_bracket_is_a_rigid_mount_and_gravity_passes():
 def test_bad_scenes_are_one_clear_message(own, words):
     with pytest.raises(InputError, match=words):
         simulate(scene(**own), "reference")
+
+
+def outcome(name, folder):
+    return judge(next(case for case in family.CASES if case.name == name), "mujoco", folder).word
+
+
+def test_without_the_check_of_the_arrangement_a_plane_is_silent(monkeypatch, tmp_path):
+    monkeypatch.setattr(sensor_array, "PLANE", 0.0)
+    monkeypatch.setattr(sensor_array, "FLAT", 0.0)
+    assert outcome("accelerometers nearly in a plane", tmp_path) == "SILENT"
+
+
+def test_without_the_consistency_figure_a_loose_sensor_is_silent(monkeypatch, tmp_path):
+    monkeypatch.setattr(rigid_body_motion, "LIMIT", 1.0)
+    assert outcome("accelerometer on a bracket", tmp_path) == "SILENT"

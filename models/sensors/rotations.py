@@ -12,6 +12,8 @@ from numba import njit
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from models.errors import InputError
+
 Rule = Literal["held", "mean", "cubic"]
 """How a rate runs between its samples; order 1, 2, 4 of the orientation in the sampling period."""
 LOCK = 1e-6
@@ -21,7 +23,7 @@ SKEWED = 1e-6
 """Largest departure of S^T S from the identity that still counts as a rotation."""
 
 
-class GimbalLock(ValueError):
+class GimbalLock(InputError):
     """Cardan angles were asked for where roll and yaw cannot be told apart; quaternions go on without harm.
 
     sample : index of the first such orientation; pitch : its pitch (rad).
@@ -29,8 +31,9 @@ class GimbalLock(ValueError):
 
     def __init__(self, sample: int, pitch: float) -> None:
         self.sample, self.pitch = sample, pitch
-        super().__init__(f"gimbal lock at sample {sample}: at a pitch of {np.degrees(pitch):.6g} degrees roll and yaw "
-                         "turn about the same axis and only their sum is defined; use the quaternion or the matrix")
+        super().__init__("", f"orientation, sample {sample}", None, "gimbal lock: at a pitch of "
+                         f"{np.degrees(pitch):.6g} degrees roll and yaw turn about the same axis; use the quaternion "
+                         "or the matrix")
 
 
 def skew(v: np.ndarray) -> np.ndarray:

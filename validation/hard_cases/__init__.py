@@ -9,7 +9,8 @@ from importlib import import_module
 
 from validation.hard_cases.case import Case
 
-FAMILIES = ("stepping", "sampled_input", "contact_points", "prescribed_pitch", "invariants", "extremes")
+FAMILIES = ("stepping", "sampled_input", "contact_points", "prescribed_pitch", "invariants", "extremes",
+            "accelerometers")  # fmt: skip
 
 
 def all_cases() -> tuple[Case, ...]:

@@ -1,0 +1,267 @@
+"""Motion from accelerometers (Section 3.1): exact with clean data, honest about planes, noise and loose mounts."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.assembly import assemble
+from models.effects.accelerometers import names
+from models.engines.protocol import build, settings_of
+from models.noise import ACCELEROMETERS, normal
+from models.scene import build as build_scene
+from models.sensors.rate_filter import filter_rates
+from models.sensors.rigid_body_motion import (
+    Start,
+    angular_acceleration,
+    integrate_rates,
+    motion,
+    quality,
+    rates_up_to_sign,
+    spin,
+    tilt_displacement,
+)
+from models.sensors.rotations import from_cardan, skew
+from models.sensors.sensor_array import SensorArray, sensor_array
+from models.simulate import outputs
+from validation.bands import mean_square
+from validation.hard_cases.case import IMPLEMENTATIONS
+from validation.rows import Row, System, Table, at_most, behaves, within
+from validation.spatial_motion import ARRAYS, PATH, readings, tilted
+
+TITLE = "Motion from accelerometers"
+SYSTEM: System = "drift"
+SEED = 30
+BOUND = 1e-12
+HEIGHTS = {1.0: 0.69, 0.3: 1.9, 0.1: 5.8, 0.03: 18.9}
+"""Height (m) of the fifth sensor over a floor of 2 m by 1.2 m -> known gain relative to the last sensor (1/m)."""
+NOISE = 0.3
+"""m/s^2 on each sample of the drift rows."""
+PERIOD = 0.01
+RIGID = {"front left": (1.1, -0.6, 0.2), "front right": (1.1, 0.6, 0.2), "rear left": (-0.9, -0.6, 0.2),
+         "rear right": (-0.9, 0.6, 0.2), "roof": (0.1, 0.0, -0.9)}  # fmt: skip
+BRACKET = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows for clean motions in space, for noise, for each engine's own readings, and for drift."""
+    rows = [row for name in ARRAYS for row in _exact(name)]
+    rows += [_plain(), _order(), _tilt()]
+    gains, found = _gains(4000 if quick else 40_000)
+    rows += found
+    for engine in IMPLEMENTATIONS:
+        rows += _engine(engine, 1.0 if quick else 8.0)
+    walked, curves = _walk(20 if quick else 300)
+    return [*rows, *walked, *_held(curves, quick)], {"gains": gains, "curves": curves}
+
+
+def _exact(name: str) -> list[Row]:
+    """What needs no integration, on a motion whose derivatives are closed forms."""
+    array = sensor_array(ARRAYS[name])
+    clean = readings(array.positions)
+    found, key = spin(array, clean), f"motion.exact.{name.replace(',', '').replace(' ', '-')}"
+    alpha = float(np.abs(angular_acceleration(found, PATH.rates) - PATH.alpha).max())
+    squares = (rates_up_to_sign(found) @ array.frame) ** 2 - (PATH.rates @ array.frame) ** 2
+    what = f"{name} sensors{', formula for a plane' if array.planar else ''}"
+    why = "rounding of readings of 20 m/s^2; nothing is integrated"
+    return [
+        at_most(f"{key}.alpha", SYSTEM, f"angular acceleration from clean readings, {what}", alpha, "rad/s^2", BOUND,
+                why, "closed form"),
+        at_most(f"{key}.rates", SYSTEM, f"rates up to sign from the symmetric part, squares, {what}",
+                float(np.abs(squares).max()), "rad^2/s^2", BOUND, why, "closed form"),
+        at_most(f"{key}.consistency", SYSTEM, f"share of the readings that no rigid body explains, {what}",
+                quality(array, clean).share, "", BOUND, why, "closed form"),
+    ]  # fmt: skip
+
+
+def _plain() -> Row:
+    """The trap, shown by writing eq. (18) down as it stands."""
+    floor = np.array(list(ARRAYS["5 in a plane"].values()))
+    relative = readings(floor) - readings(floor).mean(axis=1, keepdims=True)
+    m = np.swapaxes(relative, 1, 2) @ np.linalg.pinv((floor - floor.mean(axis=0)).T)
+    plain = 0.5 * (m[:, 2, 1] - m[:, 1, 2])
+    half = 0.5 * (PATH.alpha[:, 0] + PATH.rates[:, 1] * PATH.rates[:, 2])
+    return at_most("motion.plain", SYSTEM, "eq. (18) as printed, sensors in a plane: roll acceleration against (alpha1 "
+                   "+ w2 w3) / 2", float(np.abs(plain - half).max()), "rad/s^2", BOUND,
+                   "half of the true value plus a bias, without a word: this is why planes are detected", "closed form")
+
+
+def _order() -> Row:
+    """Order of the whole chain, readings to position, in the sampling period."""
+    array = sensor_array(ARRAYS["5 in a tilted plane"])
+    clean = readings(array.positions)
+    errors = [float(np.abs(motion(array, clean[::n], n * PATH.period, PATH.start).position - PATH.position[::n]).max())
+              for n in (40, 20)]  # fmt: skip
+    return within("motion.order", SYSTEM, "order of the recovered position in the sampling period, 40 and 20 ms",
+                  float(np.log2(errors[0] / errors[1])), "", 4.0, 0.4,
+                  "cubics through four neighbours and a fourth-order step of the quaternion", "closed form")
+
+
+def _tilt() -> Row:
+    array, tilt, count = sensor_array(ARRAYS["4"]), 1e-3, 10_001
+    still = np.broadcast_to([0.0, 0.0, -9.81], (count, 4, 3))
+    level = tuple(from_cardan(0.0, tilt, 0.0).tolist())
+    found = -motion(array, still, 1e-3, Start(orientation=level)).position[:, 0]
+    law = tilt_displacement(tilt, 1e-3 * np.arange(count))
+    return at_most("motion.tilt", SYSTEM, f"false displacement of a tilt error of 1 mrad after 10 s, {law[-1]:.4f} m, "
+                   "against g sin(tilt) t^2 / 2", float(np.abs(found - law).max() / law[-1]), "", 1e-10,
+                   "a constant is integrated exactly", "closed form")
+
+
+def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
+    """Noise of the angular acceleration by Monte Carlo against its law, by height of the fifth sensor."""
+    rows, lines = [], []
+    for i, height in enumerate((*HEIGHTS, 0.0)):
+        line = [height]
+        for formula in ("spatial", "plane") if height else ("plane",):
+            array = sensor_array(tilted(height, np.eye(3)), formula)
+            noise = normal(SEED, i, count, 15, source=ACCELEROMETERS).reshape(count, 5, 3)
+            alpha = angular_acceleration(spin(array, noise), np.zeros((count, 3)))
+            axis = int(np.argmax(array.gains()))
+            law, found = float(array.gains()[axis] ** 2), float(np.mean(alpha[:, axis] ** 2))
+            key = f"motion.gain.{formula}.{height:g}"
+            rows.append(mean_square(key, SYSTEM, f"variance of the {('roll', 'pitch', 'yaw')[axis]} acceleration per "
+                        f"unit variance of the readings, fifth sensor {height:g} m up, {formula} formula", found, law,
+                        count, "1/m^2", f"{count:,} samples; gain {law**0.5:.3g} 1/m"))  # fmt: skip
+            line += [law**0.5, found**0.5]
+        if height in HEIGHTS:
+            rows.append(within(f"motion.known_gain.{height:g}", SYSTEM, "largest noise gain, fifth sensor "
+                               f"{height:g} m up, plain formula", line[1], "1/m", HEIGHTS[height],
+                               0.04 * HEIGHTS[height], "figures relative to the last sensor; relative to the mean up "
+                               "to 3 % less",
+                               "published"))  # fmt: skip
+        lines.append(line)
+    return lines, rows
+
+
+def _engine(engine: str, duration: float) -> list[Row]:
+    """Five rigid sensors and a loose one on each engine's own run over the study road."""
+    sensors = {name: dict(zip("xyz", place, strict=True)) for name, place in RIGID.items()} | {"battery": BRACKET}
+    scene = build_scene({"title": TITLE, "run": {"duration": duration, "step": 1e-3},
+                         "effects": {"road": {"source": "study", "speed": 20.0},
+                                     "accelerometers": {"sampling_rate": 250.0, "sensors": sensors}}})  # fmt: skip
+    assembly = assemble(scene)
+    model = build(engine, assembly, settings_of(scene, engine))
+    run = model.run()
+    channels = outputs(assembly, run, model)
+    p = scene.effects["accelerometers"]
+    felt = np.stack([np.column_stack([channels[name][2][::4] for name in own]) for own in names(p)], axis=1)
+    array, whole = sensor_array(RIGID), sensor_array(p.positions())
+    rate = run.states[::4, 7]
+    turning = np.column_stack([0 * rate, rate, 0 * rate])
+    found = angular_acceleration(spin(array, felt[:, :5]), turning)[:, 1]
+    true = _pitch_acceleration(assembly, scene, run)
+    loose, rigid = quality(whole, felt), quality(array, felt[:, :5])
+    return [
+        at_most(f"motion.pitch_acceleration.{engine}", SYSTEM, "pitch acceleration from the readings of "
+                f"{engine}'s run against the paper's equations at its states, by the largest",
+                float(np.abs(found - true).max() / np.abs(true).max()), "", BOUND,
+                "the engine's acceleration beside eq. (38), as in the build audit",
+                "shared kernel" if engine == "reference" else "native"),
+        behaves(f"motion.bracket.{engine}", SYSTEM, f"six sensors, one on a bracket of 30 Hz, {engine}: "
+                f"{100 * loose.share:.2g} % fits no rigid body", f"loose: {loose.suspect}" if not loose.rigid else
+                "rigid", "loose: battery", "more than 5 % is a loose mount; the one without which it passes is named",
+                "closed form"),
+        at_most(f"motion.rigid.{engine}", SYSTEM, f"share that no rigid body explains, the five rigid mounts, {engine}",
+                rigid.share, "", BOUND, "rounding: far below the 5 % at which a mount is called loose", "closed form"),
+    ]  # fmt: skip
+
+
+def _pitch_acceleration(assembly: Any, scene: Any, run: Any) -> np.ndarray:
+    """Eq. (38) at every fourth state of a run (rad/s^2)."""
+    equations = build("reference", assembly, settings_of(scene, "reference"))
+    return np.array([equations.acceleration(t, y)[3] for t, y in zip(run.times[::4], run.states[::4], strict=True)])
+
+
+def _moving(count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
+    """True rates (n, 3) of a body that never stops turning, an array, and its clean readings without gravity."""
+    t = PERIOD * np.arange(count)
+    rates = np.column_stack([0.5 * np.sin(2 * t), 0.4 * np.cos(1.3 * t), 0.3 + 0.1 * np.sin(t)])
+    alpha = np.column_stack([np.cos(2 * t), -0.52 * np.sin(1.3 * t), 0.1 * np.cos(t)])
+    array = sensor_array(ARRAYS["5, one 1 m up"])
+    return rates, array, np.einsum("nij,sj->nsi", skew(alpha) + skew(rates) @ skew(rates), array.positions)
+
+
+def _noise(path: int, count: int) -> np.ndarray:
+    return NOISE * normal(SEED + 1, path, count, 15, source=ACCELEROMETERS).reshape(count, 5, 3)
+
+
+def _walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
+    """Integration alone: the rate walks off as the square root of time."""
+    count = 6001
+    array = sensor_array(ARRAYS["5, one 1 m up"])
+    errors = np.array([integrate_rates(spin(array, _noise(path, count)), PERIOD, np.zeros(3)) for path in range(paths)])
+    last = errors[:, -1] / array.gains()
+    law = NOISE**2 * PERIOD * (count - 1) * PERIOD
+    row = mean_square("motion.walk", SYSTEM, "rate error of integration alone after 60 s, mean square by its gain",
+                      float(np.mean(last**2)), law, 3 * paths, "m^2/s^2",
+                      f"{paths} paths of {NOISE:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period time")
+    curve = np.sqrt(np.mean(errors**2, axis=(0, 2)))
+    return [row], {"time": (PERIOD * np.arange(count))[::25].tolist(), "integrated": curve[::25].tolist(),
+                   "law": (NOISE * float(np.sqrt(np.mean(array.gains() ** 2)))
+                           * np.sqrt(PERIOD**2 * np.arange(count)))[::25].tolist()}  # fmt: skip
+
+
+def _held(curves: dict[str, Any], quick: bool) -> list[Row]:
+    """The symmetric part as a measurement: the error stays where it is."""
+    count, paths = (1001, 1) if quick else (6001, 8)
+    rates, array, clean = _moving(count)
+    found = [filter_rates(spin(array, clean + _noise(path, count)), PERIOD, rates[0], NOISE) for path in range(paths)]
+    squares = np.mean([np.mean((held - rates) ** 2, axis=1) for held, _ in found], axis=0)
+    stated = np.sqrt(np.mean(found[0][1] ** 2, axis=1))
+    curves["held"], curves["stated"] = np.sqrt(squares)[::25].tolist(), stated[::25].tolist()
+    walked = NOISE * float(np.sqrt(np.mean(array.gains() ** 2))) * np.sqrt(PERIOD * (count - 1) * PERIOD)
+    late, early = (float(np.sqrt(np.mean(part))) for part in (squares[-count // 3 :], squares[count // 6 : count // 3]))
+    why = f"{paths} paths of {PERIOD * (count - 1):g} s, {NOISE:g} m/s^2 at 100 Hz; filterpy's extended Kalman filter"
+    rows = [
+        at_most("motion.held", SYSTEM, "rate error with the symmetric part as a measurement, rms of the last third, by "
+                "that of integration alone at the end", late / walked, "", 0.8 if quick else 0.2, why, "closed form"),
+        within("motion.held.stated", SYSTEM, "the same by the standard deviation that the filter states",
+               late / float(np.sqrt(np.mean(stated[-count // 3 :] ** 2))), "", 1.0,
+               0.5 if quick else 0.2, f"{why}; it neglects that the readings are used twice", "closed form"),
+    ]  # fmt: skip
+    if quick:  # too short to tell growth from settling
+        return rows
+    grown = within("motion.held.growth", SYSTEM, "rms of the last third by that of the second sixth", late / early, "",
+                   1.0, 0.2, f"{why}; integration alone would grow by 1.8", "closed form")  # fmt: skip
+    return [*rows, grown]
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """What a flat arrangement costs."""
+    rows = tuple(
+        (f"{line[0]:g}", *(f"{value:.3g}" for value in line[1:])) if len(line) == 5
+        else (f"{line[0]:g}", "half and a bias", "", *(f"{value:.3g}" for value in line[1:]))
+        for line in data["gains"]
+    )  # fmt: skip
+    note = ("Four sensors at the corners of a floor of 2 m by 1.2 m, a fifth above its middle: standard deviation of "
+            "the worse of roll and pitch acceleration per unit of the readings' (1/m), by law and by Monte Carlo. The "
+            "formula for a plane is exact at every height; below a flatness of 0.1 it is taken, and said to be.")
+    heads = ("height [m]", "plain formula", "Monte Carlo", "formula for a plane", "Monte Carlo")
+    return [Table("What sensors in nearly one plane cost", note, heads, rows)]
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Noise gain by height, and the error of the rate over time."""
+    from studies.figures import plt
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
+    heights = np.geomspace(0.02, 1.2, 40)
+    for formula, label in (("spatial", "plain formula"), ("plane", "formula for a plane")):
+        arrays = [sensor_array(tilted(float(height), np.eye(3)), formula) for height in heights]  # type: ignore[arg-type]
+        left.loglog(heights, [array.gains().max() for array in arrays], label=label)
+    both = [line for line in data["gains"] if len(line) == 5]
+    left.plot([line[0] for line in both], [line[2] for line in both], "ko", markersize=4, label="Monte Carlo")
+    left.plot([line[0] for line in both], [line[4] for line in both], "ko", markersize=4)
+    left.set_title("noise of the angular acceleration by that of the readings [1/m]")
+    left.set_xlabel("height of the fifth sensor above the plane of the others [m]")
+    curves = data["curves"]
+    names_ = {"integrated": "integration alone", "law": "its law, sqrt(t)", "held": "with the symmetric part",
+              "stated": "what the filter states"}  # fmt: skip
+    for key, style in (("integrated", "C0-"), ("law", "k--"), ("held", "C1-"), ("stated", "C7--")):
+        right.plot(curves["time"][: len(curves[key])], curves[key], style, label=names_[key], linewidth=1)
+    right.set_title("error of the angular velocity, rms [rad/s]")
+    right.set_xlabel("time [s]")
+    for axis in (left, right):
+        axis.legend()
+    return [("What a flat arrangement costs, and what holds the rate", figure)]

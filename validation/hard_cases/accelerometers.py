@@ -1,0 +1,217 @@
+"""Accelerometers on the chassis: arrangements, mounts, readings and attitudes that mislead without a word."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.engines.protocol import build
+from models.sensors.rigid_body_motion import Start, angular_acceleration, motion, quality, spin
+from models.sensors.rotations import from_cardan, matrix
+from models.sensors.sensor_array import sensor_array
+from models.signals import Sampled
+from models.simulate import outputs
+from validation.hard_cases import setups
+from validation.hard_cases.case import IMPLEMENTATIONS, Case
+
+PERIOD, NOISE = 1e-3, 0.1
+FLOOR = {"fl": (1.1, -0.6, 0.2), "fr": (1.1, 0.6, 0.2), "rl": (-0.9, -0.6, 0.2), "rr": (-0.9, 0.6, 0.2),
+         "mid": (0.1, 0.0, 0.2)}  # fmt: skip
+RAISED = FLOOR | {"mid": (0.1, 0.0, 0.17)}
+ROOFED = FLOOR | {"mid": (0.1, 0.0, -0.8)}
+BRACKET = {"battery": {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}}
+REFUSED: dict[str, Any] = dict.fromkeys(IMPLEMENTATIONS, "refused")
+
+
+def _read(engine: str, places: dict[str, Any], extra: dict[str, Any] | None = None, noise: float = 0.0,
+          initial: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """Readings (n, sensors, 3), states (n, 8) and pitch accelerations (n,) of 0.3 s.
+
+    After a kick on a flat road, or in free fall from an initial state.
+    """
+    sensors = {name: dict(zip("xyz", place, strict=True)) for name, place in places.items()} | (extra or {})
+    start = setups.vehicle().initial + np.array([0, 0, 0, 0, 0, 0, 0.5, 1.5])
+    base = setups.vehicle(initial=start if initial is None else initial, effects={
+        "accelerometers": {"sampling_rate": 1 / PERIOD, "sensors": sensors, "deviation": noise}})  # fmt: skip
+    assembly = base if initial is None else setups.driven(base, Sampled(np.zeros((400, 2)), PERIOD, held=True))
+    model = build(engine, assembly, setups.settings(engine, PERIOD, 0.3))
+    run = model.run()
+    channels = outputs(assembly, run, model)
+    felt = np.stack([np.column_stack([channels[f"a{axis}{i + 1}"][2] for axis in "xyz"])
+                     for i in range(len(sensors))], axis=1)  # fmt: skip
+    true = np.array([model.acceleration(t, y)[3] for t, y in zip(run.times, run.states, strict=True)])
+    return felt, run.states, true
+
+
+def _turning(states: np.ndarray) -> np.ndarray:
+    """Local rates (n, 3) of a vehicle that pitches alone."""
+    return states[:, 7:] * [0.0, 1.0, 0.0]
+
+
+def _plain(places: dict[str, Any], felt: np.ndarray) -> np.ndarray:
+    """Pitch acceleration by eq. (18) as printed, with numpy's pseudo-inverse and nothing checked."""
+    positions = np.array(list(places.values()))
+    relative = np.swapaxes(felt - felt[:, -1:], 1, 2)[:, :, :-1]
+    m = relative @ np.linalg.pinv((positions[:-1] - positions[-1]).T)
+    return 0.5 * (m[:, 0, 2] - m[:, 2, 0])
+
+
+def plane(engine: str, folder: Path) -> float:
+    """Sensors on a flat floor; the pitch axis lies in their plane."""
+    felt, states, true = _read(engine, FLOOR)
+    found = angular_acceleration(spin(sensor_array(FLOOR), felt), _turning(states))[:, 1]
+    return setups.largest(found - true) / setups.largest(true)
+
+
+def plane_naive(folder: Path) -> str:
+    """The printed formula on the same readings."""
+    felt, _, true = _read("reference", FLOOR)
+    part = setups.rms(_plain(FLOOR, felt)) / setups.rms(true)
+    return f"the printed formula gives {part:.2f} of the pitch acceleration"
+
+
+def nearly_plane(engine: str, folder: Path) -> float:
+    """The fifth sensor 3 cm above the others, and noise: of what the noise of the readings must leave."""
+    felt, states, true = _read(engine, RAISED, noise=NOISE)
+    array = sensor_array(RAISED)
+    found = angular_acceleration(spin(array, felt), _turning(states))[:, 1]
+    least = array.gains(planar=True)[1]
+    return setups.rms(found - true) / (NOISE * least)
+
+
+def nearly_plane_naive(folder: Path) -> str:
+    """The printed formula on the same readings."""
+    felt, _, true = _read("reference", RAISED, noise=NOISE)
+    error = setups.rms(_plain(RAISED, felt) - true)
+    return f"the printed formula errs by {error:.1f} rad/s^2 for {NOISE:g} m/s^2 of noise"
+
+
+def bracket(engine: str, folder: Path) -> float:
+    """Five rigid sensors and one on a bracket; the one that does not belong is left out."""
+    felt, states, true = _read(engine, ROOFED, BRACKET)
+    places = ROOFED | {"battery": (0.6, 0.3, 0.0)}
+    loose = quality(sensor_array(places), felt).suspect
+    keep = [name != loose for name in places]
+    rest = sensor_array({name: place for name, place in places.items() if name != loose})
+    found = angular_acceleration(spin(rest, felt[:, keep]), _turning(states))[:, 1]
+    return setups.largest(found - true) / setups.largest(true)
+
+
+def bracket_naive(folder: Path) -> str:
+    """The printed formula on all six."""
+    felt, _, true = _read("reference", ROOFED, BRACKET)
+    wrong = setups.largest(_plain(ROOFED | {"battery": (0.6, 0.3, 0.0)}, felt) - true) / setups.largest(true)
+    return f"all six together are wrong by {100 * wrong:.0f} % of the largest pitch acceleration"
+
+
+def gap(engine: str, folder: Path) -> float:
+    """One reading is not a number."""
+    felt, states, _ = _read(engine, ROOFED)
+    felt[100, 2, 0] = np.nan
+    return setups.largest(motion(sensor_array(ROOFED), felt, PERIOD).rates - _turning(states))
+
+
+def gap_naive(folder: Path) -> str:
+    """The printed formula, summed up."""
+    felt, _, _ = _read("reference", ROOFED)
+    felt[100, 2, 0] = np.nan
+    lost = np.isnan(np.cumsum(_plain(ROOFED, felt))).mean()
+    return f"a sum over one missing reading is lost for {100 * lost:.0f} % of the record"
+
+
+def _falling(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.ndarray, Start]:
+    """A vehicle in free fall that turns, its struts unstressed: readings, states and the start."""
+    p, sine, speed = setups.vehicle().parameters, np.sin(pitch), np.cos(pitch) * rate
+    start = np.array([-p.b * sine, p.a * sine, 0, pitch, -p.b * speed, p.a * speed, 0, rate])
+    felt, states, _ = _read(engine, ROOFED, initial=start)
+    orientation = tuple(from_cardan(0.0, pitch, 0.0).tolist())
+    return felt, states, Start((0.0, rate, 0.0), orientation)
+
+
+def tumbling(engine: str, folder: Path) -> float:
+    """The nose passes through the vertical: the orientation as a matrix."""
+    felt, states, start = _falling(engine, 1.4, 3.0)
+    found = motion(sensor_array(ROOFED), felt, PERIOD, start).orientation
+    none = np.zeros(len(states))
+    return setups.largest(matrix(found) - matrix(from_cardan(none, states[:, 3], none)))
+
+
+def locked(engine: str, folder: Path) -> float:
+    """The nose points straight up, and someone asks for roll and yaw."""
+    felt, _, start = _falling(engine, np.pi / 2, 0.0)
+    return setups.largest(motion(sensor_array(ROOFED), felt, PERIOD, start).angles()[:, [0, 2]])
+
+
+def locked_naive(folder: Path) -> str:
+    """The textbook's formulas at the same attitude."""
+    s = matrix(from_cardan(0.3, np.pi / 2, 0.0))
+    roll = np.arctan2(s[2, 1], s[2, 2])
+    return f"the textbook's formula gives a roll of {roll:.2f} rad for 0.30, out of rounding errors"
+
+
+CASES = (
+    Case(
+        "accelerometers in a plane",
+        "sensors on a flat floor do not see half of the pitch acceleration",
+        "the engine's own pitch acceleration",
+        "of its largest",
+        1e-12,
+        "the formula for a plane is exact: rounding only",
+        plane,
+        {},
+        plane_naive,
+    ),
+    Case(
+        "accelerometers nearly in a plane",
+        "one sensor 3 cm off the plane makes the formula solvable and its noise 22 times larger",
+        "noise of the pitch acceleration against that of the formula for a plane",
+        "of that noise",
+        1.2,
+        "300 samples: 4 % standard error",
+        nearly_plane,
+        {},
+        nearly_plane_naive,
+    ),
+    Case(
+        "accelerometer on a bracket",
+        "one of six sensors moves on its own",
+        "the engine's own pitch acceleration, once the loose sensor is found and left out",
+        "of its largest",
+        1e-12,
+        "five rigid sensors: rounding only",
+        bracket,
+        {},
+        bracket_naive,
+    ),
+    Case(
+        "accelerometer reading that is no number",
+        "one missing reading spreads over the whole record by integration",
+        "refused with sensor and sample",
+        "",
+        0.0,
+        "no answer is wanted",
+        gap,
+        REFUSED,
+        gap_naive,
+    ),
+    Case(
+        "attitude through the vertical",
+        "Cardan angles are singular where the nose points straight up",
+        "orientation of a tumbling vehicle",
+        "",
+        1e-6,
+        "quaternions pass; order 4 at 1 ms, across wheel modes of 700 1/s",
+        tumbling,
+    ),
+    Case(
+        "Cardan angles at gimbal lock",
+        "roll and yaw turn about the same axis",
+        "refused with the sample and its pitch",
+        "",
+        0.0,
+        "no answer is wanted",
+        locked,
+        REFUSED,
+        locked_naive,
+    ),
+)
