@@ -174,13 +174,9 @@ def _figure(times: np.ndarray, errors: np.ndarray, drift_off: np.ndarray, option
     from studies.figures import plt, save
 
     figure, (fan, histogram) = plt.subplots(1, 2, figsize=(10, 3.8), width_ratios=(3, 2))
-    low, quarter, middle, three, high = np.nanpercentile(np.abs(errors[:, 1:]), FAN, axis=0)
-    fan.fill_between(times[1:], low, high, alpha=0.2, color="C0", linewidth=0, label="5 to 95 %")
-    fan.fill_between(times[1:], quarter, three, alpha=0.4, color="C0", linewidth=0, label="25 to 75 %")
-    fan.semilogy(times[1:], middle, color="C0", label="median")
+    draw_fan(fan, times[1:], percentiles(errors[:, 1:]))
     fan.axhline(options.threshold, color="black", linestyle="--", linewidth=0.8,
                 label=f"drift-off, {options.threshold:g} rad")
-    fan.set_title("magnitude of the pitch error [rad]")
     fan.legend(loc="lower right")
     drifted = drift_off[np.isfinite(drift_off)]
     histogram.hist(drifted, bins=40, color="C0", alpha=0.6)
@@ -193,8 +189,23 @@ def _figure(times: np.ndarray, errors: np.ndarray, drift_off: np.ndarray, option
         histogram.legend()
     for axis in (fan, histogram):
         axis.set_xlabel("time [s]")
-    figure.suptitle(f"{options.paths} noise paths of one measured run", x=0.01, ha="left", fontweight="bold")
+    title = f"{options.paths} noise paths of one measured run, forces at {options.sampling_rate:g} Hz"
+    figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
     save(figure, folder / "ensemble.png")
+
+
+def percentiles(errors: np.ndarray) -> np.ndarray:
+    """Percentiles FAN of the magnitude of errors (paths, times), shape (5, times); failed paths are left out."""
+    return np.nanpercentile(np.abs(errors), FAN, axis=0)
+
+
+def draw_fan(axis: Any, times: np.ndarray, bands: np.ndarray) -> None:
+    """The bands of ``percentiles`` (5, times) of a pitch error (rad) over times (s)."""
+    low, quarter, middle, three, high = bands
+    axis.fill_between(times, low, high, alpha=0.2, color="C0", linewidth=0, label="5 to 95 %")
+    axis.fill_between(times, quarter, three, alpha=0.4, color="C0", linewidth=0, label="25 to 75 %")
+    axis.semilogy(times, middle, color="C0", label="median")
+    axis.set_title("magnitude of the pitch error [rad]")
 
 
 if __name__ == "__main__":

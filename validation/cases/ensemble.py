@@ -204,11 +204,13 @@ def _half_step_row(forces: Path) -> Row:
 def _data(truth: np.ndarray, times: np.ndarray, found: Arrays, large: dict[str, Any],
           prices: dict[str, float]) -> dict[str, Any]:  # fmt: skip
     """What the tables and the figure show."""
+    from studies.ensemble import percentiles
+
     errors = found["states"] - truth[:: round(1.0 / STEP)]
     spreads = [[when, *deviation(errors[:, round(when), 3]), *deviation(errors[:, round(when), 2])] for when in TIMES]
     quantiles = [[level, *quantile(found["drift_off"], level)] for level in (0.05, 0.5, 0.95)]
     counts, edges = np.histogram(found["drift_off"], bins=np.arange(0.0, 31.0, 0.5))
-    fan = np.percentile(np.abs(errors[:, 1:, 3]), (5, 25, 50, 75, 95), axis=0)
+    fan = percentiles(errors[:, 1:, 3])
     return {"spreads": spreads, "quantiles": quantiles, "prices": prices, "large": large, "times": times[1:].tolist(),
             "counts": counts.tolist(), "edges": edges.tolist(), "fan": fan.tolist()}  # fmt: skip
 
@@ -238,14 +240,11 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Fan of the pitch error and histogram of the drift-off times."""
     if not data:
         return []
+    from studies.ensemble import draw_fan
     from studies.figures import plt
 
     figure, (fan, histogram) = plt.subplots(1, 2, figsize=(10, 3.6), width_ratios=(3, 2))
-    low, quarter, middle, three, high = data["fan"]
-    fan.fill_between(data["times"], low, high, alpha=0.2, color="C0", linewidth=0, label="5 to 95 %")
-    fan.fill_between(data["times"], quarter, three, alpha=0.4, color="C0", linewidth=0, label="25 to 75 %")
-    fan.semilogy(data["times"], middle, color="C0", label="median")
-    fan.set_title("magnitude of the pitch error [rad]")
+    draw_fan(fan, np.array(data["times"]), np.array(data["fan"]))
     fan.legend(loc="lower right")
     histogram.stairs(data["counts"], data["edges"], fill=True, color="C0", alpha=0.6)
     histogram.set_title("drift-off time, paths per half second")
