@@ -105,6 +105,7 @@ WORDS = {
     "string_type": "must be text in quotes",
     "bool_type": "must be true or false",
     "list_type": "must be a list in [ ]",
+    "too_short": "must hold at least {min_length} value(s)",
     "tuple_type": "must be a list in [ ]",
     "dict_type": "must be a table of keys and values",
     "model_type": "must be a table of keys and values",

@@ -28,7 +28,7 @@ from models.strict import Strict, quantity, read
 
 Progress = Callable[[str, float], None]
 Positive = Annotated[float, Field(gt=0)]
-Minutes = Annotated[float, Field(gt=0, le=600)]
+Minutes = Annotated[float, Field(ge=0.1, le=600)]
 
 NODES = 41
 """Constant angle errors at which damage is counted; an odd number, so that one of them is zero."""
@@ -48,10 +48,10 @@ class Options(Strict):
     random_walks: list[Positive] = Field([0.0005, 0.002, 0.02, 0.1, 0.5], min_length=1,
                                          description="random walk of each grade, deg/sqrt(h)")  # fmt: skip
     durations: list[Minutes] = Field([1.0, 5.0, 10.0, 60.0], min_length=1,
-                                     description="lengths of a drive, min, rising")  # fmt: skip
+                                     description="lengths of a drive, min, rising, to a second")  # fmt: skip
     correlation_time: float = quantity("s", "time in which the bias forgets itself", default=3600.0)
     allowed_damage_error: float = quantity("", "largest error of the damage that is good enough", default=0.05)
-    sampling_rate: float = Field(100.0, ge=1, le=1000, description="samples of the gyro in a second")
+    sampling_rate: int = Field(100, ge=1, le=1000, description="samples of the gyro in a second")
     samples: int = Field(200, ge=10, le=10_000, description="units of each grade")
     seed: int = Field(1, ge=0, lt=2**64, description="seed of noise and bias")
 
@@ -102,7 +102,7 @@ def unit_paths(options: Options) -> tuple[np.ndarray, np.ndarray]:
 
     Every grade is a multiple of the same paths, so that grades are compared without scatter between them.
     """
-    rate, length = round(options.sampling_rate), round(60 * options.durations[-1])
+    rate, length = options.sampling_rate, round(60 * options.durations[-1])
     made = [_unit_path(options.seed, path, rate, length, options.correlation_time) for path in range(options.samples)]
     walk, wander = (np.array(part) for part in zip(*made, strict=True))
     return walk, wander

@@ -109,8 +109,10 @@ def test_the_study_adds_what_the_effects_add():
     (["options.random_walks=[0.1]"], "one value for each"),
     (["options.grades=[1.0, 0.1, 2.0, 3.0, 4.0]"], "must rise"),
     (["options.durations=[5.0, 1.0]"], "must rise"),
-    (["options.durations=[-5.0]"], "must be above 0"),
+    (["options.durations=[-5.0]"], "must be 0.1 or more"),
     (["options.samples=2"], "samples"),
+    (["options.sampling_rate=33.3"], "whole number"),
+    (["options.grades=[]"], "at least 1 value"),
 ])  # fmt: skip
 def test_lists_that_make_no_table_are_refused(changes, words, tmp_path):
     with pytest.raises(InputError, match=words):
@@ -119,7 +121,7 @@ def test_lists_that_make_no_table_are_refused(changes, words, tmp_path):
 
 
 def test_a_scene_without_a_road_or_without_motion_is_refused(tmp_path):
-    own = {"durations": [1.0], "samples": 10, "sampling_rate": 1.0}
+    own = {"durations": [1.0], "samples": 10, "sampling_rate": 1}
     table = {"title": "test", "study": "inertial_unit", "run": {"duration": 2.0, "step": 1e-3}, "options": own}
     with pytest.raises(InputError, match="needs a run on a road"):
         study.run(build(table), ("reference",), tmp_path, lambda text, part: None)

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from models.assembly import assemble
+from models.engines.protocol import Settings
 from models.errors import InputError
 from models.noise import GYRO, PITCH_SENSOR, normal
 from models.scene import build
@@ -86,4 +88,7 @@ def test_a_rate_that_falls_between_the_steps_is_refused():
         simulate(scene({"gyro": {"sampling_rate": 300.0, "deviation": 0.1}}), "reference")
     own = scene({"pitch_sensor": {"sampling_rate": 100.0, "deviation": 0.1}}, exudyn={"integrator": "DOPRI5"})
     with pytest.raises(InputError, match="needs a row"):
-        simulate(own, "exudyn")
+        assemble(own)
+    uneven = scene({"gyro": {"sampling_rate": 100.0, "deviation": 0.1}})
+    with pytest.raises(InputError, match="needs a row"):
+        simulate(uneven, "reference", Settings("RK4", 4e-3, 0.4))

@@ -14,10 +14,13 @@ from models.time_series import write_time_series
 
 SLACK = 1e-6
 """Part of a period by which a row may lie beside its instant; a run's times are whole numbers of steps."""
+NO_ROW = "each sample needs a row of the run: use an integrator of fixed steps, which must divide the sampling period"
 
 
 def check_rate(scene: Scene, place: str, rate: float) -> None:
-    """Refuse, before a run, a sampling rate whose instants fall between the steps of an engine."""
+    """Refuse, before a run, a sampling rate whose instants fall between the rows of an engine."""
+    if CATALOGUE["exudyn"][str(scene.settings("exudyn").integrator)].adaptive:
+        raise InputError(scene.file, place, rate, NO_ROW)
     for engine in CATALOGUE:
         step = float(scene.settings(engine).step or 0)
         if not divides(step, 1 / rate):
@@ -39,8 +42,7 @@ def read(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, place
     number = numbers(times, rate)
     row = np.searchsorted(times, (number - SLACK) / rate)
     if np.abs(times[row] * rate - number).max() > SLACK:
-        allowed = "each sample needs a row of the run: use an integrator of fixed steps that divide the period"
-        raise InputError(scene.file, place, rate, allowed)
+        raise InputError(scene.file, place, rate, NO_ROW)
     return values[row]
 
 
