@@ -45,12 +45,13 @@ class Options(Strict):
 
 @dataclass
 class Source:
-    """Readings (n, sensors, 3) every ``period`` (s) of one engine or file, and the truth where there is one."""
+    """Readings (n, sensors, 3) every ``period`` (s) of one engine or file, the truth and a gyro where there are any."""
 
     name: str
     readings: np.ndarray
     period: float
     truth: dict[str, np.ndarray] = field(default_factory=dict)
+    gyro: np.ndarray | None = None
     quality: Quality | None = None
     ways: dict[str, Motion] = field(default_factory=dict)
 
@@ -136,6 +137,7 @@ def _run(scene: Scene, engine: str, folder: Path) -> Source:
     rows = np.searchsorted(result.times, source.period * (np.arange(len(source.readings)) - 1e-3))
     wanted = {name: channel for name, (channel, _) in CHANNELS.items()} | {"heave rate": "z3_rate"}
     source.truth = {name: result[channel][rows] for name, channel in wanted.items()}
+    source.gyro = result["gyro"][rows] if "gyro" in result.data else None
     return source
 
 
@@ -152,6 +154,9 @@ def _recover(source: Source, array: SensorArray, options: Options, p: Parameters
     if p.deviation > 0:
         held, _ = filter_rates(spin(array, readings), source.period, np.array(source.start.rates), p.deviation)
         source.ways["rates held by w w^T"] = _moved(source, array, readings, options, rates=held)
+    if source.gyro is not None:
+        turning = source.gyro[:, None] * [0.0, 1.0, 0.0]  # it reads the pitch rate; the vehicle does nothing else
+        source.ways["rates from the gyro"] = _moved(source, array, readings, options, rates=turning)
     source.ways["high-passed"] = _moved(source, array, readings, options, turning_cut_off=options.turning_cut_off,
                                         position_cut_off=options.position_cut_off)  # fmt: skip
 

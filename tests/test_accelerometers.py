@@ -8,6 +8,7 @@ from models.scene import build
 from models.sensors import rigid_body_motion, sensor_array
 from models.sensors.virtual_accelerometers import on_bracket, readings
 from models.simulate import simulate
+from models.time_series import write_time_series
 from validation.hard_cases import accelerometers as family
 from validation.hard_cases.case import judge
 
@@ -61,6 +62,26 @@ def test_readings_are_the_second_derivative_of_a_point_of_the_run(engine, effect
     # fourth-order differences across the fastest poles, 1/ms and faster, once the start has rung off
     assert np.abs(local - felt)[60:].max() < 2e-3 * np.abs(felt).max()
     assert np.abs(run["ay1"]).max() < 1e-14
+
+
+@pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
+@pytest.mark.parametrize("guide", [{}, {"prescribed_heave_and_pitch": {"file": "m.csv"}}], ids=["body frame", "guided"])
+def test_readings_follow_the_run_whatever_drives_it(engine, guide, tmp_path):
+    """Two sensors ahead of one another give heave and pitch acceleration, whatever else acts: against differences."""
+    t = 1e-3 * np.arange(301)
+    write_time_series(tmp_path / "f.csv", {"front": ("N", 4200 + 800 * np.sin(9 * t)),
+                                           "rear": ("N", 3300 + 500 * np.cos(7 * t))}, 1e-3)  # fmt: skip
+    write_time_series(tmp_path / "m.csv", {"z3": ("m", 0.06 + 0.01 * np.sin(np.pi * t) ** 2),
+                                           "pitch": ("rad", 0.05 * (1 - np.cos(8 * t)))}, 1e-3)  # fmt: skip
+    forces = {"file": "f.csv", "interpolation": "linear", "frame": "inertial" if guide else "body"}
+    two = {"sampling_rate": 1000.0, "sensors": {"middle": {"x": 0.0, "z": 0.0}, "ahead": {"x": 1.0, "z": 0.0}}}
+    run = simulate(build(BARE | {"start": {}, "effects": {"wheel_forces": forces, "accelerometers": two, **guide}}, "",
+                         tmp_path), engine)  # fmt: skip
+    heave = 9.81 + np.cos(run["pitch"]) * run["az1"] - np.sin(run["pitch"]) * run["ax1"]
+    for found, rate in ((heave, run["z3_rate"]), (run["az1"] - run["az2"], run["pitch_rate"])):
+        slope = np.gradient(rate, run.times)
+        # second-order differences at 0.5 ms, once the start has rung off
+        assert np.abs(found - slope)[200:-4:2].max() < 2e-4 * np.abs(slope).max()
 
 
 def test_three_engines_read_the_same_and_are_not_disturbed():

@@ -8,8 +8,8 @@ from models.scene import load
 from studies.command_line import SCENES
 from studies.motion import run
 
-SHORT = ["run.duration=2.5", "effects.accelerometers.sampling_rate=200.0", "options.turning_cut_off=0.5",
-         "options.position_cut_off=0.5"]  # fmt: skip
+SHORT = ["run.duration=2.5", "effects.accelerometers.sampling_rate=200.0", "effects.gyro.sampling_rate=200.0",
+         "options.turning_cut_off=0.5", "options.position_cut_off=0.5"]  # fmt: skip
 CLEAN = [*SHORT, "effects.accelerometers.deviation=0.0"]
 
 
@@ -26,6 +26,9 @@ def test_the_loose_sensor_is_left_out_and_the_rest_recovers_the_motion(tmp_path)
         # 0.02 m/s^2 at 200 Hz: 0.02 * 0.56 / m * sqrt(3 s * 5 ms) = 1.4 mrad/s in the rate after 3 s
         assert row["ways"]["integrated"]["rate"][0] < 5e-3
         assert row["ways"]["rates held by w w^T"]["rate"][0] < 5e-3
+        # four standard deviations of the gyro's samples; summed over 2.5 s at 200 Hz: 0.2 mrad
+        assert row["ways"]["rates from the gyro"]["rate"][0] < 1e-2
+        assert row["ways"]["rates from the gyro"]["pitch"][0] < 1e-3
         # 20 m/s over the first hill: slow pitch of some hundredths that the filter takes away
         assert row["ways"]["high-passed"]["pitch"][0] > 0.01
     assert "'battery' does not move" in "\n".join(found["table"])

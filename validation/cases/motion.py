@@ -50,7 +50,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     gains, found = _gains(4000 if quick else 40_000)
     rows += found
     for engine in IMPLEMENTATIONS:
-        rows += _engine(engine, 1.0 if quick else 8.0)
+        rows += _engine(engine, 1.0 if quick else 5.0)
     walked, curves = _walk(20 if quick else 300)
     return [*rows, *walked, *_held(curves, quick)], {"gains": gains, "curves": curves}
 
@@ -139,20 +139,23 @@ def _engine(engine: str, duration: float) -> list[Row]:
     sensors = {name: dict(zip("xyz", place, strict=True)) for name, place in RIGID.items()} | {"battery": BRACKET}
     scene = build_scene({"title": TITLE, "run": {"duration": duration, "step": 1e-3},
                          "effects": {"road": {"source": "study", "speed": 20.0},
-                                     "accelerometers": {"sampling_rate": 250.0, "sensors": sensors}}})  # fmt: skip
+                                     "gyro": {"sampling_rate": 1000.0, "deviation": 0.0},
+                                     "accelerometers": {"sampling_rate": 1000.0, "sensors": sensors}}})  # fmt: skip
     assembly = assemble(scene)
     model = build(engine, assembly, settings_of(scene, engine))
     run = model.run()
     channels = outputs(assembly, run, model)
     p = scene.effects["accelerometers"]
-    felt = np.stack([np.column_stack([channels[name][2][::4] for name in own]) for own in names(p)], axis=1)
+    felt = np.stack([np.column_stack([channels[name][2] for name in own]) for own in names(p)], axis=1)
     array, whole = sensor_array(RIGID), sensor_array(p.positions())
-    rate = run.states[::4, 7]
+    rate = channels["gyro"][2]
     turning = np.column_stack([0 * rate, rate, 0 * rate])
     found = angular_acceleration(spin(array, felt[:, :5]), turning)[:, 1]
     true = _pitch_acceleration(assembly, scene, run)
     loose, rigid = quality(whole, felt), quality(array, felt[:, :5])
     return [
+        *_follows("accelerometers", engine, array, felt[:, :5], run.states, None),
+        *_follows("gyro", engine, array, felt[:, :5], run.states, turning),
         at_most(f"motion.pitch_acceleration.{engine}", SYSTEM, "pitch acceleration from the readings of "
                 f"{engine}'s run against the paper's equations at its states, by the largest",
                 float(np.abs(found - true).max() / np.abs(true).max()), "", BOUND,
@@ -167,10 +170,26 @@ def _engine(engine: str, duration: float) -> list[Row]:
     ]  # fmt: skip
 
 
+def _follows(way: str, engine: str, array: SensorArray, felt: np.ndarray, states: np.ndarray,
+             rates: np.ndarray | None) -> list[Row]:  # fmt: skip
+    """Pitch and heave recovered from a run's clean readings, with or without its gyro, against its states (n, 8)."""
+    first = states[0].tolist()
+    start = Start((0.0, first[7], 0.0), tuple(from_cardan(0.0, first[3], 0.0).tolist()), (0.0, 0.0, first[6]),
+                  (0.0, 0.0, first[2]))  # fmt: skip
+    found = motion(array, felt, 1e-3, start, rates=rates)
+    errors = (("pitch", found.angles()[:, 1] - states[:, 3], "rad", 1e-6),
+              ("heave", found.position[:, 2] - states[:, 2], "m", 1e-5))  # fmt: skip
+    words = "accelerometers alone" if rates is None else "accelerometers and a gyro"
+    return [at_most(f"motion.recovered.{way}.{what}.{engine}", SYSTEM, f"{what} recovered from {words}, {engine}, "
+                    f"{len(states) / 1e3:.0f} s at 1 kHz without noise", float(np.abs(error).max()), unit, bound,
+                    "cubics through samples of 1 ms, across wheel modes of 700 1/s", "closed form")
+            for what, error, unit, bound in errors]  # fmt: skip
+
+
 def _pitch_acceleration(assembly: Any, scene: Any, run: Any) -> np.ndarray:
-    """Eq. (38) at every fourth state of a run (rad/s^2)."""
+    """Eq. (38) at every state of a run (rad/s^2)."""
     equations = build("reference", assembly, settings_of(scene, "reference"))
-    return np.array([equations.acceleration(t, y)[3] for t, y in zip(run.times[::4], run.states[::4], strict=True)])
+    return np.array([equations.acceleration(t, y)[3] for t, y in zip(run.times, run.states, strict=True)])
 
 
 def _moving(count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
