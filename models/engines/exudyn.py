@@ -90,7 +90,7 @@ def _pitch_spring(built: Build, spring: PitchSpring) -> None:
 def _dead_band(built: Build, spring: PitchSpring) -> dict[str, Any]:
     """A law for a spring with a dead band, nothing for one without.
 
-    Exudyn has limit stops, but decides once per step whether one is touched: 1e-3 off where a step is 1 ms.
+    Exudyn has limit stops, but asks once per step whether one is touched: not what a stage would find.
     """
     if not spring.dead_band:
         return {}

@@ -29,7 +29,9 @@ SEED, FORCE_NOISE, WALK = 31, 31.0, np.deg2rad(0.2)
 """Seed of the noise; N per sample of each force; rad per sqrt(s) of the integrated rate of a cheap gyro."""
 SMOOTH = 5.0
 """Bandwidth (Hz) of the pitch that such a gyro gives."""
-HAND = {"index 1": {}, "index 1, Baumgarte": {"alpha": ALPHA}, "index 1, projection": {"projected": True}}
+HAND: dict[str, dict[str, Any]] = {
+    "index 1": {}, "index 1, Baumgarte": {"alpha": ALPHA}, "index 1, projection": {"projected": True},
+}  # fmt: skip
 EXUDYN = {"index 2": "TrapezoidalIndex2", "index 3": "GeneralizedAlpha"}
 LACKING = (
     ("exudyn.1", "Exudyn at index 1", "has no formulation on the level of accelerations; its explicit solvers leave "

@@ -1,0 +1,192 @@
+"""Drift: runs that look right by the wrong figure, and scores of loads that are none."""
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.damage import damage_ratio, pseudo_damage
+from models.drift.score import Errors, Limits, Own, blind_verdict, errors, own_figures, verdict
+from models.engines.protocol import Settings
+from models.result import Result
+from models.scene import Scene
+from models.simulate import simulate
+from validation.hard_cases import setups
+from validation.hard_cases.case import IMPLEMENTATIONS, Case
+from validation.scenes import STUDY_ROAD, force_scene, road_scene, write_forces
+
+DURATION = 8.0
+TILT = 0.2
+"""Pitch (rad) by which a drifted run starts wrong: at a growth of 0.4 1/s it has turned over in 8 s."""
+SOFT = 50.0
+"""N m/rad: 82 hold on this road."""
+OFF = 0.05
+"""Pitch error (rad) beyond which no two runs are compared."""
+HEAVY = 300.0
+"""Noise (N) on the forces with which a run has drifted off after some seconds."""
+
+
+@cache
+def measured(grade: float = 0.0) -> Result:
+    """The study road, on a grade (rad) where one is asked for."""
+    road = STUDY_ROAD | ({"grade": grade} if grade else {})
+    return simulate(road_scene(duration=DURATION, road=road), "reference")
+
+
+def follow(folder: Path, truth: Result, effects: dict[str, Any] | None = None, tilt: float = 0.0) -> Scene:
+    """The vehicle under the forces of that run, started tilted (rad)."""
+    write_forces(truth, folder, 1e-3)
+    scene = force_scene(folder, duration=DURATION, effects=effects)
+    return scene.model_copy(update={"start": {"pitch": tilt}} if tilt else {})
+
+
+def figures(run: Result, truth: Result, scene: Scene) -> tuple[Own, Errors]:
+    """What is known of a run without the truth, and with it."""
+    return own_figures(run, scene.vehicle_parameters()), errors(run, truth)
+
+
+def words(engine: str, scene: Scene, truth: Result) -> tuple[str, str]:
+    """The verdicts with the truth and without it."""
+    own, wrong = figures(simulate(scene, engine), truth, scene)
+    known = blind_verdict(own, scene.effects, DURATION, Limits())
+    return verdict(own, wrong, scene.effects, Limits()).word, known.word
+
+
+def tumbled(engine: str, folder: Path) -> float:
+    """A free run that has turned over."""
+    found = words(engine, follow(folder, measured(), tilt=TILT), measured())
+    return float(found != ("rejected", "rejected"))
+
+
+def tumbled_naive(folder: Path) -> str:
+    """What its vertical forces say."""
+    scene = follow(folder, measured(), tilt=TILT)
+    own, wrong = figures(simulate(scene, "reference"), measured(), scene)
+    return (f"at a pitch of {own.pitch_max:.1f} rad its vertical f3 does {wrong.vertical_damage['f3']:.3f} times the true "
+            f"damage, its f3 along the chassis {wrong.damage['f3x']:.0e} times")  # fmt: skip
+
+
+SPRING = {"pitch_spring": {"stiffness": SOFT, "damping": 250.0}}
+FIRM = {"pitch_spring": {"stiffness": 300.0, "damping": 600.0}}
+
+
+def soft(engine: str, folder: Path) -> float:
+    """A spring that is too soft."""
+    return float(words(engine, follow(folder, measured(), SPRING, TILT), measured())[0] != "rejected")
+
+
+def soft_naive(folder: Path) -> str:
+    """What the run itself shows."""
+    scene = follow(folder, measured(), SPRING, TILT)
+    own, wrong = figures(simulate(scene, "reference"), measured(), scene)
+    return (f"its artificial moment is {own.moment_share_band:.1%} of I pitch'' and its vertical f3 does "
+            f"{wrong.vertical_damage['f3']:.3f} times the true damage; its pitch is {wrong.pitch_max:.2f} rad wrong")
+
+
+def graded(engine: str, folder: Path) -> float:
+    """A spring on a grade: wrong, and never called right without the truth."""
+    found = words(engine, follow(folder, measured(0.1), FIRM), measured(0.1))
+    return float(found != ("rejected", "stabilise"))
+
+
+def graded_naive(folder: Path) -> str:
+    """What the run itself shows."""
+    scene = follow(folder, measured(0.1), FIRM)
+    own, wrong = figures(simulate(scene, "reference"), measured(0.1), scene)
+    return (f"its artificial moment is {own.moment_share_band:.1%} of I pitch''; its pitch is {wrong.pitch_max:.2f} rad "
+            f"wrong, f3 along the chassis does {wrong.damage['f3x']:.2f} times the true damage")  # fmt: skip
+
+
+@cache
+def _walk() -> np.ndarray:
+    return np.random.default_rng(2).standard_normal(500).cumsum()
+
+
+def broken_load(engine: str, folder: Path) -> float:
+    """One sample that is not a number."""
+    load = _walk().copy()
+    load[250] = np.nan
+    return pseudo_damage(load)
+
+
+def broken_load_naive(folder: Path) -> str:
+    """What the library makes of it."""
+    from rainflow import extract_cycles
+
+    load = _walk().copy()
+    load[250] = np.nan
+    found = sum(count * span**5 for span, _, count, _, _ in extract_cycles(load.tolist()))
+    return f"rainflow alone finds {found / pseudo_damage(_walk()):.2g} times the damage of the whole load"
+
+
+def empty_load(engine: str, folder: Path) -> float:
+    """A load without a sample."""
+    return pseudo_damage(np.empty(0))
+
+
+def constant_truth(engine: str, folder: Path) -> float:
+    """A true load that never varies: nothing can be compared to its damage."""
+    return damage_ratio(_walk(), np.full(500, 3.0))
+
+
+def two_points(engine: str, folder: Path) -> float:
+    """A load of one rise."""
+    return abs(pseudo_damage(np.array([0.0, 2.0]), 5.0) - 0.5 * 2.0**5)
+
+
+def two_points_naive(folder: Path) -> str:
+    """What the library makes of it."""
+    from rainflow import extract_cycles
+
+    return f"rainflow alone finds {len(list(extract_cycles([0.0, 2.0])))} cycles in it"
+
+
+def before_drift(engine: str, folder: Path) -> float:
+    """Difference to another implementation under the same noise, up to the drift-off, of the largest state."""
+    scene = follow(folder, measured(), {"force_noise": {"deviation": HEAVY}})
+    other = "mujoco" if engine == "reference" else "reference"
+    one, two = (simulate(scene, name) for name in (engine, other))
+    held = slice(None, _off(one))
+    return setups.largest(one.states[held] - two.states[held]) / setups.largest(two.states[held])
+
+
+def _off(run: Result) -> int | None:
+    """First row at which the run is OFF from the measured pitch; None where it never is."""
+    far = np.flatnonzero(np.abs(run["pitch"] - measured()["pitch"]) > OFF)
+    return int(far[0]) if len(far) else None
+
+
+def before_drift_naive(folder: Path) -> str:
+    """Two step sizes of the reference, compared over 30 s."""
+    write_forces(simulate(road_scene(duration=30.0), "reference"), folder, 1e-3)
+    scene = force_scene(folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY}})
+    coarse, fine = (simulate(scene, "reference", Settings("RK4", step, 30.0)) for step in (1e-3, 5e-4))
+    gap = np.abs(coarse["pitch"] - fine["pitch"][::2])
+    return f"two step sizes of the reference differ by {gap[: _off(coarse)].max():.0e} rad before, {gap.max():.0e} after"
+
+
+REFUSED = dict.fromkeys(IMPLEMENTATIONS, "refused")
+
+CASES = (
+    Case("drifted run scored by its vertical forces", "the vertical force is the same at every pitch",
+         "rejected with the truth and without it", "wrong verdicts", 0.0, "a word is right or wrong", tumbled,
+         naive=tumbled_naive),
+    Case("spring below the smallest that holds", "it is a stabiliser, and the vehicle drifts all the same",
+         "rejected", "wrong verdicts", 0.0, "a word is right or wrong", soft, naive=soft_naive),
+    Case("spring on a grade", "keeping the pitch near zero is wrong there, and no figure of the run shows it",
+         "rejected with the truth; without it never accepted", "wrong verdicts", 0.0, "a word is right or wrong", graded,
+         naive=graded_naive),
+    Case("load with a value that is not a number", "rainflow compares, and every comparison with it is false",
+         "refused", "N^5", 0.0, "no damage is right", broken_load, REFUSED, broken_load_naive),
+    Case("load without a sample", "no cycle, but no measurement either", "refused", "N^5", 0.0, "no damage is right",
+         empty_load, REFUSED),
+    Case("true load that never varies", "its damage is 0, by which the ratio would divide", "refused", "", 0.0,
+         "no ratio is right", constant_truth, REFUSED),
+    Case("load of a single rise", "two turning points make half a cycle", "half of range^5", "N^5", 0.0,
+         "exact in doubles", two_points, naive=two_points_naive),
+    Case("engines compared up to the drift-off", "errors grow without bound, rounding among them: beyond the drift-off "
+         "a difference says nothing of an engine", "another implementation, same noise file", "of the largest state",
+         1e-9, "rounding of 1e-15 to 1e-13 that grows by less than 100", before_drift, naive=before_drift_naive,
+         against="native"),
+)  # fmt: skip
