@@ -6,7 +6,8 @@ that was killed, to the same bits. Each other engine repeats the first paths on 
 """
 
 from collections.abc import Callable
-from contextlib import nullcontext
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -18,7 +19,7 @@ from models.engines.catalogue import CATALOGUE
 from models.ensemble.engines import gap, mujoco_threads
 from models.ensemble.paths import NoisePaths, noise_paths
 from models.ensemble.runner import Progress as Done
-from models.ensemble.runner import processes, run_paths
+from models.ensemble.runner import cluster, processes, run_paths
 from models.ensemble.statistics import deviation, quantile
 from models.ensemble.store import Arrays
 from models.errors import InputError
@@ -45,6 +46,7 @@ class Options(Strict):
     engine_paths: int = Field(4, ge=1, le=10_000, description="number of the first paths that other engines repeat")
     seed: int = Field(1, ge=0, lt=2**64, description="seed of the noise")
     workers: int = Field(2, ge=1, le=256, description="processes that compute; the results do not depend on it")
+    cluster: str | None = Field(None, description="address of a Dask scheduler whose workers compute instead")
     rows: float = quantity("s", "spacing of the saved states", default=0.5)
     times: list[float] = Field([1.0, 2.0, 5.0, 10.0, 15.0], description="times (s) of the table, on saved rows")
     threshold: float = quantity("rad", "pitch error at which a path has drifted off", default=0.05)
@@ -81,8 +83,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     def tell(done: Done) -> None:
         progress(f"reference: {done}", done.done / done.paths)
 
-    pooled = processes(options.workers) if options.workers > 1 else nullcontext()
-    with TemporaryDirectory() as name, pooled as pool:
+    with TemporaryDirectory() as name, _workers(options) as pool:
         noisy = _noisy(scene, options, measured, every, Path(name))
         truth = measured["pitch"]
         job = noise_paths(noisy, times, truth, options.threshold)
@@ -100,6 +101,13 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     _figure(times, found["states"][:, :, 3] - true[:, 3], found["drift_off"], options, folder)
     return {"scene": scene.title, "folder": str(folder), "paths": options.paths, "rows": rows, "gaps": gaps,
             "failed": {}, "table": table}  # fmt: skip
+
+
+def _workers(options: Options) -> AbstractContextManager[Executor | None]:
+    """Who computes: a cluster, processes, or this process alone."""
+    if options.cluster is not None:
+        return cluster(options.cluster)
+    return processes(options.workers) if options.workers > 1 else nullcontext()
 
 
 def _noisy(scene: Scene, options: Options, measured: Result, every: int, folder: Path) -> Scene:

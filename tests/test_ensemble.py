@@ -16,7 +16,7 @@ from models.engines import protocol
 from models.ensemble import store
 from models.ensemble.engines import gap, mujoco_threads
 from models.ensemble.paths import NoisePaths, noise_paths
-from models.ensemble.runner import PathFailed, processes, run_paths
+from models.ensemble.runner import PathFailed, cluster, processes, run_paths
 from models.ensemble.statistics import deviation, quantile
 from models.errors import InputError, RunFailed
 from models.noise import normal
@@ -104,10 +104,21 @@ def test_processes_change_nothing(folder, expected):
 
 
 def test_a_dask_cluster_changes_nothing(folder, expected):
-    from distributed import Client
+    from distributed import LocalCluster
 
-    with Client(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as client:
-        assert same(run_paths(job(folder), PATHS, executor=client.get_executor(), block=BLOCK), expected)
+    with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as local:  # noqa: SIM117
+        with cluster(local.scheduler_address) as executor:
+            assert same(run_paths(job(folder), PATHS, executor=executor, block=BLOCK), expected)
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://here"])
+def test_a_cluster_that_is_not_there_is_named(address, monkeypatch):
+    import distributed
+
+    own = distributed.Client
+    monkeypatch.setattr(distributed, "Client", lambda *args, **options: own(*args, **options | {"timeout": "0.2s"}))
+    with pytest.raises(InputError, match="no Dask scheduler answers"), cluster(address):
+        pass
 
 
 class ByOrder(NoisePaths):
@@ -161,15 +172,26 @@ def test_a_killed_run_resumes_without_losing_a_block(folder, expected, tmp_path)
     assert all(path.stat().st_mtime_ns == when for path, when in kept.items())
 
 
-def test_an_interrupt_leaves_the_finished_blocks(folder, expected, tmp_path):
+class Counted(NoisePaths):
+    """Counts its calls, which take longer than to save a block."""
+
+    calls = 0
+
+    def __call__(self, paths):
+        Counted.calls += 1
+        time.sleep(0.05)
+        return super().__call__(paths)
+
+
+def test_an_interrupt_leaves_the_finished_blocks_and_begins_no_others(folder, expected, tmp_path):
     def stop(state):
-        if state.done >= 2 * BLOCK:
+        if state.done >= 2:
             raise KeyboardInterrupt
 
-    with ThreadPoolExecutor(1) as executor, pytest.raises(KeyboardInterrupt):
-        run_paths(job(folder), PATHS, tmp_path, executor, BLOCK, stop)
-    assert len(list(tmp_path.glob("block*.npz"))) == 2
-    assert same(run_paths(job(folder), PATHS, tmp_path, block=BLOCK), expected)
+    with pytest.raises(KeyboardInterrupt), ThreadPoolExecutor(1) as executor:
+        run_paths(Counted(**vars(job(folder))), PATHS, tmp_path, executor, 1, stop)
+    assert len(list(tmp_path.glob("block*.npz"))) == 2 and Counted.calls < PATHS / 2
+    assert same(run_paths(job(folder), PATHS, tmp_path, block=1), expected)
 
 
 def test_a_block_is_written_whole_or_not_at_all(tmp_path, monkeypatch):

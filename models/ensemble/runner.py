@@ -11,8 +11,9 @@ import math
 import os
 import signal
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from itertools import islice
 from multiprocessing import get_context
@@ -22,12 +23,14 @@ from typing import Any, Protocol
 import numpy as np
 
 from models.ensemble.store import Arrays, Store
-from models.errors import RunFailed
+from models.errors import InputError, RunFailed
 
 BLOCK = 50
 """Paths per block: half a second of work of the pitch plane over 60 s, which a killed run may lose."""
 AHEAD = 64
 """Blocks under way at once, so that the memory for results on their way stays bounded."""
+TOLD = 5
+"""Failed blocks that a message names."""
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
 """Options of glibc's mallopt, from its malloc.h."""
@@ -100,7 +103,7 @@ def run_paths(job: Job, paths: int, folder: Path | None = None, executor: Execut
 
     folder : keeps every finished block; one that holds blocks of the same job is resumed, one of another job is
     an InputError that names the difference; None keeps them in memory. executor : a process pool
-    (``processes``), a thread pool, a Dask ``Client.get_executor()``; None computes here. A block that fails does
+    (``processes``), a Dask cluster (``cluster``), a thread pool; None computes here. A block that fails does
     not stop the others: RunFailed then names the blocks and paths, and what is finished is kept.
     """
     store: Store | _Memory = _Memory()
@@ -111,7 +114,8 @@ def run_paths(job: Job, paths: int, folder: Path | None = None, executor: Execut
     failed = _compute(job, cut, store, executor, progress)
     if failed:
         kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
-        raise RunFailed("ensemble", "; ".join(failed) + kept)
+        more = f"; {len(failed) - TOLD} more blocks" if len(failed) > TOLD else ""
+        raise RunFailed("ensemble", "; ".join(failed[:TOLD]) + more + kept)
     return _together([store.load(i) for i in range(len(cut))])
 
 
@@ -123,19 +127,20 @@ def _compute(job: Job, cut: list[range], store: Store | _Memory, executor: Execu
     done = before = paths - sum(len(cut[i]) for i in missing)
     start, failed = time.perf_counter(), []
     progress(Progress(done, paths, 0.0, math.inf if missing else 0.0))
-    for i, answer in _answers(job, cut, missing, executor):
-        if isinstance(answer, _Failure):
-            failed.append(f"block {i} (paths {cut[i][0]} to {cut[i][-1]}): {answer.reason}")
-            continue
-        store.save(i, answer)
-        done += len(cut[i])
-        rate = (done - before) / (time.perf_counter() - start)
-        progress(Progress(done, paths, rate, (paths - done) / rate))
+    with closing(_answers(job, cut, missing, executor)) as answers:  # an interrupt drops at once what waits
+        for i, answer in answers:
+            if isinstance(answer, _Failure):
+                failed.append(f"block {i} (paths {cut[i][0]} to {cut[i][-1]}): {answer.reason}")
+                continue
+            store.save(i, answer)
+            done += len(cut[i])
+            rate = (done - before) / (time.perf_counter() - start)
+            progress(Progress(done, paths, rate, (paths - done) / rate))
     return failed
 
 
 def _answers(job: Job, cut: list[range], missing: list[int],
-             executor: Executor | None) -> Iterator[tuple[int, Arrays | _Failure]]:  # fmt: skip
+             executor: Executor | None) -> Generator[tuple[int, Arrays | _Failure]]:  # fmt: skip
     """Blocks and their answers, as they come."""
     if executor is None:
         yield from ((i, _attempt(job, cut[i])) for i in missing)
@@ -204,3 +209,22 @@ def _prepare_worker() -> None:
     if mallopt is not None:
         for option in (M_TRIM_THRESHOLD, M_MMAP_THRESHOLD):
             mallopt(option, KEPT_MEMORY)
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[Executor]:
+    """The workers of a Dask scheduler, such as ``tcp://host:8786``, where the same twinrig must be installed.
+
+    Raises InputError where the extra ``cluster`` is not installed or nobody answers.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError("", "cluster", address, "needs Dask: pip install 'twinrig[cluster]'") from None
+    try:
+        client = Client(address, timeout="10s", set_as_default=False)
+    except (OSError, ValueError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError("", "cluster", address, f"no Dask scheduler answers there: {reason}") from None
+    with client:
+        yield client.get_executor()
