@@ -218,7 +218,8 @@ def _verdict(found: Quality) -> str:
         return f"{share} (allowed: {100 * LIMIT:g} %, or what the noise leaves): the mounts pass for rigid"
     if found.suspect:
         return f"{share} (allowed: {100 * LIMIT:g} %): {found.suspect!r} does not move with the body and is left out"
-    return f"{share} (allowed: {100 * LIMIT:g} %): the body or a mount gives way, and no single sensor explains it"
+    return (f"{share} (allowed: {100 * LIMIT:g} %): the body or a mount gives way and no single sensor explains it, "
+            "or the noise is larger than the scene states (deviation)")
 
 
 def _closing(options: Options) -> list[str]:
@@ -232,7 +233,7 @@ def _closing(options: Options) -> list[str]:
 
 
 def _figure(source: Source, path: Path) -> None:
-    """Pitch, heave, error of the rate, and the misfit of the readings, of one source."""
+    """Pitch, heave, error of the pitch or its rate, and the misfit of the readings, of one source."""
     from studies.figures import plt, save
 
     times = source.period * np.arange(len(source.readings))
@@ -246,15 +247,16 @@ def _figure(source: Source, path: Path) -> None:
         values = _values(found)
         for axis, name, _ in panels:
             axis.plot(times, values[name], color=f"C{i}", linewidth=0.9, label=way)
-        axes[1, 0].plot(times, values["rate"] - source.truth.get("rate", 0.0), color=f"C{i}", linewidth=0.7)
-    axes[1, 0].set_title("error of the pitch rate [rad/s]" if source.truth else "pitch rate [rad/s]")
+        lower = 1e3 * (values["pitch"] - source.truth["pitch"]) if source.truth else values["rate"]
+        axes[1, 0].plot(times, lower, color=f"C{i}", linewidth=0.9)
+    axes[1, 0].set_title("error of the pitch [mrad]" if source.truth else "pitch rate [rad/s]")
     assert source.quality is not None
     axes[1, 1].plot(times, source.quality.misfit, color="C7", linewidth=0.4)
     axes[1, 1].set_title(f"readings that no rigid motion explains, {100 * source.quality.share:.2g} % [m/s^2]")
     for axis in axes[1]:
         axis.set_xlabel("time [s]")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
-    title = f"Pitch, rate and heave from accelerometers alone, {source.name}"
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=8.5)
+    title = f"Pitch and heave from accelerometers, {source.name}"
     figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
     save(figure, path)
 
