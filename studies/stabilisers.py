@@ -207,7 +207,7 @@ class Bench:
             failed[f"{engine}, {self.road}, {name}"] = str(error)
             return []
         seconds = time.perf_counter() - start
-        return [{"engine": engine, "road": self.road, **self._row(name, effects, found), "seconds": seconds}]
+        return [{"engine": engine, "road": self.road, **self.row(name, effects, found), "seconds": seconds}]
 
     def simulate(self, engine: str, effects: dict[str, Any]) -> Result:
         """A run of the perturbed model under noisy forces."""
@@ -217,7 +217,7 @@ class Bench:
         noise = {"force_noise": {"deviation": self.deviation, "seed": self.options.seed}}
         return self.follow(self.override, noise | effects)
 
-    def _row(self, name: str, effects: dict[str, Any], run: Result) -> Row:
+    def row(self, name: str, effects: dict[str, Any], run: Result) -> Row:
         """Figures and verdicts; a tumbled run has no damage that could mislead."""
         limits = self.options.limits
         own, wrong = own_figures(run, self.parameters), errors(run, self.truth, self.options.slope)

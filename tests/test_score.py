@@ -171,3 +171,27 @@ def test_turning_points_change_no_count():
     load = np.round(np.random.default_rng(4).standard_normal(3000).cumsum(), 0)  # plateaus among them
     whole = sum(count * span**5 for span, _, count, _, _ in extract_cycles(load.tolist()))
     assert len(turning_points(load)) < 2000 and pseudo_damage(load) == pytest.approx(whole, rel=1e-12)
+
+
+@pytest.mark.parametrize("implementation", ["reference", "mujoco"])
+def test_a_spring_taken_for_a_measurement_is_found(implementation, monkeypatch, tmp_path):
+    """Planted: whoever trusts a spring as if it knew the pitch is told by the hard case on a grade."""
+    from models.drift import score
+    from validation.hard_cases import drift
+    from validation.hard_cases.case import judge
+
+    case = next(case for case in drift.CASES if case.name == "spring on a grade")
+    monkeypatch.setattr(score, "MEASURED", (*score.MEASURED, "pitch_spring"))
+    assert judge(case, implementation, tmp_path).word == "SILENT"
+
+
+def test_forces_scored_without_their_pitch_are_found(monkeypatch, tmp_path):
+    """Planted: a score that leaves out the component along the chassis calls the tumbled run anything but rejected."""
+    from models.drift import score
+    from validation.hard_cases import drift
+    from validation.hard_cases.case import judge
+
+    case = next(case for case in drift.CASES if case.name == "drifted run scored by its vertical forces")
+    monkeypatch.setattr(score, "TUMBLED", np.inf)
+    monkeypatch.setattr(score, "_beyond", lambda found, limits: [])
+    assert judge(case, "reference", tmp_path).word == "SILENT"
