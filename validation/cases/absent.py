@@ -234,11 +234,11 @@ def _job(own: Scene, engine: str) -> Any:
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """The price list of effects."""
-    note = ("Each effect is added to the scene without it: wheel_forces, road, pitch_spring and the sensors to the bare "
-            "vehicle, gyro_bias to one with a gyro, the others to the vehicle under wheel forces. Counts are exact; "
+    note = ("Each effect is added to the scene without it: wheel_forces, road, pitch_spring and the sensors to the "
+            "bare vehicle, gyro_bias to one with a gyro, the others to one under wheel forces. Counts are exact; "
             "microseconds per step of 1 ms, channels included, are the median of paired differences with their median "
-            "deviation, the factor is the median of paired ratios with a 95 % interval. An effect that is not named costs "
-            "nothing: see the rows above.")
+            "deviation, the factor is the median of paired ratios with a 95 % interval. An effect that is not named "
+            "costs nothing: see the rows above.")
     headings = ("effect", "engine", "adds", "without it, us per step", "adds, us per step", "factor")
     return [Table("Price list of effects", note, headings, tuple(_line(entry) for entry in data["price"]))]
 
