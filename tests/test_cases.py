@@ -6,7 +6,8 @@ import pytest
 
 from validation.run import CASES, seeds
 
-QUICK = ("audit", "twin", "order", "tight", "enforced_moment", "roads", "guards", "motion", "score", "hard_cases", "ensemble")
+QUICK = ("audit", "twin", "order", "tight", "enforced_moment", "roads", "guards", "motion", "score", "hard_cases",
+         "ensemble")  # fmt: skip
 """Cases whose rows no other test file runs as a whole."""
 
 
