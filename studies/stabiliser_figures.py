@@ -1,14 +1,13 @@
 """Two figures to decide from: what each stabiliser leaves, and what its stiffness or cut-off does on a grade."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from models.drift.score import BAND, TUMBLED, Limits
 from models.section_forces import CHANNELS
-from studies.figures import plt, save
+from studies.figures import plt
 
 Row = dict[str, Any]
 
@@ -23,7 +22,7 @@ SHARP = 0.05
 """Damage ratios are drawn as asinh(ln(ratio) / SHARP): linear about 1, logarithmic far from it."""
 
 
-def decide(rows: list[Row], limits: Limits, grade: float | None, path: Path) -> None:
+def decision(rows: list[Row], limits: Limits, grade: float | None) -> Any:
     """One line per method: damage, pitch error, artificial moment, cost and the two verdicts."""
     methods = list(dict.fromkeys(row["method"] for row in rows))
     widths = (3.4, 1.9, 2.1, 3.6)
@@ -46,7 +45,7 @@ def decide(rows: list[Row], limits: Limits, grade: float | None, path: Path) -> 
     _legend(figure, grade)
     figure.suptitle("Which stabiliser leaves the section forces right: perturbed model, noisy wheel forces "
                     f"({rows[0]['engine']})", x=0.01, ha="left", fontweight="bold")  # fmt: skip
-    save(figure, path)
+    return figure
 
 
 def _marks(axes: Any, row: Row, line: int) -> None:
@@ -104,7 +103,7 @@ def _legend(figure: Any, grade: float | None) -> None:
     figure.legend(handles=[*marks, *roads, good], loc="outside lower center", ncols=7, fontsize=8.5)
 
 
-def swept(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: float | None, path: Path) -> None:
+def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: float | None) -> Any:
     """Pitch error and worst damage ratio over stiffness, with the equivalent cut-off above, on every road.
 
     sweep : per road what ``Bench.sweep`` gives; level : the bench of the road without the grade
@@ -137,4 +136,4 @@ def swept(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: float
     figure.suptitle(f"Keeping the pitch near zero: no stiffness is right, least of all on a grade of {grade or 0:g} rad"
                     if grade is not None else "Keeping the pitch near zero: what the stiffness does",
                     x=0.01, ha="left", fontweight="bold")  # fmt: skip
-    save(figure, path)
+    return figure

@@ -76,12 +76,13 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     table = text(rows, benches, options)
     (folder / "table.txt").write_text("\n".join(table) + "\n")
     _write_csv(folder / "score.csv", rows)
-    from studies.stabiliser_figures import decide, swept
+    from studies.figures import save
+    from studies.stabiliser_figures import decision, stiffness
 
     progress("figures", 1.0)
     own = [row for row in rows if row["engine"] == engines[0]]
-    decide(own, options.limits, options.grade, folder / "decide.png")
-    swept(sweep, benches[0], options.limits, options.grade, folder / "stiffness.png")
+    save(decision(own, options.limits, options.grade), folder / "decide.png")
+    save(stiffness(sweep, benches[0], options.limits, options.grade), folder / "stiffness.png")
     return {"scene": scene.title, "folder": str(folder), "rows": rows, "failed": failed, "table": table,
             "sweep": {road: found.tolist() for road, found in sweep.items()}}  # fmt: skip
 
@@ -140,8 +141,9 @@ class Bench:
         """What is known before any run: until when a free one can be trusted (s), and which spring holds (N m/rad)."""
         free = assemble(self._scene({}))
         found = trust(free, self.options.limits.pitch_error)
-        assert found is not None and found.until is not None  # force noise always ends a free run's trust
-        self.trusted, self.holding = found.until[1], holding_stiffness(self.parameters, found.rate)
+        assert found is not None  # nothing holds a free run
+        self.trusted = free.scene.run.duration if found.until is None else found.until[1]
+        self.holding = holding_stiffness(self.parameters, found.rate)
 
     def _write_sensors(self, every: int) -> None:
         """Noisy pitch, and exact heave and pitch, as files."""

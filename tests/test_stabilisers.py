@@ -8,7 +8,7 @@ import pytest
 from models.errors import InputError
 from models.scene import load
 from studies.command_line import SCENES
-from studies.stabilisers import run
+from studies.stabilisers import Bench, Options, run
 
 SHORT = ["run.duration=5.0", "options.stiffnesses=[300.0]", "options.cut_offs=[0.1]", "options.sweep=[50.0, 3e3]"]
 
@@ -86,3 +86,10 @@ def test_what_the_study_cannot_follow_is_refused_before_it_writes(change, words,
     with pytest.raises(InputError, match=words):
         run(load(SCENES / "stabilisers.toml", [change]), ("exudyn",), tmp_path, quiet)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_linear_vehicle_needs_no_spring(tmp_path):
+    """Linearised, nothing grows: no stiffness is needed, and noise alone ends the trust in a free run."""
+    scene = load(SCENES / "stabilisers.toml", [*SHORT, "vehicle.geometry=linear"])
+    bench = Bench(scene, "road", Options(), tmp_path)
+    assert bench.holding == 0.0 and 0.0 < bench.trusted <= 5.0

@@ -228,3 +228,15 @@ def _cells(row: dict[str, Any]) -> tuple[str, ...]:
         f"{row['pitch error max [rad]']:.2g}", f"{row['moment rms [N m]']:.0f}", f"{row['moment share to 15 Hz']:.1%}",
         row["verdict"], row["without truth"],
     )  # fmt: skip
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """The study's figure to decide from."""
+    if not data["study"]:
+        return []
+    from studies.stabiliser_figures import decision
+
+    scene = load(SCENE)
+    options = read(Options, scene.options, "", "options")
+    rows = [row for row in data["study"] if row["engine"] == "reference"]
+    return [("What each stabiliser leaves in the section forces", decision(rows, options.limits, options.grade))]
