@@ -203,4 +203,5 @@ def balanced(engine: str, times: np.ndarray, enforced: np.ndarray,
     for i in np.flatnonzero(~(off <= BALANCE_BOUND * size + 1e-3))[::-1]:
         what, unit, data = ("moment", "N m", "pitch") if i == len(size) - 1 else ("force", "N", "heave")
         raise RunFailed(engine, f"the enforced {what} misses the balance of {what}s by {off[i]:.3g} {unit} (rms) of "
-                                f"{size[i]:.3g}: the {data} is too rough for this step; smooth its data or shorten it")
+                                f"{size[i]:.3g}: the {data} is too rough for this step; smooth its data "
+                                "(bandwidth) or shorten it")
