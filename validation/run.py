@@ -14,8 +14,9 @@ from typing import Any
 from models.result import provenance
 from validation.rows import REPORTED, Row
 
-CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "point_mass",
-         "inertial_unit", "motion", "stabilisers", "index_reduction", "hard_cases",
+CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "growth",
+         "drift_off", "drift_solvers", "holding_spring", "point_mass",
+         "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
          "planted_faults", "absent", "price", "ensemble")  # fmt: skip
 """Case modules in the order of the report."""
 
@@ -83,13 +84,29 @@ def seeds() -> dict[str, int]:
     """Every seed that the rows depend on; with them and the versions all counts and states repeat exactly."""
     from studies.six_runs import Options
     from validation import checks, timing
-    from validation.cases import ensemble, index_reduction, inertial_unit, motion, point_mass, roads, stabilisers
+    from validation.cases import (
+        drift_off,
+        drift_solvers,
+        ensemble,
+        growth,
+        holding_spring,
+        index_reduction,
+        inertial_unit,
+        kalman,
+        motion,
+        point_mass,
+        roads,
+        score,
+        stabilisers,
+    )
 
     return {"random states": checks.SEED, "class C road": roads.SEED, "six runs": Options.model_fields["seed"].default,
             "order of timing": timing.SEED, "point mass": point_mass.SEED,
             "inertial unit": inertial_unit.SEED, "noise paths": ensemble.SEED,
-            "accelerometers": motion.SEED,
-            "stabilisers": stabilisers.SEED, "index reduction": index_reduction.SEED}  # fmt: skip
+            "accelerometers": motion.SEED, "Kalman filter": kalman.SEED,
+            "loads of the score": score.SEED, "stabilisers": stabilisers.SEED, "index reduction": index_reduction.SEED,
+            "growth of noise": growth.SEED, "drift-off": drift_off.SEED, "drift by solver": drift_solvers.SEED,
+            "holding spring": holding_spring.SEED}  # fmt: skip
 
 
 def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numba.extending import register_jitable
 
 from models.assembly import Assembly
 from models.engines.reference import compiled, march_of
@@ -62,7 +63,7 @@ class PitchStep:
         first = number * self._substeps * self._rows[2]
         inputs = self._inputs[first : first + len(self._hats)]
         found = self._respond(x, self.period / self._substeps, self._substeps, inputs, self._rows, self._p, self._hats)
-        return found[:, 0], found[:, 1:8], found[:, 8:10], found[:, 10:]
+        return found[:, 0].copy(), found[:, 1:8], found[:, 8:10], found[:, 10:]
 
 
 def responding(mode: str, geometry: str) -> Any:
@@ -72,9 +73,9 @@ def responding(mode: str, geometry: str) -> Any:
     and d/d(last one) (2). step to p are those of the reference's march; hats (rows, 2) say how the first and the
     last sample share in each row of the inputs.
     """
-    key = (mode, geometry)
+    key = (mode, geometry)  # the march goes in as Python: numba cannot cache what encloses compiled code
     if key not in _RESPONDING:
-        _RESPONDING[key] = _compile(march_of(*key), key)
+        _RESPONDING[key] = _compile(register_jitable(march_of(*key).py_func), key)
     return _RESPONDING[key]
 
 

@@ -1,0 +1,120 @@
+"""The Kalman filter of the pitch: holes in the measurement, a wrong start, a vehicle too stiff for its samples."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from filterpy.common import van_loan_discretization
+from filterpy.kalman import ExtendedKalmanFilter
+from scipy.linalg import expm
+
+from models.drift.pitch_step import KEPT, RELATIVE, PitchStep
+from models.engines.stability import first_order, linearised
+from models.noise import PITCH_SENSOR, normal
+from models.scene import build
+from models.signals import Sampled
+from models.simulate import simulate
+from models.time_series import write_time_series
+from validation.hard_cases import setups
+from validation.hard_cases.case import Case
+
+PERIOD, DURATION = 5e-3, 6.0
+FORCE, ANGLE, TURN = 16.0, 8e-4, 0.2
+"""Deviations: N per force sample, rad per angle, rad of a start that is not known."""
+SLOW = 0.1
+"""s between force samples that are 70 time constants of the wheels apart."""
+
+
+def _drawn(engine: str, folder: Path, lost: slice, turn: float = 0.0, **own: Any) -> float:
+    """Largest pitch error by its stated deviation of a vehicle at rest, its pitch unknown in the ``lost`` samples.
+
+    The filter starts from a pitch that is ``turn`` (rad) wrong.
+    """
+    count = round(DURATION / PERIOD) + 1
+    base = setups.vehicle()
+    forces = setups.static_forces(base, count, PERIOD, held=False).values
+    write_time_series(folder / "forces.csv", {"front": ("N", forces[:, 0]), "rear": ("N", forces[:, 1])}, PERIOD)
+    seen = base.initial[3] + ANGLE * normal(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
+    seen[lost] = np.nan
+    write_time_series(folder / "pitch.csv", {"pitch": ("rad", seen)}, PERIOD)
+    p, start = base.parameters, base.initial.copy()
+    start[[0, 1, 3]] += turn * np.array([-p.b, p.a, 1.0])
+    scene = build({
+        "title": "kalman", "run": {"duration": DURATION, "step": 1e-3},
+        "start": {"z1": start[0], "z2": start[1], "pitch": start[3]},
+        "effects": {"wheel_forces": {"file": "forces.csv", "interpolation": "linear"},
+                    "force_noise": {"deviation": FORCE, "seed": 7},
+                    "kalman_filter": {"file": "pitch.csv", "force_deviation": FORCE, "pitch_deviation": ANGLE, **own}},
+    }, "kalman", folder)  # fmt: skip
+    run = simulate(scene, engine)
+    ended = PERIOD * (lost.stop or 0)
+    late = (run.times < ended) | (run.times > ended + 1.0)  # the moment takes a while to draw the vehicle back
+    return setups.largest(((run["pitch"] - base.initial[3]) / run["pitch_deviation"])[late & (run.times > 0.1)])
+
+
+def outage(engine: str, folder: Path) -> float:
+    """Three and a half seconds without a number."""
+    return _drawn(engine, folder, slice(200, 900))
+
+
+def outage_naive(folder: Path) -> str:
+    """The filter's own update with a value that is not a number."""
+    own = ExtendedKalmanFilter(2, 1)
+    own.x = np.zeros(2)
+    own.update(np.array([np.nan]), lambda x: np.eye(2)[:1], lambda x: x[:1])
+    return f"filterpy takes the NaN in without a word: its state is {own.x[0]} for ever after"
+
+
+def wrong_start(engine: str, folder: Path) -> float:
+    """A start that is wrong by one stated deviation."""
+    return _drawn(engine, folder, slice(0, 0), TURN, start_deviation=TURN)
+
+
+def nothing(engine: str, folder: Path) -> float:
+    """A column without a single number."""
+    return _drawn(engine, folder, slice(None))
+
+
+def _exact() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A (6, 6) and B (6, 2) of the relative states, and the exact response (6, 2) to forces held over SLOW."""
+    base = setups.vehicle(geometry="linear").without_tyres()
+    pushes = np.zeros((8, 2))
+    pushes[4, 0], pushes[5, 1] = -1 / base.parameters.m1, -1 / base.parameters.m2
+    a, b = RELATIVE @ first_order(linearised(base.vehicle))[:, KEPT], RELATIVE @ pushes
+    block = np.zeros((8, 8))
+    block[:6, :6], block[:6, 6:] = a, b
+    return a, b, expm(block * SLOW)[:6, 6:]
+
+
+def stiff(engine: str, folder: Path) -> float:
+    """Process noise of forces sampled at 10 Hz beside a pole of -697 1/s."""
+    base = setups.vehicle(geometry="linear")
+    forces = Sampled(setups.static_forces(base, 2, SLOW).values, SLOW, held=True)
+    step = PitchStep(setups.driven(base, forces), SLOW, 1)
+    early = step.advance(np.append(RELATIVE @ base.initial, 0.0), 0)[2][:6]
+    wanted = _exact()[2]
+    return float(np.linalg.norm(early @ early.T - wanted @ wanted.T) / np.linalg.norm(wanted @ wanted.T))
+
+
+def stiff_naive(folder: Path) -> str:
+    """filterpy's own discretisation."""
+    a, b, wanted = _exact()
+    noise = van_loan_discretization(a, b * np.sqrt(SLOW), SLOW)[1]
+    times, least = noise[2, 2] / (wanted @ wanted.T)[2, 2], np.linalg.eigvalsh((noise + noise.T) / 2).min()
+    return (f"filterpy's van_loan_discretization gives a pitch variance {times:.1e} times the right one, and an "
+            f"eigenvalue of {least:.1e}, unwarned")  # fmt: skip
+
+
+CASES = (
+    Case("pitch measurement with an outage", "3.5 s without a number, during which the vehicle drifts freely",
+         "the true pitch, by the deviation that the filter states", "deviations", 5.0,
+         "Gaussian: 5 deviations are left once in 1.7 million", outage, {}, outage_naive),
+    Case("filter from a wrong start", "vehicle and filter begin 0.2 rad from where the true one is",
+         "the true pitch after 1 s, by the deviation that the filter states", "deviations", 5.0,
+         "Gaussian: 5 deviations are left once in 1.7 million", wrong_start),
+    Case("pitch measurement without a number", "a column of NaN", "refused", "", 0.0, "there is nothing to follow",
+         nothing, dict.fromkeys(("reference", "exudyn", "mujoco"), "refused")),
+    Case("process noise of a stiff vehicle", "forces at 10 Hz, a pole of -697 1/s",
+         "the response to a held force by the matrix exponential", "of its norm", 1e-6,
+         "Runge-Kutta in substeps of 1 ms; the fast modes have settled", stiff, {}, stiff_naive),
+)  # fmt: skip

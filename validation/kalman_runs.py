@@ -1,0 +1,298 @@
+"""Experiments on the Kalman filter of the pitch: scenes, consistency, the linear closed loop, gaps, damage."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.signal import butter, sosfiltfilt
+
+from models.assembly import Assembly, assemble
+from models.damage import damage_ratio
+from models.drift.pitch_filter import PITCH, RATE, Estimate, Measurement, estimate
+from models.drift.pitch_step import KEPT, RELATIVE
+from models.effects.kalman_filter import pull
+from models.engines.protocol import Settings, build
+from models.engines.stability import first_order, linearised
+from models.noise import PITCH_SENSOR, normal
+from models.result import Result
+from models.scene import Scene
+from models.scene import build as build_scene
+from models.section_forces import CHANNELS, section_forces
+from models.simulate import simulate
+from models.strict import read
+from models.time_series import write_time_series
+from validation.scenes import road_scene, write_forces
+
+ANGLE = float(np.deg2rad(0.1))
+"""Deviation (rad) of the inertial unit, white at 1 kHz."""
+GYRO = 0.1
+"""Deviation (rad/s) of the gyro, white at 1 kHz."""
+FRACTION = 0.002
+"""Deviation of the force noise by the largest force, at 1 kHz."""
+COARSE = 5e-3
+"""Sampling period (s) of the statistics; deviations per sample then keep the intensity of those at 1 kHz."""
+WRONG = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
+"""The paper's perturbed model, as factors."""
+BAND = 15.0
+"""Hz, up to which the artificial moment is judged."""
+
+
+def at_period(deviation: float, period: float) -> float:
+    """Deviation per sample that has the intensity of ``deviation`` at 1 kHz."""
+    return deviation * float(np.sqrt(1e-3 / period))
+
+
+@cache
+def measured(folder: Path, duration: float, period: float) -> Result:
+    """The virtual measurement on the study road, its files left in the folder; rows ``period`` (s) apart."""
+    found = simulate(road_scene(step=min(period, 1e-3) / 2, duration=duration), "reference")
+    write_forces(found, folder, period)
+    return found.every(period)
+
+
+def force_deviation(true: Result) -> float:
+    """0.2 % of the largest wheel force (N)."""
+    return FRACTION * float(max(np.abs(true["f1"]).max(), np.abs(true["f2"]).max()))
+
+
+def driven(folder: Path, duration: float, effects: dict[str, Any], *, wrong: bool = False,
+           geometry: str = "exact") -> Scene:  # fmt: skip
+    """The vehicle under the forces in the folder, steps of 1 ms."""
+    plain = build_scene({"title": "kalman", "run": {"duration": duration, "step": 1e-3}}).vehicle_parameters()
+    override = {name: getattr(plain, name) * factor for name, factor in WRONG.items()} if wrong else {}
+    forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}}
+    table = {"title": "kalman", "vehicle": {"override": override, "geometry": geometry},
+             "run": {"duration": duration, "step": 1e-3}, "effects": forces | effects}  # fmt: skip
+    return build_scene(table, "", folder)
+
+
+def noise_of(deviation: float, seed: int) -> dict[str, Any]:
+    """The effect of noisy forces."""
+    return {"force_noise": {"deviation": deviation, "seed": seed}}
+
+
+def free_run(assembly: Assembly, duration: float, period: float) -> np.ndarray:
+    """States (n, 8) of the reference, ``period`` apart."""
+    states = build("reference", assembly, Settings("RK4", 1e-3, duration)).run().states
+    return states[:: round(period / 1e-3)]
+
+
+def consistency(folder: Path, duration: float, seed: int, scales: dict[str, tuple[float, float]]) -> dict[str, Any]:
+    """One run without model error: NEES and NIS of filters whose Q and R are scaled, by name.
+
+    The true vehicle starts turned by a random angle, which the filter knows the deviation of. NEES (6 states) is
+    taken once a second from the second one on, far beyond the estimate's memory of some 0.2 s.
+    """
+    true = measured(folder, duration, COARSE)
+    force, angle = at_period(force_deviation(true), COARSE), at_period(ANGLE, COARSE)
+    clean = assemble(driven(folder, duration, {}))
+    turn = START * float(normal(seed, 1, 1, 1, source=PITCH_SENSOR)[0, 0])
+    p, start = clean.parameters, clean.initial.copy()
+    start[[0, 1, 3]] += turn * np.array([-p.b, p.a, 1.0])
+    states = free_run(replace(clean, initial=start), duration, COARSE)
+    seen = states[:, 3] + angle * normal(seed, 0, len(states), 1, source=PITCH_SENSOR)[:, 0]
+    noisy = assemble(driven(folder, duration, noise_of(force, seed)))
+    found = {}
+    for name, (q, r) in scales.items():
+        own = Measurement(seen[:, None], COARSE, (PITCH,), (angle * np.sqrt(r),))
+        filtered = estimate(noisy, own, force * np.sqrt(q), start_deviation=START)
+        found[name] = (nees(filtered, states), filtered.surprises[round(1 / COARSE) :])
+    return found
+
+
+START = 0.02
+"""Deviation (rad) of the start in the runs on consistency."""
+
+
+def nees(found: Estimate, states: np.ndarray) -> np.ndarray:
+    """Normalised error squared of the six states, once a second from the second one on."""
+    rows = np.arange(round(2 / found.period), len(states), round(1 / found.period))
+    wrong = (found.states[rows, :6] - states[rows] @ RELATIVE.T)[:, :, None]
+    return (wrong.transpose(0, 2, 1) @ np.linalg.solve(found.errors()[rows, :6, :6], wrong))[:, 0, 0]
+
+
+def closed_loop(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]:
+    """Transition (14, 14) and stationary covariance of [estimate's error, run's error, force noise], linearised.
+
+    Errors are those of the six relative states at the samples, estimate after its update, ``COARSE`` apart. Exact:
+    exponentials of the vehicle's and of the held vehicle's matrices under inputs that are linear between samples.
+    deviation : N, of each force sample at COARSE.
+    """
+    import control
+
+    force, angle = deviation, at_period(ANGLE, COARSE)
+    scene = driven(folder, 1.0, {}, geometry="linear")
+    assembly = assemble(scene)
+    stiffness, damping = pull(assembly, effect(scene))
+    free, pushes = _relative(assembly)
+    lever = np.zeros((6, 6))
+    lever[RATE, [PITCH, RATE]] = np.array([stiffness, damping]) / assembly.parameters.I
+    f, g0, g1 = first_order_hold(free, pushes)
+    h, m0, m1 = first_order_hold(free - lever, np.hstack([pushes, lever]))
+    q = force**2 * (g0 + f @ g1) @ (g0 + f @ g1).T
+    see = np.eye(6)[[PITCH]]
+    prior = control.dare(f.T, see.T, q, np.array([[angle**2]]))[0]
+    gain = prior @ see.T / (prior[PITCH, PITCH] + angle**2)
+    keep = np.eye(6) - gain @ see
+    step, push = np.zeros((14, 14)), np.zeros((14, 3))
+    step[:6, :6], step[:6, 12:], push[:6, :2], push[:6, 2:] = keep @ f, keep @ g0, keep @ g1, gain
+    step[6:12, :6] = m0[:, 2:] + m1[:, 2:] @ keep @ f
+    step[6:12, 6:12], step[6:12, 12:] = h, m0[:, :2] + m1[:, 2:] @ keep @ g0
+    push[6:12, :2], push[6:12, 2:] = m1[:, :2] + m1[:, 2:] @ keep @ g1, m1[:, 2:] @ gain
+    push[12:, :2] = np.eye(2)
+    scaled = push * np.array([force, force, angle])
+    return step, control.dlyap(step, scaled @ scaled.T)
+
+
+def effect(scene: Scene) -> Any:
+    """The filter's settings as a scene without any of its own would have them."""
+    from models.effects.kalman_filter import Parameters
+
+    return read(Parameters, {"file": "", "force_deviation": 1.0, "pitch_deviation": 1.0}, "")
+
+
+def _relative(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
+    """A (6, 6) and B (6, 2) of the relative states under the wheel forces, about zero pitch."""
+    p = assembly.parameters
+    pushes = np.zeros((8, 2))
+    pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
+    return RELATIVE @ first_order(linearised(assembly.vehicle))[:, KEPT], RELATIVE @ pushes
+
+
+def first_order_hold(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Over COARSE: transition, and what the input's samples at the start and at the end of the step add."""
+    n, m = b.shape
+    block = np.zeros((n + 2 * m, n + 2 * m))
+    block[:n, :n], block[:n, n : n + m] = a, b
+    block[n : n + m, n + m :] = np.eye(m) / COARSE
+    moved = expm(block * COARSE)
+    late = moved[:n, n + m :]
+    return moved[:n, :n], moved[:n, n : n + m] - late, late
+
+
+def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> np.ndarray:
+    """Errors (n, 12) of estimate and run as ``closed_loop`` orders them, after 2 s: the effect itself, linearised.
+
+    deviation : N, at COARSE. The true vehicle rests, because the interpolation of a moving estimate between its
+    samples would add an error that is no noise.
+    """
+    rest = assemble(build_scene({"title": "kalman", "vehicle": {"geometry": "linear"}, "run": {"duration": 1.0}}))
+    p, start, angle = rest.parameters, rest.initial, at_period(ANGLE, COARSE)
+    count = round(duration / COARSE) + 1
+    loads = np.tile([p.k1 * start[0], p.k2 * start[1]], (count, 1))
+    write_time_series(folder / "wheel_forces.csv", {"front": ("N", loads[:, 0]), "rear": ("N", loads[:, 1])}, COARSE)
+    seen = start[3] + angle * normal(seed, 0, count, 1, source=PITCH_SENSOR)[:, 0]
+    write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, COARSE)
+    own = {"file": "read.csv", "force_deviation": deviation, "pitch_deviation": angle}
+    noise = noise_of(deviation, seed)
+    drawn = driven(folder, duration, noise | {"kalman_filter": own}, geometry="linear")
+    run = free_run(assemble(drawn), duration, COARSE)
+    found = estimate(assemble(driven(folder, duration, noise, geometry="linear")),
+                     Measurement(seen[:, None], COARSE, (PITCH,), (angle,)), deviation)  # fmt: skip
+    errors = np.hstack([found.states[:, :6] - RELATIVE @ start, (run - start) @ RELATIVE.T])
+    return errors[round(2 / COARSE) :]
+
+
+def spread_of_mean_square(step: np.ndarray, covariance: np.ndarray, count: int) -> np.ndarray:
+    """Relative standard deviation of the mean square of each error over ``count`` correlated samples.
+
+    For Gaussian errors: 2/N times the sum over all lags of the squared autocorrelation.
+    """
+    lags, total, carried = min(count, 2000), np.zeros(len(step)), covariance.copy()
+    for lag in range(lags):
+        total += (2.0 if lag else 1.0) * np.square(carried.diagonal() / covariance.diagonal())
+        carried = step @ carried
+    return np.sqrt(2.0 * total / count)
+
+
+def stabilised(folder: Path, duration: float, seed: int, engines: tuple[str, ...],
+               wrong: bool = True) -> dict[str, dict[str, float]]:  # fmt: skip
+    """Damage ratios, shares of the artificial moment and pitch error of the stabilised runs of one noise sample."""
+    true = measured(folder, duration, 1e-3)
+    seen = true["pitch"] + ANGLE * normal(seed, 0, len(true.times), 1, source=PITCH_SENSOR)[:, 0]
+    write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, 1e-3)
+    force = force_deviation(true)
+    own = {"file": "read.csv", "force_deviation": force, "pitch_deviation": ANGLE, "inertia_deviation": INERTIA}
+    scene = driven(folder, duration, noise_of(force, seed) | {"kalman_filter": own}, wrong=wrong)
+    return {engine: _scored(true, simulate(scene, engine)) for engine in engines}
+
+
+INERTIA = 0.05
+"""What the filter is told of the model: its inertia may be 5 % wrong."""
+
+
+def _scored(true: Result, run: Result) -> dict[str, float]:
+    wanted, had = (section_forces(one["f3"], one["f4"], one["pitch"]) for one in (true, run))
+    found = {name: damage_ratio(had[name], wanted[name]) for name in CHANNELS}
+    term = build_scene({"title": "", "run": {"duration": 1.0}}).vehicle_parameters().I * np.gradient(
+        true["pitch_rate"], true.times)  # fmt: skip
+    moments = {"pull": run["kalman_moment"], "all": run["kalman_moment"] + run["inertia_moment"]}
+    low = butter(4, BAND, fs=1 / float(true.times[1]), output="sos")
+    for name, moment in moments.items():
+        found[name] = rms(moment) / rms(term)
+        found[f"{name}, band"] = rms(sosfiltfilt(low, moment)) / rms(sosfiltfilt(low, term))
+    found["pitch"] = float(np.abs(run["pitch"] - true["pitch"]).max())
+    found["inertia"] = float(run["inertia_share"][-1])
+    return found
+
+
+def rms(values: np.ndarray) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
+    """What a gyro alone leaves unknown of the pitch (rad) after a long run, and what the averaged instability says.
+
+    The law: the stationary Riccati equation of pitch'' = lambda^2 pitch + noise with the rate measured. About a
+    vehicle that stands level, A(0), the same gyro leaves a random walk.
+    """
+    import control
+
+    true = measured(folder, duration, COARSE)
+    force, gyro = at_period(force_deviation(true), COARSE), at_period(GYRO, COARSE)
+    assembly = assemble(driven(folder, duration, noise_of(force, seed)))
+    clean = true.states
+    seen = clean[:, 7] + gyro * normal(seed, 0, len(clean), 1, source=PITCH_SENSOR)[:, 0]
+    found = estimate(assembly, Measurement(seen[:, None], COARSE, (RATE,), (gyro,)), force)
+    p, sure = assembly.parameters, np.sqrt(found.errors()[:, PITCH, PITCH])
+    inertia = p.I + p.m1 * p.b**2 + p.m2 * p.a**2
+    growth = rms(true["pitch_rate"]) * np.sqrt(p.I / inertia)
+    push = (force**2 * COARSE * (p.a**2 + p.b**2)) / inertia**2
+    model, see = np.array([[0.0, 1.0], [growth**2, 0.0]]), np.array([[0.0, 1.0]])
+    law = control.care(model.T, see.T, np.diag([0.0, push]), np.array([[gyro**2 * COARSE]]))[0]
+    wrong = found.states[len(clean) // 6 :, PITCH] - clean[len(clean) // 6 :, 3]
+    return {"stated": float(sure[-1]), "law": float(np.sqrt(law[0, 0])), "error": rms(wrong),
+            "walk": float(GYRO * np.sqrt(1e-3 * duration))}  # fmt: skip
+
+
+def with_gaps(folder: Path, duration: float, seed: int, columns: tuple[int, ...], random_gaps: float,
+              outage: tuple[float, float] | None) -> dict[str, float]:  # fmt: skip
+    """A stabilised run on a file with holes: its worst error by the deviation that the filter states, and counts."""
+    true = measured(folder, duration, COARSE)
+    deviations = {PITCH: at_period(ANGLE, COARSE), RATE: at_period(GYRO, COARSE)}
+    clean = free_run(assemble(driven(folder, duration, {})), duration, COARSE)
+    noise = normal(seed, 0, len(clean), 3, source=PITCH_SENSOR)
+    lost = np.abs(noise[:, 2]) < random_gaps
+    if outage is not None:
+        lost[round(outage[0] / COARSE) : round(outage[1] / COARSE)] = True
+    names = {PITCH: ("pitch", "rad", 3, "pitch_deviation"), RATE: ("pitch_rate", "rad/s", 7, "rate_deviation")}
+    table, force = {}, at_period(force_deviation(true), COARSE)
+    own: dict[str, Any] = {"file": "read.csv", "force_deviation": force}
+    for i, column in enumerate(columns):
+        name, unit, state, key = names[column]
+        table[name] = (unit, np.where(lost, np.nan, clean[:, state] + deviations[column] * noise[:, i]))
+        own[key] = deviations[column]
+    write_time_series(folder / "read.csv", table, COARSE)
+    run = simulate(driven(folder, duration, noise_of(force, seed) | {"kalman_filter": own}), "reference")
+    every = round(COARSE / 1e-3)
+    wrong = run["pitch_estimate"][::every] - clean[:, 3]
+    sure = run["pitch_deviation"][::every]
+    return {"error by deviation": float(np.abs(wrong[1:] / sure[1:]).max()), "error": float(np.abs(wrong).max()),
+            "run's error": float(np.abs(run["pitch"][::every] - clean[:, 3]).max()), "deviation": float(sure.max()),
+            "miscounted": float(abs(run["kalman_missed"][-1] - lost.sum() * len(columns))),
+            "missed": float(run["kalman_missed"][-1])}  # fmt: skip
+
