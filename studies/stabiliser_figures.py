@@ -78,7 +78,7 @@ def _verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
     columns = [(row["road"], key) for row in rows if row["method"] == "free" for key in ("verdict", "without truth")]
     places = dict(zip(columns, (0.1, 2.4, 4.9, 7.2), strict=False))
     for (road, key), x in places.items():
-        name = "by damage" if key == "verdict" else "blind"
+        name = "by damage" if key == "verdict" else "without truth"
         axis.text(x, -0.75, f"{ROADS[road][0]},\n{name}", fontsize=8, va="bottom", color=ROADS[road][1])
     for row in rows:
         for key in ("verdict", "without truth"):
