@@ -22,7 +22,7 @@ from models.vehicles.pitch_plane import Parameters
 CUTOFF = 0.2
 """Frequency (Hz) above which a pitch rate counts as fast: 1.3 rad/s, three times the largest growth rate of the study
 roads, for an average over a motion means something only where the error hardly grows meanwhile. Half of it or twice
-as much changes the growth rate of these roads by about 1 %."""
+as much changes the growth rate of these roads by 1 to 3 %."""
 SERIES = 0.1
 """Below this 2 lambda t the sinh law is summed as a series, which loses no digit."""
 MEDIAN = 0.6744897501960817

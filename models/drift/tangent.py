@@ -194,3 +194,30 @@ def tilted(assembly: Assembly) -> np.ndarray:
     cosine = 1.0 if assembly.vehicle.geometry == "linear" else math.cos(pitch)
     shape = np.array([-p.b * cosine, p.a * cosine, 0.0, 1.0])
     return np.array([[*shape, *np.zeros(4)], [*np.zeros(4), *shape]])
+
+
+def tilt_map(path: Path) -> np.ndarray:
+    """How the tilt and its rate at the end of a path follow from those at its start, shape (2, 2).
+
+    The slow error has no damping, so the determinant of the exact map is 1; how far it is from 1 says how much of the
+    fast motion is in the four numbers.
+    """
+    _, columns = path.carry(tilted(path.assembly))
+    return columns[-1][:, [3, 7]].T
+
+
+def measured_growth(path: Path) -> tuple[float, float]:
+    """Growth rate (1/s) of a tilt error along a path, and its uncertainty (1/s), which falls with the length.
+
+    The rate is that of the larger eigenvalue of ``tilt_map``; both on the unit circle is no growth but a swing. Where
+    they meet, at 1, an error of the map moves them by its square root.
+    """
+    found, duration = tilt_map(path), path.forces.period * path.samples
+    off = abs(float(np.linalg.det(found)) - 1.0)
+    return float(np.log(np.abs(np.linalg.eigvals(found)).max())) / duration, math.sqrt(off) / duration
+
+
+def swing(path: Path) -> float:
+    """Frequency (rad/s) of the slow swing of a tilt error along a path; 0 where it grows instead."""
+    half = 0.5 * float(np.trace(tilt_map(path)))
+    return math.acos(half) / (path.forces.period * path.samples) if abs(half) <= 1.0 else 0.0

@@ -1,0 +1,184 @@
+"""When a run drifts off: predicted before it starts, and measured, over roads, speeds, sampling rates and sources.
+
+A run has drifted off when its pitch is 0.05 rad from the true one, that of the road-excited run. Noise is random, so
+its ensemble has paths. The other sources are not: the ensemble of the error between the samples is made of
+neighbouring speeds or of the seeds of an ISO 8608 road, that of a wrong model of random models (each of k3, k4, d3,
+d4 and I times a factor between 0.9 and 1.1, as in Fig. 7 of the paper).
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.assembly import Assembly, assemble
+from models.drift.trust import ANGLE, interpolation_time, model_time, noise_time
+from models.engines.protocol import build, settings_of
+from models.ensemble.paths import noise_paths
+from models.ensemble.runner import run_paths
+from models.ensemble.statistics import quantile
+from models.result import Result
+from models.simulate import simulate
+from models.vehicles.pitch_plane import Parameters
+from validation.rows import Row, System, Table, within
+from validation.scenes import force_scene, road_scene, write_forces
+
+TITLE = "When a force-excited run drifts off, predicted before it starts"
+SYSTEM: System = "drift"
+SEED = 12
+PATHS, QUICK_PATHS = 300, 60
+STEP = 5e-4
+"""Of the runs, s."""
+MODELS = 15
+"""Random models; seven neighbouring roads stand for the error between the samples."""
+SPEEDS = (0.94, 0.96, 0.98, 1.0, 1.02, 1.04, 1.06)
+"""Factors on the speed."""
+
+
+@dataclass(frozen=True)
+class Combination:
+    """source : noise, interpolation or model; road : of the effect; rate : Hz; size : N of the noise."""
+
+    name: str
+    source: str
+    road: dict[str, Any]
+    rate: float
+    duration: float
+    size: float = 0.0
+    interpolation: str = "linear"
+
+
+STUDY = {"source": "study"}
+ISO = {"source": "iso8608", "road_class": "D", "level": "one-sided"}
+COMBINATIONS = (
+    Combination("study 20 m/s", "noise", {**STUDY, "speed": 20.0}, 1000.0, 16.0, 30.7),
+    Combination("study 20 m/s", "noise", {**STUDY, "speed": 20.0}, 200.0, 16.0, 30.7),
+    Combination("study 10 m/s", "noise", {**STUDY, "speed": 10.0}, 500.0, 24.0, 30.0),
+    Combination("study 20 m/s, smoother", "noise", {**STUDY, "speed": 20.0, "gd": 6e-4}, 1000.0, 30.0, 10.0),
+    Combination("study 30 m/s, smoother", "noise", {**STUDY, "speed": 30.0, "gd": 1.2e-3}, 1000.0, 30.0, 3.0),
+    Combination("ISO class D 25 m/s", "noise", {**ISO, "speed": 25.0, "seed": 3}, 500.0, 30.0, 15.0),
+    Combination("study 20 m/s", "interpolation", {**STUDY, "speed": 20.0}, 100.0, 30.0),
+    Combination("study 20 m/s", "interpolation", {**STUDY, "speed": 20.0}, 500.0, 40.0),
+    Combination("study 20 m/s", "interpolation", {**STUDY, "speed": 20.0}, 1000.0, 40.0),
+    Combination("study 15 m/s", "interpolation", {**STUDY, "speed": 15.0}, 200.0, 50.0, interpolation="held"),
+    Combination("ISO class E 20 m/s", "interpolation", {**ISO, "road_class": "E", "speed": 20.0}, 200.0, 40.0),
+    Combination("study 20 m/s", "model", {**STUDY, "speed": 20.0}, 1000.0, 30.0),
+    Combination("study 10 m/s", "model", {**STUDY, "speed": 10.0}, 500.0, 40.0),
+    Combination("ISO class D 25 m/s", "model", {**ISO, "speed": 25.0, "seed": 3}, 1000.0, 40.0),
+)
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """A row per combination."""
+    found = [_combination(one, folder, quick) for one in (COMBINATIONS[:1] if quick else COMBINATIONS)]
+    return [_row(one) for one in found], {"combinations": found}
+
+
+def _combination(one: Combination, folder: Path, quick: bool) -> dict[str, Any]:
+    """Predicted and measured times of all members; a member that never drifts off is infinitely late."""
+    members = {"noise": _noise, "interpolation": _between, "model": _models}[one.source]
+    predicted, measured = members(one, folder, QUICK_PATHS if quick else PATHS)
+    late = [np.inf if time is None else time for time in predicted]
+    median, low, high = quantile(np.array(measured), 0.5)
+    inner = [quantile(np.array(measured), level)[0] for level in (0.25, 0.75)]
+    said = one.source + (f" {one.size:g} N" if one.size else "") + ("" if one.interpolation == "linear" else ", held")
+    return {"name": one.name, "source": said, "rate": one.rate, "predicted": quantile(np.array(late), 0.5)[0],
+            "median": median, "low": low, "high": high, "quartiles": inner, "members": len(measured)}  # fmt: skip
+
+
+def _truth(one: Combination, folder: Path, road: dict[str, Any], step: float = STEP) -> Result:
+    true = simulate(road_scene(step=step, duration=one.duration, road=road), "reference")
+    write_forces(true, folder, 1 / one.rate)
+    return true
+
+
+def _noise(one: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
+    """One prediction, and the drift-off time of every path."""
+    step = 1e-3
+    true = _truth(one, folder, one.road, step)
+    noise = {"force_noise": {"deviation": one.size, "seed": SEED}}
+    scene = force_scene(folder, step=step, duration=one.duration, effects=noise)
+    times = run_paths(noise_paths(scene, np.array([]), true["pitch"], ANGLE), paths)["drift_off"]
+    quiet = assemble(force_scene(folder, step=step, duration=one.duration))
+    return [noise_time(quiet, one.size)], times.tolist()
+
+
+def _between(one: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
+    """Neighbouring speeds, or seeds, each predicted and run."""
+    speed = one.road["speed"]
+    roads = [one.road | ({"seed": i} if one.road["source"] == "iso8608" else {"speed": speed * factor})
+             for i, factor in enumerate(SPEEDS)]  # fmt: skip
+    pairs = [_undisturbed(one, folder, road) for road in roads]
+    return [predicted for predicted, _ in pairs], [measured for _, measured in pairs]
+
+
+def _undisturbed(one: Combination, folder: Path, road: dict[str, Any]) -> tuple[float | None, float]:
+    true = _truth(one, folder, road)
+    assembly = assemble(force_scene(folder, step=STEP, duration=one.duration, interpolation=one.interpolation))
+    return interpolation_time(assembly), _drift_off(assembly, true)
+
+
+def _models(one: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
+    """Random models, each predicted and run from the true start."""
+    true = _truth(one, folder, one.road)
+    assembly = assemble(force_scene(folder, step=STEP, duration=one.duration))
+    others = [_random_model(assembly.parameters, i) for i in range(MODELS)]
+    return ([model_time(assembly, other) for other in others],
+            [_drift_off(replace(assembly, parameters=other), true) for other in others])  # fmt: skip
+
+
+def _random_model(p: Parameters, index: int) -> Parameters:
+    names = ("k3", "k4", "d3", "d4", "I")
+    factors = np.random.Generator(np.random.Philox(key=[SEED, index])).uniform(0.9, 1.1, len(names))
+    return p.model_copy(update={name: getattr(p, name) * f for name, f in zip(names, factors, strict=True)})
+
+
+def _drift_off(assembly: Assembly, true: Result) -> float:
+    """First time (s) at which the run's pitch is ANGLE from the true one; infinite if never."""
+    run = build("reference", assembly, settings_of(assembly.scene, "reference")).run()
+    off = np.abs(run.states[:, 3] - true["pitch"]) > ANGLE
+    return float(run.times[off.argmax()]) if off.any() else np.inf
+
+
+def _row(found: dict[str, Any]) -> Row:
+    key = f"drift_off.{found['source']}.{found['name']}.{found['rate']:g}Hz".replace(" ", "-").replace(",", "")
+    scatter = "{:.1f} to {:.1f} s".format(*found["quartiles"])
+    what = (f"drift-off of {found['name']}, {found['source']}, {found['rate']:g} Hz: median of {found['members']} runs "
+            f"(half of them {scatter}) by the prediction {found['predicted']:.2f} s")
+    why = f"10 % is asked; the median lies in {found['low']:.2f} to {found['high']:.2f} s at 95 %"
+    return within(key, SYSTEM, what, found["median"] / found["predicted"], "", 1.0, 0.1, why, "closed form")
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """All combinations."""
+    rows = tuple(
+        (one["name"], one["source"], f"{one['rate']:g}", f"{one['predicted']:.2f}", f"{one['median']:.2f}",
+         f"{one['low']:.2f} to {one['high']:.2f}", "{:.1f} to {:.1f}".format(*one["quartiles"]), str(one["members"]),
+         f"{one['median'] / one['predicted']:.3f}")
+        for one in data["combinations"]
+    )  # fmt: skip
+    heads = ("road", "source", "rate [Hz]", "predicted [s]", "median [s]", "its 95 % interval [s]", "quartiles [s]",
+             "runs", "by prediction")  # fmt: skip
+    note = f"Drift-off: pitch {ANGLE} rad from the true one. The prediction of an ensemble is its median, too."
+    return [Table("Drift-off, predicted and measured", note, heads, rows)]
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Measured over predicted."""
+    from studies.figures import plt
+
+    figure, axis = plt.subplots(figsize=(5.2, 4.2))
+    ends = [one["predicted"] for one in data["combinations"]]
+    line = np.array([0.9 * min(ends), 1.1 * max(ends)])
+    axis.fill_between(line, 0.9 * line, 1.1 * line, alpha=0.15, color="#222222", linewidth=0, label="within 10 %")
+    for source, colour in (("noise", "#0072b2"), ("interpolation", "#d55e00"), ("model", "#009e73")):
+        own = [one for one in data["combinations"] if one["source"].startswith(source)]
+        if own:
+            middle, quartiles = np.array([one["median"] for one in own]), np.array([one["quartiles"] for one in own]).T
+            axis.errorbar([one["predicted"] for one in own], middle, np.abs(quartiles - middle), fmt="o", color=colour,
+                          label=source, markersize=4, elinewidth=0.8)  # fmt: skip
+    axis.set(xlabel="predicted before the run [s]", ylabel="measured: median and quartiles [s]")
+    axis.legend(loc="upper left")
+    caption = "Time at which the pitch is 0.05 rad off, over roads, speeds, sampling rates and sources of error."
+    return [(caption, figure)]

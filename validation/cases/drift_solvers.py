@@ -1,0 +1,230 @@
+"""What drift depends on and what not: solver and tolerance, interpolation, smoothing, the order of the scheme.
+
+The paper remarks that drift does not depend on the solver, and that smoothing or better schemes only rescale the
+error. Here the error of the interpolation between the samples stands apart from that of the integrator: the first
+one is what the drift of the undisturbed run comes from, and every accurate solver reads the same samples.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.assembly import Assembly, assemble
+from models.damage import damage_ratio
+from models.drift.growth import growth_until, pitch_rate_of_forces, pitch_variance, rigid_pitch
+from models.engines.protocol import Settings, build
+from models.result import Result
+from models.section_forces import section_forces
+from models.signals import Sampled
+from models.simulate import simulate
+from validation.rows import Row, System, Table, finding, within
+from validation.scenes import force_scene, road_scene, write_forces
+
+TITLE = "What drift depends on: samples and noise, not solvers"
+SYSTEM: System = "drift"
+SEED = 14
+ANGLE = 0.05
+RATE, DURATION = 50.0, 16.0
+"""Sampling rate (Hz) of the runs by solver and their length (s): few samples, as adaptive solvers restart at each."""
+SOLVERS = (
+    ("reference", "RK4", 1e-3), ("reference", "RK4", 5e-4),
+    ("reference", "DOP853", 1e-6), ("reference", "DOP853", 1e-9),
+    ("reference", "LSODA", 1e-6), ("reference", "LSODA", 1e-9),
+    ("reference", "Radau", 1e-4), ("reference", "Radau", 1e-6),
+    ("exudyn", "RK44", 1e-3), ("exudyn", "RK44", 5e-4),
+    ("exudyn", "DOPRI5", 1e-5), ("exudyn", "DOPRI5", 1e-7),
+    ("exudyn", "GeneralizedAlpha", 5e-4), ("exudyn", "GeneralizedAlpha", 2.5e-4),
+    ("mujoco", "RK4", 1e-3), ("mujoco", "RK4", 5e-4),
+)
+"""Steps (s) of fixed-step methods, relative tolerances of adaptive ones. LSODA is Adams' and the BDF methods."""
+TIGHT, LOOSE = 0.005, 0.1
+"""Allowed difference of drift-off by that of the first solver; LOOSE is for tolerances of 1e-5 and above, whose own
+error is as large as that of the samples."""
+ADAPTIVE = ("DOP853", "LSODA", "Radau", "DOPRI5")
+NOISE, NOISY_RATE, NOISY = 30.7, 1000.0, 8.0
+"""Noise (N) on the samples at this rate (Hz), and the length (s) of the runs that are smoothed or not."""
+CUTOFFS = (5.0, 15.0, 50.0)
+"""Of the low-pass before the run, Hz."""
+SCHEMES = (("ExplicitEuler", 1, 2.5e-4), ("ExplicitMidpoint", 2, 1e-3), ("RK44", 4, 1e-3))
+"""Methods of Exudyn, their order and step (s)."""
+PATHS = 20
+WINDOW = (4.0, 8.0)
+"""Times (s) between which the growth of the spread is measured: after the start, before the pitch tumbles."""
+SCORED = 5.0
+"""Time (s) up to which section forces are compared, before drift-off."""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Drift-off by solver and by interpolation, growth and bias by smoothing and scheme."""
+    solvers = _solvers(folder, SOLVERS[:1] if quick else SOLVERS)
+    rows = _solver_rows(solvers)
+    if quick:
+        return rows, {"solvers": solvers, "smoothing": []}
+    smoothing = _smoothing(folder)
+    return rows + _smoothing_rows(smoothing), {"solvers": solvers, "smoothing": smoothing}
+
+
+def _truth(folder: Path, duration: float, rate: float) -> Result:
+    true = simulate(road_scene(step=2.5e-4, duration=duration), "reference")
+    write_forces(true, folder, 1 / rate)
+    return true
+
+
+def _solvers(folder: Path, solvers: Any) -> list[dict[str, Any]]:
+    """Drift-off (s) by solver: undisturbed with linear and with smooth samples, and noisy with linear ones.
+
+    Every solver takes the undisturbed linear samples; the others are left to the tighter half of them, and noise to
+    fixed steps.
+    """
+    true = _truth(folder, DURATION, RATE)
+    noise = {"force_noise": {"deviation": NOISE, "seed": SEED}}
+    found = []
+    tight = solvers[1::2]
+    fixed = tuple(one for one in tight if one[1] not in ADAPTIVE)
+    inputs = (("linear", "linear", {}, solvers), ("smooth", "smooth", {}, tight), ("noisy", "linear", noise, fixed))
+    for name, rule, effects, chosen in inputs:
+        scene = force_scene(folder, step=1e-3, duration=DURATION, interpolation=rule, effects=effects)
+        assembly = assemble(scene)
+        found += [{"engine": engine, "method": method, "value": value, "input": name,
+                   **_drift(assembly, engine, method, value, true)} for engine, method, value in chosen]  # fmt: skip
+    return found
+
+
+def _drift(assembly: Assembly, engine: str, method: str, value: float, true: Result) -> dict[str, float]:
+    """Time (s) at which the pitch is off, the run's length if never, and the error then or at the end (rad)."""
+    settings = Settings(method, value, DURATION)
+    if method in ADAPTIVE:
+        settings = Settings(method, 1e-3 if engine == "reference" else 5e-3, DURATION, value)
+    run = build(engine, assembly, settings).run()
+    error = np.abs(run.states[:, 3] - np.interp(run.times, true.times, true["pitch"]))
+    off = error > ANGLE
+    return {"drift-off": float(run.times[off.argmax()]) if off.any() else DURATION, "error": float(error[-1])}
+
+
+def _smoothing(folder: Path) -> list[dict[str, Any]]:
+    """Each way to treat one set of noise files: growth of the pitch's spread, and what the section forces lose."""
+    true = _truth(folder, NOISY, NOISY_RATE)
+    quiet = assemble(force_scene(folder, step=1e-3, duration=NOISY))
+    found = [_treated(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "RK44", 1e-3) for cutoff in CUTOFFS]
+    return found + [_treated(f"not smoothed, order {order}", true, quiet, None, method, step)
+                    for method, order, step in SCHEMES]  # fmt: skip
+
+
+def _treated(name: str, true: Result, quiet: Assembly, cutoff: float | None, method: str,
+             step: float) -> dict[str, Any]:  # fmt: skip
+    forces = quiet.input
+    assert isinstance(forces, Sampled)
+    settings = Settings(method, step, NOISY)
+    clean = _run(quiet, forces.values, cutoff, settings)
+    rows = np.rint(np.array(WINDOW) / step).astype(int)
+    spread = np.zeros(2)
+    for path in range(PATHS):
+        noise = NOISE * _white(path, len(forces.values))
+        spread += (_run(quiet, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]) ** 2
+    spread, law = np.sqrt(spread / PATHS), _law(_low_pass(forces.values, cutoff), quiet)
+    growth, expected = (float(np.log(one[1] / one[0]) / np.diff(WINDOW)[0]) for one in (spread, law))
+    return {"name": name, "law": expected, "growth": growth, "spread": float(spread[1]),
+            **_bias(clean[:: round(1e-3 / step)], true, quiet)}  # fmt: skip
+
+
+def _white(path: int, count: int) -> np.ndarray:
+    from models.noise import normal
+
+    return normal(SEED, path, count, 2)
+
+
+def _run(assembly: Assembly, values: np.ndarray, cutoff: float | None, settings: Settings) -> np.ndarray:
+    """States (n, 8) under these samples (n, 2), smoothed before the run."""
+    forces = Sampled(_low_pass(values, cutoff), 1 / NOISY_RATE, held=False)
+    return build("exudyn", replace(assembly, input=forces), settings).run().states
+
+
+def _low_pass(values: np.ndarray, cutoff: float | None) -> np.ndarray:
+    """Butterworth of order 4, forward and backward: no delay."""
+    if cutoff is None:
+        return values
+    from scipy.signal import butter, sosfiltfilt
+
+    return sosfiltfilt(butter(4, cutoff, fs=NOISY_RATE, output="sos"), values, axis=0)
+
+
+def _bias(states: np.ndarray, true: Result, assembly: Assembly) -> dict[str, float]:
+    """Pseudo-damage of the front section force by the truth's, both components, without any noise, before drift-off."""
+    end, p = round(SCORED * NOISY_RATE), assembly.parameters
+    wanted = section_forces(true["f3"][::4][:end], true["f4"][::4][:end], true["pitch"][::4][:end])
+    y = states[:end]
+    sine, cosine = np.sin(y[:, 3]), np.cos(y[:, 3])
+    f3 = p.k3 * (y[:, 2] - y[:, 0] - p.b * sine) + p.d3 * (y[:, 6] - y[:, 4] - p.b * y[:, 7] * cosine)
+    found = section_forces(f3, f3, y[:, 3])
+    return {f"damage {name}": damage_ratio(found[name], wanted[name]) for name in ("f3x", "f3z")}
+
+
+def _law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
+    """Standard deviation (2,) in rad at WINDOW by the closed law, from the smoothed forces (n, 2) alone."""
+    p, period = assembly.parameters, 1 / NOISY_RATE
+    rates = growth_until(pitch_rate_of_forces(forces, period, p), period, p)
+    at = np.rint(np.array(WINDOW) / period).astype(int)
+    return np.sqrt(pitch_variance(np.array(WINDOW), rates[at], rigid_pitch(p).intensity(NOISE, period)))
+
+
+def _solver_rows(solvers: list[dict[str, Any]]) -> list[Row]:
+    """Who drifts off when."""
+    rows = []
+    for name in ("linear", "noisy"):
+        own = [one for one in solvers if one["input"] == name]
+        first = own[0]["drift-off"]
+        for one in own[1:]:
+            solver = f"{one['engine']} {one['method']} {one['value']:g}"
+            rows.append(within(f"drift_solvers.{name}.{solver.replace(' ', '.')}", SYSTEM, f"drift-off of the {name} "
+                               f"run by that of the first solver ({first:.2f} s), {solver}", one["drift-off"] / first,
+                               "", 1.0, LOOSE if one["value"] >= 1e-5 and one["method"] in ADAPTIVE else TIGHT,
+                               "the samples make the error, so accurate solvers agree; a loose tolerance adds to it",
+                               "native"))  # fmt: skip
+    smooth = [one["error"] for one in solvers if one["input"] == "smooth"]
+    linear = solvers[0]["error"]
+    return [*rows, within("drift_solvers.interpolation", SYSTEM, "largest pitch error at the end by any accurate solver "
+                          "with samples joined by a spline, by that of the reference with straight lines",
+                          max(smooth) / linear, "", 0.0, 0.2, "interpolation is what drifts", "native")]
+
+
+def _smoothing_rows(smoothing: list[dict[str, Any]]) -> list[Row]:
+    """Smoothing and schemes only rescale: the spread follows the law of the forces that are left."""
+    rows = []
+    for one in smoothing:
+        key = one["name"].replace(" ", "-").replace(",", "")
+        rows += [
+            within(f"drift_solvers.growth.{key}", SYSTEM, f"growth of the pitch's spread from {WINDOW[0]:g} to "
+                   f"{WINDOW[1]:g} s, {one['name']}, by the closed law", one["growth"] / one["law"], "", 1.0, 0.1,
+                   f"the same {PATHS} noise files in all; their own chance is 3 %", "closed form"),
+            finding(f"drift_solvers.bias.{key}.f3z", SYSTEM, f"damage of the front section force, body z, "
+                    f"{one['name']}, no noise, by the truth's", one["damage f3z"], "", "1", "what smoothing takes away", "none"),
+            finding(f"drift_solvers.bias.{key}.f3x", SYSTEM, f"the same, body x, {one['name']}", one["damage f3x"], "",
+                    "1", "what smoothing takes away", "none"),
+        ]  # fmt: skip
+    return rows
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Drift-off by solver, and what smoothing and schemes do."""
+    rows = tuple((one["input"], one["engine"], one["method"], f"{one['value']:g}", _when(one), f"{one['error']:.2e}")
+                 for one in data["solvers"])  # fmt: skip
+    note = (f"Study road at 20 m/s, {RATE:g} Hz, {DURATION:g} s. Value: step (s), or relative tolerance of an adaptive "
+            f"solver. Linear and smooth: undisturbed; noisy: {NOISE} N, linear.")  # fmt: skip
+    heads = ("input", "engine", "method", "value", "drift-off [s]", "pitch error at the end [rad]")
+    found = [Table("Drift-off by solver and interpolation", note, heads, rows)]
+    if data["smoothing"]:
+        lines = tuple((one["name"], f"{one['growth']:.3f}", f"{one['law']:.3f}", f"{one['spread']:.4f}",
+                       f"{one['damage f3z']:.3f}", f"{one['damage f3x']:.3f}")
+                      for one in data["smoothing"])  # fmt: skip
+        columns = ("treatment", "growth of the spread [1/s]", "by the law [1/s]", f"spread at {WINDOW[1]:g} s [rad]",
+                   "damage f3z by truth", "damage f3x by truth")  # fmt: skip
+        about = (f"{PATHS} noise files of {NOISE} N at {NOISY_RATE:g} Hz; damage without noise, first {SCORED:g} s, "
+                 "front section force in the chassis' frame.")  # fmt: skip
+        found.append(Table("Smoothing before the run, and schemes", about, columns, lines))
+    return found
+
+
+def _when(one: dict[str, Any]) -> str:
+    return "never" if one["drift-off"] >= DURATION else f"{one['drift-off']:.2f}"
