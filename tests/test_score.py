@@ -9,7 +9,7 @@ from models.damage import damage_ratio, pseudo_damage, turning_points
 from models.drift.score import Errors, Limits, Own, blind_verdict, errors, low_pass, own_figures, rms, verdict
 from models.errors import InputError
 from models.result import Result
-from models.section_forces import CHANNELS
+from models.section_forces import CHANNELS, section_forces
 from models.simulate import simulate
 from validation.scenes import force_scene, road_scene, write_forces
 
@@ -92,6 +92,22 @@ def test_vertical_forces_are_blind_to_a_pitch_of_any_size(place):
     found = errors(turned, truth)
     assert set(found.vertical_damage.values()) == {1.0}
     assert min(found.damage["f3x"], found.damage["f4x"]) > 1e3
+
+
+def test_section_forces_turn_with_the_chassis():
+    """Nose up by 30 degrees: half of a vertical force points forward, and cos 30 of it stays upright."""
+    found = section_forces(np.array([2.0]), np.array([-4.0]), np.array([np.pi / 6]))
+    wanted = {"f3x": 1.0, "f3z": 3**0.5, "f4x": -2.0, "f4z": -2 * 3**0.5}
+    assert {name: float(force[0]) for name, force in found.items()} == pytest.approx(wanted, rel=1e-15)
+
+
+def test_the_upright_component_is_scored_in_the_chassis_frame(place):
+    """Turned by a further radian at every time, f3 cos(pitch) is about cos(1) of what it was: damage by its power 5."""
+    _, truth = place
+    turned = Result(truth.data.copy())
+    turned.data["pitch"] = truth.data["pitch"] + 1.0
+    # pitch of up to 0.07 rad changes cos(1 + pitch) by 11 %, to the power 5 a factor of up to 1.7 for the largest cycles
+    assert 0.54**5 / 2 < errors(turned, truth).damage["f3z"] < 0.54**5 * 2
 
 
 @pytest.mark.parametrize(("own", "wrong", "effects", "word"), [
