@@ -106,7 +106,7 @@ def test_the_upright_component_is_scored_in_the_chassis_frame(place):
     _, truth = place
     turned = Result(truth.data.copy())
     turned.data["pitch"] = truth.data["pitch"] + 1.0
-    # pitch of up to 0.07 rad changes cos(1 + pitch) by 11 %, to the power 5 a factor of up to 1.7 for the largest cycles
+    # pitch of up to 0.07 rad changes cos(1 + pitch) by 11 %, to the power 5 by up to 1.7
     assert 0.54**5 / 2 < errors(turned, truth).damage["f3z"] < 0.54**5 * 2
 
 
