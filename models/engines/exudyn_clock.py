@@ -1,0 +1,50 @@
+"""The input as Exudyn's callbacks read it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from models.engines.catalogue import CATALOGUE
+from models.engines.protocol import Settings
+from models.signals import Signal
+
+
+class Clock:
+    """A signal as Exudyn's callbacks read it: by step, by half step or at any time."""
+
+    def __init__(self, signal: Signal, settings: Settings) -> None:
+        h, n = settings.step, settings.steps
+        self.per_time = 2.0 / h
+        self.step = 0
+        nodes = CATALOGUE["exudyn"][settings.integrator].nodes
+        self.held = signal.held
+        self.table: list[list[float]] = []
+        self.steps: list[list[float]] = []
+        if self.held:
+            self.steps = signal.sample(0.0, h, n).T.tolist()
+        if not self.held and nodes != "any":
+            self.table = signal.sample(0.0, h / 2, 2 * n + 1).T.tolist()
+        self.signal = signal
+        self.latest = (-1.0, np.empty(0))
+
+    def reader(self, column: int, scale: float) -> Callable[[Any, float, float], float]:
+        """Callback (mbs, t, load) -> scale times one channel."""
+        if self.held:
+            values = [scale * value for value in self.steps[column]]
+            return lambda mbs, t, load: values[self.step]
+        if self.table:
+            values, per_time = [scale * value for value in self.table[column]], self.per_time
+            return lambda mbs, t, load: values[round(t * per_time)]
+        return lambda mbs, t, load: scale * self.at(t)[column]
+
+    def at(self, t: float) -> np.ndarray:
+        """All channels at one time; the loads of one stage ask for the same time one after another."""
+        if t != self.latest[0]:
+            self.latest = (t, self.signal.at(t))
+        return self.latest[1]
+
+    def advance(self, mbs: Any, t: float) -> bool:
+        """Before each step: t is its end, so the step is the one before it."""
+        self.step = min(round(t * self.per_time / 2) - 1, len(self.steps[0]) - 1)
+        return True
