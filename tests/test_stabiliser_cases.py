@@ -1,5 +1,7 @@
 """Rows on stabilisers and index reduction pass, and fail where something is wrong."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -17,9 +19,15 @@ def failed(module, tmp_path):
     return {row.id for row in module.measure(True, tmp_path)[0] if row.status == "failed"}
 
 
-def test_all_rows_pass_and_their_ids_are_their_own(tmp_path):
-    for module, name in ((case, "stabilisers"), (index_case, "index_reduction")):
-        rows = module.measure(True, tmp_path)[0]
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """Both quick cases: name -> (rows, data)."""
+    folder = tmp_path_factory.mktemp("cases")
+    return {"stabilisers": case.measure(True, folder), "index_reduction": index_case.measure(True, folder)}
+
+
+def test_all_rows_pass_and_their_ids_are_their_own(measured):
+    for name, (rows, _) in measured.items():
         assert [(row.id, row.reason) for row in rows if row.status == "failed"] == []
         assert len({row.id for row in rows}) == len(rows) and all(row.id.startswith(f"{name}.") for row in rows)
 
@@ -43,12 +51,11 @@ def test_a_force_without_its_sign_fails_its_rows(monkeypatch, tmp_path, module, 
     assert failed(case, tmp_path) == names
 
 
-def test_the_balance_sees_a_force_without_its_sign(monkeypatch, tmp_path):
+def test_the_balance_sees_a_force_without_its_sign(monkeypatch):
     original = exudyn.ExudynModel._enforced
     monkeypatch.setattr(exudyn.ExudynModel, "_enforced", lambda self: original(self) * np.array([-1.0, 1.0]))
-    own = hard.on_rails(mass=0.95)
     with pytest.raises(RunFailed, match="of forces"):
-        hard._guided("exudyn", own)
+        hard._guided("exudyn", hard.on_rails(mass=0.95))
 
 
 def test_a_missing_projection_fails_its_row(monkeypatch, tmp_path):
@@ -71,11 +78,8 @@ def test_the_gap_law_is_the_damped_one():
     assert np.abs(second + 14.0 * rate[1:-1] + 49.0 * g[1:-1]).max() < 1e-6  # differences of 1e-5: rounding 1e-8
 
 
-def test_figure_draws_from_saved_data(tmp_path):
-    import json
-
-    data = json.loads(json.dumps(index_case.measure(True, tmp_path)[1]))
-    ((_, figure),) = index_case.draw(data)
+def test_figure_draws_from_saved_data(measured):
+    ((_, figure),) = index_case.draw(json.loads(json.dumps(measured["index_reduction"][1])))
     figure.canvas.draw()
 
 
