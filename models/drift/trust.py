@@ -21,8 +21,6 @@ ANGLE = 0.05
 """A pitch error (rad) from which on a run is not trusted: 0.05 rad turn 5 % of a vertical force into the x axis."""
 LEAST = 8
 """Samples that a quintic spline needs, with two to spare."""
-TUMBLED = 1.0
-"""Beyond this pitch (rad) a vehicle has turned over, and laws of small errors along its path say nothing."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +34,19 @@ class Growth:
     times: np.ndarray
     rate: float
     until: np.ndarray
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Size of the pitch error (rad) that one source makes, at ``times`` (n,) in s, as long as it is small."""
+
+    times: np.ndarray
+    size: np.ndarray
+
+    def passes(self, angle: float = ANGLE) -> float | None:
+        """First time (s) at which the size exceeds ``angle`` (rad), None if it never does."""
+        beyond = ~(self.size <= angle)  # what is not a number any more has
+        return float(self.times[beyond.argmax()]) if beyond.any() else None
 
 
 def growth(assembly: Assembly) -> Growth:
@@ -56,11 +67,11 @@ def _covering(path: Path) -> np.ndarray:
     return values if len(values) > path.samples else np.vstack([values, values[-1:]])
 
 
-def noise_time(assembly: Assembly, deviation: float, angle: float = ANGLE) -> float | None:
-    """Time (s) by which half of all paths are off, for white samples of ``deviation`` (N); None if not in this run."""
+def noise(assembly: Assembly, deviation: float) -> Curve:
+    """Median size over paths, for white samples of ``deviation`` (N) each."""
     own, period = growth(assembly), path_of(assembly).forces.period
     intensity = rigid_pitch(assembly.parameters).intensity(deviation, period)
-    return _first(own.times, MEDIAN * np.sqrt(pitch_variance(own.times, own.until, intensity)), angle)
+    return Curve(own.times, MEDIAN * np.sqrt(pitch_variance(own.times, own.until, intensity)))
 
 
 def interpolation_error(path: Path) -> np.ndarray:
@@ -79,16 +90,14 @@ def interpolation_error(path: Path) -> np.ndarray:
     return np.stack([read[0] - true[0:-1:2], read[1] - true[1::2], read[2] - true[2::2]], axis=1).reshape(3 * count, 2)
 
 
-def interpolation_time(assembly: Assembly, angle: float = ANGLE, longest: float = STEP) -> float | None:
-    """Time (s) at which the rule between the samples alone leads the pitch off; None if not in this run."""
+def interpolation(assembly: Assembly, longest: float = STEP) -> Curve:
+    """Error of the rule between the samples alone; 0 for a run of too few samples to tell."""
     path = path_of(assembly, longest)
-    if path.samples < LEAST:
-        return None
-    return _carried(path, angle, errors=interpolation_error(path))
+    return _carried(path, interpolation_error(path) if path.samples >= LEAST else None)
 
 
-def model_time(assembly: Assembly, other: Parameters, angle: float = ANGLE, longest: float = STEP) -> float | None:
-    """Time (s) at which the parameters of ``other`` instead of the assembly's lead the pitch off; None if never.
+def model(assembly: Assembly, other: Parameters, longest: float = STEP) -> Curve:
+    """Error of a run with the parameters ``other`` instead of the assembly's.
 
     What drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine alone.
     The difference is carried along a run with the mean of both models, which leaves no error of second order.
@@ -97,28 +106,21 @@ def model_time(assembly: Assembly, other: Parameters, angle: float = ANGLE, long
     change = {name: getattr(other, name) - value for name, value in own.items()}
     mean = Parameters(**{name: value + 0.5 * change[name] for name, value in own.items()})
     shifted = Parameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
-    return _carried(path_of(replace(assembly, parameters=mean), longest), angle, other=shifted)
+    return _carried(path_of(replace(assembly, parameters=mean), longest), other=shifted)
 
 
-def _carried(path: Path, angle: float, errors: np.ndarray | None = None,
-             other: Parameters | None = None) -> float | None:  # fmt: skip
+def _carried(path: Path, errors: np.ndarray | None = None, other: Parameters | None = None) -> Curve:
     pushes = None if errors is None else errors[:, None, :]
     _, columns = path.carry(np.zeros((1, 8)), pushes, other)
-    return _first(path.times, np.abs(columns[:, 0, 3]), angle)
+    return Curve(path.times, np.abs(columns[:, 0, 3]))
 
 
-def rounding_time(assembly: Assembly, angle: float = ANGLE) -> float | None:
-    """Time (s) by which rounding alone has led half of all runs off, each step rounding the pitch rate anew."""
+def rounding(assembly: Assembly) -> Curve:
+    """Median size of what rounding alone does, each step rounding the pitch rate anew: a floor for every solver."""
     own, path = growth(assembly), path_of(assembly)
     rate = pitch_rate_of_forces(_covering(path), path.forces.period, assembly.parameters)
     each = np.finfo(float).eps * float(np.sqrt(np.mean(rate**2))) / math.sqrt(12)
-    return _first(own.times, MEDIAN * np.sqrt(pitch_variance(own.times, own.until, each**2 / path.step)), angle)
-
-
-def _first(times: np.ndarray, size: np.ndarray, angle: float) -> float | None:
-    """First time at which ``size`` exceeds ``angle``; one that is not a number any more has."""
-    beyond = ~(size <= angle)
-    return float(times[beyond.argmax()]) if beyond.any() else None
+    return Curve(own.times, MEDIAN * np.sqrt(pitch_variance(own.times, own.until, each**2 / path.step)))
 
 
 @dataclass(frozen=True)
@@ -152,10 +154,10 @@ def trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
     except ValueError:
         return None
     assert isinstance(forces, Sampled | Smooth)
-    times = {"interpolation between the samples": interpolation_time(assembly, angle)}
-    noise = assembly.scene.effects.get("force_noise")
-    if noise is not None and noise.deviation > 0:
-        named = f"noise of {noise.deviation:g} N at {1 / forces.period:g} Hz"
-        times[named] = noise_time(assembly, noise.deviation, angle)
-    times["rounding"] = rounding_time(assembly, angle)
+    times = {"interpolation between the samples": interpolation(assembly).passes(angle)}
+    added = assembly.scene.effects.get("force_noise")
+    if added is not None and added.deviation > 0:
+        named = f"noise of {added.deviation:g} N at {1 / forces.period:g} Hz"
+        times[named] = noise(assembly, added.deviation).passes(angle)
+    times["rounding"] = rounding(assembly).passes(angle)
     return Trust(times, growth(assembly).rate, angle)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from models.assembly import Assembly, assemble
-from models.drift.trust import ANGLE, interpolation_time, model_time, noise_time
+from models.drift.trust import ANGLE, interpolation, model, noise
 from models.engines.protocol import build, settings_of
 from models.ensemble.paths import noise_paths
 from models.ensemble.runner import run_paths
@@ -97,11 +97,11 @@ def _noise(one: Combination, folder: Path, paths: int) -> tuple[list[float | Non
     """One prediction, and the drift-off time of every path."""
     step = 1e-3
     true = _truth(one, folder, one.road, step)
-    noise = {"force_noise": {"deviation": one.size, "seed": SEED}}
-    scene = force_scene(folder, step=step, duration=one.duration, effects=noise)
+    effects = {"force_noise": {"deviation": one.size, "seed": SEED}}
+    scene = force_scene(folder, step=step, duration=one.duration, effects=effects)
     times = run_paths(noise_paths(scene, np.array([]), true["pitch"], ANGLE), paths)["drift_off"]
     quiet = assemble(force_scene(folder, step=step, duration=one.duration))
-    return [noise_time(quiet, one.size)], times.tolist()
+    return [noise(quiet, one.size).passes()], times.tolist()
 
 
 def _between(one: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
@@ -116,7 +116,7 @@ def _between(one: Combination, folder: Path, paths: int) -> tuple[list[float | N
 def _undisturbed(one: Combination, folder: Path, road: dict[str, Any]) -> tuple[float | None, float]:
     true = _truth(one, folder, road)
     assembly = assemble(force_scene(folder, step=STEP, duration=one.duration, interpolation=one.interpolation))
-    return interpolation_time(assembly), _drift_off(assembly, true)
+    return interpolation(assembly).passes(), _drift_off(assembly, true)
 
 
 def _models(one: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
@@ -124,7 +124,7 @@ def _models(one: Combination, folder: Path, paths: int) -> tuple[list[float | No
     true = _truth(one, folder, one.road)
     assembly = assemble(force_scene(folder, step=STEP, duration=one.duration))
     others = [_random_model(assembly.parameters, i) for i in range(MODELS)]
-    return ([model_time(assembly, other) for other in others],
+    return ([model(assembly, other).passes() for other in others],
             [_drift_off(replace(assembly, parameters=other), true) for other in others])  # fmt: skip
 
 

@@ -184,8 +184,8 @@ def _solver_rows(solvers: list[dict[str, Any]]) -> list[Row]:
                                "native"))  # fmt: skip
     smooth = [one["error"] for one in solvers if one["input"] == "smooth"]
     linear = solvers[0]["error"]
-    return [*rows, within("drift_solvers.interpolation", SYSTEM, "largest pitch error at the end by any accurate solver "
-                          "with samples joined by a spline, by that of the reference with straight lines",
+    return [*rows, within("drift_solvers.interpolation", SYSTEM, "largest pitch error at the end by any accurate "
+                          "solver with samples joined by a spline, by that of the reference with straight lines",
                           max(smooth) / linear, "", 0.0, 0.2, "interpolation is what drifts", "native")]
 
 
@@ -199,7 +199,8 @@ def _smoothing_rows(smoothing: list[dict[str, Any]]) -> list[Row]:
                    f"{WINDOW[1]:g} s, {one['name']}, by the closed law", one["growth"] / one["law"], "", 1.0, 0.1,
                    f"the same {PATHS} noise files in all; their own chance is 3 %", "closed form"),
             finding(f"drift_solvers.bias.{key}.f3z", SYSTEM, f"damage of the front section force, body z, "
-                    f"{one['name']}, no noise, by the truth's", one["damage f3z"], "", "1", "what smoothing takes away", "none"),
+                    f"{one['name']}, no noise, by the truth's", one["damage f3z"], "", "1",
+                    "what smoothing takes away", "none"),
             finding(f"drift_solvers.bias.{key}.f3x", SYSTEM, f"the same, body x, {one['name']}", one["damage f3x"], "",
                     "1", "what smoothing takes away", "none"),
         ]  # fmt: skip

@@ -1,0 +1,227 @@
+"""How long can this force-excited run be trusted, and what would it take for longer?
+
+Each source of error is predicted before any run, from the forces and the vehicle alone, and then measured: noise by
+an ensemble of paths, the error between the samples and that of a wrong inertia by a run each. With a road in its
+scene the forces are a virtual measurement and the true pitch is known; with a file of wheel forces there is no truth,
+and only the noise can be run against the same forces without it.
+"""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.assembly import assemble
+from models.drift.trust import ANGLE, Curve, growth, interpolation, model, noise, rounding
+from models.ensemble.paths import noise_paths
+from models.ensemble.runner import run_paths
+from models.ensemble.statistics import quantile
+from models.errors import InputError
+from models.scene import Scene, build
+from models.simulate import simulate
+from models.strict import Strict, quantity, read
+from studies.virtual_measurement import check_road, follower, measure, stride, write_measurement
+
+Progress = Callable[[str, float], None]
+Row = dict[str, Any]
+SPACING = 0.1
+"""Of the paths' rows in the figure, s."""
+ORDERS = {"held": 2, "linear": 2, "smooth": 4}
+"""Power of the sampling period with which each rule between the samples errs."""
+
+
+class Options(Strict):
+    """[options] of this study."""
+
+    sampling_rate: float | None = quantity("Hz", "rate of the virtual measurement on a road", default=None)
+    noise_fraction: float = quantity("", "standard deviation of the force noise by the largest force", default=0.002)
+    inertia_error: float = quantity("", "share by which the pitch inertia may be wrong", default=0.05)
+    wanted: float = quantity("s", "time for which the run shall be trusted", default=60.0)
+    angle: float = quantity("rad", "pitch error from which on a run is not trusted", default=ANGLE)
+    paths: int = Field(100, ge=20, description="noise paths of the ensemble")
+    seed: int = Field(1, ge=0, lt=2**63, description="seed of the noise")
+
+
+def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Predictions, an ensemble and two runs in the first engine; saves ``table.txt`` and ``error_growth.png``."""
+    check(scene, engines)
+    options = read(Options, scene.options, scene.file, "options")
+    base, truth, largest = _forces(scene, options, folder)
+    deviation = options.noise_fraction * largest
+    assembly = assemble(base)
+    other = assembly.parameters.model_copy(update={"I": assembly.parameters.I * (1 - options.inertia_error)})
+    progress("predictions", 0.1)
+    curves = {"noise": noise(assembly, deviation), "interpolation": interpolation(assembly),
+              "inertia": model(assembly, other), "rounding": rounding(assembly)}  # fmt: skip
+    runs = {}
+    if truth is not None:
+        progress("runs", 0.2)
+        runs["interpolation"] = _error(base, engines[0], truth)
+        runs["inertia"] = _error(_with(base, {"I": other.I}), engines[0], truth)
+    progress("noise paths", 0.4)
+    spread = _ensemble(base, deviation, options, truth, engines[0])
+    rows = _rows(curves, runs, spread, options)
+    table = _text(rows, options, deviation, growth(assembly).rate, base, curves)
+    (folder / "table.txt").write_text("\n".join(table) + "\n")
+    progress("figure", 0.9)
+    _figure(curves, runs, spread, options, folder / "error_growth.png")
+    return {"scene": scene.title, "folder": str(folder), "rows": rows, "failed": {}, "table": table}
+
+
+def check(scene: Scene, engines: tuple[str, ...]) -> None:
+    """Refuse, before anything is written, what is neither a road nor a free run on wheel forces."""
+    options = read(Options, scene.options, scene.file, "options")
+    if "road" in scene.effects:
+        if options.sampling_rate is None:
+            raise InputError(scene.file, "options.sampling_rate", None, "is missing: forces measured on a road need it")
+        check_road(scene, engines, options.sampling_rate)
+        return
+    if set(scene.effects) != {"wheel_forces"}:
+        raise InputError(scene.file, "effects", sorted(scene.effects), "this study takes a road or wheel forces alone, "
+                         "and names noise itself")
+    if options.sampling_rate is not None:
+        raise InputError(scene.file, "options.sampling_rate", options.sampling_rate, "the file of wheel forces has its "
+                         "own: drop this key")
+
+
+def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, np.ndarray | None, float]:
+    """The force-excited scene, the true pitch at its steps where that is known, and the largest force (N)."""
+    if "road" not in scene.effects:
+        return scene, None, float(np.abs(assemble(scene).input.values).max())  # type: ignore[union-attr]
+    assert options.sampling_rate is not None
+    measured = measure(scene)
+    largest = write_measurement(measured, options.sampling_rate, stride(scene, options.sampling_rate), folder)
+    return follower(scene, folder)({}, {}), measured["pitch"], largest
+
+
+def _with(scene: Scene, override: dict[str, float]) -> Scene:
+    table = scene.table()
+    vehicle = table["vehicle"] | {"override": {**table["vehicle"].get("override", {}), **override}}
+    return build({**table, "vehicle": vehicle}, scene.file, Path(scene.folder))
+
+
+def _error(scene: Scene, engine: str, truth: np.ndarray) -> Curve:
+    """Pitch error of a run."""
+    run = simulate(scene, engine)
+    return Curve(run.times, np.abs(run["pitch"] - truth))
+
+
+def _ensemble(base: Scene, deviation: float, options: Options, truth: np.ndarray | None,
+              engine: str) -> dict[str, np.ndarray]:  # fmt: skip
+    """Drift-off times (paths,) and pitch errors (paths, rows) of noise paths; nan from where a path left all bounds."""
+    table = base.table()
+    effects = table["effects"] | {"force_noise": {"deviation": deviation, "seed": options.seed}}
+    scene = build({**table, "effects": effects}, base.file, Path(base.folder))
+    quiet = simulate(base, "reference")
+    true = quiet["pitch"] if truth is None else truth
+    every = max(1, round(SPACING / base.run.step))
+    rows = np.arange(0, len(true), every)
+    found = run_paths(noise_paths(scene, quiet.times[rows], true, options.angle, engine), options.paths)
+    return {"times": quiet.times[rows], "drift_off": found["drift_off"],
+            "errors": np.abs(found["states"][:, :, 3] - true[rows])}  # fmt: skip
+
+
+NAMES = {"noise": "noise on the samples", "interpolation": "interpolation between them", "inertia": "a wrong inertia",
+         "rounding": "rounding"}  # fmt: skip
+
+
+def _rows(curves: dict[str, Curve], runs: dict[str, Curve], spread: dict[str, np.ndarray],
+          options: Options) -> list[Row]:  # fmt: skip
+    """Predicted and measured drift-off (s) by source; None where it lies beyond the run."""
+    rows = []
+    for name, curve in curves.items():
+        row: Row = {"source": name, "predicted": curve.passes(options.angle), "measured": None, "quartiles": None}
+        if name in runs:
+            row["measured"] = runs[name].passes(options.angle)
+        if name == "noise":
+            found = [quantile(spread["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)]
+            row["measured"] = _finite(found[0])
+            row["quartiles"] = [_finite(time) for time in found[1:]]
+        rows.append(row)
+    return rows
+
+
+def _finite(time: float) -> float | None:
+    return time if math.isfinite(time) else None
+
+
+def _text(rows: list[Row], options: Options, deviation: float, rate: float, base: Scene,
+          curves: dict[str, Curve]) -> list[str]:  # fmt: skip
+    """The table as lines of text, and what a longer run would take."""
+    lines = [f"  pitch {options.angle:g} rad off after [s]     predicted   measured",
+             *(f"  {NAMES[row['source']]:<28} {_when(row['predicted']):>14} {_measured(row):>10}" for row in rows)]
+    limits = [row["predicted"] for row in rows if row["predicted"] is not None]
+    until = f"until about {min(limits):.3g} s" if limits else "to its end"
+    lines.append(f"  trusted {until}; a tilt error grows by e in {1 / rate:.2g} s (growth rate {rate:.3g} 1/s)" if rate
+                 else f"  trusted {until}; a tilt error does not grow exponentially")  # fmt: skip
+    return lines + _remedies(options, deviation, rate, base, curves)
+
+
+def _when(time: float | None) -> str:
+    return "beyond the run" if time is None else f"{time:.2f}"
+
+
+def _measured(row: Row) -> str:
+    if row["source"] == "rounding":
+        return "-"
+    if row["quartiles"]:
+        ends = " to ".join(_when(time) for time in row["quartiles"])
+        return f"{_when(row['measured']):>10}   (median; half of all paths {ends})"
+    return _when(row["measured"])
+
+
+def _remedies(options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, Curve]) -> list[str]:
+    """Sampling rate and noise for the wanted time, by the growth rate from the time that is predicted."""
+    forces = assemble(base).input
+    assert forces is not None and forces.period is not None
+    lines = [f"  for {options.wanted:g} s it would take:"]
+    for name in ("noise", "interpolation", "inertia"):
+        excess = _excess(curves[name], options, rate)
+        order = ORDERS[base.effects["wheel_forces"].interpolation]
+        takes = {"noise": f"noise of {deviation / excess:.2g} N instead of {deviation:.3g} N on each sample",
+                 "interpolation": f"samples at {excess ** (1 / order) / forces.period:.3g} Hz instead of "
+                                  f"{1 / forces.period:g} Hz",
+                 "inertia": f"an inertia known to {100 * options.inertia_error / excess:.2g} % instead of "
+                            f"{100 * options.inertia_error:g} %"}  # fmt: skip
+        lines.append(f"    {takes[name]}" if excess > 1 else f"    nothing against {NAMES[name]}")
+    return [*lines, "  or a stabiliser: see the effects prescribed_pitch, pitch_spring, kalman_filter"]
+
+
+def _excess(curve: Curve, options: Options, rate: float) -> float:
+    """Size of an error at the wanted time by the allowed angle, from drift-off or the run's end by the growth rate."""
+    time = curve.passes(options.angle)
+    start = min(options.wanted, curve.times[-1] if time is None else time)
+    size = float(curve.size[: np.searchsorted(curve.times, start) + 1].max())
+    return size / options.angle * math.exp(rate * (options.wanted - start))
+
+
+def _figure(curves: dict[str, Curve], runs: dict[str, Curve], spread: dict[str, np.ndarray], options: Options,
+            path: Path) -> None:  # fmt: skip
+    """Error growth on a logarithmic scale: laws dashed, runs drawn through."""
+    from studies.figures import plt, save
+
+    colours = {"noise": "#0072b2", "interpolation": "#d55e00", "inertia": "#009e73", "rounding": "#888888"}
+    figure, axis = plt.subplots(figsize=(8.0, 4.6))
+    axis.semilogy(spread["times"], spread["errors"][:20].T, color="#0072b2", alpha=0.15, linewidth=0.6)
+    axis.semilogy(spread["times"], np.median(spread["errors"], axis=0), color="#0072b2",
+                  label="noise: median of the paths (20 of them thin)")  # fmt: skip
+    for name, curve in runs.items():
+        axis.semilogy(curve.times[::50], curve.size[::50], color=colours[name], linewidth=0.9, label=f"{name}: run")
+    for name, curve in curves.items():
+        small = np.where(np.maximum.accumulate(curve.size) < 1.0, curve.size, np.nan)  # no law holds for a tumbling run
+        axis.semilogy(curve.times[::50], small[::50], "--", color=colours[name], linewidth=1.5,
+                      label=f"{name}: predicted")  # fmt: skip
+    axis.axhline(options.angle, color="black", linewidth=0.8, label=f"not trusted above {options.angle:g} rad")
+    axis.set(xlabel="time [s]", ylabel="pitch error [rad]", ylim=(1e-12, 10), xlim=(0, curves["noise"].times[-1]),
+             title="Growth of the pitch error of a force-excited run by source, predicted and run")  # fmt: skip
+    figure.legend(loc="outside lower center", ncols=3, fontsize=8.5)
+    save(figure, path)
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("trust")
