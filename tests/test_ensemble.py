@@ -379,3 +379,14 @@ def test_what_cannot_be_resumed_is_refused(args, said, tmp_path, monkeypatch, ca
     monkeypatch.chdir(tmp_path)
     assert twinrig("run", *args) == 2
     assert said in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("seconds", "busy", "said"), [
+    (70.0, 135.0, ("passed", "passed")), (130.0, 250.0, ("failed", "failed")), (400.0, 170.0, ("not run", "passed")),
+    (400.0, 250.0, ("not run", "failed"))])  # fmt: skip
+def test_seconds_are_judged_on_free_cores_and_processor_time_always(seconds, busy, said):
+    from validation.cases.ensemble import _scale_rows
+
+    found = {"path-steps": 6e8, "failed": 0, "seconds": seconds, "busy": busy, "bytes": 7e8}
+    rows = {row.id: row.status for row in _scale_rows(found)}
+    assert (rows["ensemble.scale.seconds"], rows["ensemble.scale.processor"]) == said

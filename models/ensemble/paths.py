@@ -2,7 +2,7 @@
 
 Every effect that has a parameter ``path`` (``force_noise``) gets the number; what comes before the first of them is
 assembled once. A path is then marched by the engine's own adapter, so there is no second copy of the equations, and
-whatever an engine can run can be an ensemble. The reference takes some 200 ns per path and step, 30 of them for the
+whatever an engine can run can be an ensemble. The reference takes some 220 ns per path and step, 30 of them for the
 noise.
 """
 
