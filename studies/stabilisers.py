@@ -20,7 +20,7 @@ from pydantic import Field
 from models.assembly import assemble
 from models.damage import CONVENTION, SLOPE
 from models.drift.growth import holding_stiffness
-from models.drift.score import TUMBLED, Limits, blind_verdict, errors, own_figures, verdict
+from models.drift.score import TUMBLED, Limits, blind_verdict, consistent, errors, own_figures, verdict
 from models.drift.trust import trust
 from models.errors import InputError, RunFailed
 from models.noise import PITCH_SENSOR, normal
@@ -224,7 +224,8 @@ class Bench:
         limits = self.options.limits
         own, wrong = own_figures(run, self.parameters), errors(run, self.truth, self.options.slope)
         with_truth = verdict(own, wrong, effects, limits)
-        alone = blind_verdict(own, effects, float(run.times[-1]), limits, self.trusted)
+        alone = blind_verdict(own, effects, float(run.times[-1]), limits, self.trusted,
+                              consistent(run))
         loads = {f"damage {channel}": wrong.damage[channel] for channel in CHANNELS}
         loads |= {f"error {channel} [N]": wrong.force_rms[channel] for channel in CHANNELS}
         return {

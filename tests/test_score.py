@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 
 from models.damage import damage_ratio, pseudo_damage, turning_points
-from models.drift.score import Errors, Limits, Own, blind_verdict, errors, low_pass, own_figures, rms, verdict
+from models.drift.score import (
+    Errors,
+    Limits,
+    Own,
+    blind_verdict,
+    consistent,
+    errors,
+    low_pass,
+    own_figures,
+    rms,
+    verdict,
+)
 from models.errors import InputError
 from models.result import Result
 from models.section_forces import CHANNELS, section_forces
@@ -141,6 +152,16 @@ def test_verdict_with_the_truth(own, wrong, effects, word):
 ])  # fmt: skip
 def test_verdict_without_the_truth(own, effects, more, word):
     assert blind_verdict(replace(OWN, **own), effects, 10.0, Limits(), **more).word == word
+
+
+@pytest.mark.parametrize(("mean", "expected"), [(1.0, True), (0.97, True), (1.3, False), (0.9, False)])
+def test_a_filter_is_consistent_where_its_surprises_are_its_own(mean, expected, place):
+    """10,000 values: the 99.9 % band of their mean is 1 +- 0.047."""
+    filtered = Result(place[1].data.copy())
+    assert consistent(filtered) is None
+    for name, last in (("kalman_used", 1e4), ("kalman_surprise", mean * 1e4)):
+        filtered.data[name] = ("time", np.linspace(0.0, last, len(filtered.times)))
+    assert consistent(filtered) is expected
 
 
 def test_reasons_name_what_is_wrong():

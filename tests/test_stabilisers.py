@@ -35,6 +35,11 @@ def test_what_knows_the_pitch_is_accepted_on_both_roads_in_both_engines(summary)
             assert (row["verdict"], row["without truth"]) == ("accepted", "accepted")
 
 
+def test_a_filter_that_is_sure_of_a_wrong_model_is_unmasked_without_the_truth(summary):
+    row = of(summary, "Kalman, sure of the model")
+    assert row["without truth"] == "rejected" and "NIS" in row["reason without truth"]
+
+
 def test_springs_and_high_pass_are_wrong_on_the_grade(summary):
     for method in ("spring 300 N m/rad", "300 beyond 0.05 rad", "high-pass 0.1 Hz"):
         row = of(summary, method, "grade")

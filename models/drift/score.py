@@ -34,6 +34,9 @@ MEASURED = ("prescribed_pitch", "prescribed_heave_and_pitch", "kalman_filter")
 LEVEL = ("pitch_spring", "high_pass")
 """Effects that hold it near zero, whatever the road does."""
 
+CONFIDENCE = 0.999
+"""Of the band in which a filter's innovations must lie."""
+
 LEAST, COARSEST = 100, 5e-3
 """Rows and spacing (s) that a balance of moments over each step takes: a quarter of a wave at 50 Hz."""
 
@@ -156,6 +159,21 @@ def verdict(own: Own, found: Errors, effects: Iterable[str], limits: Limits) -> 
         return Verdict("accepted", f"damage ratios within {limits.damage_error:.0%} of 1")
     stabilised = not set(effects).isdisjoint((*MEASURED, *LEVEL))
     return Verdict("rejected" if stabilised else "stabilise", "; ".join(wrong))
+
+
+def consistent(run: Result) -> bool | None:
+    """Whether the Kalman filter of a run was as surprised by its measurement as it expected; None without one.
+
+    The mean normalised innovation squared over the whole run, per measured value, lies in the chi-square band of
+    CONFIDENCE. A filter whose model is wrong in a way that it does not allow for lies far above it.
+    """
+    from scipy.stats import chi2
+
+    if "kalman_surprise" not in run.data:
+        return None
+    count = float(run["kalman_used"][-1])
+    low, high = chi2.ppf([0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], count)
+    return bool(low <= run["kalman_surprise"][-1] <= high)
 
 
 def blind_verdict(own: Own, effects: Iterable[str], duration: float, limits: Limits, trusted: float | None = None,

@@ -36,7 +36,7 @@ COST = "a filter over all samples before the run, about 0.1 ms each; one native 
 Channels = dict[str, tuple[str, str, np.ndarray]]
 """Name -> unit, meaning, values."""
 CHANNELS = ("kalman_moment", "inertia_moment", "pitch_estimate", "pitch_rate_estimate", "pitch_deviation",
-            "pitch_rate_deviation", "inertia_share", "kalman_used", "kalman_missed")  # fmt: skip
+            "pitch_rate_deviation", "inertia_share", "kalman_used", "kalman_missed", "kalman_surprise")  # fmt: skip
 
 
 BANDWIDTH = 3.0
@@ -87,6 +87,7 @@ class Guide:
     values, deviations : (n, 2), estimated pitch and rate (rad, rad/s) and their standard deviations
     inertia : (n,), share by which 1/I is estimated above the model's; lacking : (n,), the moment (N m) to it
     used, missed : (n,), measured values so far
+    surprise : (n,), sum of the normalised innovations squared so far
     """
 
     period: float
@@ -96,6 +97,7 @@ class Guide:
     lacking: np.ndarray
     used: np.ndarray
     missed: np.ndarray
+    surprise: np.ndarray
 
 
 _LATEST: dict[str, Guide] = {}
@@ -121,7 +123,8 @@ def _guide_of(assembly: Assembly, found: "Estimate") -> Guide:
     deviations = np.sqrt(found.errors()[:, [PITCH, RATE], [PITCH, RATE]])
     share = found.states[:, INERTIA]
     return Guide(found.period, found.states[:, [PITCH, RATE]], deviations, share,
-                 share * suspension_moment(assembly, found.states), np.cumsum(found.used), np.cumsum(found.missed))
+                 share * suspension_moment(assembly, found.states), np.cumsum(found.used), np.cumsum(found.missed),
+                 np.nancumsum(found.surprises))
 
 
 def _digest(assembly: Assembly, measured: "Measurement", p: Parameters) -> str:
@@ -181,10 +184,11 @@ def _channels(guide: Guide, stiffness: float, damping: float, assembly: Assembly
               states: np.ndarray) -> Channels:  # fmt: skip
     """The moment and what it follows, at the saved times."""
     grid = guide.period * np.arange(len(guide.values))
-    pitch, rate, pitch_deviation, rate_deviation, inertia, lacking, used, missed = (
+    pitch, rate, pitch_deviation, rate_deviation, inertia, lacking = (
         np.interp(times, grid, column)
-        for column in (*guide.values.T, *guide.deviations.T, guide.inertia, guide.lacking, guide.used, guide.missed)
+        for column in (*guide.values.T, *guide.deviations.T, guide.inertia, guide.lacking)
     )
+    latest = np.clip(np.floor(times / guide.period + 1e-6).astype(int), 0, len(grid) - 1)
     moment = stiffness * (pitch - states[:, 3]) + damping * (rate - states[:, 7])
     return {
         "kalman_moment": ("N m", "artificial moment towards the estimated pitch, nose up", moment),
@@ -194,6 +198,7 @@ def _channels(guide: Guide, stiffness: float, damping: float, assembly: Assembly
         "pitch_deviation": ("rad", "standard deviation of the estimated pitch", pitch_deviation),
         "pitch_rate_deviation": ("rad/s", "standard deviation of its estimated rate", rate_deviation),
         "inertia_share": ("", "share by which 1/I of the chassis is estimated to exceed the scene's", inertia),
-        "kalman_used": ("", "measured values that the filter has taken in so far", np.floor(used)),
-        "kalman_missed": ("", "measured values so far that were no numbers", np.floor(missed)),
+        "kalman_used": ("", "measured values that the filter has taken in so far", guide.used[latest]),
+        "kalman_missed": ("", "measured values so far that were no numbers", guide.missed[latest]),
+        "kalman_surprise": ("", "sum of the normalised innovations squared so far", guide.surprise[latest]),
     }  # fmt: skip
