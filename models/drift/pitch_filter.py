@@ -81,12 +81,14 @@ class _Steps:
 class PitchFilter(ExtendedKalmanFilter):
     """The vehicle over one step after the other; ``x`` (7,), ``P`` (7, 7) as filterpy names them."""
 
-    def __init__(self, step: PitchStep, start: np.ndarray, covariance: np.ndarray, intensity: float) -> None:
+    def __init__(self, step: PitchStep, start: np.ndarray, covariance: np.ndarray, intensity: float,
+                 measured: Measurement) -> None:  # fmt: skip
         """start (7,), covariance (7, 7); intensity: variance (N^2) of a force sample, per step of the filter."""
         super().__init__(dim_x=STATES, dim_z=1)
-        self.step, self.intensity = step, intensity
+        self.step, self.intensity, self.measured = step, intensity, measured
         self.x, self.P = start.copy(), covariance.copy()
         self.late = np.zeros((STATES, 2))
+        self._seen: dict[tuple[int, ...], tuple[list[int], np.ndarray, np.ndarray]] = {}
 
     def predict_x(self, u: Any = 0) -> None:
         """State and Jacobians over step number ``u``.
@@ -99,17 +101,23 @@ class PitchFilter(ExtendedKalmanFilter):
         push = early + self.F @ self.late
         self.Q, self.late = self.intensity * (push @ push.T), late
 
-    def measure(self, values: np.ndarray, columns: tuple[int, ...], variances: np.ndarray) -> tuple[int, float]:
-        """Take in the values that are numbers; returns how many, and the normalised innovation squared."""
-        there = [i for i, value in enumerate(values.tolist()) if math.isfinite(value)]
+    def measure(self, number: int) -> tuple[int, float]:
+        """Take in what is a number in a row of the measurement: how many, and the normalised innovation squared."""
+        values = self.measured.values[number]
+        there = tuple(i for i, value in enumerate(values.tolist()) if math.isfinite(value))
         if not there:
             return 0, math.nan
-        rows = self._I[[columns[i] for i in there]]
+        chosen, rows, own = self._of(there)
         late = rows @ self.late
-        noise = self.intensity * (late @ late.T)
-        noise.flat[:: len(there) + 1] += variances[there]
-        self.update(values[there], lambda x: rows, lambda x: rows @ x, R=noise)
-        return len(there), self.mahalanobis**2
+        self.update(values[chosen], lambda x: rows, rows.dot, R=own + self.intensity * (late @ late.T))
+        return len(there), float(self.y @ self.SI @ self.y)
+
+    def _of(self, there: tuple[int, ...]) -> tuple[list[int], np.ndarray, np.ndarray]:
+        """Measured columns, what each sees of the state (m, 7) and its noise (m, m); few patterns, so they are kept."""
+        if there not in self._seen:
+            rows = self._I[[self.measured.columns[i] for i in there]]
+            self._seen[there] = list(there), rows, np.diag([self.measured.deviations[i] ** 2 for i in there])
+        return self._seen[there]
 
 
 def estimate(assembly: Assembly, measured: Measurement, deviation: float, *, start_deviation: float = 0.0,
@@ -129,14 +137,13 @@ def estimate(assembly: Assembly, measured: Measurement, deviation: float, *, sta
     period = min(assembly.input.period, measured.period)
     step = PitchStep(assembly, period, math.ceil(assembly.scene.run.duration / period - 1e-9))
     start = _start(assembly, start_deviation, inertia_deviation)
-    own = PitchFilter(step, *start, deviation**2 * assembly.input.period / period)
-    found, steps = _march(own, measured)
+    found, steps = _march(PitchFilter(step, *start, deviation**2 * assembly.input.period / period, measured))
     return _smoothed(found, steps) if smoother else found
 
 
-def _march(own: PitchFilter, measured: Measurement) -> tuple[Estimate, _Steps]:
+def _march(own: PitchFilter) -> tuple[Estimate, _Steps]:
     """Predict over each step, take in what was measured at its end, and keep everything."""
-    n, period, variances = own.step.count + 1, own.step.period, np.square(measured.deviations)
+    n, period, measured = own.step.count + 1, own.step.period, own.measured
     every, width = round(measured.period / period), len(measured.columns)
     states, pending, predictions = np.empty((n, 7)), np.empty((n, 7, 2)), np.empty((n, 7))
     covariances, transitions, noises = (np.empty((n, 7, 7)) for _ in range(3))
@@ -148,7 +155,7 @@ def _march(own: PitchFilter, measured: Measurement) -> tuple[Estimate, _Steps]:
             raise RunFailed("kalman filter", "the estimate became infinite or not a number", i * period)
         predictions[i], transitions[i], noises[i] = own.x, own.F, own.Q
         if i % every == 0 and i // every < len(measured.values):
-            used[i], surprises[i] = own.measure(measured.values[i // every], measured.columns, variances)
+            used[i], surprises[i] = own.measure(i // every)
             missed[i] = width - used[i]
         states[i], covariances[i], pending[i] = own.x, own.P, own.late
     pending *= math.sqrt(own.intensity)
