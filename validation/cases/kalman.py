@@ -136,8 +136,8 @@ def _gyro_rows(found: dict[str, float]) -> list[Row]:
         within("kalman.gyro", SYSTEM, f"{words}, by the averaged Riccati equation", found["stated"] / found["law"], "",
                1.0, 0.1, why, "closed form"),
         within("kalman.gyro.error", SYSTEM, "its actual error, rms from 100 s on, by the stated deviation",
-               found["error"] / found["stated"], "", 1.0, 0.4, "some 200 times the error's memory of 1/lambda = 2.5 s: "
-               "12 % at 99.9 % would need four times as long; samples at 200 Hz are linear in between", "closed form"),
+               found["error"] / found["stated"], "", 1.0, 0.2, "the error's slow pole is lambda, so 500 s hold some "
+               "T lambda = 195 independent squares: 3.29 / sqrt(2 195) = 17 %", "closed form"),
         finding("kalman.gyro.level", SYSTEM, "the same about a level vehicle, A(0): a random walk", found["walk"],
                 "rad", found["stated"], "nothing in A(0) shows the pitch", "closed form"),
     ]  # fmt: skip
