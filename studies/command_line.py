@@ -76,9 +76,10 @@ def _first_sentence(module: str) -> str:
 
 
 def _print_list(title: str, entries: dict[str, str]) -> None:
+    width = max(map(len, entries))
     print(title)
     for name, text in entries.items():
-        print(f"  {name:<18} {text}")
+        print(f"  {name:<{width}} {text}")
 
 
 @app.command()

@@ -65,7 +65,8 @@ def test_show_says_what_each_engine_will_compute(capsys):
     assert twinrig("show", "study_road", *SHORT, "--set", "effects.pitch_spring.stiffness=5") == 0
     said = capsys.readouterr().out
     for words in ("Pitch-plane vehicle", "eq. 38", "chassis", "750 kg, 500 kg m^2", "5 N m/rad", "z1 0.0191",
-                  "pitch_rate", "road: height", "absent     contact_points", "f1, f2, f3, f4", "native items"):
+                  "pitch_rate", "road: height", "absent     accelerometers, contact_points",
+                  "f1, f2, f3, f4", "native items"):
         assert words in said
     rows = {line.split()[0]: line.split() for line in said.splitlines()[-3:]}
     assert rows["reference"][1:6] == ["RK4", "4", "0.001", "s", "50"]

@@ -5,17 +5,18 @@ reading is held.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import Field
 
 from models.assembly import Assembly
-from models.engines.protocol import Model, Trajectory
 from models.noise import ACCELEROMETERS, normal
 from models.sensors.sampling import check_rate, numbers, read
-from models.sensors.virtual_accelerometers import on_bracket, readings
 from models.strict import Strict, quantity
+
+if TYPE_CHECKING:
+    from models.engines.protocol import Model, Trajectory
 
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
@@ -69,7 +70,7 @@ class Accelerometers:
 
     parameters: Parameters
 
-    def __call__(self, assembly: Assembly, run: Trajectory, model: Model) -> Channels:
+    def __call__(self, assembly: Assembly, run: "Trajectory", model: "Model") -> Channels:
         """Three channels per sensor: specific force (m/s^2) along the chassis' x, y and z."""
         p, number = self.parameters, numbers(run.times, self.parameters.sampling_rate)
         row = read(run.times, np.arange(len(run.times)), p.sampling_rate, assembly.scene, PLACE)
@@ -80,8 +81,10 @@ class Accelerometers:
             for j, (axis, channel) in enumerate(zip("xyz", channels, strict=True))
         }
 
-    def _felt(self, assembly: Assembly, run: Trajectory, model: Model, rows: np.ndarray) -> np.ndarray:
+    def _felt(self, assembly: Assembly, run: "Trajectory", model: "Model", rows: np.ndarray) -> np.ndarray:
         """Readings (samples, sensors, 3) at the rows of the sensors' instants."""
+        from models.sensors.virtual_accelerometers import on_bracket, readings
+
         p, y = self.parameters, run.states[rows]
         moved = np.array([model.acceleration(run.times[row], run.states[row]) for row in rows])
         places = np.array(list(p.positions().values()))
