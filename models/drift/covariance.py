@@ -41,11 +41,16 @@ def covariance(assembly: Assembly, deviation: float, longest: float = STEP) -> C
     path = path_of(assembly, longest)
     if assembly.scene.effects["wheel_forces"].interpolation == "smooth":
         raise ValueError("the noise of samples that a spline goes through has no recursion: hold it, or take it linear")
+    return Covariance(path.forces.period * np.arange(path.samples + 1), carried(path, deviation))
+
+
+def carried(path: Path, deviation: float) -> np.ndarray:
+    """Covariances (samples + 1, 8, 8) at the samples of a path, of noise of ``deviation`` (N); 0 at its start."""
     matrices = np.zeros((path.samples + 1, 8, 8))
-    march = path.march(_compile_covariance)
-    march(assembly.initial.copy(), path.step, path.per_sample, path.table(path.forces), _weights(path), path.rows,
-          assembly.parameters.array(), deviation**2, matrices)
-    return Covariance(path.forces.period * np.arange(path.samples + 1), matrices)
+    own, march = path.assembly, path.march(_compile_covariance)
+    march(own.initial.copy(), path.step, path.per_sample, path.table(path.forces), _weights(path), path.rows,
+          own.parameters.array(), deviation**2, matrices)  # fmt: skip
+    return matrices
 
 
 def _weights(path: Path) -> np.ndarray:

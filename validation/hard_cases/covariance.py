@@ -1,0 +1,68 @@
+"""Covariance of force noise beside a stiff pole: the recursion along the path, and what van Loan's block form does."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from models.assembly import Assembly
+from models.drift.covariance import carried
+from models.drift.tangent import Path as ErrorPath
+from models.signals import Sampled
+from validation.hard_cases import setups
+from validation.hard_cases.case import Case
+
+PERIOD, SAMPLES, STEP = 0.05, 10, 1e-3
+"""Of the held samples (s), their number, and the step (s): 35 times the decay time of the fastest pole per sample."""
+
+
+def _base(values: np.ndarray) -> Assembly:
+    """The linearised vehicle under its weight and these errors of its forces (n, 2) in N."""
+    base = setups.vehicle(geometry="linear")
+    forces = setups.static_forces(base, SAMPLES, PERIOD)
+    return setups.driven(base, replace(forces, values=forces.values + values))
+
+
+def held_noise(engine: str, folder: Path) -> float:
+    """Every sample of 1 N alone through the engine, squared and summed, against the recursion; relative."""
+    quiet = setups.run(engine, _base(np.zeros((SAMPLES, 2))), STEP, PERIOD * SAMPLES).states[-1]
+    responses = []
+    for sample in range(SAMPLES):
+        for wheel in range(2):
+            values = np.zeros((SAMPLES, 2))
+            values[sample, wheel] = 1.0
+            responses.append(setups.run(engine, _base(values), STEP, PERIOD * SAMPLES).states[-1] - quiet)
+    found, expected = np.array(responses).T @ np.array(responses), _recursion()
+    return setups.largest(found - expected) / setups.largest(expected)
+
+
+def _recursion() -> np.ndarray:
+    assembly = _base(np.zeros((SAMPLES, 2)))
+    assert isinstance(assembly.input, Sampled)
+    return carried(ErrorPath(assembly, assembly.input, round(PERIOD / STEP), SAMPLES), 1.0)[-1]
+
+
+def van_loan_naive(folder: Path) -> str:
+    """The same process noise over one and over twenty periods by filterpy's van Loan discretisation."""
+    from filterpy.common import van_loan_discretization
+
+    from models.engines.stability import first_order, linearised
+
+    base = _base(np.zeros((SAMPLES, 2)))
+    p, linear = base.parameters, linearised(base.vehicle)
+    pushes = np.zeros((8, 2))
+    pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
+    found = []
+    with np.errstate(all="ignore"):
+        for length in (PERIOD, 20 * PERIOD):
+            noise = van_loan_discretization(first_order(linear), pushes, length)[1]
+            found.append(float(np.linalg.eigvalsh(0.5 * (noise + noise.T)).min() / np.abs(noise).max()))
+    return (f"filterpy's van Loan gives a covariance with a negative eigenvalue of {found[0]:.0e} of its size over "
+            f"{PERIOD:g} s and {found[1]:.0e} over {20 * PERIOD:g} s, without a word")
+
+
+CASES = (
+    Case("covariance beside a stiff pole", "noise held over 50 ms, 35 times the decay time of a pole at -697 1/s: a "
+         "block exponential overflows", "each sample alone, squared and summed", "", 1e-9,
+         "the same sum in another order, rounding aside", held_noise, naive=van_loan_naive, against="native"),
+)  # fmt: skip

@@ -1,0 +1,105 @@
+"""Problem B: the pitch-plane vehicle driven by the samples of its wheel forces, before it drifts off.
+
+The forces are a virtual measurement of the study road at 100 Hz, linear between the samples: every solver reads the
+same ones, so the error here is the integrator's alone, and not that of the interpolation, from which such a run
+drifts. Adaptive solvers restart at each sample; what they do is in the case ``drift_solvers``.
+"""
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from models.assembly import Assembly, assemble
+from models.engines.protocol import Model, Settings, Trajectory, build
+from models.signals import Sampled
+from models.simulate import simulate
+from validation.price.problems import Setting
+from validation.price.problems.road_excited import SPEED, scene, setting, settings_of
+
+DURATION, RATE = 2.0, 100.0
+"""Length of the run (s); rate of the samples (Hz), whose period every fixed step divides."""
+PERIOD = 1 / RATE
+FINE = PERIOD / 1280
+"""Step (s) of the reference's own Runge-Kutta march, which meets every sample: its error is that of rounding."""
+
+MS = 1e-3
+_STEPS = (2.5 * MS, 2 * MS, 1.25 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS, 0.0625 * MS)
+FULL: dict[tuple[str, str], tuple[float, ...]] = {
+    ("reference", "RK4"): _STEPS,
+    ("exudyn", "RK44"): _STEPS,
+    ("exudyn", "ExplicitMidpoint"): _STEPS,
+    ("exudyn", "ExplicitEuler"): _STEPS,
+    ("exudyn", "GeneralizedAlpha 0.9"): (10 * MS, *_STEPS),
+    ("exudyn", "GeneralizedAlpha 0.6"): _STEPS,
+    ("exudyn", "TrapezoidalIndex2"): _STEPS,
+    ("mujoco", "RK4"): _STEPS,
+    ("mujoco", "Euler"): _STEPS,
+    ("mujoco", "implicit"): _STEPS,
+    ("mujoco", "implicitfast"): _STEPS,
+    ("mujoco", "discrete"): _STEPS,
+}
+QUICK: dict[tuple[str, str], tuple[float, ...]] = {
+    ("reference", "RK4"): (0.5 * MS, 0.25 * MS, 0.125 * MS),
+    ("exudyn", "ExplicitEuler"): (1 * MS, 0.5 * MS, 0.25 * MS),
+    ("mujoco", "Euler"): (2 * MS, 1 * MS, 0.5 * MS),
+}
+"""The named share of FULL that the quick report takes."""
+
+
+def driven() -> Assembly:
+    """The vehicle cut off the road and driven by what its tyres carried there."""
+    on_road = assemble(scene(DURATION))
+    true = simulate(on_road.scene, "reference", Settings("RK4", PERIOD / 80, DURATION))
+    forces = Sampled(np.column_stack([true["f1"], true["f2"]])[::80], PERIOD, held=False)
+    return replace(on_road.without_tyres().with_input("force", forces))
+
+
+class ForceExcited:
+    """The problem with its reference; see ``validation.price.problems.Problem``."""
+
+    key = "forces"
+    duration = DURATION
+    note = "The forces are those of a virtual measurement at 100 Hz, linear between the samples, the same for all."
+
+    def __init__(self, quick: bool) -> None:
+        steps = [1e3 * one.value for one in self.settings(quick)]
+        self.title = (f"Pitch-plane vehicle driven by its wheel forces, {DURATION:g} s at {SPEED:g} m/s, before "
+                      f"drift-off, fixed steps of {min(steps):g} to {max(steps):g} ms")  # fmt: skip
+        self.units = {"state": "m, rad, m/s, rad/s"}
+        self.tolerances: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+        self.assembly = driven()
+        other = Settings("RK4", 2 * FINE, DURATION) if quick else Settings("DOP853", PERIOD, DURATION, 1e-12)
+        self.reference = f"RK4 at {1e6 * FINE:.2g} us and " + ("twice that" if quick else "DOP853 at 1e-12")
+        self._states = self._rows(Settings("RK4", FINE, DURATION))
+        self.uncertainty = {"state": float(np.abs(self._rows(other) - self._states).max())}
+        self.bound = 10 * float(np.abs(self._states).max())
+
+    def _rows(self, settings: Settings) -> np.ndarray:
+        """States (n, 8) of the paper's equations at the samples."""
+        return build("reference", self.assembly, settings).run().states[:: round(PERIOD / settings.step)]
+
+    def settings(self, quick: bool) -> tuple[Setting, ...]:
+        """FULL, or its named share QUICK."""
+        chosen = QUICK if quick else FULL
+        return tuple(setting(*curve, value) for curve, values in chosen.items() for value in values)
+
+    def setting(self, engine: str, method: str, value: float) -> Setting:
+        """A setting of this problem by its curve and the longest step (s) up to ``value`` that meets every sample."""
+        return setting(engine, method, PERIOD / math.ceil(PERIOD / value * (1 - 1e-9)))
+
+    def build(self, setting: Setting) -> Model:
+        """The vehicle in one engine."""
+        return build(setting.engine, self.assembly, settings_of(setting))
+
+    def errors(self, solution: Trajectory) -> dict[str, float]:
+        """Largest error of any state at the samples, which every fixed step meets."""
+        every = (len(solution.states) - 1) // (len(self._states) - 1)
+        return {"state": float(np.abs(solution.states[::every] - self._states).max())}
+
+
+@cache
+def problem(quick: bool) -> ForceExcited:
+    """The problem, its reference computed once per process."""
+    return ForceExcited(quick)
