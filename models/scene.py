@@ -1,8 +1,6 @@
-"""The user's file: read strictly, before anything is imported that a run would need."""
+"""Scenes of the pitch-plane vehicle."""
 
-import re
-import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
@@ -11,7 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from models.engines.catalogue import CATALOGUE, MISSING, RECOMMENDED
-from models.errors import InputError, similar_file
+from models.errors import InputError
+from models.scene_file import SceneFile, checked, existing, parse
 from models.steps import MOST_STEPS, divides, fitting
 from models.strict import Strict, quantity, read
 from models.vehicles import pitch_plane
@@ -60,10 +59,9 @@ class EngineTable(Strict):
     spectral_radius: float = Field(default=0.6, ge=0, le=1, description="of generalised-alpha at infinite frequency")
 
 
-class Scene(Strict):
-    """One scene file. ``effects`` and ``options`` are checked by the files that own them."""
+class Scene(SceneFile):
+    """One scene file. ``effects`` are checked by the files that own them."""
 
-    title: str = Field(description="what the scene shows")
     system: Literal["pitch-plane"] = "pitch-plane"
     study: str = Field(default="single_run", description="the study that runs the scene")
     vehicle: VehicleTable = VehicleTable()
@@ -71,9 +69,6 @@ class Scene(Strict):
     start: dict[str, float] = Field(default_factory=dict, description="initial states beside the static equilibrium")
     effects: dict[str, Any] = Field(default_factory=dict, description="the effects of the scene, a table each")
     engines: dict[str, EngineTable] = Field(default_factory=dict)
-    options: dict[str, Any] = Field(default_factory=dict, description="options of the study")
-    file: str = Field(default="", exclude=True)
-    folder: str = Field(default=".", exclude=True)
 
     def vehicle_parameters(self) -> pitch_plane.Parameters:
         """The parameter set with the scene's overrides; each is judged under its own file's name."""
@@ -91,10 +86,6 @@ class Scene(Strict):
             "engines": {name: values.model_dump(exclude_unset=True) for name, values in self.engines.items()},
         }
 
-    def path(self, name: str, place: str = "") -> Path:
-        """A file that the scene names at ``place``, relative to the scene's own folder; it must be there."""
-        return _existing(name, Path(self.folder), self.file, place)
-
     def settings(self, engine: str) -> EngineTable:
         """Settings of one engine, with recommended values where the scene says nothing."""
         given = self.engines.get(engine, EngineTable())
@@ -108,23 +99,11 @@ class Scene(Strict):
 def _parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
     """A published set by its name, or the user's own from a TOML file."""
     if name.endswith(".toml"):
-        return read(pitch_plane.Parameters, parse(_existing(name, folder, file, "vehicle.parameters")), name)
+        return read(pitch_plane.Parameters, parse(existing(name, folder, file, "vehicle.parameters")), name)
     if name not in parameter_sets():
         allowed = "must be a TOML file with all parameters, or a published set"
         raise InputError(file, "vehicle.parameters", name, allowed, parameter_sets())
     return import_module(f"models.parameters.{name}").PARAMETERS
-
-
-def _existing(name: str, folder: Path, file: str, place: str) -> Path:
-    path = folder / name
-    try:
-        if path.is_file():
-            return path
-        if path.is_dir():
-            raise InputError(file, place, name, "is a folder: name a file")
-    except OSError:  # such as a name that is too long
-        pass
-    raise InputError(file, place, name, f"no such file, looked for as {str(path)!r}{similar_file(path)}")
 
 
 SMALLEST = 1e-9
@@ -146,49 +125,9 @@ def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
                          "the springs k1 to k4 are too soft for the weight")
 
 
-def parse(path: Path) -> dict[str, Any]:
-    """A TOML file as nested tables; raises InputError where it cannot be read."""
-    try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except FileNotFoundError:
-        raise InputError(path, "", None, f"no such file{similar_file(path)}") from None
-    except OSError as error:
-        raise InputError(path, "", None, f"cannot be read as a file: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise InputError(path, f"byte {error.start}", None, "the file must be text in UTF-8") from None
-    except (ValueError, RecursionError) as error:  # tomllib's own, too long numbers, too deep nesting
-        raise _not_toml(path, error) from None
-
-
-def _not_toml(path: Path, error: Exception) -> InputError:
-    """Message with the line at which reading stopped."""
-    if not isinstance(error, tomllib.TOMLDecodeError):
-        reason = "nested too deeply" if isinstance(error, RecursionError) else "a number has too many digits"
-        return InputError(path, "", None, f"not valid TOML: {reason}")
-    what, line, column = _WHERE.fullmatch(str(error)).groups()  # type: ignore[union-attr]
-    if line is None:
-        return InputError(path, "", None, f"not valid TOML: {what}")
-    text = path.read_bytes().decode("utf-8-sig").splitlines()[int(line) - 1].strip()
-    return InputError(path, f"line {line}, column {column}", text, f"not valid TOML: {what}")
-
-
-_WHERE = re.compile(r"(.*?)(?: \(at line (\d+), column (\d+)\))?", re.DOTALL)
-
-
-def load(path: Path, changes: Iterable[str] = ()) -> Scene:
-    """Read a scene file, with ``--set`` changes of the form KEY.KEY=VALUE applied on top."""
-    table, changes = parse(path), list(changes)
-    for change in changes:
-        _apply(table, change)
-    return build(table, path.name + (" with --set" if changes else ""), path.parent)
-
-
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Scene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
-    for key in ("file", "folder"):
-        if key in table:
-            raise InputError(file, key, table[key], "unknown key", tuple(set(Scene.model_fields) - {"file", "folder"}))
-    scene = read(Scene, {**table, "file": file, "folder": str(folder)}, file)
+    scene = checked(Scene, table, file, folder)
     effects = {name: _effect(name, values, file) for name, values in scene.effects.items()}
     for name in scene.engines:
         _check_engine(name, scene)
@@ -252,25 +191,3 @@ def _check_step(scene: Scene, place: str, step: float) -> None:
     if wanted is not None and not divides(step, wanted):
         allowed = f"must be a multiple of {place} = {step:g} s"
         raise InputError(scene.file, "run.output_step", wanted, allowed)
-
-
-def _apply(table: dict[str, Any], change: str) -> None:
-    """Set one nested key from KEY.KEY=VALUE; the value is read as TOML, or as text if it is not."""
-    key, equals, text = (part.strip() for part in change.partition("="))
-    *parents, last = key.split(".")
-    if not equals or not all((*parents, last)):
-        raise InputError("--set", "", change, "must read KEY=VALUE, for example run.step=5e-4")
-    for i, parent in enumerate(parents):
-        table = table.setdefault(parent, {})
-        if not isinstance(table, dict):
-            raise InputError("--set", key, text, f"{'.'.join(parents[: i + 1])} is a value, not a table of keys")
-    table[last] = _value(text)
-
-
-def _value(text: str) -> Any:
-    """A value as in a scene file; text needs no quotes."""
-    try:
-        found = tomllib.loads(f"x = {text}")
-    except (ValueError, RecursionError):
-        return text
-    return found["x"] if len(found) == 1 else text

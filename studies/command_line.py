@@ -13,7 +13,6 @@ import typer
 from typer.exceptions import TyperException
 
 SCENES = Path(__file__).parent / "scenes"
-ENGINES = ("reference", "exudyn", "mujoco")
 
 app = typer.Typer(
     add_completion=False, pretty_exceptions_enable=False,
@@ -59,7 +58,8 @@ def _end(message: str, code: int) -> NoReturn:
 def list_scenes() -> None:
     """List the scenes that come with twinrig, the effects, the parameter sets and the engines."""
     from models.engines.catalogue import CATALOGUE
-    from models.scene import effect_names, load, parameter_sets
+    from models.scene import effect_names, parameter_sets
+    from models.systems import load
 
     scenes = {path.stem: load(path).title for path in sorted(SCENES.glob("*.toml"))}
     effects = {name: _first_sentence(f"models.effects.{name}") for name in effect_names()}
@@ -85,15 +85,14 @@ def _print_list(title: str, entries: dict[str, str]) -> None:
 @app.command()
 def show(scene: SceneName, changes: Changes = None) -> None:
     """Print what a scene will compute, per engine, without running it."""
-    from models.plan import describe
-
-    print(describe(_load(scene, changes)))
+    loaded = _load(scene, changes)
+    print(_plan(loaded).describe(loaded))
 
 
 @app.command()
 def run(
     scene: SceneName,
-    engine: Annotated[str, typer.Option(help="exudyn, mujoco, reference or all")] = "all",
+    engine: Annotated[str | None, typer.Option(help="exudyn, mujoco, reference or all (which is the default)")] = None,
     out: Out = None,
     resume: Resume = None,
     changes: Changes = None,
@@ -101,7 +100,7 @@ def run(
 ) -> None:
     """Run a scene and save its results and figures."""
     loaded = _load(scene, changes)
-    _finish(loaded, _engines(engine), out, resume, as_json)
+    _finish(loaded, _engines(engine, loaded.system), out, resume, as_json)
 
 
 @app.command()
@@ -121,7 +120,7 @@ def validate(
 def _load(name: str, changes: list[str] | None) -> Any:
     """A scene that comes with twinrig by its name, or a file; a file's name ends in .toml."""
     from models.errors import InputError
-    from models.scene import load
+    from models.systems import load
 
     names = tuple(sorted(path.stem for path in SCENES.glob("*.toml")))
     if name in names:
@@ -131,23 +130,34 @@ def _load(name: str, changes: list[str] | None) -> Any:
     return load(Path(name), changes or ())
 
 
-def _engines(name: str) -> tuple[str, ...]:
-    from models.errors import InputError
+def _plan(scene: Any) -> Any:
+    """The module that describes and checks scenes of this one's system."""
+    from models.systems import SYSTEMS
 
-    if name == "all":
-        return ENGINES
-    if name not in ENGINES:
-        raise InputError("--engine", "", name, "no such engine", (*ENGINES, "all"))
+    return import_module(SYSTEMS[scene.system].plan)
+
+
+def _engines(name: str | None, system: str) -> tuple[str, ...]:
+    """The engines that were asked for; none for a system that no engine computes."""
+    from models.errors import InputError
+    from models.systems import SYSTEMS
+
+    engines = SYSTEMS[system].engines
+    if name is not None and not engines:
+        raise InputError("--engine", "", name, f"has no meaning for {system}, which no engine computes: leave it out")
+    if name is None or name == "all":
+        return engines
+    if name not in engines:
+        raise InputError("--engine", "", name, "no such engine", (*engines, "all"))
     return (name,)
 
 
 def _finish(scene: Any, engines: tuple[str, ...], out: Path | None, resume: Path | None, as_json: bool) -> None:
     """Check everything, then run the scene's study with a progress bar and print its summary."""
-    from models.plan import check
     from studies.folders import drop_if_empty
 
     module = _study(scene)
-    check(scene, engines)
+    _plan(scene).check(scene, engines)
     if hasattr(module, "check"):
         module.check(scene, engines)
     folder = _folder(module, scene, out, resume)
@@ -184,11 +194,16 @@ def _study(scene: Any) -> Any:
     """The study's module, once the scene's options are known to be its own."""
     from models.errors import InputError
     from models.strict import read
+    from models.systems import DEFAULT
 
     names = tuple(sorted(path.stem for path in SCENES.parent.glob("*.py") if path.stem not in NOT_STUDIES))
     if scene.study not in names:
         raise InputError(scene.file, "study", scene.study, "no such study", names)
     module = import_module(f"studies.{scene.study}")
+    own = getattr(module, "SYSTEM", DEFAULT)
+    if own != scene.system:
+        allowed = f"is a study of system {own!r}; this scene's system is {scene.system!r}"
+        raise InputError(scene.file, "study", scene.study, allowed)
     if hasattr(module, "Options"):
         read(module.Options, scene.options, scene.file, "options")
     elif scene.options:

@@ -106,7 +106,7 @@ SCENES = [
     _set("spectral radius elsewhere", "engines.mujoco.spectral_radius=0.5", "spectral_radius", "GeneralizedAlpha"),
     _set("misspelt source", "effects.road.source=stdy", "road.source = 'stdy'", "did you mean 'study'?", scene=ON_ROAD),
     _set("misspelt geometry", "vehicle.geometry=Exat", "vehicle.geometry = 'Exat'", "exact or linear", "mean 'exact'?"),
-    _set("unknown system", "system=tyre", "system = 'tyre'", "must be pitch-plane"),
+    _set("unknown system", "system=tyre", "system = 'tyre'", "no such system"),
     _set("unknown study", "study=single_rn", "study = 'single_rn'", "no such study", "did you mean 'single_run'?"),
     _set("option of a study that takes none", "options.seed=3", "options.seed = 3", "takes no options"),
     _set("negative mass", "vehicle.override.m3=-750", "vehicle.override.m3 = -750.0", "above 0", "in kg"),

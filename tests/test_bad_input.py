@@ -20,7 +20,7 @@ from models.errors import InputError
 from models.plan import check
 from models.road.opencrg import write_opencrg
 from models.road.study import study_road
-from models.scene import load
+from models.systems import SYSTEMS, load
 from models.vehicles.pitch_plane import Parameters
 from studies import command_line
 
@@ -162,7 +162,7 @@ step = 0.0005
 def accepted_or_refused(path, *changes):
     """Read and check a scene as ``run`` does before it runs; an error that is not the user's passes through."""
     try:
-        check(load(path, changes), command_line.ENGINES)
+        check(load(path, changes), SYSTEMS["pitch-plane"].engines)
     except InputError as error:
         assert str(error) and "\n" not in str(error)
 

@@ -16,8 +16,8 @@ from models.effects import pitch_spring
 from models.engines.protocol import build, settings_of
 from models.noise import normal
 from models.plan import describe, trust_line
-from models.scene import load
 from models.simulate import simulate
+from models.systems import load
 from studies.command_line import SCENES
 from studies.trust import run as run_study
 from validation.scenes import VEHICLES, force_scene, road_scene, write_forces

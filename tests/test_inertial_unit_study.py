@@ -7,11 +7,12 @@ import pytest
 
 from models.damage import pseudo_damage
 from models.errors import InputError
-from models.scene import build, load
+from models.scene import build
 from models.section_forces import CHANNELS, section_forces
 from models.sensors.gyro import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR
 from models.simulate import simulate
 from models.strict import read
+from models.systems import load
 from studies import inertial_unit as study
 from studies.command_line import SCENES
 

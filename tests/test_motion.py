@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.errors import InputError
-from models.scene import load
+from models.systems import load
 from studies.command_line import SCENES
 from studies.motion import run
 

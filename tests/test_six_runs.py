@@ -3,7 +3,7 @@
 import pytest
 
 from models.errors import InputError
-from models.scene import load
+from models.systems import load
 from studies.command_line import SCENES
 from studies.six_runs import run
 

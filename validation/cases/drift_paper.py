@@ -4,7 +4,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from models.scene import load
+from models.systems import load
 from studies.six_runs import run
 from validation.rows import Row, System, Table, finding, within
 

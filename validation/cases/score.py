@@ -10,10 +10,11 @@ from models.damage import SLOPE, pseudo_damage
 from models.drift.score import errors
 from models.noise import normal
 from models.result import Result
-from models.scene import build, load
+from models.scene import build
 from models.section_forces import CHANNELS
 from models.simulate import simulate
 from models.strict import read
+from models.systems import load
 from studies.stabilisers import Bench, Options, run
 from validation.hard_cases.case import IMPLEMENTATIONS
 from validation.rows import Row, System, Table, at_most, behaves, finding, within

@@ -1,0 +1,114 @@
+"""A scene file of any system: a TOML table read strictly, before anything is imported that a run would need."""
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import Field
+
+from models.errors import InputError, similar_file
+from models.strict import Strict, read
+
+
+class SceneFile(Strict):
+    """What the scenes of all systems have in common; ``options`` is checked by the study that owns it."""
+
+    title: str = Field(description="what the scene shows")
+    system: str
+    study: str = Field(description="the study that runs the scene")
+    options: dict[str, Any] = Field(default_factory=dict, description="options of the study")
+    file: str = Field(default="", exclude=True)
+    folder: str = Field(default=".", exclude=True)
+
+    def table(self) -> dict[str, Any]:
+        """The scene as nested tables of plain values, defaults included: enough to run it again."""
+        return self.model_dump(exclude_none=True)
+
+    def path(self, name: str, place: str = "") -> Path:
+        """A file that the scene names at ``place``, relative to the scene's own folder; it must be there."""
+        return existing(name, Path(self.folder), self.file, place)
+
+
+Model = TypeVar("Model", bound=SceneFile)
+
+
+def checked(model: type[Model], table: Mapping[str, Any], file: str, folder: Path) -> Model:
+    """The scene of one system from nested tables; raises InputError for anything that is not understood."""
+    for key in ("file", "folder"):
+        if key in table:
+            raise InputError(file, key, table[key], "unknown key", tuple(set(model.model_fields) - {"file", "folder"}))
+    return read(model, {**table, "file": file, "folder": str(folder)}, file)
+
+
+def existing(name: str, folder: Path, file: str, place: str) -> Path:
+    """The file ``name`` within ``folder``; raises InputError that names the place of the scene that wanted it."""
+    path = folder / name
+    try:
+        if path.is_file():
+            return path
+        if path.is_dir():
+            raise InputError(file, place, name, "is a folder: name a file")
+    except OSError:  # such as a name that is too long
+        pass
+    raise InputError(file, place, name, f"no such file, looked for as {str(path)!r}{similar_file(path)}")
+
+
+def changed(path: Path, changes: Iterable[str]) -> dict[str, Any]:
+    """A TOML file as nested tables, with changes of the form KEY.KEY=VALUE applied on top."""
+    table = parse(path)
+    for change in changes:
+        _apply(table, change)
+    return table
+
+
+def parse(path: Path) -> dict[str, Any]:
+    """A TOML file as nested tables; raises InputError where it cannot be read."""
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except FileNotFoundError:
+        raise InputError(path, "", None, f"no such file{similar_file(path)}") from None
+    except OSError as error:
+        raise InputError(path, "", None, f"cannot be read as a file: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(path, f"byte {error.start}", None, "the file must be text in UTF-8") from None
+    except (ValueError, RecursionError) as error:  # tomllib's own, too long numbers, too deep nesting
+        raise _not_toml(path, error) from None
+
+
+def _not_toml(path: Path, error: Exception) -> InputError:
+    """Message with the line at which reading stopped."""
+    if not isinstance(error, tomllib.TOMLDecodeError):
+        reason = "nested too deeply" if isinstance(error, RecursionError) else "a number has too many digits"
+        return InputError(path, "", None, f"not valid TOML: {reason}")
+    what, line, column = _WHERE.fullmatch(str(error)).groups()  # type: ignore[union-attr]
+    if line is None:
+        return InputError(path, "", None, f"not valid TOML: {what}")
+    text = path.read_bytes().decode("utf-8-sig").splitlines()[int(line) - 1].strip()
+    return InputError(path, f"line {line}, column {column}", text, f"not valid TOML: {what}")
+
+
+_WHERE = re.compile(r"(.*?)(?: \(at line (\d+), column (\d+)\))?", re.DOTALL)
+
+
+def _apply(table: dict[str, Any], change: str) -> None:
+    """Set one nested key from KEY.KEY=VALUE; the value is read as TOML, or as text if it is not."""
+    key, equals, text = (part.strip() for part in change.partition("="))
+    *parents, last = key.split(".")
+    if not equals or not all((*parents, last)):
+        raise InputError("--set", "", change, "must read KEY=VALUE, for example run.step=5e-4")
+    for i, parent in enumerate(parents):
+        table = table.setdefault(parent, {})
+        if not isinstance(table, dict):
+            raise InputError("--set", key, text, f"{'.'.join(parents[: i + 1])} is a value, not a table of keys")
+    table[last] = _value(text)
+
+
+def _value(text: str) -> Any:
+    """A value as in a scene file; text needs no quotes."""
+    try:
+        found = tomllib.loads(f"x = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return found["x"] if len(found) == 1 else text
