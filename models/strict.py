@@ -38,10 +38,10 @@ def read(model: type[Model], values: Mapping[str, Any], file: object, place: str
     try:
         return model.model_validate(dict(values))
     except ValidationError as error:
-        raise _message(error, model, file, place) from None
+        raise message(error, model, file, place) from None
 
 
-def _message(error: ValidationError, model: type[BaseModel], file: object, place: str) -> InputError:
+def message(error: ValidationError, model: type[BaseModel], file: object, place: str) -> InputError:
     """One message for all that was found."""
     first, *others = sorted(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
     keys = _keys(first)

@@ -1,0 +1,156 @@
+"""Hertz: two smooth convex bodies pressed together without friction touch on an ellipse.
+
+Source: Johnson, Contact Mechanics (1985), section 4.2. With the short semi-axis s, the long one l, g = s/l and
+e^2 = 1 - g^2, the complete elliptic integrals
+
+    B = int cos^2 / sqrt(1 - e^2 sin^2) = (E - g^2 K) / e^2,    D = int sin^2 / sqrt(1 - e^2 sin^2) = (K - E) / e^2
+
+(0 to pi/2) give the curvature along the short axis p0 B / (E* s), the one along the long axis g^2 D / B times as
+large, and the approach p0 s (B + D) / E*. The same in K and E loses all digits towards the circle; B and D are
+computed here as sums of positive terms (Bulirsch, Numerische Mathematik 7 (1965) 78, his cel2), and lose none.
+
+The theory holds for contact that is small against the radii of both bodies, and for elastic material: that the
+pressure stays below three times the yield stress in shear is for the user to see.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from models.contact.inputs import Array, quantity, together
+from models.contact.material import Pair
+from models.errors import InputError
+
+FLATTEST = 0.01
+"""The larger curvature (1/m) of real bodies is not below this, a radius of 50 m: one in 1/mm usually is."""
+LARGEST_LOAD = 1e10
+"""N"""
+LARGEST_APPROACH = 0.05
+"""m: beyond it no contact is small against its body; an approach in mm often is."""
+
+
+@dataclass(frozen=True)
+class Hertz:
+    """The contact of two bodies; every field has the common shape of what was given.
+
+    Where nothing touches, axes, pressure, approach and load are exactly zero.
+
+    a, b : semi-axes along x and y (m); p0 : largest pressure (Pa), 3/2 of the mean; approach : of distant points (m);
+    load : N; A, B : curvatures of the undeformed distance A x^2 + B y^2 (1/m).
+    """
+
+    a: Array
+    b: Array
+    p0: Array
+    approach: Array
+    load: Array
+    A: Array
+    B: Array
+
+
+def by_load(A: Any, B: Any, load: Any, pair: Pair) -> Hertz:
+    """Contact under a given load.
+
+    A, B : curvatures (1/m), above 0; load : N, compression positive; arrays of any shapes that broadcast. A load of
+    zero or less makes no contact. Raises InputError for a curvature that is not above zero, a number that is not
+    finite, magnitudes that are none in SI, or shapes that do not fit together.
+    """
+    load = quantity("load", load, f"a load in N, at most {LARGEST_LOAD:g}", most=LARGEST_LOAD)
+    A, B, load = together(**_curvatures(A, B), load=np.maximum(load, 0.0))
+    ratio, cosine, sine = aspects(np.minimum(A, B) / np.maximum(A, B))
+    area = 1.5 * load * cosine / (math.pi * pair.modulus * np.maximum(A, B))  # l s^2
+    return _contact(A, B, load, np.cbrt(area * ratio), ratio, cosine + sine, pair)
+
+
+def by_approach(A: Any, B: Any, approach: Any, pair: Pair) -> Hertz:
+    """Contact of bodies brought nearer to each other by ``approach`` (m) from first touch; zero or less is a gap.
+
+    Otherwise as ``by_load``.
+    """
+    allowed = f"an approach in m, at most {LARGEST_APPROACH:g}"
+    approach = np.maximum(quantity("approach", approach, allowed, most=LARGEST_APPROACH), 0.0)
+    A, B, approach = together(**_curvatures(A, B), approach=approach)
+    ratio, cosine, sine = aspects(np.minimum(A, B) / np.maximum(A, B))
+    short = np.sqrt(approach * cosine / (np.maximum(A, B) * (cosine + sine)))
+    load = 2.0 / 3.0 * math.pi * pair.modulus * approach * short / (ratio * (cosine + sine))
+    return _contact(A, B, load, short, ratio, cosine + sine, pair)
+
+
+def _curvatures(A: Any, B: Any) -> dict[str, Array]:
+    """Both curvatures as arrays; raises InputError where they are none of a Hertzian contact."""
+    found = {name: quantity(name, value, "a curvature in 1/m, at most 1e12", most=1e12)
+             for name, value in (("A", A), ("B", B))}  # fmt: skip
+    for name, value in found.items():
+        if (value <= 0.0).any():
+            raise InputError("", name, float(value.min()), "must be above 0: bodies that are flat to each other in one "
+                             "direction, conform or interpenetrate do not touch on an ellipse; compute them as "
+                             "non-Hertzian contact")  # fmt: skip
+    A, B = together(**found)
+    flattest = float(np.maximum(A, B).min(initial=np.inf))
+    if flattest < FLATTEST:
+        raise InputError("", "A, B", flattest, f"the larger of both must be {FLATTEST:g} 1/m or more; radii are in m, "
+                         "not in mm")  # fmt: skip
+    return found
+
+
+def _contact(A: Array, B: Array, load: Array, short: Array, ratio: Array, whole: Array, pair: Pair) -> Hertz:
+    """The contact from its short axis; ``whole`` is K = B + D. Where it is zero, so is everything."""
+    long = short / ratio
+    area = math.pi * short * long
+    p0 = np.divide(1.5 * load, area, out=np.zeros_like(area), where=area > 0.0)
+    along = A <= B  # the long axis lies along the smaller curvature
+    a, b = np.where(along, long, short), np.where(along, short, long)
+    fields = (a, b, p0, p0 * short * whole / pair.modulus, load, A, B)
+    return Hertz(*(field[()] for field in fields))  # numbers from numbers
+
+
+def aspects(curvatures: Array) -> tuple[Array, Array, Array]:
+    """``aspect`` of each ratio of curvatures, of any shape: three arrays of that shape."""
+    found = _aspects(np.ascontiguousarray(curvatures).ravel()).reshape(3, *curvatures.shape)
+    return found[0], found[1], found[2]
+
+
+@njit(cache=True)
+def _aspects(curvatures: Array) -> Array:
+    found = np.empty((3, curvatures.size))
+    for i in range(curvatures.size):
+        found[:, i] = aspect(curvatures[i])
+    return found
+
+
+@njit(cache=True)
+def aspect(curvatures: float) -> tuple[float, float, float]:
+    """Ratio g of the short axis to the long one, and the integrals B and D there.
+
+    curvatures : the smaller by the larger, above 0 and up to 1. Newton's method for ln(g^2 D / B) as a function of
+    ln g, whose slope 1 + C (1/D + g^2/B), C = (D - B)/e^2, stays between 1.5 and 2.
+    """
+    g = curvatures ** (2.0 / 3.0)
+    for _ in range(50):
+        cosine, sine = integrals(g)
+        e2 = (1.0 - g) * (1.0 + g)
+        third = (sine - cosine) / e2 if e2 > 1e-4 else math.pi / 16.0
+        slope = 1.0 + third * (1.0 / sine + g * g / cosine)
+        step = math.log(g * g * sine / cosine / curvatures) / slope
+        g = min(g * math.exp(-step), 1.0)
+        if abs(step) < 1e-9:  # the next step would be the square of this
+            break
+    return (g, *integrals(g))
+
+
+@njit(cache=True)
+def integrals(g: float) -> tuple[float, float]:
+    """B and D of the module's head at g = sqrt(1 - e^2), above 0 and up to 1, to rounding."""
+    other, mean = g, 1.0
+    a_b, b_b, a_d, b_d = 1.0, 0.0, 0.0, 1.0  # the integrands as (a cos^2 + b sin^2) / sqrt(...)
+    while True:
+        a_b, b_b = a_b + b_b / mean, 2.0 * (b_b + a_b * other)
+        a_d, b_d = a_d + b_d / mean, 2.0 * (b_d + a_d * other)
+        before, mean = mean, mean + other
+        if abs(before - other) <= 1e-8 * before:  # the error is the square of this
+            scale = math.pi / (4.0 * mean)
+            return scale * (a_b + b_b / mean), scale * (a_d + b_d / mean)
+        other = 2.0 * math.sqrt(before * other)

@@ -1,0 +1,96 @@
+"""Elastic constants of the two bodies, and what a pair of them is to the theory of contact.
+
+A pair is treated as two bodies of one material with combined constants (Kalker, Three-Dimensional Elastic Bodies in
+Rolling Contact, 1990, section 1.7). That is exact for frictionless pressure. With friction it is exact for
+quasi-identical bodies alone, those with Kalker's K = 0; otherwise it leaves out the surface strain 2 K p / G by which
+the two bodies differ under a pressure p, a slip that nobody prescribed.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from pydantic import Field, ValidationError
+
+from models.errors import InputError
+from models.strict import Strict, message
+
+LARGEST_MISMATCH = 0.01
+"""Friction between a pair beyond this |K| is refused: at mu = 0.3 its forces would be off by 7 % of mu N."""
+
+
+class Material(Strict):
+    """An isotropic elastic body, ``Material(E=2.1e11, nu=0.28)``; raises InputError for constants of none."""
+
+    E: float = Field(ge=1e6, le=1e13, description="Young's modulus, not in MPa", json_schema_extra={"unit": "Pa"})
+    nu: float = Field(ge=0.0, le=0.5, description="Poisson's ratio")
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise message(error, type(self), "", "material") from None
+
+    @property
+    def G(self) -> float:
+        """Shear modulus E / (2 (1 + nu)) in Pa."""
+        return self.E / (2.0 * (1.0 + self.nu))
+
+
+STEEL = Material(E=2.1e11, nu=0.28)
+"""Steel of wheel and rail as the Manchester contact benchmark has it, G = 82 GPa."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two bodies in touch, ``one`` the wheel and ``two`` the rail; constants of a pair of equals are their own.
+
+    ``G`` and ``nu`` serve tangential contact: they raise InputError for a pair too unlike (see LARGEST_MISMATCH).
+    """
+
+    one: Material = STEEL
+    two: Material = STEEL
+
+    @cached_property
+    def modulus(self) -> float:
+        """E* in Pa of normal contact: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2, which is (1 - nu)/G."""
+        return 1.0 / ((1.0 - self.one.nu**2) / self.one.E + (1.0 - self.two.nu**2) / self.two.E)
+
+    @cached_property
+    def mismatch(self) -> float:
+        """Kalker's K = G/4 ((1 - 2 nu1)/G1 - (1 - 2 nu2)/G2), zero for equal or two incompressible bodies.
+
+        Dundurs' second constant is K / (1 - nu).
+        """
+        one, two = self.one, self.two
+        return self._shear / 4.0 * ((1.0 - 2.0 * one.nu) / one.G - (1.0 - 2.0 * two.nu) / two.G)
+
+    @cached_property
+    def G(self) -> float:
+        """Combined shear modulus in Pa: 1/G = (1/G1 + 1/G2) / 2."""
+        self._require_likeness()
+        return self._shear
+
+    @cached_property
+    def nu(self) -> float:
+        """Combined Poisson's ratio: nu/G = (nu1/G1 + nu2/G2) / 2."""
+        self._require_likeness()
+        return self._shear * (self.one.nu / self.one.G + self.two.nu / self.two.G) / 2.0
+
+    def quasi_identity_error(self, friction: float) -> float:
+        """Force, as a share of mu N, that leaving K out may cost at this coefficient of friction: 2 |K| / mu.
+
+        The mean of the strain 2 K p / G over the patch is a creepage of K N / (pi a b G) on a circle and up to twice
+        that on a band, which the linear theory answers with G a b C11 times as much: 1.3 to 2 times K N.
+        """
+        return 2.0 * abs(self.mismatch) / friction
+
+    @property
+    def _shear(self) -> float:
+        return 2.0 / (1.0 / self.one.G + 1.0 / self.two.G)
+
+    def _require_likeness(self) -> None:
+        if abs(self.mismatch) > LARGEST_MISMATCH:
+            raise InputError("", "pair", None, f"these materials are too unlike for contact with friction: Kalker's "
+                             f"K = {self.mismatch:.3g} must be within +-{LARGEST_MISMATCH:g}, or the pressure makes "
+                             "slip of its own; normal contact takes any pair")  # fmt: skip
