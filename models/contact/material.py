@@ -16,7 +16,7 @@ from models.errors import InputError
 from models.strict import Strict, message
 
 LARGEST_MISMATCH = 0.01
-"""Friction between a pair beyond this |K| is refused: at mu = 0.3 its forces would be off by 7 % of mu N."""
+"""Theories that leave K out refuse a pair beyond this |K|: at mu = 0.3 the forces would be off by 7 % of mu N."""
 
 
 class Material(Strict):
@@ -43,10 +43,7 @@ STEEL = Material(E=2.1e11, nu=0.28)
 
 @dataclass(frozen=True)
 class Pair:
-    """Two bodies in touch, ``one`` the wheel and ``two`` the rail; constants of a pair of equals are their own.
-
-    ``G`` and ``nu`` serve tangential contact: they raise InputError for a pair too unlike (see LARGEST_MISMATCH).
-    """
+    """Two bodies in touch, ``one`` the wheel and ``two`` the rail; constants of a pair of equals are their own."""
 
     one: Material = STEEL
     two: Material = STEEL
@@ -57,25 +54,23 @@ class Pair:
         return 1.0 / ((1.0 - self.one.nu**2) / self.one.E + (1.0 - self.two.nu**2) / self.two.E)
 
     @cached_property
-    def mismatch(self) -> float:
-        """Kalker's K = G/4 ((1 - 2 nu1)/G1 - (1 - 2 nu2)/G2), zero for equal or two incompressible bodies.
-
-        Dundurs' second constant is K / (1 - nu).
-        """
-        one, two = self.one, self.two
-        return self._shear / 4.0 * ((1.0 - 2.0 * one.nu) / one.G - (1.0 - 2.0 * two.nu) / two.G)
-
-    @cached_property
     def G(self) -> float:
         """Combined shear modulus in Pa: 1/G = (1/G1 + 1/G2) / 2."""
-        self._require_likeness()
-        return self._shear
+        return 2.0 / (1.0 / self.one.G + 1.0 / self.two.G)
 
     @cached_property
     def nu(self) -> float:
         """Combined Poisson's ratio: nu/G = (nu1/G1 + nu2/G2) / 2."""
-        self._require_likeness()
-        return self._shear * (self.one.nu / self.one.G + self.two.nu / self.two.G) / 2.0
+        return self.G * (self.one.nu / self.one.G + self.two.nu / self.two.G) / 2.0
+
+    @cached_property
+    def mismatch(self) -> float:
+        """Kalker's K = G/4 ((1 - 2 nu1)/G1 - (1 - 2 nu2)/G2), zero for equal bodies and for two incompressible ones.
+
+        Dundurs' second constant is K / (1 - nu).
+        """
+        one, two = self.one, self.two
+        return self.G / 4.0 * ((1.0 - 2.0 * one.nu) / one.G - (1.0 - 2.0 * two.nu) / two.G)
 
     def quasi_identity_error(self, friction: float) -> float:
         """Force, as a share of mu N, that leaving K out may cost at this coefficient of friction: 2 |K| / mu.
@@ -85,12 +80,9 @@ class Pair:
         """
         return 2.0 * abs(self.mismatch) / friction
 
-    @property
-    def _shear(self) -> float:
-        return 2.0 / (1.0 / self.one.G + 1.0 / self.two.G)
-
-    def _require_likeness(self) -> None:
+    def require_likeness(self) -> None:
+        """Raise InputError for a pair too unlike to leave K out where there is friction (see LARGEST_MISMATCH)."""
         if abs(self.mismatch) > LARGEST_MISMATCH:
-            raise InputError("", "pair", None, f"these materials are too unlike for contact with friction: Kalker's "
-                             f"K = {self.mismatch:.3g} must be within +-{LARGEST_MISMATCH:g}, or the pressure makes "
-                             "slip of its own; normal contact takes any pair")  # fmt: skip
+            raise InputError("", "pair", None, f"materials too unlike for a theory that takes them as quasi-identical: "
+                             f"Kalker's K = {self.mismatch:.3g} must be within +-{LARGEST_MISMATCH:g}, or the pressure "
+                             "makes slip of its own")  # fmt: skip
