@@ -1,0 +1,192 @@
+"""Scenes of rolling contact: two bodies, where they touch, how they roll, and by which theory they are computed."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from models.contact.material import STEEL, Material, Pair
+from models.errors import InputError
+from models.scene_file import SceneFile, checked
+from models.strict import Strict, quantity
+
+GEOMETRIES = ("ellipse", "curvatures", "radii", "profiles")
+"""Tables that say where the bodies touch; a scene has one of them."""
+
+
+class Bodies(Strict):
+    """[bodies]: elastic constants, steel where nothing else is said."""
+
+    wheel: Material = Field(default=STEEL, description="E in Pa and nu of body 1")
+    rail: Material = Field(default=STEEL, description="E in Pa and nu of body 2")
+
+
+class Ellipse(Strict):
+    """[ellipse]: the contact area itself."""
+
+    a: float = quantity("m", "semi-axis along x, the direction of rolling")
+    b: float = quantity("m", "semi-axis along y")
+
+
+class Curvatures(Strict):
+    """[curvatures]: undeformed distance A x^2 + B y^2."""
+
+    A: float = quantity("1/m", "curvature along x, half the sum of both bodies' curvatures")
+    B: float = quantity("1/m", "curvature along y, half the sum of both bodies' curvatures")
+
+
+class Radii(Strict):
+    """[radii]: of both bodies, positive where convex; a radius that is left out is a flat direction."""
+
+    wheel_x: float | None = quantity("m", "rolling radius of the wheel", default=None, signed=True)
+    wheel_y: float | None = quantity("m", "radius of the wheel's profile", default=None, signed=True)
+    rail_x: float | None = quantity("m", "radius of the rail along x", default=None, signed=True)
+    rail_y: float | None = quantity("m", "radius of the rail's profile", default=None, signed=True)
+
+    def curvatures(self, file: str) -> tuple[float, float]:
+        """A and B (1/m); raises InputError for a radius of zero or bodies that do not touch on an ellipse."""
+        for name, radius in self:
+            if radius == 0:
+                raise InputError(file, f"radii.{name}", radius, "must not be 0 (radius in m, negative if concave)")
+        found = []
+        for axis in ("x", "y"):
+            value = sum(1.0 / radius for name, radius in self if radius is not None and name.endswith(axis)) / 2
+            if value <= 0:
+                raise InputError(file, f"radii.wheel_{axis}, rail_{axis}", None, f"are flat or conform along {axis}: "
+                                 f"half the sum of their curvatures is {value:.4g} 1/m and must be above 0")
+            found.append(value)
+        return found[0], found[1]
+
+
+class Profiles(Strict):
+    """[profiles]: cross-sections of wheel and rail, and how they stand to each other."""
+
+    wheel: str = Field(default="S1002", description="S1002, or a file of a profile")
+    rail: str = Field(default="UIC60", description="UIC60, or a file of a profile")
+    inclination: float = quantity("rad", "of the rail towards the track's centre", default=0.025, signed=True)
+    lateral_shift: float = quantity("m", "of the wheel towards the rail's gauge corner", default=0.0, signed=True)
+    yaw: float = quantity("rad", "of the wheelset", default=0.0, signed=True)
+    radius: float = quantity("m", "of the wheel at its taping line", default=0.46)
+
+
+class Contact(Strict):
+    """[contact]: how hard the bodies press, and what friction there is."""
+
+    load: float | None = quantity("N", "normal load", default=None)
+    approach: float | None = quantity("m", "approach of the bodies instead of a load", default=None)
+    friction: float = quantity("", "coefficient of friction")
+
+
+class Creepage(Strict):
+    """[creepage]: velocity of the wheel relative to the rail by the rolling speed."""
+
+    xi_x: float = quantity("", "longitudinal creepage", default=0.0, signed=True)
+    xi_y: float = quantity("", "lateral creepage", default=0.0, signed=True)
+    spin: float = quantity("1/m", "spin by the rolling speed", default=0.0, signed=True)
+
+
+class Sweep(Strict):
+    """[sweep]: one creepage through a range, the others as [creepage] has them."""
+
+    of: Literal["xi_x", "xi_y", "spin"] = Field(description="the creepage that is swept")
+    start: float = quantity("1 or 1/m", "first value", signed=True)
+    stop: float = quantity("1 or 1/m", "last value", signed=True)
+    count: int = Field(25, ge=2, le=10_000, description="number of values")
+    spacing: Literal["linear", "logarithmic"] = Field(default="linear", description="of the values")
+
+    def values(self) -> np.ndarray:
+        """All values, from start to stop."""
+        spaced = np.linspace if self.spacing == "linear" else np.geomspace
+        return spaced(self.start, self.stop, self.count)
+
+
+class Method(Strict):
+    """[method]: the theory, and how finely it is evaluated. Cells are counted along each axis of the contact."""
+
+    name: Literal["fastsim", "simplified", "exact", "linear"] = Field(default="fastsim", description="theory")
+    cells: int = Field(21, ge=5, le=400, description="cells along each axis")
+    march: Literal["second-order", "plain"] = Field(default="second-order", description="of FASTSIM")
+    bound: Literal["parabolic", "elliptic"] = Field(default="parabolic", description="of the traction in FASTSIM")
+    flexibilities: Literal["one", "three"] = Field(default="one", description="of FASTSIM")
+
+
+class ContactScene(SceneFile):
+    """One scene of rolling contact. Exactly one of the tables ``GEOMETRIES`` is there."""
+
+    system: Literal["contact"] = "contact"
+    study: str = Field(default="contact", description="the study that runs the scene")
+    bodies: Bodies = Bodies()
+    ellipse: Ellipse | None = Field(default=None, description="semi-axes of the contact area")
+    curvatures: Curvatures | None = Field(default=None, description="of the undeformed distance")
+    radii: Radii | None = Field(default=None, description="of both bodies")
+    profiles: Profiles | None = Field(default=None, description="cross-sections of wheel and rail")
+    contact: Contact = Field(description="table with load or approach, and friction")
+    creepage: Creepage = Creepage()
+    sweep: Sweep | None = Field(default=None, description="one creepage through a range")
+    method: Method = Method()
+
+    @property
+    def geometry(self) -> str:
+        """Name of the one table that says where the bodies touch."""
+        return next(name for name in GEOMETRIES if getattr(self, name) is not None)
+
+    @property
+    def pair(self) -> Pair:
+        """Both materials."""
+        return Pair(self.bodies.wheel, self.bodies.rail)
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> ContactScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(ContactScene, table, file, folder)
+    _check_geometry(scene)
+    _check_sweep(scene)
+    _check_method(scene)
+    return scene
+
+
+def _check_geometry(scene: ContactScene) -> None:
+    given = [name for name in GEOMETRIES if getattr(scene, name) is not None]
+    if len(given) != 1:
+        found = f"found {', '.join(given)}" if given else "found none"
+        raise InputError(scene.file, "", None, f"one of the tables {', '.join(GEOMETRIES)} says where the bodies touch; "
+                         f"{found}")  # fmt: skip
+    if (scene.contact.load is None) == (scene.contact.approach is None):
+        raise InputError(scene.file, "contact.load", scene.contact.load, "give either the load in N or contact.approach "
+                         "in m")  # fmt: skip
+    if scene.radii is not None:
+        scene.radii.curvatures(scene.file)
+
+
+def _check_sweep(scene: ContactScene) -> None:
+    sweep = scene.sweep
+    if sweep is None:
+        return
+    if sweep.start == sweep.stop:
+        raise InputError(scene.file, "sweep.stop", sweep.stop, "must differ from sweep.start")
+    if sweep.spacing == "logarithmic" and sweep.start * sweep.stop <= 0:
+        raise InputError(scene.file, "sweep.spacing", sweep.spacing, "start and stop must then both be above 0, or both "
+                         "below")  # fmt: skip
+    if sweep.of in scene.creepage.model_fields_set:
+        value = getattr(scene.creepage, sweep.of)
+        raise InputError(scene.file, f"creepage.{sweep.of}", value, "is swept: drop this key")
+
+
+FOR_FASTSIM = ("march", "bound", "flexibilities")
+ON_PROFILES = ("simplified", "exact")
+"""Theories that need no ellipse."""
+
+
+def _check_method(scene: ContactScene) -> None:
+    """No key that the theory would not read, and no theory that the geometry does not fit."""
+    method = scene.method
+    for key in method.model_fields_set & {*FOR_FASTSIM} if method.name != "fastsim" else ():
+        allowed = f"has no meaning for {method.name}: it belongs to fastsim"
+        raise InputError(scene.file, f"method.{key}", getattr(method, key), allowed)
+    if method.name == "linear" and "cells" in method.model_fields_set:
+        raise InputError(scene.file, "method.cells", method.cells, "has no meaning for linear, which is a formula")
+    if scene.profiles is not None and method.name not in ON_PROFILES:
+        raise InputError(scene.file, "method.name", method.name, "needs an ellipse; for profiles use "
+                         + " or ".join(ON_PROFILES))  # fmt: skip
