@@ -20,6 +20,9 @@ METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 DISTANCES = {"m": 1.0, "km": 1e3}
 SECONDS = {"s": 1.0, "ms": 1e-3}
 NEWTONS = {"N": 1.0, "kN": 1e3}
+PASCALS = {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9}
+PER_METRE = {"1/m": 1.0, "rad/m": 1.0, "1/mm": 1e3, "rad/mm": 1e3}
+SHARES = {"-": 1.0, "%": 1e-2}
 RADIANS = {"rad": 1.0, "deg": math.pi / 180.0}
 ACCELERATIONS = {"m/s^2": 1.0, "g": 9.80665}
 RADIANS_PER_SECOND = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
@@ -56,7 +59,7 @@ def read_table(
     InputError : naming file, line (counted from 1), column, value, what is allowed and the nearest match
     """
     header, rows = _header_and_rows(path)
-    names, factors = _headings(path, header, columns)
+    names, factors = headings(path, header, columns)
     free = [gaps and name != increasing for name in names]
     raw = _numbers(path, rows, header[1].split(","), free)
     if len(rows) < least:
@@ -90,7 +93,7 @@ def _header_and_rows(path: str | Path) -> tuple[tuple[int, str], Lines]:
     return used[0], used[1:]
 
 
-def _headings(path: str | Path, header: tuple[int, str], columns: Columns) -> tuple[list[str], list[float]]:
+def headings(path: str | Path, header: tuple[int, str], columns: Columns) -> tuple[list[str], list[float]]:
     """Column names and factors to SI, in the order of the file."""
     place = f"line {header[0]} (header)"
     found = [_heading(path, place, cell, columns) for cell in header[1].split(",")]
@@ -133,11 +136,11 @@ def _numbers(path: str | Path, rows: Lines, headings: list[str], free: list[bool
             raise InputError(path, f"line {line}", row, f"{len(headings)} values are needed, found {len(cells)}")
         for j, cell in enumerate(cells):
             gap = free[j] and cell.strip().lower() in GAPS
-            values[i, j] = math.nan if gap else _number(path, line, headings[j], cell)
+            values[i, j] = math.nan if gap else number(path, line, headings[j], cell)
     return values
 
 
-def _number(path: str | Path, line: int, heading: str, cell: str) -> float:
+def number(path: str | Path, line: int, heading: str, cell: str) -> float:
     """One finite number; Python's own extras (1_000, non-Latin digits) are text here."""
     try:
         value = float(cell) if cell.isascii() and "_" not in cell else math.nan
