@@ -12,7 +12,7 @@ from models.errors import InputError
 from models.scene_file import SceneFile, checked
 from models.strict import Strict, quantity
 
-GEOMETRIES = ("ellipse", "curvatures", "radii", "profiles")
+GEOMETRIES = ("ellipse", "curvatures", "radii", "profiles", "cases")
 """Tables that say where the bodies touch; a scene has one of them."""
 
 
@@ -71,6 +71,12 @@ class Profiles(Strict):
     radius: float = quantity("m", "of the wheel at its taping line", default=0.46)
 
 
+class Cases(Strict):
+    """[cases]: a table with a contact, its load, friction and creepages in every row."""
+
+    file: str = Field(description="CSV file, beside the scene or in the folder in which the command runs")
+
+
 class Contact(Strict):
     """[contact]: how hard the bodies press, and what friction there is."""
 
@@ -111,6 +117,11 @@ class Method(Strict):
     bound: Literal["parabolic", "elliptic"] = Field(default="parabolic", description="of the traction in FASTSIM")
     flexibilities: Literal["one", "three"] = Field(default="one", description="of FASTSIM")
 
+    def unread(self) -> frozenset[str]:
+        """Keys that have no meaning for this theory."""
+        fastsim = {"march", "bound", "flexibilities"}
+        return frozenset({"fastsim": set(), "linear": {"cells", *fastsim}}.get(self.name, fastsim))
+
 
 class ContactScene(SceneFile):
     """One scene of rolling contact. Exactly one of the tables ``GEOMETRIES`` is there."""
@@ -122,7 +133,8 @@ class ContactScene(SceneFile):
     curvatures: Curvatures | None = Field(default=None, description="of the undeformed distance")
     radii: Radii | None = Field(default=None, description="of both bodies")
     profiles: Profiles | None = Field(default=None, description="cross-sections of wheel and rail")
-    contact: Contact = Field(description="table with load or approach, and friction")
+    cases: Cases | None = Field(default=None, description="a contact in every row of a file")
+    contact: Contact | None = Field(default=None, description="table with load or approach, and friction")
     creepage: Creepage = Creepage()
     sweep: Sweep | None = Field(default=None, description="one creepage through a range")
     method: Method = Method()
@@ -153,11 +165,26 @@ def _check_geometry(scene: ContactScene) -> None:
         found = f"found {', '.join(given)}" if given else "found none"
         raise InputError(scene.file, "", None, f"one of the tables {', '.join(GEOMETRIES)} says where the bodies touch; "
                          f"{found}")  # fmt: skip
+    if scene.radii is not None:
+        scene.radii.curvatures(scene.file)
+    _check_contact(scene)
+
+
+OF_CASES = ("contact", "creepage", "sweep")
+"""Tables whose content every row of a table of cases has itself."""
+
+
+def _check_contact(scene: ContactScene) -> None:
+    given = sorted(scene.model_fields_set & {*OF_CASES})
+    if scene.cases is not None:
+        if given:
+            raise InputError(scene.file, given[0], None, "is in the file of cases: drop this table")
+        return
+    if scene.contact is None:
+        raise InputError(scene.file, "contact", None, "is missing: a table with load or approach, and friction")
     if (scene.contact.load is None) == (scene.contact.approach is None):
         raise InputError(scene.file, "contact.load", scene.contact.load, "give either the load in N or contact.approach "
                          "in m")  # fmt: skip
-    if scene.radii is not None:
-        scene.radii.curvatures(scene.file)
 
 
 def _check_sweep(scene: ContactScene) -> None:
@@ -174,7 +201,6 @@ def _check_sweep(scene: ContactScene) -> None:
         raise InputError(scene.file, f"creepage.{sweep.of}", value, "is swept: drop this key")
 
 
-FOR_FASTSIM = ("march", "bound", "flexibilities")
 ON_PROFILES = ("simplified", "exact")
 """Theories that need no ellipse."""
 
@@ -182,11 +208,10 @@ ON_PROFILES = ("simplified", "exact")
 def _check_method(scene: ContactScene) -> None:
     """No key that the theory would not read, and no theory that the geometry does not fit."""
     method = scene.method
-    for key in method.model_fields_set & {*FOR_FASTSIM} if method.name != "fastsim" else ():
-        allowed = f"has no meaning for {method.name}: it belongs to fastsim"
-        raise InputError(scene.file, f"method.{key}", getattr(method, key), allowed)
-    if method.name == "linear" and "cells" in method.model_fields_set:
-        raise InputError(scene.file, "method.cells", method.cells, "has no meaning for linear, which is a formula")
+    for key in sorted(method.model_fields_set & method.unread()):
+        raise InputError(scene.file, f"method.{key}", getattr(method, key), f"has no meaning for {method.name}")
+    if scene.cases is not None and method.name != "fastsim":
+        raise InputError(scene.file, "method.name", method.name, "a table of cases is computed by fastsim")
     if scene.profiles is not None and method.name not in ON_PROFILES:
         raise InputError(scene.file, "method.name", method.name, "needs an ellipse; for profiles use "
                          + " or ".join(ON_PROFILES))  # fmt: skip
