@@ -70,6 +70,13 @@ def read_table(
     return {name: table[name] for name in columns}
 
 
+def write_table(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]]) -> None:
+    """Write columns name -> (unit, values) with every digit, so that reading gives back the same numbers."""
+    names = [f"{name} [{unit}]" for name, (unit, _) in columns.items()]
+    values = np.column_stack([values for _, values in columns.values()])
+    np.savetxt(path, values, fmt="%.17g", delimiter=",", header=",".join(names), comments="")
+
+
 def _text(path: str | Path) -> str:
     """Whole text of a file; whatever prevents reading it is the user's to repair."""
     try:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from models.errors import InputError
-from models.tables import SECONDS, read_table
+from models.tables import SECONDS, read_table, write_table
 
 
 def read_time_series(path: str | Path, columns: Mapping[str, Mapping[str, float]], *,
@@ -38,8 +38,6 @@ def _check_even(path: str | Path, time: np.ndarray, period: float) -> None:
 
 
 def write_time_series(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]], period: float) -> None:
-    """Write columns name -> (unit, values) with every digit, so that reading gives back the same numbers."""
-    names = [f"{name} [{unit}]" for name, (unit, _) in columns.items()]
-    values = np.column_stack([values for _, values in columns.values()])
-    rows = np.column_stack([period * np.arange(len(values)), values])
-    np.savetxt(path, rows, fmt="%.17g", delimiter=",", header=",".join(["time [s]", *names]), comments="")
+    """Write columns name -> (unit, values), shape (n,) each, beside their times."""
+    count = len(next(iter(columns.values()))[1])
+    write_table(path, {"time": ("s", period * np.arange(count)), **columns})
