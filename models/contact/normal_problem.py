@@ -1,0 +1,191 @@
+"""Normal contact of two half-spaces with a given undeformed distance: contact area and pressure, without friction.
+
+    gap = distance + u_z(pressure) - approach;   gap = 0 where pressure > 0, pressure = 0 where gap > 0.
+
+Solved by conjugate gradients on the changing contact area (Polonsky and Keer, Wear 231, 1999, 206-219). The problem is
+convex, so a pressure that meets all conditions is the answer: ``NormalSolution.residual`` is the proof.
+
+The error of the grid, measured on Hertz' ellipse with n cells along each axis (a/b = 1, load given): see
+``validation/cases/contact_exact.py``.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.contact.half_space import Convolution, Z, influence, offsets
+from models.errors import InputError, RunFailed
+
+if TYPE_CHECKING:
+    from models.contact.material import Pair
+
+TOLERANCE = 1e-9
+"""Largest violation of a contact condition, as a part of the greatest elastic displacement."""
+MOST_ITERATIONS = 2000
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """A pressure on a regular grid of cells.
+
+    pressure : (ny, nx) in Pa, zero outside the contact. x, y : (nx,), (ny,) centres of the cells (m), evenly spaced.
+    """
+
+    pressure: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+
+    @property
+    def dx(self) -> float:
+        """Length of a cell along x (m)."""
+        return float(self.x[1] - self.x[0])
+
+    @property
+    def dy(self) -> float:
+        """Width of a cell along y (m)."""
+        return float(self.y[1] - self.y[0])
+
+    @property
+    def contact(self) -> np.ndarray:
+        """Cells in contact, (ny, nx) bool."""
+        return self.pressure > 0
+
+    @property
+    def load(self) -> float:
+        """Resultant of the pressure (N)."""
+        return float(self.pressure.sum() * self.dx * self.dy)
+
+    @property
+    def area(self) -> float:
+        """Area of the cells in contact (m^2)."""
+        return float(np.count_nonzero(self.contact) * self.dx * self.dy)
+
+
+@dataclass(frozen=True)
+class NormalSolution(Pressed):
+    """Solution of the normal problem.
+
+    approach : rigid approach of the bodies from first touch at distance 0 (m).
+    gap : (ny, nx) distance between the deformed surfaces (m).
+    residual : largest of |gap| in contact and -gap outside, as a part of the greatest elastic displacement.
+    iterations : of the conjugate gradients.
+    """
+
+    approach: float
+    gap: np.ndarray
+    residual: float
+    iterations: int
+
+
+def centres(cells: int, step: float) -> np.ndarray:
+    """Centres (m) of ``cells`` cells about zero."""
+    return (np.arange(cells) - (cells - 1) / 2) * step
+
+
+def solve_normal(distance: np.ndarray, dx: float, dy: float, pair: "Pair", *, load: float | None = None,
+                 approach: float | None = None) -> NormalSolution:  # fmt: skip
+    """Pressure and contact area of two bodies pressed together.
+
+    Parameters
+    ----------
+    distance : (ny, nx) undeformed distance (m) at the cells' centres; rows are y, columns x. Its zero is where the
+        approach counts from. Several separate patches may lie in one grid.
+    dx, dy : size of a cell (m)
+    pair : materials of the two bodies; a mismatch is neglected here (the tractions' effect on the pressure)
+    load : normal force (N), or
+    approach : rigid approach (m); exactly one of the two
+
+    Raises
+    ------
+    InputError : a wrong shape or value, or a contact that reaches the edge of the grid
+    RunFailed : the contact conditions were not met to ``TOLERANCE``
+    """
+    distance = _checked(distance, dx, dy, load, approach)
+    rows, columns = distance.shape
+    x, y = centres(columns, dx), centres(rows, dy)
+    if (load is not None and load <= 0) or (approach is not None and not np.any(distance < approach)):
+        return _apart(distance, x, y, approach)
+    kernel = influence(offsets(columns, dx), offsets(rows, dy)[:, None], dx, dy, pair)[..., Z, Z]
+    displace = Convolution(kernel[..., None, None])
+    pressure, iterations = _conjugate_gradients(distance, displace, load, approach, dx * dy)
+    return _proved(pressure, distance, displace, approach, x, y, iterations)
+
+
+def _checked(distance: np.ndarray, dx: float, dy: float, load: float | None, approach: float | None) -> np.ndarray:
+    """The distance as an array of numbers; raises InputError."""
+    distance = np.asarray(distance, float)
+    if distance.ndim != 2 or min(distance.shape) < 2:
+        raise InputError("", "distance", list(distance.shape), "must have the shape (ny, nx), two cells or more each")
+    if not np.isfinite(distance).all():
+        raise InputError("", "distance", None, "must be finite everywhere (m); use a large distance outside the bodies")
+    for name, value in (("dx", dx), ("dy", dy)):
+        if not 0 < value < np.inf:
+            raise InputError("", name, value, "must be above 0 (size of a cell in m)")
+    if (load is None) == (approach is None):
+        raise InputError("", "load", load, "give either the load (N) or the approach (m)")
+    for name, given in (("load", load), ("approach", approach)):
+        if given is not None and not np.isfinite(given):
+            raise InputError("", name, given, "must be finite")
+    return distance
+
+
+def _apart(distance: np.ndarray, x: np.ndarray, y: np.ndarray, approach: float | None) -> NormalSolution:
+    """Bodies that do not press on each other: at the given approach, or at first touch."""
+    least = float(distance.min()) if approach is None else approach
+    return NormalSolution(np.zeros(distance.shape), x, y, least, distance - least, 0.0, 0)
+
+
+def _conjugate_gradients(distance: np.ndarray, displace: Convolution, load: float | None, approach: float | None,
+                         cell: float) -> tuple[np.ndarray, int]:  # fmt: skip
+    """Pressure (ny, nx) that meets the contact conditions, and the iterations taken."""
+    pressure = _start(distance, displace, load, approach, cell)
+    direction, square, restart = np.zeros_like(pressure), 1.0, True
+    for iteration in range(1, MOST_ITERATIONS + 1):
+        contact = pressure > 0
+        displacement = displace(pressure[..., None])[..., 0]
+        gap = distance + displacement
+        gap -= gap[contact].mean() if approach is None else approach
+        if _violation(gap, contact, displacement) < TOLERANCE:
+            return pressure, iteration
+        before, square = square, float(np.sum(gap[contact] ** 2))
+        direction = np.where(contact, gap + (0.0 if restart else square / before) * direction, 0.0)
+        response = displace(direction[..., None])[..., 0]
+        if approach is None:
+            response -= response[contact].mean()
+        step = np.sum(gap[contact] * direction[contact]) / np.sum(response[contact] * direction[contact])
+        pressure = np.maximum(pressure - step * direction, 0.0)
+        entering = (pressure == 0) & (gap < 0)
+        restart = bool(entering.any())
+        pressure[entering] -= step * gap[entering]
+        if load is not None:
+            pressure *= load / (pressure.sum() * cell)
+    raise RunFailed("normal problem", f"contact conditions not met in {MOST_ITERATIONS} iterations")
+
+
+def _start(distance: np.ndarray, displace: Convolution, load: float | None, approach: float | None,
+           cell: float) -> np.ndarray:  # fmt: skip
+    """A first pressure: even over the grid for a load, proportional to the overlap for an approach."""
+    if load is not None:
+        return np.full(distance.shape, load / (distance.size * cell))
+    overlap = np.maximum(float(approach or 0.0) - distance, 0.0)
+    return overlap * (overlap.max() / displace(overlap[..., None]).max())
+
+
+def _violation(gap: np.ndarray, contact: np.ndarray, displacement: np.ndarray) -> float:
+    """Largest violated condition as a part of the greatest displacement."""
+    inside, outside = np.abs(gap[contact]).max(), -gap[~contact].min(initial=0.0)
+    return float(max(inside, outside) / displacement.max())
+
+
+def _proved(pressure: np.ndarray, distance: np.ndarray, displace: Convolution, approach: float | None, x: np.ndarray,
+            y: np.ndarray, iterations: int) -> NormalSolution:  # fmt: skip
+    """The solution with its conditions evaluated afresh."""
+    contact = pressure > 0
+    if contact[[0, -1]].any() or contact[:, [0, -1]].any():
+        raise InputError("", "distance", None, "the contact reaches the edge of the grid: give a larger one")
+    displacement = displace(pressure[..., None])[..., 0]
+    gap = distance + displacement
+    found = float(gap[contact].mean()) if approach is None else approach
+    gap -= found
+    return NormalSolution(pressure, x, y, found, gap, _violation(gap, contact, displacement), iterations)

@@ -1,0 +1,52 @@
+"""Compiled sweeps over the cells of a rolling contact: each cell's traction from all the others."""
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, fastmath=True, nogil=True)
+def sweep(traction, rigid, kernel, bound, relaxation):
+    """One relaxed Gauss-Seidel sweep in place, strip by strip, each from its leading edge back.
+
+    traction, rigid : (2, ny, nx) traction in units of G and rigid slip; bound : (ny, nx), zero outside the contact;
+    kernel : (3, 2 ny - 1, 2 nx - 1), xx, xy and yy, reversed in both axes so that its rows run beside the traction's.
+    """
+    rows, columns = bound.shape
+    own_x, own_y = kernel[0, rows - 1, columns - 1], kernel[2, rows - 1, columns - 1]
+    for row in range(rows):
+        for column in range(columns - 1, -1, -1):
+            if bound[row, column] <= 0:
+                continue
+            slip_x, slip_y = rigid[0, row, column], rigid[1, row, column]
+            first = columns - 1 - column
+            for other in range(rows):
+                k = rows - 1 - row + other
+                for i in range(columns):
+                    p_x, p_y = traction[0, other, i], traction[1, other, i]
+                    cross = kernel[1, k, first + i]
+                    slip_x += kernel[0, k, first + i] * p_x + cross * p_y
+                    slip_y += cross * p_x + kernel[2, k, first + i] * p_y
+            p_x, p_y = traction[0, row, column], traction[1, row, column]
+            new_x, new_y = answer(slip_x - own_x * p_x, slip_y - own_y * p_y, own_x, own_y, bound[row, column])
+            traction[0, row, column] = p_x + relaxation * (new_x - p_x)
+            traction[1, row, column] = p_y + relaxation * (new_y - p_y)
+
+
+@njit(cache=True, nogil=True)
+def answer(slip_x, slip_y, own_x, own_y, bound):
+    """Traction of one cell whose slip is (slip_x + own_x p_x, slip_y + own_y p_y): sticking, or opposite to its slip.
+
+    In slip p = -slip / (own + l) with l > 0 such that |p| = bound: Newton's iteration on 1/|p|, monotone from l = 0.
+    """
+    p_x, p_y = -slip_x / own_x, -slip_y / own_y
+    length = np.hypot(p_x, p_y)
+    shift = 0.0
+    while length > bound * (1 + 1e-14):
+        slope = p_x * p_x / (own_x + shift) + p_y * p_y / (own_y + shift)
+        increase = length * length * (length - bound) / (bound * slope)
+        if increase <= 1e-15 * shift:
+            break
+        shift += increase
+        p_x, p_y = -slip_x / (own_x + shift), -slip_y / (own_y + shift)
+        length = np.hypot(p_x, p_y)
+    return p_x, p_y

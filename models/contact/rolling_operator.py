@@ -1,0 +1,90 @@
+"""Slip of a rolling contact as a linear function of its tractions, and Newton's step for cells that stick or slip."""
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from models.contact.half_space import Convolution, Y, influence, offsets
+
+if TYPE_CHECKING:
+    from models.contact.material import Pair
+
+INNER_TOLERANCE = 1e-6
+"""Relative residual at which the linear solver of one Newton step stops."""
+
+
+class SlipOperator:
+    """C: tractions (ny, nx, 2) in units of G to minus the gradient of displacement along x, (ny, nx, 2).
+
+    The gradient is the difference between a cell's centre and the next one upstream, so it stands for the point
+    dx / 2 before the centre.
+    """
+
+    def __init__(self, columns: int, rows: int, dx: float, dy: float, pair: "Pair") -> None:
+        x, y = offsets(columns, dx), offsets(rows, dy)[:, None]
+        upstream = influence(np.append(x, x[-1] + dx), y, dx, dy, pair)[..., : Y + 1, : Y + 1] * (pair.G / dx)
+        self.kernel = upstream[:, :-1] - upstream[:, 1:]
+        self.rows, self.columns = rows, columns
+        self._convolution = Convolution(self.kernel)
+
+    def __call__(self, traction: np.ndarray) -> np.ndarray:
+        """Slip (ny, nx, 2) by tractions (ny, nx, 2)."""
+        return self._convolution(traction)
+
+    @cached_property
+    def reversed(self) -> np.ndarray:
+        """Kernel as ``rolling_kernels.sweep`` reads it, (3, 2 ny - 1, 2 nx - 1)."""
+        kernel = self.kernel[::-1, ::-1]
+        return np.ascontiguousarray(np.stack([kernel[..., 0, 0], kernel[..., 0, 1], kernel[..., 1, 1]]))
+
+    @cached_property
+    def own(self) -> np.ndarray:
+        """Slip of a cell by its own traction, (2,)."""
+        return np.diag(self.kernel[self.rows - 1, self.columns - 1]).copy()
+
+    @cached_property
+    def strip(self) -> np.ndarray:
+        """Coupling within one strip, (nx, 2, nx, 2)."""
+        index = np.arange(self.columns)
+        return self.kernel[self.rows - 1][index[:, None] - index + self.columns - 1].transpose(0, 2, 1, 3)
+
+
+def solve_on(operator: SlipOperator, free: np.ndarray, stiff: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Change of traction d within the free directions with free (C d + stiff d) = free wanted.
+
+    free : (ny, nx, 2, 2) projection of each cell's traction onto its free directions. stiff : (ny, nx) added stiffness.
+    wanted : (ny, nx, 2) change of slip. GMRES, preconditioned by the exact inverse of every strip by itself.
+    """
+    shape = wanted.shape
+    fixed = np.eye(2) - free
+
+    def apply(flat: np.ndarray) -> np.ndarray:
+        change = flat.reshape(shape)
+        moved = _times(free, change)
+        return (_times(free, operator(moved) + stiff[..., None] * moved) + _times(fixed, change)).ravel()
+
+    inverse = _strip_inverses(operator, free, stiff)
+
+    def precondition(flat: np.ndarray) -> np.ndarray:
+        return (inverse @ flat.reshape(shape[0], -1, 1)).ravel()
+
+    size = (wanted.size, wanted.size)
+    solution, _ = gmres(LinearOperator(size, apply), _times(free, wanted).ravel(), rtol=INNER_TOLERANCE, restart=80,
+                        maxiter=3, M=LinearOperator(size, precondition))  # fmt: skip
+    return _times(free, solution.reshape(shape))
+
+
+def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Product of each cell's matrix (..., 2, 2) with its vector (..., 2)."""
+    return np.einsum("...ij,...j->...i", matrices, vectors)
+
+
+def _strip_inverses(operator: SlipOperator, free: np.ndarray, stiff: np.ndarray) -> np.ndarray:
+    """Inverse of the system within every strip, (ny, 2 nx, 2 nx)."""
+    rows, columns = stiff.shape
+    system = np.einsum("riab,ibjc,rjcd->riajd", free, operator.strip, free, optimize=True)
+    index = np.arange(columns)
+    system[:, index, :, index, :] += np.moveaxis(np.eye(2) + (stiff[..., None, None] - 1.0) * free, 1, 0)
+    return np.linalg.inv(system.reshape(rows, 2 * columns, 2 * columns))

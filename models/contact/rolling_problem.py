@@ -1,0 +1,189 @@
+"""Steady rolling of two half-spaces with Coulomb friction on a given pressure: the exact theory, on a grid.
+
+Kalker, Three-Dimensional Elastic Bodies in Rolling Contact, 1990, section 4.3 (program TANG). Material flows through the
+contact from the leading edge (largest x) back, so the slip of the wheel over the rail, by the rolling speed, is
+
+    s = (xi_x - spin y, xi_y + spin x) - du/dx,
+
+u the displacement difference of the tractions p. On a grid du/dx is (u(x + dx) - u(x)) / dx about each cell's leading
+side, where the rigid slip is taken too. A cell sticks (s = 0, |p| <= g) or slips (p = -g s/|s|), with g = mu times the
+pressure. With s = w + C p this is a variational inequality: |p| <= g and s.(q - p) >= 0 for every |q| <= g. C is
+positive definite (its symmetric part is the second difference of a positive definite kernel), so there is exactly
+one solution, and tractions that meet the conditions of every cell are it: ``RollingSolution.residual`` is the proof.
+
+Solved by Gauss-Seidel sweeps, which settle which cells stick, each followed by a step of Newton's method for the cells
+so found: GMRES with the fast Fourier transform for products with C, preconditioned by each strip's own coupling.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.contact.inputs import quantity
+from models.contact.normal_problem import Pressed
+from models.contact.rolling_kernels import sweep
+from models.contact.rolling_operator import SlipOperator, solve_on
+from models.errors import RunFailed
+
+if TYPE_CHECKING:
+    from models.contact.material import Pair
+
+TOLERANCE = 1e-8
+"""Largest residual of a solution."""
+RELAXATION = 0.6
+"""Of the sweeps; beyond 0.7 they diverge on fine grids that stick."""
+SWEEPS = 3
+"""In each round."""
+MOST_ROUNDS = 60
+"""Rounds of sweeps and Newton steps before the problem is given up."""
+
+
+@dataclass(frozen=True)
+class RollingSolution:
+    """Forces and fields of steady rolling; cells as in the pressure's grid.
+
+    fx, fy : forces on the wheel (N). mz : moment on the wheel about the origin of x and y (N m).
+    traction : (ny, nx, 2) on the wheel (Pa). slip : (ny, nx, 2) by the rolling speed, zero outside the contact.
+    stick : (ny, nx) bool. power : dissipated by friction per unit of rolling speed (W s/m = N), never negative.
+    residual : largest change of a cell's traction that would still be needed if all others were right, by the largest
+        bound. rounds : of sweeps and Newton steps.
+    """
+
+    fx: float
+    fy: float
+    mz: float
+    traction: np.ndarray
+    slip: np.ndarray
+    stick: np.ndarray
+    power: float
+    residual: float
+    rounds: int
+
+
+def solve_rolling(pressed: Pressed, mu: float, xi_x: float, xi_y: float, spin: float, pair: "Pair") -> RollingSolution:
+    """Tractions of steady rolling.
+
+    Parameters
+    ----------
+    pressed : pressure on its grid; a ``NormalSolution`` is one. Its x and y are the origin of spin and moment.
+    mu : coefficient of friction
+    xi_x, xi_y : creepages
+    spin : 1/m
+    pair : materials; too unlike ones are refused
+
+    Raises
+    ------
+    InputError : a value that is not finite, a negative coefficient of friction, too unlike materials
+    RunFailed : the conditions of stick and slip were not met to ``TOLERANCE``
+    """
+    mu = float(quantity("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0))
+    motion = [float(quantity(name, value, told)) for name, value, told in
+              (("xi_x", xi_x, "a creepage"), ("xi_y", xi_y, "a creepage"), ("spin", spin, "a spin in 1/m"))]  # fmt: skip
+    pair.require_likeness()
+    box = _box(pressed.contact)
+    bound = mu * pressed.pressure[box] / pair.G
+    if not bound.any():
+        return _frictionless(pressed)
+    operator = SlipOperator(*bound.shape[::-1], pressed.dx, pressed.dy, pair)
+    rigid = rigid_slip(pressed.x[box[1]] + pressed.dx / 2, pressed.y[box[0]], *motion)
+    state, rounds = _solve(operator, rigid, bound)
+    return _assembled(state, rounds, pressed, box, pair.G)
+
+
+def rigid_slip(x: np.ndarray, y: np.ndarray, xi_x: float, xi_y: float, spin: float) -> np.ndarray:
+    """Slip (ny, nx, 2) of rigid bodies, by the rolling speed, at x (nx,) and y (ny,)."""
+    along, across = np.broadcast_arrays(xi_x - spin * y[:, None], xi_y + spin * x)
+    return np.stack([along, across], axis=-1)
+
+
+def _box(contact: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns that hold the contact; nothing where there is none."""
+    spans = (np.flatnonzero(contact.any(axis=axis)) for axis in (1, 0))
+    rows, columns = (slice(span[0], span[-1] + 1) if span.size else slice(0) for span in spans)
+    return rows, columns
+
+
+class _State:
+    """Tractions, by G, with their slip and how far they are from meeting every cell's condition."""
+
+    def __init__(self, operator: SlipOperator, rigid: np.ndarray, bound: np.ndarray, traction: np.ndarray) -> None:
+        self.traction, self.bound = traction, bound
+        self.slip = rigid + operator(traction)
+        self.trial = traction - self.slip / operator.own.max()
+        self.size = np.linalg.norm(self.trial, axis=-1)
+        needed = _limited(self.trial, bound) - traction
+        self.residual = float(np.linalg.norm(needed, axis=-1)[bound > 0].max() / bound.max())
+
+    @property
+    def stick(self) -> np.ndarray:
+        """Cells whose traction need not be cut to the bound."""
+        return (self.size <= self.bound) & (self.bound > 0)
+
+
+def _limited(traction: np.ndarray, bound: np.ndarray) -> np.ndarray:
+    """Tractions (..., 2) cut to their bounds, along their own directions."""
+    size = np.linalg.norm(traction, axis=-1)
+    return traction * np.where(size > bound, bound / np.where(size > 0, size, 1.0), 1.0)[..., None]
+
+
+def _solve(operator: SlipOperator, rigid: np.ndarray, bound: np.ndarray) -> tuple[_State, int]:
+    """Tractions that meet all conditions, and the rounds taken."""
+    state = _State(operator, rigid, bound, np.zeros_like(rigid))
+    for done in range(MOST_ROUNDS):
+        if state.residual <= TOLERANCE:
+            return state, done
+        state = _swept(operator, rigid, state)
+        step = _State(operator, rigid, bound, _newton(operator, rigid, state))
+        state = min(state, step, key=lambda one: one.residual)
+    raise RunFailed("rolling problem", f"conditions of stick and slip met to {state.residual:.2g} only "
+                    f"after {MOST_ROUNDS} rounds")  # fmt: skip
+
+
+def _swept(operator: SlipOperator, rigid: np.ndarray, state: _State) -> _State:
+    """The state after a few sweeps."""
+    traction = np.ascontiguousarray(np.moveaxis(state.traction, -1, 0))
+    motion = np.ascontiguousarray(np.moveaxis(rigid, -1, 0))
+    for _ in range(SWEEPS):
+        sweep(traction, motion, operator.reversed, state.bound, RELAXATION)
+    return _State(operator, rigid, state.bound, np.moveaxis(traction, 0, -1))
+
+
+def _newton(operator: SlipOperator, rigid: np.ndarray, state: _State) -> np.ndarray:
+    """Tractions after Newton's step for the cells that stick and slip in ``state``.
+
+    A sticking cell is free to change; a slipping one is put on its bound and turns there, until its traction is
+    opposite to its slip: t.C d + (|s| / g) d = -t.s along the tangent t.
+    """
+    bound, slips = state.bound, (state.size > state.bound) & (state.bound > 0)
+    opposite = state.trial / np.where(state.size > 0, state.size, 1.0)[..., None]
+    traction = np.where(slips[..., None], bound[..., None] * opposite, state.traction)
+    slip = rigid + operator(traction)
+    tangent = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
+    free = np.where(slips[..., None, None], tangent[..., :, None] * tangent[..., None, :], np.eye(2))
+    free = free * (bound > 0)[..., None, None]
+    against = np.maximum(-np.sum(slip * opposite, axis=-1), 0.0)
+    stiff = np.where(slips, against / np.where(slips, bound, 1.0), 0.0)
+    moved = traction + solve_on(operator, free, stiff, -slip)
+    size = np.linalg.norm(moved, axis=-1)
+    onto = np.where(slips | (size > bound), bound / np.where(size > 0, size, 1.0), 1.0)
+    return moved * onto[..., None]
+
+
+def _frictionless(pressed: Pressed) -> RollingSolution:
+    """No friction, or no contact."""
+    none = np.zeros((*pressed.pressure.shape, 2))
+    return RollingSolution(0.0, 0.0, 0.0, none, none, np.zeros(pressed.pressure.shape, bool), 0.0, 0.0, 0)
+
+
+def _assembled(state: _State, rounds: int, pressed: Pressed, box: tuple[slice, slice], G: float) -> RollingSolution:
+    """Resultants, and the fields on the grid of the pressure."""
+    cell = pressed.dx * pressed.dy
+    traction, slip = np.zeros((2, *pressed.pressure.shape, 2))
+    stick = np.zeros(pressed.pressure.shape, bool)
+    traction[box], stick[box] = G * state.traction, state.stick
+    slip[box] = np.where(state.bound[..., None] > 0, state.slip, 0.0)
+    fx, fy = (float(force) for force in traction.sum(axis=(0, 1)) * cell)
+    mz = float(np.sum(pressed.x * traction[..., 1] - pressed.y[:, None] * traction[..., 0]) * cell)
+    power = float(-np.sum(traction * slip) * cell)
+    return RollingSolution(fx, fy, mz, traction, slip, stick, power, state.residual, rounds)
