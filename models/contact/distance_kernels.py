@@ -1,0 +1,107 @@
+"""Compiled interpolation of an undeformed distance: cubic convolution, which is exact for a quadratic surface.
+
+Values stand on evenly spaced nodes with one more on every side, so that a position of u spacings from the first node
+lies in the segment between padded nodes i + 1 and i + 2, where i = floor(u) (Keys, IEEE Trans. ASSP 29, 1981).
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def weights(t):
+    """Weights of the four nodes about a point at the share ``t`` of its segment, and of their slope per spacing."""
+    value = (
+        0.5 * t * (-1.0 + t * (2.0 - t)),
+        1.0 + 0.5 * t * t * (-5.0 + 3.0 * t),
+        0.5 * t * (1.0 + t * (4.0 - 3.0 * t)),
+        0.5 * t * t * (t - 1.0),
+    )
+    slope = (
+        0.5 * (-1.0 + t * (4.0 - 3.0 * t)),
+        0.5 * t * (-10.0 + 9.0 * t),
+        0.5 * (1.0 + t * (8.0 - 9.0 * t)),
+        0.5 * t * (3.0 * t - 2.0),
+    )
+    return value, slope
+
+
+@njit(cache=True)
+def segment(position, segments):
+    """Index of the segment and the share of it at a position in spacings, held to the ends."""
+    i = min(max(math.floor(position), 0), segments - 1)
+    return i, position - i
+
+
+@njit(cache=True)
+def value_and_slopes(padded, u, v):
+    """Value at u spacings along x (columns) and v along y (rows), and its slopes per spacing along x and y."""
+    i, t = segment(u, padded.shape[1] - 3)
+    j, s = segment(v, padded.shape[0] - 3)
+    wx, sx = weights(t)
+    wy, sy = weights(s)
+    value = along_x = along_y = 0.0
+    for k in range(4):
+        row = slope = 0.0
+        for m in range(4):
+            row += wx[m] * padded[j + k, i + m]
+            slope += sx[m] * padded[j + k, i + m]
+        value += wy[k] * row
+        along_x += wy[k] * slope
+        along_y += sy[k] * row
+    return value, along_x, along_y
+
+
+@njit(cache=True)
+def values(padded, u, v):
+    """Values at the points (u[k], v[k])."""
+    found = np.empty(u.size)
+    for k in range(u.size):
+        found[k] = value_and_slopes(padded, u[k], v[k])[0]
+    return found
+
+
+@njit(cache=True)
+def row_at(padded, v):
+    """Padded values along x at v spacings along y."""
+    j, s = segment(v, padded.shape[0] - 3)
+    w, _ = weights(s)
+    return w[0] * padded[j] + w[1] * padded[j + 1] + w[2] * padded[j + 2] + w[3] * padded[j + 3]
+
+
+@njit(cache=True)
+def least_of_row(row):
+    """Least value along a padded row, also between its nodes, and its position in spacings."""
+    least, where = np.inf, 0.0
+    for i in range(row.size - 3):
+        a, b, c, d = row[i], row[i + 1], row[i + 2], row[i + 3]
+        for t in (0.0, lowest((-a + 3.0 * b - 3.0 * c + d) / 2.0, (2.0 * a - 5.0 * b + 4.0 * c - d) / 2.0,
+                              (c - a) / 2.0), 1.0):  # fmt: skip
+            w, _ = weights(t)
+            value = w[0] * a + w[1] * b + w[2] * c + w[3] * d
+            if value < least:
+                least, where = value, i + t
+    return least, where
+
+
+@njit(cache=True)
+def lowest(cube, square, linear):
+    """Share of the segment at which cube t^3 + square t^2 + linear t has its minimum, 0 where it has none inside."""
+    root = square * square - 3.0 * cube * linear
+    if root <= 0.0:
+        return 0.0
+    denominator = square + math.sqrt(root)
+    t = -linear / denominator if denominator != 0.0 else 0.0
+    return t if 0.0 < t < 1.0 else 0.0
+
+
+@njit(cache=True)
+def valley(padded, finer):
+    """Least value along x on lines across y, ``finer`` lines per spacing, and where along x: (lines,), (lines,)."""
+    lines = (padded.shape[0] - 3) * finer + 1
+    least, where = np.empty(lines), np.empty(lines)
+    for k in range(lines):
+        least[k], where[k] = least_of_row(row_at(padded, k / finer))
+    return least, where

@@ -1,0 +1,153 @@
+"""Patches: the valleys of an undeformed distance, each of which makes an area of contact of its own.
+
+A distance with several valleys is cut between them, along straight lines through the ridges: first along y, where
+patches of wheel and rail lie side by side, then along x. The cuts follow from the distance alone. They do not move
+with the load, so nothing jumps when two areas of contact grow together.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from models.contact.undeformed_distance import Distance
+from models.errors import InputError
+
+RIDGE = 1e-6
+"""Height (m) of a ridge between two valleys that parts them; lower ones are roughness of one valley."""
+Table = tuple[np.ndarray, np.ndarray]
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """One valley of a distance. ``cut`` tells which sides (low x, high x, low y, high y) touch another valley."""
+
+    distance: Distance
+    cut: tuple[bool, bool, bool, bool] = (False, False, False, False)
+
+    @cached_property
+    def bottom(self) -> tuple[float, float, float]:
+        """Position x, y of the least distance (m), and that distance (m)."""
+        lines, least, where = self.distance.valley_y
+        k = int(np.argmin(least))
+        return _lowest(self.distance, float(where[k]), float(lines[k]))
+
+    @property
+    def low(self) -> float:
+        """Least distance (m): nothing touches at a smaller depth."""
+        return self.bottom[2]
+
+    @cached_property
+    def edge(self) -> float:
+        """Depth (m) at which the area {h < depth} reaches a side that is no cut."""
+        x, y = self.distance.valley_x[1], self.distance.valley_y[1]
+        sides = (x[0], x[-1], y[0], y[-1])
+        return float(min((side for side, cut in zip(sides, self.cut, strict=True) if not cut), default=np.inf))
+
+    @cached_property
+    def _tables(self) -> tuple[Table, Table]:
+        """Lines along x and along y with the root of the least height above the bottom, linear for a parabola."""
+        return tuple(_rooted(valley[0], valley[1], at, self.low) for valley, at in
+                     ((self.distance.valley_x, self.bottom[0]), (self.distance.valley_y, self.bottom[1])))  # type: ignore[return-value]  # fmt: skip
+
+    def box(self, depth: float) -> Box:
+        """Rectangle x0, x1, y0, y1 (m) about {h < depth}, continuous in the depth.
+
+        Each side lies as far from the bottom as the lengths of the valley below the depth add up to on that side: that
+        is the bounding box of an area in one piece, and it cannot jump to a dip that opens beyond a low ridge.
+        Raises InputError if the area reaches a side of the distance.
+        """
+        if depth > self.edge:
+            raise InputError("", "distance", None, f"contact at a depth of {depth:.3g} m reaches the edge of the area "
+                             "over which the undeformed distance is known: give a larger area")  # fmt: skip
+        root = np.sqrt(max(depth - self.low, 0.0))
+        (x, rx), (y, ry) = self._tables
+        return (*_sides(x, rx, self.bottom[0], root), *_sides(y, ry, self.bottom[1], root))
+
+
+def separate(distance: Distance, ridge: float = RIDGE) -> list[Patch]:
+    """The valleys of a distance, from low to high y (then x), parted by every ridge higher than ``ridge`` (m)."""
+    return [
+        Patch(part, (*along_x, *along_y))
+        for row, along_y in _cut(distance, 1, ridge)
+        for part, along_x in _cut(row, 0, ridge)
+    ]
+
+
+def whole(distance: Distance) -> list[Patch]:
+    """The distance as one patch, whatever its valleys."""
+    return [Patch(distance)]
+
+
+def _cut(distance: Distance, axis: int, ridge: float) -> list[tuple[Distance, tuple[bool, bool]]]:
+    """Parts of the distance along an axis (0: x, 1: y), each with whether its two ends are cuts."""
+    lines, least, _ = distance.valley_y if axis else distance.valley_x
+    nodes = distance.y if axis else distance.x
+    inner = [int(np.argmin(np.abs(nodes - lines[k]))) for k in ridges(least, ridge)]
+    ends = [0, *(k for k in inner if 3 <= k < nodes.size - 3), nodes.size - 1]
+    everything = slice(None)
+    return [
+        (distance.part(*((everything, slice(a, b + 1)) if axis else (slice(a, b + 1), everything))),
+         (a > 0, b < nodes.size - 1))
+        for a, b in pairwise(ends) if b - a >= 3
+    ]  # fmt: skip
+
+
+def ridges(heights: np.ndarray, least: float) -> list[int]:
+    """Indices of the maxima of a line that rise more than ``least`` above the valleys on both sides."""
+    found: list[int] = []
+    low, top, at = heights[0], heights[0], 0
+    climbed = False
+    for k, height in enumerate(heights):
+        if not climbed:
+            low = min(low, height)
+            if height > low + least:
+                climbed, top, at = True, height, k
+        elif height > top:
+            top, at = height, k
+        elif height < top - least:
+            if at > 0:
+                found.append(at)
+            climbed, low = False, height
+    return found
+
+
+def _lowest(distance: Distance, x: float, y: float) -> tuple[float, float, float]:
+    """Position and value of the minimum near x, y: the parabola through three lines, in turn, a few times."""
+    for _ in range(3):
+        x, y = (_vertex(distance, x, y, distance.dx, 0), y)
+        x, y = (x, _vertex(distance, x, y, distance.dy, 1))
+    return x, y, float(distance.at(np.array(x), np.array(y)))
+
+
+def _vertex(distance: Distance, x: float, y: float, step: float, axis: int) -> float:
+    """Minimum along an axis of the parabola through three points near by; the place itself if there is none."""
+    nodes, here = (distance.y, y) if axis else (distance.x, x)
+    middle = min(max(here, nodes[0] + step / 4), nodes[-1] - step / 4)
+    points = middle + np.array([-0.25, 0.0, 0.25]) * step
+    left, centre, right = distance.at(points if not axis else np.full(3, x), np.full(3, y) if not axis else points)
+    curvature = left - 2.0 * centre + right
+    if curvature <= 0.0:
+        return here
+    moved = middle - 0.125 * step * (right - left) / curvature
+    return float(min(max(moved, points[0]), points[2]))
+
+
+def _rooted(lines: np.ndarray, least: np.ndarray, bottom: float, low: float) -> Table:
+    """Lines and the root of their height above the bottom, with the bottom itself as one more line."""
+    k = int(np.searchsorted(lines, bottom))
+    roots = np.sqrt(np.maximum(least - low, 0.0))
+    return np.insert(lines, k, bottom), np.insert(roots, k, 0.0)
+
+
+def _sides(lines: np.ndarray, roots: np.ndarray, bottom: float, root: float) -> tuple[float, float]:
+    """Where the lengths below ``root``, added up from the bottom, end on the low and on the high side."""
+    first, last = roots[:-1], roots[1:]
+    lower, upper = np.minimum(first, last), np.maximum(first, last)
+    span = upper - lower
+    share = np.where(span > 0, np.clip((root - lower) / np.where(span > 0, span, 1.0), 0.0, 1.0), root > lower)
+    lengths = np.diff(lines) * share
+    after = lines[:-1] >= bottom
+    return bottom - float(lengths[~after].sum()), bottom + float(lengths[after].sum())

@@ -1,0 +1,266 @@
+"""Compiled parts of Kalker's theory of 1983: fit on the crude net, strips of the fine net, march along them."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from models.contact.distance_kernels import row_at, segment, value_and_slopes, weights
+
+PARABOLIC, ELLIPTIC = 0, 1
+"""Pressure proportional to the depth d - h, as the theory has it, or to its root, as Hertz' pressure is."""
+DISPLACEMENT, GRADIENT = 0, 1
+"""What the least squares fit."""
+FINER = 3
+"""Points per crude mesh and axis at which the pressure is summed to the load."""
+LEAST = 0.2
+"""Least stiffness 1/W as a share of depth over mean displacement; a Hertzian contact has about 1.2. A flat or ringlike
+bottom leaves the fit undefined, and this bound keeps it positive."""
+
+
+@njit(cache=True)
+def overlap_pressure(depth, height, low, shape):
+    """W times the pressure at a height: depth - height, or the root that has the same value at the bottom."""
+    over = depth - height
+    if over <= 0.0:
+        return 0.0
+    return over if shape == PARABOLIC else math.sqrt(over * (depth - low))
+
+
+@njit(cache=True)
+def crude_net(padded, origin, step, box, depth, low, cells, shape):
+    """Height, W p and covered share of every mesh (cells, cells), rows along y.
+
+    The share of a mesh that the contact covers, for a straight edge: it makes meshes enter and leave without a jump.
+    """
+    height, pressure, cover = np.empty((cells, cells)), np.empty((cells, cells)), np.empty((cells, cells))
+    dx, dy = (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
+    for j in range(cells):
+        v = (box[2] + (j + 0.5) * dy - origin[1]) / step[1]
+        for i in range(cells):
+            u = (box[0] + (i + 0.5) * dx - origin[0]) / step[0]
+            h, slope_x, slope_y = value_and_slopes(padded, u, v)
+            fall = abs(slope_x) * dx / step[0] + abs(slope_y) * dy / step[1]
+            height[j, i], pressure[j, i] = h, overlap_pressure(depth, h, low, shape)
+            share = 0.5 + (depth - h) / fall if fall > 0.0 else (1.0 if h < depth else 0.0)
+            cover[j, i] = min(max(share, 0.0), 1.0)
+    return height, pressure, cover
+
+
+@njit(cache=True)
+def resultant(padded, origin, step, box, depth, low, points, shape):
+    """Sum of W p dA over the box and its first moments along x and y, from points x points midpoints."""
+    total = along_x = along_y = 0.0
+    dx, dy = (box[1] - box[0]) / points, (box[3] - box[2]) / points
+    for j in range(points):
+        y = box[2] + (j + 0.5) * dy
+        for i in range(points):
+            x = box[0] + (i + 0.5) * dx
+            h = value_and_slopes(padded, (x - origin[0]) / step[0], (y - origin[1]) / step[1])[0]
+            p = overlap_pressure(depth, h, low, shape)
+            total += p
+            along_x += p * x
+            along_y += p * y
+    return total * dx * dy, along_x * dx * dy, along_y * dx * dy
+
+
+@njit(cache=True)
+def corner(x, y):
+    """Integral of 1/r over the rectangle from the origin to (x, y), signed (Boussinesq; Johnson, section 3.3)."""
+    along = x * math.asinh(y / abs(x)) if x != 0.0 else 0.0
+    across = y * math.asinh(x / abs(y)) if y != 0.0 else 0.0
+    return along + across
+
+
+@njit(cache=True)
+def displacement(pressure, dx, dy, modulus):
+    """Normal displacement (m) at the meshes' centres by a pressure (Pa) on each mesh, both bodies together."""
+    cells = pressure.shape[0]
+    edges = np.empty((cells + 1, cells + 1))
+    for j in range(cells + 1):
+        for i in range(cells + 1):
+            edges[j, i] = corner((i - 0.5) * dx, (j - 0.5) * dy)
+    influence = edges[1:, 1:] - edges[1:, :-1] - edges[:-1, 1:] + edges[:-1, :-1]
+    found = np.zeros((cells, cells))
+    for row in range(cells):
+        for column in range(cells):
+            p = pressure[row, column]
+            if p > 0.0:
+                for j in range(cells):
+                    k = abs(j - row)
+                    for i in range(cells):
+                        found[j, i] += influence[k, abs(i - column)] * p
+    return found / (math.pi * modulus)
+
+
+@njit(cache=True)
+def covariances(u, h, cover):
+    """Weighted means of u and h, covariance of u and h, and variances of u and of h."""
+    total = cover.sum()
+    mean_u, mean_h = (cover * u).sum() / total, (cover * h).sum() / total
+    du, dh = u - mean_u, h - mean_h
+    return mean_u, mean_h, (cover * du * dh).sum(), (cover * du * du).sum(), (cover * dh * dh).sum()
+
+
+@njit(cache=True)
+def slope_products(u, h, cover, dx, dy, along_y):
+    """Weighted sums of the products of the slopes of u and h and of the squares of those of u, between meshes."""
+    product = square = 0.0
+    rows, columns = u.shape
+    for j in range(rows):
+        for i in range(columns - 1):
+            w, du, dh = cover[j, i] * cover[j, i + 1], (u[j, i + 1] - u[j, i]) / dx, (h[j, i + 1] - h[j, i]) / dx
+            product += w * du * dh
+            square += w * du * du
+    if along_y:
+        for j in range(rows - 1):
+            for i in range(columns):
+                w, du, dh = cover[j, i] * cover[j + 1, i], (u[j + 1, i] - u[j, i]) / dy, (h[j + 1, i] - h[j, i]) / dy
+                product += w * du * dh
+                square += w * du * du
+    return product, square
+
+
+@njit(cache=True)
+def crude_fit(padded, origin, step, box, depth, low, cells, shape, kind, modulus):
+    """Stiffness 1/W (Pa/m), approach (m), sum of W p dA and its first moments, of one patch at a depth."""
+    height, pressure, cover = crude_net(padded, origin, step, box, depth, low, cells, shape)
+    dx, dy = (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
+    u = displacement(pressure, dx, dy, modulus)
+    mean_u, mean_h, both, square, _ = covariances(u, height, cover)
+    if kind == GRADIENT:
+        both, square = slope_products(u, height, cover, dx, dy, True)
+    least = LEAST * (depth - low) / mean_u
+    stiffness = max(-both / square, least) if square > 0.0 else least
+    total, along_x, along_y = resultant(padded, origin, step, box, depth, low, FINER * cells, shape)
+    return stiffness, mean_u * stiffness + mean_h, total, along_x, along_y
+
+
+@njit(cache=True)
+def strips(padded, origin, step, box, depth, low, rows, cells, shape):
+    """Strips of the fine net: y, low and high end in x (s,), and W p in the cells from the leading edge back (s, n).
+
+    Each of ``rows`` lines gives one strip per interval in which h < depth, its ends by bisection of the interpolation.
+    """
+    looks = 4
+    width = (box[3] - box[2]) / rows
+    first = max(int((box[0] - origin[0]) / step[0] * looks) - 1, 0)
+    last = min(int((box[1] - origin[0]) / step[0] * looks) + 2, (padded.shape[1] - 3) * looks)
+    most = rows * (1 + (last - first) // 2)
+    y, low_x, high_x = np.empty(most), np.empty(most), np.empty(most)
+    count = 0
+    for k in range(rows):
+        centre = box[2] + (k + 0.5) * width
+        row = row_at(padded, (centre - origin[1]) / step[1])
+        inside = along(row, first / looks) < depth
+        start = first / looks
+        for m in range(first + 1, last + 1):
+            now = along(row, m / looks) < depth
+            if now and not inside:
+                start = crossing(row, depth, m / looks, (m - 1) / looks)
+            if inside and (not now or m == last):
+                end = crossing(row, depth, (m - 1) / looks, m / looks) if not now else m / looks
+                y[count], low_x[count], high_x[count] = centre, origin[0] + start * step[0], origin[0] + end * step[0]
+                count += 1
+            inside = now
+    pressure = np.empty((count, cells))
+    for s in range(count):
+        row = row_at(padded, (y[s] - origin[1]) / step[1])
+        length = (high_x[s] - low_x[s]) / cells
+        for i in range(cells):
+            h = along(row, (high_x[s] - (i + 0.5) * length - origin[0]) / step[0])
+            pressure[s, i] = overlap_pressure(depth, h, low, shape)
+    return y[:count].copy(), low_x[:count].copy(), high_x[:count].copy(), pressure
+
+
+@njit(cache=True)
+def along(row, u):
+    """Value of a padded row at u spacings."""
+    i, t = segment(u, row.size - 3)
+    w, _ = weights(t)
+    return w[0] * row[i] + w[1] * row[i + 1] + w[2] * row[i + 2] + w[3] * row[i + 3]
+
+
+@njit(cache=True)
+def crossing(row, depth, inner, outer):
+    """Where the row passes the depth between a point below and a point not below it."""
+    for _ in range(50):
+        middle = 0.5 * (inner + outer)
+        if along(row, middle) < depth:
+            inner = middle
+        else:
+            outer = middle
+    return 0.5 * (inner + outer)
+
+
+@njit(cache=True)
+def march(y, low_x, high_x, width, pressure, mu, flexibility, xi_x, xi_y, spin, traction):
+    """FASTSIM along strips with the pressure p of every cell; fills the tractions (s, n, 2).
+
+    Returns fx, fy (N), mz (N m, about x = y = 0) and the area that sticks (m^2). The march is the second-order one:
+    half a first step, and the exact turning of a slipping traction.
+    """
+    fx = fy = mz = stuck = 0.0
+    cells = pressure.shape[1]
+    for s in range(y.size):
+        length = (high_x[s] - low_x[s]) / cells
+        px = py = before = 0.0
+        slips = False
+        for i in range(cells):
+            x = high_x[s] - (i + 0.5) * length
+            go, middle = (length, x + 0.5 * length) if i > 0 else (0.5 * length, x + 0.25 * length)
+            u, v = go * (xi_x - spin * y[s]) / flexibility, go * (xi_y + spin * middle) / flexibility
+            bound = mu * pressure[s, i]
+            px, py, slips = step_on(px, py, u, v, bound, 0.5 * (before + bound), slips)
+            before = bound
+            traction[s, i, 0], traction[s, i, 1] = px, py
+            cell = length * width
+            fx += px * cell
+            fy += py * cell
+            mz += (x * py - y[s] * px) * cell
+            stuck += 0.0 if slips else cell
+    return fx, fy, mz, stuck
+
+
+@njit(cache=True)
+def step_on(px, py, u, v, bound, middle, slips):
+    """Traction after a step in which the rigid slip would take (u, v) from it, and whether it slips.
+
+    A traction that slips on keeps to the bound and turns towards -(u, v): with psi between the two, tan(psi/2) shrinks
+    by exp(-|(u, v)| / middle), ``middle`` the bound half way.
+    """
+    x, y = px - u, py - v
+    size = math.hypot(x, y)
+    if size <= bound:
+        return x, y, False
+    slip, held = math.hypot(u, v), math.hypot(px, py)
+    if slips and slip > 0.0 and held > 0.0 and middle > 0.0:
+        cosine, sine = -(px * u + py * v) / (held * slip), (px * v - py * u) / (held * slip)
+        shrunk = math.exp(-slip / middle)
+        over, aside = (1.0 + cosine, shrunk * sine) if cosine > 0.0 else (sine, shrunk * (1.0 - cosine))
+        square = over * over + aside * aside
+        if square > 0.0:
+            cosine, sine = (over * over - aside * aside) / square, 2.0 * over * aside / square
+        x, y, size = -cosine * u + sine * v, -cosine * v - sine * u, slip
+    return bound * x / size, bound * y / size, True
+
+
+@njit(cache=True)
+def gather(y, low_x, high_x, width, traction, box, cells):
+    """Mean tractions (2, cells, cells) of the crude meshes: every cell's share by its overlap with the mesh."""
+    found = np.zeros((2, cells, cells))
+    dx, dy = (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
+    steps = traction.shape[1]
+    for s in range(y.size):
+        length = (high_x[s] - low_x[s]) / steps
+        bottom, top = (y[s] - 0.5 * width - box[2]) / dy, (y[s] + 0.5 * width - box[2]) / dy
+        for j in range(max(int(bottom), 0), min(int(top) + 1, cells)):
+            high = max(min(top, j + 1.0) - max(bottom, 1.0 * j), 0.0)
+            for i in range(steps):
+                right = (high_x[s] - i * length - box[0]) / dx
+                left = right - length / dx
+                for k in range(max(int(left), 0), min(int(right) + 1, cells)):
+                    share = high * max(min(right, k + 1.0) - max(left, 1.0 * k), 0.0)
+                    found[0, j, k] += share * traction[s, i, 0]
+                    found[1, j, k] += share * traction[s, i, 1]
+    return found

@@ -1,0 +1,131 @@
+"""The undeformed distance of two bodies: how far apart opposite points are while the bodies just touch.
+
+A function h(x, y) >= 0 over a rectangle, kept as values on even nodes with a cubic interpolation that is exact for
+quadratic surfaces. It comes from a formula (``from_function``), from measured or computed values (``from_arrays``),
+from curvatures (``quadratic``) or from two profiles (``models.contact.wheel_on_rail``).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from models.contact.distance_kernels import valley, values
+from models.errors import InputError
+
+NODES = 97
+"""Nodes along each axis of a distance that is made here: 48 spacings on each side of the centre."""
+EVEN = 1e-6
+"""Nodes count as even if no spacing differs from the mean by more than this share of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Distance:
+    """Undeformed distance on even nodes.
+
+    x : (nx,) and y : (ny,) nodes (m), ascending, the axes of the package. height : (ny, nx) distance (m), rows along y.
+    The approach of the bodies counts from distance zero, whether or not the least height is zero.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    height: np.ndarray
+
+    @property
+    def dx(self) -> float:
+        """Spacing of the nodes along x (m)."""
+        return float(self.x[-1] - self.x[0]) / (self.x.size - 1)
+
+    @property
+    def dy(self) -> float:
+        """Spacing of the nodes along y (m)."""
+        return float(self.y[-1] - self.y[0]) / (self.y.size - 1)
+
+    @cached_property
+    def padded(self) -> np.ndarray:
+        """Heights with one more node on every side, continued by the parabola through the last three."""
+        return _continued(_continued(self.height).T).T.copy()
+
+    def at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Distance (m) at points x, y (m), broadcast; raises InputError outside the nodes."""
+        x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        for name, points, nodes in (("x", x, self.x), ("y", y, self.y)):
+            if points.size and not (nodes[0] <= points.min() and points.max() <= nodes[-1]):
+                raise InputError("", name, None, f"must lie from {nodes[0]:g} to {nodes[-1]:g} m, where h is known")
+        u, v = (x.ravel() - self.x[0]) / self.dx, (y.ravel() - self.y[0]) / self.dy
+        return values(self.padded, u, v).reshape(x.shape)
+
+    @cached_property
+    def valley_y(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Lines y (m), the least height on each (m), and the x where it is (m): how the valley runs across y."""
+        return self._valley(self.padded, self.y, self.x, self.dx)
+
+    @cached_property
+    def valley_x(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Lines x (m), the least height on each (m), and the y where it is (m)."""
+        return self._valley(np.ascontiguousarray(self.padded.T), self.x, self.y, self.dy)
+
+    @staticmethod
+    def _valley(padded: np.ndarray, along: np.ndarray, across: np.ndarray,
+                step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+        finer = 2
+        least, where = valley(padded, finer)
+        return np.linspace(along[0], along[-1], least.size), least, across[0] + where * step
+
+    def part(self, x: slice, y: slice) -> "Distance":
+        """The distance on a part of the nodes."""
+        return Distance(self.x[x], self.y[y], self.height[y, x])
+
+
+def from_function(height: Callable[[np.ndarray, np.ndarray], np.ndarray], x: tuple[float, float],
+                  y: tuple[float, float], nodes: int = NODES) -> Distance:  # fmt: skip
+    """Distance from a formula ``height(x, y)`` in m, of arrays in m, over the rectangle x[0]..x[1], y[0]..y[1].
+
+    Raises InputError for an empty rectangle and for a formula without a finite answer of the right shape.
+    """
+    for name, (first, last) in (("x", x), ("y", y)):
+        if not (np.isfinite([first, last]).all() and first < last):
+            raise InputError("", name, [first, last], "must be two finite bounds in m, the lower first")
+    nodes_x, nodes_y = np.linspace(*x, nodes), np.linspace(*y, nodes)
+    found = np.asarray(height(nodes_x[None, :], nodes_y[:, None]), float)
+    try:
+        found = np.broadcast_to(found, (nodes, nodes))
+    except ValueError:
+        raise InputError("", "height", list(found.shape), "must give one distance per point") from None
+    return from_arrays(nodes_x, nodes_y, found)
+
+
+def from_arrays(x: np.ndarray, y: np.ndarray, height: np.ndarray) -> Distance:
+    """Distance from values: x (nx,), y (ny,) even ascending nodes (m), height (ny, nx) (m), rows along y.
+
+    Raises InputError for a wrong shape, uneven nodes, fewer than four of them, or values that are not finite.
+    """
+    nodes = {"x": np.asarray(x, float), "y": np.asarray(y, float)}
+    height = np.array(height, dtype=float)
+    for name, array in nodes.items():
+        if array.ndim != 1 or array.size < 4:
+            raise InputError("", name, list(array.shape), "must have the shape (n,) with n of 4 or more")
+        steps = np.diff(array)
+        if not (np.isfinite(array).all() and steps.min() > 0 and np.ptp(steps) <= 2 * EVEN * steps.mean()):
+            raise InputError("", name, None, "must ascend in even steps (m)")
+    shape = (nodes["y"].size, nodes["x"].size)
+    if height.shape != shape:
+        raise InputError("", "height", list(height.shape), f"must have the shape (ny, nx) = {shape}, rows along y")
+    if not np.isfinite(height).all():
+        raise InputError("", "height", None, "must be finite everywhere (m)")
+    if np.abs(height).max() > 1.0:
+        raise InputError("", "height", float(np.abs(height).max()), "must be in m, not mm: no contact is 1 m deep")
+    return Distance(nodes["x"], nodes["y"], height)
+
+
+def quadratic(A: float, B: float, x: float, y: float, nodes: int = NODES) -> Distance:
+    """Hertz' distance A x^2 + B y^2 (A and B in 1/m) over -x..x and -y..y (m)."""
+    return from_function(lambda u, v: A * u**2 + B * v**2, (-x, x), (-y, y), nodes)
+
+
+def _continued(rows: np.ndarray) -> np.ndarray:
+    """One more row before and after, on the parabola through the three nearest."""
+    first = 3.0 * (rows[0] - rows[1]) + rows[2]
+    last = 3.0 * (rows[-1] - rows[-2]) + rows[-3]
+    return np.vstack([first, rows, last])
