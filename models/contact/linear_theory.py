@@ -1,0 +1,200 @@
+"""Linear theory of rolling contact: forces at creepages so small that nothing slips (Kalker 1967).
+
+    Fx = -G ab C11 xi_x,    Fy = -G ab C22 xi_y - G (ab)^(3/2) C23 spin,
+    Mz = G (ab)^(3/2) C23 xi_y - G (ab)^2 C33 spin,
+
+with coefficients C of the ratio a/b and Poisson's ratio alone, and the flexibilities that make a bed of springs answer
+small creepages with the same forces (Kalker, Vehicle System Dynamics 11 (1982) 1). Signs as in ``models.contact``.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from models.contact.inputs import Array, quantity, together
+from models.contact.material import Pair
+
+STEPS = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0])
+RATIOS = np.concatenate((STEPS, 1.0 / STEPS[-2::-1]))
+"""Ratios a/b of the table."""
+TABLE = np.array([
+    [[2.51, 3.31, 4.85], [2.51, 2.52, 2.53], [0.334, 0.473, 0.731], [6.42, 8.28, 11.7]],
+    [[2.59, 3.37, 4.81], [2.59, 2.63, 2.66], [0.483, 0.603, 0.809], [3.46, 4.27, 5.66]],
+    [[2.68, 3.44, 4.8], [2.68, 2.75, 2.81], [0.607, 0.715, 0.889], [2.49, 2.96, 3.72]],
+    [[2.78, 3.53, 4.82], [2.78, 2.88, 2.98], [0.72, 0.823, 0.977], [2.02, 2.32, 2.77]],
+    [[2.88, 3.62, 4.83], [2.88, 3.01, 3.14], [0.827, 0.929, 1.07], [1.74, 1.93, 2.22]],
+    [[2.98, 3.72, 4.91], [2.98, 3.14, 3.31], [0.93, 1.03, 1.18], [1.56, 1.68, 1.86]],
+    [[3.09, 3.81, 4.97], [3.09, 3.28, 3.48], [1.03, 1.14, 1.29], [1.43, 1.5, 1.6]],
+    [[3.19, 3.91, 5.05], [3.19, 3.41, 3.65], [1.13, 1.25, 1.4], [1.34, 1.37, 1.42]],
+    [[3.29, 4.01, 5.12], [3.29, 3.54, 3.82], [1.23, 1.36, 1.51], [1.27, 1.27, 1.27]],
+    [[3.4, 4.12, 5.2], [3.4, 3.67, 3.98], [1.33, 1.47, 1.63], [1.21, 1.19, 1.16]],
+    [[3.51, 4.22, 5.3], [3.51, 3.81, 4.16], [1.44, 1.59, 1.77], [1.16, 1.11, 1.06]],
+    [[3.65, 4.36, 5.42], [3.65, 3.99, 4.39], [1.58, 1.75, 1.94], [1.1, 1.04, 0.954]],
+    [[3.82, 4.54, 5.58], [3.82, 4.21, 4.67], [1.76, 1.95, 2.18], [1.05, 0.965, 0.852]],
+    [[4.06, 4.78, 5.8], [4.06, 4.5, 5.04], [2.01, 2.23, 2.5], [1.01, 0.892, 0.751]],
+    [[4.37, 5.1, 6.11], [4.37, 4.9, 5.56], [2.35, 2.62, 2.96], [0.958, 0.819, 0.65]],
+    [[4.84, 5.57, 6.57], [4.84, 5.48, 6.31], [2.88, 3.24, 3.7], [0.912, 0.747, 0.549]],
+    [[5.57, 6.34, 7.34], [5.57, 6.4, 7.51], [3.79, 4.32, 5.01], [0.868, 0.674, 0.446]],
+    [[6.96, 7.78, 8.82], [6.96, 8.14, 9.79], [5.72, 6.63, 7.89], [0.828, 0.601, 0.341]],
+    [[10.7, 11.7, 12.9], [10.7, 12.8, 16.0], [12.2, 14.6, 18.0], [0.795, 0.526, 0.228]],
+])  # fmt: skip
+"""[ratio, C11 C22 C23 C33, nu = 0, 1/4, 1/2]: Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), table
+E.3; C33 as recalled, and confirmed by the exact theory of ``rolling_problem`` as the others are."""
+LOGARITHMS = np.log(TABLE)
+SLOPES = np.gradient(LOGARITHMS, np.log(RATIOS), axis=0, edge_order=2)
+NARROW_FADING, LONG_FADING = 1.5, 0.75
+"""Powers of the slenderness with which the difference from the asymptotes vanishes below and above the table."""
+LARGEST_PATCH = 0.5
+"""sqrt(ab) in m: a larger one is usually in mm."""
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Coefficients of creepage and spin, dimensionless, of the common shape of ratio and nu; C32 is -C23."""
+
+    c11: Array
+    c22: Array
+    c23: Array
+    c33: Array
+
+
+def coefficients(ratio: Any, nu: Any) -> Coefficients:
+    """Kalker's coefficients.
+
+    ratio : a/b, from 1e-9 to 1e9; nu : Poisson's ratio, 0 to 1/2; arrays of shapes that broadcast. Raises InputError.
+
+    Between the nodes of the table ln C is a cubic of ln(a/b), and 1/C a parabola of nu. Below a/b = 0.1 and above 10
+    Kalker's asymptotes for slender patches hold, times a factor that makes them meet the table and goes to 1 with the
+    slenderness.
+    """
+    ratio = quantity("ratio", ratio, "a ratio a/b of semi-axes from 1e-9 to 1e9", 1e-9, 1e9)
+    ratio, nu = together(ratio=ratio, nu=quantity("nu", nu, "a Poisson's ratio from 0 to 0.5", 0.0, 0.5))
+    found = _each(ratio.ravel(), nu.ravel()).reshape(4, *ratio.shape)
+    return Coefficients(*(values[()] for values in found))
+
+
+def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair) -> tuple[Array, Array, Array]:
+    """Fx, Fy (N) and Mz (N m) on the wheel as long as nothing slips.
+
+    a, b : semi-axes (m), zero where nothing touches; xi_x, xi_y : creepages (1); spin : 1/m; arrays of shapes that
+    broadcast. Friction does not enter: the forces have no bound. Raises InputError, also for too unlike a pair.
+    """
+    pair.require_likeness()
+    a, b = _axes(a, b)
+    spin = quantity("spin", spin, "a spin in 1/m")
+    xi_x, xi_y = (quantity(name, value, "a creepage") for name, value in (("xi_x", xi_x), ("xi_y", xi_y)))
+    a, b, xi_x, xi_y, spin = together(a=a, b=b, xi_x=xi_x, xi_y=xi_y, spin=spin)
+    c, area = coefficients(_ratio(a, b), pair.nu), a * b
+    fy = -pair.G * (area * c.c22 * xi_y + area**1.5 * c.c23 * spin)
+    mz = pair.G * (area**1.5 * c.c23 * xi_y - area**2 * c.c33 * spin)
+    return -pair.G * area * c.c11 * xi_x, fy, mz
+
+
+def flexibilities(a: Any, b: Any, pair: Pair) -> tuple[Array, Array, Array]:
+    """Flexibilities L1, L2, L3 (m^3/N) of the simplified theory for xi_x, xi_y and spin: displacement by traction.
+
+    L1 = 8 a / (3 G C11), L2 = 8 a / (3 G C22), L3 = pi a sqrt(a/b) / (4 G C23) (Kalker 1982). a, b : semi-axes (m) of
+    shapes that broadcast; zero where nothing touches, and zero comes out. Raises InputError, also for too unlike a
+    pair.
+    """
+    pair.require_likeness()
+    a, b = _axes(a, b)
+    found = _flexible(a.ravel(), b.ravel(), pair.G, pair.nu).reshape(3, *a.shape)
+    return found[0][()], found[1][()], found[2][()]
+
+
+def _axes(a: Any, b: Any) -> tuple[Array, ...]:
+    a, b = (quantity(name, value, "a semi-axis in m, zero or more", 0.0) for name, value in (("a", a), ("b", b)))
+    a, b = together(a=a, b=b)
+    quantity("sqrt(a b)", np.sqrt(a * b), f"at most {LARGEST_PATCH:g} m; axes are in m, not in mm", 0.0, LARGEST_PATCH)
+    return a, b
+
+
+def _ratio(a: Array, b: Array) -> Array:
+    """a/b, and 1 where nothing touches."""
+    return np.divide(a, b, out=np.ones_like(a), where=(a > 0.0) & (b > 0.0))
+
+
+@njit(cache=True)
+def _each(ratio: Array, nu: Array) -> Array:
+    found = np.empty((4, ratio.size))
+    for i in range(ratio.size):
+        for kind in range(4):
+            found[kind, i] = coefficient_at(kind, ratio[i], nu[i])
+    return found
+
+
+@njit(cache=True)
+def _flexible(a: Array, b: Array, modulus: float, nu: float) -> Array:
+    found = np.empty((3, a.size))
+    for i in range(a.size):
+        found[0, i], found[1, i], found[2, i] = flexibilities_at(a[i], b[i], modulus, nu)
+    return found
+
+
+@njit(cache=True)
+def flexibilities_at(a: float, b: float, modulus: float, nu: float) -> tuple[float, float, float]:
+    """L1, L2, L3 of one patch, ``modulus`` the shear modulus G (Pa); for compiled callers, nothing is checked."""
+    if a <= 0.0 or b <= 0.0:
+        return 0.0, 0.0, 0.0
+    c11, c22, c23 = (coefficient_at(0, a / b, nu), coefficient_at(1, a / b, nu), coefficient_at(2, a / b, nu))
+    unit = a / modulus
+    return 8.0 * unit / (3.0 * c11), 8.0 * unit / (3.0 * c22), math.pi * unit * math.sqrt(a / b) / (4.0 * c23)
+
+
+@njit(cache=True)
+def coefficient_at(kind: int, ratio: float, nu: float) -> float:
+    """One of C11, C22, C23, C33 (kind 0 to 3) of one patch; for compiled callers, nothing is checked."""
+    inner = min(max(ratio, RATIOS[0]), RATIOS[-1])
+    found = _tabulated(kind, inner, nu)
+    if inner == ratio:
+        return found
+    if ratio < 1.0:
+        excess = found / _narrow(kind, inner, nu) - 1.0
+        return _narrow(kind, ratio, nu) * (1.0 + excess * (ratio / inner) ** NARROW_FADING)
+    excess = found / _long(kind, inner, nu) - 1.0
+    return _long(kind, ratio, nu) * (1.0 + excess * (inner / ratio) ** LONG_FADING)
+
+
+@njit(cache=True)
+def _tabulated(kind: int, ratio: float, nu: float) -> float:
+    """Cubic Hermite interpolation of ln C in ln(a/b), then the parabola of 1/C through nu = 0, 1/4, 1/2."""
+    i = min(int(np.searchsorted(RATIOS, ratio, side="right")), RATIOS.size - 1) - 1
+    width = math.log(RATIOS[i + 1] / RATIOS[i])
+    t = math.log(ratio / RATIOS[i]) / width
+    rise, low, high = t * t * (3.0 - 2.0 * t), t * (1.0 - t) ** 2 * width, t * t * (t - 1.0) * width
+    s, inverse = 4.0 * nu, 0.0
+    for k, weight in enumerate(((1.0 - s) * (1.0 - s / 2.0), s * (2.0 - s), s * (s - 1.0) / 2.0)):
+        logarithm = (1.0 - rise) * LOGARITHMS[i, kind, k] + rise * LOGARITHMS[i + 1, kind, k]
+        logarithm += low * SLOPES[i, kind, k] + high * SLOPES[i + 1, kind, k]
+        inverse += weight * math.exp(-logarithm)
+    return 1.0 / inverse
+
+
+@njit(cache=True)
+def _narrow(kind: int, ratio: float, nu: float) -> float:
+    """Coefficient of a patch across the direction of rolling, a/b = g to 0 (Kalker 1990, table E.3, first row)."""
+    if kind == 0:
+        return math.pi**2 / (4.0 * (1.0 - nu))
+    if kind == 1:
+        return math.pi**2 / 4.0
+    if kind == 2:
+        return math.pi * math.sqrt(ratio) / (3.0 * (1.0 - nu)) * (1.0 + nu * (math.log(16.0 / ratio) - 5.0))
+    return math.pi**2 / (16.0 * (1.0 - nu) * ratio)
+
+
+@njit(cache=True)
+def _long(kind: int, ratio: float, nu: float) -> float:
+    """Coefficient of a patch along the direction of rolling, b/a = g to 0 (the same table, last row)."""
+    wide = 2.0 * math.log(4.0 * ratio)
+    one, two, three = wide - 2.0 * nu, (1.0 - nu) * wide + 2.0 * nu, (1.0 - nu) * wide - 2.0 + 4.0 * nu
+    if kind == 0:
+        return 2.0 * math.pi * ratio / one * (1.0 + (3.0 - math.log(4.0)) / one)
+    if kind == 1:
+        return 2.0 * math.pi * ratio / two * (1.0 + (1.0 - nu) * (3.0 - math.log(4.0)) / two)
+    if kind == 2:
+        return 2.0 * math.pi * ratio**1.5 / (3.0 * three)
+    return math.pi / 4.0 * (1.0 - nu * (wide - 2.0) / three)
