@@ -23,10 +23,11 @@ Continuity
 
 Several patches
     Each has a net, W_3 and depth of its own. They share the rigid approach, and each is pushed down by the others'
-    pressure, at its centre of pressure, as the half-space has it.
+    pressure, at its centre of pressure, as the half-space has it. Where patches lean (tread and flange), the approach
+    and the load are those along the common direction, the track's vertical.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -106,11 +107,11 @@ class PatchPressure:
 
 
 @dataclass(frozen=True, eq=False)
-class Pressed:
+class NormalContact:
     """Normal contact by the simplified theory.
 
-    approach : rigid approach (m), counted from distance zero. load : N. area : m^2. peak : largest pressure (Pa).
-    patches : the parts in contact.
+    approach : rigid approach (m), counted from distance zero. load : N. Both are along the common direction where
+    patches lean. area : m^2. peak : largest pressure (Pa). patches : the parts in contact.
     """
 
     approach: float
@@ -141,17 +142,21 @@ class Rolling:
     fields: tuple[Fields, ...]
 
 
-def press(distance: Distance, pair: Pair, *, load: float | None = None, approach: float | None = None,
-          options: Options = PLAIN) -> Pressed:  # fmt: skip
-    """Area, pressure and approach of two bodies with an undeformed distance, by a load (N) or by a rigid approach (m).
+def press(bodies: Distance | Sequence[Patch], pair: Pair, *, load: float | None = None, approach: float | None = None,
+          options: Options = PLAIN) -> NormalContact:  # fmt: skip
+    """Area, pressure and approach of two bodies, by a load (N) or by a rigid approach (m).
+
+    bodies : their undeformed distance, or the patches of a wheel on a rail.
 
     Zero or negative load, or bodies apart, give an empty contact. Raises InputError for a load that is not finite, both
     or neither of load and approach, or a contact that reaches the edge of the distance.
     """
     if (load is None) == (approach is None):
         raise InputError("", "load", load, "give either the load in N or the approach in m")
-    patches = separate(distance) if options.separate else whole(distance)
-    lowest = min(patch.low for patch in patches)
+    if isinstance(bodies, Distance):
+        bodies = separate(bodies) if options.separate else whole(bodies)
+    patches = list(bodies)
+    lowest = min(patch.low / np.cos(patch.lean) for patch in patches)
     if load is not None:
         wanted = float(quantity("load", load, "a load in N, up to 1e9", -1e9, 1e9))
         if wanted <= 0.0:
@@ -181,12 +186,13 @@ def _grid(patch: Patch) -> tuple[tuple[float, float], tuple[float, float]]:
     return (float(distance.x[0]), float(distance.y[0])), (distance.dx, distance.dy)
 
 
-def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, options: Options) -> Pressed:
+def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, options: Options) -> NormalContact:
     """Find the depth of a single patch, or the common approach of several, that carries the load."""
     if len(patches) == 1:
-        alone = load_at_depth(patches[0], _found(lambda d: load_at_depth(patches[0], d, pair, options).load, load,
-                                                 lowest, patches[0].edge), pair, options)  # fmt: skip
-        return _gathered(alone.approach, (alone,), pair, options)
+        patch, along = patches[0], np.cos(patches[0].lean)
+        depth = _found(lambda d: load_at_depth(patch, d, pair, options).load, load / along, patch.low, patch.edge)
+        alone = load_at_depth(patch, depth, pair, options)
+        return _gathered(alone.approach / along, (alone,), pair, options)
     approach = _found(lambda reached: _total(_share(patches, reached, pair, options)), load, lowest, np.inf)
     return _gathered(approach, _share(patches, approach, pair, options), pair, options)
 
@@ -203,7 +209,7 @@ def _found(load_at: Callable[[float], float], load: float, lowest: float, limit:
 
 
 def _total(parts: tuple[PatchPressure, ...]) -> float:
-    return sum(part.load for part in parts)
+    return float(sum(part.load * np.cos(part.patch.lean) for part in parts))
 
 
 def _share(patches: list[Patch], approach: float, pair: Pair, options: Options) -> tuple[PatchPressure, ...]:
@@ -213,13 +219,14 @@ def _share(patches: list[Patch], approach: float, pair: Pair, options: Options) 
     depth; the displacements by the others are less than their own, so passing on converges.
     """
     low = np.array([patch.low for patch in patches])
-    depths, ratios = low + 0.6 * (approach - low), np.full(len(patches), 1.0 / 0.6)
+    reached = approach * np.cos([patch.lean for patch in patches])
+    depths, ratios = low + 0.6 * (reached - low), np.full(len(patches), 1.0 / 0.6)
     for _ in range(PASSES):
         parts = tuple(load_at_depth(p, float(d), pair, options) for p, d in zip(patches, depths, strict=True))
         for k, part in enumerate(parts):
             if part.load > 0.0:
                 ratios[k] = (part.approach - low[k]) / (part.depth - low[k])
-        before, depths = depths, low + (approach - _pushed(parts, pair) - low) / ratios
+        before, depths = depths, low + (reached - _pushed(parts, pair) - low) / ratios
         if np.abs(np.maximum(depths, low) - np.maximum(before, low)).max() <= CLOSE * abs(approach):
             return tuple(part for part in parts if part.load > 0.0)
     raise RunFailed("simplified theory", f"patches that share an approach of {approach:.4g} m did not settle")
@@ -231,16 +238,17 @@ def _pushed(parts: tuple[PatchPressure, ...], pair: Pair) -> np.ndarray:
     for k, one in enumerate(parts):
         for other in parts:
             if other is not one:
-                far = np.hypot(one.centre[0] - other.centre[0], one.centre[1] - other.centre[1])
+                across = one.centre[1] + one.patch.place - other.centre[1] - other.patch.place
+                far = np.hypot(one.centre[0] - other.centre[0], across)
                 found[k] += other.load / (np.pi * pair.modulus * far)
     return found
 
 
-def _gathered(approach: float, parts: tuple[PatchPressure, ...], pair: Pair, options: Options) -> Pressed:
+def _gathered(approach: float, parts: tuple[PatchPressure, ...], pair: Pair, options: Options) -> NormalContact:
     """The sum of the patches; area and peak from strips with exact ends."""
     area = sum(_area(part) for part in parts)
     peak = max((part.stiffness * (part.depth - part.patch.low) for part in parts), default=0.0)
-    return Pressed(approach, _total(parts), area, peak, parts, pair, options)
+    return NormalContact(approach, _total(parts), area, peak, parts, pair, options)
 
 
 def _area(part: PatchPressure, rows: int = 200) -> float:
@@ -254,10 +262,12 @@ def _strips(part: PatchPressure, rows: int, cells: int, shape: int) -> tuple[np.
     return strips(patch.distance.padded, origin, step, part.box, part.depth, patch.low, rows, cells, shape)
 
 
-def roll(pressed: Pressed, friction: float, xi_x: float, xi_y: float, spin: float, *, cells: int = CELLS) -> Rolling:
+def roll(pressed: NormalContact, friction: float, xi_x: float, xi_y: float, spin: float, *,
+         cells: int = CELLS) -> Rolling:  # fmt: skip
     """Forces of steady rolling: FASTSIM twice on the fine net of each patch, W_1 = W_2 refitted in between.
 
-    friction : coefficient. xi_x, xi_y : creepages. spin : 1/m, about x = y = 0. cells : strips, and cells in each.
+    friction : coefficient. xi_x, xi_y : creepages. spin : 1/m. cells : strips, and cells in each. Spin and moment are
+    about x = y = 0 of the distance, where patches lean of each patch; roll these one by one if their creepages differ.
     Raises InputError for values that are not finite or a friction below zero.
     """
     quantity("friction", friction, "a coefficient of friction from 0 to 10", 0.0, 10.0)
@@ -272,7 +282,7 @@ def roll(pressed: Pressed, friction: float, xi_x: float, xi_y: float, spin: floa
                    tuple(found[2] for found in rolled))  # fmt: skip
 
 
-def _roll_patch(part: PatchPressure, pressed: Pressed, friction: float, creepage: tuple[float, float, float],
+def _roll_patch(part: PatchPressure, pressed: NormalContact, friction: float, creepage: tuple[float, float, float],
                 cells: int) -> tuple[tuple[float, ...], float, Fields]:  # fmt: skip
     """Forces, flexibility and fields of one patch."""
     y, low, high, pressure = _strips(part, cells, cells, SHAPES[pressed.options.shape])
@@ -288,7 +298,7 @@ def _roll_patch(part: PatchPressure, pressed: Pressed, friction: float, creepage
     return found, flexibility, _fields(y, low, high, width, pressure, traction, friction)
 
 
-def _refitted(part: PatchPressure, pressed: Pressed, traction: np.ndarray) -> float:
+def _refitted(part: PatchPressure, pressed: NormalContact, traction: np.ndarray) -> float:
     """W_1 = W_2 (m/Pa) by least squares of u = W p + a against the half-space; W_3 where no traction can be fitted."""
     net, (x0, x1, y0, y1), pair = pressed.options.net, part.box, pressed.pair
     dx, dy = (x1 - x0) / net, (y1 - y0) / net

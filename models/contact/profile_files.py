@@ -1,0 +1,161 @@
+"""Readers of profile files: two columns of text, Simpack (.prw, .prr) and MiniProf (.whl, .ban).
+
+two columns   y and z per line, apart by blanks, commas or semicolons; lines from #, ! or % on are comments Simpack
+keys "name = value" and the points between point.begin and point.end; "!" starts a comment. Shift, rotation,
+              bounds, mirrors, order and unit of the header are applied, in this order
+MiniProf      a header of lines "key=value", an empty line, then the points x y ...; y upwards
+
+Lengths are in mm unless a Simpack header says otherwise. What a file leaves open is found from the shape: a wheel's
+flange is where its profile is farthest from the tread, and is laid at negative y, downwards; the top of a rail is up. A
+rail's gauge corner cannot be told from its shape, so a rail that is drawn the other way round needs ``mirror``.
+"""
+
+import math
+import re
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from models.contact.profiles import Profile, profile
+from models.errors import InputError, similar_file
+
+MM = 1e-3
+Kind = Literal["wheel", "rail"]
+Points = tuple[np.ndarray, np.ndarray]
+SIMPACK, MINIPROF = (".prw", ".prr"), (".whl", ".ban")
+OF_KIND = {".prw": "wheel", ".prr": "rail", ".whl": "wheel", ".ban": "rail"}
+COMMENTS = re.compile(r"[#!%].*")
+APART = re.compile(r"[\s,;]+")
+SHOWN = 40
+"""Characters of a line that a message shows."""
+
+
+def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror: bool = False) -> Profile:
+    """The profile in a file, as the package has it (m, z down, flange or gauge corner at negative y).
+
+    kind : "wheel" or "rail". smoothing : wavelength (m) of which half is left. mirror : exchange left and right.
+    Raises InputError for a file that cannot be read or understood, naming the line and its text.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if OF_KIND.get(ending, kind) != kind:
+        raise InputError(path, "", None, f"is a file of a {OF_KIND[ending]} by its ending, and a {kind} is wanted")
+    lines = _lines(path)
+    reader = _simpack if ending in SIMPACK else _miniprof if ending in MINIPROF else _columns
+    y, z = reader(lines, path)
+    if y.size < 10:
+        raise InputError(path, "", int(y.size), "points found; a profile needs ten or more, two numbers a line")
+    y, z = _laid(y, z, kind)
+    return profile(-y if mirror else y, z, smoothing, path)
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as error:
+        reason = error.strerror or "cannot be read"
+        raise InputError(path, "", None, f"{reason[0].lower()}{reason[1:]}{similar_file(path)}") from None
+
+
+def _numbers(text: str, number: int, path: Path, least: int = 2) -> list[float]:
+    """The numbers of one line; raises InputError with the line where it holds anything else or too few."""
+    try:
+        found = [float(part) for part in APART.split(text.strip(" \t,;"))]
+    except ValueError:
+        found = []
+    if len(found) < least or not all(math.isfinite(value) for value in found):
+        raise InputError(path, f"line {number}", text.strip()[:SHOWN], f"must hold {least} or more finite numbers")
+    return found
+
+
+def _points(rows: list[list[float]], first: int = 0, second: int = 1) -> Points:
+    return np.array([row[first] for row in rows]), np.array([row[second] for row in rows])
+
+
+def _columns(lines: list[str], path: Path) -> Points:
+    """Two columns of text, in m."""
+    plain = [(k, COMMENTS.sub("", line)) for k, line in enumerate(lines, 1)]
+    y, z = _points([_numbers(line, k, path) for k, line in plain if line.strip()])
+    return y * MM, z * MM
+
+
+def _miniprof(lines: list[str], path: Path) -> Points:
+    """MiniProf: header to the first empty line, then points with y upwards."""
+    rows, columns, heading = [], ["X", "Y"], True
+    for k, line in enumerate(lines, 1):
+        if heading:
+            key, equals, value = line.partition("=")
+            if key.strip().lower() == "columndef":
+                columns = [name.strip().upper() for name in value.split(",")]
+            if line.strip() and not equals:
+                raise InputError(path, f"line {k}", line.strip()[:SHOWN], "must be key=value: a MiniProf header ends "
+                                 "with an empty line")  # fmt: skip
+            heading = bool(line.strip())
+        elif line.strip():
+            rows.append(_numbers(line, k, path))
+    if not {"X", "Y"} <= set(columns[:2]):
+        raise InputError(path, "ColumnDef", ",".join(columns), "must begin with X,Y or Y,X")
+    x, y = _points(rows, columns.index("X"), columns.index("Y"))
+    return x * MM, -y * MM
+
+
+def _simpack(lines: list[str], path: Path) -> Points:
+    """Simpack: the points as the header transforms them."""
+    keys: dict[str, tuple[str, int]] = {}
+    rows: list[list[float]] = []
+    inside = ended = False
+    for k, line in enumerate(lines, 1):
+        text = line.partition("!")[0].strip()
+        if text == "point.begin":
+            inside = True
+        elif text == "point.end":
+            inside, ended = False, True
+        elif inside and text:
+            rows.append(_numbers(text, k, path))
+        elif "=" in text:
+            name, _, value = text.partition("=")
+            keys[name.strip()] = (value.strip(), k)
+    if not ended:
+        raise InputError(path, "", None, "has no points between point.begin and point.end")
+    return _transformed(_points(rows), {name: _key(keys, name, path) for name in DEFAULTS})
+
+
+DEFAULTS = {
+    "shift.y": 0.0, "shift.z": 0.0, "rotate": 0.0, "bound.y.min": 1.0, "bound.y.max": 0.0, "bound.z.min": 1.0,
+    "bound.z.max": 0.0, "mirror.y": 0.0, "mirror.z": 0.0, "inversion": 0.0, "units.len.f": 1e3, "units.ang.f": 1.0,
+}  # fmt: skip
+"""Keys of a Simpack file that change its points; bounds whose lower one is larger are none."""
+
+
+def _key(keys: dict[str, tuple[str, int]], name: str, path: Path) -> float:
+    text, line = keys.get(name, (str(DEFAULTS[name]), 0))
+    value = _numbers(text, line, path, 1)[0]
+    if name.startswith("units") and value <= 0.0:
+        raise InputError(path, f"line {line}: {name}", value, "must be above 0 (units of the file by m or rad)")
+    return value
+
+
+def _transformed(points: Points, key: dict[str, float]) -> Points:
+    """Shift, rotation, bounds, mirrors, order and unit of a Simpack header, in this order."""
+    y, z = points[0] + key["shift.y"], points[1] + key["shift.z"]
+    angle = key["rotate"] / key["units.ang.f"]
+    y, z = y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)
+    keep = np.full(y.shape, True)
+    for values, axis in ((y, "y"), (z, "z")):
+        low, high = key[f"bound.{axis}.min"], key[f"bound.{axis}.max"]
+        keep &= (low >= high) | ((values >= low) & (values <= high))
+    y, z = y[keep] * (1.0 - 2.0 * key["mirror.y"]), z[keep] * (1.0 - 2.0 * key["mirror.z"])
+    order = slice(None, None, -1 if key["inversion"] else 1)
+    return y[order] / key["units.len.f"], z[order] / key["units.len.f"]
+
+
+def _laid(y: np.ndarray, z: np.ndarray, kind: Kind) -> Points:
+    """The points with the rail's top up, or the wheel's flange down and at negative y."""
+    if kind == "rail":
+        ends = 0.5 * (z[0] + z[-1])
+        return (y, z) if ends >= np.median(z) else (y, -z)
+    middle = np.median(z)
+    tip = int(np.argmax(np.abs(z - middle)))
+    z = z if z[tip] > middle else -z
+    return (y, z) if y[tip] < 0.5 * (y.min() + y.max()) else (-y, z)

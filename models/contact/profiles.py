@@ -1,0 +1,95 @@
+"""Cross-sections of wheels and rails.
+
+A profile is a curve z(y) with z downwards, from the wheel into the rail, and y away from the middle of the track:
+a right wheel on a right rail. The flange and the gauge corner lie at negative y.
+    wheel  y from the taping line, z the growth of the radius over that at the taping line
+    rail   y from the rail's axis, z from its highest point
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import CubicSpline, make_smoothing_spline
+
+from models.errors import InputError
+
+SPACING = 1e-4
+"""Distance (m) of the points along a profile's contour."""
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A profile as points.
+
+    y, z : (n,) in m, y ascending. smoothing : wavelength (m) along the contour of which smoothing left half, 0 for
+    none; longer waves pass, shorter ones are damped by 1 / (1 + (smoothing / wavelength)^4).
+    """
+
+    y: np.ndarray
+    z: np.ndarray
+    smoothing: float = 0.0
+
+    @cached_property
+    def curve(self) -> CubicSpline:
+        """z(y), twice continuously differentiable."""
+        return CubicSpline(self.y, self.z)
+
+    def turned(self, angle: float) -> "Profile":
+        """The profile turned by an angle (rad), for a rail the inclination towards the middle of the track.
+
+        The part that stays a curve over y is kept; z counts from its highest point again.
+        """
+        y = self.y * np.cos(angle) + self.z * np.sin(angle)
+        z = self.z * np.cos(angle) - self.y * np.sin(angle)
+        keep = _ascending(y)
+        return Profile(y[keep], z[keep] - z[keep].min(), self.smoothing)
+
+
+def profile(y: np.ndarray, z: np.ndarray, smoothing: float = 0.0, file: object = "") -> Profile:
+    """A profile from measured points y, z (n,) in m, in order along the contour, smoothed and evenly spaced again.
+
+    smoothing : wavelength (m) of which half is left (see ``Profile``). Raises InputError for wrong shapes, values that
+    are not finite or not a profile's size in m, and a contour that does not run along y.
+    """
+    y, z = np.asarray(y, float), np.asarray(z, float)
+    _check(y, z, smoothing, file)
+    if y[0] > y[-1]:
+        y, z = y[::-1], z[::-1]
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
+    apart = np.concatenate([[True], np.diff(length) > 0.0])
+    length, y, z = length[apart], y[apart], z[apart]
+    even = np.linspace(0.0, length[-1], max(round(length[-1] / SPACING), 10) + 1)
+    y, z = (_smoothed(length, values, even, smoothing) for values in (y, z))
+    keep = _ascending(y)
+    return Profile(y[keep], z[keep], smoothing)
+
+
+def _check(y: np.ndarray, z: np.ndarray, smoothing: float, file: object) -> None:
+    if y.ndim != 1 or y.shape != z.shape or y.size < 10:
+        raise InputError(file, "profile", [list(y.shape), list(z.shape)], "must be two columns of ten points or more")
+    if not (np.isfinite(y).all() and np.isfinite(z).all()):
+        raise InputError(file, "profile", None, "must hold finite numbers")
+    width = float(np.ptp(y))
+    if not 0.01 <= width <= 0.5:
+        raise InputError(file, "profile", width, "is its width in m; wheels and rails are 0.01 to 0.5 m wide: is the unit "
+                         "right?")  # fmt: skip
+    if not 0.0 <= smoothing <= 0.05:
+        raise InputError(file, "smoothing", smoothing, "must be a wavelength from 0 to 0.05 m")
+
+
+def _smoothed(length: np.ndarray, values: np.ndarray, even: np.ndarray, smoothing: float) -> np.ndarray:
+    """Coordinate at even lengths: interpolated, then the curve that minimises error^2 + (L / 2 pi)^4 curvature^2."""
+    found = CubicSpline(length, values)(even)
+    if smoothing == 0.0:
+        return found
+    penalty = (smoothing / (2.0 * np.pi)) ** 4 / (even[1] - even[0])
+    return make_smoothing_spline(even, found, lam=penalty)(even)
+
+
+def _ascending(y: np.ndarray) -> slice:
+    """The longest run of points along which y ascends."""
+    breaks = np.flatnonzero(np.diff(y) <= 0.0)
+    starts, ends = np.concatenate([[0], breaks + 1]), np.concatenate([breaks + 1, [y.size]])
+    k = int(np.argmax(ends - starts))
+    return slice(int(starts[k]), int(ends[k]))

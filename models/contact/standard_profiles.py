@@ -1,0 +1,102 @@
+"""Built-in profiles: the wheel S1002 and the rail UIC 60 (60E1), new.
+
+S1002
+    The sections of EN 13715 (formerly UIC 510-2 and ORE S1002) for a flange of 28 mm height and 32.5 mm thickness,
+    lengths in mm, y from the taping line, here with the flange at negative y.
+UIC 60
+    The head of tangent arcs of 300, 80 and 13 mm radius and a side of 1:20, as EN 13674-1 draws it. The two places
+    where the radius changes are fitted, to the rail of the Manchester contact benchmark; the standard's own drawing
+    rounds them otherwise, which moves the surface by some hundredths of a millimetre.
+"""
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+from models.contact.profiles import SPACING, Profile
+from models.errors import InputError
+
+MM = 1e-3
+
+TREAD = (0.0, -3.358537058e-2, 1.565681624e-3, -2.810427944e-5, 5.844240864e-8, -1.562379023e-8, 5.309217349e-15,
+         -5.957839843e-12, 2.646656573e-13)  # fmt: skip
+THROAT = (-4.320221063e3, -1.038384026e3, -1.065501873e2, -6.051367875, -2.054332446e-1, -4.169739389e-3,
+          -4.687195829e-5, -2.252755540e-7)  # fmt: skip
+WHEEL = (-70.0, -62.764705882, -49.662510381, -39.764473993, -38.426669071, -35.0, -26.0, 32.15796, 60.0)
+"""Ends of the sections H to A (mm)."""
+SECTIONS: tuple[Callable[[np.ndarray], np.ndarray], ...] = (
+    lambda y: 9.519259302 + np.sqrt(20.5**2 - (y + 49.5) ** 2),
+    lambda y: 16.0 + np.sqrt(12.0**2 - (y + 55.0) ** 2),
+    lambda y: 8.834924130 + np.sqrt(20.0**2 - (y + 58.558326413) ** 2),
+    lambda y: -93.576667419 - 2.747477419 * y,
+    lambda y: 16.446 - np.sqrt(13.0**2 - (y + 26.210665) ** 2),
+    lambda y: np.polynomial.polynomial.polyval(y, THROAT),
+    lambda y: np.polynomial.polynomial.polyval(y, TREAD),
+    lambda y: 1.364323640 - 0.066666667 * y,
+)
+"""Height over y (mm) in each section, from the flange's back to the outer end of the tread."""
+
+RADII = (300.0, 80.0, 13.0)
+CHANGES = (10.49975, 25.98806)
+"""Distance from the rail's axis (mm) at which 300 changes to 80 and 80 to 13 mm."""
+SIDE = 20.0
+"""Slope of the head's side."""
+LOWEST = 37.0
+"""Depth of the head's side below its top (mm) down to which it is kept."""
+
+
+def s1002_height(y: np.ndarray) -> np.ndarray:
+    """Growth (mm) of the radius of an S1002 wheel at y (mm) from the taping line, flange at -70 to -38 mm."""
+    y = np.asarray(y, float)
+    section = np.clip(np.searchsorted(WHEEL, y, side="right") - 1, 0, len(SECTIONS) - 1)
+    with np.errstate(invalid="ignore"):  # every formula is evaluated everywhere, and used where it is defined
+        return np.select([section == k for k in range(len(SECTIONS))], [height(y) for height in SECTIONS])
+
+
+@cache
+def s1002() -> Profile:
+    """The wheel profile S1002 from 0.5 mm inside its flange's back to 60 mm outside the taping line."""
+    y = np.linspace(-69.5, 60.0, 20001)
+    return _even(y, s1002_height(y))
+
+
+@cache
+def uic60() -> Profile:
+    """The head of an upright UIC 60 rail, to 37 mm below its top."""
+    y, z = _half_head()
+    return _even(np.concatenate([-y[::-1], y[1:]]), np.concatenate([z[::-1], z[1:]]))
+
+
+def _half_head() -> tuple[np.ndarray, np.ndarray]:
+    """Right half of the head (mm) from the axis: arcs that continue one another's tangent, then the side."""
+    y, z, angle = [np.zeros(1)], [np.zeros(1)], 0.0
+    for radius, end in zip(RADII, (*CHANGES, None), strict=True):
+        centre_y, centre_z = y[-1][-1] - radius * np.sin(angle), z[-1][-1] + radius * np.cos(angle)
+        last = np.arctan(SIDE) if end is None else np.arcsin((end - centre_y) / radius)
+        angles = np.linspace(angle, last, 2001)[1:]
+        y.append(centre_y + radius * np.sin(angles))
+        z.append(centre_z - radius * np.cos(angles))
+        angle = last
+    depth = np.linspace(z[-1][-1], LOWEST, 1001)[1:]
+    y.append(y[-1][-1] + (depth - z[-1][-1]) / SIDE)
+    return np.concatenate(y), np.concatenate([*z, depth])
+
+
+def _even(y: np.ndarray, z: np.ndarray) -> Profile:
+    """Points (mm) at even distances along the contour, in m."""
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
+    even = np.linspace(0.0, length[-1], round(length[-1] * MM / SPACING) + 1)
+    return Profile(np.interp(even, length, y) * MM, np.interp(even, length, z) * MM)
+
+
+WHEELS = {"S1002": s1002}
+RAILS = {"UIC60": uic60}
+
+
+def built_in(name: str) -> Profile:
+    """The wheel or rail of this name; raises InputError that lists the names."""
+    known = WHEELS | RAILS
+    if name not in known:
+        raise InputError("", "profile", name, "is not built in", tuple(known))
+    return known[name]()

@@ -1,0 +1,260 @@
+"""A wheel on a rail: where the profiles touch, and the undeformed distance around each place.
+
+The wheel is a body of revolution, the rail straight along x. Axes of the track: x in the direction of rolling, y to
+the right, z down. The wheelset is shifted to the right, turned by the yaw (about z, positive from x to y) and rolled
+(about x) so far that both wheels touch; then it is lowered. The right wheel is described; the left one is its mirror
+image, with shift, yaw and roll reversed.
+
+Touching
+    Of every circle of the wheel one point is nearest to a straight rail: where the wheel's normal is square to x.
+    These points form the wheel's outline, seen along x (Wickens; also "locus of contact points"). The vertical gap of
+    outline and rail has a minimum at every place that can touch.
+Distance
+    At each minimum a plane touches the rail. Over this plane both surfaces are heights, and the difference of the
+    heights is the distance, by Newton's method on the wheel's surface itself: rolling radius, yaw and roll are all in
+    it.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
+
+from models.contact.inputs import quantity
+from models.contact.patches import RIDGE, Patch, ridges
+from models.contact.profiles import Profile
+from models.contact.undeformed_distance import Distance
+from models.errors import InputError, RunFailed
+
+DEEP = 2e-4
+"""Distance (m) up to which the surroundings of a touching place are taken in; steel yields long before."""
+NODES = 121
+"""Nodes of a distance along each axis."""
+STEEPEST_ROLL = 0.06
+"""Largest roll angle (rad) that is looked for."""
+ITERATIONS = 12
+
+
+@dataclass(frozen=True)
+class Track:
+    """gauge : between the rails (m), ``gauge_depth`` below their tops (m). inclination : of the rails (rad)."""
+
+    gauge: float = 1.435
+    gauge_depth: float = 0.014
+    inclination: float = 0.025
+
+
+@dataclass(frozen=True)
+class Wheelset:
+    """radius : at the taping line (m). back_to_back : between the flanges' backs (m). taping : line to back (m)."""
+
+    radius: float = 0.46
+    back_to_back: float = 1.360
+    taping: float = 0.070
+
+    @property
+    def arm(self) -> float:
+        """From the middle of the axle to a taping line (m)."""
+        return self.back_to_back / 2.0 + self.taping
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Where the wheelset is, seen from one side.
+
+    shift : towards this side's rail (m). yaw, roll : rad. fall : of the axle (m) below the height at which the taping
+    line is level with the top of the rail.
+    """
+
+    shift: float
+    yaw: float
+    roll: float
+    fall: float
+
+    @cached_property
+    def turn(self) -> np.ndarray:
+        """Rotation (3, 3) from the wheelset to the track: roll, then yaw."""
+        (cr, sr), (cy, sy) = ((np.cos(a), np.sin(a)) for a in (self.roll, self.yaw))
+        return np.array([[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]]) @ np.array(
+            [[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """A place where wheel and rail touch, or would if they came closer.
+
+    gap : vertical gap (m), 0 at the place that touches but for some nanometres. angle : of the rail's surface (rad),
+    negative where it falls towards the gauge corner. wheel_y, rail_y : place on the profiles (m; rail: from the rail's
+    highest point after inclination). x : ahead of the axle (m). patch : undeformed distance around it, x and y from
+    the place, y along the surface.
+    """
+
+    gap: float
+    angle: float
+    wheel_y: float
+    rail_y: float
+    x: float
+    patch: Patch
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One wheel on one rail. rail : as it lies in the track, y from the middle of the track."""
+
+    wheel: Profile
+    rail: Profile
+    wheelset: Wheelset
+
+    def outline(self, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
+        """Points (n, 3) of the wheel nearest to straight rails, in the track (m), and their slope dz/dy."""
+        y, slope = self.wheel.y, self.wheel.curve(self.wheel.y, 1)
+        radius = self.wheelset.radius + self.wheel.z
+        lead = np.sin(pose.roll) * np.tan(pose.yaw)
+        sine = -slope * np.cos(pose.roll) * np.tan(pose.yaw) / np.hypot(1.0, lead)
+        angle = np.arcsin(np.clip(sine, -1.0, 1.0)) - np.arctan(lead)
+        points = np.column_stack([radius * np.sin(angle), self.wheelset.arm + y, radius * np.cos(angle)])
+        return points @ pose.turn.T + self.centre(pose), slope
+
+    def centre(self, pose: Pose) -> np.ndarray:
+        """Middle of the axle in the track (m)."""
+        return np.array([0.0, pose.shift, pose.fall - self.wheelset.radius])
+
+    def gaps(self, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
+        """Outline points (n, 3) that lie over the rail, and the vertical gap (m) below each."""
+        points, _ = self.outline(pose)
+        over = (points[:, 1] >= self.rail.y[0]) & (points[:, 1] <= self.rail.y[-1])
+        over &= np.concatenate([np.diff(points[:, 1]) > 0.0, [True]])
+        if np.count_nonzero(over) < 10:
+            raise InputError("", "lateral_shift", pose.shift, "leaves no part of the wheel above the rail")
+        return points[over], self.rail.curve(points[over, 1]) - points[over, 2]
+
+    def clearance(self, pose: Pose) -> float:
+        """Least vertical gap (m), between the points by a parabola."""
+        gap = self.gaps(pose)[1]
+        k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
+        rise, bend = (gap[k + 1] - gap[k - 1]) / 2.0, gap[k + 1] - 2.0 * gap[k] + gap[k - 1]
+        return float(gap[k] - 0.5 * rise**2 / bend) if bend > abs(rise) else float(gap.min())
+
+
+def wheel_on_rail(wheel: Profile, rail: Profile, *, lateral_shift: float = 0.0, yaw: float = 0.0,
+                  track: Track | None = None, wheelset: Wheelset | None = None) -> list[Touch]:  # fmt: skip
+    """Touching places of the right wheel, the one that touches first, others by their gap while this is below 0.2 mm.
+
+    wheel, rail : profiles; the rail upright, ``track.inclination`` turns it (0 for one that is measured as it lies).
+    lateral_shift : of the wheelset to the right (m). yaw : rad. For the left wheel give both with the other sign.
+    The defaults of ``track`` and ``wheelset`` are those of the Manchester contact benchmark.
+    Raises InputError for values out of range, or a wheelset so placed that both wheels cannot touch.
+    """
+    track, wheelset = track or Track(), wheelset or Wheelset()
+    quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
+    quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
+    side = Side(wheel, laid(rail, track), wheelset)
+    pose = _placed(side, lateral_shift, yaw)
+    return _touches(side, pose)
+
+
+def laid(rail: Profile, track: Track) -> Profile:
+    """The rail as it lies to the right of the track: inclined, its top at z = 0, its gauge face at half the gauge."""
+    inclined = rail.turned(track.inclination) if track.inclination else rail
+    y, z = inclined.y, inclined.z - inclined.z.min()
+    inner = (y < y[np.argmin(z)]) & (z <= track.gauge_depth)
+    if not inner.any() or z[0] < track.gauge_depth:
+        raise InputError("", "rail", float(z[0]), f"is the depth (m) to which the gauge side is known; the gauge is "
+                         f"measured at {track.gauge_depth:g} m")  # fmt: skip
+    return Profile(y - y[inner].min() + track.gauge / 2.0, z, inclined.smoothing)
+
+
+def _placed(side: Side, shift: float, yaw: float) -> Pose:
+    """The pose in which both wheels just touch."""
+
+    def right_over_left(roll: float) -> float:
+        return side.clearance(Pose(shift, yaw, roll, 0.0)) - side.clearance(Pose(-shift, -yaw, -roll, 0.0))
+
+    if right_over_left(-STEEPEST_ROLL) * right_over_left(STEEPEST_ROLL) > 0.0:
+        raise InputError("", "lateral_shift", shift, "lets only one wheel touch: profiles, gauge and shift do not fit")
+    roll = float(brentq(right_over_left, -STEEPEST_ROLL, STEEPEST_ROLL, xtol=1e-13))
+    return Pose(shift, yaw, roll, side.clearance(Pose(shift, yaw, roll, 0.0)))
+
+
+def _touches(side: Side, pose: Pose) -> list[Touch]:
+    """The minima of the vertical gap, each between the ridges beside it."""
+    points, gap = side.gaps(pose)
+    cuts = [0, *ridges(gap, RIDGE), gap.size - 1]
+    found = []
+    for first, last in pairwise(cuts):
+        k = first + int(np.argmin(gap[first : last + 1]))
+        if gap[k] < DEEP and 0 < k < gap.size - 1:
+            found.append(_touch(side, pose, points, gap, (first, k, last)))
+    return sorted(found, key=lambda touch: touch.gap)
+
+
+def _touch(side: Side, pose: Pose, points: np.ndarray, gap: np.ndarray, at: tuple[int, int, int]) -> Touch:
+    """One touching place and the distance around it."""
+    first, k, last = at
+    x, y = float(points[k, 0]), float(points[k, 1])
+    angle = float(np.arctan(side.rail.curve(y, 1)))
+    low, high = _reach(gap, at, angle)
+    cut = (False, False, low == first and first > 0, high == last and last < gap.size - 1)
+    ends = (points[low, 1] - y) / np.cos(angle), (points[high, 1] - y) / np.cos(angle)
+    distance = _distance(side, pose, np.array([x, y, side.rail.curve(y)]), angle, ends)
+    top = float(side.rail.y[np.argmin(side.rail.z)])
+    between = np.linspace(top, y, 200)
+    along = float(np.trapezoid(np.hypot(1.0, side.rail.curve(between, 1)), between))
+    wheel_y = float((pose.turn.T @ (points[k] - side.centre(pose)))[1] - side.wheelset.arm)
+    patch = Patch(distance, cut, abs(angle), along)
+    return Touch(patch.low / float(np.cos(angle)), angle, wheel_y, y - top, x, patch)
+
+
+def _distance(side: Side, pose: Pose, place: np.ndarray, angle: float, ends: tuple[float, float]) -> Distance:
+    """Distance over the plane that touches the rail at a place, between two ends along the rail's contour."""
+    half = 1.2 * np.sqrt(2.0 * DEEP * side.wheelset.radius / np.cos(angle))
+    rail_s, rail_n = _rail_heights(side.rail, place, angle)
+    x = np.linspace(-half, half, NODES)
+    s = np.linspace(max(ends[0], rail_s[0]), min(ends[1], rail_s[-1]), NODES)
+    return Distance(x, s, CubicSpline(rail_s, rail_n)(s)[:, None] - _wheel_heights(side, pose, place, angle, x, s))
+
+
+def _reach(gap: np.ndarray, at: tuple[int, int, int], angle: float) -> tuple[int, int]:
+    """Indices to both sides of a minimum where its surroundings end: beyond DEEP along the normal, or at a ridge."""
+    first, k, last = at
+    deep = (gap - gap[k]) * np.cos(angle) > DEEP * 1.5
+    below, above = np.flatnonzero(deep[first:k]), np.flatnonzero(deep[k : last + 1])
+    return (first + int(below[-1]) if below.size else first), (k + int(above[0]) if above.size else last)
+
+
+def _rail_heights(rail: Profile, place: np.ndarray, angle: float) -> tuple[np.ndarray, np.ndarray]:
+    """The rail over its tangent plane: s along it and n into the rail (m), where s ascends around the place."""
+    y, z = rail.y - place[1], rail.z - place[2]
+    s, n = y * np.cos(angle) + z * np.sin(angle), z * np.cos(angle) - y * np.sin(angle)
+    backward = np.flatnonzero(np.diff(s) <= 1e-9)
+    here = int(np.argmin(np.abs(s)))
+    low = backward[backward < here]
+    high = backward[backward >= here]
+    keep = slice(int(low[-1]) + 1 if low.size else 0, int(high[0]) + 1 if high.size else s.size)
+    return s[keep], n[keep]
+
+
+def _wheel_heights(side: Side, pose: Pose, place: np.ndarray, angle: float, x: np.ndarray,
+                   s: np.ndarray) -> np.ndarray:  # fmt: skip
+    """The wheel over the plane that touches the rail, (s, x): Newton's method on distance to the axle = radius."""
+    along = np.array([0.0, np.cos(angle), np.sin(angle)])
+    into = np.array([0.0, -np.sin(angle), np.cos(angle)])
+    turn, centre = pose.turn, side.centre(pose)
+    base = place + x[None, :, None] * np.array([1.0, 0.0, 0.0]) + s[:, None, None] * along
+    base, into = (base - centre) @ turn, into @ turn
+    curve, slope, arm = side.wheel.curve, side.wheel.curve.derivative(), side.wheelset.arm
+    height = np.zeros((s.size, x.size))
+    for _ in range(ITERATIONS):
+        q = base + height[..., None] * into
+        y, axle = np.clip(q[..., 1] - arm, side.wheel.y[0], side.wheel.y[-1]), np.hypot(q[..., 0], q[..., 2])
+        short = axle - side.wheelset.radius - curve(y)
+        rate = (q[..., 0] * into[0] + q[..., 2] * into[2]) / axle - slope(y) * into[1]
+        step = short / rate
+        height -= step
+        if np.abs(step).max() < 1e-12:
+            return height
+    raise RunFailed("wheel on rail", "the wheel's surface was not found around the place of contact")
