@@ -1,0 +1,169 @@
+"""FASTSIM: creep forces on an elliptic contact by Kalker's simplified theory (Vehicle System Dynamics 11 (1982) 1).
+
+Displacement is traction times a flexibility L. In each strip along the direction of rolling the traction starts from
+zero at the leading edge and grows by -w dx / L over each step, with w = (xi_x - spin y, xi_y + spin x) the rigid
+slip; where it would exceed mu times the pressure, the strip slips and the traction is held to that bound.
+
+Flexibilities
+    L1, L2, L3 for longitudinal and lateral creepage and spin make the forces of small creepages those of the linear
+    theory. ``"three"`` uses each with its own creepage; sliding all over, the traction then does not point along the
+    slip. ``"one"`` is the mean of 1982, weighted by the creepages: right in full sliding, but not smooth at small
+    creepage, and up to 15 % of mu N off in mixed creepage. ``"blended"``, the default, goes from three to one where
+    the tractions of the linear theory pass 1.5 to 3 times the bound, and has the virtues of both.
+Bound
+    ``"parabolic"`` pressure, the default, is the one that goes with a bed of springs; ``"elliptic"`` is Hertz's, closer
+    to the exact theory half-way to full sliding and in pure spin, and further from it on the whole.
+March
+    ``"second-order"``, the default, takes half a first step and turns a slipping traction exactly. ``"plain"`` is the
+    program of 1982, first order in the size of the cells.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from models.contact.fastsim_falling import Falling, forces_falling
+from models.contact.fastsim_grid import Bound, Grid, grid, strips_of
+from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER
+from models.contact.fastsim_many import BLENDED, ONE, THREE, forces, point
+from models.contact.hertz import LARGEST_LOAD
+from models.contact.inputs import Array, quantity, together
+from models.contact.linear_theory import flexibilities as linear_flexibilities
+from models.contact.material import Pair
+from models.errors import InputError
+
+Flexibilities = Literal["blended", "one", "three"]
+March = Literal["second-order", "plain"]
+KINDS = {"blended": BLENDED, "one": ONE, "three": THREE}
+MARCHES = {"second-order": SECOND_ORDER, "plain": PLAIN}
+LEAST_CELLS, MOST_CELLS = 3, 2000
+LARGEST_CREEPAGE = 10.0
+LARGEST_SPIN = 1e6
+"""1/m"""
+
+
+@dataclass(frozen=True)
+class Creep:
+    """Forces on the wheel; every field has the common shape of what was given.
+
+    fx, fy : N. mz : N m, about the centre. stick : share of the area that sticks. dissipation : -(fx xi_x + fy xi_y +
+    mz spin) in J per metre rolled, times the rolling speed the power in W; never negative. wear_number : |fx xi_x| +
+    |fy xi_y| in N (T gamma).
+    """
+
+    fx: Array
+    fy: Array
+    mz: Array
+    stick: Array
+    dissipation: Array
+    wear_number: Array
+
+
+def fastsim(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair, *, cells: int = 21,
+            bound: Bound = "parabolic", flexibilities: Flexibilities = "blended", march: March = "second-order",
+            falling: Falling | None = None) -> Creep:  # fmt: skip
+    """Creep forces on one ellipse or on many.
+
+    Parameters
+    ----------
+    a, b : semi-axes along and across the direction of rolling (m)
+    load : N; zero or less makes all forces zero
+    mu : coefficient of friction, 0 to 10
+    xi_x, xi_y : creepages; spin : 1/m, signs as in ``models.contact``
+        All of them arrays of any shapes that broadcast.
+    pair : the two materials
+    cells : in each strip; strips are as many, and more on an ellipse narrower than a/b = 1/2 (see ``fastsim_grid``)
+    falling : friction that falls with the speed of slip; None for a constant one
+
+    Raises
+    ------
+    InputError : names the value that is not finite, not plausible in SI, or of no common shape, or the word not known
+    """
+    check_choices(cells, bound, flexibilities, march)
+    columns, shape = _columns(a, b, load, mu, xi_x, xi_y, spin, pair)
+    found = np.zeros((len(columns), 4))
+    strips = strips_of(columns[:, 0] / columns[:, 1], cells)
+    for count in np.unique(strips):
+        rows = strips == count
+        net, some = grid(cells, int(count), bound), np.zeros((int(rows.sum()), 4))
+        if falling is None:
+            forces(columns[rows], net.strips, net.cells, net.middle, KINDS[flexibilities], MARCHES[march], some)
+        else:
+            _second_order_only(march)
+            forces_falling(columns[rows], net.strips, net.cells, net.middle, KINDS[flexibilities], *falling.law, some)
+        found[rows] = some
+    return _creep(found, columns, shape)
+
+
+class Ellipse:
+    """FASTSIM on ellipses of one shape, as a wheel on a rail has them: all that does not change is computed once.
+
+    ``Ellipse(ratio, pair)(a, load, mu, xi_x, xi_y, spin)`` is (fx, fy, mz) in N, N, N m, from plain numbers and for
+    plain numbers, in microseconds; ratio = a/b. Options are those of ``fastsim``. Raises InputError.
+    """
+
+    def __init__(self, ratio: float, pair: Pair, *, cells: int = 21, bound: Bound = "parabolic",
+                 flexibilities: Flexibilities = "blended", march: March = "second-order") -> None:  # fmt: skip
+        check_choices(cells, bound, flexibilities, march)
+        self.ratio = float(quantity("ratio", ratio, "a ratio a/b of semi-axes from 1e-6 to 1e6", 1e-6, 1e6))
+        self.net: Grid = grid(cells, int(strips_of(np.array(self.ratio), cells)), bound)
+        unit = 1e-3
+        self._unit = tuple(float(value) / unit for value in linear_flexibilities(unit, unit / self.ratio, pair))
+        self._fixed = (1.0 / self.ratio, *self._unit, self.net.strips, self.net.cells, self.net.middle,
+                       KINDS[flexibilities], MARCHES[march])  # fmt: skip
+
+    def __call__(self, a: float, load: float, mu: float, xi_x: float, xi_y: float, spin: float
+                 ) -> tuple[float, float, float]:  # fmt: skip
+        """Forces and moment; a : semi-axis along the direction of rolling (m)."""
+        found = point(a, load, mu, xi_x, xi_y, spin, *self._fixed)
+        if not math.isfinite(found[0] + found[1] + found[2]):
+            _columns(a, a / self.ratio, load, mu, xi_x, xi_y, spin, Pair())
+            raise InputError("", "a", a, "must be a semi-axis in m, above 0 where there is a load")
+        return found
+
+
+def check_choices(cells: int, bound: str, flexibilities: str, march: str) -> None:
+    """Raise InputError for an option that is not one."""
+    if isinstance(cells, bool) or not isinstance(cells, int | np.integer) or not LEAST_CELLS <= cells <= MOST_CELLS:
+        raise InputError("", "cells", cells, f"must be a whole number from {LEAST_CELLS} to {MOST_CELLS}")
+    for name, value, known in (("bound", bound, ("parabolic", "elliptic")), ("march", march, tuple(MARCHES)),
+                               ("flexibilities", flexibilities, tuple(KINDS))):  # fmt: skip
+        if value not in known:
+            raise InputError("", name, value, "is not known", known)
+
+
+def _second_order_only(march: str) -> None:
+    if march != "second-order":
+        raise InputError("", "march", march, "must be second-order where friction falls with the speed of slip")
+
+
+def _columns(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair
+             ) -> tuple[Array, tuple[int, ...]]:  # fmt: skip
+    """The contacts (n, 10) as the kernels read them, and the shape they had; those without load have axes of 1 m."""
+    creepages = {name: quantity(name, value, f"a creepage within +-{LARGEST_CREEPAGE:g}", -LARGEST_CREEPAGE,
+                                LARGEST_CREEPAGE) for name, value in (("xi_x", xi_x), ("xi_y", xi_y))}  # fmt: skip
+    axes = {name: quantity(name, value, "a semi-axis in m, zero or more", 0.0) for name, value in (("a", a), ("b", b))}
+    given = together(
+        **axes,
+        load=quantity("load", load, f"a load in N, at most {LARGEST_LOAD:g}", most=LARGEST_LOAD),
+        mu=quantity("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0), **creepages,
+        spin=quantity("spin", spin, f"a spin in 1/m within +-{LARGEST_SPIN:g}", -LARGEST_SPIN, LARGEST_SPIN),
+    )  # fmt: skip
+    columns = np.array([values.ravel() for values in given]).T.reshape(-1, 7)
+    loaded = columns[:, 2] > 0.0
+    quantity("a", columns[loaded, 0], "a semi-axis in m, above 0 where there is a load", np.nextafter(0.0, 1.0))
+    quantity("b", columns[loaded, 1], "a semi-axis in m, above 0 where there is a load", np.nextafter(0.0, 1.0))
+    columns[~loaded, :2] = 0.1
+    flexible = linear_flexibilities(columns[:, 0], columns[:, 1], pair)
+    return np.ascontiguousarray(np.column_stack([columns, *flexible])), given[0].shape
+
+
+def _creep(found: Array, columns: Array, shape: tuple[int, ...]) -> Creep:
+    """Rows (n, 4) of the kernels with the powers that follow from them."""
+    fx, fy, mz, stick = found.T
+    along, across = fx * columns[:, 4], fy * columns[:, 5]
+    lost = -(along + across + mz * columns[:, 6])
+    named = (fx, fy, mz, stick, lost, np.abs(along) + np.abs(across))
+    return Creep(*(values.reshape(shape)[()] for values in named))

@@ -1,0 +1,69 @@
+"""The cells of FASTSIM on an ellipse of semi-axes 1: strips with exact ends, and the bound normalised to the load."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+
+from models.contact.inputs import Array
+
+Bound = Literal["parabolic", "elliptic"]
+MOST_STRIPS = 3
+"""Strips per cell along them, at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The net of one ellipse, in its own scale.
+
+    strips : (4, strips), rows as in ``fastsim_many``: y/b, half length by a, that by the bound, share of the load
+    cells : (7, cells), rows as in ``fastsim_kernels``
+    middle : pressure in the middle of the ellipse times a b / N
+    """
+
+    strips: Array
+    cells: Array
+    middle: float
+
+
+def strips_of(ratio: Array, cells: int) -> Array:
+    """Strips that a net of ``cells`` per strip has on ellipses of a/b = ``ratio``: an even number of at least as many.
+
+    Under spin the traction turns about a pole, within a distance of a: strips of a narrow ellipse must not be wider.
+    An even number, because a strip through the pole of pure spin would stand for both its sides.
+    """
+    wanted = cells * np.clip((0.5 / ratio) ** 0.6, 1.0, MOST_STRIPS)
+    return 2 * np.ceil(wanted / 2.0 - 1e-9).astype(int)
+
+
+@lru_cache(maxsize=256)
+def grid(cells: int, strips: int, bound: Bound) -> Grid:
+    """Net of ``strips`` strips of one width with ``cells`` cells each, of one length within a strip.
+
+    Pressure is sampled at the cells' centres and scaled so that its sum over all cells is the load exactly.
+    """
+    y = 1.0 - (2.0 * np.arange(strips) + 1.0) / strips
+    half = np.sqrt((1.0 - y) * (1.0 + y))
+    along, height = _along(cells, bound), _pressure(y, bound)
+    share = height * half
+    whole = share.sum() * along[1].sum()
+    return Grid(np.array([y, half, half / height, share / whole]), along, cells * strips / (4.0 * whole))
+
+
+def _along(cells: int, bound: Bound) -> Array:
+    """What is the same for every strip: rows CENTRE, BOUND, MIDDLE, SHARE, CHANGE, BEFORE, RATE of the kernels."""
+    edges = np.linspace(1.0, -1.0, cells + 1)
+    centre = (edges[:-1] + edges[1:]) / 2.0
+    first = np.arange(cells) == 0
+    middle = np.where(first, (1.0 + centre[0]) / 2.0, edges[:-1])
+    share = np.where(first, 0.5, 1.0)
+    height = _pressure(centre, bound)
+    before = np.where(first, 0.0, np.roll(height, 1))
+    return np.array([centre, height, middle, share, -2.0 / cells * share**2, before, 1.0 / _pressure(middle, bound)])
+
+
+def _pressure(t: Array, bound: Bound) -> Array:
+    """Pressure over that in the middle, at distance ``t`` from it in semi-axes."""
+    square = (1.0 - t) * (1.0 + t)
+    return square if bound == "parabolic" else np.sqrt(square)

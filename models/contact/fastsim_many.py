@@ -1,0 +1,149 @@
+"""Many ellipses at once: from creepages to the strips' own numbers, through the march, and back to forces.
+
+Strips of all ellipses are lined up and marched in full blocks, so that no lane is empty but at the very end.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from models.contact.fastsim_kernels import (
+    LANES,
+    ROWS,
+    SECOND_ORDER,
+    STUCK,
+    SUM_T,
+    SUM_X,
+    SUM_Y,
+    V0,
+    V1,
+    U,
+    march_plain,
+    march_second_order,
+)
+
+A, B, LOAD, MU, XI_X, XI_Y, SPIN, L1, L2, L3 = range(10)
+"""Columns of contacts; L1 to L3 are the flexibilities (m^3/N) along x, along y and in spin."""
+Y, HALF, SPREAD, PART = range(4)
+"""Rows of the strips: y/b, half length by a, that by the bound in the strip's middle, share of the load per bound."""
+ONE, THREE, BLENDED = 0, 1, 2
+FIRST, SATURATED = 1.5, 3.0
+"""Creepages by those at which the tractions of the linear theory reach the bound: the blend begins and is done."""
+
+
+@njit(cache=True, error_model="numpy")
+def forces(contacts, strips, cells, middle, kind, march, found):
+    """Fill ``found`` (n, 4) with fx, fy (N), mz (N m) and the share of the area that sticks.
+
+    contacts : (n, 10), columns as above; strips, cells, middle : a net from ``fastsim_grid``; kind : of flexibility;
+    march : PLAIN or SECOND_ORDER. A contact without load or friction has zeros all over.
+    """
+    slips = np.empty((len(contacts), 3))
+    for c in range(len(contacts)):
+        rigid_slip(contacts[c], cells.shape[1], middle, kind, slips[c])
+        found[c] = 0.0
+    lanes = np.zeros(ROWS * LANES)
+    m = strips.shape[1]
+    for first in range(0, len(contacts) * m, LANES):
+        count = min(LANES, len(contacts) * m - first)
+        _fill(lanes, first, count, contacts, strips, slips)
+        if march == SECOND_ORDER:
+            march_second_order(lanes, cells)
+        else:
+            march_plain(lanes, cells)
+        _collect(lanes, first, count, contacts, strips, found)
+    area = 0.0
+    for s in range(m):
+        area += strips[HALF, s]
+    for c in range(len(contacts)):
+        found[c, 3] /= cells.shape[1] * area
+
+
+@njit(cache=True, error_model="numpy")
+def rigid_slip(contact, cells, middle, kind, slip):
+    """Fill ``slip`` with the traction by the bound in the ellipse's middle that each creepage builds up over one cell
+    of the middle strip, were there no slip; the third one is that of spin per metre."""
+    a, b, load, mu = contact[A], contact[B], contact[LOAD], contact[MU]
+    if not (load > 0.0 and mu > 0.0):
+        slip[:] = 0.0
+        return
+    bound = mu * middle * load / (a * b)
+    k1, k2, k3 = stiffness(contact, bound, kind)
+    step = 2.0 * a / (cells * bound)
+    slip[0], slip[1], slip[2] = k1 * contact[XI_X] * step, k2 * contact[XI_Y] * step, k3 * contact[SPIN] * step
+
+
+@njit(cache=True, error_model="numpy")
+def stiffness(contact, bound, kind):
+    """Inverses of the flexibilities along x, along y and in spin (N/m^3)."""
+    k1, k2, k3 = 1.0 / contact[L1], 1.0 / contact[L2], 1.0 / contact[L3]
+    if kind == THREE:
+        return k1, k2, k3
+    turn = contact[SPIN] * math.sqrt(contact[A] * contact[B])
+    one = 1.0 / weighted(contact, turn)
+    part = 1.0
+    if kind == BLENDED:
+        x, y, z = contact[XI_X] * k1, contact[XI_Y] * k2, turn * k3
+        size = contact[A] * math.sqrt(x * x + y * y + z * z) / bound
+        part = min(1.0, max(0.0, (size - FIRST) / (SATURATED - FIRST)))
+        part *= part * (3.0 - 2.0 * part)
+    return k1 + part * (one - k1), k2 + part * (one - k2), k3 + part * (one - k3)
+
+
+@njit(cache=True, error_model="numpy")
+def weighted(contact, turn):
+    """Flexibility of 1982: those of the three creepages, weighted by their sizes; ``turn`` = spin sqrt(a b)."""
+    x, y, z = abs(contact[XI_X]), abs(contact[XI_Y]), abs(turn)
+    most = max(x, max(y, z))
+    if most == 0.0:
+        return contact[L1]
+    x, y, z = x / most, y / most, z / most
+    return (x * contact[L1] + y * contact[L2] + z * contact[L3]) / math.sqrt(x * x + y * y + z * z)
+
+
+@njit(cache=True, error_model="numpy")
+def _fill(lanes, first, count, contacts, strips, slips):
+    """The strips from number ``first`` on into the lanes; those beyond ``count`` stay at rest."""
+    c, s = first // strips.shape[1], first % strips.shape[1]
+    for j in range(LANES):
+        if j >= count:
+            lanes[U * LANES + j] = lanes[V0 * LANES + j] = lanes[V1 * LANES + j] = 0.0
+            continue
+        spread = strips[SPREAD, s]
+        lanes[U * LANES + j] = spread * (slips[c, 0] - slips[c, 2] * contacts[c, B] * strips[Y, s])
+        lanes[V0 * LANES + j] = spread * slips[c, 1]
+        lanes[V1 * LANES + j] = spread * slips[c, 2] * contacts[c, A] * strips[HALF, s]
+        s += 1
+        if s == strips.shape[1]:
+            c, s = c + 1, 0
+
+
+@njit(cache=True, error_model="numpy")
+def _collect(lanes, first, count, contacts, strips, found):
+    """Sums of the lanes into the forces of their ellipses, and sticking cells weighted by their area."""
+    c, s = first // strips.shape[1], first % strips.shape[1]
+    for j in range(count):
+        limit = contacts[c, MU] * contacts[c, LOAD]
+        if limit > 0.0 and contacts[c, LOAD] > 0.0:
+            part, half = limit * strips[PART, s], strips[HALF, s]
+            x = lanes[SUM_X * LANES + j]
+            found[c, 0] += part * x
+            found[c, 1] += part * lanes[SUM_Y * LANES + j]
+            found[c, 2] += part * (contacts[c, A] * half * lanes[SUM_T * LANES + j] - contacts[c, B] * strips[Y, s] * x)
+            found[c, 3] += half * lanes[STUCK * LANES + j]
+        s += 1
+        if s == strips.shape[1]:
+            c, s = c + 1, 0
+
+
+@njit(cache=True, error_model="numpy")
+def point(a, load, mu, xi_x, xi_y, spin, by_ratio, l1, l2, l3, strips, cells, middle, kind, march):
+    """fx, fy, mz of one ellipse of semi-axes a and a ``by_ratio``, flexibilities a (l1, l2, l3); NaN for bad input."""
+    contacts, found = np.empty((1, 10)), np.empty((1, 4))
+    if not (mu >= 0.0 and (a > 0.0 or load <= 0.0)):
+        return math.nan, math.nan, math.nan
+    contacts[0] = (a, a * by_ratio, load, mu, xi_x, xi_y, spin, a * l1, a * l2, a * l3)
+    forces(contacts, strips, cells, middle, kind, march, found)
+    bad = 0.0 * (load + mu + xi_x + xi_y + spin)  # zero, or NaN where one of them is not finite
+    return found[0, 0] + bad, found[0, 1] + bad, found[0, 2] + bad
