@@ -44,7 +44,7 @@ def influence(x: np.ndarray, y: np.ndarray, dx: float, dy: float, pair: "Pair") 
 
 
 def _primitives(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Integrals, twice, of y^2/r^3, x^2/r^3, xy/r^3, x/r^2, y/r^2 over the rectangle from the origin to (x, y): (..., 5).
+    """Integrals from the origin to (x, y) of y^2/r^3, x^2/r^3, xy/r^3, x/r^2 and y/r^2, (..., 5).
 
     Terms that depend on x alone or on y alone are left out: they cancel between the corners.
     """

@@ -1,4 +1,4 @@
-"""Compiled sweeps over the cells of a rolling contact: each cell's traction from all the others."""
+"""Compiled loops over the cells of a rolling contact: sweeps, and the coupling within its strips."""
 
 import numpy as np
 from numba import njit
@@ -50,3 +50,36 @@ def answer(slip_x, slip_y, own_x, own_y, bound):
         p_x, p_y = -slip_x / (own_x + shift), -slip_y / (own_y + shift)
         length = np.hypot(p_x, p_y)
     return p_x, p_y
+
+
+@njit(cache=True, fastmath=True, nogil=True)
+def factor(systems):
+    """Each of the matrices (many, n, n) to its factors L (unit diagonal) and U, in place.
+
+    Without pivoting, which a matrix with a positive definite symmetric part does not need.
+    """
+    many, n, _ = systems.shape
+    for which in range(many):
+        for pivot in range(n - 1):
+            for row in range(pivot + 1, n):
+                part = systems[which, row, pivot] / systems[which, pivot, pivot]
+                if part != 0.0:
+                    systems[which, row, pivot] = part
+                    for column in range(pivot + 1, n):
+                        systems[which, row, column] -= part * systems[which, pivot, column]
+
+
+@njit(cache=True, fastmath=True, nogil=True)
+def substitute(factors, values):
+    """Solutions (many, n) of the systems in ``factors`` for right-hand sides (many, n)."""
+    many, n = values.shape
+    solution = values.copy()
+    for which in range(many):
+        for row in range(1, n):
+            for column in range(row):
+                solution[which, row] -= factors[which, row, column] * solution[which, column]
+        for row in range(n - 1, -1, -1):
+            for column in range(row + 1, n):
+                solution[which, row] -= factors[which, row, column] * solution[which, column]
+            solution[which, row] /= factors[which, row, row]
+    return solution

@@ -79,14 +79,14 @@ def solve_rolling(pressed: Pressed, mu: float, xi_x: float, xi_y: float, spin: f
     """
     mu = float(quantity("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0))
     motion = [float(quantity(name, value, told)) for name, value, told in
-              (("xi_x", xi_x, "a creepage"), ("xi_y", xi_y, "a creepage"), ("spin", spin, "a spin in 1/m"))]  # fmt: skip
+              (("xi_x", xi_x, "a creepage"), ("xi_y", xi_y, "a creepage"), ("spin", spin, "in 1/m"))]  # fmt: skip
     pair.require_likeness()
     box = _box(pressed.contact)
     bound = mu * pressed.pressure[box] / pair.G
     if not bound.any():
         return _frictionless(pressed)
-    operator = SlipOperator(*bound.shape[::-1], pressed.dx, pressed.dy, pair)
-    rigid = rigid_slip(pressed.x[box[1]] + pressed.dx / 2, pressed.y[box[0]], *motion)
+    operator = SlipOperator(bound.shape[1], bound.shape[0], pressed.dx, pressed.dy, pair)
+    rigid = rigid_slip(pressed.x[box[1]], pressed.y[box[0]], *motion)
     state, rounds = _solve(operator, rigid, bound)
     return _assembled(state, rounds, pressed, box, pair.G)
 
