@@ -1,0 +1,164 @@
+"""Hertz against the closed form in many decimal digits, from thin lines to the circle, and what it refuses."""
+
+from collections.abc import Callable
+from decimal import Decimal, localcontext
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.contact.hertz import Hertz, by_approach, by_load
+from models.contact.material import STEEL, Material, Pair
+from models.errors import InputError
+from validation.rows import Row, System, Table, at_most, behaves, within
+
+TITLE = "Hertz: two smooth bodies touch on an ellipse"
+SYSTEM: System = "contact"
+DIGITS = 60
+BOUND = 1e-10
+LOAD = 1e5
+PRESSURE, SHORT = Decimal(10) ** 9, Decimal(1) / 1000
+"""Largest pressure (Pa) and short semi-axis (m) of the contacts compared."""
+PAIR = Pair(STEEL, Material(E=7e10, nu=0.33))
+"""Steel on aluminium: the combined modulus is exact for any two materials as long as there is no friction."""
+NEAR_CIRCLE = tuple(1.0 - 10.0**-k for k in range(1, 16))
+RANGE = tuple(float(g) for g in 10.0 ** np.linspace(-6, 0, 49))
+"""Ratios of axes: 1e-4 and a curvature ratio of 1e-4 are inside."""
+WHY = ("K and E by the arithmetic-geometric mean in 60 decimal digits, which leaves 30 where K - E cancels: no digit "
+       "and no integral shared with the code")  # fmt: skip
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows for axes, pressure, approach and load over all ratios of axes, for one published contact, for refusals."""
+    data = {"ratio": [*RANGE, *NEAR_CIRCLE], "errors": _errors((*RANGE, *NEAR_CIRCLE))}
+    rows = [at_most(f"contact_hertz.{name}", SYSTEM, f"{name}, axis ratios 1e-6 to 1e6: worst relative error",
+                    max(errors), "", BOUND, WHY, "closed form")
+            for name, errors in data["errors"].items()]  # fmt: skip
+    return rows + _published() + _behaviour(), data
+
+
+def ellipse(ratio: float) -> dict[str, Decimal]:
+    """Curvatures, load and approach of a contact whose short semi-axis is ``ratio`` times the long one."""
+    with localcontext(prec=DIGITS):
+        g, modulus = Decimal(ratio), Decimal(PAIR.modulus)
+        k, e = _complete(g)
+        if ratio == 1.0:
+            flat = steep = _pi() * PRESSURE / (4 * SHORT * modulus)
+        else:
+            scale = PRESSURE * g * g / (modulus * (1 - g * g) * SHORT)
+            flat, steep = scale * (k - e), scale * (e / (g * g) - k)
+        return {"short": SHORT, "long": SHORT / g, "p0": PRESSURE, "approach": PRESSURE * SHORT * k / modulus,
+                "flat": flat, "steep": steep, "load": 2 * _pi() * PRESSURE * SHORT**2 / (3 * g)}  # fmt: skip
+
+
+def _complete(g: Decimal) -> tuple[Decimal, Decimal]:
+    """K and E at the modulus sqrt(1 - g^2): K = pi / (2 M(1, g)), E = K (1 - sum 2^(n-1) c_n^2)."""
+    a, b, total, weight = Decimal(1), g, (1 - g * g) / 2, Decimal(1) / 2
+    while abs(a - b) > Decimal(10) ** (4 - DIGITS) * a:
+        weight, c = 2 * weight, (a - b) / 2
+        a, b = (a + b) / 2, (a * b).sqrt()
+        total += weight * c * c
+    k = _pi() / (2 * a)
+    return k, k * (1 - total)
+
+
+def _pi() -> Decimal:
+    """By Gauss and Legendre."""
+    a, b, t, p = Decimal(1), 1 / Decimal(2).sqrt(), Decimal(1) / 4, Decimal(1)
+    for _ in range(7):
+        a, b, t, p = (a + b) / 2, (a * b).sqrt(), t - p * ((a - b) / 2) ** 2, 2 * p
+    return (a + b) ** 2 / (4 * t)
+
+
+def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
+    """Worst relative error of every quantity at each ratio, along x and along y, by load and by approach."""
+    truth = [ellipse(g) for g in ratios]
+    flat, steep, load, approach = (np.array([float(one[name]) for one in truth])
+                                   for name in ("flat", "steep", "load", "approach"))  # fmt: skip
+    found = [by_load(flat, steep, load, PAIR), by_approach(flat, steep, approach, PAIR),
+             _turned(by_load(steep, flat, load, PAIR)), _turned(by_approach(steep, flat, approach, PAIR))]  # fmt: skip
+    named = {"a": "long", "b": "short", "p0": "p0", "approach": "approach", "load": "load"}
+    return {name: [max(float(abs(Decimal(float(getattr(one, field)[i])) / exact[name] - 1)) for one in found)
+                   for i, exact in enumerate(truth)]
+            for field, name in named.items()}  # fmt: skip
+
+
+def _turned(found: Hertz) -> Hertz:
+    """The same contact with x and y exchanged."""
+    return Hertz(found.b, found.a, found.p0, found.approach, found.load, found.B, found.A)
+
+
+def _published() -> list[Row]:
+    """A contact that another program computed on a grid, and scaling."""
+    found, eight = (by_load(1 / 0.92, 1 / 0.6, load, Pair()) for load in (1e5, 8e5))
+    why = "CONTACT, half-space solved on cells of 0.25 mm, that is 1/29 of an axis"
+    return [
+        within("contact_hertz.contact.p0", SYSTEM, "largest pressure of a wheel on a rail, 100 kN", float(found.p0),
+               "Pa", 1.22674e9, 1e6, why, "native"),
+        within("contact_hertz.contact.approach", SYSTEM, "approach of the same", float(found.approach), "m",
+               1.04996e-4, 1e-8, why, "native"),
+        within("contact_hertz.scaling", SYSTEM, "axes at eight times the load, by the axes", float(eight.a / found.a),
+               "", 2.0, 1e-14, "axes go with the cube root of the load", "closed form"),
+    ]  # fmt: skip
+
+
+def _behaviour() -> list[Row]:
+    """Zero and negative load, and what is no Hertzian contact."""
+    nothing = [by_load(1.0, 2.0, load, PAIR) for load in (0.0, -1.0, -1e6)] + [by_approach(1.0, 2.0, -1e-3, PAIR)]
+    exact = all(value == 0.0 for one in nothing for value in (one.a, one.b, one.p0, one.approach, one.load))
+    why = "a silent number would be wrong"
+    asked: dict[str, Callable[[], object]] = {
+        "flat": lambda: by_load(0.0, 1.0, LOAD, PAIR), "concave": lambda: by_load(1.0, -0.1, LOAD, PAIR),
+        "not finite": lambda: by_load(1.0, np.nan, LOAD, PAIR),
+        "radius in mm": lambda: by_load(1 / 920, 1 / 600, LOAD, PAIR),
+        "modulus in MPa": lambda: Material(E=2.1e5, nu=0.28),
+        "approach in mm": lambda: by_approach(1.0, 1.0, 0.1, PAIR),
+        "shapes": lambda: by_load([1.0, 2.0], [1.0, 2.0, 3.0], LOAD, PAIR),
+        "friction of steel on aluminium": PAIR.require_likeness,
+    }  # fmt: skip
+    rows = [behaves(f"contact_hertz.refused.{name.replace(' ', '_')}", SYSTEM, f"refused: {name}", _outcome(ask),
+                    "refused", why) for name, ask in asked.items()]  # fmt: skip
+    return [behaves("contact_hertz.nothing", SYSTEM, "no load, negative load, a gap", "zero" if exact else "not zero",
+                    "zero", "nothing touches: exactly zero, no number near it"), *rows]  # fmt: skip
+
+
+def _outcome(ask: Callable[[], object]) -> str:
+    try:
+        ask()
+    except InputError:
+        return "refused"
+    return "accepted"
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Worst errors by range of the ratio of axes."""
+    ratio = np.array(data["ratio"])
+    ranges = {"1e-6 to 1e-4": (0.0, 1e-4), "1e-4 to 0.1": (1e-4, 0.1), "0.1 to 0.9": (0.1, 0.9), "0.9 to 1": (0.9, 1.0)}
+    rows = tuple((title, *(f"{np.array(errors)[(ratio > low) & (ratio <= high)].max():.1e}"
+                           for errors in data["errors"].values()))
+                 for title, (low, high) in ranges.items())  # fmt: skip
+    note = (f"Worst relative error against {DIGITS} digits, driven by load and by approach, the long axis along x and "
+            "along y.")  # fmt: skip
+    return [Table("Hertz: relative error by the ratio of axes", note, ("axes", *data["errors"]), rows)]
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Axes over the ratio of curvatures, and the error over the ratio of axes."""
+    from studies.figures import plt
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
+    curvature = np.geomspace(1e-4, 1e4, 201)
+    found = by_load(curvature, 1.0, LOAD, Pair())
+    for values, name in ((found.a, "a, along x"), (found.b, "b, along y")):
+        left.loglog(curvature, values * 1e3, label=name)
+    left.set(title="semi-axes, steel, 100 kN, B = 1 1/m", xlabel="ratio of curvatures A/B", ylabel="[mm]")
+    left.legend()
+    ratio = np.array(data["ratio"])
+    for name, errors in data["errors"].items():
+        right.loglog(ratio[: len(RANGE)], np.maximum(errors[: len(RANGE)], 1e-17), ".", markersize=4, label=name)
+    right.axhline(BOUND, color="black", linestyle=":", label="allowed")
+    right.set(title="relative error against 60 digits", xlabel="short axis / long axis", ylim=(3e-18, 1e-9))
+    right.legend(loc="center", ncols=3, fontsize=8)
+    figure.suptitle("Hertzian contact loses no digits from a thin line to the circle", x=0.01, ha="left",
+                    fontweight="bold")  # fmt: skip
+    return [("Semi-axes of Hertz's ellipse and their error.", figure)]
