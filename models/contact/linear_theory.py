@@ -45,6 +45,8 @@ TABLE = np.array([
 E.3; C33 as recalled, and confirmed by the exact theory of ``rolling_problem`` as the others are."""
 LOGARITHMS = np.log(TABLE)
 SLOPES = np.gradient(LOGARITHMS, np.log(RATIOS), axis=0, edge_order=2)
+POWERS = np.array([-1.0, -1.0, -1.0, 0.75])
+"""Powers of the coefficients that are nearly parabolas of nu; 1/C33 is none where a/b is large."""
 NARROW_FADING, LONG_FADING = 1.5, 0.75
 """Powers of the slenderness with which the difference from the asymptotes vanishes below and above the table."""
 LARGEST_PATCH = 0.5
@@ -66,9 +68,9 @@ def coefficients(ratio: Any, nu: Any) -> Coefficients:
 
     ratio : a/b, from 1e-9 to 1e9; nu : Poisson's ratio, 0 to 1/2; arrays of shapes that broadcast. Raises InputError.
 
-    Between the nodes of the table ln C is a cubic of ln(a/b), and 1/C a parabola of nu. Below a/b = 0.1 and above 10
-    Kalker's asymptotes for slender patches hold, times a factor that makes them meet the table and goes to 1 with the
-    slenderness.
+    Between the nodes of the table ln C is a cubic of ln(a/b), and 1/C (of C33 the power 3/4) a parabola of nu. Below
+    a/b = 0.1 and above 10 Kalker's asymptotes for slender patches hold, times a factor that makes them meet the table
+    and goes to 1 with the slenderness.
     """
     ratio = quantity("ratio", ratio, "a ratio a/b of semi-axes from 1e-9 to 1e9", 1e-9, 1e9)
     ratio, nu = together(ratio=ratio, nu=quantity("nu", nu, "a Poisson's ratio from 0 to 0.5", 0.0, 0.5))
@@ -161,17 +163,17 @@ def coefficient_at(kind: int, ratio: float, nu: float) -> float:
 
 @njit(cache=True)
 def _tabulated(kind: int, ratio: float, nu: float) -> float:
-    """Cubic Hermite interpolation of ln C in ln(a/b), then the parabola of 1/C through nu = 0, 1/4, 1/2."""
+    """Cubic Hermite interpolation of ln C in ln(a/b), then the parabola of a power of C through nu = 0, 1/4, 1/2."""
     i = min(int(np.searchsorted(RATIOS, ratio, side="right")), RATIOS.size - 1) - 1
     width = math.log(RATIOS[i + 1] / RATIOS[i])
     t = math.log(ratio / RATIOS[i]) / width
     rise, low, high = t * t * (3.0 - 2.0 * t), t * (1.0 - t) ** 2 * width, t * t * (t - 1.0) * width
-    s, inverse = 4.0 * nu, 0.0
+    s, power, found = 4.0 * nu, POWERS[kind], 0.0
     for k, weight in enumerate(((1.0 - s) * (1.0 - s / 2.0), s * (2.0 - s), s * (s - 1.0) / 2.0)):
         logarithm = (1.0 - rise) * LOGARITHMS[i, kind, k] + rise * LOGARITHMS[i + 1, kind, k]
         logarithm += low * SLOPES[i, kind, k] + high * SLOPES[i + 1, kind, k]
-        inverse += weight * math.exp(-logarithm)
-    return 1.0 / inverse
+        found += weight * math.exp(power * logarithm)
+    return found ** (1.0 / power)
 
 
 @njit(cache=True)
