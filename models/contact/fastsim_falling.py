@@ -12,8 +12,8 @@ import numpy as np
 from numba import njit
 from pydantic import Field
 
-from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, CHANGE, MIDDLE, RATE, SHARE, advance
-from models.contact.fastsim_many import HALF, LOAD, MU, PART, SPIN, SPREAD, XI_X, XI_Y, A, B, Y, rigid_slip
+from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, MIDDLE, RATE, advance, cut
+from models.contact.fastsim_many import HALF, LOAD, MU, PART, SPIN, SPREAD, XI_X, XI_Y, A, B, Y, rigid_slip, touches
 from models.strict import Strict
 
 
@@ -44,7 +44,7 @@ def forces_falling(contacts, strips, cells, middle, kind, floor, decay, found):
     for c in range(len(contacts)):
         own = contacts[c]
         found[c] = 0.0
-        if not (own[LOAD] > 0.0 and own[MU] > 0.0):
+        if not touches(own):
             continue
         rigid_slip(own, n, middle, kind, slip)
         limit = own[MU] * own[LOAD]
@@ -64,20 +64,24 @@ def _strip(own, strip, cells, slip, floor, decay, sums):
     u, v0 = spread * (slip[0] - slip[2] * own[B] * y), spread * slip[1]
     v1 = spread * slip[2] * own[A] * half
     along, across, turn = own[XI_X] - own[SPIN] * own[B] * y, own[XI_Y], own[SPIN] * own[A] * half
-    x = y_ = slips = last = 0.0
+    change, last = -2.0 / cells.shape[1], 0.0
+    px = py = slips = 0.0
     sums[:] = 0.0
     for i in range(cells.shape[1]):
-        t, share = cells[CENTRE, i], cells[SHARE, i]
+        t, v = cells[CENTRE, i], v0 + v1 * cells[MIDDLE, i]
         here = _left(along, across + turn * t, floor, decay)
         middle = _left(along, across + turn * cells[MIDDLE, i], floor, decay)
-        v = share * (v0 + v1 * cells[MIDDLE, i])
-        x, y_, sticks = advance(x, y_, slips, share * u, v, v1 * cells[CHANGE, i], here * cells[BOUND, i],
-                                last * cells[BEFORE, i], cells[RATE, i] / middle)  # fmt: skip
-        slips, last = 0.0 if sticks else 1.0, here
-        sums[0] += x
-        sums[1] += y_
-        sums[2] += t * y_
-        sums[3] += 1.0 if sticks else 0.0
+        g = here * cells[BOUND, i]
+        if i == 0:
+            px, py, slips = cut(-0.5 * u, -0.5 * v, g)
+        else:
+            rate = cells[RATE, i] / middle
+            px, py, slips = advance(px, py, slips, u, v, v1 * change, g, last * cells[BEFORE, i], rate)
+        last = here
+        sums[0] += px
+        sums[1] += py
+        sums[2] += t * py
+        sums[3] += 1.0 - slips
 
 
 @njit(cache=True, error_model="numpy")

@@ -11,6 +11,8 @@ from models.contact.inputs import Array
 Bound = Literal["parabolic", "elliptic"]
 MOST_STRIPS = 3
 """Strips per cell along them, at most."""
+ROUNDED = 1.0 + 2e-15
+"""A little more than a bound: the part of a traction along a unit vector is less than that, whatever the rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +20,7 @@ class Grid:
     """The net of one ellipse, in its own scale.
 
     strips : (4, strips), rows as in ``fastsim_many``: y/b, half length by a, that by the bound, share of the load
-    cells : (7, cells), rows as in ``fastsim_kernels``
+    cells : (5, cells), rows as in ``fastsim_kernels``
     middle : pressure in the middle of the ellipse times a b / N
     """
 
@@ -52,15 +54,13 @@ def grid(cells: int, strips: int, bound: Bound) -> Grid:
 
 
 def _along(cells: int, bound: Bound) -> Array:
-    """What is the same for every strip: rows CENTRE, BOUND, MIDDLE, SHARE, CHANGE, BEFORE, RATE of the kernels."""
+    """What is the same for every strip: rows CENTRE, BOUND, MIDDLE, BEFORE, RATE of the kernels."""
     edges = np.linspace(1.0, -1.0, cells + 1)
     centre = (edges[:-1] + edges[1:]) / 2.0
-    first = np.arange(cells) == 0
-    middle = np.where(first, (1.0 + centre[0]) / 2.0, edges[:-1])
-    share = np.where(first, 0.5, 1.0)
+    middle = np.append((1.0 + centre[0]) / 2.0, edges[1:-1])
     height = _pressure(centre, bound)
-    before = np.where(first, 0.0, np.roll(height, 1))
-    return np.array([centre, height, middle, share, -2.0 / cells * share**2, before, 1.0 / _pressure(middle, bound)])
+    before = np.append(0.0, height[:-1]) * ROUNDED
+    return np.array([centre, height, middle, before, 0.125 / _pressure(middle, bound)])
 
 
 def _pressure(t: Array, bound: Bound) -> Array:

@@ -12,7 +12,7 @@ from models.contact.fastsim_kernels import (
     LANES,
     ROWS,
     SECOND_ORDER,
-    STUCK,
+    SLID,
     SUM_T,
     SUM_X,
     SUM_Y,
@@ -57,7 +57,14 @@ def forces(contacts, strips, cells, middle, kind, march, found):
     for s in range(m):
         area += strips[HALF, s]
     for c in range(len(contacts)):
-        found[c, 3] /= cells.shape[1] * area
+        if touches(contacts[c]):
+            found[c, 3] = 1.0 - found[c, 3] / (cells.shape[1] * area)
+
+
+@njit(cache=True, error_model="numpy")
+def touches(contact):
+    """Whether there is anything that friction could hold."""
+    return contact[LOAD] > 0.0 and contact[MU] > 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -65,7 +72,7 @@ def rigid_slip(contact, cells, middle, kind, slip):
     """Fill ``slip`` with the traction by the bound in the ellipse's middle that each creepage builds up over one cell
     of the middle strip, were there no slip; the third one is that of spin per metre."""
     a, b, load, mu = contact[A], contact[B], contact[LOAD], contact[MU]
-    if not (load > 0.0 and mu > 0.0):
+    if not touches(contact):
         slip[:] = 0.0
         return
     bound = mu * middle * load / (a * b)
@@ -121,17 +128,16 @@ def _fill(lanes, first, count, contacts, strips, slips):
 
 @njit(cache=True, error_model="numpy")
 def _collect(lanes, first, count, contacts, strips, found):
-    """Sums of the lanes into the forces of their ellipses, and sticking cells weighted by their area."""
+    """Sums of the lanes into the forces of their ellipses, and slipping cells weighted by their length."""
     c, s = first // strips.shape[1], first % strips.shape[1]
     for j in range(count):
-        limit = contacts[c, MU] * contacts[c, LOAD]
-        if limit > 0.0 and contacts[c, LOAD] > 0.0:
-            part, half = limit * strips[PART, s], strips[HALF, s]
+        if touches(contacts[c]):
+            part, half = contacts[c, MU] * contacts[c, LOAD] * strips[PART, s], strips[HALF, s]
             x = lanes[SUM_X * LANES + j]
             found[c, 0] += part * x
             found[c, 1] += part * lanes[SUM_Y * LANES + j]
             found[c, 2] += part * (contacts[c, A] * half * lanes[SUM_T * LANES + j] - contacts[c, B] * strips[Y, s] * x)
-            found[c, 3] += half * lanes[STUCK * LANES + j]
+            found[c, 3] += half * lanes[SLID * LANES + j]
         s += 1
         if s == strips.shape[1]:
             c, s = c + 1, 0
