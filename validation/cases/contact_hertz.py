@@ -30,11 +30,11 @@ WHY = ("K and E by the arithmetic-geometric mean in 60 decimal digits, which lea
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for axes, pressure, approach and load over all ratios of axes, for one published contact, for refusals."""
-    data = {"ratio": [*RANGE, *NEAR_CIRCLE], "errors": _errors((*RANGE, *NEAR_CIRCLE))}
+    errors = _errors((*RANGE, *NEAR_CIRCLE))
     rows = [at_most(f"contact_hertz.{name}", SYSTEM, f"{name}, axis ratios 1e-6 to 1e6: worst relative error",
-                    max(errors), "", BOUND, WHY, "closed form")
-            for name, errors in data["errors"].items()]  # fmt: skip
-    return rows + _published() + _behaviour(), data
+                    max(found), "", BOUND, WHY, "closed form")
+            for name, found in errors.items()]  # fmt: skip
+    return rows + _published() + _behaviour(), {"ratio": [*RANGE, *NEAR_CIRCLE], "errors": errors}
 
 
 def ellipse(ratio: float) -> dict[str, Decimal]:
