@@ -72,7 +72,7 @@ def _check(y: np.ndarray, z: np.ndarray, smoothing: float, file: object) -> None
         raise InputError(file, "profile", None, "must hold finite numbers")
     width = float(np.ptp(y))
     if not 0.01 <= width <= 0.5:
-        raise InputError(file, "profile", width, "is its width in m; wheels and rails are 0.01 to 0.5 m wide: is the unit "
+        raise InputError(file, "profile", width, "is its width in m, which must be from 0.01 to 0.5: is the unit "
                          "right?")  # fmt: skip
     if not 0.0 <= smoothing <= 0.05:
         raise InputError(file, "smoothing", smoothing, "must be a wavelength from 0 to 0.05 m")

@@ -49,19 +49,16 @@ def crude_net(padded, origin, step, box, depth, low, cells, shape):
 
 @njit(cache=True)
 def resultant(padded, origin, step, box, depth, low, points, shape):
-    """Sum of W p dA over the box and its first moments along x and y, from points x points midpoints."""
-    total = along_x = along_y = 0.0
+    """Sum of W p dA over the box from points x points midpoints."""
+    total = 0.0
     dx, dy = (box[1] - box[0]) / points, (box[3] - box[2]) / points
     for j in range(points):
         y = box[2] + (j + 0.5) * dy
         for i in range(points):
             x = box[0] + (i + 0.5) * dx
             h = value_and_slopes(padded, (x - origin[0]) / step[0], (y - origin[1]) / step[1])[0]
-            p = overlap_pressure(depth, h, low, shape)
-            total += p
-            along_x += p * x
-            along_y += p * y
-    return total * dx * dy, along_x * dx * dy, along_y * dx * dy
+            total += overlap_pressure(depth, h, low, shape)
+    return total * dx * dy
 
 
 @njit(cache=True)
@@ -95,11 +92,11 @@ def displacement(pressure, dx, dy, modulus):
 
 @njit(cache=True)
 def covariances(u, h, cover):
-    """Weighted means of u and h, covariance of u and h, and variances of u and of h."""
+    """Mean of u, covariance of u and h and variance of u, weighted by the covered shares (the last two not divided)."""
     total = cover.sum()
     mean_u, mean_h = (cover * u).sum() / total, (cover * h).sum() / total
     du, dh = u - mean_u, h - mean_h
-    return mean_u, mean_h, (cover * du * dh).sum(), (cover * du * du).sum(), (cover * dh * dh).sum()
+    return mean_u, (cover * du * dh).sum(), (cover * du * du).sum()
 
 
 @njit(cache=True)
@@ -123,17 +120,38 @@ def slope_products(u, h, cover, dx, dy, along_y):
 
 @njit(cache=True)
 def crude_fit(padded, origin, step, box, depth, low, cells, shape, kind, modulus):
-    """Stiffness 1/W (Pa/m), approach (m), sum of W p dA and its first moments, of one patch at a depth."""
+    """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA of one patch at a depth.
+
+    The approach is the mean of u + h weighted by the pressure: the work of the pressure by the load.
+    """
     height, pressure, cover = crude_net(padded, origin, step, box, depth, low, cells, shape)
     dx, dy = (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
     u = displacement(pressure, dx, dy, modulus)
-    mean_u, mean_h, both, square, _ = covariances(u, height, cover)
+    mean_u, both, square = covariances(u, height, cover)
     if kind == GRADIENT:
         both, square = slope_products(u, height, cover, dx, dy, True)
     least = LEAST * (depth - low) / mean_u
     stiffness = max(-both / square, least) if square > 0.0 else least
-    total, along_x, along_y = resultant(padded, origin, step, box, depth, low, FINER * cells, shape)
-    return stiffness, mean_u * stiffness + mean_h, total, along_x, along_y
+    total = resultant(padded, origin, step, box, depth, low, FINER * cells, shape)
+    approach = (pressure * (u * stiffness + height)).sum() / pressure.sum()
+    return stiffness, approach, total
+
+
+@njit(cache=True)
+def mean_push(x, y, force, at_x, at_y, weight):
+    """Weighted mean of sum(force / r) over points: times 1 / (pi E*) the displacement by loads of another patch.
+
+    All arguments are flat: loads (N) at x, y, points at_x, at_y (m).
+    """
+    total = 0.0
+    for k in range(at_x.size):
+        if weight[k] > 0.0:
+            pushed = 0.0
+            for m in range(x.size):
+                if force[m] > 0.0:
+                    pushed += force[m] / math.hypot(x[m] - at_x[k], y[m] - at_y[k])
+            total += weight[k] * pushed
+    return total / weight.sum()
 
 
 @njit(cache=True)

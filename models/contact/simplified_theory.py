@@ -15,6 +15,8 @@ How equation (10) is read
     not known either, both are fitted: least squares of u* / W_3 + h - delta over the contact, which are linear in (1 /
     W_3, delta):
         1 / W_3 = -cov(u*, h) / var(u*),    delta = mean(u* / W_3 + h).
+    The mean that is reported as approach is weighted by the pressure, which makes it the work of the pressure by the
+    load: off by 0.2 % at most on Hertz's ellipses where the plain mean is off by up to 3 %.
 
 Continuity
     The net is the rectangle about the contact (``Patch.box``), and a mesh counts by the share of it that is covered, so
@@ -23,7 +25,7 @@ Continuity
 
 Several patches
     Each has a net, W_3 and depth of its own. They share the rigid approach, and each is pushed down by the others'
-    pressure, at its centre of pressure, as the half-space has it. Where patches lean (tread and flange), the approach
+    pressure as the half-space has it, as a whole. Where patches lean (tread and flange), the approach
     and the load are those along the common direction, the track's vertical.
 """
 
@@ -48,6 +50,7 @@ from models.contact.simplified_kernels import (
     crude_net,
     gather,
     march,
+    mean_push,
     strips,
 )
 from models.contact.undeformed_distance import Distance
@@ -59,7 +62,7 @@ CELLS = 45
 """Strips of the fine net, and cells along each strip."""
 SHAPES = {"parabolic": PARABOLIC, "elliptic": ELLIPTIC}
 FITS = {"displacement": DISPLACEMENT, "gradient": GRADIENT}
-CLOSE = 1e-14
+CLOSE = 1e-13
 """Change of the depths, as a share of the approach, at which patches that press on each other have settled."""
 PASSES = 200
 
@@ -69,12 +72,14 @@ class Options:
     """How the theory is used.
 
     net : meshes of the crude net along each axis. shape : of the pressure over the depth: "parabolic", proportional to
-    d - h as the theory has it, or "elliptic", proportional to its root. fit : least squares of the displacement or of
-    its gradient, which is what rolling feels. separate : a net and constants for each patch, or one for all.
+    d - h as the paper has it, or "elliptic", proportional to its root as in Hertz's contact. The latter is nearer to
+    the half-space in area, peak pressure and forces, so it is what is used where nothing else is said. fit : least
+    squares of the displacement or of its gradient, which is what rolling feels. separate : a net and constants for
+    each patch, or one for all.
     """
 
     net: int = NET
-    shape: Literal["parabolic", "elliptic"] = "parabolic"
+    shape: Literal["parabolic", "elliptic"] = "elliptic"
     fit: Literal["displacement", "gradient"] = "displacement"
     separate: bool = True
 
@@ -87,6 +92,8 @@ class Options:
 
 
 PLAIN = Options()
+PAPER = Options(shape="parabolic")
+"""The theory to the letter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +101,7 @@ class PatchPressure:
     """Normal contact of one patch.
 
     depth : d = -a_3 (m). stiffness : 1 / W_3 (Pa/m). approach : rigid approach that the fit finds for this pressure
-    alone (m). load : N. centre : centre of pressure x, y (m). box : x0, x1, y0, y1 of its net (m).
+    alone (m). load : N. box : x0, x1, y0, y1 of its net (m).
     """
 
     patch: Patch
@@ -102,7 +109,6 @@ class PatchPressure:
     stiffness: float
     approach: float
     load: float
-    centre: tuple[float, float]
     box: Box
 
 
@@ -169,15 +175,14 @@ def press(bodies: Distance | Sequence[Patch], pair: Pair, *, load: float | None 
 def load_at_depth(patch: Patch, depth: float, pair: Pair, options: Options = PLAIN) -> PatchPressure:
     """One patch at a depth d = -a_3 (m): the paper's N(a_3), with W_3 and the approach fitted on the crude net."""
     if depth <= patch.low:
-        return PatchPressure(patch, depth, 0.0, depth, 0.0, patch.bottom[:2], (0.0, 0.0, 0.0, 0.0))
+        return PatchPressure(patch, depth, 0.0, depth, 0.0, (0.0, 0.0, 0.0, 0.0))
     box, (origin, step) = patch.box(depth), _grid(patch)
-    stiffness, approach, volume, along_x, along_y = crude_fit(
+    stiffness, approach, volume = crude_fit(
         patch.distance.padded, origin, step, box, depth, patch.low, options.net, SHAPES[options.shape],
         FITS[options.fit], pair.modulus)  # fmt: skip
     if not (volume > 0.0 and np.isfinite(stiffness)):  # so shallow that rounding leaves nothing of it
-        return PatchPressure(patch, depth, 0.0, depth, 0.0, patch.bottom[:2], box)
-    centre = (along_x / volume, along_y / volume)
-    return PatchPressure(patch, depth, stiffness, approach, volume * stiffness, centre, box)
+        return PatchPressure(patch, depth, 0.0, depth, 0.0, box)
+    return PatchPressure(patch, depth, stiffness, approach, volume * stiffness, box)
 
 
 def _grid(patch: Patch) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -216,32 +221,53 @@ def _share(patches: list[Patch], approach: float, pair: Pair, options: Options) 
     """The patches at a common rigid approach, each pushed down by the others.
 
     A patch alone follows approach - low = ratio (depth - low) with a ratio that hardly changes, which gives the next
-    depth; the displacements by the others are less than their own, so passing on converges.
+    depth; the displacements by the others are less than their own, so passing on converges, relaxed by Aitken's rule
+    where patches that grow together make the ratio turn sharply.
     """
     low = np.array([patch.low for patch in patches])
     reached = approach * np.cos([patch.lean for patch in patches])
     depths, ratios = low + 0.6 * (reached - low), np.full(len(patches), 1.0 / 0.6)
+    before, share = np.zeros(len(patches)), 1.0
     for _ in range(PASSES):
         parts = tuple(load_at_depth(p, float(d), pair, options) for p, d in zip(patches, depths, strict=True))
         for k, part in enumerate(parts):
             if part.load > 0.0:
                 ratios[k] = (part.approach - low[k]) / (part.depth - low[k])
-        before, depths = depths, low + (reached - _pushed(parts, pair) - low) / ratios
-        if np.abs(np.maximum(depths, low) - np.maximum(before, low)).max() <= CLOSE * abs(approach):
+        off = np.maximum(low + (reached - _pushed(parts, pair, options) - low) / ratios, low) - np.maximum(depths, low)
+        if np.abs(off).max() <= CLOSE * abs(approach):
             return tuple(part for part in parts if part.load > 0.0)
+        share = _relaxed(share, before, off)
+        depths, before = np.maximum(depths, low) + share * off, off
     raise RunFailed("simplified theory", f"patches that share an approach of {approach:.4g} m did not settle")
 
 
-def _pushed(parts: tuple[PatchPressure, ...], pair: Pair) -> np.ndarray:
-    """Displacement (m) of each patch, at its centre of pressure, by the others' loads: N / (pi E* r)."""
+def _relaxed(share: float, before: np.ndarray, off: np.ndarray) -> float:
+    """Share of the next change that is taken: Aitken's, from how the last change changed it (Irons and Tuck, 1969)."""
+    turned = off - before
+    square = float(turned @ turned)
+    return float(np.clip(-share * (before @ turned) / square, 0.02, 1.5)) if before.any() and square > 0.0 else 1.0
+
+
+def _pushed(parts: tuple[PatchPressure, ...], pair: Pair, options: Options) -> np.ndarray:
+    """Displacement (m) of each patch, weighted by its pressure, by the others', each mesh a load N / (pi E* r)."""
     found = np.zeros(len(parts))
-    for k, one in enumerate(parts):
-        for other in parts:
-            if other is not one:
-                across = one.centre[1] + one.patch.place - other.centre[1] - other.patch.place
-                far = np.hypot(one.centre[0] - other.centre[0], across)
-                found[k] += other.load / (np.pi * pair.modulus * far)
+    nets = {k: _net(part, options) for k, part in enumerate(parts) if part.load > 0.0}
+    for k, (x, y, own) in nets.items():
+        for m, (other_x, other_y, force) in nets.items():
+            if m != k:
+                found[k] += mean_push(other_x, other_y, force, x, y, own) / (np.pi * pair.modulus)
     return found
+
+
+def _net(part: PatchPressure, options: Options) -> tuple[np.ndarray, ...]:
+    """Crude net of one patch, flat: x, y along the common contour (m) and load (N) of every mesh."""
+    x0, x1, y0, y1 = part.box
+    middles = (np.arange(options.net) + 0.5) / options.net
+    y, x = np.meshgrid(y0 + middles * (y1 - y0) + part.patch.place, x0 + middles * (x1 - x0), indexing="ij")
+    origin, step = _grid(part.patch)
+    pressure = crude_net(part.patch.distance.padded, origin, step, part.box, part.depth, part.patch.low, options.net,
+                         SHAPES[options.shape])[1]  # fmt: skip
+    return x.ravel(), y.ravel(), (pressure * (part.load / pressure.sum())).ravel()
 
 
 def _gathered(approach: float, parts: tuple[PatchPressure, ...], pair: Pair, options: Options) -> NormalContact:
