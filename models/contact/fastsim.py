@@ -82,7 +82,7 @@ def fastsim(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any,
     InputError : names the value that is not finite, not plausible in SI, or of no common shape, or the word not known
     """
     check_choices(cells, bound, flexibilities, march)
-    columns, shape = _columns(a, b, load, mu, xi_x, xi_y, spin, pair)
+    columns, shape = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)
     found = np.zeros((len(columns), 4))
     strips = strips_of(columns[:, 0] / columns[:, 1], cells)
     for count in np.unique(strips):
@@ -119,7 +119,7 @@ class Ellipse:
         """Forces and moment; a : semi-axis along the direction of rolling (m)."""
         found = point(a, load, mu, xi_x, xi_y, spin, *self._fixed)
         if not math.isfinite(found[0] + found[1] + found[2]):
-            _columns(a, a / self.ratio, load, mu, xi_x, xi_y, spin, Pair())
+            contacts_of(a, a / self.ratio, load, mu, xi_x, xi_y, spin, Pair())
             raise InputError("", "a", a, "must be a semi-axis in m, above 0 where there is a load")
         return found
 
@@ -139,7 +139,7 @@ def _second_order_only(march: str) -> None:
         raise InputError("", "march", march, "must be second-order where friction falls with the speed of slip")
 
 
-def _columns(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair
+def contacts_of(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair
              ) -> tuple[Array, tuple[int, ...]]:  # fmt: skip
     """The contacts (n, 10) as the kernels read them, and the shape they had; those without load have axes of 1 m."""
     creepages = {name: quantity(name, value, f"a creepage within +-{LARGEST_CREEPAGE:g}", -LARGEST_CREEPAGE,

@@ -20,8 +20,8 @@ U, V0, V1, SUM_X, SUM_Y, SUM_T, SLID, QX, QY, SLIPS = range(10)
 """Rows of the lanes: the three inputs; sums over the cells of q_x, q_y, t q_y and of slipping cells; the state."""
 ROWS = 10
 CENTRE, BOUND, MIDDLE, BEFORE, RATE = range(5)
-"""Rows of the cells, each about the step that ends in its centre: t there, g there, t in the middle of the step, g where
-it starts (more by a rounding), 1/(8 g) in its middle."""
+"""Rows of the cells, each about the step that ends in its centre: t there, g there, t in the middle of the step, g
+where it starts (more by a rounding), 1/(8 g) in its middle."""
 PLAIN, SECOND_ORDER = 0, 1
 
 LONGEST = 50.0
@@ -92,7 +92,8 @@ def march_second_order(lanes, cells):
         _keep(lanes, j, cells[CENTRE, 0], x, y, slips)
     change = -2.0 / cells.shape[1]
     for i in range(1, cells.shape[1]):
-        t, g, middle, before, rate = cells[CENTRE, i], cells[BOUND, i], cells[MIDDLE, i], cells[BEFORE, i], cells[RATE, i]
+        t, g, middle = cells[CENTRE, i], cells[BOUND, i], cells[MIDDLE, i]
+        before, rate = cells[BEFORE, i], cells[RATE, i]
         for j in range(LANES):
             u, v1 = lanes[U * LANES + j], lanes[V1 * LANES + j]
             v = lanes[V0 * LANES + j] + v1 * middle

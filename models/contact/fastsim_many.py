@@ -85,17 +85,23 @@ def rigid_slip(contact, cells, middle, kind, slip):
 def stiffness(contact, bound, kind):
     """Inverses of the flexibilities along x, along y and in spin (N/m^3)."""
     k1, k2, k3 = 1.0 / contact[L1], 1.0 / contact[L2], 1.0 / contact[L3]
-    if kind == THREE:
+    part = blend(contact, bound, kind)[0]
+    if part == 0.0:
         return k1, k2, k3
-    turn = contact[SPIN] * math.sqrt(contact[A] * contact[B])
-    one = 1.0 / weighted(contact, turn)
-    part = 1.0
-    if kind == BLENDED:
-        x, y, z = contact[XI_X] * k1, contact[XI_Y] * k2, turn * k3
-        size = contact[A] * math.sqrt(x * x + y * y + z * z) / bound
-        part = min(1.0, max(0.0, (size - FIRST) / (SATURATED - FIRST)))
-        part *= part * (3.0 - 2.0 * part)
+    one = 1.0 / weighted(contact, contact[SPIN] * math.sqrt(contact[A] * contact[B]))
     return k1 + part * (one - k1), k2 + part * (one - k2), k3 + part * (one - k3)
+
+
+@njit(cache=True, error_model="numpy")
+def blend(contact, bound, kind):
+    """Part of the one flexibility, 0 to 1, its derivative to the reach of the linear tractions, and that reach."""
+    turn = contact[SPIN] * math.sqrt(contact[A] * contact[B])
+    x, y, z = contact[XI_X] / contact[L1], contact[XI_Y] / contact[L2], turn / contact[L3]
+    reach = contact[A] * math.sqrt(x * x + y * y + z * z) / bound
+    if kind != BLENDED:
+        return 1.0 if kind == ONE else 0.0, 0.0, reach
+    p = min(1.0, max(0.0, (reach - FIRST) / (SATURATED - FIRST)))
+    return p * p * (3.0 - 2.0 * p), 6.0 * p * (1.0 - p) / (SATURATED - FIRST), reach
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,0 +1,198 @@
+"""How FASTSIM's forces change with creepages, spin and load: the march differentiated along with itself.
+
+A sticking traction changes as the sum that it is. A slipping one keeps its size and only turns, so its derivative is
+that of its angle: with phi the angle of -w, psi from there to the traction, and z = |w| step / g,
+
+    d angle = d phi + (sin psi' / sin psi) d psi - sin psi' dz,
+
+psi' being psi after the step. The load enters through the scale alone: forces by mu N depend on creepages by N/(a b)
+and nothing else, so its derivative follows from the others (Euler's theorem).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from models.contact.fastsim import KINDS, Flexibilities, check_choices, contacts_of
+from models.contact.fastsim_grid import Bound, grid, strips_of
+from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, LONGEST, MIDDLE, RATE, STILL, advance, cut, lateness
+from models.contact.fastsim_many import (
+    HALF,
+    L1,
+    LOAD,
+    MU,
+    PART,
+    SPIN,
+    SPREAD,
+    XI_X,
+    XI_Y,
+    A,
+    B,
+    Y,
+    blend,
+    rigid_slip,
+    stiffness,
+    touches,
+    weighted,
+)
+from models.contact.inputs import Array
+from models.contact.material import Pair
+
+
+@dataclass(frozen=True)
+class Derivatives:
+    """Forces with their derivatives.
+
+    forces : (..., 3) of fx, fy (N), mz (N m). slopes : (..., 3, 4), of each to xi_x, xi_y, spin (1/m) and load (N).
+    """
+
+    forces: Array
+    slopes: Array
+
+
+def derivatives(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair, *, cells: int = 21,
+                bound: Bound = "parabolic", flexibilities: Flexibilities = "blended", growing: bool = True
+                ) -> Derivatives:  # fmt: skip
+    """Derivatives of the forces of ``fastsim`` with the second-order march; the same parameters and errors.
+
+    growing : whether the semi-axes grow with the load, as its cube root (Hertz, bodies of given shape), or stay
+
+    They are those of the march itself but for the size of its jumps, where a cell begins to stick or slip. Without
+    load or friction all are zero.
+    """
+    check_choices(cells, bound, flexibilities, "second-order")
+    contacts, shape = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)
+    found, slopes = np.zeros((len(contacts), 3)), np.zeros((len(contacts), 3, 4))
+    strips = strips_of(contacts[:, A] / contacts[:, B], cells)
+    for count in np.unique(strips):
+        rows, net = np.flatnonzero(strips == count), grid(cells, int(count), bound)
+        _slopes(contacts, rows, net.strips, net.cells, net.middle, KINDS[flexibilities], found, slopes)
+    _to_load(contacts, found, slopes, growing)
+    return Derivatives(found.reshape(*shape, 3), slopes.reshape(*shape, 3, 4))
+
+
+def _to_load(contacts: Array, found: Array, slopes: Array, growing: bool) -> None:
+    """Fill in the derivatives to the load from those to the creepages."""
+    touching = (contacts[:, LOAD] > 0.0) & (contacts[:, MU] > 0.0)
+    own, moving = contacts[touching], slopes[touching, :, :3] * contacts[touching][:, None, XI_X : SPIN + 1]
+    if growing:  # fx / N is a function of xi N^(-1/3) and spin, mz / N^(4/3) as well
+        change = found[touching] * np.array([1.0, 1.0, 4.0 / 3.0]) - moving[:, :, :2].sum(axis=2) / 3.0
+    else:
+        change = found[touching] - moving.sum(axis=2)
+    slopes[touching, :, 3] = change / own[:, LOAD, None]
+
+
+@njit(cache=True, error_model="numpy")
+def _slopes(contacts, rows, strips, cells, middle, kind, found, slopes):
+    """Fill forces (n, 3) and their derivatives (n, 3, 4) to the creepages in the given rows."""
+    slip, sums, moved = np.empty(3), np.empty(3), np.empty((3, 3))
+    scale, total = np.empty((3, 3)), np.empty((3, 3))
+    for c in rows:
+        own = contacts[c]
+        if not touches(own):
+            continue
+        rigid_slip(own, cells.shape[1], middle, kind, slip)
+        _scale_slopes(own, cells.shape[1], middle, kind, scale)
+        total[:] = 0.0
+        for s in range(strips.shape[1]):
+            _strip(own, strips[:, s], cells, slip, sums, moved)
+            part = own[MU] * own[LOAD] * strips[PART, s]
+            arm, off = own[A] * strips[HALF, s], own[B] * strips[Y, s]
+            for f in range(2):
+                found[c, f] += part * sums[f]
+                total[f] += part * moved[f]
+            found[c, 2] += part * (arm * sums[2] - off * sums[0])
+            total[2] += part * (arm * moved[2] - off * moved[0])
+        for f in range(3):
+            for k in range(3):
+                slopes[c, f, k] = total[f, 0] * scale[0, k] + total[f, 1] * scale[1, k] + total[f, 2] * scale[2, k]
+
+
+@njit(cache=True, error_model="numpy")
+def _scale_slopes(own, cells, middle, kind, scale):
+    """Derivatives (3, 3) of the numbers of ``rigid_slip`` to the creepages; spin counts times sqrt(a b) until the end."""
+    a, c = own[A], math.sqrt(own[A] * own[B])
+    bound = own[MU] * middle * own[LOAD] / (a * own[B])
+    step, creep, k = 2.0 * a / (cells * bound), (own[XI_X], own[XI_Y], own[SPIN] * c), stiffness(own, bound, kind)
+    part, steep, reach = blend(own, bound, kind)
+    size = math.sqrt(creep[0] ** 2 + creep[1] ** 2 + creep[2] ** 2)
+    mean = weighted(own, creep[2])
+    for j in range(3):
+        d_one = d_part = 0.0
+        if part > 0.0 and size > 0.0:
+            sign = 1.0 if creep[j] > 0.0 else -1.0 if creep[j] < 0.0 else 0.0
+            d_one = -(sign * own[L1 + j] - mean * creep[j] / size) / (size * mean * mean)
+            d_part = steep * (a / (own[L1 + j] * bound)) ** 2 * creep[j] / reach
+        for i in range(3):
+            change = d_part * (1.0 / mean - 1.0 / own[L1 + i]) + part * d_one
+            unit = (c if j == 2 else 1.0) / (c if i == 2 else 1.0)
+            scale[i, j] = step * unit * (change * creep[i] + (k[i] if i == j else 0.0))
+
+
+@njit(cache=True, error_model="numpy")
+def _strip(own, strip, cells, slip, sums, moved):
+    """Sums of q_x, q_y, t q_y along one strip, and their derivatives (3, 3) to the three numbers of rigid slip."""
+    spread, off, arm = strip[SPREAD], own[B] * strip[Y], own[A] * strip[HALF]
+    u, v0, v1 = spread * (slip[0] - slip[2] * off), spread * slip[1], spread * slip[2] * arm
+    du, dv0, dv1 = (spread, 0.0, -spread * off), (0.0, spread, 0.0), (0.0, 0.0, spread * arm)
+    dx, dy = np.zeros(3), np.zeros(3)
+    px = py = slips = 0.0
+    change = -2.0 / cells.shape[1]
+    sums[:] = 0.0
+    moved[:] = 0.0
+    for i in range(cells.shape[1]):
+        t, mid, g, share = cells[CENTRE, i], cells[MIDDLE, i], cells[BOUND, i], 0.5 if i == 0 else 1.0
+        v = v0 + v1 * mid
+        if i == 0:
+            x, y, now = cut(-0.5 * u, -0.5 * v, g)
+        else:
+            x, y, now = advance(px, py, slips, u, v, v1 * change, g, cells[BEFORE, i], cells[RATE, i])
+        turns = slips * (u * u + v * v) > STILL
+        late, steep = _lateness_slope((abs(u) + abs(v)) * cells[RATE, i]) if turns else (0.0, 0.0)
+        w = v + v1 * change * late
+        if turns and now > 0.0:
+            kept, pull, size = _turning(px, py, u, w, cells[BEFORE, i], cells[RATE, i])
+        for k in range(3):
+            dv = dv0[k] + dv1[k] * mid
+            if now == 0.0:
+                dx[k] -= share * du[k]
+                dy[k] -= share * dv
+                continue
+            if turns:
+                rise = (math.copysign(1.0, u) * du[k] + math.copysign(1.0, v) * dv) * cells[RATE, i] * steep
+                dw = dv + change * (dv1[k] * late + v1 * rise)
+                heading = (u * dw - w * du[k]) / (size * size)
+                before = (px * dy[k] - py * dx[k]) / (px * px + py * py)
+                angle = heading + kept * (before - heading) - pull * (u * du[k] + w * dw) / size
+            else:
+                tx, ty = px - share * u, py - share * v
+                angle = (tx * (dy[k] - share * dv) - ty * (dx[k] - share * du[k])) / (tx * tx + ty * ty)
+            dx[k], dy[k] = -angle * y, angle * x
+        px, py, slips = x, y, now
+        for f, value, slope in ((0, px, dx), (1, py, dy)):
+            sums[f] += value
+            moved[f] += slope
+        sums[2] += t * py
+        moved[2] += t * dy
+
+
+@njit(cache=True, error_model="numpy")
+def _lateness_slope(z):
+    """``lateness`` and its derivative."""
+    return lateness(z), (0.5 if z < 0.4 else 0.2 if z < 1.75 else 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _turning(px, py, u, v, before, rate):
+    """What ``advance`` does to a slipping traction: sin psi' / sin psi, the part of psi' per |w|, and |w|."""
+    size = math.sqrt(u * u + v * v)
+    h = min(size * rate, LONGEST)
+    base = 1.0 + h * (1.0 + h * (0.5 + h * (1.0 / 6.0)))
+    grown = base**8
+    over, aside = before * size - (px * u + py * v), px * v - py * u
+    whole = (grown * over) ** 2 + aside * aside
+    growth = 8.0 * (1.0 + h * (1.0 + 0.5 * h)) / base * rate if h < LONGEST else 0.0
+    return grown * (over * over + aside * aside) / whole, 2.0 * grown * over * aside / whole * growth, size
