@@ -1,12 +1,14 @@
 """Ensembles: the same bits on any executor and after any interruption, folders that know whose they are."""
 
 import math
+import os
 import signal
 import subprocess
 import sys
 import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import replace
+from multiprocessing import active_children
 from pathlib import Path
 
 import numpy as np
@@ -192,6 +194,14 @@ def test_an_interrupt_leaves_the_finished_blocks_and_begins_no_others(folder, ex
         run_paths(Counted(**vars(job(folder))), PATHS, tmp_path, executor, 1, stop)
     assert len(list(tmp_path.glob("block*.npz"))) == 2 and Counted.calls < PATHS / 2
     assert same(run_paths(job(folder), PATHS, tmp_path, block=1), expected)
+
+
+def test_an_interrupt_while_workers_start_reaches_none_of_them():
+    """A terminal sends Ctrl-C to all of its processes; one that still imports would die of it and break the pool."""
+    with processes(1) as pool:
+        (worker,) = active_children()
+        os.kill(worker.pid, signal.SIGINT)
+        assert pool.submit(abs, -1).result(timeout=60) == 1
 
 
 def test_a_block_is_written_whole_or_not_at_all(tmp_path, monkeypatch):

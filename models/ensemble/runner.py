@@ -194,8 +194,29 @@ def _together(blocks: list[Arrays]) -> Arrays:
 
 
 def processes(workers: int) -> ProcessPoolExecutor:
-    """A process pool whose workers start fresh: engines and compilers keep threads that no fork survives."""
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_prepare_worker)
+    """A process pool whose workers start fresh: engines and compilers keep threads that no fork survives.
+
+    They start here, with Ctrl-C held back, which they inherit: one that struck a worker while it imports would break
+    the pool, and the process that keeps the blocks could wait for it for ever.
+    """
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_prepare_worker)
+    with _interrupts_held():
+        for _ in range(workers):
+            pool.submit(os.getpid)
+    return pool
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Keep Ctrl-C waiting until the end of the block, where the system can."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _prepare_worker() -> None:
