@@ -40,7 +40,7 @@ KINDS = {"blended": BLENDED, "one": ONE, "three": THREE}
 MARCHES = {"second-order": SECOND_ORDER, "plain": PLAIN}
 LEAST_CELLS, MOST_CELLS = 3, 2000
 LARGEST_CREEPAGE = 10.0
-LARGEST_SPIN = 1e6
+LARGEST_SPIN = 1e9
 """1/m"""
 
 

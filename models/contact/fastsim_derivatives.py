@@ -88,14 +88,14 @@ def _to_load(contacts: Array, found: Array, slopes: Array, growing: bool) -> Non
 @njit(cache=True, error_model="numpy")
 def _slopes(contacts, rows, strips, cells, middle, kind, found, slopes):
     """Fill forces (n, 3) and their derivatives (n, 3, 4) to the creepages in the given rows."""
-    slip, sums, moved = np.empty(3), np.empty(3), np.empty((3, 3))
-    scale, total = np.empty((3, 3)), np.empty((3, 3))
+    slip, sums, moved, total = np.empty(5), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    scale, weights = np.empty((3, 3)), np.empty((2, 3))
     for c in rows:
         own = contacts[c]
         if not touches(own):
             continue
         rigid_slip(own, cells.shape[1], middle, kind, slip)
-        _scale_slopes(own, cells.shape[1], middle, kind, scale)
+        _scale_slopes(own, cells.shape[1], middle, kind, scale, weights)
         total[:] = 0.0
         for s in range(strips.shape[1]):
             _strip(own, strips[:, s], cells, slip, sums, moved)
@@ -104,32 +104,36 @@ def _slopes(contacts, rows, strips, cells, middle, kind, found, slopes):
             for f in range(2):
                 found[c, f] += part * sums[f]
                 total[f] += part * moved[f]
-            found[c, 2] += part * (arm * sums[2] - off * sums[0])
-            total[2] += part * (arm * moved[2] - off * moved[0])
+            found[c, 2] += part * (slip[4] * arm * sums[2] - slip[3] * off * sums[0])
+            total[2] += part * (slip[4] * arm * moved[2] - slip[3] * off * moved[0])
+            slopes[c, 2, :3] += part * (weights[1] * arm * sums[2] - weights[0] * off * sums[0])
         for f in range(3):
             for k in range(3):
-                slopes[c, f, k] = total[f, 0] * scale[0, k] + total[f, 1] * scale[1, k] + total[f, 2] * scale[2, k]
+                slopes[c, f, k] += total[f, 0] * scale[0, k] + total[f, 1] * scale[1, k] + total[f, 2] * scale[2, k]
 
 
 @njit(cache=True, error_model="numpy")
-def _scale_slopes(own, cells, middle, kind, scale):
-    """Derivatives (3, 3) of the numbers of ``rigid_slip`` to the creepages; spin counts times sqrt(a b) until the end."""
+def _scale_slopes(own, cells, middle, kind, scale, weights):
+    """Derivatives of the five numbers of ``rigid_slip`` to the creepages: (3, 3) of the first, (2, 3) of the last."""
     a, c = own[A], math.sqrt(own[A] * own[B])
     bound = own[MU] * middle * own[LOAD] / (a * own[B])
-    step, creep, k = 2.0 * a / (cells * bound), (own[XI_X], own[XI_Y], own[SPIN] * c), stiffness(own, bound, kind)
+    step, creep = 2.0 * a / (cells * bound), (own[XI_X], own[XI_Y], own[SPIN] * c)
+    k, change = stiffness(own, bound, kind), np.zeros(3)
     part, steep, reach = blend(own, bound, kind)
     size = math.sqrt(creep[0] ** 2 + creep[1] ** 2 + creep[2] ** 2)
     mean = weighted(own, creep[2])
     for j in range(3):
-        d_one = d_part = 0.0
+        unit = c if j == 2 else 1.0
         if part > 0.0 and size > 0.0:
             sign = 1.0 if creep[j] > 0.0 else -1.0 if creep[j] < 0.0 else 0.0
             d_one = -(sign * own[L1 + j] - mean * creep[j] / size) / (size * mean * mean)
             d_part = steep * (a / (own[L1 + j] * bound)) ** 2 * creep[j] / reach
+            for i in range(3):
+                change[i] = unit * (d_part * (1.0 / mean - 1.0 / own[L1 + i]) + part * d_one)
         for i in range(3):
-            change = d_part * (1.0 / mean - 1.0 / own[L1 + i]) + part * d_one
-            unit = (c if j == 2 else 1.0) / (c if i == 2 else 1.0)
-            scale[i, j] = step * unit * (change * creep[i] + (k[i] if i == j else 0.0))
+            scale[i, j] = step * (change[i] * creep[i] / (c if i == 2 else 1.0) + (k[i] if i == j else 0.0))
+        for i in range(2):
+            weights[i, j] = (change[2] - change[i] * k[2] / k[i]) / k[i]
 
 
 @njit(cache=True, error_model="numpy")

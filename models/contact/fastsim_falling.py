@@ -37,7 +37,7 @@ class Falling(Strict):
 def forces_falling(contacts, strips, cells, middle, kind, floor, decay, found):
     """As ``fastsim_many.forces`` with the second-order march, and friction that falls."""
     n, m = cells.shape[1], strips.shape[1]
-    slip, sums = np.empty(3), np.empty(4)
+    slip, sums = np.empty(5), np.empty(4)
     area = 0.0
     for s in range(m):
         area += strips[HALF, s]
@@ -53,7 +53,7 @@ def forces_falling(contacts, strips, cells, middle, kind, floor, decay, found):
             part, half = limit * strips[PART, s], strips[HALF, s]
             found[c, 0] += part * sums[0]
             found[c, 1] += part * sums[1]
-            found[c, 2] += part * (own[A] * half * sums[2] - own[B] * strips[Y, s] * sums[0])
+            found[c, 2] += part * (slip[4] * own[A] * half * sums[2] - slip[3] * own[B] * strips[Y, s] * sums[0])
             found[c, 3] += half * sums[3] / (n * area)
 
 

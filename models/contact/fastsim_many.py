@@ -39,7 +39,7 @@ def forces(contacts, strips, cells, middle, kind, march, found):
     contacts : (n, 10), columns as above; strips, cells, middle : a net from ``fastsim_grid``; kind : of flexibility;
     march : PLAIN or SECOND_ORDER. A contact without load or friction has zeros all over.
     """
-    slips = np.empty((len(contacts), 3))
+    slips = np.empty((len(contacts), 5))
     for c in range(len(contacts)):
         rigid_slip(contacts[c], cells.shape[1], middle, kind, slips[c])
         found[c] = 0.0
@@ -52,7 +52,7 @@ def forces(contacts, strips, cells, middle, kind, march, found):
             march_second_order(lanes, cells)
         else:
             march_plain(lanes, cells)
-        _collect(lanes, first, count, contacts, strips, found)
+        _collect(lanes, first, count, contacts, strips, slips, found)
     area = 0.0
     for s in range(m):
         area += strips[HALF, s]
@@ -69,8 +69,13 @@ def touches(contact):
 
 @njit(cache=True, error_model="numpy")
 def rigid_slip(contact, cells, middle, kind, slip):
-    """Fill ``slip`` with the traction by the bound in the ellipse's middle that each creepage builds up over one cell
-    of the middle strip, were there no slip; the third one is that of spin per metre."""
+    """Fill ``slip`` (5,) with what the march and the moment need.
+
+    First the traction by the bound in the ellipse's middle that each creepage builds up over one cell of the middle
+    strip, were there no slip; the third one is that of spin per metre. Then the weights in the moment of -y p_x and of
+    x p_y: a bed whose spin has another flexibility than its creepage along x sees the spin k3/k1 times as large there,
+    and the work of the moment must be that of the tractions. So C32 = -C23, and power is never positive.
+    """
     a, b, load, mu = contact[A], contact[B], contact[LOAD], contact[MU]
     if not touches(contact):
         slip[:] = 0.0
@@ -79,6 +84,7 @@ def rigid_slip(contact, cells, middle, kind, slip):
     k1, k2, k3 = stiffness(contact, bound, kind)
     step = 2.0 * a / (cells * bound)
     slip[0], slip[1], slip[2] = k1 * contact[XI_X] * step, k2 * contact[XI_Y] * step, k3 * contact[SPIN] * step
+    slip[3], slip[4] = k3 / k1, k3 / k2
 
 
 @njit(cache=True, error_model="numpy")
@@ -133,7 +139,7 @@ def _fill(lanes, first, count, contacts, strips, slips):
 
 
 @njit(cache=True, error_model="numpy")
-def _collect(lanes, first, count, contacts, strips, found):
+def _collect(lanes, first, count, contacts, strips, slips, found):
     """Sums of the lanes into the forces of their ellipses, and slipping cells weighted by their length."""
     c, s = first // strips.shape[1], first % strips.shape[1]
     for j in range(count):
@@ -142,7 +148,8 @@ def _collect(lanes, first, count, contacts, strips, found):
             x = lanes[SUM_X * LANES + j]
             found[c, 0] += part * x
             found[c, 1] += part * lanes[SUM_Y * LANES + j]
-            found[c, 2] += part * (contacts[c, A] * half * lanes[SUM_T * LANES + j] - contacts[c, B] * strips[Y, s] * x)
+            arm, off = slips[c, 4] * contacts[c, A] * half, slips[c, 3] * contacts[c, B] * strips[Y, s]
+            found[c, 2] += part * (arm * lanes[SUM_T * LANES + j] - off * x)
             found[c, 3] += half * lanes[SLID * LANES + j]
         s += 1
         if s == strips.shape[1]:
