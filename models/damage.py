@@ -14,6 +14,10 @@ SLOPE = 5.0
 CONVENTION = "rainflow after ASTM E1049-85, residue as half cycles"
 
 
+STILL = 1e-9
+"""A load that varies by less than this part of its size is at rest: what a run's rounding leaves, a thousandfold."""
+
+
 def turning_points(load: np.ndarray) -> np.ndarray:
     """The values of ``load`` (n,) at which it turns, with its first and last one: all that rainflow reads."""
     load = np.asarray(load, dtype=float)
@@ -42,6 +46,6 @@ def pseudo_damage(load: np.ndarray, slope: float = SLOPE) -> float:
 def damage_ratio(load: np.ndarray, truth: np.ndarray, slope: float = SLOPE) -> float:
     """Pseudo-damage of a load (n,) by that of the true one (m,); raises InputError if the true one never varies."""
     whole = pseudo_damage(truth, slope)
-    if whole == 0.0:
+    if whole == 0.0 or np.ptp(truth) <= STILL * np.abs(truth).max():
         raise InputError("", "true load", None, "never varies, so it does no damage to which another could be compared")
     return pseudo_damage(load, slope) / whole

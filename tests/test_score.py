@@ -192,6 +192,9 @@ def test_a_constant_load_does_no_damage_and_is_no_truth():
     assert pseudo_damage(np.full(9, 3.0)) == 0.0
     with pytest.raises(InputError, match="never varies"):
         damage_ratio(np.array([0.0, 1.0, 0.0]), np.full(9, 3.0))
+    standing = 3000.0 + 1e-9 * np.sin(np.arange(90.0))  # rounding: the ratio to it would be 1e57
+    with pytest.raises(InputError, match="never varies"):
+        damage_ratio(standing + np.sin(np.arange(90.0)), standing)
 
 
 def test_damage_counts_astm_half_cycles():
