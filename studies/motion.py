@@ -97,10 +97,16 @@ def check(scene: Scene, engines: tuple[str, ...]) -> tuple[Options, Parameters]:
         raise InputError(scene.file, "effects.accelerometers", None, "is missing: this study reads accelerometers")
     p = scene.effects["accelerometers"]
     _array(scene, p.positions())
+    if scene.run.output_step is not None:
+        raise InputError(scene.file, "run.output_step", scene.run.output_step, "this study reads its sensors at every "
+                         "step, and saves their samples alone: drop this key")
     if options.file is not None:
         source = _measured(scene, options, p)
         count, period = len(source.readings), source.period
     else:
+        if options.zeroed:
+            raise InputError(scene.file, "options.zeroed", True, "virtual sensors read specific force, gravity "
+                             "included: this key belongs to readings of your own (options.file)")
         count, period = round(scene.run.duration * p.sampling_rate) + 1, 1 / p.sampling_rate
     for name in ("turning_cut_off", "position_cut_off"):
         check_cut_off(count, period, getattr(options, name), scene.file, f"options.{name}")

@@ -65,6 +65,8 @@ def test_a_users_file_takes_the_place_of_the_runs(tmp_path):
     ("effects.accelerometers.sensors={a = {x = 1.0, z = 0.0}, b = {x = 2.0, z = 0.0}}", "sensors.*at least three"),
     ("effects.accelerometers.sensors={a={x=1.0,z=0.0},b={x=2.0,z=0.0},c={x=3.0,z=0.0}}", "sensors.*on a line"),
     ("options.file=none.csv", "options.file.*no such file"),
+    ("options.zeroed=true", "options.zeroed.*of your own"),
+    ("run.output_step=5e-3", "run.output_step.*drop this key"),
     ("options.speed=3.0", "unknown key"),
 ])  # fmt: skip
 def test_what_cannot_be_used_is_refused_before_anything_is_written(change, words, tmp_path):
