@@ -20,7 +20,7 @@ from pydantic import Field
 from models.assembly import assemble
 from models.damage import CONVENTION, SLOPE
 from models.drift.growth import holding_stiffness
-from models.drift.score import TUMBLED, Limits, blind_verdict, consistent, errors, own_figures, verdict
+from models.drift.score import COARSEST, LEAST, TUMBLED, Limits, blind_verdict, consistent, errors, own_figures, verdict
 from models.drift.trust import trust
 from models.errors import InputError, RunFailed
 from models.noise import PITCH_SENSOR, normal
@@ -31,7 +31,15 @@ from models.simulate import simulate
 from models.strict import Strict, quantity, read
 from models.time_series import write_time_series
 from models.vehicles.pitch_plane import Parameters
-from studies.virtual_measurement import PAPER, check_road, follower, measure, stride, write_measurement
+from studies.virtual_measurement import (
+    PAPER,
+    check_road,
+    check_steps,
+    follower,
+    measure,
+    stride,
+    write_measurement,
+)
 
 Progress = Callable[[str, float], None]
 Row = dict[str, Any]
@@ -91,6 +99,10 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
     """Refuse, before anything is written, a scene that this study cannot follow through all its runs."""
     options = read(Options, scene.options, scene.file, "options")
     check_road(scene, engines, options.sampling_rate)
+    check_steps(scene, engines)
+    if scene.run.step > COARSEST or scene.run.duration < LEAST * scene.run.step:
+        raise InputError(scene.file, "run", f"{scene.run.duration:g} s by {scene.run.step:g} s",
+                         f"the score takes {LEAST} steps or more, of {COARSEST:g} s or less")
     for name, factor in options.factors.items():
         if name not in Parameters.model_fields:
             allowed = "not a parameter of the vehicle"

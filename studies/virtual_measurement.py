@@ -56,6 +56,15 @@ def _check_integrator(scene: Scene, engine: str) -> None:
         raise InputError(scene.file, f"engines.{engine}.integrator", given, allowed)
 
 
+def check_steps(scene: Scene, engines: tuple[str, ...]) -> None:
+    """Refuse an engine with a step of its own where runs are compared with the measurement row by row."""
+    for engine in engines:
+        step = scene.settings(engine).step
+        if step != scene.run.step:
+            raise InputError(scene.file, f"engines.{engine}.step", step, "this study compares runs row by row with the "
+                             f"measurement, whose step is run.step = {scene.run.step:g} s: drop this key")
+
+
 def stride(scene: Scene, sampling_rate: float) -> int:
     """Steps of the measurement from one sample to the next."""
     ratio = 1.0 / (sampling_rate * scene.run.step)

@@ -86,6 +86,8 @@ def test_the_files_that_a_user_gets_are_there(summary):
     ("effects.pitch_spring.stiffness=2e5", "drop it"),
     ("run.output_step=0.01", "drop this key"),
     ("options.sampling_rate=700.0", "sampling_rate"),
+    ("engines.exudyn.step=5e-4", r"engines\.exudyn\.step.*drop this key"),
+    ("run.duration=0.05", "100 steps or more"),
 ])  # fmt: skip
 def test_what_the_study_cannot_follow_is_refused_before_it_writes(change, words, tmp_path):
     with pytest.raises(InputError, match=words):
