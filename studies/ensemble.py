@@ -5,6 +5,7 @@ blocks of paths are kept in the folder ``blocks``, so that ``twinrig run ensembl
 that was killed, to the same bits. Each other engine repeats the first paths on the same noise samples.
 """
 
+import math
 from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
@@ -99,7 +100,8 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     table = text(options, scene, rows, found, gaps)
     (folder / "table.txt").write_text("\n".join(table) + "\n")
     _figure(times, found["states"][:, :, 3] - true[:, 3], found["drift_off"], options, folder)
-    return {"scene": scene.title, "folder": str(folder), "paths": options.paths, "rows": rows, "gaps": gaps,
+    told = {engine: None if math.isnan(worst) else worst for engine, worst in gaps.items()}
+    return {"scene": scene.title, "folder": str(folder), "paths": options.paths, "rows": rows, "gaps": told,
             "failed": {}, "table": table}  # fmt: skip
 
 
@@ -168,9 +170,15 @@ def text(options: Options, scene: Scene, rows: list[dict[str, float]], found: Ar
         lines.append(f"  {100 * level:7g} %   {_time(value)}   ({_time(low)} to {_time(high)})")
     lost = int(np.isfinite(found["failed"]).sum())
     lines += [f"  {lost} paths left all bounds and count as drifted off by then"] if lost else []
-    lines += [f"  {engine}: {options.engine_paths} of these paths differ by at most {worst:.0e} of the largest state "
-              "before drift-off" for engine, worst in gaps.items()]  # fmt: skip
+    lines += [f"  {engine}: {_compared(options, worst)}" for engine, worst in gaps.items()]
     return lines
+
+
+def _compared(options: Options, worst: float) -> str:
+    """How far another engine is from the reference, or why that cannot be said."""
+    if math.isnan(worst):
+        return "not compared, as every path drifts off before the first saved row"
+    return f"{options.engine_paths} of these paths differ by at most {worst:.0e} of the largest state before drift-off"
 
 
 def _time(value: float) -> str:

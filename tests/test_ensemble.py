@@ -313,6 +313,7 @@ def test_engines_repeat_the_paths(folder, interpolation):
     assert gap(reference, run_paths(noise_paths(own, TIMES, engine="exudyn"), 2), TIMES) < 1e-12
     other = run_paths(noise_paths(scene(folder, seed=4, interpolation=interpolation), TIMES), 3)
     assert gap(reference, other, TIMES) > 1e-6
+    assert math.isnan(gap(reference | {"drift_off": np.full(3, 0.1)}, other, TIMES))  # only the common start is left
 
 
 def test_what_cannot_be_an_ensemble_is_refused(folder):

@@ -6,6 +6,7 @@ a table, among its threads. Exudyn, and anything else, runs in processes: ``nois
 ``runner.processes``.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -76,10 +77,13 @@ def gap(reference: Arrays, other: Arrays, times: np.ndarray) -> float:
     """Largest difference of any state before both paths' drift-off, by the reference's largest state there.
 
     reference, other : arrays of ``NoisePaths`` of which the second may hold fewer paths; times (rows,) in s. After
-    drift-off a rounding error is as large as the run, and no comparison says anything.
+    drift-off a rounding error is as large as the run, and no comparison says anything; nan where all paths have
+    drifted off before the first row past the start.
     """
     count = len(other["states"])
     until = np.minimum(reference["drift_off"][:count], other["drift_off"])
+    if not (times[times > 0.0] < until[:, None]).any():
+        return math.nan
     one = np.where((times < until[:, None])[:, :, None], reference["states"][:count], 0.0)
     two = np.where((times < until[:, None])[:, :, None], other["states"], 0.0)
     return float(np.abs(one - two).max() / np.abs(one).max())
