@@ -79,6 +79,20 @@ def by_approach(A: Any, B: Any, approach: Any, pair: Pair) -> Hertz:
     return _contact(A, B, load, short, ratio, cosine + sine, pair)
 
 
+def by_axes(a: float, b: float, pair: Pair, *, load: float | None = None, approach: float | None = None) -> Hertz:
+    """Contact of known semi-axes a, b (m), plain numbers, under a load (N) or at an approach (m), above 0.
+
+    The curvatures follow from both: the same axes under twice the load are those of bodies curved twice as much.
+    """
+    short, g = min(a, b), min(a, b) / max(a, b)
+    cosine, sine = integrals(g)
+    if approach is not None:
+        load = 2.0 / 3.0 * math.pi * a * b * approach * pair.modulus / (short * (cosine + sine))
+    curvature = 1.5 * (load or 0.0) / (math.pi * a * b) * cosine / (pair.modulus * short)
+    other = curvature * g * g * sine / cosine
+    return by_load(*((other, curvature) if a >= b else (curvature, other)), load, pair)
+
+
 def _curvatures(A: Any, B: Any) -> dict[str, Array]:
     """Both curvatures as arrays; raises InputError where they are none of a Hertzian contact."""
     found = {name: quantity(name, value, "a curvature in 1/m, at most 1e12", most=1e12)

@@ -69,6 +69,10 @@ class Profiles(Strict):
     lateral_shift: float = quantity("m", "of the wheel towards the rail's gauge corner", default=0.0, signed=True)
     yaw: float = quantity("rad", "of the wheelset", default=0.0, signed=True)
     radius: float = quantity("m", "of the wheel at its taping line", default=0.46)
+    back_to_back: float = quantity("m", "between the backs of the wheels' flanges", default=1.360)
+    gauge: float = quantity("m", "of the track", default=1.435)
+    gauge_depth: float = quantity("m", "below the rails' tops where the gauge is measured", default=0.014)
+    smoothing: float = quantity("m", "wavelength of which half is left in profiles from files", default=0.0, zero=True)
 
 
 class Cases(Strict):
@@ -115,7 +119,17 @@ class Method(Strict):
     cells: int = Field(21, ge=5, le=400, description="cells along each axis")
     march: Literal["second-order", "plain"] = Field(default="second-order", description="of FASTSIM")
     bound: Literal["parabolic", "elliptic"] = Field(default="parabolic", description="of the traction in FASTSIM")
-    flexibilities: Literal["one", "three"] = Field(default="one", description="of FASTSIM")
+    flexibilities: Literal["blended", "one", "three"] = Field(default="blended", description="of FASTSIM")
+
+    @property
+    def order(self) -> float:
+        """Power of the size of a cell with which the error of the forces falls."""
+        return 2.0 if self.name == "fastsim" and self.march == "second-order" and self.bound == "parabolic" else 1.0
+
+    @property
+    def band(self) -> str:
+        """Name of the theory's band of error in ``models.contact.accuracy``."""
+        return f"{self.flexibilities} {self.bound}" if self.name == "fastsim" else self.name
 
     def unread(self) -> frozenset[str]:
         """Keys that have no meaning for this theory."""
@@ -143,6 +157,12 @@ class ContactScene(SceneFile):
     def geometry(self) -> str:
         """Name of the one table that says where the bodies touch."""
         return next(name for name in GEOMETRIES if getattr(self, name) is not None)
+
+    def cases_file(self) -> Path:
+        """The file of cases: beside the scene, or else in the folder in which the command runs."""
+        assert self.cases is not None
+        here = Path(self.cases.file)
+        return here if not (Path(self.folder) / here).exists() and here.is_file() else self.path(str(here), "cases.file")
 
     @property
     def pair(self) -> Pair:

@@ -1,0 +1,84 @@
+"""From a scene to its contact, pressed, by the theory that it names."""
+
+from typing import Literal
+
+import numpy as np
+
+from models.contact.hertz import Hertz, by_approach, by_axes, by_load
+from models.contact.material import Pair
+from models.contact.profile_files import read_profile
+from models.contact.profiles import Profile
+from models.contact.scene import ContactScene
+from models.contact.simplified_theory import NormalContact, press
+from models.contact.standard_profiles import RAILS, WHEELS, built_in
+from models.contact.theories import Contact, Exact, ExactOnEllipse, Fastsim, Linear, Simplified
+from models.contact.undeformed_distance import quadratic
+from models.contact.wheel_on_rail import Touch, Track, Wheelset, wheel_on_rail
+from models.errors import InputError
+
+BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
+
+
+def contact(scene: ContactScene) -> Contact:
+    """The contact of a scene, pressed, by the theory that the scene names."""
+    method = scene.method
+    assert scene.contact is not None
+    friction = scene.contact.friction
+    if scene.profiles is not None:
+        pressed = press([touch.patch for touch in touches(scene)], scene.pair, **_pressed(scene))
+        return Simplified(pressed, friction) if method.name == "simplified" else Exact(pressed, friction, method.cells)
+    hertz = _hertz(scene)
+    if method.name == "simplified":
+        return Simplified(interpenetrating(hertz, scene.pair), friction)
+    if method.name == "fastsim":
+        choices = method.model_dump(include={"march", "bound", "flexibilities"})
+        return Fastsim(hertz, friction, scene.pair, **choices)
+    return (Linear if method.name == "linear" else ExactOnEllipse)(hertz, friction, scene.pair)
+
+
+def _pressed(scene: ContactScene) -> dict[str, float | None]:
+    """What presses the bodies together: load or approach."""
+    assert scene.contact is not None
+    return {"load": scene.contact.load, "approach": scene.contact.approach}
+
+
+def interpenetrating(hertz: Hertz, pair: Pair) -> NormalContact:
+    """An ellipse as the theory of 1983 finds it, with room for more than its area."""
+    A, B = float(hertz.A), float(hertz.B)
+    x, y = (float(np.sqrt(1.5 * hertz.approach / curvature)) for curvature in (A, B))
+    return press(quadratic(A, B, x, y), pair, load=float(hertz.load))
+
+
+def touches(scene: ContactScene) -> list[Touch]:
+    """Where the profiles of a scene touch."""
+    p = scene.profiles
+    assert p is not None
+    track = Track(gauge=p.gauge, gauge_depth=p.gauge_depth, inclination=p.inclination)
+    wheelset = Wheelset(radius=p.radius, back_to_back=p.back_to_back)
+    return wheel_on_rail(_profile(scene, "wheel"), _profile(scene, "rail"), lateral_shift=p.lateral_shift, yaw=p.yaw,
+                         track=track, wheelset=wheelset)  # fmt: skip
+
+
+def _profile(scene: ContactScene, kind: Literal["wheel", "rail"]) -> Profile:
+    """A built-in profile by its name, or the user's file."""
+    assert scene.profiles is not None
+    name = getattr(scene.profiles, kind)
+    if name in BUILT_IN[kind]:
+        return built_in(name)
+    if "." not in name:
+        raise InputError(scene.file, f"profiles.{kind}", name, "must be a file or built in", tuple(BUILT_IN[kind]))
+    return read_profile(scene.path(name, f"profiles.{kind}"), kind, smoothing=scene.profiles.smoothing)
+
+
+def _hertz(scene: ContactScene) -> Hertz:
+    """Hertz' contact from semi-axes, curvatures or radii, by load or approach."""
+    load, approach = _pressed(scene).values()
+    if scene.ellipse is not None:
+        return by_axes(scene.ellipse.a, scene.ellipse.b, scene.pair, load=load, approach=approach)
+    A, B = scene.radii.curvatures(scene.file) if scene.radii is not None else _given(scene)
+    return by_load(A, B, load, scene.pair) if load is not None else by_approach(A, B, approach, scene.pair)
+
+
+def _given(scene: ContactScene) -> tuple[float, float]:
+    assert scene.curvatures is not None
+    return scene.curvatures.A, scene.curvatures.B

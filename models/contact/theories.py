@@ -1,0 +1,183 @@
+"""One contact by any of the theories, asked in one way.
+
+A contact is pressed once: load, area, largest pressure and approach are then known. ``roll`` gives its forces at any
+creepage on any number of cells. ``models.contact.accuracy`` tells how far they are off.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from models.contact import linear_theory
+from models.contact.fastsim import fastsim
+from models.contact.fields import Fields
+from models.contact.hertz import Hertz
+from models.contact.hertz_cells import hertzian
+from models.contact.material import Pair
+from models.contact.normal_problem import Pressed, centres, solve_normal
+from models.contact.rolling_problem import RollingSolution, solve_rolling
+from models.contact.simplified_theory import NormalContact, PatchPressure
+from models.contact.simplified_theory import roll as roll_simplified
+
+Motion = tuple[float, float, float]
+"""xi_x, xi_y and spin (1/m)."""
+
+
+@dataclass(frozen=True)
+class Rolled:
+    """Forces on the wheel (N), moment (N m), share of the area that sticks, dissipation by rolling speed (N)."""
+
+    fx: float
+    fy: float
+    mz: float
+    stick: float
+    dissipation: float
+    fields: tuple[Fields, ...] = ()
+
+    @property
+    def force(self) -> np.ndarray:
+        """fx and fy."""
+        return np.array([self.fx, self.fy])
+
+
+@dataclass(frozen=True)
+class Pressing:
+    """Normal contact: load (N), area (m^2), largest pressure (Pa), approach (m)."""
+
+    load: float
+    area: float
+    peak: float
+    approach: float
+
+
+class Contact(ABC):
+    """Two bodies pressed together, to be rolled by one theory; ``order``: of the error in the size of a cell."""
+
+    order = 1.0
+
+    def __init__(self, pressing: Pressing, friction: float, pair: Pair) -> None:
+        self.pressing, self.friction, self.pair = pressing, friction, pair
+
+    @abstractmethod
+    def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
+        """Forces at creepages and spin; with ``fields`` also what happens in every cell, patch by patch."""
+
+
+class OnEllipse(Contact):
+    """Hertz' contact, with semi-axes a and b (m)."""
+
+    def __init__(self, hertz: Hertz, friction: float, pair: Pair) -> None:
+        self.hertz, self.a, self.b = hertz, float(hertz.a), float(hertz.b)
+        pressing = Pressing(float(hertz.load), float(np.pi * self.a * self.b), float(hertz.p0), float(hertz.approach))
+        super().__init__(pressing, friction, pair)
+
+
+class Linear(OnEllipse):
+    """Forces without slip, in proportion to the creepages and without a bound."""
+
+    def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
+        """Forces; there are no cells and no fields."""
+        fx, fy, mz = (float(f) for f in linear_theory.forces(self.a, self.b, *motion, self.pair))
+        return Rolled(fx, fy, mz, 1.0, -float(np.dot((fx, fy, mz), motion)))
+
+
+class Fastsim(OnEllipse):
+    """The simplified theory of 1982; ``choices`` are those of ``fastsim``."""
+
+    def __init__(self, hertz: Hertz, friction: float, pair: Pair, **choices: Any) -> None:
+        super().__init__(hertz, friction, pair)
+        self.choices = choices
+        self.order = 2.0 if choices["march"] == "second-order" and choices["bound"] == "parabolic" else 1.0
+
+    def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
+        """Forces on ``cells`` cells in each strip."""
+        given = (self.a, self.b, self.pressing.load, self.friction, *motion, self.pair)
+        found = fastsim(*given, cells=cells, **self.choices)
+        from models.contact.fastsim_fields import fields as fastsim_fields
+        inside = (fastsim_fields(*given, cells=cells, **self.choices),) if fields else ()
+        return Rolled(*(float(v) for v in (found.fx, found.fy, found.mz, found.stick, found.dissipation)), inside)
+
+
+class ExactOnEllipse(OnEllipse):
+    """Half-spaces with Coulomb friction under Hertz' pressure."""
+
+    def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
+        """Forces on ``cells`` x ``cells`` cells about the ellipse."""
+        return _exact([hertzian(self.a, self.b, self.pressing.load, cells)], motion, self.friction, self.pair)
+
+
+class Simplified(Contact):
+    """The simplified theory of 1983 for any undeformed distance."""
+
+    def __init__(self, pressed: NormalContact, friction: float) -> None:
+        pressing = Pressing(pressed.load, pressed.area, pressed.peak, pressed.approach)
+        super().__init__(pressing, friction, pressed.pair)
+        self.pressed = pressed
+
+    def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
+        """Forces on ``cells`` strips and cells in each patch; fields lie where the patches do on the contour."""
+        found = roll_simplified(self.pressed, self.friction, *motion, cells=cells)
+        places = [part.patch.place for part in self.pressed.patches]
+        return Rolled(found.fx, found.fy, found.mz, found.stick_share, found.power, _placed(found.fields, places))
+
+
+class Exact(Contact):
+    """Half-spaces with Coulomb friction, area and pressure found too; patches share the load as the theory of 1983 says."""
+
+    def __init__(self, pressed: NormalContact, friction: float, cells: int) -> None:
+        self.pressed = pressed
+        self.parts = pressed.patches
+        grids = self._grids(cells)
+        pressing = Pressing(pressed.load, sum(g.area for g in grids), max(float(g.pressure.max()) for g in grids),
+                            pressed.approach)  # fmt: skip
+        super().__init__(pressing, friction, pressed.pair)
+
+    def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
+        """Forces on ``cells`` x ``cells`` cells about each patch."""
+        found = _exact(self._grids(cells), motion, self.friction, self.pair)
+        return Rolled(found.fx, found.fy, found.mz, found.stick, found.dissipation,
+                      _placed(found.fields, [part.patch.place for part in self.parts]))  # fmt: skip
+
+    def _grids(self, cells: int) -> list[Pressed]:
+        return [_pressed(part, cells, self.pressed.pair) for part in self.parts]
+
+
+def _exact(grids: Sequence[Pressed], motion: Motion, friction: float, pair: Pair) -> Rolled:
+    """The sum over patches that do not feel each other's tractions."""
+    found = [solve_rolling(grid, friction, *motion, pair) for grid in grids]
+    areas = [grid.area for grid in grids]
+    stuck = sum(np.count_nonzero(one.stick & grid.contact) * grid.dx * grid.dy
+                for one, grid in zip(found, grids, strict=True))  # fmt: skip
+    fields = tuple(_fields(one, grid) for one, grid in zip(found, grids, strict=True))
+    return Rolled(*(float(sum(getattr(one, name) for one in found)) for name in ("fx", "fy", "mz")),
+                  float(stuck / sum(areas)), float(sum(one.power for one in found)), fields)  # fmt: skip
+
+
+def _fields(found: RollingSolution, grid: Pressed) -> Fields:
+    x, y = np.meshgrid(grid.x, grid.y)
+    return Fields(x, y, np.full_like(x, grid.dx), np.full_like(x, grid.dy), grid.pressure, found.traction[..., 0],
+                  found.traction[..., 1], ~found.stick, grid.contact)  # fmt: skip
+
+
+def _placed(fields: Sequence[Fields], places: Sequence[float]) -> tuple[Fields, ...]:
+    """Fields with y along the contour of the rail, so that several patches lie beside one another."""
+    return tuple(replace(one, y=one.y + place) for one, place in zip(fields, places, strict=True))
+
+
+MARGIN = 1.25
+"""Sides of the grid of the exact normal problem by those of the area that the simplified theory finds."""
+
+
+def _pressed(part: PatchPressure, cells: int, pair: Pair) -> Pressed:
+    """Exact pressure of one patch, with the load that the simplified theory gives it."""
+    x0, x1, y0, y1 = part.box
+    middle = np.array([x0 + x1, y0 + y1]) / 2
+    dx, dy = MARGIN * (x1 - x0) / cells, MARGIN * (y1 - y0) / cells
+    x, y = middle[0] + centres(cells, dx), middle[1] + centres(cells, dy)
+    nodes = part.patch.distance
+    inside = np.clip(x, nodes.x[0], nodes.x[-1]), np.clip(y, nodes.y[0], nodes.y[-1])
+    found = solve_normal(nodes.at(*np.meshgrid(*inside)), dx, dy, pair, load=part.load)
+    return Pressed(found.pressure, x, y)

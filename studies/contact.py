@@ -1,0 +1,158 @@
+"""What one contact of wheel and rail does: area, pressure, forces and how far they are off, at a creepage or a sweep."""
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.contact.accuracy import Error, rolled
+from models.contact.of_scene import contact, touches
+from models.contact.scene import ContactScene
+from models.contact.theories import Contact, ExactOnEllipse, Motion, OnEllipse, Rolled
+from models.errors import InputError
+from models.strict import Strict, read
+from models.tables import write_table
+
+SYSTEM = "contact"
+Progress = Callable[[str, float], None]
+UNITS = {"fx": "N", "fy": "N", "mz": "N m", "stick": "-", "dissipation": "N"}
+"""Of the forces; the power lost is the dissipation times the rolling speed."""
+ROWS = 12
+"""Rows of a sweep that are printed, about; the file has all."""
+
+
+class Options(Strict):
+    """[options] of this study."""
+
+    exact: int = Field(5, ge=0, le=100, description="points of a sweep that the exact theory checks, on an ellipse")
+
+
+def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
+    """Refuse a table of cases, which is another study's."""
+    if scene.cases is not None:
+        raise InputError(scene.file, "study", scene.study, "computes one contact; for a table of cases use contact_table")
+
+
+def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Press the bodies, roll them; saves ``forces.csv``, ``fields.csv`` and figures."""
+    check(scene, engines)
+    progress("pressing", 0.0)
+    start = time.perf_counter()
+    body = contact(scene)
+    motions = creepages(scene)
+    last = len(motions) - 1
+    found = []
+    for i, motion in enumerate(motions):
+        progress("rolling", i / len(motions))
+        found.append(rolled(body, motion, scene.method.cells, fields=i == last))
+    seconds = time.perf_counter() - start
+    _save(motions, found, folder)
+    progress("figures", 0.9)
+    _figures(scene, body, motions, found, folder)
+    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(body, motions, found),
+            "table": _table(scene, body, motions, found, seconds)}  # fmt: skip
+
+
+def creepages(scene: ContactScene) -> list[Motion]:
+    """The creepages of the scene, one or a sweep of them."""
+    fixed = scene.creepage.model_dump()
+    values = [{}] if scene.sweep is None else [{scene.sweep.of: float(value)} for value in scene.sweep.values()]
+    return [tuple({**fixed, **value}.values()) for value in values]  # type: ignore[misc]
+
+
+def _save(motions: list[Motion], found: list[tuple[Rolled, Error]], folder: Path) -> None:
+    """Forces of every creepage, and the cells of the last one."""
+    creepages = zip(("xi_x [-]", "xi_y [-]", "spin [1/m]"), np.array(motions).T, strict=True)
+    columns = {name.partition(" ")[0]: (name.partition("[")[2][:-1], values) for name, values in creepages}
+    for name, unit in UNITS.items():
+        columns[name] = (unit, np.array([getattr(one, name) for one, _ in found]))
+    columns["error_of_cells"] = ("N", np.array([error.cells for _, error in found]))
+    columns["error_of_theory"] = ("N", np.array([error.theory for _, error in found]))
+    write_table(folder / "forces.csv", columns)
+    fields = found[-1][0].fields
+    if fields:
+        units = {"x": "m", "y": "m", "dx": "m", "dy": "m", "pressure": "Pa", "px": "Pa", "py": "Pa", "slips": "-"}
+        write_table(folder / "fields.csv", {name: (unit, np.concatenate([getattr(f, name)[f.inside] for f in fields]))
+                                            for name, unit in units.items()})  # fmt: skip
+
+
+def _answer(body: Contact, motions: list[Motion], found: list[tuple[Rolled, Error]]) -> dict[str, Any]:
+    """Everything that was computed, as plain numbers in SI."""
+    rows = [{**dict(zip(("xi_x", "xi_y", "spin"), motion, strict=True)), **{name: getattr(one, name) for name in UNITS},
+             "error_of_cells": error.cells, "error_of_theory": error.theory}
+            for motion, (one, error) in zip(motions, found, strict=True)]  # fmt: skip
+    return {**asdict(body.pressing), "friction": body.friction, "forces": rows}
+
+
+def _table(scene: ContactScene, body: Contact, motions: list[Motion], found: list[tuple[Rolled, Error]],
+           seconds: float) -> list[str]:  # fmt: skip
+    """Normal contact, then forces with their errors: all of one creepage, or some rows of a sweep."""
+    p, limit = body.pressing, body.friction * body.pressing.load
+    size = f"a = {1e3 * body.a:.3f} mm, b = {1e3 * body.b:.3f} mm, " if isinstance(body, OnEllipse) else ""
+    lines = [f"  load {p.load:,.0f} N, approach {1e6 * p.approach:.2f} um, {size}area {1e6 * p.area:.2f} mm^2, "
+             f"largest pressure {1e-6 * p.peak:,.0f} MPa", *_places(scene),
+             f"  forces on the wheel by {scene.method.name}, {scene.method.cells} cells along each axis, "
+             f"{1e3 * seconds:.3g} ms in all; mu N = {limit:,.0f} N",
+             f"    {'xi_x [-]':>10}{'xi_y [-]':>10}{'spin [1/m]':>11}{'Fx [N]':>10}{'Fy [N]':>10}{'Mz [N m]':>10}"
+             f"{'stick':>7}{'loss [N]':>10}   error of cells, of theory [% of mu N]"]  # fmt: skip
+    step = max(1, (len(motions) - 1) // ROWS)
+    for motion, (one, error) in list(zip(motions, found, strict=True))[::step]:
+        lines.append(f"    {motion[0]:>10.3g}{motion[1]:>10.3g}{motion[2]:>11.3g}{one.fx:>10,.0f}{one.fy:>10,.0f}"
+                     f"{one.mz:>10.3f}{one.stick:>7.0%}{one.dissipation:>10.3g}   {_percent(error.cells, limit):>6}"
+                     f"{_percent(error.theory, limit):>8}")  # fmt: skip
+    return [*lines, "  loss: power by the rolling speed; errors are of the force (Fx, Fy)"]
+
+
+def _percent(error: float, limit: float) -> str:
+    return f"{100 * error / limit:.2f}" if limit > 0 else "0"
+
+
+def _places(scene: ContactScene) -> list[str]:
+    """Where profiles touch, a line each."""
+    if scene.profiles is None:
+        return []
+    return [f"  touches at {1e3 * touch.rail_y:.2f} mm from the rail's top and {1e3 * touch.wheel_y:.2f} mm from the "
+            f"taping line, {touch.angle:.4f} rad steep, gap {1e6 * touch.gap:.1f} um"
+            for touch in touches(scene)]  # fmt: skip
+
+
+def _figures(scene: ContactScene, body: Contact, motions: list[Motion], found: list[tuple[Rolled, Error]],
+             folder: Path) -> None:  # fmt: skip
+    from studies.contact_figures import contact_figure, sweep_figure
+
+    one, fields = found[-1][0], list(found[-1][0].fields)
+    if fields:
+        contact_figure(fields, body.friction, _caption(scene, motions[-1], one), folder / "contact.png")
+    if scene.sweep is not None:
+        sweep_figure(scene.sweep, body, found, _checks(scene, body), scene.title, folder / "forces.png")
+
+
+def _caption(scene: ContactScene, motion: Motion, one: Rolled) -> str:
+    return (f"{scene.title}\n" rf"$\xi_x$ = {motion[0]:.3g}, $\xi_y$ = {motion[1]:.3g}, spin = {motion[2]:.3g} 1/m: "
+            f"$F_x$ = {1e-3 * one.fx:.2f} kN, $F_y$ = {1e-3 * one.fy:.2f} kN, $M_z$ = {one.mz:.1f} N m "
+            f"({scene.method.name})")  # fmt: skip
+
+
+CHECKED = 40
+"""Cells along each axis of the exact theory where it checks a sweep."""
+
+
+def _checks(scene: ContactScene, body: Contact) -> list[tuple[float, Rolled]]:
+    """The exact theory at a few values of a sweep on an ellipse."""
+    points = read(Options, scene.options, scene.file, "options").exact
+    if scene.sweep is None or not isinstance(body, OnEllipse) or isinstance(body, ExactOnEllipse) or not points:
+        return []
+    exact = ExactOnEllipse(body.hertz, body.friction, body.pair)
+    values, motions = scene.sweep.values(), creepages(scene)
+    chosen = np.unique(np.linspace(0, len(values) - 1, points).round().astype(int))
+    return [(float(values[i]), exact.roll(motions[i], CHECKED)) for i in chosen]
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("contact_ellipse")

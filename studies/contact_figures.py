@@ -1,0 +1,139 @@
+"""Pictures of rolling contact: pressure, tractions with stick and slip, creep forces with their error."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+
+from models.contact.accuracy import Error
+from models.contact.fields import Fields
+from models.contact.scene import Sweep
+from models.contact.theories import Contact, Rolled
+from studies.figures import plt, save
+
+MILLI, MEGA = 1e3, 1e-6
+STICK, SLIP = "#cfe3f2", "#f6c9a8"
+ARROWS = 17
+"""Arrows across the longer side of a contact area, about."""
+
+
+def contact_figure(patches: list[Fields], friction: float, title: str, path: Path) -> None:
+    """Pressure over the contact area beside its tractions, all patches to scale."""
+    figure, axes = plt.subplots(1, 2, figsize=_size(patches), sharex=True, sharey=True)
+    _pressure(axes[0], patches)
+    _tractions(axes[1], patches, friction)
+    for axis in axes:
+        axis.set_aspect("equal")
+        axis.grid(visible=False)
+        axis.set_xlabel("x, direction of rolling [mm]")
+    axes[0].set_ylabel("y, to the right [mm]")
+    axes[0].invert_yaxis()  # as seen from above, where x is ahead
+    figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    save(figure, path)
+
+
+def _extent(patches: list[Fields]) -> tuple[float, float]:
+    """Length along x and width along y of all patches together (mm)."""
+    return tuple(float(np.ptp(np.concatenate([getattr(f, name)[f.inside] for f in patches]))) * MILLI  # type: ignore
+                 for name in ("x", "y"))  # fmt: skip
+
+
+def _size(patches: list[Fields]) -> tuple[float, float]:
+    length, width = _extent(patches)
+    return 10.5, float(np.clip(4.0 * width / length + 1.7, 3.6, 8.5))
+
+
+def _rectangles(f: Fields) -> np.ndarray:
+    """Corners of the cells inside, (cells, 4, 2) in mm."""
+    x, y, dx, dy = (MILLI * getattr(f, name)[f.inside] for name in ("x", "y", "dx", "dy"))
+    corners = [(x + i * dx / 2, y + j * dy / 2) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return np.array([np.stack(corner, -1) for corner in corners]).transpose(1, 0, 2)
+
+
+def _pressure(axis: Any, patches: list[Fields]) -> None:
+    greatest = MEGA * max(float(f.pressure.max()) for f in patches)
+    for f in patches:
+        cells = PolyCollection(_rectangles(f), array=MEGA * f.pressure[f.inside], cmap="viridis", edgecolor="face",
+                               linewidth=0.2)  # fmt: skip
+        cells.set_clim(0.0, greatest)
+        axis.add_collection(cells)
+    axis.autoscale_view()
+    axis.figure.colorbar(cells, ax=axis, label="pressure [MPa]", shrink=0.8)
+    axis.set_title(f"pressure, largest {greatest:,.0f} MPa")
+
+
+def _tractions(axis: Any, patches: list[Fields], friction: float) -> None:
+    """Zones of stick and slip, and an arrow of the traction on the wheel in every so many cells."""
+    largest = friction * max(float(f.pressure.max()) for f in patches)
+    spacing = max(_extent(patches)) / ARROWS
+    for f in patches:
+        slips = f.slips[f.inside]
+        colours = np.where(slips, SLIP, STICK)
+        axis.add_collection(PolyCollection(_rectangles(f), facecolor=colours, edgecolor="face", linewidth=0.2))
+        x, y, px, py = _arrows(f, spacing / MILLI)
+        arrows = axis.quiver(MILLI * x, MILLI * y, px, py, angles="xy", scale_units="xy",
+                             scale=largest / (1.6 * spacing), width=0.003, color="#222222")  # fmt: skip
+    axis.quiverkey(arrows, 0.88, 0.035, largest, f"{MEGA * largest:,.0f} MPa", labelpos="W")
+    marks = [plt.Rectangle((0, 0), 1, 1, facecolor=colour) for colour in (STICK, SLIP)]
+    share = np.concatenate([f.slips[f.inside] for f in patches])
+    weight = np.concatenate([(f.dx * f.dy)[f.inside] for f in patches])
+    slip = float(weight[share].sum() / weight.sum())
+    labels = [f"stick, {1 - slip:.0%} of the area", f"slip, {slip:.0%}"]
+    axis.figure.legend(marks, labels, loc="outside lower right", ncols=2)
+    axis.set_title("traction on the wheel")
+
+
+def _arrows(f: Fields, spacing: float) -> tuple[np.ndarray, ...]:
+    """Position and traction at points of an even net: in rows near multiples of the spacing, linear along each."""
+    found = []
+    lines = f.y[:, 0]
+    wanted = np.arange(np.ceil(lines.min() / spacing), np.floor(lines.max() / spacing) + 1) * spacing
+    for row in {int(np.argmin(np.abs(lines - y))) for y in wanted}:
+        inside = np.flatnonzero(f.inside[row])
+        inside = inside[np.argsort(f.x[row, inside])]
+        if inside.size:
+            x = f.x[row, inside]
+            at = np.arange(np.ceil(x[0] / spacing), np.floor(x[-1] / spacing) + 1) * spacing
+            values = (np.interp(at, x, getattr(f, name)[row, inside]) for name in ("px", "py"))
+            found.append(np.array([at, np.full_like(at, lines[row]), *values]))
+    return tuple(np.concatenate(found, axis=1))
+
+
+LABELS = {"xi_x": "longitudinal creepage [-]", "xi_y": "lateral creepage [-]", "spin": "spin [1/m]"}
+COLOURS = {"fx": "#0072b2", "fy": "#d55e00", "mz": "#009e73"}
+
+
+def sweep_figure(sweep: Sweep, body: Contact, found: list[tuple[Rolled, Error]], checks: list[tuple[float, Rolled]],
+                 title: str, path: Path) -> None:  # fmt: skip
+    """Forces and moment against a creepage, with the band of their error, and points of the exact theory."""
+    figure, axes = plt.subplots(1, 2, figsize=(11.0, 4.4))
+    values, limit = sweep.values(), body.friction * body.pressing.load
+    error = np.array([one.total for _, one in found])
+    for name, text in (("fx", "$F_x$"), ("fy", "$F_y$")):
+        force = np.array([getattr(one, name) for one, _ in found])
+        low, high = np.clip(force - error, -limit, limit), np.clip(force + error, -limit, limit)
+        axes[0].fill_between(values, 1e-3 * low, 1e-3 * high, color=COLOURS[name], alpha=0.18, linewidth=0)
+        axes[0].plot(values, 1e-3 * force, color=COLOURS[name], linewidth=1.6, label=text)
+        axes[0].plot([at for at, _ in checks], [1e-3 * getattr(one, name) for _, one in checks], "o",
+                     color=COLOURS[name], markerfacecolor="white", markersize=5)  # fmt: skip
+    axes[1].plot(values, [one.mz for one, _ in found], color=COLOURS["mz"], linewidth=1.6)
+    axes[1].plot([at for at, _ in checks], [one.mz for _, one in checks], "o", color=COLOURS["mz"],
+                 markerfacecolor="white", markersize=5)  # fmt: skip
+    for sign in (-1, 1):
+        axes[0].axhline(sign * 1e-3 * limit, color="black", linewidth=0.7, linestyle=":")
+    axes[0].set_title(r"tangential force on the wheel [kN]; dotted: $\mu N$")
+    axes[1].set_title("moment on the wheel about the normal [N m]")
+    for axis in axes:
+        axis.set_xlabel(LABELS[sweep.of])
+        axis.set_xscale("log" if sweep.spacing == "logarithmic" and sweep.start > 0 else "linear")
+    _legend(axes[0], bool(checks))
+    figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    save(figure, path)
+
+
+def _legend(axis: Any, checked: bool) -> None:
+    axis.fill_between([], [], color="#888888", alpha=0.3, linewidth=0, label="error: cells and theory")
+    if checked:
+        axis.plot([], [], "o", color="#444444", markerfacecolor="white", markersize=5, label="exact theory")
+    axis.legend(loc="best")

@@ -1,0 +1,42 @@
+"""Forces for a table of contacts: from a CSV with a contact in every row to a CSV with forces, errors and a status."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from models.contact.cases_table import answer
+from models.contact.scene import ContactScene
+from models.errors import InputError
+
+SYSTEM = "contact"
+Progress = Callable[[str, float], None]
+ANSWER = "forces.csv"
+
+
+def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
+    """Refuse a scene of one contact, and a file that is not there."""
+    if scene.cases is None:
+        raise InputError(scene.file, "study", scene.study, "needs the table [cases] with a file; one contact is what the "
+                         "study contact computes")  # fmt: skip
+    scene.cases_file()
+
+
+def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Answer every row; saves ``forces.csv``."""
+    check(scene, engines)
+    start = time.perf_counter()
+    path = scene.cases_file()
+    rows = answer(path, folder / ANSWER, scene.pair, scene.method, lambda done: progress(f"{done:,} rows", 0.0))
+    seconds = time.perf_counter() - start
+    wrong = f"; {rows['wrong']:,} of them wrong, see their status" if rows["wrong"] else ", all of them sound"
+    table = [f"  {rows['rows']:,} rows of {path.name}{wrong}",
+             f"  {seconds:.2f} s, {1e6 * seconds / max(rows['rows'], 1):.1f} us a row: reading, forces twice for the "
+             "error of the cells, writing"]  # fmt: skip
+    return {"scene": scene.title, "folder": str(folder), "failed": {}, "rows": rows, "seconds": seconds, "table": table}
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("contact_table")

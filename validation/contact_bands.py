@@ -1,0 +1,81 @@
+"""Bands of error of the simplified theories, from their forces on ``contact_set``: ``python -m validation.contact_bands``
+prints what ``models.contact.accuracy`` keeps.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.contact.accuracy import KNOTS, band, spin_share
+from models.contact.fastsim import fastsim
+from models.contact.hertz import by_axes
+from models.contact.of_scene import interpenetrating
+from models.contact.theories import Simplified
+from validation.contact_set import FRICTION, LOAD, PAIR, Case, read
+
+CELLS = 101
+"""In each strip of FASTSIM: its own error is then below 0.05 % of mu N."""
+SHARE = 0.95
+"""Part of the contacts that a band holds."""
+FASTSIM = [f"{kind} {bound}" for kind in ("blended", "one", "three") for bound in ("parabolic", "elliptic")]
+EDGES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 1.1)
+"""Forces by mu N between which a knot lies."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """A theory against the exact one; all by mu N. force : (n, 2). error : (n,). spinning : (n,) share of spin."""
+
+    force: np.ndarray
+    error: np.ndarray
+    spinning: np.ndarray
+
+    @property
+    def used(self) -> np.ndarray:
+        """Size of the force, (n,)."""
+        return np.linalg.norm(self.force, axis=1)
+
+
+def forces(name: str, cases: list[Case], cells: int) -> np.ndarray:
+    """Force (n, 2) by mu N of a theory, one of those in FASTSIM or "simplified"."""
+    axes, motions = np.array([c.axes for c in cases]).T, np.array([c.creepage for c in cases]).T
+    if name == "simplified":
+        found = [_simplified(c).roll(c.creepage, cells).force for c in cases]
+        return np.array(found) / (FRICTION * LOAD)
+    kind, bound = name.split()
+    one = fastsim(*axes, LOAD, FRICTION, *motions, PAIR, cells=cells, bound=bound, flexibilities=kind)  # type: ignore[arg-type]
+    return np.stack([one.fx, one.fy], axis=1) / (FRICTION * LOAD)
+
+
+def _simplified(case: Case) -> Simplified:
+    return Simplified(interpenetrating(by_axes(*case.axes, PAIR, load=LOAD), PAIR), FRICTION)
+
+
+def held(name: str, cases: list[Case], cells: int = CELLS) -> Held:
+    """A theory's forces and errors."""
+    force = forces(name, cases, cells)
+    exact = np.array([(c.fx, c.fy) for c in cases])
+    axes, motions = np.array([c.axes for c in cases]).T, np.array([c.creepage for c in cases]).T
+    return Held(force, np.linalg.norm(force - exact, axis=1), spin_share(*axes, motions, PAIR.nu))
+
+
+def kept(name: str, one: Held) -> float:
+    """Part of the contacts whose error lies within the band that ``models.contact.accuracy`` states."""
+    return float(np.mean(one.error <= band(name, one.used, one.spinning)))
+
+
+def measured(one: Held) -> tuple[tuple[float, ...], ...]:
+    """Quantiles of the error at each knot, without spin and with it; a knot that no contact is near has the largest."""
+    found = []
+    for rows in (one.spinning < 0.5, one.spinning >= 0.5):
+        within = [rows & (one.used >= low) & (one.used < high) for low, high in zip(EDGES, EDGES[1:], strict=False)]
+        whole = float(np.quantile(one.error[rows], SHARE))
+        found.append(tuple(round(float(np.quantile(one.error[some], SHARE)) if some.sum() > 3 else whole, 4)
+                           for some in within))  # fmt: skip
+    return tuple(found)
+
+
+if __name__ == "__main__":
+    assert len(EDGES) == len(KNOTS) + 1
+    for theory in (*FASTSIM, "simplified"):
+        print(f'    "{theory}": {measured(held(theory, read()))},')
