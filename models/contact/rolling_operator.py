@@ -65,17 +65,18 @@ def solve_on(operator: SlipOperator, free: np.ndarray, stiff: np.ndarray, wanted
     wanted : (ny, nx, 2) change of slip. GMRES, preconditioned by the exact inverse of every strip by itself.
     """
     shape = wanted.shape
+    scale = 1.0 / (operator.own.max() + stiff[..., None])  # a cell near the edge is many times stiffer than the others
     factors = _strip_systems(operator, free, stiff)
     factor(factors)
 
     def apply(flat: np.ndarray) -> np.ndarray:
         change = flat.reshape(shape)
-        return _times(free, operator(change) + stiff[..., None] * change).ravel()
+        return (scale * _times(free, operator(change) + stiff[..., None] * change)).ravel()
 
     def precondition(flat: np.ndarray) -> np.ndarray:
-        return substitute(factors, flat.reshape(shape[0], -1)).ravel()
+        return substitute(factors, (flat.reshape(shape) / scale).reshape(shape[0], -1)).ravel()
 
-    right = _times(free, wanted).ravel()
+    right = (scale * _times(free, wanted)).ravel()
     return krylov.solve(apply, precondition, right, INNER_TOLERANCE, MOST_PRODUCTS).reshape(shape)
 
 

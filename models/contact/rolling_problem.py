@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 TOLERANCE = 1e-8
 """Largest residual of a solution."""
-RELAXATION = 0.6
-"""Of the sweeps; beyond 0.7 they diverge on fine grids that stick."""
+RELAXATION, SLOWER = 0.5, 0.7
+"""Of the first sweeps, and its factor after each round that came no nearer: needed for cells narrower than long."""
 SWEEPS = 3
 """In each round."""
 MOST_ROUNDS = 60
@@ -129,23 +129,25 @@ def _limited(traction: np.ndarray, bound: np.ndarray) -> np.ndarray:
 
 def _solve(operator: SlipOperator, rigid: np.ndarray, bound: np.ndarray) -> tuple[_State, int]:
     """Tractions that meet all conditions, and the rounds taken."""
-    state = _State(operator, rigid, bound, np.zeros_like(rigid))
+    state, relaxation = _State(operator, rigid, bound, np.zeros_like(rigid)), RELAXATION
     for done in range(MOST_ROUNDS):
         if state.residual <= TOLERANCE:
             return state, done
-        state = _swept(operator, rigid, state)
-        step = _State(operator, rigid, bound, _newton(operator, rigid, state))
-        state = min(state, step, key=lambda one: one.residual)
+        swept = _swept(operator, rigid, state, relaxation)
+        turned = _State(operator, rigid, bound, _newton(operator, rigid, swept))
+        nearest = min(swept, turned, key=lambda one: one.residual)
+        relaxation *= 1.0 if nearest.residual < state.residual else SLOWER
+        state = nearest
     raise RunFailed("rolling problem", f"conditions of stick and slip met to {state.residual:.2g} only "
                     f"after {MOST_ROUNDS} rounds")  # fmt: skip
 
 
-def _swept(operator: SlipOperator, rigid: np.ndarray, state: _State) -> _State:
+def _swept(operator: SlipOperator, rigid: np.ndarray, state: _State, relaxation: float) -> _State:
     """The state after a few sweeps."""
     traction = np.ascontiguousarray(np.moveaxis(state.traction, -1, 0))
     motion = np.ascontiguousarray(np.moveaxis(rigid, -1, 0))
     for _ in range(SWEEPS):
-        sweep(traction, motion, operator.reversed, state.bound, RELAXATION)
+        sweep(traction, motion, operator.reversed, state.bound, relaxation)
     return _State(operator, rigid, state.bound, np.moveaxis(traction, 0, -1))
 
 
