@@ -44,7 +44,7 @@ class RollingSolution:
     """Forces and fields of steady rolling; cells as in the pressure's grid.
 
     fx, fy : forces on the wheel (N). mz : moment on the wheel about the origin of x and y (N m).
-    traction : (ny, nx, 2) on the wheel (Pa). slip : (ny, nx, 2) by the rolling speed, zero outside the contact.
+    traction : (ny, nx, 2) on the wheel (Pa). slip : (ny, nx, 2) by the rolling speed, zero where a cell sticks and outside the contact.
     stick : (ny, nx) bool. power : dissipated by friction per unit of rolling speed (W s/m = N), never negative.
     residual : largest change of a cell's traction that would still be needed if all others were right, by the largest
         bound. rounds : of sweeps and Newton steps.
@@ -134,8 +134,7 @@ def _solve(operator: SlipOperator, rigid: np.ndarray, bound: np.ndarray) -> tupl
         if state.residual <= TOLERANCE:
             return state, done
         swept = _swept(operator, rigid, state, relaxation)
-        turned = _State(operator, rigid, bound, _newton(operator, rigid, swept))
-        nearest = min(swept, turned, key=lambda one: one.residual)
+        nearest = swept if swept.residual <= TOLERANCE else min(swept, _turned(operator, rigid, swept), key=_residual)
         relaxation *= 1.0 if nearest.residual < state.residual else SLOWER
         state = nearest
     raise RunFailed("rolling problem", f"conditions of stick and slip met to {state.residual:.2g} only "
@@ -149,6 +148,18 @@ def _swept(operator: SlipOperator, rigid: np.ndarray, state: _State, relaxation:
     for _ in range(SWEEPS):
         sweep(traction, motion, operator.reversed, state.bound, relaxation)
     return _State(operator, rigid, state.bound, np.moveaxis(traction, 0, -1))
+
+
+def _residual(state: _State) -> float:
+    return state.residual
+
+
+def _turned(operator: SlipOperator, rigid: np.ndarray, state: _State) -> _State:
+    """The state after Newton's step; the same where the step is lost in rounding."""
+    try:
+        return _State(operator, rigid, state.bound, _newton(operator, rigid, state))
+    except RunFailed:
+        return state
 
 
 def _newton(operator: SlipOperator, rigid: np.ndarray, state: _State) -> np.ndarray:
@@ -183,8 +194,8 @@ def _assembled(state: _State, rounds: int, pressed: Pressed, box: tuple[slice, s
     cell = pressed.dx * pressed.dy
     traction, slip = np.zeros((2, *pressed.pressure.shape, 2))
     stick = np.zeros(pressed.pressure.shape, bool)
-    traction[box], stick[box] = G * state.traction, state.stick
-    slip[box] = np.where(state.bound[..., None] > 0, state.slip, 0.0)
+    slips = ~state.stick & (state.bound > 0)
+    traction[box], stick[box], slip[box] = G * state.traction, state.stick, state.slip * slips[..., None]
     fx, fy = (float(force) for force in traction.sum(axis=(0, 1)) * cell)
     mz = float(np.sum(pressed.x * traction[..., 1] - pressed.y[:, None] * traction[..., 0]) * cell)
     power = float(-np.sum(traction * slip) * cell)
