@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from models.compiled import njit
 from models.contact.distance_kernels import row_at, segment, value_and_slopes, weights
 
 PARABOLIC, ELLIPTIC = 0, 1
@@ -215,10 +215,10 @@ def crossing(row, depth, inner, outer):
 def march(y, low_x, high_x, width, pressure, mu, flexibility, xi_x, xi_y, spin, traction):
     """FASTSIM along strips with the pressure p of every cell; fills the tractions (s, n, 2).
 
-    Returns fx, fy (N), mz (N m, about x = y = 0) and the area that sticks (m^2). The march is the second-order one:
-    half a first step, and the exact turning of a slipping traction.
+    Returns fx, fy (N), mz (N m, about x = y = 0), the area that sticks and the whole area (m^2). The march is the
+    second-order one: half a first step, and the exact turning of a slipping traction.
     """
-    fx = fy = mz = stuck = 0.0
+    fx = fy = mz = stuck = area = 0.0
     cells = pressure.shape[1]
     for s in range(y.size):
         length = (high_x[s] - low_x[s]) / cells
@@ -237,7 +237,8 @@ def march(y, low_x, high_x, width, pressure, mu, flexibility, xi_x, xi_y, spin, 
             fy += py * cell
             mz += (x * py - y[s] * px) * cell
             stuck += 0.0 if slips else cell
-    return fx, fy, mz, stuck
+            area += cell
+    return fx, fy, mz, stuck, area
 
 
 @njit(cache=True)

@@ -65,6 +65,8 @@ FITS = {"displacement": DISPLACEMENT, "gradient": GRADIENT}
 CLOSE = 1e-13
 """Change of the depths, as a share of the approach, at which patches that press on each other have settled."""
 PASSES = 200
+ROUNDING = 1e-12
+"""Depth (m) above the bottom below which rounding spoils the ratio of approach and depth."""
 
 
 @dataclass(frozen=True)
@@ -231,7 +233,7 @@ def _share(patches: list[Patch], approach: float, pair: Pair, options: Options) 
     for _ in range(PASSES):
         parts = tuple(load_at_depth(p, float(d), pair, options) for p, d in zip(patches, depths, strict=True))
         for k, part in enumerate(parts):
-            if part.load > 0.0:
+            if part.load > 0.0 and part.depth - low[k] > ROUNDING:
                 ratios[k] = (part.approach - low[k]) / (part.depth - low[k])
         off = np.maximum(low + (reached - _pushed(parts, pair, options) - low) / ratios, low) - np.maximum(depths, low)
         if np.abs(off).max() <= CLOSE * abs(approach):
@@ -250,24 +252,31 @@ def _relaxed(share: float, before: np.ndarray, off: np.ndarray) -> float:
 
 def _pushed(parts: tuple[PatchPressure, ...], pair: Pair, options: Options) -> np.ndarray:
     """Displacement (m) of each patch, weighted by its pressure, by the others', each mesh a load N / (pi E* r)."""
+    nets = [_net(part, options) for part in parts]
     found = np.zeros(len(parts))
-    nets = {k: _net(part, options) for k, part in enumerate(parts) if part.load > 0.0}
-    for k, (x, y, own) in nets.items():
-        for m, (other_x, other_y, force) in nets.items():
-            if m != k:
-                found[k] += mean_push(other_x, other_y, force, x, y, own) / (np.pi * pair.modulus)
+    for k, (x, y, _, weight) in enumerate(nets):
+        for m, (other_x, other_y, force, _) in enumerate(nets):
+            if m != k and parts[m].load > 0.0:
+                found[k] += mean_push(other_x, other_y, force, x, y, weight) / (np.pi * pair.modulus)
     return found
 
 
 def _net(part: PatchPressure, options: Options) -> tuple[np.ndarray, ...]:
-    """Crude net of one patch, flat: x, y along the common contour (m) and load (N) of every mesh."""
+    """Crude net of one patch, flat: x, y along the common contour (m), load (N) and weight of every mesh.
+
+    A patch that carries nothing is its bottom, which it shrinks to, and which the others push.
+    """
+    if part.load == 0.0:
+        bottom = part.patch.bottom
+        return np.array([bottom[0]]), np.array([bottom[1] + part.patch.place]), np.zeros(1), np.ones(1)
     x0, x1, y0, y1 = part.box
     middles = (np.arange(options.net) + 0.5) / options.net
     y, x = np.meshgrid(y0 + middles * (y1 - y0) + part.patch.place, x0 + middles * (x1 - x0), indexing="ij")
     origin, step = _grid(part.patch)
     pressure = crude_net(part.patch.distance.padded, origin, step, part.box, part.depth, part.patch.low, options.net,
                          SHAPES[options.shape])[1]  # fmt: skip
-    return x.ravel(), y.ravel(), (pressure * (part.load / pressure.sum())).ravel()
+    weight = (pressure / pressure.sum()).ravel()
+    return x.ravel(), y.ravel(), part.load * weight, weight
 
 
 def _gathered(approach: float, parts: tuple[PatchPressure, ...], pair: Pair, options: Options) -> NormalContact:
@@ -301,8 +310,7 @@ def roll(pressed: NormalContact, friction: float, xi_x: float, xi_y: float, spin
         quantity(name, value, "a creepage from -10 to 10", -10.0, 10.0)
     quantity("spin", spin, "a spin in rad/m from -1e4 to 1e4", -1e4, 1e4)
     rolled = [_roll_patch(part, pressed, friction, (xi_x, xi_y, spin), cells) for part in pressed.patches]
-    fx, fy, mz, stuck = (float(sum(found[0][k] for found in rolled)) for k in range(4))
-    area = sum(float((found[2].dx * found[2].dy).sum()) for found in rolled)
+    fx, fy, mz, stuck, area = (float(sum(found[0][k] for found in rolled)) for k in range(5))
     power = -(fx * xi_x + fy * xi_y + mz * spin)
     return Rolling(fx, fy, mz, stuck / area if area > 0.0 else 0.0, power, tuple(found[1] for found in rolled),
                    tuple(found[2] for found in rolled))  # fmt: skip

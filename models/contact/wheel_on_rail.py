@@ -89,8 +89,8 @@ class Touch:
 
     gap : vertical gap (m), 0 at the place that touches but for some nanometres. angle : of the rail's surface (rad),
     negative where it falls towards the gauge corner. wheel_y, rail_y : place on the profiles (m; rail: from the rail's
-    highest point after inclination). x : ahead of the axle (m). patch : undeformed distance around it, x and y from
-    the place, y along the surface.
+    highest point after inclination). x : ahead of the axle, square to it (m). patch : undeformed distance around it, x
+    and y from the place, y along the surface.
     """
 
     gap: float
@@ -195,7 +195,8 @@ def _touches(side: Side, pose: Pose) -> list[Touch]:
 def _touch(side: Side, pose: Pose, points: np.ndarray, gap: np.ndarray, at: tuple[int, int, int]) -> Touch:
     """One touching place and the distance around it."""
     first, k, last = at
-    x, y = float(points[k, 0]), float(points[k, 1])
+    lowest = _between(points, gap, k)
+    x, y = float(lowest[0]), float(lowest[1])
     angle = float(np.arctan(side.rail.curve(y, 1)))
     low, high = _reach(gap, at, angle)
     cut = (False, False, low == first and first > 0, high == last and last < gap.size - 1)
@@ -204,9 +205,19 @@ def _touch(side: Side, pose: Pose, points: np.ndarray, gap: np.ndarray, at: tupl
     top = float(side.rail.y[np.argmin(side.rail.z)])
     between = np.linspace(top, y, 200)
     along = float(np.trapezoid(np.hypot(1.0, side.rail.curve(between, 1)), between))
-    wheel_y = float((pose.turn.T @ (points[k] - side.centre(pose)))[1] - side.wheelset.arm)
+    ahead, across, _ = pose.turn.T @ (lowest - side.centre(pose))
     patch = Patch(distance, cut, abs(angle), along)
-    return Touch(patch.low / float(np.cos(angle)), angle, wheel_y, y - top, x, patch)
+    return Touch(
+        patch.low / float(np.cos(angle)), angle, float(across) - side.wheelset.arm, y - top, float(ahead), patch
+    )
+
+
+def _between(points: np.ndarray, gap: np.ndarray, k: int) -> np.ndarray:
+    """Where the parabola through three points of the outline has its least gap."""
+    rise, bend = (gap[k + 1] - gap[k - 1]) / 2.0, gap[k + 1] - 2.0 * gap[k] + gap[k - 1]
+    share = float(np.clip(-rise / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
+    neighbour = points[k + 1] if share > 0.0 else points[k - 1]
+    return points[k] + abs(share) * (neighbour - points[k])
 
 
 def _distance(side: Side, pose: Pose, place: np.ndarray, angle: float, ends: tuple[float, float]) -> Distance:

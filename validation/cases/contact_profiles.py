@@ -1,0 +1,179 @@
+"""Wheel on rail: the built-in profiles, and where they touch as the wheelset moves sideways."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.spatial import KDTree
+
+from models.contact.material import Pair
+from models.contact.profile_files import read_profile
+from models.contact.profiles import Profile
+from models.contact.simplified_theory import press
+from models.contact.standard_profiles import s1002, uic60
+from models.contact.wheel_on_rail import Track, wheel_on_rail
+from models.errors import InputError
+from validation.contact_shapes import Shape, exact_normal
+from validation.rows import Row, System, Table, at_most, finding, not_run, within
+from validation.scenes import data_folder
+
+TITLE = "Rolling contact of profiles: S1002 on UIC 60"
+SYSTEM: System = "contact"
+WHEEL_FILE, RAIL_FILE = "MBench_S1002_v3.prw", "MBench_UIC60_v3.prr"
+NEAR = 2e-5
+"""Largest distance (m) of a built-in profile from the benchmark's."""
+SHIFTS = np.arange(0.0, 10.1, 0.5)
+QUICK_SHIFTS = np.array([0.0, 4.5, 5.0, 6.0, 6.5])
+LOAD = 1e4
+"""Vertical load of a wheel (N): the benchmark has 20 kN on a wheelset."""
+CELLS = 40
+PAIR = Pair()
+BENCHMARK = ("Manchester contact benchmark, case A (Shackleton and Iwnicki, Vehicle Syst. Dyn. 46, 2008, 129-149), "
+             "S1002 on UIC 60 at 1:40, gauge 1435 mm, back to back 1360 mm, radius 460 mm")  # fmt: skip
+TWO_PATCHES = {"from": -22.6, "to": -33.4, "peak": 1556.0}
+"""Where the benchmark's contact on the right rail jumps at 5 mm (mm), and its peak pressure there (MPa)."""
+FLANGE = 6.5
+"""Shift (mm) from which the benchmark's flange touches."""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows on the built-in profiles and on the places of contact; in the full run at every shift, and with yaw."""
+    shifts = QUICK_SHIFTS if quick else SHIFTS
+    data: dict[str, Any] = {"no yaw": [_at(float(shift), 0.0, not quick) for shift in shifts]}
+    if not quick:
+        data["yaw"] = [_at(float(shift), 2.4e-3 * float(shift), False) for shift in shifts]
+    rows = _file_rows() + _place_rows(data["no yaw"])
+    return rows + ([] if quick else _benchmark_rows(data["no yaw"])), data
+
+
+def _at(shift: float, yaw: float, exact: bool) -> dict[str, Any]:
+    """Contact of the right wheel at a shift (mm) and yaw (rad): places, load and peak pressure."""
+    touches = wheel_on_rail(s1002(), uic60(), lateral_shift=shift * 1e-3, yaw=yaw)
+    pressed = press([touch.patch for touch in touches], PAIR, load=LOAD)
+    loads = {id(part.patch): part.load for part in pressed.patches}
+    places = [{"rail": 1e3 * touch.rail_y, "wheel": 1e3 * touch.wheel_y, "ahead": 1e3 * touch.x, "gap": 1e6 * touch.gap,
+               "angle": float(np.degrees(-touch.angle)), "load": loads.get(id(touch.patch), 0.0)}
+              for touch in touches]  # fmt: skip
+    found = {"shift": shift, "yaw": yaw, "places": places, "area": 1e6 * pressed.area, "peak": pressed.peak / 1e6}
+    heaviest = max(pressed.patches, key=lambda part: part.load)
+    return found | {"exact": _exact_peak(heaviest.patch, heaviest.load, heaviest.box) if exact else None}
+
+
+def _exact_peak(patch: Any, load: float, box: tuple[float, float, float, float]) -> float | None:
+    """Peak pressure (MPa) of the exact contact of one patch under its load, None where it grows into its neighbour."""
+    x0, x1, y0, y1 = box
+    distance = patch.distance
+    wide, high = 0.15 * (x1 - x0), 0.3 * (y1 - y0)
+    grid = (x0 - wide, x1 + wide, max(y0 - high, distance.y[0]), min(y1 + high, distance.y[-1]))
+    try:
+        return float(exact_normal(Shape("", distance, load), CELLS, grid).pressure.max() / 1e6)
+    except InputError:
+        return None
+
+
+def _file_rows() -> list[Row]:
+    folder = data_folder()
+    if folder is None or not (folder / WHEEL_FILE).is_file():
+        reason = "TWINRIG_DATA names no folder with the benchmark's profiles"
+        return [not_run(f"contact_profiles.{name}", SYSTEM, f"built-in {name} against the benchmark's file", reason)
+                for name in ("S1002", "UIC60")]  # fmt: skip
+    wheel, rail = read_profile(folder / WHEEL_FILE, "wheel"), read_profile(folder / RAIL_FILE, "rail")
+    off = {"S1002": _wheel_off(wheel), "UIC60": _rail_off(rail)}
+    return [at_most(f"contact_profiles.{name}", SYSTEM, f"built-in {name}, largest distance from the benchmark's file",
+                    1e3 * value, "mm", 1e3 * NEAR, "the figure set for the built-in profiles", "published")
+            for name, value in off.items()]  # fmt: skip
+
+
+def _wheel_off(wheel: Profile) -> float:
+    """Largest difference in height (m) where both are known."""
+    own = s1002()
+    inside = (wheel.y >= own.y[0]) & (wheel.y <= own.y[-1])
+    return float(np.abs(own.curve(wheel.y[inside]) - wheel.z[inside]).max())
+
+
+def _rail_off(rail: Profile) -> float:
+    """Largest distance (m) of the file's points from the inclined rail, after the best shift: its origin is its own."""
+    own = uic60().turned(Track().inclination)
+    tree = KDTree(np.column_stack([own.y, own.z]))
+    points = np.column_stack([rail.y, rail.z])[rail.z < 0.036]
+
+    def far(shift: np.ndarray) -> float:
+        return float(tree.query(points - shift)[0].max())
+
+    start = np.array([rail.y[np.argmin(rail.z)] - own.y[np.argmin(own.z)], 0.0])
+    return float(minimize(far, start, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-8}).fun)
+
+
+def _main(case: dict[str, Any]) -> dict[str, float]:
+    """The place that carries most."""
+    return max(case["places"], key=lambda place: place["load"])
+
+
+def _place_rows(cases: list[dict[str, Any]]) -> list[Row]:
+    by = {case["shift"]: case for case in cases}
+    flange = min(case["shift"] for case in cases if _main(case)["angle"] > 45.0)
+    at5 = _main(by[5.0])
+    return [
+        within("contact_profiles.flange", SYSTEM, "shift from which the flange carries the wheel", flange, "mm", FLANGE,
+               0.25, f"{BENCHMARK}; half of its steps", "published"),
+        within("contact_profiles.jump_from", SYSTEM, "place of contact on the rail at 4.5 mm", _main(by[4.5])["rail"],
+               "mm", TWO_PATCHES["from"], 1.0, f"{BENCHMARK}; where the patch is before it jumps", "published"),
+        within("contact_profiles.jump_to", SYSTEM, "place of contact on the rail at 5 mm", at5["rail"], "mm",
+               TWO_PATCHES["to"], 1.0, f"{BENCHMARK}; a touching point here, the middle of a patch 4 mm wide there",
+               "published"),
+        within("contact_profiles.places", SYSTEM, "places closer than 0.2 mm at 5 mm", float(len(by[5.0]["places"])),
+               "", 2.0, 0.0, "both ends of the jump", "published"),
+    ]  # fmt: skip
+
+
+def _benchmark_rows(cases: list[dict[str, Any]]) -> list[Row]:
+    by = {case["shift"]: case for case in cases}
+    vertical = max(abs(sum(place["load"] * np.cos(np.radians(place["angle"])) for place in case["places"]) - LOAD)
+                   for case in cases)  # fmt: skip
+    return [
+        at_most("contact_profiles.load", SYSTEM, "vertical sum of the patches' loads less the wheel's, at every shift",
+                float(vertical), "N", 1e-6, "patches share the load without loss", "none"),
+        finding("contact_profiles.peak", SYSTEM, "peak pressure at 5 mm, exact, of the patch that carries most",
+                by[5.0]["exact"], "MPa", TWO_PATCHES["peak"], BENCHMARK),
+        finding("contact_profiles.flange_peak", SYSTEM, "peak pressure at 6.5 mm, exact", by[FLANGE]["exact"], "MPa",
+                "about 2600", BENCHMARK),
+    ]  # fmt: skip
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Every shift: places, loads, pressures."""
+    heads = ("shift [mm]", "yaw [mrad]", "on the rail [mm]", "on the wheel [mm]", "ahead [mm]", "contact angle [deg]",
+             "load [kN]", "peak [MPa]", "exact peak [MPa]")  # fmt: skip
+    note = (
+        f"{BENCHMARK}; {LOAD / 1e3:g} kN on the right wheel, vertical. A row for every place closer than 0.2 mm; y on "
+        "the rail from its highest point, on the wheel from the taping line; pressures of the theory of 1983."
+    )
+    return [Table(f"Places of contact, {name}", note, heads, tuple(_table_rows(cases))) for name, cases in data.items()]
+
+
+def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
+    return [
+        (f"{case['shift']:g}", f"{1e3 * case['yaw']:g}", f"{place['rail']:.2f}", f"{place['wheel']:.2f}",
+         f"{place['ahead']:.2f}", f"{place['angle']:.1f}", f"{place['load'] / 1e3:.2f}", f"{case['peak']:.0f}",
+         f"{case['exact']:.0f}" if case["exact"] is not None else "-")
+        for case in cases for place in case["places"]
+    ]  # fmt: skip
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Place of contact and its load over the shift."""
+    from studies.figures import plt
+
+    figure, axis = plt.subplots(figsize=(7.0, 3.6))
+    for name, cases in data.items():
+        points = [(case["shift"], place["rail"], place["load"]) for case in cases for place in case["places"]]
+        shift, rail, load = np.array(points).T
+        style: dict[str, Any] = {"marker": "o" if name == "no yaw" else "x", "linestyle": "none"}
+        axis.plot(shift[load > 0], rail[load > 0], label=f"in contact, {name}", **style)
+        axis.plot(shift[load == 0], rail[load == 0], color="0.75", markersize=4, **style)
+    axis.set(xlabel="lateral shift of the wheelset [mm]", ylabel="place of contact on the rail [mm]")
+    axis.legend()
+    caption = ("Right wheel S1002 on UIC 60: the contact jumps to the gauge corner at 5 mm, and the flange touches "
+               "from 6.5 mm. Grey: closer than 0.2 mm, but not in contact.")  # fmt: skip
+    return [(caption, figure)]

@@ -1,0 +1,268 @@
+"""Kalker's theory of 1983 against the exact contact of half-spaces: approach, area, peak pressure, forces, and time."""
+
+import re
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.contact.fastsim import fastsim
+from models.contact.hertz import by_load
+from models.contact.patches import Patch, separate
+from models.contact.simplified_theory import PAPER, PLAIN, NormalContact, Options, load_at_depth, press, roll
+from models.contact.undeformed_distance import quadratic
+from validation.contact_shapes import (
+    CURVATURE,
+    FRICTION,
+    GROWN,
+    PAIR,
+    Shape,
+    creepages,
+    exact_normal,
+    exact_rolling,
+    formulas,
+    profiles,
+)
+from validation.rows import Row, System, Table, at_most, finding
+
+TITLE = "Rolling contact of any shape: the theory of 1983"
+SYSTEM: System = "contact"
+FULL = 36
+"""Cells of the exact grid along each axis."""
+WAYS = {
+    "elliptic": PLAIN,
+    "paper": PAPER,
+    "elliptic, gradient": Options(fit="gradient"),
+    "paper, gradient": replace(PAPER, fit="gradient"),
+    (ONE := "elliptic, one net"): replace(PLAIN, separate=False),
+}
+"""Ways to use the theory; the first is the default, the second the paper to the letter."""
+NETS = (5, 7, 9, 11, 15, 19, 25)
+HERTZ = (0.05, 0.2, 1.0, 5.0, 20.0)
+"""B/A of the ellipses whose exact answer is closed."""
+APPROACH, JUMP = 0.02, 1e-6
+ABOUT = "the theory has one W for the whole contact: nothing is claimed, the figure tells what it is worth"
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows on Hertz's ellipses and on the continuity; in the full run on all shapes, ways, nets and the time."""
+    hertz = {f"{ratio:g}": _hertz(ratio, PLAIN) | {"paper": _hertz(ratio, PAPER)["approach"]} for ratio in HERTZ}
+    jump = _largest_jump(separate(formulas()[4].distance)[0], 20 if quick else 200)
+    data: dict[str, Any] = {"hertz": hertz, "jump": jump}
+    rows = [*_hertz_rows(hertz), _jump_row(jump)]
+    if quick:
+        return rows, data
+    data["shapes"] = {shape.name: _against_exact(shape) for shape in formulas() + profiles()}
+    data["nets"] = {str(net): _hertz(5.0, replace(PLAIN, net=net)) for net in NETS}
+    data["time"] = _times()
+    return rows + _shape_rows(data["shapes"]) + _time_rows(data["time"]), data
+
+
+def _hertz(ratio: float, options: Options) -> dict[str, float]:
+    """Errors of approach, area and peak on Hertz's ellipse, as shares."""
+    exact = by_load(CURVATURE, CURVATURE * ratio, 1e5, PAIR)
+    a, b = float(exact.a), float(exact.b)
+    found = press(quadratic(CURVATURE, CURVATURE * ratio, 2.5 * a, 2.5 * b), PAIR, load=1e5, options=options)
+    return _errors(found, float(exact.approach), np.pi * a * b, float(exact.p0))
+
+
+def _errors(found: NormalContact, approach: float, area: float, peak: float) -> dict[str, float]:
+    exact = {"approach": approach, "area": area, "peak": peak}
+    return {key: getattr(found, key) / value - 1.0 for key, value in exact.items()}
+
+
+def _largest_jump(patch: Patch, steps: int) -> float:
+    """Largest jump (N) of N(a_3): every step of a sweep is halved, towards the larger change, down to rounding."""
+    depths = np.linspace(2e-6, 6e-5, steps + 1)
+
+    def load(depth: float) -> float:
+        return load_at_depth(patch, depth, PAIR).load
+
+    return max(_jump(load, float(low), float(high)) for low, high in pairwise(depths))
+
+
+def _jump(load: Callable[[float], float], low: float, high: float) -> float:
+    """What is left of the change between two depths when they are as near as floating point allows."""
+    at_low, at_high = load(low), load(high)
+    while high - low > 1e-15 * high:
+        middle = 0.5 * (low + high)
+        at_middle = load(middle)
+        if abs(at_middle - at_low) > abs(at_high - at_middle):
+            high, at_high = middle, at_middle
+        else:
+            low, at_low = middle, at_middle
+    return abs(at_high - at_low)
+
+
+def _against_exact(shape: Shape) -> dict[str, Any]:
+    """Errors of every way, in shares of the exact figure and forces in % of mu N, and the exact figures."""
+    found = {name: press(shape.distance, PAIR, load=shape.load, options=way) for name, way in WAYS.items()}
+    normal = exact_normal(shape, FULL, shape.box or _around(found["elliptic"]))
+    exact = {key: exact_rolling(normal, creepage) for key, creepage in creepages(normal.area, shape.load).items()}
+    solved = {key: solution for key, solution in exact.items() if solution is not None}
+    peak = float(normal.pressure.max())
+    ways = {}
+    for name, contact in found.items():
+        forces = [_off(contact, creepages(normal.area, shape.load)[key], solved[key], shape.load) for key in solved]
+        mean, most = (float(np.mean(forces)), float(np.max(forces))) if forces else (np.nan, np.nan)
+        ways[name] = _errors(contact, normal.approach, normal.area, peak) | {"force": mean, "force_max": most}
+    figures = {"approach": normal.approach, "area": normal.area, "peak": peak}
+    return {"exact": figures, "ways": ways, "rolling": len(solved), "asked": len(exact)}
+
+
+def _around(found: NormalContact) -> tuple[float, float, float, float]:
+    """The contact's box with a fifth more on every side."""
+    boxes = np.array([part.box for part in found.patches])
+    x0, x1, y0, y1 = boxes[:, 0].min(), boxes[:, 1].max(), boxes[:, 2].min(), boxes[:, 3].max()
+    return x0 - 0.2 * (x1 - x0), x1 + 0.2 * (x1 - x0), y0 - 0.2 * (y1 - y0), y1 + 0.2 * (y1 - y0)
+
+
+def _off(contact: NormalContact, creepage: tuple[float, float, float], exact: Any, load: float) -> float:
+    """Distance of the force from the exact one, in % of mu N."""
+    found = roll(contact, FRICTION, *creepage)
+    return float(100.0 * np.hypot(found.fx - exact.fx, found.fy - exact.fy) / (FRICTION * load))
+
+
+def _times() -> dict[str, float]:
+    """Seconds of one evaluation of both programs at about 45 x 45 cells, the best of some."""
+    hertz = by_load(CURVATURE, 1.5 * CURVATURE, 1e5, PAIR)
+    a, b = float(hertz.a), float(hertz.b)
+    distance, creepage = quadratic(CURVATURE, 1.5 * CURVATURE, 2.5 * a, 2.5 * b), (1e-3, 5e-4, 0.3)
+    contact = press(distance, PAIR, load=1e5)
+    patch = separate(distance)[0]
+    return {
+        "1982": _best(lambda: fastsim(a, b, 1e5, FRICTION, *creepage, PAIR, cells=45)),
+        "roll": _best(lambda: roll(contact, FRICTION, *creepage)),
+        "press": _best(lambda: press(distance, PAIR, load=1e5)),
+        "depth": _best(lambda: load_at_depth(patch, 5e-5, PAIR)),
+        "exact": _best(lambda: exact_normal(formulas()[0], 45, (-0.008, 0.008, -0.008, 0.008)), 3),
+    }
+
+
+def _best(call: Callable[[], Any], repeats: int = 20) -> float:
+    """Shortest time (s) of a call."""
+    call()
+    taken = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        call()
+        taken.append(time.perf_counter() - start)
+    return min(taken)
+
+
+def _hertz_rows(hertz: dict[str, dict[str, float]]) -> list[Row]:
+    worst = {key: max(abs(case[key]) for case in hertz.values()) for key in ("approach", "paper")}
+    why = "the figure set for the theory; the closed form is Hertz's"
+    rows = [
+        at_most(f"contact_simplified.hertz.{key}", SYSTEM, f"largest error of the approach, B/A {HERTZ[0]:g} to "
+                f"{HERTZ[-1]:g}, {'pressure to the letter of the paper' if key == 'paper' else 'default'}",
+                100.0 * value, "%", 100.0 * APPROACH, why, "closed form")
+        for key, value in worst.items()
+    ]  # fmt: skip
+    circle = hertz["1"]
+    rows += [at_most(f"contact_simplified.circle.{key}", SYSTEM, f"{key} of a circular contact",
+                     100.0 * abs(circle[key]), "%", 2.0, "with Hertz's profile the theory contains the circle "
+                     "but for its net", "closed form") for key in ("area", "peak")]  # fmt: skip
+    return rows
+
+
+def _jump_row(jump: float) -> Row:
+    return at_most("contact_simplified.continuity", SYSTEM, "largest jump of N(a3), lopsided contact", jump, "N", JUMP,
+                   "every step of the sweep is bisected to neighbouring numbers; the figure set for the "
+                   "theory", "none")  # fmt: skip
+
+
+def _shape_rows(shapes: dict[str, dict[str, Any]]) -> list[Row]:
+    rows = []
+    for name, case in shapes.items():
+        place = "contact_simplified." + "_".join(re.findall(r"\w+", name))
+        best = case["ways"]["elliptic"]
+        rows.append(_approach_row(f"{place}.approach", name, case["ways"]))
+        for key, what in (("area", "area"), ("peak", "peak pressure")):
+            rows.append(finding(f"{place}.{key}", SYSTEM, f"error of the {what}, {name}", 100.0 * best[key], "%",
+                                0.0, ABOUT, "native"))  # fmt: skip
+        asked = f"{case['rolling']} of {case['asked']} creepages"
+        rows.append(finding(f"{place}.force", SYSTEM, f"mean error of the force, {name}, {asked}", best["force"],
+                            "% of mu N", 0.0, ABOUT, "native"))  # fmt: skip
+    return rows
+
+
+def _approach_row(place: str, name: str, ways: dict[str, dict[str, float]]) -> Row:
+    """Patches that have grown together are one patch: their approach is judged with one net, and both are told."""
+    if name != GROWN:
+        return at_most(place, SYSTEM, f"error of the approach, {name}", 100.0 * abs(ways["elliptic"]["approach"]), "%",
+                       100.0 * APPROACH, "the figure set for the theory", "native")  # fmt: skip
+    return at_most(place, SYSTEM, f"error of the approach, {name}, one net", 100.0 * abs(ways[ONE]["approach"]), "%",
+                   100.0 * APPROACH, "the figure set for the theory; kept apart they give "
+                   f"{100.0 * ways['elliptic']['approach']:+.1f} %, the price of a load without a jump where they meet",
+                   "native")  # fmt: skip
+
+
+def _time_rows(times: dict[str, float]) -> list[Row]:
+    why = "the paper's program was written for one machine of 1983; compiled marches made FASTSIM alone much cheaper"
+    both = times["roll"] + times["press"]
+    return [
+        finding("contact_simplified.time.forces", SYSTEM, "FASTSIM twice with the refit, by the 1982 program",
+                times["roll"] / times["1982"], "", "about 3, all in all", why),
+        finding("contact_simplified.time.all", SYSTEM, "contact and forces, by the 1982 program on a given ellipse",
+                both / times["1982"], "", "about 3", why),
+        finding("contact_simplified.time.exact", SYSTEM, "the exact normal problem at the same fineness, by this one",
+                times["exact"] / times["press"], "", "", "what the theory saves", "none"),
+    ]  # fmt: skip
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Hertz's ellipses; and in the full run every shape and way, and the size of the net."""
+    signed = "{:+.2f}".format
+    hertz = tuple((ratio, *(signed(100.0 * case[key]) for key in ("approach", "area", "peak", "paper")))
+                  for ratio, case in data["hertz"].items())  # fmt: skip
+    heads: tuple[str, ...] = ("B/A", "approach [%]", "area [%]", "peak pressure [%]", "approach, paper [%]")
+    found = [Table("Theory of 1983 on Hertz's ellipses", "Error by ratio of curvatures, 15 x 15 net.", heads, hertz)]
+    if "shapes" not in data:
+        return found
+    rows = tuple(
+        (name, way, *(signed(100.0 * errors[key]) for key in ("approach", "area", "peak")), f"{errors['force']:.1f}",
+         f"{errors['force_max']:.1f}")
+        for name, case in data["shapes"].items() for way, errors in case["ways"].items()
+    )  # fmt: skip
+    note = (
+        f"Errors against the exact contact on {FULL} x {FULL} cells. Forces: mean and largest over five kinds of "
+        "creepage at 0.5 and 2 times the linear scale. Paper: pressure proportional to the depth, to the letter; "
+        "elliptic: to its root, the default; gradient: least squares of the slopes; one net: one W for all patches."
+    )
+    heads = ("shape", "way", "approach [%]", "area [%]", "peak [%]", "force, mean [% mu N]", "force, max [% mu N]")
+    nets = tuple((net, *(signed(100.0 * case[key]) for key in ("approach", "area", "peak")))
+                 for net, case in data["nets"].items())  # fmt: skip
+    return [
+        *found,
+        Table("Theory of 1983 against the exact contact", note, heads, rows),
+        Table("Size of the crude net", "Errors on an ellipse with B/A = 5.", ("net", *heads[2:5]), nets),
+    ]
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Errors of the two pressure profiles by shape."""
+    if "shapes" not in data:
+        return []
+    from studies.figures import plt
+
+    shapes = data["shapes"]
+    figure, axes = plt.subplots(1, 4, figsize=(10.0, 4.2), sharey=True)
+    place = np.arange(len(shapes))
+    for axis, (key, label) in zip(axes, {"approach": "approach [%]", "area": "area [%]", "peak": "peak pressure [%]",
+                                         "force": "mean force [% mu N]"}.items(), strict=True):  # fmt: skip
+        for way, mark in (("elliptic", "o"), ("paper", "x")):
+            scale = 1.0 if key == "force" else 100.0
+            axis.plot([scale * case["ways"][way][key] for case in shapes.values()], place, mark, label=way)
+        axis.axvline(0.0, color="0.7", linewidth=0.8)
+        axis.set_xlabel(label)
+    axes[0].set_yticks(place, list(shapes))
+    axes[0].invert_yaxis()
+    axes[-1].legend()
+    caption = ("Errors of the theory of 1983 against the exact contact: with Hertz's profile of the pressure "
+               "(elliptic) area and peak are much nearer than with the paper's.")  # fmt: skip
+    return [(caption, figure)]
