@@ -1,7 +1,8 @@
 """Compiled evaluation of piecewise polynomials, with their derivatives, and of lines between samples."""
 
 import numpy as np
-from numba import njit
+
+from models.compiled import njit
 
 
 @njit(cache=True)

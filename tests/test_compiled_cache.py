@@ -14,6 +14,26 @@ def test_no_two_kernels_share_a_cache_file():
     assert len(set(names)) == len(names)
 
 
+def test_two_processes_never_write_the_same_file(tmp_path):
+    """Both read an empty index, then each keeps its own signature: numba's own names would be one and the same."""
+    from numba.core.caching import IndexDataCacheFile
+
+    file = march_of("road", "exact")._cache._cache_file
+    assert file._data_name(1) != file._data_name(1)
+    plain = IndexDataCacheFile(str(tmp_path), "kernel", None)
+    assert plain._data_name(1) == plain._data_name(1)  # as soon as this fails, numba has its own cure
+
+
+def test_every_kernel_is_compiled_that_way():
+    from pathlib import Path
+
+    import models
+
+    sources = {path.name: path.read_text() for path in Path(models.__file__).parent.rglob("*.py")}
+    own = {name for name, text in sources.items() if "numba.njit(" in text or "from numba import njit" in text}
+    assert own == {"compiled.py"}
+
+
 def test_a_change_of_the_equations_is_seen(tmp_path):
     """Copy the package, run, change a sign in the equations, run again: the answer must change."""
     import shutil

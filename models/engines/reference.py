@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from scipy.integrate import solve_ivp
 
 from models.assembly import Assembly
+from models.compiled import njit
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, Trajectory, guard
 from models.errors import RunFailed

@@ -6,7 +6,8 @@ Frame: s along the road in m, zeta in m positive **down** (a rise is negative), 
 import math
 
 import numpy as np
-from numba import njit
+
+from models.compiled import njit
 
 RESYNCHRONISE = 128
 """Samples between two exact sin/cos in :func:`sines_uniform`.

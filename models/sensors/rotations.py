@@ -8,10 +8,10 @@ S' = S skew(w), q' = q (0, w) / 2 (eq. 22). Axes as everywhere: x forward, y rig
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from models.compiled import njit
 from models.errors import InputError
 
 Rule = Literal["held", "mean", "cubic"]
