@@ -7,7 +7,8 @@ lies in the segment between padded nodes i + 1 and i + 2, where i = floor(u) (Ke
 import math
 
 import numpy as np
-from numba import njit
+
+from models.compiled import njit
 
 
 @njit(cache=True)

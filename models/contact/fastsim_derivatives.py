@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from models.compiled import njit
 from models.contact.fastsim import KINDS, Flexibilities, check_choices, contacts_of
 from models.contact.fastsim_grid import Bound, grid, strips_of
 from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, LONGEST, MIDDLE, RATE, STILL, advance, cut, lateness

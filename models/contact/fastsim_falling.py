@@ -9,9 +9,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
+from models.compiled import njit
 from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, MIDDLE, RATE, advance, cut
 from models.contact.fastsim_many import HALF, LOAD, MU, PART, SPIN, SPREAD, XI_X, XI_Y, A, B, Y, rigid_slip, touches
 from models.strict import Strict

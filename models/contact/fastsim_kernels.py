@@ -12,7 +12,7 @@ and only strips side by side keep the processor busy meanwhile.
 
 import math
 
-from numba import njit
+from models.compiled import njit
 
 LANES = 24
 """Strips that are marched at once; the last ones may be empty."""

@@ -6,8 +6,8 @@ Strips of all ellipses are lined up and marched in full blocks, so that no lane 
 import math
 
 import numpy as np
-from numba import njit
 
+from models.compiled import njit
 from models.contact.fastsim_kernels import (
     LANES,
     ROWS,

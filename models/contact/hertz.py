@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from models.compiled import njit
 from models.contact.inputs import Array, quantity, together
 from models.contact.material import Pair
 from models.errors import InputError

@@ -6,8 +6,8 @@ Its own loops instead of a library's, whose calls of threaded linear algebra on 
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
+from models.compiled import njit
 from models.errors import RunFailed
 
 Map = Callable[[np.ndarray], np.ndarray]

@@ -1,7 +1,8 @@
 """Compiled loops over the cells of a rolling contact: sweeps, and the coupling within its strips."""
 
 import numpy as np
-from numba import njit
+
+from models.compiled import njit
 
 
 @njit(cache=True, fastmath=True, nogil=True)
