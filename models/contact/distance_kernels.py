@@ -73,6 +73,14 @@ def row_at(padded, v):
 
 
 @njit(cache=True)
+def along(row, u):
+    """Value of a padded row at u spacings."""
+    i, t = segment(u, row.size - 3)
+    w, _ = weights(t)
+    return w[0] * row[i] + w[1] * row[i + 1] + w[2] * row[i + 2] + w[3] * row[i + 3]
+
+
+@njit(cache=True)
 def least_of_row(row):
     """Least value along a padded row, also between its nodes, and its position in spacings."""
     least, where = np.inf, 0.0
@@ -106,3 +114,21 @@ def valley(padded, finer):
     for k in range(lines):
         least[k], where[k] = least_of_row(row_at(padded, k / finer))
     return least, where
+
+
+@njit(cache=True)
+def sides(lines, roots, bottom, root):
+    """Where the lengths below ``root``, added up from the bottom, end on the low and on the high side.
+
+    lines : positions, one of them the bottom; roots : root of the height above the bottom there, linear in between.
+    """
+    before = after = 0.0
+    for k in range(lines.size - 1):
+        lower, upper = min(roots[k], roots[k + 1]), max(roots[k], roots[k + 1])
+        if root > lower:
+            length = (lines[k + 1] - lines[k]) * (min((root - lower) / (upper - lower), 1.0) if upper > lower else 1.0)
+            if lines[k] >= bottom:
+                after += length
+            else:
+                before += length
+    return bottom - before, bottom + after

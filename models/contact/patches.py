@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from models.contact.distance_kernels import sides
 from models.contact.undeformed_distance import Distance
 from models.errors import InputError
 
@@ -71,7 +72,7 @@ class Patch:
                              "over which the undeformed distance is known: give a larger area")  # fmt: skip
         root = np.sqrt(max(depth - self.low, 0.0))
         (x, rx), (y, ry) = self._tables
-        return (*_sides(x, rx, self.bottom[0], root), *_sides(y, ry, self.bottom[1], root))
+        return (*sides(x, rx, self.bottom[0], root), *sides(y, ry, self.bottom[1], root))
 
 
 def separate(distance: Distance, ridge: float = RIDGE) -> list[Patch]:
@@ -147,14 +148,3 @@ def _rooted(lines: np.ndarray, least: np.ndarray, bottom: float, low: float) -> 
     k = int(np.searchsorted(lines, bottom))
     roots = np.sqrt(np.maximum(least - low, 0.0))
     return np.insert(lines, k, bottom), np.insert(roots, k, 0.0)
-
-
-def _sides(lines: np.ndarray, roots: np.ndarray, bottom: float, root: float) -> tuple[float, float]:
-    """Where the lengths below ``root``, added up from the bottom, end on the low and on the high side."""
-    first, last = roots[:-1], roots[1:]
-    lower, upper = np.minimum(first, last), np.maximum(first, last)
-    span = upper - lower
-    share = np.where(span > 0, np.clip((root - lower) / np.where(span > 0, span, 1.0), 0.0, 1.0), root > lower)
-    lengths = np.diff(lines) * share
-    after = lines[:-1] >= bottom
-    return bottom - float(lengths[~after].sum()), bottom + float(lengths[after].sum())

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from models.compiled import njit
-from models.contact.distance_kernels import row_at, segment, value_and_slopes, weights
+from models.contact.distance_kernels import along, row_at, value_and_slopes
 
 PARABOLIC, ELLIPTIC = 0, 1
 """Pressure proportional to the depth d - h, as the theory has it, or to its root, as Hertz' pressure is."""
@@ -53,11 +53,10 @@ def resultant(padded, origin, step, box, depth, low, points, shape):
     total = 0.0
     dx, dy = (box[1] - box[0]) / points, (box[3] - box[2]) / points
     for j in range(points):
-        y = box[2] + (j + 0.5) * dy
+        row = row_at(padded, (box[2] + (j + 0.5) * dy - origin[1]) / step[1])
         for i in range(points):
-            x = box[0] + (i + 0.5) * dx
-            h = value_and_slopes(padded, (x - origin[0]) / step[0], (y - origin[1]) / step[1])[0]
-            total += overlap_pressure(depth, h, low, shape)
+            height = along(row, (box[0] + (i + 0.5) * dx - origin[0]) / step[0])
+            total += overlap_pressure(depth, height, low, shape)
     return total * dx * dy
 
 
@@ -77,16 +76,20 @@ def displacement(pressure, dx, dy, modulus):
     for j in range(cells + 1):
         for i in range(cells + 1):
             edges[j, i] = corner((i - 0.5) * dx, (j - 0.5) * dy)
-    influence = edges[1:, 1:] - edges[1:, :-1] - edges[:-1, 1:] + edges[:-1, :-1]
+    influence = np.empty((cells, 2 * cells - 1))  # by rows apart, and columns apart from 1 - cells on
+    for j in range(cells):
+        for i in range(2 * cells - 1):
+            k = abs(i - cells + 1)
+            influence[j, i] = edges[j + 1, k + 1] - edges[j + 1, k] - edges[j, k + 1] + edges[j, k]
     found = np.zeros((cells, cells))
     for row in range(cells):
         for column in range(cells):
             p = pressure[row, column]
             if p > 0.0:
                 for j in range(cells):
-                    k = abs(j - row)
+                    k, first = abs(j - row), cells - 1 - column
                     for i in range(cells):
-                        found[j, i] += influence[k, abs(i - column)] * p
+                        found[j, i] += influence[k, first + i] * p
     return found / (math.pi * modulus)
 
 
@@ -189,14 +192,6 @@ def strips(padded, origin, step, box, depth, low, rows, cells, shape):
             h = along(row, (high_x[s] - (i + 0.5) * length - origin[0]) / step[0])
             pressure[s, i] = overlap_pressure(depth, h, low, shape)
     return y[:count].copy(), low_x[:count].copy(), high_x[:count].copy(), pressure
-
-
-@njit(cache=True)
-def along(row, u):
-    """Value of a padded row at u spacings."""
-    i, t = segment(u, row.size - 3)
-    w, _ = weights(t)
-    return w[0] * row[i] + w[1] * row[i + 1] + w[2] * row[i + 2] + w[3] * row[i + 3]
 
 
 @njit(cache=True)

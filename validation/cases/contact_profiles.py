@@ -33,6 +33,7 @@ BENCHMARK = ("Manchester contact benchmark, case A (Shackleton and Iwnicki, Vehi
              "S1002 on UIC 60 at 1:40, gauge 1435 mm, back to back 1360 mm, radius 460 mm")  # fmt: skip
 TWO_PATCHES = {"from": -22.6, "to": -33.4, "peak": 1556.0}
 """Where the benchmark's contact on the right rail jumps at 5 mm (mm), and its peak pressure there (MPa)."""
+LABELS = {"no yaw": "no yaw", "yaw": "yaw of 2.4 mrad per mm of shift"}
 FLANGE = 6.5
 """Shift (mm) from which the benchmark's flange touches."""
 
@@ -169,9 +170,10 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     for name, cases in data.items():
         points = [(case["shift"], place["rail"], place["load"]) for case in cases for place in case["places"]]
         shift, rail, load = np.array(points).T
-        style: dict[str, Any] = {"marker": "o" if name == "no yaw" else "x", "linestyle": "none"}
-        axis.plot(shift[load > 0], rail[load > 0], label=f"in contact, {name}", **style)
-        axis.plot(shift[load == 0], rail[load == 0], color="0.75", markersize=4, **style)
+        hollow: dict[str, Any] = {} if name == "no yaw" else {"markerfacecolor": "none", "markersize": 10}
+        style: dict[str, Any] = {"marker": "o", "linestyle": "none", **hollow}
+        axis.plot(shift[load == 0], rail[load == 0], color="0.75", **style)
+        axis.plot(shift[load > 0], rail[load > 0], label=f"in contact, {LABELS[name]}", **style)
     axis.set(xlabel="lateral shift of the wheelset [mm]", ylabel="place of contact on the rail [mm]")
     axis.legend()
     caption = ("Right wheel S1002 on UIC 60: the contact jumps to the gauge corner at 5 mm, and the flange touches "

@@ -262,7 +262,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         axis.set_xlabel(label)
     axes[0].set_yticks(place, list(shapes))
     axes[0].invert_yaxis()
-    axes[-1].legend()
+    axes[0].legend(loc="upper right")
     caption = ("Errors of the theory of 1983 against the exact contact: with Hertz's profile of the pressure "
                "(elliptic) area and peak are much nearer than with the paper's.")  # fmt: skip
     return [(caption, figure)]
