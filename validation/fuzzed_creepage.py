@@ -10,13 +10,13 @@ from models.contact.material import Pair
 
 OPTIONS: tuple[dict[str, Any], ...] = (
     {},
-    {"cells": 11},
+    {"cells": 11, "bound": "parabolic"},
     {"bound": "elliptic"},
     {"flexibilities": "three"},
     {"flexibilities": "one"},
     {"march": "plain"},
-    {"cells": 6, "bound": "elliptic", "march": "plain", "flexibilities": "one"},
-    {"cells": 7, "bound": "elliptic", "flexibilities": "three"},
+    {"cells": 9, "bound": "elliptic", "march": "plain", "flexibilities": "one"},
+    {"cells": 12, "bound": "elliptic", "flexibilities": "three"},
 )
 """What the contacts are computed with, in turn."""
 KINDS = 8

@@ -24,6 +24,8 @@ from models.contact.fastsim_many import (
     L1,
     LOAD,
     MU,
+    OF_SPIN,
+    ONE,
     PART,
     SPIN,
     SPREAD,
@@ -33,10 +35,10 @@ from models.contact.fastsim_many import (
     B,
     Y,
     blend,
+    mean_flexibility,
     rigid_slip,
     stiffness,
     touches,
-    weighted,
 )
 from models.contact.inputs import Array
 from models.contact.material import Pair
@@ -54,7 +56,7 @@ class Derivatives:
 
 
 def derivatives(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair, *, cells: int = 21,
-                bound: Bound = "parabolic", flexibilities: Flexibilities = "blended", growing: bool = True
+                bound: Bound = "intermediate", flexibilities: Flexibilities = "blended", growing: bool = True
                 ) -> Derivatives:  # fmt: skip
     """Derivatives of the forces of ``fastsim`` with the second-order march; the same parameters and errors.
 
@@ -121,13 +123,17 @@ def _scale_slopes(own, cells, middle, kind, scale, weights):
     k, change = stiffness(own, bound, kind), np.zeros(3)
     part, steep, reach = blend(own, bound, kind)
     size = math.sqrt(creep[0] ** 2 + creep[1] ** 2 + creep[2] ** 2)
-    mean = weighted(own, creep[2])
+    mean = mean_flexibility(own, creep[2], kind)
     for j in range(3):
         unit = c if j == 2 else 1.0
         if part > 0.0 and size > 0.0:
             sign = 1.0 if creep[j] > 0.0 else -1.0 if creep[j] < 0.0 else 0.0
-            d_one = -(sign * own[L1 + j] - mean * creep[j] / size) / (size * mean * mean)
-            d_part = steep * (a / (own[L1 + j] * bound)) ** 2 * creep[j] / reach
+            if kind == ONE:
+                d_mean = (sign * own[L1 + j] - mean * creep[j] / size) / size
+            else:
+                d_mean = 2.0 * creep[j] * (own[L1 + j] - mean) / (size * size)
+            d_one = -d_mean / (mean * mean)
+            d_part = steep * (a * (OF_SPIN if j == 2 else 1.0) / (own[L1 + j] * bound)) ** 2 * creep[j] / reach
             for i in range(3):
                 change[i] = unit * (d_part * (1.0 / mean - 1.0 / own[L1 + i]) + part * d_one)
         for i in range(3):

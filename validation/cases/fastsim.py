@@ -1,0 +1,247 @@
+"""FASTSIM: error of its cells, error of its model, what must always hold, derivatives, and the price of a call."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.contact.fastsim import fastsim
+from models.contact.fastsim_derivatives import derivatives
+from models.contact.fastsim_grid import POWERS
+from models.contact.linear_theory import coefficients
+from models.contact.linear_theory import forces as linear_forces
+from models.contact.material import Pair
+from models.contact.normal_problem import Pressed, centres
+from models.contact.rolling_problem import solve_rolling
+from models.errors import RunFailed
+from validation.fastsim_speed import speed
+from validation.fuzzed_creepage import OPTIONS, ROUNDING, contacts, worst
+from validation.rows import Row, System, Table, at_most, not_run
+
+TITLE = "FASTSIM"
+SYSTEM: System = "contact"
+SEED = 41
+"""Of the fuzzing; the quick share and the full one draw different streams of it, the tests one of their own."""
+RATIOS = (0.2, 0.5, 1.0, 2.0, 5.0)
+KINDS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "spin": (0.0, 0.0, 1.0), "y+spin": (0.0, 0.7071, 0.7071),
+         "y-spin": (0.0, 0.7071, -0.7071), "x+spin": (0.7071, 0.0, 0.7071),
+         "x-y+spin": (0.5774, -0.5774, 0.5774)}  # fmt: skip
+LEVELS = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
+MODEL_KINDS = ("x", "y", "spin", "y+spin", "x-y+spin")
+MODEL_LEVELS = (0.05, 0.3, 1.0, 2.0, 4.0, 10.0)
+LOAD, FRICTION, MEAN_AXIS = 80e3, 0.3, 5e-3
+PAIR = Pair()
+CELLS = (11, 21, 41, 81)
+FINE = 321
+EXACT_CELLS = 24
+"""Cells of the exact theory by sqrt(ab): its own error at these is near 1 % of mu N."""
+EXACT = (0.0, "exact in floating point")
+ALLOWED = {"finite": EXACT, "reversal": EXACT, "zero": EXACT, "similarity": EXACT,
+           "power coarse": (1e-5, "a slender strip that sticks to its end, in the last half cell")}  # fmt: skip
+WHY = "the same model with 321 cells per strip; a fifth of the model's own error"
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows for the discretisation, the invariants and the derivatives; in full the model's error and the speed too."""
+    rows, data = _discretisation()
+    rows += _invariants(2 if quick else 64, 10_000 if quick else 16_000, 0 if quick else 100)
+    rows += _limits() + _derivatives()
+    if quick:
+        return rows, data
+    found, data["model"] = _model()
+    timed, data["speed"] = speed(PAIR, LOAD, FRICTION, MEAN_AXIS)
+    return rows + found + timed, data
+
+
+def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> dict[str, np.ndarray]:
+    """Contacts of every ratio, kind and level of creepage, by mu N / (G c^2 C) with C11, C22 and C23 c, as columns."""
+    ratio, kind, level = (grid.ravel() for grid in np.meshgrid(RATIOS, np.arange(len(kinds)), levels, indexing="ij"))
+    part = np.array([KINDS[name] for name in kinds])[kind] * level[:, None]
+    known, unit = coefficients(ratio, PAIR.nu), FRICTION * LOAD / (PAIR.G * MEAN_AXIS**2)
+    scale = unit / np.stack([known.c11, known.c22, known.c23 * MEAN_AXIS], axis=1)
+    xi_x, xi_y, spin = (part * scale).T
+    a, b = MEAN_AXIS * np.sqrt(ratio), MEAN_AXIS / np.sqrt(ratio)
+    return {"a": a, "b": b, "load": np.full(len(a), LOAD), "mu": np.full(len(a), FRICTION), "xi_x": xi_x,
+            "xi_y": xi_y, "spin": spin}  # fmt: skip
+
+
+def _vector(given: dict[str, np.ndarray], **options: Any) -> np.ndarray:
+    """Forces (n, 2) by mu N."""
+    found = fastsim(**given, pair=PAIR, **options)
+    return np.stack([found.fx, found.fy], axis=1) / (FRICTION * LOAD)
+
+
+def _discretisation() -> tuple[list[Row], dict[str, Any]]:
+    """Largest error of every net, and the order between the second and the last."""
+    given = creepages(tuple(KINDS), LEVELS)
+    rows: list[Row] = []
+    data: dict[str, Any] = {}
+    for bound in POWERS:
+        truth = _vector(given, cells=FINE, bound=bound)
+        for march in ("second-order", "plain"):
+            errors = [np.hypot(*(_vector(given, cells=n, bound=bound, march=march) - truth).T) for n in CELLS]
+            data[f"{bound}, {march}"] = [[float(e.mean()), float(e.max())] for e in errors]
+            if march == "plain":
+                continue
+            rows.append(at_most(f"fastsim.cells.{bound}", SYSTEM, f"largest error at 21 cells per strip, "
+                                f"{bound} bound, {len(truth)} cases", float(errors[1].max()), "mu N", 0.004, WHY, "none"))  # fmt: skip
+            mean = np.array([np.sqrt(np.mean(e**2)) for e in errors])
+            order = float(np.log(mean[0] / mean[-1]) / np.log(CELLS[-1] / CELLS[0]))
+            if bound == "parabolic":
+                rows.append(at_most("fastsim.order", SYSTEM, "2 less the observed order, 11 to 81 cells per strip",
+                                    max(0.0, 2.0 - order), "", 0.2, "order 1.8 or more; root mean square over all "
+                                    "cases, because single ones jump as cells begin to slip", "none"))  # fmt: skip
+    return rows, {"cells": data}
+
+
+def _invariants(batches: int, count: int, first: int) -> list[Row]:
+    """Everything that must always hold, over random contacts."""
+    found: dict[str, float] = {}
+    for i in range(batches):
+        options = OPTIONS[i % len(OPTIONS)]
+        for name, value in worst(contacts(SEED, first + i, count), options, PAIR).items():
+            name += " coarse" if name == "power" and options.get("cells", 21) < 20 else ""
+            found[name] = max(found.get(name, 0.0), value)
+    what = {"finite": "results that are not finite", "bound": "|F| beyond mu N", "reversal": "F(-creepage) + F",
+            "mirror": "mirrored in y", "power": "power that friction would give, by creepage", "power coarse":
+            "power that friction would give, by creepage, on 9 to 12 cells per strip",
+            "zero": "force without load or creepage",
+            "similarity": "eight times the load, twice the size", "stick": "share of stick outside 0 to 1"}  # fmt: skip
+    total = batches * count
+    return [at_most(f"fastsim.always.{name.replace(' ', '_')}", SYSTEM, f"{what[name]}, worst of {total:,} random "
+                    "contacts", value, "mu N", *ALLOWED.get(name, (ROUNDING, "rounding of some hundred sums")),
+                    "none") for name, value in found.items()]  # fmt: skip
+
+
+def _limits() -> list[Row]:
+    """Small creepages against the linear theory, and the direction of full sliding."""
+    given = creepages(("x", "y", "spin"), (1e-6,))
+    found = fastsim(**given, pair=PAIR)
+    linear = np.stack(linear_forces(given["a"], given["b"], given["xi_x"], given["xi_y"], given["spin"], PAIR))
+    size = np.hypot(linear[0], linear[1])
+    slope = np.hypot(found.fx - linear[0], found.fy - linear[1]) / size
+    sliding = creepages(("x", "y"), (100.0,))
+    turn = np.random.default_rng((SEED, 999)).uniform(-np.pi, np.pi, len(sliding["a"]))
+    sliding["xi_x"], sliding["xi_y"] = 0.5 * np.cos(turn), 0.5 * np.sin(turn)
+    slid = fastsim(**sliding, pair=PAIR)
+    off = np.abs(np.angle(-(slid.fx + 1j * slid.fy) * np.exp(-1j * turn), deg=True)).max()
+    short = np.abs(np.hypot(slid.fx, slid.fy) / (FRICTION * LOAD) - 1.0).max()
+    return [
+        at_most("fastsim.slope", SYSTEM, "forces at a millionth of the linear scale against the linear theory",
+                float(slope.max()), "of them", 0.004, "error of 21 cells: strips of finite width", "closed form"),
+        at_most("fastsim.sliding.direction", SYSTEM, "angle from the force to minus the slip, all sliding", float(off),
+                "deg", 0.3, "one flexibility in full sliding makes it rounding; 0.3 asked for", "closed form"),
+        at_most("fastsim.sliding.size", SYSTEM, "force in full sliding less mu N", float(short), "mu N", ROUNDING,
+                "pressures of the cells sum up to the load", "closed form"),
+    ]  # fmt: skip
+
+
+def _derivatives() -> list[Row]:
+    """Analytic derivatives against central differences of the forces."""
+    given = creepages(tuple(KINDS), LEVELS)
+    scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_AXIS, "load": LOAD}
+    own = derivatives(**given, pair=PAIR)
+    off = []
+    for k, (name, unit) in enumerate(scale.items()):
+        h = 1e-6 * unit
+        ends = [_forces(_moved(given, name, sign * h)) for sign in (1.0, -1.0)]
+        off.append(np.abs((ends[0] - ends[1]) / 2e-6 - own.slopes[..., k] * unit) / _units())
+    share = np.quantile(np.max(off, axis=(0, 2)), 0.98)
+    return [at_most("fastsim.derivatives", SYSTEM, "derivatives to creepages, spin and load against differences, "
+                    f"98 % of {len(own.forces)} cases", float(share), "mu N, mu N c", 1e-7, "differences over 2e-6 of "
+                    "a scale err by 1e-9; where a cell begins to slip within them the force jumps", "none")]  # fmt: skip
+
+
+def _moved(given: dict[str, np.ndarray], name: str, step: float) -> dict[str, np.ndarray]:
+    """The contacts with one value changed; a load that grows takes the ellipse with it."""
+    moved = {**given, name: given[name] + step}
+    if name == "load":
+        grown = np.cbrt(moved["load"] / given["load"])
+        moved |= {"a": given["a"] * grown, "b": given["b"] * grown}
+    return moved
+
+
+def _forces(given: dict[str, np.ndarray]) -> np.ndarray:
+    found = fastsim(**given, pair=PAIR)
+    return np.stack([found.fx, found.fy, found.mz], axis=1)
+
+
+def _units() -> np.ndarray:
+    return FRICTION * LOAD * np.array([1.0, 1.0, MEAN_AXIS])
+
+
+def _model() -> tuple[list[Row], list[list[Any]]]:
+    """Error of the model at a converged grid against the exact theory on its own."""
+    given = creepages(MODEL_KINDS, MODEL_LEVELS)
+    exact = np.array([_exact({name: float(values[i]) for name, values in given.items()})
+                      for i in range(len(given["a"]))])  # fmt: skip
+    solved = np.isfinite(exact[:, 0])
+    table = []
+    for bound in POWERS:
+        for kind in ("blended", "one", "three"):
+            found = fastsim(**given, pair=PAIR, cells=161, bound=bound, flexibilities=kind)  # type: ignore[arg-type]
+            off = (np.stack([found.fx, found.fy, found.mz], axis=1) - exact)[solved] / _units()
+            force = np.hypot(off[:, 0], off[:, 1])
+            table.append([bound, kind, float(force.mean()), float(force.max()), float(np.abs(off[:, 2]).mean()),
+                          float(np.abs(off[:, 2]).max())])  # fmt: skip
+    why = f"exact theory with {EXACT_CELLS} cells by sqrt(ab); {solved.sum()} of {len(solved)} cases"
+    rows = [
+        at_most("fastsim.model.mean", SYSTEM, "mean error of the model against the exact theory", table[0][2], "mu N",
+                0.02, why, "native"),
+        at_most("fastsim.model.max", SYSTEM, "largest error of the model against the exact theory", table[0][3], "mu N",
+                0.09, why, "native"),
+    ]  # fmt: skip
+    if not solved.all():
+        rows.append(not_run("fastsim.model.unsolved", SYSTEM, f"{(~solved).sum()} cases of the exact theory",
+                            "its solver did not meet its own tolerance there"))  # fmt: skip
+    return rows, table
+
+
+def _exact(case: dict[str, float]) -> tuple[float, float, float]:
+    """Forces and moment by the exact theory on cells that are square, NaN where it gives up."""
+    a, b, step = case["a"], case["b"], 2.0 * MEAN_AXIS / EXACT_CELLS
+    nx, ny = round(2.0 * a / step), round(2.0 * b / step)
+    x, y = centres(nx, 2.0 * a / nx), centres(ny, 2.0 * b / ny)
+    pressure = np.sqrt(np.maximum(1.0 - (x / a) ** 2 - (y[:, None] / b) ** 2, 0.0))
+    pressure *= LOAD / (pressure.sum() * 4.0 * a * b / (nx * ny))
+    try:
+        found = solve_rolling(Pressed(pressure, x, y), FRICTION, case["xi_x"], case["xi_y"], case["spin"], PAIR)
+    except RunFailed:
+        return np.nan, np.nan, np.nan
+    return found.fx, found.fy, found.mz
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Errors by cells, and in full those of the model and the price."""
+    rows = tuple((name, *(f"{100 * mean:.2g} / {100 * most:.2g}" for mean, most in values))
+                 for name, values in data["cells"].items())  # fmt: skip
+    found = [Table("FASTSIM: error of the cells", "Mean / largest error of the force in % of mu N against "
+                   f"{FINE} cells per strip, over all ellipses, kinds and levels of creepage.",
+                   ("bound, march", *(f"{n} cells" for n in CELLS)), rows)]  # fmt: skip
+    if "model" in data:
+        found.append(Table("FASTSIM: error of the model", "Converged, against the exact theory: force in % of mu N, "
+                           "moment in % of mu N sqrt(ab).",
+                           ("bound", "flexibilities", "mean", "largest", "moment, mean", "moment, largest"), tuple((*row[:2], *(f"{100 * v:.2f}" for v in row[2:]))
+                                                     for row in data["model"])))  # fmt: skip
+    if "speed" in data:
+        found.append(Table("FASTSIM: price", "Beside the time that a root and a division per cell take on this "
+                           "machine, its lower bound.", ("what", "time", "by the bound"),
+                           tuple(tuple(row) for row in data["speed"])))  # fmt: skip
+    return found
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Largest error over the cells."""
+    from studies.figures import plt
+
+    figure, axis = plt.subplots(figsize=(6.5, 4.2))
+    for i, (name, values) in enumerate(data["cells"].items()):
+        axis.loglog(CELLS, [100 * most for _, most in values], "o-" if "second" in name else "s--", color=f"C{i // 2}",
+                    label=name)  # fmt: skip
+    axis.axhline(0.4, color="black", linestyle=":", label="0.4 % asked for at 21")
+    axis.set_xticks(CELLS, [str(n) for n in CELLS])
+    axis.minorticks_off()
+    axis.set(xlabel="cells per strip", ylabel="largest error of the force [% of mu N]",
+             title="FASTSIM: the second-order march needs a tenth of the cells")  # fmt: skip
+    axis.legend()
+    return [("Largest error of FASTSIM's force over its cells, both bounds and both marches.", figure)]

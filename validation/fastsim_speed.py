@@ -1,0 +1,92 @@
+"""What FASTSIM costs, beside the least that its arithmetic can: one root and one division per cell."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from models.contact.fastsim import Ellipse, fastsim
+from models.contact.fastsim_grid import grid
+from models.contact.fastsim_kernels import LANES, ROWS, march_plain, march_second_order
+from models.contact.material import Pair
+from validation.rows import Row, System, at_most
+
+SYSTEM: System = "contact"
+CELLS = 21
+ROUNDS, REPEATS = 60, 200
+CONTACTS = 4000
+WHY = "least of interleaved rounds: whatever else a machine does only adds to a time"
+
+
+def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], list[list[str]]]:
+    """Rows for a call and for a cell, and a table (what, time, by the bound)."""
+    draw = np.random.default_rng(5)
+    lanes = np.zeros(ROWS * LANES)
+    lanes[: 3 * LANES] = draw.normal(0.0, 0.3, 3 * LANES)
+    cells, values = grid(CELLS, CELLS + 1, "intermediate").cells, draw.uniform(1.0, 2.0, CELLS * LANES)
+    creep = tuple(draw.normal(0.0, 2e-3, CONTACTS) for _ in range(2))
+    many = (axis, axis, load, mu, *creep, draw.normal(0.0, 0.3, CONTACTS), pair)
+    calls = {n: Ellipse(1.0, pair, cells=n) for n in (12, CELLS)}
+    jobs: dict[str, tuple[Callable[[], Any], float]] = {
+        "bound": (lambda: _bound(values, REPEATS), REPEATS * CELLS * LANES),
+        "plain": (lambda: _plain(lanes, cells, REPEATS), REPEATS * CELLS * LANES),
+        "second": (lambda: _second(lanes, cells, REPEATS), REPEATS * CELLS * LANES),
+        **{f"call {n}": (lambda e=e: [e(axis, load, mu, 1e-3, 5e-4, 0.2) for _ in range(REPEATS)], REPEATS)
+           for n, e in calls.items()},
+        **{f"many {march}": (lambda march=march: fastsim(*many, march=march), CONTACTS * CELLS * (CELLS + 1))
+           for march in ("plain", "second-order")},
+    }  # fmt: skip
+    took = _least(jobs)
+    ratio = {name: took[name] / took["bound"] for name in took}
+    rows = [
+        at_most("fastsim.speed.plain", SYSTEM, "plain march per cell, by a root and a division", ratio["plain"], "",
+                1.8, WHY, "none"),
+        at_most("fastsim.speed.second", SYSTEM, "second-order march per cell, by a root and a division",
+                ratio["second"], "", 4.0, WHY, "none"),
+        at_most("fastsim.speed.call.1", SYSTEM, "one call from Python, 12 cells per strip (0.8 % of mu N)",
+                took["call 12"] * 1e6, "us",
+                5.0, WHY, "none"),
+        at_most("fastsim.speed.call.04", SYSTEM, "one call from Python, 21 cells per strip (0.4 % of mu N)",
+                took[f"call {CELLS}"] * 1e6, "us", 10.0, WHY, "none"),
+    ]  # fmt: skip
+    table = [[name, f"{seconds * 1e6:.2f} us" if "call" in name else f"{seconds * 1e9:.2f} ns per cell",
+              "" if "call" in name else f"{ratio[name]:.2f}"] for name, seconds in took.items()]  # fmt: skip
+    return rows, table
+
+
+def _least(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, float]:
+    """Least seconds per unit of every job, in interleaved rounds."""
+    least = dict.fromkeys(jobs, np.inf)
+    for job, _ in jobs.values():
+        job()
+    for _ in range(ROUNDS):
+        for name, (job, units) in jobs.items():
+            start = time.perf_counter()
+            job()
+            least[name] = min(least[name], (time.perf_counter() - start) / units)
+    return least
+
+
+@njit(error_model="numpy")
+def _bound(values, repeats):
+    """A root and a division per element, each independent of all others, in vector registers."""
+    total = 0.0
+    for _ in range(repeats):
+        for i in range(values.size):
+            values[i] = 1.0 / np.sqrt(values[i])
+        total += values[0]
+    return total
+
+
+@njit(error_model="numpy")
+def _plain(lanes, cells, repeats):
+    for _ in range(repeats):
+        march_plain(lanes, cells)
+
+
+@njit(error_model="numpy")
+def _second(lanes, cells, repeats):
+    for _ in range(repeats):
+        march_second_order(lanes, cells)
