@@ -161,9 +161,10 @@ def mean_push(x, y, force, at_x, at_y, weight):
 def strips(padded, origin, step, box, depth, low, rows, cells, shape):
     """Strips of the fine net: y, low and high end in x (s,), and W p in the cells from the leading edge back (s, n).
 
-    Each of ``rows`` lines gives one strip per interval in which h < depth, its ends by bisection of the interpolation.
+    Each of ``rows`` lines gives one strip per interval in which h < depth, its ends where the interpolation passes the
+    depth.
     """
-    looks = 4
+    looks = 2
     width = (box[3] - box[2]) / rows
     first = max(int((box[0] - origin[0]) / step[0] * looks) - 1, 0)
     last = min(int((box[1] - origin[0]) / step[0] * looks) + 2, (padded.shape[1] - 3) * looks)
@@ -196,14 +197,23 @@ def strips(padded, origin, step, box, depth, low, rows, cells, shape):
 
 @njit(cache=True)
 def crossing(row, depth, inner, outer):
-    """Where the row passes the depth between a point below and a point not below it."""
-    for _ in range(50):
-        middle = 0.5 * (inner + outer)
-        if along(row, middle) < depth:
-            inner = middle
+    """Where the row passes the depth between a point below and a point not below it: false position, Illinois' rule."""
+    at_inner, at_outer = along(row, inner) - depth, along(row, outer) - depth
+    middle, kept = outer, 0
+    for _ in range(30):
+        middle = inner - at_inner * (outer - inner) / (at_outer - at_inner)
+        height = along(row, middle) - depth
+        if abs(height) < 1e-13 * (at_outer - at_inner) or abs(outer - inner) < 1e-12:
+            break
+        if height < 0.0:
+            inner, at_inner = middle, height
+            at_outer *= 0.5 if kept < 0 else 1.0
+            kept = -1
         else:
-            outer = middle
-    return 0.5 * (inner + outer)
+            outer, at_outer = middle, height
+            at_inner *= 0.5 if kept > 0 else 1.0
+            kept = 1
+    return middle
 
 
 @njit(cache=True)

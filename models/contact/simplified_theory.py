@@ -286,7 +286,7 @@ def _gathered(approach: float, parts: tuple[PatchPressure, ...], pair: Pair, opt
     return NormalContact(approach, _total(parts), area, peak, parts, pair, options)
 
 
-def _area(part: PatchPressure, rows: int = 200) -> float:
+def _area(part: PatchPressure, rows: int = 100) -> float:
     """Area (m^2) of one patch."""
     y, low, high, _ = _strips(part, rows, 1, PARABOLIC)
     return float((high - low).sum() * (part.box[3] - part.box[2]) / rows) if y.size else 0.0
