@@ -24,7 +24,7 @@ ROUNDING = 1e-12
 """Of sums over some hundred cells, each right to 1e-16."""
 
 
-def contacts(seed: int, stream: int, count: int) -> dict[str, np.ndarray]:
+def contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
     """``count`` contacts: load 1e-6 to 1e6 N, friction 1e-6 to 1, a/b 1e-3 to 1e3, creepage 0 to 1, spin up to 1 by b.
 
     In turn: pure xi_x, xi_y and spin, none at all, spin against lateral creepage with its pole inside the ellipse, all
@@ -48,7 +48,7 @@ def contacts(seed: int, stream: int, count: int) -> dict[str, np.ndarray]:
     return {"a": a, "b": b, "load": load, "mu": mu, "xi_x": xi_x, "xi_y": xi_y, "spin": spin}
 
 
-def worst(given: Mapping[str, np.ndarray], options: Mapping[str, Any], pair: Pair) -> dict[str, float]:
+def worst(given: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) -> dict[str, float]:
     """Largest violation of each invariant, by mu N and the creepages where it has a size; not finite counts as inf."""
     found = fastsim(**given, pair=pair, **options)
     back = fastsim(**{**given, **{name: -given[name] for name in ("xi_x", "xi_y", "spin")}}, pair=pair, **options)
@@ -75,7 +75,7 @@ def worst(given: Mapping[str, np.ndarray], options: Mapping[str, Any], pair: Pai
     }
 
 
-def _grown(given: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _grown(given: Mapping[str, Any]) -> dict[str, Any]:
     """The similar contact of twice the size: eight times the load, twice the creepage."""
     powers = {"a": 2.0, "b": 2.0, "load": 8.0, "xi_x": 2.0, "xi_y": 2.0}
     return {name: given[name] * power for name, power in powers.items()}

@@ -18,11 +18,12 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "drift_off", "drift_solvers", "holding_spring", "point_mass",
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
          "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients",
-         "contact_simplified", "contact_profiles")  # fmt: skip
+         "contact_simplified", "contact_profiles",
+         "fastsim")  # fmt: skip
 """Case modules in the order of the report."""
 
 
-ALONE = ("absent", "price", "ensemble")
+ALONE = ("absent", "price", "ensemble", "fastsim")
 """Cases that time what they run: they begin when all others have ended, and have the machine to themselves."""
 WORKERS = 2
 """Processes that measure the other cases."""
@@ -89,6 +90,7 @@ def seeds() -> dict[str, int]:
         drift_off,
         drift_solvers,
         ensemble,
+        fastsim,
         growth,
         holding_spring,
         index_reduction,
@@ -107,7 +109,8 @@ def seeds() -> dict[str, int]:
             "accelerometers": motion.SEED, "Kalman filter": kalman.SEED,
             "loads of the score": score.SEED, "stabilisers": stabilisers.SEED, "index reduction": index_reduction.SEED,
             "growth of noise": growth.SEED, "drift-off": drift_off.SEED, "drift by solver": drift_solvers.SEED,
-            "holding spring": holding_spring.SEED}  # fmt: skip
+            "holding spring": holding_spring.SEED,
+            "random contacts": fastsim.SEED}  # fmt: skip
 
 
 def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:

@@ -11,8 +11,8 @@ Flexibilities
     quarter of mu N off in mixed creepage. ``"blended"``, the default, goes from three to one mean as slip takes over.
 Bound
     ``"parabolic"`` pressure goes with a bed of springs and begins to slip as it should; ``"elliptic"`` is Hertz's,
-    right in full sliding with spin. ``"intermediate"``, the default, has the power 0.8 of the parabola (ellipse: 0.5), the
-    least error on the whole.
+    right in full sliding with spin. ``"intermediate"``, the default, has the power 0.8 of the parabola (ellipse:
+    0.5), the least error on the whole.
 March
     ``"second-order"``, the default, takes half a first step and turns a slipping traction exactly. ``"plain"`` is the
     program of 1982, first order in the size of the cells.

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from models.contact.fastsim import KINDS as KINDS_OF_FLEXIBILITY
 from models.contact.fastsim import fastsim
 from models.contact.fastsim_derivatives import derivatives
 from models.contact.fastsim_grid import POWERS
@@ -31,6 +32,8 @@ MODEL_KINDS = ("x", "y", "spin", "y+spin", "x-y+spin")
 MODEL_LEVELS = (0.05, 0.3, 1.0, 2.0, 4.0, 10.0)
 LOAD, FRICTION, MEAN_AXIS = 80e3, 0.3, 5e-3
 PAIR = Pair()
+Contacts = dict[str, Any]
+"""Arrays by the names of the parameters of ``fastsim``."""
 CELLS = (11, 21, 41, 81)
 FINE = 321
 EXACT_CELLS = 24
@@ -53,7 +56,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + found + timed, data
 
 
-def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> dict[str, np.ndarray]:
+def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
     """Contacts of every ratio, kind and level of creepage, by mu N / (G c^2 C) with C11, C22 and C23 c, as columns."""
     ratio, kind, level = (grid.ravel() for grid in np.meshgrid(RATIOS, np.arange(len(kinds)), levels, indexing="ij"))
     part = np.array([KINDS[name] for name in kinds])[kind] * level[:, None]
@@ -65,7 +68,7 @@ def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> dict[str, np
             "xi_y": xi_y, "spin": spin}  # fmt: skip
 
 
-def _vector(given: dict[str, np.ndarray], **options: Any) -> np.ndarray:
+def _vector(given: Contacts, **options: Any) -> np.ndarray:
     """Forces (n, 2) by mu N."""
     found = fastsim(**given, pair=PAIR, **options)
     return np.stack([found.fx, found.fy], axis=1) / (FRICTION * LOAD)
@@ -84,7 +87,8 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
             if march == "plain":
                 continue
             rows.append(at_most(f"fastsim.cells.{bound}", SYSTEM, f"largest error at 21 cells per strip, "
-                                f"{bound} bound, {len(truth)} cases", float(errors[1].max()), "mu N", 0.004, WHY, "none"))  # fmt: skip
+                                f"{bound} bound, {len(truth)} cases", float(errors[1].max()), "mu N",
+                                0.004, WHY, "none"))  # fmt: skip
             mean = np.array([np.sqrt(np.mean(e**2)) for e in errors])
             order = float(np.log(mean[0] / mean[-1]) / np.log(CELLS[-1] / CELLS[0]))
             if bound == "parabolic":
@@ -152,7 +156,7 @@ def _derivatives() -> list[Row]:
                     "a scale err by 1e-9; where a cell begins to slip within them the force jumps", "none")]  # fmt: skip
 
 
-def _moved(given: dict[str, np.ndarray], name: str, step: float) -> dict[str, np.ndarray]:
+def _moved(given: Contacts, name: str, step: float) -> Contacts:
     """The contacts with one value changed; a load that grows takes the ellipse with it."""
     moved = {**given, name: given[name] + step}
     if name == "load":
@@ -161,7 +165,7 @@ def _moved(given: dict[str, np.ndarray], name: str, step: float) -> dict[str, np
     return moved
 
 
-def _forces(given: dict[str, np.ndarray]) -> np.ndarray:
+def _forces(given: Contacts) -> np.ndarray:
     found = fastsim(**given, pair=PAIR)
     return np.stack([found.fx, found.fy, found.mz], axis=1)
 
@@ -176,10 +180,11 @@ def _model() -> tuple[list[Row], list[list[Any]]]:
     exact = np.array([_exact({name: float(values[i]) for name, values in given.items()})
                       for i in range(len(given["a"]))])  # fmt: skip
     solved = np.isfinite(exact[:, 0])
-    table = []
+    table: list[list[Any]] = []
     for bound in POWERS:
-        for kind in ("blended", "one", "three"):
-            found = fastsim(**given, pair=PAIR, cells=161, bound=bound, flexibilities=kind)  # type: ignore[arg-type]
+        for kind in KINDS_OF_FLEXIBILITY:
+            options: dict[str, Any] = {"bound": bound, "flexibilities": kind}
+            found = fastsim(**given, pair=PAIR, cells=161, **options)
             off = (np.stack([found.fx, found.fy, found.mz], axis=1) - exact)[solved] / _units()
             force = np.hypot(off[:, 0], off[:, 1])
             table.append([bound, kind, float(force.mean()), float(force.max()), float(np.abs(off[:, 2]).mean()),
@@ -221,7 +226,8 @@ def tables(data: dict[str, Any]) -> list[Table]:
     if "model" in data:
         found.append(Table("FASTSIM: error of the model", "Converged, against the exact theory: force in % of mu N, "
                            "moment in % of mu N sqrt(ab).",
-                           ("bound", "flexibilities", "mean", "largest", "moment, mean", "moment, largest"), tuple((*row[:2], *(f"{100 * v:.2f}" for v in row[2:]))
+                           ("bound", "flexibilities", "mean", "largest", "moment, mean", "moment, largest"),
+                           tuple((*row[:2], *(f"{100 * v:.2f}" for v in row[2:]))
                                                      for row in data["model"])))  # fmt: skip
     if "speed" in data:
         found.append(Table("FASTSIM: price", "Beside the time that a root and a division per cell take on this "

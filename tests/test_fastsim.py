@@ -1,0 +1,196 @@
+"""FASTSIM: right in signs and units, against a march of its own in plain Python, and each planted fault found."""
+
+import math
+
+import numpy as np
+import pytest
+
+from models.contact import hertz
+from models.contact.fastsim import Ellipse, fastsim
+from models.contact.fastsim_derivatives import derivatives
+from models.contact.fastsim_falling import Falling
+from models.contact.fastsim_grid import POWERS, grid, strips_of
+from models.contact.linear_theory import flexibilities
+from models.contact.material import Pair
+from models.errors import InputError
+from validation.cases import fastsim as case
+from validation.fuzzed_creepage import OPTIONS, contacts, worst
+
+PAIR = Pair()
+AT = {"a": 6e-3, "b": 4e-3, "load": 80e3, "mu": 0.3, "xi_x": 1e-3, "xi_y": -5e-4, "spin": 0.3}
+STREAM = 500
+"""Of the tests: the case draws from streams 0 and 100 on."""
+
+
+def plain_python(a, b, load, mu, xi_x, xi_y, spin, cells, power, half):
+    """Three flexibilities, one cell after the other in SI; the rotation by sine, cosine and exponential."""
+    l1, l2, l3 = flexibilities(a, b, PAIR)
+    strips = int(strips_of(np.array(a / b), cells))
+    ys = b * ((strips - 1 - 2 * np.arange(strips)) / strips)
+    p0 = mu * load / sum(
+        (1 - (x / a) ** 2 - (y / b) ** 2) ** power * (2 * s / cells) * (2 * b / strips)
+        for y in ys for s in [a * math.sqrt(1 - (y / b) ** 2)] for x in s * (1 - (2 * np.arange(cells) + 1) / cells)
+    )  # fmt: skip
+    total = np.zeros(3)
+    for y in ys:
+        s = a * math.sqrt(1 - (y / b) ** 2)
+        dx = 2 * s / cells
+        p, slips = 0j, False
+        for i in range(cells):
+            x = s - (i + 0.5) * dx
+            share = 0.5 if half and i == 0 else 1.0
+            at = x + share * dx / 2 if half else x
+            g = p0 * max(1 - (x / a) ** 2 - (y / b) ** 2, 0.0) ** power
+            w = complex(xi_x / l1 - spin * y / l3, xi_y / l2 + spin * at / l3)
+            trial = p - w * dx * share
+            if abs(trial) <= g:
+                p, slips = trial, False
+            elif half and slips:
+                g_mid = p0 * (1 - (at / a) ** 2 - (y / b) ** 2) ** power
+                z = (abs(w.real) + abs(w.imag)) * dx / g_mid / 8
+                w -= 1j * spin / l3 * dx * min(0.5 * z, 0.12 + 0.2 * z, 0.47)
+                psi = np.angle(p / -w)
+                psi = 2 * math.atan(math.tan(psi / 2) * math.exp(-abs(w) * dx / g_mid))
+                p = g * -w / abs(w) * complex(math.cos(psi), math.sin(psi))
+            else:
+                p, slips = g * trial / abs(trial), True
+            total += (p.real, p.imag, x * p.imag * l2 / l3 - y * p.real * l1 / l3) * np.array(dx * 2 * b / strips)
+    return total
+
+
+@pytest.mark.parametrize("march", ["second-order", "plain"])
+@pytest.mark.parametrize("bound", list(POWERS))
+def test_the_kernels_do_what_a_plain_march_does(march, bound):
+    for scale in (0.2, 1.0, 4.0):
+        given = {**AT, **{name: scale * AT[name] for name in ("xi_x", "xi_y", "spin")}}
+        found = fastsim(**given, pair=PAIR, cells=13, bound=bound, march=march, flexibilities="three")
+        truth = plain_python(**given, cells=13, power=POWERS[bound], half=march == "second-order")
+        # the kernels' exponential is right to 1e-5, a plain march to rounding
+        allowed = 2e-5 if march == "second-order" else 1e-12
+        assert np.abs([found.fx - truth[0], found.fy - truth[1]]).max() <= allowed * 24e3
+        assert abs(found.mz - truth[2]) <= allowed * 24e3 * 6e-3
+
+
+def test_signs():
+    """Forces oppose creepage; spin to the left pushes to the right as the linear theory has it: Fy = -C23 spin."""
+    still = {**AT, "xi_x": 0.0, "xi_y": 0.0, "spin": 0.0}
+    assert fastsim(**{**still, "xi_x": 1e-4}, pair=PAIR).fx < 0
+    assert fastsim(**{**still, "xi_y": 1e-4}, pair=PAIR).fy < 0 < fastsim(**{**still, "xi_y": 1e-4}, pair=PAIR).mz
+    turned = fastsim(**{**still, "spin": 0.1}, pair=PAIR)
+    assert turned.fy < 0 and turned.mz < 0 and abs(turned.fx) < 1e-9
+
+
+def test_eight_times_the_load_doubles_the_radius():
+    small, large = (hertz.by_load(1.1, 1.1, load, PAIR) for load in (1e4, 8e4))
+    assert large.a == pytest.approx(2 * small.a, rel=1e-12)
+    forces = [fastsim(h.a, h.b, h.load, 0.3, s * 1e-3, 0.0, 0.2, PAIR) for h, s in ((small, 1), (large, 2))]
+    assert forces[1].fx == pytest.approx(8 * forces[0].fx, rel=1e-12)
+
+
+def test_a_call_is_the_function():
+    one = Ellipse(AT["a"] / AT["b"], PAIR)
+    found = fastsim(**AT, pair=PAIR)
+    values = [AT[name] for name in ("a", "load", "mu", "xi_x", "xi_y", "spin")]
+    assert one(*values) == pytest.approx((found.fx, found.fy, found.mz), rel=1e-12)
+    for place, bad in ((0, 0.0), (1, math.nan), (2, -0.1), (4, math.inf)):
+        with pytest.raises(InputError):
+            one(*values[:place], bad, *values[place + 1 :])
+
+
+def test_many_are_as_they_are_alone():
+    """Contacts of several shapes, whose strips share a block of lanes."""
+    given = case.creepages(("x", "y-spin"), (0.3, 2.0))
+    together = fastsim(**given, pair=PAIR)
+    for i in range(len(given["a"])):
+        alone = fastsim(**{name: values[i] for name, values in given.items()}, pair=PAIR)
+        assert together.fx[i] == pytest.approx(alone.fx, rel=1e-12, abs=1e-9)
+        assert together.mz[i] == pytest.approx(alone.mz, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("load", [0.0, -5.0])
+def test_no_load_no_force(load):
+    found = fastsim(**{**AT, "load": load, "a": 0.0, "b": 0.0}, pair=PAIR)
+    assert (found.fx, found.fy, found.mz, found.dissipation, found.wear_number) == (0.0,) * 5
+    assert not derivatives(**{**AT, "load": load}, pair=PAIR).slopes.any()
+
+
+def test_without_creepage_the_slopes_are_those_of_the_linear_theory():
+    still = {**AT, "xi_x": 0.0, "xi_y": 0.0, "spin": 0.0}
+    found = derivatives(**still, pair=PAIR)
+    assert not found.forces.any() and np.isfinite(found.slopes).all()
+    from models.contact.linear_theory import coefficients
+
+    c, ab = coefficients(1.5, PAIR.nu), 24e-6
+    # 21 cells: 0.4 %
+    assert found.slopes[0, 0] == pytest.approx(-PAIR.G * ab * c.c11, rel=4e-3)
+    assert found.slopes[1, 1] == pytest.approx(-PAIR.G * ab * c.c22, rel=4e-3)
+    assert found.slopes[1, 2] == pytest.approx(-PAIR.G * ab**1.5 * c.c23, rel=4e-3)
+    assert found.slopes[2, 1] == pytest.approx(PAIR.G * ab**1.5 * c.c23, rel=4e-3)
+
+
+@pytest.mark.parametrize("growing", [True, False])
+@pytest.mark.parametrize("kind", ["blended", "one", "three"])
+def test_derivatives_are_those_of_the_march(kind, growing):
+    given = case.creepages(tuple(case.KINDS), (0.2, 2.0))
+    own = derivatives(**given, pair=PAIR, flexibilities=kind, growing=growing).slopes[..., 3] * case.LOAD
+    ends = []
+    for share in (1e-6, -1e-6):
+        grown = (1 + share) ** (1 / 3) if growing else 1.0
+        moved = {**given, "load": given["load"] * (1 + share), "a": given["a"] * grown, "b": given["b"] * grown}
+        found = fastsim(**moved, pair=PAIR, flexibilities=kind)
+        ends.append(np.stack([found.fx, found.fy, found.mz], axis=1))
+    off = np.abs((ends[0] - ends[1]) / 2e-6 - own) / case._units()
+    assert np.quantile(off.max(axis=1), 0.95) < 1e-7
+
+
+def test_falling_friction():
+    given = {**AT, "xi_x": 0.05, "xi_y": 0.0, "spin": 0.0}
+    law = Falling(floor=0.4, decay=0.6, speed=20.0)
+    # all slides at 1 m/s: mu (0.4 + 0.6 exp(-0.6))
+    expected = -0.3 * 80e3 * (0.4 + 0.6 * math.exp(-0.6))
+    assert fastsim(**given, pair=PAIR, falling=law).fx == pytest.approx(expected, rel=1e-9)
+    none = fastsim(**AT, pair=PAIR, falling=Falling(floor=1.0, decay=1.0, speed=20.0))
+    assert none.fx == pytest.approx(fastsim(**AT, pair=PAIR).fx, rel=1e-12)
+
+
+@pytest.mark.parametrize("options", OPTIONS[:4])
+def test_invariants_of_random_contacts(options):
+    found = worst(contacts(case.SEED, STREAM, 2000), options, PAIR)
+    assert max(value for name, value in found.items() if name != "power") <= 1e-12
+    assert found["power"] <= (1e-5 if options.get("cells", 21) < 20 else 1e-12)
+
+
+@pytest.mark.parametrize(("name", "value"), [
+    ("a", -1e-3), ("a", 600.0), ("b", math.nan), ("load", math.inf), ("mu", -0.1), ("mu", 30.0), ("xi_x", math.nan),
+    ("xi_x", 50.0), ("spin", math.inf), ("a", 0.0), ("xi_y", [1e-3, 2e-3]), ("xi_x", "much")])  # fmt: skip
+def test_bad_input_is_named(name, value):
+    with pytest.raises(InputError, match=name):
+        fastsim(**{**AT, "xi_x": [0.0, 1e-3, 2e-3], name: value}, pair=PAIR)
+
+
+@pytest.mark.parametrize("options", [{"cells": 2}, {"cells": 21.0}, {"bound": "round"}, {"march": "third"},
+                                     {"flexibilities": "two"}])  # fmt: skip
+def test_an_unknown_option_is_named(options):
+    with pytest.raises(InputError, match=next(iter(options))):
+        fastsim(**AT, pair=PAIR, **options)
+
+
+@pytest.mark.parametrize("bound", list(POWERS))
+def test_the_pressure_of_the_cells_is_the_load(bound):
+    net = grid(21, 36, bound)
+    assert net.strips[3].sum() * net.cells[1].sum() == pytest.approx(1.0, rel=1e-14)
+
+
+def test_every_row_of_the_case_passes(tmp_path):
+    rows, data = case.measure(True, tmp_path)
+    assert [row.id for row in rows if row.status == "failed"] == []
+    assert case.tables(data) and case.draw(data)
+
+
+@pytest.mark.full
+def test_a_planted_fault_is_found():
+    """Without the half step, and with spin of the wrong sign, the march is not that of plain Python."""
+    truth = plain_python(**AT, cells=13, power=1.0, half=True)
+    whole = plain_python(**AT, cells=13, power=1.0, half=False)
+    turned = plain_python(**{**AT, "spin": -AT["spin"]}, cells=13, power=1.0, half=True)
+    assert np.hypot(*(whole - truth)[:2]) > 1e-3 * 24e3 and np.hypot(*(turned - truth)[:2]) > 1e-2 * 24e3

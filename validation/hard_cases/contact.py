@@ -1,0 +1,90 @@
+"""Rolling contact: no creepage, next to none, spin against lateral creepage, lift-off, cells that flip.
+
+No engine takes part: forces are plain functions of the creepages, so each case has one answer for all.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from models.contact import hertz
+from models.contact.fastsim import fastsim
+from models.contact.fastsim_derivatives import derivatives
+from models.contact.linear_theory import forces
+from models.contact.material import Pair
+from validation.hard_cases.case import Case
+
+PAIR = Pair()
+A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
+
+
+def no_creepage(implementation: str, folder: Path) -> float:
+    """Forces without creepage, and whether their derivatives are numbers."""
+    found = derivatives(A, B, LOAD, MU, 0.0, 0.0, 0.0, PAIR)
+    return float(np.abs(found.forces).max() + (0.0 if np.isfinite(found.slopes).all() else np.inf))
+
+
+def no_creepage_naive(folder: Path) -> str:
+    """The weighted flexibility as it is printed."""
+    with np.errstate(invalid="ignore"):
+        weighted = np.float64(0.0) / np.float64(0.0)
+    return f"the weighted flexibility of 1982 is 0/0 there: {weighted}"
+
+
+def next_to_none(implementation: str, folder: Path) -> float:
+    """Creepages of 1e-300 to 1e-12 against the linear theory."""
+    small = 10.0 ** np.arange(-300.0, -11.0, 12.0)
+    given = (small, -0.5 * small, 30.0 * small)
+    found, linear = fastsim(A, B, LOAD, MU, *given, PAIR), forces(A, B, *given, PAIR)
+    off = np.hypot(found.fx / linear[0] - 1.0, (found.fy - linear[1]) / np.abs(linear[0]))
+    return float(np.abs(off).max())
+
+
+def against(implementation: str, folder: Path) -> float:
+    """Spin whose pole is anywhere in the ellipse: error of 21 cells by mu N, all bounded."""
+    pole = np.linspace(-1.0, 1.0, 41)
+    given = (np.zeros(41), -0.5 * A * pole, np.full(41, 0.5))
+    coarse, fine = (fastsim(A, B, LOAD, MU, *given, PAIR, cells=cells) for cells in (21, 201))
+    return float(np.hypot(coarse.fx - fine.fx, coarse.fy - fine.fy).max() / (MU * LOAD))
+
+
+def against_naive(folder: Path) -> str:
+    """The march of 1982 on the same cells."""
+    given = (0.0, -0.25 * A, 0.5)
+    plain, fine = fastsim(A, B, LOAD, MU, *given, PAIR, march="plain"), fastsim(A, B, LOAD, MU, *given, PAIR, cells=201)
+    return f"the plain march is {100 * abs(plain.fy - fine.fy) / (MU * LOAD):.1f} % of mu N off on as many cells"
+
+
+def lift_off(implementation: str, folder: Path) -> float:
+    """Force by mu N as the load goes to nothing and below: full sliding, then exactly none."""
+    load = np.concatenate((10.0 ** np.arange(-12.0, 5.0), [0.0, -1.0, -1e3]))
+    contact = hertz.by_load(1.1, 0.8, load, PAIR)
+    found = fastsim(contact.a, contact.b, load, MU, 0.02, 0.0, 0.0, PAIR)
+    return float(np.abs(found.fx + MU * np.maximum(load, 0.0)).max() / (MU * load.max()))
+
+
+def flipping(implementation: str, folder: Path) -> float:
+    """Largest deviation of a creep curve from a smooth one, by mu N, over 2001 creepages."""
+    creep = np.linspace(0.0, 4e-3, 2001)
+    force = fastsim(A, B, LOAD, MU, creep, 0.5 * creep, 50.0 * creep, PAIR).fx / (MU * LOAD)
+    return float(np.abs(np.diff(force, 2)).max())
+
+
+def locked(implementation: str, folder: Path) -> float:
+    """A locked wheel, and spin of a thousand per metre: |F| beyond mu N."""
+    found = fastsim(A, B, LOAD, [1e-6, 0.3, 1.0], [[1.0], [0.0], [-1.0]], [[0.0], [1.0], [1.0]], 1e3, PAIR)
+    return float(np.max(np.hypot(found.fx, found.fy) / (np.array([1e-6, 0.3, 1.0]) * LOAD) - 1.0, initial=0.0))
+
+
+CASES = (
+    Case("rolling without creepage", "the mean flexibility is 0/0", "no force, derivatives are numbers", "N", 0.0,
+         "exact", no_creepage, naive=no_creepage_naive),
+    Case("creepage of 1e-300", "squares underflow", "linear theory", "of it", 4e-3, "error of 21 cells", next_to_none),
+    Case("spin against lateral creepage", "forces nearly cancel, tractions turn about a pole", "201 cells per strip",
+         "mu N", 4e-3, "error of 21 cells", against, against="none", naive=against_naive),
+    Case("lift-off", "axes and stiffness vanish", "mu N to 1e-12 N, then none", "mu N", 1e-12, "rounding", lift_off),
+    Case("cells that begin to slip", "a cell sticks or slips, nothing between", "second difference of a creep curve",
+         "mu N", 1e-3, "a tenth of a per cent, and the curve itself bends by 1e-5", flipping, against="none"),
+    Case("locked wheel with spin", "no cell sticks, directions all differ", "|F| <= mu N", "mu N", 1e-12, "rounding",
+         locked),
+)  # fmt: skip
