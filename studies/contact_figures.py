@@ -5,11 +5,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
 
 from models.contact.accuracy import Error
 from models.contact.fields import Fields
 from models.contact.scene import Sweep
 from models.contact.theories import Contact, Rolled
+from models.contact.work_precision import TARGETS, Point
 from studies.figures import plt, save
 
 MILLI, MEGA = 1e3, 1e-6
@@ -137,3 +139,34 @@ def _legend(axis: Any, checked: bool) -> None:
     if checked:
         axis.plot([], [], "o", color="#444444", markerfacecolor="white", markersize=5, label="exact theory")
     axis.legend(loc="best")
+
+
+STYLES = {"linear theory": ("#888888", "x"), "FASTSIM 1982": ("#d55e00", "s"), "FASTSIM, plain march": ("#e69f00", "v"),
+          "FASTSIM": ("#0072b2", "o"), "FASTSIM, three flexibilities": ("#56b4e9", "^"),
+          "FASTSIM, parabolic": ("#009e73", "D"), "theory of 1983": ("#cc79a7", "P"),
+          "exact theory": ("#222222", "*")}  # fmt: skip
+
+
+def price_figure(points: list[Point], title: str) -> Figure:
+    """Error of every theory over its time and over its cells, both logarithmic; thin lines: 95 of 100 contacts."""
+    figure, axes = plt.subplots(1, 2, figsize=(11.5, 5.2), sharey=True)
+    for name, (colour, marker) in STYLES.items():
+        own = [one for one in points if one.name == name]
+        error, most = ([100 * value for value in values]
+                       for values in ([one.mean for one in own], [one.most for one in own]))  # fmt: skip
+        for axis, along in zip(axes, ([one.seconds for one in own], [one.cells**2 for one in own]), strict=True):
+            axis.plot(along, error, color=colour, marker=marker, linewidth=1.4, markersize=5.5, label=name)
+            axis.plot(along, most, color=colour, marker=marker, linewidth=0.6, markersize=3, alpha=0.6)
+    for axis, label in zip(axes, ("time of one evaluation from Python [s]", "cells in the contact area"), strict=True):
+        axis.set(xscale="log", yscale="log", xlabel=label)
+        for target in TARGETS:
+            axis.axhline(100 * target, color="black", linewidth=0.5, linestyle=":")
+    axes[0].set_ylim(top=40.0)
+    axes[0].set_yticks([0.2, 0.5, 1, 2, 5, 10, 20], ["0.2", "0.5", "1", "2", "5", "10", "20"])
+    axes[0].minorticks_off()
+    axes[0].set_ylabel(r"error of the tangential force [% of $\mu N$]")
+    axes[0].set_title("thick: mean of all contacts; thin: 95 of 100 are better")
+    axes[1].set_title("dotted: 5, 2, 1 and 0.5 %")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    return figure

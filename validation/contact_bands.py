@@ -11,13 +11,14 @@ from models.contact.fastsim import fastsim
 from models.contact.hertz import by_axes
 from models.contact.of_scene import interpenetrating
 from models.contact.theories import Simplified
-from validation.contact_set import FRICTION, LOAD, PAIR, Case, read
+from models.contact.work_precision import Case
+from validation.contact_set import FRICTION, LOAD, PAIR, read
 
 CELLS = 101
 """In each strip of FASTSIM: its own error is then below 0.05 % of mu N."""
 SHARE = 0.95
 """Part of the contacts that a band holds."""
-FASTSIM = [f"{kind} {bound}" for kind in ("blended", "one", "three") for bound in ("parabolic", "elliptic")]
+FASTSIM = [f"{kind} {bound}" for kind in ("blended", "one", "three") for bound in ("intermediate", "parabolic", "elliptic")]
 EDGES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 1.1)
 """Forces by mu N between which a knot lies."""
 
@@ -38,24 +39,29 @@ class Held:
 
 def forces(name: str, cases: list[Case], cells: int) -> np.ndarray:
     """Force (n, 2) by mu N of a theory, one of those in FASTSIM or "simplified"."""
-    axes, motions = np.array([c.axes for c in cases]).T, np.array([c.creepage for c in cases]).T
     if name == "simplified":
-        found = [_simplified(c).roll(c.creepage, cells).force for c in cases]
+        found = [_simplified(c).roll(c.motion, cells).force for c in cases]
         return np.array(found) / (FRICTION * LOAD)
+    axes, motions = _arrays(cases)
     kind, bound = name.split()
     one = fastsim(*axes, LOAD, FRICTION, *motions, PAIR, cells=cells, bound=bound, flexibilities=kind)  # type: ignore[arg-type]
     return np.stack([one.fx, one.fy], axis=1) / (FRICTION * LOAD)
 
 
+def _arrays(cases: list[Case]) -> tuple[np.ndarray, np.ndarray]:
+    """Semi-axes (2, n) and motions (3, n)."""
+    return np.array([(c.a, c.b) for c in cases]).T, np.array([c.motion for c in cases]).T
+
+
 def _simplified(case: Case) -> Simplified:
-    return Simplified(interpenetrating(by_axes(*case.axes, PAIR, load=LOAD), PAIR), FRICTION)
+    return Simplified(interpenetrating(by_axes(case.a, case.b, PAIR, load=LOAD), PAIR), FRICTION)
 
 
 def held(name: str, cases: list[Case], cells: int = CELLS) -> Held:
     """A theory's forces and errors."""
     force = forces(name, cases, cells)
-    exact = np.array([(c.fx, c.fy) for c in cases])
-    axes, motions = np.array([c.axes for c in cases]).T, np.array([c.creepage for c in cases]).T
+    exact = np.array([c.force for c in cases])
+    axes, motions = _arrays(cases)
     return Held(force, np.linalg.norm(force - exact, axis=1), spin_share(*axes, motions, PAIR.nu))
 
 

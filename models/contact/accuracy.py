@@ -99,5 +99,5 @@ def _of_linear(contact: OnEllipse, motion: Motion, found: Rolled) -> float:
     return float(np.linalg.norm(found.force - other.force)) + error.total
 
 
-BEST = {"flexibilities": "blended", "bound": "parabolic", "march": "second-order"}
+BEST = {"flexibilities": "blended", "bound": "intermediate", "march": "second-order"}
 """Choices of FASTSIM that are closest to the exact theory on the whole."""

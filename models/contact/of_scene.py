@@ -27,7 +27,7 @@ def contact(scene: ContactScene) -> Contact:
     if scene.profiles is not None:
         pressed = press([touch.patch for touch in touches(scene)], scene.pair, **_pressed(scene))
         return Simplified(pressed, friction) if method.name == "simplified" else Exact(pressed, friction, method.cells)
-    hertz = _hertz(scene)
+    hertz = hertz_of(scene)
     if method.name == "simplified":
         return Simplified(interpenetrating(hertz, scene.pair), friction)
     if method.name == "fastsim":
@@ -70,7 +70,7 @@ def _profile(scene: ContactScene, kind: Literal["wheel", "rail"]) -> Profile:
     return read_profile(scene.path(name, f"profiles.{kind}"), kind, smoothing=scene.profiles.smoothing)
 
 
-def _hertz(scene: ContactScene) -> Hertz:
+def hertz_of(scene: ContactScene) -> Hertz:
     """Hertz' contact from semi-axes, curvatures or radii, by load or approach."""
     load, approach = _pressed(scene).values()
     if scene.ellipse is not None:

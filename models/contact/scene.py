@@ -118,13 +118,13 @@ class Method(Strict):
     name: Literal["fastsim", "simplified", "exact", "linear"] = Field(default="fastsim", description="theory")
     cells: int = Field(21, ge=5, le=400, description="cells along each axis")
     march: Literal["second-order", "plain"] = Field(default="second-order", description="of FASTSIM")
-    bound: Literal["parabolic", "elliptic"] = Field(default="parabolic", description="of the traction in FASTSIM")
+    bound: Literal["intermediate", "parabolic", "elliptic"] = Field(default="intermediate", description="of the traction in FASTSIM")
     flexibilities: Literal["blended", "one", "three"] = Field(default="blended", description="of FASTSIM")
 
     @property
     def order(self) -> float:
         """Power of the size of a cell with which the error of the forces falls."""
-        return 2.0 if self.name == "fastsim" and self.march == "second-order" and self.bound == "parabolic" else 1.0
+        return 2.0 if self.name == "fastsim" and self.march == "second-order" and self.bound != "elliptic" else 1.0
 
     @property
     def band(self) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from models.contact import linear_theory
 from models.contact.fastsim import fastsim
+from models.contact.fastsim_fields import fastsim_fields
 from models.contact.fields import Fields
 from models.contact.hertz import Hertz
 from models.contact.hertz_cells import hertzian
@@ -90,13 +91,12 @@ class Fastsim(OnEllipse):
     def __init__(self, hertz: Hertz, friction: float, pair: Pair, **choices: Any) -> None:
         super().__init__(hertz, friction, pair)
         self.choices = choices
-        self.order = 2.0 if choices["march"] == "second-order" and choices["bound"] == "parabolic" else 1.0
+        self.order = 2.0 if choices["march"] == "second-order" and choices["bound"] != "elliptic" else 1.0
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces on ``cells`` cells in each strip."""
         given = (self.a, self.b, self.pressing.load, self.friction, *motion, self.pair)
         found = fastsim(*given, cells=cells, **self.choices)
-        from models.contact.fastsim_fields import fields as fastsim_fields
         inside = (fastsim_fields(*given, cells=cells, **self.choices),) if fields else ()
         return Rolled(*(float(v) for v in (found.fx, found.fy, found.mz, found.stick, found.dissipation)), inside)
 
