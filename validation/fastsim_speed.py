@@ -16,8 +16,8 @@ from validation.rows import Row, System, at_most
 
 SYSTEM: System = "contact"
 CELLS = 21
-ROUNDS, REPEATS = 60, 200
-CONTACTS = 4000
+ROUNDS, REPEATS = 300, 30
+CONTACTS = 400
 WHY = "least of interleaved rounds: whatever else a machine does only adds to a time"
 
 

@@ -153,7 +153,7 @@ def _derivatives() -> list[Row]:
     share = np.quantile(np.max(off, axis=(0, 2)), 0.98)
     return [at_most("fastsim.derivatives", SYSTEM, "derivatives to creepages, spin and load against differences, "
                     f"98 % of {len(own.forces)} cases", float(share), "mu N, mu N c", 1e-7, "differences over 2e-6 of "
-                    "a scale err by 1e-9; where a cell begins to slip within them the force jumps", "none")]  # fmt: skip
+                    "a scale err by 1e-9; where a cell begins to slip within them forces jump", "none")]  # fmt: skip
 
 
 def _moved(given: Contacts, name: str, step: float) -> Contacts:
