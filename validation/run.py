@@ -17,7 +17,7 @@ from validation.rows import REPORTED, Row
 CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "growth",
          "drift_off", "drift_solvers", "holding_spring", "point_mass",
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
-         "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients",
+         "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
          "contact_simplified", "contact_profiles",
          "fastsim")  # fmt: skip
 """Case modules in the order of the report."""

@@ -5,8 +5,8 @@
 Solved by conjugate gradients on the changing contact area (Polonsky and Keer, Wear 231, 1999, 206-219). The problem is
 convex, so a pressure that meets all conditions is the answer: ``NormalSolution.residual`` is the proof.
 
-The error of the grid, measured on Hertz' ellipse with n cells along each axis (a/b = 1, load given): see
-``validation/cases/contact_exact.py``.
+Error of the cells (validation case ``contact_exact``): with 63 cells along each axis of a Hertzian ellipse the approach
+is off by 0.003 %, the greatest pressure by 0.02 %, both of order 2, the area by a part of the cells along its edge.
 """
 
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.contact.half_space import Convolution, Z, influence, offsets
+from models.contact.inputs import quantity
 from models.errors import InputError, RunFailed
 
 if TYPE_CHECKING:
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-9
 """Largest violation of a contact condition, as a part of the greatest elastic displacement."""
 MOST_ITERATIONS = 2000
+LARGEST_CELL, LARGEST_APPROACH = 0.1, 0.1
+"""In m; larger ones are usually in mm."""
 
 
 @dataclass(frozen=True)
@@ -120,13 +123,11 @@ def _checked(distance: np.ndarray, dx: float, dy: float, load: float | None, app
     if not np.isfinite(distance).all():
         raise InputError("", "distance", None, "must be finite everywhere (m); use a large distance outside the bodies")
     for name, value in (("dx", dx), ("dy", dy)):
-        if not 0 < value < np.inf:
-            raise InputError("", name, value, "must be above 0 (size of a cell in m)")
+        quantity(name, value, f"the size of a cell in m, above 0 and at most {LARGEST_CELL:g}", 1e-12, LARGEST_CELL)
     if (load is None) == (approach is None):
         raise InputError("", "load", load, "give either the load (N) or the approach (m)")
-    for name, given in (("load", load), ("approach", approach)):
-        if given is not None and not np.isfinite(given):
-            raise InputError("", name, given, "must be finite")
+    quantity("load", 0.0 if load is None else load, "a load in N")
+    quantity("approach", 0.0 if approach is None else approach, "an approach in m", -LARGEST_APPROACH, LARGEST_APPROACH)
     return distance
 
 

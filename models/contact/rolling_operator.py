@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from models.contact.material import Pair
 
 UPSTREAM = (1.5, -2.0, 0.5)
-"""Weights of u at a cell's centre and the next two upstream in -dx du/dx: second order, and never accelerating."""
+"""Weights of u at a cell's centre and at the next two upstream in -dx du/dx: of second order, and dissipative."""
+IN_PLACE = (1.0,)
+"""Weights for u itself, by dx: a shift without rolling."""
 INNER_TOLERANCE = 1e-6
 """Relative residual at which the linear solver of one Newton step stops."""
 MOST_PRODUCTS = 300
@@ -21,17 +23,18 @@ MOST_PRODUCTS = 300
 
 
 class SlipOperator:
-    """C: tractions (ny, nx, 2) in units of G to minus the gradient of displacement along x, (ny, nx, 2).
+    """C: tractions (ny, nx, 2) in units of G to their part of the slip, (ny, nx, 2): -du/dx, or u/dx in a shift.
 
     The gradient at a cell's centre is taken from there and from the next two centres upstream, where the material
     comes from. The symmetric part of C then has the symbol (1 - cos)^2 times that of the positive definite A.
     """
 
-    def __init__(self, columns: int, rows: int, dx: float, dy: float, pair: "Pair") -> None:
+    def __init__(self, columns: int, rows: int, dx: float, dy: float, pair: "Pair",
+                 weights: tuple[float, ...] = UPSTREAM) -> None:  # fmt: skip
         x, y = offsets(columns, dx), offsets(rows, dy)[:, None]
-        ahead = np.append(x, x[-1] + dx * np.arange(1, len(UPSTREAM)))
+        ahead = np.append(x, x[-1] + dx * np.arange(1, len(weights)))
         displacement = influence(ahead, y, dx, dy, pair)[..., : Y + 1, : Y + 1] * (pair.G / dx)
-        parts = [weight * displacement[:, i : i + len(x)] for i, weight in enumerate(UPSTREAM)]
+        parts = [weight * displacement[:, i : i + len(x)] for i, weight in enumerate(weights)]
         self.kernel = np.sum(parts, axis=0)
         self.rows, self.columns = rows, columns
         self._convolution = Convolution(self.kernel)

@@ -1,21 +1,26 @@
 """Steady rolling of two half-spaces with Coulomb friction on a given pressure: the exact theory, on a grid.
 
-Kalker, Three-Dimensional Elastic Bodies in Rolling Contact, 1990, section 4.3 (program TANG). Material flows through the
-contact from the leading edge (largest x) back, so the slip of the wheel over the rail, by the rolling speed, is
+Kalker, Three-Dimensional Elastic Bodies in Rolling Contact, 1990, section 4.3. Material flows through the contact from
+the leading edge (largest x) back, so the slip of the wheel over the rail, by the rolling speed, is
 
     s = (xi_x - spin y, xi_y + spin x) - du/dx,
 
-u the displacement difference of the tractions p. On a grid du/dx is (u(x + dx) - u(x)) / dx about each cell's leading
-side, where the rigid slip is taken too. A cell sticks (s = 0, |p| <= g) or slips (p = -g s/|s|), with g = mu times the
-pressure. With s = w + C p this is a variational inequality: |p| <= g and s.(q - p) >= 0 for every |q| <= g. C is
-positive definite (its symmetric part is the second difference of a positive definite kernel), so there is exactly
-one solution, and tractions that meet the conditions of every cell are it: ``RollingSolution.residual`` is the proof.
+u the displacement difference of the tractions p. A cell sticks (s = 0, |p| <= g) or slips (p = -g s/|s|), with g = mu
+times the pressure. On a grid s = w + C p with du/dx from a cell's centre and the next two upstream, and this is a
+variational inequality: |p| <= g and s.(q - p) >= 0 for every |q| <= g. C is positive definite (``SlipOperator``), so
+there is exactly one solution, and tractions that meet the conditions of every cell are it: ``RollingSolution.residual``
+is the proof.
 
 Solved by Gauss-Seidel sweeps, which settle which cells stick, each followed by a step of Newton's method for the cells
 so found: GMRES with the fast Fourier transform for products with C, preconditioned by each strip's own coupling.
+
+Error of the cells, in forces by mu N (validation case ``contact_exact``): with 40 cells along each axis of an ellipse
+0.1 to 0.4 %, 0.7 % for spin on a long one, with 80 half as much. The order is 2 where all slips and 1 where much sticks:
+the edge of the contact and the leading edge of the zone that sticks lie somewhere within a cell. Carter's cylinder is
+met to 0.2 % with 80 cells, Cattaneo and Mindlin's shift to 0.04 % with 40. Full sliding gives mu N to rounding.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,7 +28,7 @@ import numpy as np
 from models.contact.inputs import quantity
 from models.contact.normal_problem import Pressed
 from models.contact.rolling_kernels import sweep
-from models.contact.rolling_operator import SlipOperator, solve_on
+from models.contact.rolling_operator import IN_PLACE, UPSTREAM, SlipOperator, solve_on
 from models.errors import RunFailed
 
 if TYPE_CHECKING:
@@ -44,7 +49,7 @@ class RollingSolution:
     """Forces and fields of steady rolling; cells as in the pressure's grid.
 
     fx, fy : forces on the wheel (N). mz : moment on the wheel about the origin of x and y (N m).
-    traction : (ny, nx, 2) on the wheel (Pa). slip : (ny, nx, 2) by the rolling speed, zero where a cell sticks and outside the contact.
+    traction : (ny, nx, 2) on the wheel (Pa). slip : (ny, nx, 2) by the rolling speed, zero outside the slipping cells.
     stick : (ny, nx) bool. power : dissipated by friction per unit of rolling speed (W s/m = N), never negative.
     residual : largest change of a cell's traction that would still be needed if all others were right, by the largest
         bound. rounds : of sweeps and Newton steps.
@@ -80,14 +85,32 @@ def solve_rolling(pressed: Pressed, mu: float, xi_x: float, xi_y: float, spin: f
     mu = float(quantity("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0))
     motion = [float(quantity(name, value, told)) for name, value, told in
               (("xi_x", xi_x, "a creepage"), ("xi_y", xi_y, "a creepage"), ("spin", spin, "in 1/m"))]  # fmt: skip
+    return _rubbed(pressed, mu, rigid_slip(pressed.x, pressed.y, *motion), pair, UPSTREAM)
+
+
+def solve_shift(pressed: Pressed, mu: float, shift_x: float, shift_y: float, pair: "Pair") -> RollingSolution:
+    """Tractions after the wheel has been shifted over the rail, without rolling, from a rest without tractions.
+
+    The problem of Cattaneo (1938) and Mindlin (1949): s = shift + u. Arguments and errors as of ``solve_rolling``, with
+    shifts in m; in the result ``slip`` is in m and ``power`` the work of friction in J.
+    """
+    mu = float(quantity("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0))
+    way_x, way_y = (float(quantity(name, value, "a shift in m, at most 0.1", -0.1, 0.1)) for name, value in
+                    (("shift_x", shift_x), ("shift_y", shift_y)))  # fmt: skip
+    by_cell = _rubbed(pressed, mu, rigid_slip(pressed.x, pressed.y, way_x, way_y, 0.0) / pressed.dx, pair, IN_PLACE)
+    return replace(by_cell, slip=by_cell.slip * pressed.dx, power=by_cell.power * pressed.dx)
+
+
+def _rubbed(pressed: Pressed, mu: float, rigid: np.ndarray, pair: "Pair",
+            weights: tuple[float, ...]) -> RollingSolution:  # fmt: skip
+    """Solution for a rigid slip (ny, nx, 2), on the cells in contact."""
     pair.require_likeness()
     box = _box(pressed.contact)
     bound = mu * pressed.pressure[box] / pair.G
     if not bound.any():
         return _frictionless(pressed)
-    operator = SlipOperator(bound.shape[1], bound.shape[0], pressed.dx, pressed.dy, pair)
-    rigid = rigid_slip(pressed.x[box[1]], pressed.y[box[0]], *motion)
-    state, rounds = _solve(operator, rigid, bound)
+    operator = SlipOperator(bound.shape[1], bound.shape[0], pressed.dx, pressed.dy, pair, weights)
+    state, rounds = _solve(operator, rigid[box], bound)
     return _assembled(state, rounds, pressed, box, pair.G)
 
 

@@ -1,0 +1,245 @@
+"""The exact theory of contact on cells: closed forms, its own refinement, and another program's sample."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.contact.hertz import by_axes
+from models.contact.hertz_cells import hertzian
+from models.contact.material import Material, Pair
+from models.contact.normal_problem import NormalSolution, centres, solve_normal
+from models.contact.rolling_problem import RollingSolution, solve_rolling, solve_shift
+from validation.rows import Row, System, Table, at_most, not_run, within
+from validation.scenes import data_folder
+
+TITLE = "The exact theory of contact on cells"
+SYSTEM: System = "contact"
+PAIR, MU, LOAD, SIZE = Pair(), 0.3, 8e4, 5e-3
+"""Materials, friction, N, and sqrt(ab) in m."""
+LIMIT = MU * LOAD
+SAMPLE = "contact_sample.csv"
+STRIP = 0.02
+"""a/b of the ellipse whose middle is nearly a cylinder's."""
+CASES: dict[str, tuple[float, float, float, float]] = {
+    "little x": (1.0, 0.04, 0.0, 0.0),
+    "x": (1.0, 0.2, 0.0, 0.0),
+    "y, wide": (0.3, 0.0, 0.25, 0.0),
+    "spin": (1.0, 0.0, 0.0, 0.3),
+    "much spin": (1.0, 0.0, 0.0, 3.0),
+    "y and spin": (2.0, 0.0, 0.15, 0.3),
+    "x, y against spin": (2.0, 0.12, -0.13, 0.25),
+    "spin, long": (5.0, 0.0, 0.0, 0.15),
+}
+"""a/b, creepages by mu N / (G ab), spin by mu N / (G (ab)^(3/2))."""
+SHARE = 0.0075
+"""Of mu N: the error that 40 cells along each axis are said to have at most, 80 half of it."""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows for both problems against closed forms, their refinement, symmetries, and the sample where there is one."""
+    refined = _refined((8, 16, 32) if quick else (10, 20, 40, 80), ("x", "spin") if quick else tuple(CASES))
+    rows = [*_hertz_rows(), *_strip_rows(20 if quick else 80), *_shift_rows(), *_sliding_rows(), *_symmetry_rows(),
+            *_refinement_rows(refined)]  # fmt: skip
+    sample, sample_rows = _sample(quick)
+    return rows + sample_rows, {"refined": refined, "sample": sample, "strip": _strip(40, 0.5)[:2]}
+
+
+def _row(name: str, words: str, value: float, bound: float, why: str, unit: str = "", side: Any = "closed form") -> Row:
+    return at_most(f"contact_exact.{name}", SYSTEM, words, value, unit, bound, why, side)
+
+
+def pressed_by_hertz(ratio: float, cells: int) -> tuple[NormalSolution, np.ndarray]:
+    """The normal problem of an ellipse a/b = ratio on cells, and its errors of approach, peak and area (3,)."""
+    a, b = SIZE * ratio**0.5, SIZE / ratio**0.5
+    truth = by_axes(a, b, PAIR, load=LOAD)
+    dx, dy = 2 * a / cells, 2 * b / cells
+    x, y = centres(cells + 5, dx), centres(cells + 5, dy)
+    found = solve_normal(float(truth.A) * x**2 + float(truth.B) * y[:, None] ** 2, dx, dy, PAIR, load=LOAD)
+    values = np.array([found.approach, found.pressure.max(), found.area])
+    return found, values / [float(truth.approach), float(truth.p0), np.pi * a * b] - 1.0
+
+
+def _hertz_rows() -> list[Row]:
+    """Approach, greatest pressure and area on odd numbers of cells, so that one lies in the middle."""
+    rows = []
+    for ratio in (1.0, 3.0):
+        (coarse, wide), (fine, narrow) = (pressed_by_hertz(ratio, cells) for cells in (21, 63))
+        order = np.log(np.abs(wide / narrow)) / np.log(3.0)
+        name, where = f"hertz.{ratio:g}", f"Hertz, a/b {ratio:g}, 63 cells"
+        rows += [
+            _row(f"{name}.approach", f"{where}: approach", abs(narrow[0]), 2e-4, "of order 2"),
+            _row(f"{name}.pressure", f"{where}: greatest pressure", abs(narrow[1]), 4e-4, "of order 2"),
+            _row(f"{name}.area", f"{where}: area", abs(narrow[2]), 0.02, "to a part of the cells along its edge"),
+            within(f"contact_exact.{name}.order", SYSTEM, "order of the greatest pressure, 21 to 63 cells",
+                   float(order[1]), "", 2.0, 0.4, "collocation at the middle of cells", "closed form"),
+            _row(f"{name}.residual", f"{where}: contact conditions unmet, by the displacement",
+                 max(coarse.residual, fine.residual), 1e-9, "the proof of the solution"),
+        ]  # fmt: skip
+    return rows
+
+
+def carter(x: np.ndarray, a: float, share: float) -> np.ndarray:
+    """Traction by mu p0 on a strip -a < x < a that rolls to +x, at a creepage of ``share`` of that of full sliding.
+
+    Carter (1926) as in Johnson, Contact Mechanics, 1985, section 8.3: two semi-ellipses, of which the second fills the
+    zone that sticks, a (1 - share) wide each way, at the leading edge.
+    """
+    whole = np.sqrt(np.maximum(1 - (x / a) ** 2, 0.0))
+    half = a * (1 - share)
+    return whole - half / a * np.sqrt(np.maximum(1 - ((x - (a - half)) / half) ** 2, 0.0))
+
+
+def _strip(cells: int, share: float) -> tuple[list[float], list[float], float]:
+    """x/a, traction by mu p0 in the middle of a slender ellipse, and the error of its sum by that of full sliding."""
+    b = SIZE / STRIP**0.5
+    a = STRIP * b
+    pressed = hertzian(a, b, LOAD, cells + 1)  # odd: one strip of cells lies in the middle
+    bound = MU * 1.5 * LOAD / (np.pi * a * b)
+    found = solve_rolling(pressed, MU, 2 * share * bound / PAIR.modulus, 0.0, 0.0, PAIR)
+    traction = -found.traction[cells // 2, :, 0] / bound
+    error = float(traction.sum() * pressed.dx / (np.pi * a / 2) - (1 - (1 - share) ** 2))
+    return (pressed.x / a).tolist(), traction.tolist(), error
+
+
+def _strip_rows(cells: int) -> list[Row]:
+    why = "first order in the cells: the leading edge of the zone that sticks; and the ellipse is no cylinder by 1e-3"
+    return [_row(f"carter.{share:g}", f"Carter's cylinder at {share:g} of the creepage of sliding, {cells} cells: "
+                 "force by mu N", abs(_strip(cells, share)[2]), 0.2 / cells, why)
+            for share in (0.2, 0.5, 0.8)]  # fmt: skip
+
+
+def shift(share: float, nu: float, cells: int) -> RollingSolution:
+    """A ball shifted so far that, by Cattaneo and Mindlin, the force is ``share`` of mu N."""
+    body = Material(E=2.1e11, nu=nu)
+    pair = Pair(body, body)
+    way = 3 * LIMIT * (2 - nu) / (8 * SIZE * pair.G) * (1 - (1 - share) ** (2 / 3))
+    return solve_shift(hertzian(SIZE, SIZE, LOAD, cells), MU, way, 0.0, pair)
+
+
+def _shift_rows() -> list[Row]:
+    why = "exact for nu = 0 (Johnson, Contact Mechanics, 1985, section 7.2); the cells err by 4e-4"
+    return [_row(f"cattaneo.{share:g}", f"Cattaneo and Mindlin's shift of a ball, {share:g} of sliding: force by mu N",
+                 abs(shift(share, 0.0, 40).fx / LIMIT + share), 1e-3, why) for share in (0.3, 0.8)]  # fmt: skip
+
+
+def roll(name: str, cells: int, sign: float = 1.0, mirrored: float = 1.0) -> np.ndarray:
+    """fx, fy by mu N and mz by mu N sqrt(ab) (3,) of one of CASES, reversed and mirrored at will."""
+    ratio, xi_x, xi_y, spin = CASES[name]
+    creepage = LIMIT / (PAIR.G * SIZE**2) * sign
+    pressed = hertzian(SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, cells)
+    across = mirrored * creepage
+    found = solve_rolling(pressed, MU, creepage * xi_x, across * xi_y, across * spin / SIZE, PAIR)
+    return np.array([found.fx, found.fy, found.mz / SIZE]) / LIMIT
+
+
+def _sliding_rows() -> list[Row]:
+    """Creepages at which nothing sticks."""
+    pressed = hertzian(SIZE, SIZE, LOAD, 20)
+    rows = []
+    for angle in (0.0, 0.7, 2.0):
+        found = solve_rolling(pressed, MU, np.cos(angle), np.sin(angle), 0.0, PAIR)
+        gap = np.hypot(found.fx + LIMIT * np.cos(angle), found.fy + LIMIT * np.sin(angle)) / LIMIT
+        rows.append(_row(f"sliding.{angle:g}", f"sliding at creepage 1, {angle:g} rad from x: force beside mu N "
+                         "against the creepage, by mu N", float(gap), 2.6e-3, "half of 0.3 degrees"))  # fmt: skip
+    most = np.hypot(found.fx, found.fy) / LIMIT - 1.0
+    return [*rows, _row("sliding.most", "force above mu N, by mu N", max(float(most), 0.0), 1e-12, "Coulomb")]
+
+
+def _symmetry_rows() -> list[Row]:
+    """Two runs that must agree but for what the residual leaves."""
+    name, cells = "x, y against spin", 20
+    there, back, mirror = roll(name, cells), roll(name, cells, -1.0), roll(name, cells, 1.0, -1.0)
+    return [_row("reversed", "F(-creepage) + F(creepage), by mu N", float(np.abs(there + back).max()), 1e-7, "odd"),
+            _row("mirrored", "forces beside those of the mirror image in y, by mu N",
+                 float(np.abs(there - mirror * [1, -1, -1]).max()), 1e-7, "no side is preferred")]  # fmt: skip
+
+
+def _refined(grids: tuple[int, ...], names: tuple[str, ...]) -> dict[str, list[list[float]]]:
+    """Name of a case -> for every grid its cells and forces."""
+    return {name: [[cells, *roll(name, cells).tolist()] for cells in grids] for name in names}
+
+
+def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
+    """What is left to the limit of no cells, from the two finest grids at order 1."""
+    rows = []
+    for name, values in refined.items():
+        left = 2.0 * np.linalg.norm(np.diff(np.array(values)[:, 1:3], axis=0), axis=1)
+        cells = int(values[-2][0])
+        bound = SHARE * 40 / cells
+        rows.append(_row(f"refined.{name.replace(', ', '.').replace(' ', '_')}", f"rolling, {name}: error of {cells} "
+                         "cells along each axis by mu N", float(left[-1]), bound, "as its documentation states",
+                         side="none"))  # fmt: skip
+    total = np.array([np.diff(np.array(v)[:, 1:3], axis=0) for v in refined.values()])
+    changes = np.linalg.norm(total, axis=2).mean(axis=0)
+    order = float(np.log2(changes[0] / changes[-1]) / (len(changes) - 1))
+    return [*rows, within("contact_exact.order", SYSTEM, "order in the cells of the rolling forces, mean of the cases",
+                          order, "", 1.5, 0.6, "2 where all slips, 1 where much sticks", "none")]  # fmt: skip
+
+
+def _sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
+    """Every row of the other program's sample that this folder of data holds, and the worst difference."""
+    words = "forces of CONTACT's sample (40 cells, own error 0.6 %) by mu N, worst"
+    folder = data_folder()
+    if folder is None or not (folder / SAMPLE).is_file():
+        return [], [not_run("contact_exact.sample", SYSTEM, words, f"TWINRIG_DATA names no folder with {SAMPLE}")]
+    lines = (folder / SAMPLE).read_text(encoding="utf-8").splitlines()
+    table = list(csv.DictReader(line for line in lines if not line.startswith("#")))[:: 4 if quick else 1]
+    found = [_beside(row, 20 if quick else 40) for row in table]
+    force, moment = (max(part[i] for part in found) for i in (2, 3))
+    return found, [_row("sample", words, force, 0.01, "its own error and ours", side="native"),
+                   _row("sample.moment", words.replace("forces", "moments").replace("mu N", "mu N sqrt(ab)"), moment,
+                        0.01, "its own error and ours", side="native")]  # fmt: skip
+
+
+def _beside(row: dict[str, str], cells: int) -> list[Any]:
+    """Kind, a/b, difference of the force by mu N and of the moment by mu N sqrt(ab); the file is in mm, N and MPa."""
+    value = {name: float(text) for name, text in row.items() if name != "kind"}
+    a, b, nu = value["a_mm"] / 1e3, value["b_mm"] / 1e3, value["nu"]
+    body = Material(E=2e6 * value["G_MPa"] * (1 + nu), nu=nu)
+    found = solve_rolling(hertzian(a, b, value["FN_N"], cells), value["mu"], value["xi_x"], value["xi_y"],
+                          value["phi_rad_per_mm"] * 1e3, Pair(body, body))  # fmt: skip
+    limit = value["mu"] * value["FN_N"]
+    force = np.hypot(found.fx - value["Fx_N"], found.fy - value["Fy_N"]) / limit
+    moment = abs(found.mz - value["Mz_Nmm"] / 1e3) / (limit * (a * b) ** 0.5)
+    return [row["kind"], value["a_over_b"], float(force), moment]
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Forces over grids, and the sample."""
+    grids = [f"{int(row[0])} cells" for row in next(iter(data["refined"].values()))]
+    rows = tuple((name, *(f"{100 * fx:.2f}, {100 * fy:.2f}" for _, fx, fy, _ in values))
+                 for name, values in data["refined"].items())  # fmt: skip
+    found = [Table("Refinement of the exact rolling problem", "Fx, Fy in % of mu N; cells along each axis.",
+                   ("case", *grids), rows)]  # fmt: skip
+    if data["sample"]:
+        rows = tuple((f"{ratio:g}", kind, f"{100 * force:.2f}", f"{100 * moment:.2f}")
+                     for kind, ratio, force, moment in data["sample"])  # fmt: skip
+        found.append(Table("The exact theory beside CONTACT", "Differences in % of mu N and of mu N sqrt(ab).",
+                           ("a/b", "kind", "force", "moment"), rows))  # fmt: skip
+    return found
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Carter's strip, and how the forces settle with the cells."""
+    from studies.figures import plt
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
+    x, traction = data["strip"]
+    fine = np.linspace(-1, 1, 801)
+    left.plot(fine, carter(fine, 1.0, 0.5), color="0.4", label="Carter")
+    left.plot(x, traction, ".", label="40 cells, middle of a/b = 1/50")
+    left.set(xlabel="x / a (leading edge at 1)", ylabel="traction / (mu p0)")
+    left.set_title("Rolling cylinder at half the creepage of sliding")
+    left.legend()
+    for name, values in data["refined"].items():
+        numbers = np.array(values)
+        left_over = np.linalg.norm(np.diff(numbers[:, 1:3], axis=0), axis=1)
+        right.loglog(numbers[1:, 0], 100 * left_over, "o-", label=name)
+    right.set(xlabel="cells along each axis", ylabel="change from half as many [% of mu N]")
+    right.set_xticks(ticks := numbers[1:, 0].astype(int), ticks)
+    right.minorticks_off()
+    right.set_title("Rolling forces settle with the cells")
+    right.legend(fontsize=8)
+    return [("contact_exact", figure)]
