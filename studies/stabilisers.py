@@ -19,8 +19,19 @@ from pydantic import Field
 
 from models.assembly import assemble
 from models.damage import CONVENTION, SLOPE
-from models.drift.growth import holding_stiffness
-from models.drift.score import COARSEST, LEAST, TUMBLED, Limits, blind_verdict, consistent, errors, own_figures, verdict
+from models.drift.growth import holding_stiffness, rigid_pitch
+from models.drift.score import (
+    COARSEST,
+    LEAST,
+    TUMBLED,
+    Limits,
+    blind_verdict,
+    consistent,
+    errors,
+    own_figures,
+    uncertainty,
+    verdict,
+)
 from models.drift.trust import trust
 from models.errors import InputError, RunFailed
 from models.noise import PITCH_SENSOR, normal
@@ -169,9 +180,8 @@ class Bench:
 
     @property
     def resisting(self) -> float:
-        """I + J in kg m^2: what a moment on the pitch has to turn, m1 b^2 + m2 a^2 being J."""
-        p = self.parameters
-        return p.I + p.m1 * p.b**2 + p.m2 * p.a**2
+        """I + J in kg m^2: what a moment on the pitch has to turn."""
+        return rigid_pitch(self.parameters).total
 
     def spring(self, stiffness: float) -> dict[str, float]:
         """Settings of a spring to the ground with its damper."""
@@ -237,7 +247,7 @@ class Bench:
         own, wrong = own_figures(run, self.parameters), errors(run, self.truth, self.options.slope)
         with_truth = verdict(own, wrong, effects, limits)
         alone = blind_verdict(own, effects, float(run.times[-1]), limits, self.trusted,
-                              consistent(run))
+                              consistent(run), uncertainty(run))
         loads = {f"damage {channel}": wrong.damage[channel] for channel in CHANNELS}
         loads |= {f"error {channel} [N]": wrong.force_rms[channel] for channel in CHANNELS}
         return {

@@ -15,15 +15,17 @@ import numpy as np
 from pydantic import Field
 
 from models.assembly import assemble
+from models.drift.growth import pitch_variance
 from models.drift.trust import ANGLE, Curve, growth, interpolation, model, noise, rounding
 from models.ensemble.paths import noise_paths
 from models.ensemble.runner import run_paths
 from models.ensemble.statistics import quantile
 from models.errors import InputError
+from models.result import Result
 from models.scene import Scene, build
 from models.simulate import simulate
 from models.strict import Strict, quantity, read
-from studies.virtual_measurement import check_road, follower, measure, stride, write_measurement
+from studies.virtual_measurement import check_road, check_steps, follower, measure, stride, write_measurement
 
 Progress = Callable[[str, float], None]
 Row = dict[str, Any]
@@ -38,7 +40,7 @@ class Options(Strict):
 
     sampling_rate: float | None = quantity("Hz", "rate of the virtual measurement on a road", default=None)
     noise_fraction: float = quantity("", "standard deviation of the force noise by the largest force", default=0.002)
-    inertia_error: float = quantity("", "share by which the pitch inertia may be wrong", default=0.05)
+    inertia_error: float = Field(0.05, gt=0, lt=1, description="share by which the pitch inertia may be wrong")
     wanted: float = quantity("s", "time for which the run shall be trusted", default=60.0)
     angle: float = quantity("rad", "pitch error from which on a run is not trusted", default=ANGLE)
     paths: int = Field(100, ge=20, description="noise paths of the ensemble")
@@ -59,10 +61,11 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     runs = {}
     if truth is not None:
         progress("runs", 0.2)
-        runs["interpolation"] = _error(base, engines[0], truth)
-        runs["inertia"] = _error(_with(base, {"I": other.I}), engines[0], truth)
+        clean = simulate(base, engines[0])
+        runs["interpolation"] = _error(clean, truth)
+        runs["inertia"] = _error(simulate(_with(base, {"I": other.I}), engines[0]), clean["pitch"])
     progress("noise paths", 0.4)
-    spread = _ensemble(base, deviation, options, truth, engines[0])
+    spread = _ensemble(base, deviation, options, engines[0])
     rows = _rows(curves, runs, spread, options)
     table = _text(rows, options, deviation, growth(assembly).rate, base, curves)
     (folder / "table.txt").write_text("\n".join(table) + "\n")
@@ -74,6 +77,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 def check(scene: Scene, engines: tuple[str, ...]) -> None:
     """Refuse, before anything is written, what is neither a road nor a free run on wheel forces."""
     options = read(Options, scene.options, scene.file, "options")
+    check_steps(scene, engines)
     if "road" in scene.effects:
         if options.sampling_rate is None:
             raise InputError(scene.file, "options.sampling_rate", None, "is missing: forces measured on a road need it")
@@ -103,21 +107,22 @@ def _with(scene: Scene, override: dict[str, float]) -> Scene:
     return build({**table, "vehicle": vehicle}, scene.file, Path(scene.folder))
 
 
-def _error(scene: Scene, engine: str, truth: np.ndarray) -> Curve:
-    """Pitch error of a run."""
-    run = simulate(scene, engine)
-    return Curve(run.times, np.abs(run["pitch"] - truth))
+def _error(run: Result, pitch: np.ndarray) -> Curve:
+    """Pitch error of a run beside another one's pitch, so that each source of error is seen alone."""
+    return Curve(run.times, np.abs(run["pitch"] - pitch))
 
 
-def _ensemble(base: Scene, deviation: float, options: Options, truth: np.ndarray | None,
-              engine: str) -> dict[str, np.ndarray]:  # fmt: skip
-    """Drift-off times (paths,) and pitch errors (paths, rows) of noise paths; nan from where a path left all bounds."""
+def _ensemble(base: Scene, deviation: float, options: Options, engine: str) -> dict[str, np.ndarray]:
+    """Drift-off times (paths,) and pitch errors (paths, rows) of noise paths beside the run without noise.
+
+    The errors are nan from where a path left all bounds.
+    """
     table = base.table()
     effects = table["effects"] | {"force_noise": {"deviation": deviation, "seed": options.seed}}
     scene = build({**table, "effects": effects}, base.file, Path(base.folder))
     quiet = simulate(base, "reference")
-    true = quiet["pitch"] if truth is None else truth
     every = max(1, round(SPACING / base.run.step))
+    true = quiet["pitch"]
     rows = np.arange(0, len(true), every)
     found = run_paths(noise_paths(scene, quiet.times[rows], true, options.angle, engine), options.paths)
     return {"times": quiet.times[rows], "drift_off": found["drift_off"],
@@ -191,11 +196,16 @@ def _remedies(options: Options, deviation: float, rate: float, base: Scene, curv
 
 
 def _excess(curve: Curve, options: Options, rate: float) -> float:
-    """Size of an error at the wanted time by the allowed angle, from drift-off or the run's end by the growth rate."""
+    """Size of an error at the wanted time by the allowed angle, from drift-off or the run's end on by the law of noise.
+
+    Its deviation grows as t^1.5 at first and exponentially where the rate has had its time: what follows the run is
+    taken for as rough as the run.
+    """
     time = curve.passes(options.angle)
     start = min(options.wanted, curve.times[-1] if time is None else time)
     size = float(curve.size[: np.searchsorted(curve.times, start) + 1].max())
-    return size / options.angle * math.exp(rate * (options.wanted - start))
+    longer = pitch_variance(options.wanted, rate, 1.0) / pitch_variance(start, rate, 1.0)
+    return size / options.angle * math.sqrt(float(longer))
 
 
 def _figure(curves: dict[str, Curve], runs: dict[str, Curve], spread: dict[str, np.ndarray], options: Options,

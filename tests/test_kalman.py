@@ -273,3 +273,13 @@ def test_bad_input_gets_one_clear_message(folder, change, words):
 def test_it_stands_alone_among_the_stabilisers(folder, other):
     with pytest.raises(InputError, match="cannot stand beside"):
         assemble(scene(folder, drawn(folder) | other))
+
+
+@pytest.mark.parametrize("wrong", ["pitch_deviation", "sign"])
+def test_a_measurement_that_contradicts_the_forces_is_refused(folder, wrong):
+    """Errors of ANGLE, stated as a tenth of it: squares 100 times too large. A pitch nose down is worse."""
+    if wrong == "sign":
+        write_time_series(folder / "p.csv", {"pitch": ("rad", -angles(folder)[:, 0])}, PERIOD)
+    own = {"pitch_deviation": ANGLE / 10} if wrong == "pitch_deviation" else {}
+    with pytest.raises(InputError, match="contradicts forces and model"):
+        assemble(scene(folder, drawn(folder, **own)))

@@ -141,6 +141,7 @@ def test_verdict_with_the_truth(own, wrong, effects, word):
     ({}, GUIDED, {}, "accepted"),
     ({}, (*FREE, "kalman_filter"), {"consistent": True}, "accepted"),
     ({}, (*FREE, "kalman_filter"), {"consistent": False}, "rejected"),
+    ({}, (*FREE, "kalman_filter"), {"consistent": True, "uncertainty": 0.03}, "rejected"),
     ({"moment_share_band": 0.2}, GUIDED, {}, "rejected"),
     ({"moment_share_band": 0.2}, SPRUNG, {}, "rejected"),
     ({}, SPRUNG, {}, "stabilise"),

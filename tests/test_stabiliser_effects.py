@@ -144,9 +144,11 @@ def test_a_dead_band_stands_in_a_vehicle_without_any_input(tmp_path):
 
 
 def test_a_high_pass_is_the_spring_of_its_corner(forces):
-    """k = (I + J) wc^2 and d = 2 zeta (I + J) wc with J = m1 b^2 + m2 a^2: the wheels move with the pitch."""
+    """k = (I + J) wc^2 and d = 2 zeta (I + J) wc: the wheels move with the pitch, about the common centre of mass."""
     p = driven(forces).parameters
-    inertia, corner = p.I + p.m1 * p.b**2 + p.m2 * p.a**2, 2 * np.pi * 0.5
+    coupling = p.b * p.m1 - p.a * p.m2
+    inertia = p.I + p.m1 * p.b**2 + p.m2 * p.a**2 - coupling**2 / (p.m1 + p.m2 + p.m3)
+    corner = 2 * np.pi * 0.5
     (spring,) = driven(forces, high_pass={"cut_off": 0.5, "damping_ratio": 0.6}).vehicle.pitch_springs
     assert (spring.stiffness, spring.damping) == pytest.approx((inertia * corner**2, 1.2 * inertia * corner))
 

@@ -176,12 +176,18 @@ def consistent(run: Result) -> bool | None:
     return bool(low <= run["kalman_surprise"][-1] <= high)
 
 
+def uncertainty(run: Result) -> float:
+    """What a Kalman filter itself says of its pitch: twice the largest standard deviation (rad); 0 without one."""
+    return 2.0 * float(run["pitch_deviation"].max()) if "pitch_deviation" in run.data else 0.0
+
+
 def blind_verdict(own: Own, effects: Iterable[str], duration: float, limits: Limits, trusted: float | None = None,
-                  consistent: bool | None = None) -> Verdict:  # fmt: skip
+                  consistent: bool | None = None, uncertainty: float = 0.0) -> Verdict:  # fmt: skip
     """The verdict of an engineer, who has no true run: by the run's own figures alone. Damage is not among them.
 
     ``accepted``: the pitch is held to a measured one (MEASURED), the artificial moment is within its limit and the
-    filter, where there is one, is ``consistent`` with its measurement (NIS within its band); or a free run ends before
+    filter, where there is one, is ``consistent`` with its measurement (NIS within its band) and its own ``uncertainty``
+    (rad) is within the limit of pitch errors; or a free run ends before
     the ``trusted`` time (s) predicted for it. ``stabilise``: a longer free run, or one that is held near zero
     (LEVEL): that is wrong on a grade, and nothing in the run shows it. ``rejected``: all else.
 
@@ -193,6 +199,7 @@ def blind_verdict(own: Own, effects: Iterable[str], duration: float, limits: Lim
     if named.isdisjoint((*MEASURED, *LEVEL)):
         return _free(duration, trusted)
     wrong = _burden(own, limits) + (["NIS outside its band"] if consistent is False else [])
+    wrong += [f"pitch known to {uncertainty:.2g} rad only"] if uncertainty > limits.pitch_error else []
     if wrong:
         return Verdict("rejected", "; ".join(wrong))
     if named.isdisjoint(MEASURED):

@@ -2,7 +2,7 @@
 
 Integrating the pitch acceleration through a second-order high-pass, s^2 / (s^2 + 2 zeta wc s + wc^2) in place of
 1, is algebraically a rotational spring and damper to the ground. The inertia that it works against is that of the
-chassis with the wheels on its arms, I + J with J = m1 b^2 + m2 a^2: pitch drift moves the wheels along.
+chassis with the wheels on its arms, I + J (``models.drift.growth.rigid_pitch``): pitch drift moves the wheels along.
 """
 
 import math
@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from models.assembly import Assembly
+from models.drift.growth import rigid_pitch
 from models.strict import Strict, quantity
 from models.vehicles.description import PitchSpring
 from models.vehicles.pitch_plane import Parameters as Vehicle
@@ -36,5 +37,5 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 def spring_of(p: Vehicle, cut_off: float, damping_ratio: float = 0.7) -> tuple[float, float]:
     """Stiffness k = (I + J) wc^2 in N m/rad and damping d = 2 zeta (I + J) wc in N m s/rad, cut_off in Hz."""
-    corner, inertia = 2 * math.pi * cut_off, p.I + p.m1 * p.b**2 + p.m2 * p.a**2
+    corner, inertia = 2 * math.pi * cut_off, rigid_pitch(p).total
     return inertia * corner**2, 2 * damping_ratio * inertia * corner

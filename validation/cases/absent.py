@@ -46,7 +46,7 @@ PRICED: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, dict[str, int]
     "accelerometers": ({}, {"sampling_rate": 200.0, "sensors": {"one": {"x": 1.0, "z": 0.2}}},
                        {"all": {"channels": 3}}),
     "high_pass": (FORCES, {"cut_off": 0.5}, {"exudyn": {"native items": 1}, "mujoco": {"native items": 1}}),
-    "kalman_filter": (FORCES, {"file": "pitch.csv", "force_deviation": 8.0, "pitch_deviation": 0.002},
+    "kalman_filter": (FORCES, {"file": "pitch.csv", "force_deviation": 8.0, "pitch_deviation": 0.5},
                       {"exudyn": {"native items": 2, "callbacks": 1}, "mujoco": {"native items": 1, "callbacks": 1},
                        "all": {"channels": 10}}),
     "prescribed_pitch": (LINEAR, {"file": "pitch.csv"},
