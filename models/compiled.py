@@ -1,15 +1,23 @@
-"""Compiling with numba, its machine code kept on disk where several processes may write at the same time.
+"""Compiling with numba, its machine code kept on disk and never loaded where it does not belong.
 
 numba numbers the files of a function's signatures from its index. Two processes that compile two signatures at once
-then write the same file, and each later loads the other's machine code: a wrong answer without a word. Here every
-file has a name of its own; if an entry of the index is lost, the function is compiled again.
+then write the same file, and each later loads the other's machine code. Nor does numba see a change in a function
+that another file gives to a kernel. Both are wrong answers without a word. So here every file has a name of its own
+(if an entry of the index is lost, the function is compiled again), and machine code is as old as the newest of its
+folder, of the vehicles' equations and of the marches.
 """
 
+import zlib
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
 import numba
+
+COMMON = tuple(Path(__file__).parent / name for name in ("vehicles", "engines"))
+"""Folders whose functions are compiled into kernels of other folders."""
 
 
 def njit(**options: Any) -> Callable[[Callable], Any]:
@@ -18,9 +26,17 @@ def njit(**options: Any) -> Callable[[Callable], Any]:
 
 
 def _kept_apart(compiled: Any) -> Any:
-    """The compiled function, the files of its signatures named after nobody's count."""
+    """The compiled function, the files of its signatures named after nobody's count and stamped with their sources."""
     file = getattr(compiled._cache, "_cache_file", None)  # there is none where nothing is kept
     if file is not None:
         stem = file._index_name.removesuffix(".nbi")
         file._data_name = lambda number: f"{stem}.{uuid4().hex[:12]}.nbc"
+        file._source_stamp = checksum(Path(compiled.py_func.__code__.co_filename).parent)
     return compiled
+
+
+@cache
+def checksum(folder: Path) -> int:
+    """Of the sources that a kernel of this folder may be made of."""
+    sources = (path for place in sorted({folder, *COMMON}) for path in sorted(place.glob("*.py")))
+    return zlib.crc32(b"".join(path.read_bytes() for path in sources))

@@ -1,12 +1,10 @@
 """The hand-written reference: the paper's equations, a compiled fixed-step Runge-Kutta, scipy's adaptive solvers."""
 
 import math
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,23 +17,15 @@ from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, Trajectory, guard
 from models.errors import RunFailed
 from models.signals import Stacked
-from models.vehicles import pitch_plane_equations
 from models.vehicles.pitch_plane_equations import ADDED, RIGHT_HAND_SIDES, numbers
 
 NO_INPUT = np.zeros((1, 4))
 """The flat road."""
-EQUATIONS = zlib.crc32(Path(pitch_plane_equations.__file__).read_bytes())
-"""Checksum of the equations' source."""
 
 
 def compiled(function: Any, key: tuple) -> Any:
-    """Compile a closure with a cache file of its own.
-
-    Closures of one factory would share numba's index, and two processes that compile different ones at the
-    same time can then each load the other's machine code. Nor does numba see when the equations change, which
-    stand in another file; so the name of the cache file carries their checksum.
-    """
-    function.__qualname__ = "_".join([function.__name__, *(str(part) for part in key), f"{EQUATIONS:08x}"])
+    """Compile a closure with an index of its own: those of one factory would share numba's."""
+    function.__qualname__ = "_".join([function.__name__, *(str(part) for part in key)])
     return njit(cache=True, nogil=True, error_model="numpy")(function)  # no check for masses of zero: there are none
 
 
