@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from models.contact import normal_problem
 from models.contact.half_space import influence
 from models.contact.hertz import by_load
 from models.contact.material import Pair
 from models.contact.normal_problem import TOLERANCE, centres, solve_normal
-from models.errors import InputError
+from models.errors import InputError, RunFailed
 
 PAIR = Pair()
 STEP = 0.4e-3
@@ -67,6 +68,21 @@ def test_two_patches_share_the_load():
     assert not found.contact[:, 20].any()
     alone = by_load(1.0, 1.0, 5e3, PAIR)
     assert found.approach > float(alone.approach)  # each presses the other's surface down as well
+
+
+def test_a_rough_surface_touches_in_many_places():
+    """Cells that an early step lets go have to come back; the residual says whether they did."""
+    rough = bowl(radius=50.0) + 1e-6 * np.random.default_rng(3).normal(size=(41, 41))
+    rough[[0, -1]], rough[:, [0, -1]] = 1.0, 1.0
+    found = solve_normal(rough, STEP, STEP, PAIR, load=3e4)
+    assert found.residual <= 2 * TOLERANCE
+    assert 0.2 < found.contact.mean() < 0.8
+
+
+def test_an_unfinished_solution_is_none(monkeypatch):
+    monkeypatch.setattr(normal_problem, "MOST_ITERATIONS", 3)
+    with pytest.raises(RunFailed):
+        solve_normal(bowl(), STEP, STEP, PAIR, load=5e4)
 
 
 @pytest.mark.parametrize("given", [{"load": 0.0}, {"load": -5.0}, {"approach": 0.0}, {"approach": -1e-3}])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from models.contact import rolling_problem
 from models.contact.half_space import influence
 from models.contact.hertz_cells import hertzian
 from models.contact.linear_theory import coefficients
@@ -10,7 +11,7 @@ from models.contact.material import STEEL, Material, Pair
 from models.contact.normal_problem import Pressed, centres, solve_normal
 from models.contact.rolling_operator import SlipOperator
 from models.contact.rolling_problem import TOLERANCE, rigid_slip, solve_rolling, solve_shift
-from models.errors import InputError
+from models.errors import InputError, RunFailed
 from validation.cases.contact_exact import CASES, carter, measure, roll
 
 PAIR, LOAD, A, B, MU = Pair(), 8e4, 6e-3, 4e-3, 0.3
@@ -60,6 +61,12 @@ def test_slow_creepage_is_the_linear_theory():
     slope = float(coefficients(A / B, PAIR.nu).c11)
     assert found.fx == pytest.approx(-PAIR.G * PRESSED.area / np.pi * slope * little, rel=0.03)
     assert 0.0 <= found.power <= 0.1 * little * abs(found.fx)  # next to nothing slips
+
+
+def test_an_unfinished_solution_is_none(monkeypatch):
+    monkeypatch.setattr(rolling_problem, "MOST_ROUNDS", 1)
+    with pytest.raises(RunFailed):
+        solve_rolling(PRESSED, MU, 0.2 * SCALE, 0.0, 0.0, PAIR)
 
 
 def test_nothing_from_nothing():

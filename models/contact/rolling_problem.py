@@ -15,7 +15,7 @@ Solved by Gauss-Seidel sweeps, which settle which cells stick, each followed by 
 so found: GMRES with the fast Fourier transform for products with C, preconditioned by each strip's own coupling.
 
 Error of the cells, in forces by mu N (validation case ``contact_exact``): with 40 cells along each axis of an ellipse
-0.1 to 0.4 %, 0.7 % for spin on a long one, with 80 half as much. The order is 2 where all slips and 1 where much sticks:
+0.1 to 0.4 %, 0.7 % for spin on a long one, with 80 half as much. The order is 2 where all slips, 1 where much sticks:
 the edge of the contact and the leading edge of the zone that sticks lie somewhere within a cell. Carter's cylinder is
 met to 0.2 % with 80 cells, Cattaneo and Mindlin's shift to 0.04 % with 40. Full sliding gives mu N to rounding.
 """
