@@ -241,5 +241,5 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     right.set_xticks(ticks := numbers[1:, 0].astype(int), ticks)
     right.minorticks_off()
     right.set_title("Rolling forces settle with the cells")
-    right.legend(fontsize=8)
+    right.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return [("contact_exact", figure)]
