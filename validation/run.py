@@ -59,7 +59,8 @@ def _outcomes(quick: bool, folder: Path) -> Iterator[tuple[str, tuple[list[Row],
         jobs = {pool.submit(_measure, name, quick, folder): name for name in shared}
         try:
             for job in as_completed(jobs):
-                yield jobs[job], job.result()
+                error = job.exception()  # of a process that died: what a case raises is a row already
+                yield jobs[job], job.result() if error is None else ([_broken(jobs[job], error)], 0.0)
         except KeyboardInterrupt:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -75,11 +76,15 @@ def _measure(name: str, quick: bool, folder: Path) -> tuple[list[Row], float]:
         case = import_module(f"validation.cases.{name}")
         rows, data = case.measure(quick, folder)
     except Exception as error:
-        reason = f"{type(error).__name__}: {error}"
-        broken = Row(f"{name}.broken", "pitch-plane", f"case {name}", None, "", "", None, "", "none", "failed", reason)
-        return [broken], time.perf_counter() - start
+        return [_broken(name, error)], time.perf_counter() - start
     (folder / "data" / f"{name}.json").write_text(json.dumps(data))
     return rows, time.perf_counter() - start
+
+
+def _broken(name: str, error: BaseException) -> Row:
+    """The failed row of a case that gave none."""
+    reason = f"{type(error).__name__}: {error}"
+    return Row(f"{name}.broken", "pitch-plane", f"case {name}", None, "", "", None, "", "none", "failed", reason)
 
 
 def seeds() -> dict[str, int]:
