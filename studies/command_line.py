@@ -212,7 +212,8 @@ def _study(scene: Any) -> Any:
     return module
 
 
-NOT_STUDIES = ("__init__", "command_line", "figures", "folders", "stabiliser_figures", "virtual_measurement")
+NOT_STUDIES = ("__init__", "command_line", "contact_figures", "figures", "folders", "stabiliser_figures",
+               "virtual_measurement")  # fmt: skip
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""What one contact of wheel and rail does: area, pressure, forces and how far they are off, at a creepage or a sweep."""
+"""What one contact of wheel and rail does: area, pressure, forces and how far they are off, at one creepage or many."""
 
 import time
 from collections.abc import Callable
@@ -34,7 +34,8 @@ class Options(Strict):
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
     """Refuse a table of cases, which is another study's."""
     if scene.cases is not None:
-        raise InputError(scene.file, "study", scene.study, "computes one contact; for a table of cases use contact_table")
+        allowed = "computes one contact; for a table of cases use contact_table"
+        raise InputError(scene.file, "study", scene.study, allowed)
 
 
 def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:

@@ -46,11 +46,11 @@ def _size(patches: list[Fields]) -> tuple[float, float]:
     return 10.5, float(np.clip(4.0 * width / length + 1.7, 3.6, 8.5))
 
 
-def _rectangles(f: Fields) -> np.ndarray:
-    """Corners of the cells inside, (cells, 4, 2) in mm."""
+def _rectangles(f: Fields) -> list[np.ndarray]:
+    """Corners of every cell inside, (4, 2) in mm."""
     x, y, dx, dy = (MILLI * getattr(f, name)[f.inside] for name in ("x", "y", "dx", "dy"))
     corners = [(x + i * dx / 2, y + j * dy / 2) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    return np.array([np.stack(corner, -1) for corner in corners]).transpose(1, 0, 2)
+    return list(np.array([np.stack(corner, -1) for corner in corners]).transpose(1, 0, 2))
 
 
 def _pressure(axis: Any, patches: list[Fields]) -> None:
@@ -147,6 +147,10 @@ STYLES = {"linear theory": ("#888888", "x"), "FASTSIM 1982": ("#d55e00", "s"), "
           "exact theory": ("#222222", "*")}  # fmt: skip
 
 
+TOP = 60.0
+"""Largest error (%) that the figure shows."""
+
+
 def price_figure(points: list[Point], title: str) -> Figure:
     """Error of every theory over its time and over its cells, both logarithmic; thin lines: 95 of 100 contacts."""
     figure, axes = plt.subplots(1, 2, figsize=(11.5, 5.2), sharey=True)
@@ -155,14 +159,16 @@ def price_figure(points: list[Point], title: str) -> Figure:
         error, most = ([100 * value for value in values]
                        for values in ([one.mean for one in own], [one.most for one in own]))  # fmt: skip
         for axis, along in zip(axes, ([one.seconds for one in own], [one.cells**2 for one in own]), strict=True):
-            axis.plot(along, error, color=colour, marker=marker, linewidth=1.4, markersize=5.5, label=name)
+            label = name if error[0] < TOP else f"{name}: {error[0]:.0f} %"
+            axis.plot(along, error, color=colour, marker=marker, linewidth=1.4, markersize=5.5, label=label)
             axis.plot(along, most, color=colour, marker=marker, linewidth=0.6, markersize=3, alpha=0.6)
     for axis, label in zip(axes, ("time of one evaluation from Python [s]", "cells in the contact area"), strict=True):
         axis.set(xscale="log", yscale="log", xlabel=label)
         for target in TARGETS:
             axis.axhline(100 * target, color="black", linewidth=0.5, linestyle=":")
-    axes[0].set_ylim(top=40.0)
-    axes[0].set_yticks([0.2, 0.5, 1, 2, 5, 10, 20], ["0.2", "0.5", "1", "2", "5", "10", "20"])
+    axes[0].set_ylim(0.1, TOP)
+    axes[1].set_xlim(left=30.0)
+    axes[0].set_yticks([0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50], ["0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50"])
     axes[0].minorticks_off()
     axes[0].set_ylabel(r"error of the tangential force [% of $\mu N$]")
     axes[0].set_title("thick: mean of all contacts; thin: 95 of 100 are better")

@@ -17,8 +17,8 @@ ANSWER = "forces.csv"
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
     """Refuse a scene of one contact, and a file that is not there."""
     if scene.cases is None:
-        raise InputError(scene.file, "study", scene.study, "needs the table [cases] with a file; one contact is what the "
-                         "study contact computes")  # fmt: skip
+        allowed = "needs the table [cases] with a file; one contact is what the study contact computes"
+        raise InputError(scene.file, "study", scene.study, allowed)
     scene.cases_file()
 
 

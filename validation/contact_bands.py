@@ -1,8 +1,10 @@
-"""Bands of error of the simplified theories, from their forces on ``contact_set``: ``python -m validation.contact_bands``
-prints what ``models.contact.accuracy`` keeps.
+"""Bands of error of the simplified theories, from their forces on ``contact_set``.
+
+``python -m validation.contact_bands`` prints what ``models.contact.accuracy`` keeps.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,11 +18,10 @@ from validation.contact_set import FRICTION, LOAD, PAIR, read
 
 CELLS = 101
 """In each strip of FASTSIM: its own error is then below 0.05 % of mu N."""
-SHARE = 0.95
-"""Part of the contacts that a band holds."""
-FASTSIM = [f"{kind} {bound}" for kind in ("blended", "one", "three") for bound in ("intermediate", "parabolic", "elliptic")]
-EDGES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 1.1)
-"""Forces by mu N between which a knot lies."""
+SHARE, NEAR = 0.95, 0.96
+"""Part of the contacts that a band is to hold; of those between the neighbours of each knot."""
+FASTSIM = [f"{kind} {bound}" for kind in ("blended", "one", "three")
+           for bound in ("intermediate", "parabolic", "elliptic")]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,8 @@ def forces(name: str, cases: list[Case], cells: int) -> np.ndarray:
         return np.array(found) / (FRICTION * LOAD)
     axes, motions = _arrays(cases)
     kind, bound = name.split()
-    one = fastsim(*axes, LOAD, FRICTION, *motions, PAIR, cells=cells, bound=bound, flexibilities=kind)  # type: ignore[arg-type]
+    choices: dict[str, Any] = {"cells": cells, "bound": bound, "flexibilities": kind}
+    one = fastsim(axes[0], axes[1], LOAD, FRICTION, motions[0], motions[1], motions[2], PAIR, **choices)
     return np.stack([one.fx, one.fy], axis=1) / (FRICTION * LOAD)
 
 
@@ -62,7 +64,7 @@ def held(name: str, cases: list[Case], cells: int = CELLS) -> Held:
     force = forces(name, cases, cells)
     exact = np.array([c.force for c in cases])
     axes, motions = _arrays(cases)
-    return Held(force, np.linalg.norm(force - exact, axis=1), spin_share(*axes, motions, PAIR.nu))
+    return Held(force, np.linalg.norm(force - exact, axis=1), spin_share(axes[0], axes[1], motions, PAIR.nu))
 
 
 def kept(name: str, one: Held) -> float:
@@ -72,16 +74,15 @@ def kept(name: str, one: Held) -> float:
 
 def measured(one: Held) -> tuple[tuple[float, ...], ...]:
     """Quantiles of the error at each knot, without spin and with it; a knot that no contact is near has the largest."""
-    found = []
+    found, ends = [], (0.0, *KNOTS, 1.1)
     for rows in (one.spinning < 0.5, one.spinning >= 0.5):
-        within = [rows & (one.used >= low) & (one.used < high) for low, high in zip(EDGES, EDGES[1:], strict=False)]
-        whole = float(np.quantile(one.error[rows], SHARE))
-        found.append(tuple(round(float(np.quantile(one.error[some], SHARE)) if some.sum() > 3 else whole, 4)
+        within = [rows & (one.used >= low) & (one.used <= high) for low, high in zip(ends, ends[2:], strict=False)]
+        whole = float(np.quantile(one.error[rows], NEAR))
+        found.append(tuple(round(float(np.quantile(one.error[some], NEAR)) if some.sum() > 3 else whole, 4)
                            for some in within))  # fmt: skip
     return tuple(found)
 
 
 if __name__ == "__main__":
-    assert len(EDGES) == len(KNOTS) + 1
     for theory in (*FASTSIM, "simplified"):
         print(f'    "{theory}": {measured(held(theory, read()))},')

@@ -31,8 +31,11 @@ def read() -> list[Case]:
     """All contacts of the set with their forces."""
     with FILE.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    return [replace(case, **{name: float(row[name]) for name in ANSWERS})
-            for case, row in zip(cases(), rows, strict=True)]  # fmt: skip
+    return [_answered(case, *(float(row[name]) for name in ANSWERS)) for case, row in zip(cases(), rows, strict=True)]
+
+
+def _answered(case: Case, fx: float, fy: float, mz: float, error: float) -> Case:
+    return replace(case, fx=fx, fy=fy, mz=mz, error=error)
 
 
 def write() -> None:

@@ -86,7 +86,7 @@ def _sound(values: dict[str, np.ndarray], solve: Callable[[dict[str, Any]], np.n
 
 def _forces(values: dict[str, Any], pair: Pair, method: Method) -> np.ndarray:
     """Answers (rows, ANSWERS); raises InputError if a row is out of what the theory takes."""
-    load, friction, *motion = (values[name] for name in MOTION)
+    load, friction, xi_x, xi_y, spin = (values[name] for name in MOTION)
     if "A" in values:
         touching = by_load(values["A"], values["B"], load, pair)
         a, b = touching.a, touching.b
@@ -94,12 +94,13 @@ def _forces(values: dict[str, Any], pair: Pair, method: Method) -> np.ndarray:
         a, b = values["a"], values["b"]
     choices: dict[str, Any] = method.model_dump(include={"march", "bound", "flexibilities"})
     half = (method.cells + 1) // 2
-    fine, coarse = (fastsim(a, b, load, friction, *motion, pair, cells=n, **choices) for n in (method.cells, half))
+    fine, coarse = (fastsim(a, b, load, friction, xi_x, xi_y, spin, pair, cells=n, **choices)
+                    for n in (method.cells, half))  # fmt: skip
     left = np.hypot(fine.fx - coarse.fx, fine.fy - coarse.fy) / ((method.cells / half) ** method.order - 1.0)
     limit = friction * np.maximum(load, 0.0)
     used = np.divide(np.hypot(fine.fx, fine.fy), limit, out=np.zeros_like(limit), where=limit > 0)
-    axes = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
-    theory = limit * band(method.band, used, spin_share(*axes, np.array(motion), pair.nu))
+    a, b = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
+    theory = limit * band(method.band, used, spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu))
     return np.column_stack([fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation, left, theory]) + 0.0
 
 

@@ -25,7 +25,8 @@ def contact(scene: ContactScene) -> Contact:
     assert scene.contact is not None
     friction = scene.contact.friction
     if scene.profiles is not None:
-        pressed = press([touch.patch for touch in touches(scene)], scene.pair, **_pressed(scene))
+        load, approach = _pressed(scene)
+        pressed = press([touch.patch for touch in touches(scene)], scene.pair, load=load, approach=approach)
         return Simplified(pressed, friction) if method.name == "simplified" else Exact(pressed, friction, method.cells)
     hertz = hertz_of(scene)
     if method.name == "simplified":
@@ -36,10 +37,10 @@ def contact(scene: ContactScene) -> Contact:
     return (Linear if method.name == "linear" else ExactOnEllipse)(hertz, friction, scene.pair)
 
 
-def _pressed(scene: ContactScene) -> dict[str, float | None]:
-    """What presses the bodies together: load or approach."""
+def _pressed(scene: ContactScene) -> tuple[float | None, float | None]:
+    """What presses the bodies together: load (N) or approach (m)."""
     assert scene.contact is not None
-    return {"load": scene.contact.load, "approach": scene.contact.approach}
+    return scene.contact.load, scene.contact.approach
 
 
 def interpenetrating(hertz: Hertz, pair: Pair) -> NormalContact:
@@ -72,7 +73,7 @@ def _profile(scene: ContactScene, kind: Literal["wheel", "rail"]) -> Profile:
 
 def hertz_of(scene: ContactScene) -> Hertz:
     """Hertz' contact from semi-axes, curvatures or radii, by load or approach."""
-    load, approach = _pressed(scene).values()
+    load, approach = _pressed(scene)
     if scene.ellipse is not None:
         return by_axes(scene.ellipse.a, scene.ellipse.b, scene.pair, load=load, approach=approach)
     A, B = scene.radii.curvatures(scene.file) if scene.radii is not None else _given(scene)

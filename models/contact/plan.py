@@ -20,7 +20,8 @@ def describe(scene: ContactScene) -> str:
     """The scene's plan as text: bodies, geometry, contact, creepage and theory."""
     wheel, rail = scene.bodies.wheel, scene.bodies.rail
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"), _line("wheel", _material(wheel)),
-             _line("rail", _material(rail)), _line(scene.geometry, _values(getattr(scene, scene.geometry)))]  # fmt: skip
+             _line("rail", _material(rail))]  # fmt: skip
+    lines.append(_line(scene.geometry, _values(getattr(scene, scene.geometry))))
     if scene.contact is not None:
         lines += [_line("contact", _values(scene.contact)), _line("creepage", _values(scene.creepage))]
     if scene.sweep is not None:

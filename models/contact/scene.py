@@ -103,7 +103,7 @@ class Sweep(Strict):
     of: Literal["xi_x", "xi_y", "spin"] = Field(description="the creepage that is swept")
     start: float = quantity("1 or 1/m", "first value", signed=True)
     stop: float = quantity("1 or 1/m", "last value", signed=True)
-    count: int = Field(25, ge=2, le=10_000, description="number of values")
+    count: int = Field(default=25, ge=2, le=10_000, description="number of values")
     spacing: Literal["linear", "logarithmic"] = Field(default="linear", description="of the values")
 
     def values(self) -> np.ndarray:
@@ -116,9 +116,9 @@ class Method(Strict):
     """[method]: the theory, and how finely it is evaluated. Cells are counted along each axis of the contact."""
 
     name: Literal["fastsim", "simplified", "exact", "linear"] = Field(default="fastsim", description="theory")
-    cells: int = Field(21, ge=5, le=400, description="cells along each axis")
+    cells: int = Field(default=21, ge=5, le=400, description="cells along each axis")
     march: Literal["second-order", "plain"] = Field(default="second-order", description="of FASTSIM")
-    bound: Literal["intermediate", "parabolic", "elliptic"] = Field(default="intermediate", description="of the traction in FASTSIM")
+    bound: Literal["intermediate", "parabolic", "elliptic"] = Field(default="intermediate", description="of tractions")
     flexibilities: Literal["blended", "one", "three"] = Field(default="blended", description="of FASTSIM")
 
     @property
@@ -162,7 +162,9 @@ class ContactScene(SceneFile):
         """The file of cases: beside the scene, or else in the folder in which the command runs."""
         assert self.cases is not None
         here = Path(self.cases.file)
-        return here if not (Path(self.folder) / here).exists() and here.is_file() else self.path(str(here), "cases.file")
+        if here.is_file() and not (Path(self.folder) / here).exists():
+            return here
+        return self.path(str(here), "cases.file")
 
     @property
     def pair(self) -> Pair:
@@ -183,8 +185,8 @@ def _check_geometry(scene: ContactScene) -> None:
     given = [name for name in GEOMETRIES if getattr(scene, name) is not None]
     if len(given) != 1:
         found = f"found {', '.join(given)}" if given else "found none"
-        raise InputError(scene.file, "", None, f"one of the tables {', '.join(GEOMETRIES)} says where the bodies touch; "
-                         f"{found}")  # fmt: skip
+        allowed = f"one of the tables {', '.join(GEOMETRIES)} says where the bodies touch; {found}"
+        raise InputError(scene.file, "", None, allowed)
     if scene.radii is not None:
         scene.radii.curvatures(scene.file)
     _check_contact(scene)
@@ -203,8 +205,8 @@ def _check_contact(scene: ContactScene) -> None:
     if scene.contact is None:
         raise InputError(scene.file, "contact", None, "is missing: a table with load or approach, and friction")
     if (scene.contact.load is None) == (scene.contact.approach is None):
-        raise InputError(scene.file, "contact.load", scene.contact.load, "give either the load in N or contact.approach "
-                         "in m")  # fmt: skip
+        allowed = "give either the load in N or contact.approach in m"
+        raise InputError(scene.file, "contact.load", scene.contact.load, allowed)
 
 
 def _check_sweep(scene: ContactScene) -> None:
@@ -214,8 +216,8 @@ def _check_sweep(scene: ContactScene) -> None:
     if sweep.start == sweep.stop:
         raise InputError(scene.file, "sweep.stop", sweep.stop, "must differ from sweep.start")
     if sweep.spacing == "logarithmic" and sweep.start * sweep.stop <= 0:
-        raise InputError(scene.file, "sweep.spacing", sweep.spacing, "start and stop must then both be above 0, or both "
-                         "below")  # fmt: skip
+        allowed = "start and stop must then both be above 0, or both below"
+        raise InputError(scene.file, "sweep.spacing", sweep.spacing, allowed)
     if sweep.of in scene.creepage.model_fields_set:
         value = getattr(scene.creepage, sweep.of)
         raise InputError(scene.file, f"creepage.{sweep.of}", value, "is swept: drop this key")

@@ -98,7 +98,8 @@ class Fastsim(OnEllipse):
         given = (self.a, self.b, self.pressing.load, self.friction, *motion, self.pair)
         found = fastsim(*given, cells=cells, **self.choices)
         inside = (fastsim_fields(*given, cells=cells, **self.choices),) if fields else ()
-        return Rolled(*(float(v) for v in (found.fx, found.fy, found.mz, found.stick, found.dissipation)), inside)
+        fx, fy, mz, stick, lost = (float(v) for v in (found.fx, found.fy, found.mz, found.stick, found.dissipation))
+        return Rolled(fx, fy, mz, stick, lost, inside)
 
 
 class ExactOnEllipse(OnEllipse):
@@ -125,7 +126,7 @@ class Simplified(Contact):
 
 
 class Exact(Contact):
-    """Half-spaces with Coulomb friction, area and pressure found too; patches share the load as the theory of 1983 says."""
+    """Half-spaces with Coulomb friction, pressure found too; patches share the load as the theory of 1983 says."""
 
     def __init__(self, pressed: NormalContact, friction: float, cells: int) -> None:
         self.pressed = pressed
@@ -152,8 +153,8 @@ def _exact(grids: Sequence[Pressed], motion: Motion, friction: float, pair: Pair
     stuck = sum(np.count_nonzero(one.stick & grid.contact) * grid.dx * grid.dy
                 for one, grid in zip(found, grids, strict=True))  # fmt: skip
     fields = tuple(_fields(one, grid) for one, grid in zip(found, grids, strict=True))
-    return Rolled(*(float(sum(getattr(one, name) for one in found)) for name in ("fx", "fy", "mz")),
-                  float(stuck / sum(areas)), float(sum(one.power for one in found)), fields)  # fmt: skip
+    fx, fy, mz = (float(sum(getattr(one, name) for one in found)) for name in ("fx", "fy", "mz"))
+    return Rolled(fx, fy, mz, float(stuck / sum(areas)), -float(np.dot((fx, fy, mz), motion)), fields)
 
 
 def _fields(found: RollingSolution, grid: Pressed) -> Fields:

@@ -181,7 +181,8 @@ def cheapest(points: list[Point], target: float, error: Callable[[Point], float]
     return min(meets, key=lambda one: one.seconds, default=None)
 
 
-def ellipse_cases(a: float, b: float, load: float, friction: float, pair: Pair, levels: tuple[float, ...]) -> list[Case]:
+def ellipse_cases(a: float, b: float, load: float, friction: float, pair: Pair,
+                  levels: tuple[float, ...]) -> list[Case]:  # fmt: skip
     """All kinds and levels on one ellipse, without their forces."""
     return [Case(a, b, load, friction, pair, kind, level) for kind, level in product(KINDS, levels)]
 

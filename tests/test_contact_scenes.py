@@ -1,0 +1,138 @@
+"""Contact scenes: what is read, shown, refused, and that both ways to name one contact are the same contact."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.contact.of_scene import contact, hertz_of
+from models.contact.scene import build
+from models.errors import InputError
+from studies import command_line
+
+ELLIPSE = """
+title = "a contact"
+system = "contact"
+[ellipse]
+a = 5e-3
+b = 4e-3
+[contact]
+load = 8e4
+friction = 0.3
+[creepage]
+xi_x = 1e-3
+"""
+TABLE = {"title": "a contact", "system": "contact", "ellipse": {"a": 5e-3, "b": 4e-3},
+         "contact": {"load": 8e4, "friction": 0.3}}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def twinrig(*args):
+    """Exit code of ``twinrig ARGS`` within this process."""
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as ended:
+        patch.setattr(sys, "argv", ["twinrig", *args])
+        command_line.main()
+    return ended.value.code
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ("ellipse.a=-1e-3", ("ellipse.a = -0.001", "above 0", "semi-axis along x", "in m")),
+    ("ellipse.c=1e-3", ("ellipse.c", "unknown key", "a, b")),
+    ("curvatures.A=1.0", ("curvatures.B", "is missing")),
+    ("contact.load=-1", ("contact.load = -1", "above 0", "in N")),
+    ("contact.approach=1e-4", ("contact.load = 80000.0", "either the load in N or contact.approach in m")),
+    ("contact.frction=0.3", ("unknown key", "did you mean 'friction'?")),
+    ("bodies.wheel.E=2.1e5", ("bodies.wheel", "E = 210000.0", "Young's modulus", "Pa")),
+    ("creepage.xi_x=fast", ("creepage.xi_x = 'fast'", "must be a number", "longitudinal creepage")),
+    ("sweep.of=xi", ("sweep.of", "xi_x or xi_y or spin", "also wrong: sweep.start, sweep.stop")),
+    ("method.name=fastsm", ("method.name", "did you mean 'fastsim'?")),
+    ("method.cells=4", ("method.cells = 4", "5 or more")),
+    ("cases.file=x.csv", ("ellipse, cases",)),
+    ("study=six_runs", ("study = 'six_runs'", "system 'pitch-plane'", "'contact'")),
+    ("study=contact_table", ("needs the table [cases]",)),
+    ("options.points=3", ("options.points = 3", "unknown key")),
+    ("system=contcat", ("no such system", "did you mean 'contact'?")),
+], ids=lambda value: value if isinstance(value, str) else "")  # fmt: skip
+def test_a_mistake_is_one_message_and_touches_nothing(change, words, capsys):
+    Path("c.toml").write_text(ELLIPSE)
+    assert twinrig("run", "c.toml", "--set", change) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and all(word in said for word in words), said
+    assert [path.name for path in Path().iterdir()] == ["c.toml"]
+
+
+def refused(**tables):
+    with pytest.raises(InputError) as found:
+        build({**TABLE, **tables}, "c.toml")
+    return str(found.value)
+
+
+def test_keys_that_do_not_belong_together():
+    assert "has no meaning for exact" in refused(method={"name": "exact", "march": "plain"})
+    assert "which is" not in refused(method={"name": "linear", "cells": 5})
+    sweep = {"of": "xi_x", "start": 0.0, "stop": 1e-2}
+    assert "is swept: drop this key" in refused(creepage={"xi_x": 0.0}, sweep=sweep)
+    assert "both be above 0" in refused(sweep={"of": "spin", "start": 0.0, "stop": 1.0, "spacing": "logarithmic"})
+    assert "conform along y" in refused(ellipse=None, radii={"wheel_x": 0.46, "wheel_y": -0.3, "rail_y": 0.3})
+    assert "found none" in refused(ellipse=None)
+    assert "in the file of cases" in refused(ellipse=None, cases={"file": "x.csv"})
+    assert "needs an ellipse" in refused(ellipse=None, profiles={})
+
+
+def test_engines_are_refused_only_if_named(capsys):
+    Path("c.toml").write_text(ELLIPSE)
+    assert twinrig("run", "c.toml", "--engine", "mujoco") == 2
+    assert "--engine = 'mujoco': has no meaning for contact" in capsys.readouterr().err
+
+
+def test_show_names_units_and_only_what_the_theory_reads(capsys):
+    Path("c.toml").write_text(ELLIPSE)
+    assert twinrig("show", "c.toml", "--set", "method.name=exact") == 0
+    said = capsys.readouterr().out
+    assert all(word in said for word in ("a = 0.005 m", "load = 80000 N", "G = 82.03 GPa", "cells = 21", "half-spaces"))
+    assert "march" not in said and not Path("results").exists()
+
+
+def test_too_unlike_materials_are_refused_before_anything_is_written(capsys):
+    Path("c.toml").write_text(ELLIPSE)
+    assert twinrig("run", "c.toml", "--set", "bodies.wheel={E=1e9, nu=0.3}") == 2
+    assert "unlike" in capsys.readouterr().err and not Path("results").exists()
+
+
+def test_radii_curvatures_ellipse_and_approach_name_the_same_contact():
+    """To rounding of some roots: 1e-12."""
+    own = {key: value for key, value in TABLE.items() if key != "ellipse"}
+    one = hertz_of(build({**own, "radii": {"wheel_x": 0.46, "rail_y": 0.3}}))
+    same = [hertz_of(build({**own, "curvatures": {"A": 1 / 0.92, "B": 1 / 0.6}})),
+            hertz_of(build({**own, "ellipse": {"a": float(one.a), "b": float(one.b)}})),
+            hertz_of(build({**own, "ellipse": {"a": float(one.a), "b": float(one.b)},
+                            "contact": {"approach": float(one.approach), "friction": 0.3}}))]  # fmt: skip
+    for other in same:
+        for name in ("a", "b", "p0", "approach", "load", "A", "B"):
+            assert getattr(other, name) == pytest.approx(getattr(one, name), rel=1e-12), name
+
+
+@pytest.mark.parametrize("name", ["fastsim", "simplified", "exact", "linear"])
+def test_every_theory_opposes_the_creepage_and_gives_what_it_dissipates(name):
+    """Small lateral creepage: all theories within 12 % of the linear one (the 1983 theory is the worst)."""
+    body = contact(build({**TABLE, "method": {"name": name}}))
+    motion = (0.0, 5e-5, 0.0)
+    found = body.roll(motion, 15, fields=True)
+    linear = contact(build({**TABLE, "method": {"name": "linear"}})).roll(motion, 15)
+    assert found.fy == pytest.approx(linear.fy, rel=0.12) and found.fy < 0
+    assert found.dissipation == pytest.approx(-found.fy * 5e-5, rel=1e-9)
+    assert body.pressing.load == pytest.approx(8e4, rel=1e-9)
+    for f in found.fields:
+        area = f.dx * f.dy
+        assert (f.px * area)[f.inside].sum() == pytest.approx(found.fx, abs=1e-6)
+        assert (f.py * area)[f.inside].sum() == pytest.approx(found.fy, rel=1e-6)
+        assert (f.pressure * area)[f.inside].sum() == pytest.approx(8e4, rel=1e-6)
+        bound = 0.3 * f.pressure * (1 + 1e-9)
+        assert (np.hypot(f.px, f.py) <= bound + 1e-3).all()
+    assert json.dumps(found.fx)

@@ -1,0 +1,215 @@
+"""Studies of rolling contact: files, figures, errors that are true, tables of contacts, and the price of accuracy."""
+
+import csv
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.contact.accuracy import BANDS, KNOTS, band, rolled, spin_share
+from models.contact.cases_table import BY_AXES, HEADER, answer
+from models.contact.fastsim import fastsim
+from models.contact.fastsim_fields import fastsim_fields
+from models.contact.material import Pair
+from models.contact.of_scene import contact
+from models.contact.scene import Method, build
+from models.contact.work_precision import Point, cheapest, exact
+from models.errors import InputError
+from models.table_stream import blocks
+from models.tables import NEWTONS, SHARES, read_table
+from studies import command_line
+from validation.cases import contact_price
+from validation.contact_set import FRICTION, LOAD, read
+
+CASES = "a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [-],spin [1/mm]\n"
+ROW = "5,4,80,0.3,0.1,-2e-4,4e-4\n"
+TABLE = {"title": "a contact", "system": "contact", "ellipse": {"a": 5e-3, "b": 4e-3},
+         "contact": {"load": 8e4, "friction": 0.3}}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def twinrig(*args):
+    """Exit code of ``twinrig ARGS`` within this process."""
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as ended:
+        patch.setattr(sys, "argv", ["twinrig", *args])
+        command_line.main()
+    return ended.value.code
+
+
+def answered(text, name="cases.csv", **method):
+    """Counts and rows that a table is answered with."""
+    Path(name).write_text(text, encoding="utf-8", errors="surrogateescape")
+    counts = answer(Path(name), Path("out.csv"), Pair(), Method(**method))
+    with open("out.csv", newline="") as file:
+        return counts, list(csv.DictReader(file))
+
+
+def test_one_contact_saves_forces_fields_and_a_picture(capsys):
+    assert twinrig("run", "contact_ellipse", "--set", "method.cells=11", "--out", "out", "--json") == 0
+    found = json.loads(capsys.readouterr().out)["answer"]
+    assert {path.name for path in Path("out").iterdir()} == {"command.txt", "forces.csv", "fields.csv", "contact.png"}
+    force = found["forces"][0]
+    fields = np.genfromtxt("out/fields.csv", delimiter=",", skip_header=1)
+    assert Path("out/fields.csv").read_text().startswith("x [m],y [m],dx [m],dy [m],pressure [Pa],px [Pa],py [Pa]")
+    area = fields[:, 2] * fields[:, 3]
+    # The file has every digit, so its sums are the forces to rounding.
+    assert (fields[:, 4] * area).sum() == pytest.approx(found["load"], rel=1e-12)
+    assert (fields[:, 5] * area).sum() == pytest.approx(force["fx"], rel=1e-9)
+    assert (fields[:, 6] * area).sum() == pytest.approx(force["fy"], rel=1e-9)
+
+
+def test_a_sweep_saves_a_row_for_every_creepage(capsys):
+    args = ("--set", "sweep={of='xi_y', start=-1e-2, stop=1e-2, count=5}", "--set", "creepage={xi_x=0.0}",
+            "--set", "options.exact=0", "--out", "out")  # fmt: skip
+    assert twinrig("run", "contact_ellipse", *args) == 0
+    units = {"xi_x": SHARES, "xi_y": SHARES, "spin": {"1/m": 1.0}, "stick": SHARES,
+             "fx": NEWTONS, "fy": NEWTONS, "mz": {"N m": 1.0}, "dissipation": NEWTONS, "error_of_cells": NEWTONS, "error_of_theory": NEWTONS}  # fmt: skip
+    found = read_table("out/forces.csv", units)
+    assert found["xi_y"].tolist() == pytest.approx([-1e-2, -5e-3, 0.0, 5e-3, 1e-2])
+    assert found["fy"] == pytest.approx(-found["fy"][::-1]) and found["fy"][2] == 0 == found["error_of_theory"][2]
+    assert (np.diff(found["fy"]) <= 0).all() and Path("out/forces.png").exists()
+
+
+def test_profiles_touch_and_carry_the_load():
+    """100 kN on S1002 and UIC 60 with no shift; the forces stay within mu N."""
+    assert twinrig("run", "contact_profiles", "--set", "method.cells=15", "--out", "out") == 0
+    fields = np.genfromtxt("out/fields.csv", delimiter=",", skip_header=1)
+    load = (fields[:, 4] * fields[:, 2] * fields[:, 3]).sum()
+    assert load == pytest.approx(1e5, rel=0.01)  # along patches that lean by up to 0.1 rad, whose cosine is 0.995
+    assert Path("out/contact.png").exists()
+
+
+def test_the_stated_error_of_the_cells_is_of_the_size_of_the_true_one():
+    body = contact(build(TABLE))
+    motion = (1e-3, -2e-4, 0.4)
+    found, error = rolled(body, motion, 21)
+    true = np.linalg.norm(found.force - body.roll(motion, 201).force)
+    assert 0.2 * error.cells < true < 5 * error.cells and error.total == error.cells + error.theory
+
+
+def test_bands_are_zero_without_creepage_and_those_of_the_table_at_the_knots():
+    assert band("blended intermediate", np.array(0.0), np.array(0.0)) == 0.0
+    for name, (without, with_spin) in BANDS.items():
+        assert band(name, np.array(KNOTS), np.array(0.0)) == pytest.approx(without)
+        assert band(name, np.array(KNOTS), np.array(1.0)) == pytest.approx(with_spin)
+    one = np.array(5e-3)
+    assert spin_share(one, one, np.array([1e-3, 0.0, 0.0]), 0.28) == 0.0 == spin_share(one, one, np.zeros(3), 0.28)
+    assert spin_share(one, one, np.array([0.0, 0.0, 0.1]), 0.28) == 1.0
+
+
+def test_the_linear_theory_states_how_far_it_is_beyond_friction():
+    body = contact(build({**TABLE, "method": {"name": "linear"}}))
+    found, error = rolled(body, (1e-2, 0.0, 0.0), 21)
+    assert error.total >= abs(found.fx) - 0.3 * 8e4  # no force is beyond mu N
+
+
+def test_fields_of_fastsim_are_those_of_its_forces():
+    for choices in ({}, {"march": "plain", "flexibilities": "one"}, {"bound": "elliptic", "flexibilities": "three"}):
+        given = (6e-3, 3e-3, 8e4, 0.3, 1e-3, -7e-4, 0.4, Pair())
+        sums, f = fastsim(*given, **choices), fastsim_fields(*given, **choices)
+        area = f.dx * f.dy
+        assert (f.px * area).sum() == pytest.approx(float(sums.fx), rel=1e-12)
+        assert (f.py * area).sum() == pytest.approx(float(sums.fy), rel=1e-12)
+        assert 1 - (area * f.slips).sum() / area.sum() == pytest.approx(float(sums.stick), rel=1e-12)
+        assert np.hypot(f.px, f.py)[f.slips] == pytest.approx(0.3 * f.pressure[f.slips], rel=1e-9)
+
+
+def test_a_row_of_a_table_is_the_contact_with_its_units():
+    counts, rows = answered(CASES + ROW)
+    one = fastsim(5e-3, 4e-3, 8e4, 0.3, 1e-3, -2e-4, 0.4, Pair())
+    assert counts == {"rows": 1, "wrong": 0} and tuple(rows[0]) == HEADER and rows[0]["status"] == "ok"
+    for heading, value in (("fx [N]", one.fx), ("fy [N]", one.fy), ("mz [N m]", one.mz), ("stick [-]", one.stick)):
+        assert float(rows[0][heading]) == pytest.approx(float(value), rel=1e-5)
+    body = contact(build(TABLE))
+    error = rolled(body, (1e-3, -2e-4, 0.4), 21)[1]
+    assert float(rows[0]["error_of_cells [N]"]) == pytest.approx(error.cells, rel=1e-3)
+    assert float(rows[0]["error_of_theory [N]"]) == pytest.approx(error.theory, rel=1e-3)
+
+
+WRONG = {"x,4,80,0.3,0,0,0\n": "column 'a [mm]' = 'x'", "1,2\n": "7 values are needed, found 2",
+         "5,4,80,-0.3,0,0,0\n": "coefficient of friction", "-5,4,80,0.3,0,0,0\n": "semi-axis", "5,4,80,0.3,nan,0,0\n":
+         "finite number", "5,4,80,0.3,\udcff,0,0\n": "finite number", "5e9,4,80,0.3,0,0,0\n": "in m",
+         "5,4,80,0.3,1_0,0,0\n": "finite number"}  # fmt: skip
+
+
+def test_wrong_rows_get_a_status_and_stop_no_other():
+    text = CASES + "# a remark\n\n" + "".join(ROW + row for row in WRONG) + ROW
+    counts, rows = answered(text)
+    assert counts == {"rows": 2 * len(WRONG) + 1, "wrong": len(WRONG)}
+    for i, words in enumerate(WRONG.values()):
+        assert words in rows[2 * i + 1]["status"] and rows[2 * i + 1]["fx [N]"] == "", rows[2 * i + 1]
+        assert rows[2 * i + 1]["line [-]"] == str(2 * i + 5)
+    good = [row["fx [N]"] for row in rows[::2]]
+    assert {row["status"] for row in rows[::2]} == {"ok"} and len(set(good)) == 1
+
+
+def test_a_table_that_was_cut_off_says_so():
+    counts, rows = answered(CASES + ROW + ROW.strip())
+    assert counts["wrong"] == 1 and "no line end" in rows[1]["status"]
+
+
+@pytest.mark.parametrize(("header", "words"), [
+    (CASES.replace("a [mm]", "a"), "the unit is missing: write a [m]"),
+    (CASES.replace("kN", "kg"), "this unit is not known here"),
+    (CASES.replace(",spin [1/mm]", ""), "column 'spin' is missing"),
+    (CASES.replace("a [mm],b [mm]", "A [1/m],b [mm]"), "wanted"),
+    ("", "the file is empty"),
+])  # fmt: skip
+def test_a_header_that_cannot_be_used_is_refused_before_anything_is_written(header, words):
+    Path("cases.csv").write_text(header + ROW if header else "")
+    with pytest.raises(InputError) as found:
+        answer(Path("cases.csv"), Path("out.csv"), Pair(), Method())
+    assert words in str(found.value) and not Path("out.csv").exists()
+
+
+def test_curvatures_give_what_axes_do():
+    body = contact(build(TABLE)).hertz
+    header = "load [N],A [1/m],B [1/m],friction [-],xi_x [-],xi_y [-],spin [1/m]\n"
+    by_curvatures = answered(f"{header}80000,{float(body.A)!r},{float(body.B)!r},0.3,1e-3,-2e-4,.4\n")[1][0]
+    assert float(by_curvatures["fx [N]"]) == pytest.approx(float(answered(CASES + ROW)[1][0]["fx [N]"]), rel=1e-9)
+
+
+def test_blocks_join_to_the_whole_table():
+    Path("cases.csv").write_text(CASES + "".join(f"{i}{ROW[1:]}" for i in range(1, 8)) + "1,2\n")
+    parts = list(blocks(Path("cases.csv"), (BY_AXES,), 3))
+    assert [len(part.lines) for part in parts] == [3, 3, 2] and [list(part.wrong) for part in parts] == [[], [], [1]]
+    joined = np.concatenate([part.values["a"] for part in parts])
+    assert joined[:7] == pytest.approx(1e-3 * np.arange(1, 8)) and np.isnan(joined[7])
+
+
+def test_the_table_that_comes_with_twinrig_is_sound(capsys):
+    assert twinrig("run", "contact_table", "--out", "out") == 0
+    assert "all of them sound" in capsys.readouterr().out and Path("out/forces.csv").exists()
+
+
+def test_a_table_is_found_in_the_folder_of_the_command(capsys):
+    Path("mine.csv").write_text(CASES + ROW)
+    assert twinrig("run", "contact_table", "--set", "cases.file=mine.csv", "--out", "out") == 0
+    assert twinrig("run", "contact_table", "--set", "cases.file=yours.csv") == 2
+    assert "no such file" in capsys.readouterr().err
+
+
+def test_the_cheapest_is_the_fastest_that_meets_the_target():
+    points = [Point("slow", 9, (0.001,), 1.0), Point("fast", 9, (0.01,), 0.1), Point("rough", 9, (0.2,), 0.01)]
+    assert [getattr(cheapest(points, target, lambda one: one.mean), "name", None)
+            for target in (0.5, 0.05, 0.005, 0.0001)] == ["rough", "fast", "slow", None]  # fmt: skip
+
+
+def test_kept_forces_are_what_the_exact_theory_gives_and_the_set_is_complete():
+    """The second grid's own error after its first order is taken out: below 1 % of mu N."""
+    cases = read()
+    assert len(cases) == 360 and max(case.error for case in cases) < 0.01
+    case = next(one for one in cases if one.kind == "y" and one.level == 0.5 and one.a == one.b)
+    assert np.linalg.norm(exact(case, (20,)).force - case.force) < 0.01
+    assert case.limit == FRICTION * LOAD
+
+
+def test_the_quick_rows_of_the_price_pass(tmp_path):
+    rows, data = contact_price.measure(True, tmp_path)
+    assert {row.status for row in rows} == {"passed"} and contact_price.tables(data) == [] == contact_price.draw(data)

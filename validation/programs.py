@@ -1,0 +1,78 @@
+"""Kalker's programs of 1982 and 1983 side by side on ellipses, as the paper compares them, but measured."""
+
+from typing import Any
+
+import numpy as np
+
+from models.contact.fastsim import fastsim
+from models.contact.hertz import by_axes
+from models.contact.simplified_theory import CELLS, PAPER, NormalContact, press, roll
+from models.contact.undeformed_distance import quadratic
+from models.contact.work_precision import Case, duration
+from validation.rows import Table
+from validation.timing import interleave
+
+ROUNDS = 5
+"""Of timing, of which the shortest counts."""
+
+
+def compare(cases: list[Case]) -> dict[str, Any]:
+    """Errors of both programs by mu N, of the 1983 one's normal contact by Hertz's, and seconds of one evaluation."""
+    pressed = {(c.a, c.b): _pressed(c) for c in cases}
+    errors: dict[str, list[float]] = {"1982": [], "1983": []}
+    for case in cases:
+        old = fastsim(case.a, case.b, case.load, case.friction, *case.motion, case.pair, **OLD)
+        new = roll(pressed[case.a, case.b], case.friction, *case.motion)
+        for name, one in (("1982", old), ("1983", new)):
+            errors[name].append(float(np.hypot(*(np.array([one.fx, one.fy]) / case.limit - case.force))))
+    normal = [_normal(case, pressed[case.a, case.b]) for case in {(c.a, c.b): c for c in cases}.values()]
+    case = cases[len(cases) // 2]
+    both = pressed[case.a, case.b]
+    jobs = {"1982": lambda: fastsim(case.a, case.b, case.load, case.friction, *case.motion, case.pair, **OLD),
+            "press": lambda: _pressed(case), "1983": lambda: roll(both, case.friction, *case.motion)}  # fmt: skip
+    seconds = dict(zip(jobs, interleave(list(jobs.values()), ROUNDS).min(axis=1).tolist(), strict=True))
+    return {"errors": errors, "normal": normal, "seconds": seconds}
+
+
+OLD: dict[str, Any] = {"cells": CELLS, "march": "plain", "flexibilities": "one", "bound": "parabolic"}
+"""The program of 1982, on as many cells as the fine net of the other one has."""
+
+
+def _pressed(case: Case) -> NormalContact:
+    hertz = by_axes(case.a, case.b, case.pair, load=case.load)
+    x, y = (float(np.sqrt(1.5 * hertz.approach / curvature)) for curvature in (hertz.A, hertz.B))
+    return press(quadratic(float(hertz.A), float(hertz.B), x, y), case.pair, load=case.load, options=PAPER)
+
+
+def _normal(case: Case, found: NormalContact) -> dict[str, float]:
+    """Relative errors of approach, area and largest pressure."""
+    hertz = by_axes(case.a, case.b, case.pair, load=case.load)
+    return {"approach": found.approach / float(hertz.approach) - 1, "area": found.area / (np.pi * case.a * case.b) - 1,
+            "peak": found.peak / float(hertz.p0) - 1}  # fmt: skip
+
+
+def table(found: dict[str, Any]) -> Table:
+    """The paper's comparison with figures in it."""
+    error = {name: f"mean {100 * np.mean(e):.1f}, largest {100 * max(e):.0f} % of mu N"
+             for name, e in found["errors"].items()}  # fmt: skip
+    normal = {key: _span([one[key] for one in found["normal"]]) for key in ("approach", "area", "peak")}
+    t = found["seconds"]
+    both = t["1983"] + t["press"]
+    rows = (
+        ("goes in", "semi-axes, load, creepages, linear coefficients", "undeformed distance, load, creepages"),
+        ("contact area", "put in", f"found on a 15 x 15 net: {normal['area']}"),
+        ("approach, largest pressure", "put in (Hertz)", f"{normal['approach']}; {normal['peak']}"),
+        ("flexibility W", "from creepages and coefficients", "least squares against Boussinesq and Cerruti, crude net"),
+        ("FASTSIM", "once", "twice, on the fine net"),
+        ("accuracy in the paper", "roughly the same", "roughly the same"),
+        ("accuracy, measured", error["1982"], error["1983"]),
+        ("time in the paper", "1", "about 3"),
+        ("time, measured", f"1 ({duration(t['1982'])})", f"{both / t['1982']:.0f} ({duration(both)}); forces alone "
+         f"{t['1983'] / t['1982']:.0f}"),
+    )  # fmt: skip
+    return Table("The programs of 1982 and 1983", "Kalker's own comparison (1983) with measured figures; both to the "
+                 f"letter, {CELLS} strips and cells, times of one call from Python.", ("", "1982", "1983"), rows)
+
+
+def _span(values: list[float]) -> str:
+    return f"{100 * min(values):+.1f} to {100 * max(values):+.1f} %"
