@@ -69,7 +69,8 @@ def test_a_sweep_saves_a_row_for_every_creepage(capsys):
             "--set", "options.exact=0", "--out", "out")  # fmt: skip
     assert twinrig("run", "contact_ellipse", *args) == 0
     units = {"xi_x": SHARES, "xi_y": SHARES, "spin": {"1/m": 1.0}, "stick": SHARES,
-             "fx": NEWTONS, "fy": NEWTONS, "mz": {"N m": 1.0}, "dissipation": NEWTONS, "error_of_cells": NEWTONS, "error_of_theory": NEWTONS}  # fmt: skip
+             **dict.fromkeys(("fx", "fy", "dissipation", "error_of_cells", "error_of_theory"), NEWTONS),
+             "mz": {"N m": 1.0}}  # fmt: skip
     found = read_table("out/forces.csv", units)
     assert found["xi_y"].tolist() == pytest.approx([-1e-2, -5e-3, 0.0, 5e-3, 1e-2])
     assert found["fy"] == pytest.approx(-found["fy"][::-1]) and found["fy"][2] == 0 == found["error_of_theory"][2]

@@ -20,7 +20,8 @@ def test_both_commands_are_what_ci_runs_tests_first():
 
 def test_every_study_is_listed_with_its_duration_and_run_by_ci():
     ci = (ROOT / ".ci" / "run").read_text()
-    not_studies = {"__init__", "command_line", "contact_figures", "figures", "folders", "stabiliser_figures", "virtual_measurement"}
+    not_studies = {"__init__", "command_line", "contact_figures", "figures", "folders", "stabiliser_figures",
+                   "virtual_measurement"}  # fmt: skip
     for path in (ROOT / "studies").glob("*.py"):
         if path.stem not in not_studies:
             row = next(line for line in README.splitlines() if f"studies/{path.name}" in line)
@@ -44,6 +45,17 @@ def test_the_scene_of_the_readme_is_a_valid_scene(tmp_path):
 
     table = tomllib.loads(re.search(r"```toml\n(.*?)```", README, flags=re.DOTALL).group(1))
     assert set(build(table, "README.md", tmp_path).effects) == {"road"}
+
+
+def test_the_contact_of_the_readme_is_a_valid_scene_and_its_python_runs(tmp_path, capsys):
+    import tomllib
+
+    from models.contact.scene import build
+
+    table = tomllib.loads(re.findall(r"```toml\n(.*?)```", README, flags=re.DOTALL)[1])
+    assert build(table, "README.md", tmp_path).geometry == "radii"
+    exec(re.search(r"```python\n(.*?)```", README, flags=re.DOTALL).group(1), {})
+    assert float(capsys.readouterr().out.split()[0]) < 0
 
 
 def test_the_figure_of_the_readme_is_there():

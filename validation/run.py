@@ -18,12 +18,12 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "drift_off", "drift_solvers", "holding_spring", "point_mass",
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
          "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
-         "contact_simplified", "contact_profiles",
+         "contact_simplified", "contact_profiles", "contact_price",
          "fastsim")  # fmt: skip
 """Case modules in the order of the report."""
 
 
-ALONE = ("absent", "price", "ensemble", "fastsim")
+ALONE = ("absent", "price", "ensemble", "fastsim", "contact_price")
 """Cases that time what they run: they begin when all others have ended, and have the machine to themselves."""
 WORKERS = 2
 """Processes that measure the other cases."""
@@ -92,6 +92,7 @@ def seeds() -> dict[str, int]:
     from studies.six_runs import Options
     from validation import checks, timing
     from validation.cases import (
+        contact_price,
         drift_off,
         drift_solvers,
         ensemble,
@@ -115,7 +116,7 @@ def seeds() -> dict[str, int]:
             "loads of the score": score.SEED, "stabilisers": stabilisers.SEED, "index reduction": index_reduction.SEED,
             "growth of noise": growth.SEED, "drift-off": drift_off.SEED, "drift by solver": drift_solvers.SEED,
             "holding spring": holding_spring.SEED,
-            "random contacts": fastsim.SEED}  # fmt: skip
+            "random contacts": fastsim.SEED, "table of contacts": contact_price.SEED}  # fmt: skip
 
 
 def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:
