@@ -11,6 +11,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from models.ensemble.runner import one_thread_each
 from models.result import provenance
 from validation.rows import REPORTED, Row
 
@@ -55,7 +56,7 @@ def _outcomes(quick: bool, folder: Path) -> Iterator[tuple[str, tuple[list[Row],
     """Rows and seconds of every case, as they end: first those that may share the machine, then the others."""
     shared = [name for name in CASES if name not in ALONE]
     context = get_context("spawn")  # an engine's threads do not survive a fork
-    with ProcessPoolExecutor(min(WORKERS, os.cpu_count() or 1), mp_context=context) as pool:
+    with one_thread_each(), ProcessPoolExecutor(min(WORKERS, os.cpu_count() or 1), mp_context=context) as pool:
         jobs = {pool.submit(_measure, name, quick, folder): name for name in shared}
         try:
             for job in as_completed(jobs):

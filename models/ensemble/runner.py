@@ -193,6 +193,10 @@ def _together(blocks: list[Arrays]) -> Arrays:
     return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
 
+THREADS = "OPENBLAS_NUM_THREADS"
+"""How many threads numpy takes in a process, read when it is first imported there."""
+
+
 def processes(workers: int) -> ProcessPoolExecutor:
     """A process pool whose workers start fresh: engines and compilers keep threads that no fork survives.
 
@@ -200,10 +204,25 @@ def processes(workers: int) -> ProcessPoolExecutor:
     the pool, and the process that keeps the blocks could wait for it for ever.
     """
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_prepare_worker)
-    with _interrupts_held():
+    with _interrupts_held(), one_thread_each():
         for _ in range(workers):
             pool.submit(os.getpid)
     return pool
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Processes that start within the block compute linear algebra in a thread of their own.
+
+    Threads of several processes that wait for one another on the same cores make small matrices ten times slower.
+    """
+    before = os.environ.get(THREADS)
+    os.environ[THREADS] = before or "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[THREADS]
 
 
 @contextmanager
