@@ -12,7 +12,7 @@ from pydantic import Field
 from models.contact.accuracy import Error, rolled
 from models.contact.of_scene import contact, touches
 from models.contact.scene import ContactScene
-from models.contact.theories import Contact, ExactOnEllipse, Motion, OnEllipse, Rolled
+from models.contact.theories import Contact, ExactOnEllipse, Fastsim, Motion, OnEllipse, Rolled
 from models.errors import InputError
 from models.strict import Strict, read
 from models.tables import write_table
@@ -28,7 +28,7 @@ ROWS = 12
 class Options(Strict):
     """[options] of this study."""
 
-    exact: int = Field(5, ge=0, le=100, description="points of a sweep that the exact theory checks, on an ellipse")
+    exact: int = Field(9, ge=0, le=100, description="points of a sweep that the exact theory checks, on an ellipse")
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
@@ -94,7 +94,7 @@ def _table(scene: ContactScene, body: Contact, motions: list[Motion], found: lis
     """Normal contact, then forces with their errors: all of one creepage, or some rows of a sweep."""
     p, limit = body.pressing, body.friction * body.pressing.load
     size = f"a = {1e3 * body.a:.3f} mm, b = {1e3 * body.b:.3f} mm, " if isinstance(body, OnEllipse) else ""
-    lines = [f"  load {p.load:,.0f} N, approach {1e6 * p.approach:.2f} um, {size}area {1e6 * p.area:.2f} mm^2, "
+    lines = [f"  normal load {p.load:,.0f} N, approach {1e6 * p.approach:.2f} um, {size}area {1e6 * p.area:.2f} mm^2, "
              f"largest pressure {1e-6 * p.peak:,.0f} MPa", *_places(scene),
              f"  forces on the wheel by {scene.method.name}, {scene.method.cells} cells along each axis, "
              f"{1e3 * seconds:.3g} ms in all; mu N = {limit:,.0f} N",
@@ -102,8 +102,8 @@ def _table(scene: ContactScene, body: Contact, motions: list[Motion], found: lis
              f"{'stick':>7}{'loss [N]':>10}   error of cells, of theory [% of mu N]"]  # fmt: skip
     step = max(1, (len(motions) - 1) // ROWS)
     for motion, (one, error) in list(zip(motions, found, strict=True))[::step]:
-        lines.append(f"    {motion[0]:>10.3g}{motion[1]:>10.3g}{motion[2]:>11.3g}{round(one.fx):>10,}{round(one.fy):>10,}"
-                     f"{one.mz:>10.3f}{one.stick:>7.0%}{one.dissipation:>10.3g}   {_percent(error.cells, limit):>6}"
+        lines.append(f"    {motion[0]:>10.3g}{motion[1]:>10.3g}{motion[2]:>11.3g}{round(one.fx):>10,}"
+                     f"{round(one.fy):>10,}{one.mz:>10.3f}{one.stick:>7.0%}{one.dissipation:>10.3g}   {_percent(error.cells, limit):>6}"
                      f"{_percent(error.theory, limit):>8}")  # fmt: skip
     return [*lines, "  loss: power by the rolling speed; errors are of the force (Fx, Fy)"]
 
@@ -127,9 +127,17 @@ def _figures(scene: ContactScene, body: Contact, motions: list[Motion], found: l
 
     one, fields = found[-1][0], list(found[-1][0].fields)
     if fields:
-        contact_figure(fields, body.friction, _caption(scene, motions[-1], one), folder / "contact.png")
+        contact_figure(fields, body.friction, _caption(scene, motions[-1], one),
+                       _pressure(body), folder / "contact.png")
     if scene.sweep is not None:
         sweep_figure(scene.sweep, body, found, _checks(scene, body), scene.title, folder / "forces.png")
+
+
+def _pressure(body: Contact) -> str:
+    """Which pressure the cells have."""
+    if isinstance(body, Fastsim) and body.choices["bound"] != "elliptic":
+        return f"pressure of the {body.choices['bound']} bound"
+    return "pressure"
 
 
 def _caption(scene: ContactScene, motion: Motion, one: Rolled) -> str:

@@ -20,10 +20,10 @@ ARROWS = 17
 """Arrows across the longer side of a contact area, about."""
 
 
-def contact_figure(patches: list[Fields], friction: float, title: str, path: Path) -> None:
-    """Pressure over the contact area beside its tractions, all patches to scale."""
+def contact_figure(patches: list[Fields], friction: float, title: str, pressure: str, path: Path) -> None:
+    """Pressure (a word or two tell of which kind) over the contact area beside its tractions, all patches to scale."""
     figure, axes = plt.subplots(1, 2, figsize=_size(patches), sharex=True, sharey=True)
-    _pressure(axes[0], patches)
+    _pressure(axes[0], patches, pressure)
     _tractions(axes[1], patches, friction)
     for axis in axes:
         axis.set_aspect("equal")
@@ -53,7 +53,7 @@ def _rectangles(f: Fields) -> list[np.ndarray]:
     return list(np.array([np.stack(corner, -1) for corner in corners]).transpose(1, 0, 2))
 
 
-def _pressure(axis: Any, patches: list[Fields]) -> None:
+def _pressure(axis: Any, patches: list[Fields], what: str) -> None:
     greatest = MEGA * max(float(f.pressure.max()) for f in patches)
     for f in patches:
         cells = PolyCollection(_rectangles(f), array=MEGA * f.pressure[f.inside], cmap="viridis", edgecolor="face",
@@ -62,7 +62,7 @@ def _pressure(axis: Any, patches: list[Fields]) -> None:
         axis.add_collection(cells)
     axis.autoscale_view()
     axis.figure.colorbar(cells, ax=axis, label="pressure [MPa]", shrink=0.8)
-    axis.set_title(f"pressure, largest {greatest:,.0f} MPa")
+    axis.set_title(f"{what}, largest {greatest:,.0f} MPa")
 
 
 def _tractions(axis: Any, patches: list[Fields], friction: float) -> None:
@@ -87,11 +87,11 @@ def _tractions(axis: Any, patches: list[Fields], friction: float) -> None:
 
 
 def _arrows(f: Fields, spacing: float) -> tuple[np.ndarray, ...]:
-    """Position and traction at points of an even net: in rows near multiples of the spacing, linear along each."""
+    """Position and traction at points of an even net: in every so many rows of cells, and linear along each."""
     found = []
     lines = f.y[:, 0]
-    wanted = np.arange(np.ceil(lines.min() / spacing), np.floor(lines.max() / spacing) + 1) * spacing
-    for row in {int(np.argmin(np.abs(lines - y))) for y in wanted}:
+    step = max(1, round(spacing / float(f.dy[0, 0])))
+    for row in range(len(lines) // 2 % step, len(lines), step):
         inside = np.flatnonzero(f.inside[row])
         inside = inside[np.argsort(f.x[row, inside])]
         if inside.size:
@@ -102,7 +102,7 @@ def _arrows(f: Fields, spacing: float) -> tuple[np.ndarray, ...]:
     return tuple(np.concatenate(found, axis=1))
 
 
-LABELS = {"xi_x": "longitudinal creepage [-]", "xi_y": "lateral creepage [-]", "spin": "spin [1/m]"}
+LABELS = {"xi_x": "longitudinal creepage [%]", "xi_y": "lateral creepage [%]", "spin": "spin [1/m]"}
 COLOURS = {"fx": "#0072b2", "fy": "#d55e00", "mz": "#009e73"}
 
 
@@ -110,17 +110,19 @@ def sweep_figure(sweep: Sweep, body: Contact, found: list[tuple[Rolled, Error]],
                  title: str, path: Path) -> None:  # fmt: skip
     """Forces and moment against a creepage, with the band of their error, and points of the exact theory."""
     figure, axes = plt.subplots(1, 2, figsize=(11.0, 4.4))
-    values, limit = sweep.values(), body.friction * body.pressing.load
+    scale = 1.0 if sweep.of == "spin" else 100.0
+    values, limit = scale * sweep.values(), body.friction * body.pressing.load
+    at = [scale * value for value, _ in checks]
     error = np.array([one.total for _, one in found])
     for name, text in (("fx", "$F_x$"), ("fy", "$F_y$")):
         force = np.array([getattr(one, name) for one, _ in found])
         low, high = np.clip(force - error, -limit, limit), np.clip(force + error, -limit, limit)
         axes[0].fill_between(values, 1e-3 * low, 1e-3 * high, color=COLOURS[name], alpha=0.18, linewidth=0)
         axes[0].plot(values, 1e-3 * force, color=COLOURS[name], linewidth=1.6, label=text)
-        axes[0].plot([at for at, _ in checks], [1e-3 * getattr(one, name) for _, one in checks], "o",
+        axes[0].plot(at, [1e-3 * getattr(one, name) for _, one in checks], "o",
                      color=COLOURS[name], markerfacecolor="white", markersize=5)  # fmt: skip
     axes[1].plot(values, [one.mz for one, _ in found], color=COLOURS["mz"], linewidth=1.6)
-    axes[1].plot([at for at, _ in checks], [one.mz for _, one in checks], "o", color=COLOURS["mz"],
+    axes[1].plot(at, [one.mz for _, one in checks], "o", color=COLOURS["mz"],
                  markerfacecolor="white", markersize=5)  # fmt: skip
     for sign in (-1, 1):
         axes[0].axhline(sign * 1e-3 * limit, color="black", linewidth=0.7, linestyle=":")

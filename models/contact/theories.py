@@ -18,10 +18,11 @@ from models.contact.fields import Fields
 from models.contact.hertz import Hertz
 from models.contact.hertz_cells import hertzian
 from models.contact.material import Pair
-from models.contact.normal_problem import Pressed, centres, solve_normal
+from models.contact.normal_problem import NormalSolution, Pressed, centres, solve_normal
 from models.contact.rolling_problem import RollingSolution, solve_rolling
 from models.contact.simplified_theory import NormalContact, PatchPressure
 from models.contact.simplified_theory import roll as roll_simplified
+from models.errors import InputError
 
 Motion = tuple[float, float, float]
 """xi_x, xi_y and spin (1/m)."""
@@ -46,7 +47,7 @@ class Rolled:
 
 @dataclass(frozen=True)
 class Pressing:
-    """Normal contact: load (N), area (m^2), largest pressure (Pa), approach (m)."""
+    """Normal contact: load (N) along the normals of all patches, area (m^2), largest pressure (Pa), approach (m)."""
 
     load: float
     area: float
@@ -114,7 +115,7 @@ class Simplified(Contact):
     """The simplified theory of 1983 for any undeformed distance."""
 
     def __init__(self, pressed: NormalContact, friction: float) -> None:
-        pressing = Pressing(pressed.load, pressed.area, pressed.peak, pressed.approach)
+        pressing = Pressing(_normal_load(pressed), pressed.area, pressed.peak, pressed.approach)
         super().__init__(pressing, friction, pressed.pair)
         self.pressed = pressed
 
@@ -129,21 +130,18 @@ class Exact(Contact):
     """Half-spaces with Coulomb friction, pressure found too; patches share the load as the theory of 1983 says."""
 
     def __init__(self, pressed: NormalContact, friction: float, cells: int) -> None:
-        self.pressed = pressed
         self.parts = pressed.patches
-        grids = self._grids(cells)
-        pressing = Pressing(pressed.load, sum(g.area for g in grids), max(float(g.pressure.max()) for g in grids),
-                            pressed.approach)  # fmt: skip
+        found = [_solved(part, cells, pressed.pair) for part in self.parts]
+        peak = max(float(one.pressure.max()) for one in found)
+        alone = found[0].approach / float(np.cos(self.parts[0].patch.lean))
+        approach = alone if len(found) == 1 else pressed.approach
+        pressing = Pressing(_normal_load(pressed), sum(one.area for one in found), peak, approach)
         super().__init__(pressing, friction, pressed.pair)
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces on ``cells`` x ``cells`` cells about each patch."""
-        found = _exact(self._grids(cells), motion, self.friction, self.pair)
-        return Rolled(found.fx, found.fy, found.mz, found.stick, found.dissipation,
-                      _placed(found.fields, [part.patch.place for part in self.parts]))  # fmt: skip
-
-    def _grids(self, cells: int) -> list[Pressed]:
-        return [_pressed(part, cells, self.pressed.pair) for part in self.parts]
+        found = _exact([_solved(part, cells, self.pair) for part in self.parts], motion, self.friction, self.pair)
+        return replace(found, fields=_placed(found.fields, [part.patch.place for part in self.parts]))
 
 
 def _exact(grids: Sequence[Pressed], motion: Motion, friction: float, pair: Pair) -> Rolled:
@@ -172,13 +170,22 @@ MARGIN = 1.25
 """Sides of the grid of the exact normal problem by those of the area that the simplified theory finds."""
 
 
-def _pressed(part: PatchPressure, cells: int, pair: Pair) -> Pressed:
-    """Exact pressure of one patch, with the load that the simplified theory gives it."""
+def _solved(part: PatchPressure, cells: int, pair: Pair) -> NormalSolution:
+    """Exact pressure of one patch, with the load that the simplified theory gives it, in the patch's own place."""
     x0, x1, y0, y1 = part.box
-    middle = np.array([x0 + x1, y0 + y1]) / 2
     dx, dy = MARGIN * (x1 - x0) / cells, MARGIN * (y1 - y0) / cells
-    x, y = middle[0] + centres(cells, dx), middle[1] + centres(cells, dy)
-    nodes = part.patch.distance
-    inside = np.clip(x, nodes.x[0], nodes.x[-1]), np.clip(y, nodes.y[0], nodes.y[-1])
-    found = solve_normal(nodes.at(*np.meshgrid(*inside)), dx, dy, pair, load=part.load)
-    return Pressed(found.pressure, x, y)
+    x, y = (x0 + x1) / 2 + centres(cells, dx), (y0 + y1) / 2 + centres(cells, dy)
+    known = part.patch.distance
+    inside = np.meshgrid(np.clip(x, known.x[0], known.x[-1]), np.clip(y, known.y[0], known.y[-1]))
+    try:
+        return replace(solve_normal(known.at(*inside), dx, dy, pair, load=part.load), x=x, y=y)
+    except InputError as error:
+        if not any(part.patch.cut):
+            raise
+        raise InputError("", "method.name", "exact", "does not take patches of wheel and rail that have grown together: "
+                         "use simplified, a smaller load or another lateral_shift") from error  # fmt: skip
+
+
+def _normal_load(pressed: NormalContact) -> float:
+    """Load across all patches, each along its own normal (N)."""
+    return sum(part.load for part in pressed.patches)
