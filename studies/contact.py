@@ -103,8 +103,8 @@ def _table(scene: ContactScene, body: Contact, motions: list[Motion], found: lis
     step = max(1, (len(motions) - 1) // ROWS)
     for motion, (one, error) in list(zip(motions, found, strict=True))[::step]:
         lines.append(f"    {motion[0]:>10.3g}{motion[1]:>10.3g}{motion[2]:>11.3g}{round(one.fx):>10,}"
-                     f"{round(one.fy):>10,}{one.mz:>10.3f}{one.stick:>7.0%}{one.dissipation:>10.3g}   {_percent(error.cells, limit):>6}"
-                     f"{_percent(error.theory, limit):>8}")  # fmt: skip
+                     f"{round(one.fy):>10,}{one.mz:>10.3f}{one.stick:>7.0%}{one.dissipation:>10.3g}"
+                     f"   {_percent(error.cells, limit):>6}{_percent(error.theory, limit):>8}")  # fmt: skip
     return [*lines, "  loss: power by the rolling speed; errors are of the force (Fx, Fy)"]
 
 

@@ -166,24 +166,31 @@ def _placed(fields: Sequence[Fields], places: Sequence[float]) -> tuple[Fields, 
     return tuple(replace(one, y=one.y + place) for one, place in zip(fields, places, strict=True))
 
 
-MARGIN = 1.25
-"""Sides of the grid of the exact normal problem by those of the area that the simplified theory finds."""
+MARGINS = (1.2, 1.6, 2.2)
+"""Sides of the grid of the exact normal problem by those of the simplified theory's area, until it fits."""
 
 
 def _solved(part: PatchPressure, cells: int, pair: Pair) -> NormalSolution:
     """Exact pressure of one patch, with the load that the simplified theory gives it, in the patch's own place."""
+    for margin in MARGINS:
+        try:
+            return _on_grid(part, cells, margin, pair)
+        except InputError as error:  # the contact reaches the edge of the grid
+            refused = error
+    if not any(part.patch.cut):
+        raise refused
+    allowed = ("does not take patches of wheel and rail that have grown together: use simplified, a smaller load or "
+               "another lateral_shift")  # fmt: skip
+    raise InputError("", "method.name", "exact", allowed)
+
+
+def _on_grid(part: PatchPressure, cells: int, margin: float, pair: Pair) -> NormalSolution:
     x0, x1, y0, y1 = part.box
-    dx, dy = MARGIN * (x1 - x0) / cells, MARGIN * (y1 - y0) / cells
+    dx, dy = margin * (x1 - x0) / (cells - 2), margin * (y1 - y0) / (cells - 2)  # a frame of cells stays free
     x, y = (x0 + x1) / 2 + centres(cells, dx), (y0 + y1) / 2 + centres(cells, dy)
     known = part.patch.distance
     inside = np.meshgrid(np.clip(x, known.x[0], known.x[-1]), np.clip(y, known.y[0], known.y[-1]))
-    try:
-        return replace(solve_normal(known.at(*inside), dx, dy, pair, load=part.load), x=x, y=y)
-    except InputError as error:
-        if not any(part.patch.cut):
-            raise
-        raise InputError("", "method.name", "exact", "does not take patches of wheel and rail that have grown together: "
-                         "use simplified, a smaller load or another lateral_shift") from error  # fmt: skip
+    return replace(solve_normal(known.at(*inside), dx, dy, pair, load=part.load), x=x, y=y)
 
 
 def _normal_load(pressed: NormalContact) -> float:
