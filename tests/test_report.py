@@ -36,7 +36,7 @@ def rows() -> list[Row]:
 def save(folder: Path, own: list[Row]) -> Path:
     (folder / "data").mkdir()
     source = {"commit": "abc", "versions": {"exudyn": "1"}, "command": "twinrig validate --quick", "quick": True,
-              "seconds": {"audit": 1.5, "order": 3.0}}  # fmt: skip
+              "seconds": {"audit": 200.0, "order": 200.0}, "wall": 301.0}  # fmt: skip
     _save(folder, own, source)
     return folder
 
@@ -89,6 +89,7 @@ def test_verdict_comes_first_and_then_what_is_not_covered(page):
     assert heading and "<h2>" not in before
     assert "2 of 7 rows failed" in before and "nothing here is validation against a real one" in before
     assert "<h2>Pitch-plane</h2>" in after
+    assert "<b>5 min</b><span>to measure it all" in before  # not the sum over cases that ran side by side
 
 
 def test_gaps_name_systems_without_rows_and_rows_not_run(page):

@@ -46,11 +46,11 @@ def validate(folder: Path, quick: bool, command: str) -> int:
             bar.update(task, description=name, advance=1)
     rows = [row for name in CASES for row in found[name][0]]
     seconds = {name: found[name][1] for name in CASES}
-    _save(folder, rows, {**provenance(command), "seeds": seeds(), "quick": quick, "seconds": seconds})
+    wall = time.perf_counter() - start
+    _save(folder, rows, {**provenance(command), "seeds": seeds(), "quick": quick, "seconds": seconds, "wall": wall})
     from validation.report.page import write
 
-    page = write(folder)
-    return _say(rows, time.perf_counter() - start, page)
+    return _say(rows, wall, write(folder))
 
 
 def _outcomes(quick: bool, folder: Path) -> Iterator[tuple[str, tuple[list[Row], float]]]:

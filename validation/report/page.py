@@ -13,7 +13,7 @@ from validation.report import content
 from validation.report.numbers import duration, margin, marked, number, numeric_columns, powers, share
 
 TEMPLATE = "page.html.jinja"
-BLANK: dict[str, Any] = {"quick": False, "command": "", "versions": {}, "seconds": {}}
+BLANK: dict[str, Any] = {"quick": False, "command": "", "versions": {}, "seconds": {}, "wall": None}
 """What a page needs of its provenance, where the results do not hold it."""
 
 
