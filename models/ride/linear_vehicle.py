@@ -1,0 +1,58 @@
+"""The linear vehicle that every ride analysis starts from, whoever has linearised it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """Where a wheel meets the road: x (m) forward, y (m) to the left, and its axle, 0 the frontmost."""
+
+    name: str
+    x: float
+    y: float
+    axle: int
+
+
+@dataclass(frozen=True)
+class Output:
+    """One thing that an engineer reads: a linear function of motion and road.
+
+    acceleration, rate, displacement (n,): factors of q'', q', q; road, road_rate (w,): factors of the heights under
+    the wheels (m) and of their rates (m/s). ``kind`` says what it is ("acceleration", "travel", "force", ...).
+    """
+
+    name: str
+    unit: str
+    kind: str
+    acceleration: np.ndarray
+    rate: np.ndarray
+    displacement: np.ndarray
+    road: np.ndarray
+    road_rate: np.ndarray
+
+
+@dataclass(frozen=True)
+class LinearVehicle:
+    """M q'' + D q' + K q = R z + S z', with road heights z (w,) under the wheels (m, up).
+
+    mass, damping, stiffness (n, n); road_stiffness R (n, w) in N/m, road_damping S (n, w) in N s/m. ``coordinates``
+    names the n freedoms as (body, freedom). ``source`` says who linearised ("analytic", "exudyn", "mujoco") and where.
+    """
+
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    road_stiffness: np.ndarray
+    road_damping: np.ndarray
+    coordinates: tuple[tuple[str, str], ...]
+    wheels: tuple[Wheel, ...]
+    outputs: tuple[Output, ...]
+    source: str = "analytic"
+
+    @property
+    def axles(self) -> tuple[float, ...]:
+        """Places x (m) of the axles, from the front."""
+        places = {wheel.axle: wheel.x for wheel in self.wheels}
+        return tuple(places[i] for i in sorted(places))
