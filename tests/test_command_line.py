@@ -16,19 +16,7 @@ HEAVY = ("numpy", "scipy", "numba", "exudyn", "mujoco", "xarray", "h5netcdf", "m
 SHORT = ("--set", "run.duration=0.05", "--set", "run.step=0.001")
 STUDIES = Path(command_line.__file__).parent
 ENGINES = ("reference", "exudyn", "mujoco")
-
-
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
-def twinrig(*args):
-    """Exit code of ``twinrig ARGS`` within this process."""
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as ended:
-        patch.setattr(sys, "argv", ["twinrig", *args])
-        command_line.main()
-    return ended.value.code
+pytestmark = pytest.mark.usefixtures("empty_folder")
 
 
 def imported(*args):
@@ -52,7 +40,7 @@ def test_help_imports_nothing_heavy(args):
     assert imported(*args) <= ({"pydantic"} if args[:-1] else set())  # typer's own, for the options of a command
 
 
-def test_list_imports_no_engine_and_names_everything(capsys):
+def test_list_imports_no_engine_and_names_everything(twinrig, capsys):
     assert not imported("list") & {"exudyn", "mujoco", "numba", "xarray", "matplotlib"}
     assert twinrig("list") == 0
     said = capsys.readouterr().out
@@ -61,7 +49,7 @@ def test_list_imports_no_engine_and_names_everything(capsys):
     assert all(word in said for word in ("itwm_drift", "asymmetric_twin", "GeneralizedAlpha", "implicitfast"))
 
 
-def test_show_says_what_each_engine_will_compute(capsys):
+def test_show_says_what_each_engine_will_compute(twinrig, capsys):
     assert twinrig("show", "study_road", *SHORT, "--set", "effects.pitch_spring.stiffness=5") == 0
     said = capsys.readouterr().out
     for words in ("Pitch-plane vehicle", "eq. 38", "chassis", "750 kg, 500 kg m^2", "5 N m/rad", "z1 0.0191",
@@ -74,12 +62,12 @@ def test_show_says_what_each_engine_will_compute(capsys):
     assert not Path("results").exists()
 
 
-def test_show_of_a_combination_that_an_engine_refuses(capsys):
+def test_show_of_a_combination_that_an_engine_refuses(twinrig, capsys):
     assert twinrig("show", "release", *SHORT, "--set", "engines.exudyn.integrator=DVERK6") == 0
     assert "exudyn     refused: DVERK6" in capsys.readouterr().out
 
 
-def test_run_saves_every_engine_and_prints_json_alone(capsys):
+def test_run_saves_every_engine_and_prints_json_alone(twinrig, capsys):
     assert twinrig("run", "study_road", *SHORT, "--json") == 0
     said = capsys.readouterr()
     summary = json.loads(said.out)
@@ -94,20 +82,20 @@ def test_run_saves_every_engine_and_prints_json_alone(capsys):
     assert not list(Path("results").rglob(".*"))
 
 
-def test_run_prints_a_summary_for_people(capsys):
+def test_run_prints_a_summary_for_people(twinrig, capsys):
     assert twinrig("run", "release", *SHORT, "--engine", "exudyn") == 0
     said = capsys.readouterr().out
     words = ("Free release", "exudyn", "RK44", "50 steps", "200 force calls", "results/release")
     assert all(word in said for word in words)
 
 
-def test_set_changes_one_engine_alone():
+def test_set_changes_one_engine_alone(twinrig):
     assert twinrig("run", "release", *SHORT, "--set", "engines.mujoco.step=5e-4", "--out", "out") == 0
     steps = {engine: load(Path("out") / f"{engine}.nc").counts()["steps"] for engine in ENGINES}
     assert steps == {"reference": 50, "exudyn": 50, "mujoco": 100}
 
 
-def test_results_are_numbered_and_never_overwritten():
+def test_results_are_numbered_and_never_overwritten(twinrig):
     for expected in ("release", "release-2", "release-3"):
         before = contents("results") if Path("results").exists() else {}
         assert twinrig("run", "release", *SHORT, "--engine", "reference") == 0
@@ -116,7 +104,7 @@ def test_results_are_numbered_and_never_overwritten():
         assert f"results/{expected}/reference.nc" in {str(path) for path in after}
 
 
-def test_a_study_as_a_script_gives_the_same_as_the_command():
+def test_a_study_as_a_script_gives_the_same_as_the_command(twinrig):
     script = [sys.executable, str(STUDIES / "single_run.py"), *SHORT, "--out", "script", "--json"]
     done = subprocess.run(script, capture_output=True, text=True, check=True)
     assert set(json.loads(done.stdout)["runs"]) == set(ENGINES)
@@ -136,7 +124,7 @@ def _failing(engine, error):
     return simulate
 
 
-def test_a_failed_run_keeps_the_others(monkeypatch, capsys):
+def test_a_failed_run_keeps_the_others(twinrig, monkeypatch, capsys):
     broken = RunFailed("exudyn", "the state became infinite", 0.02)
     monkeypatch.setattr(single_run, "simulate", _failing("exudyn", broken))
     assert twinrig("run", "release", *SHORT) == 1
@@ -144,13 +132,13 @@ def test_a_failed_run_keeps_the_others(monkeypatch, capsys):
     assert sorted(path.name for path in Path("results/release").glob("*.nc")) == ["mujoco.nc", "reference.nc"]
 
 
-def test_runs_that_all_fail_leave_no_folder(capfd):
+def test_runs_that_all_fail_leave_no_folder(twinrig, capfd):
     assert twinrig("run", "release", *SHORT, "--set", "start.z3=1e200", "--json") == 1
     assert set(json.loads(capfd.readouterr().out)["failed"]) == set(ENGINES)
     assert not Path("results").exists()
 
 
-def test_an_interrupted_run_keeps_what_was_finished(monkeypatch, capsys):
+def test_an_interrupted_run_keeps_what_was_finished(twinrig, monkeypatch, capsys):
     assert twinrig("run", "release", *SHORT) == 0
     before = contents("results")
     monkeypatch.setattr(single_run, "simulate", _failing("exudyn", KeyboardInterrupt()))
@@ -161,14 +149,14 @@ def test_an_interrupted_run_keeps_what_was_finished(monkeypatch, capsys):
     assert load(Path("results/release-2/reference.nc")).times[-1] == 0.05
 
 
-def test_an_interrupt_before_the_first_result_leaves_no_folder(monkeypatch):
+def test_an_interrupt_before_the_first_result_leaves_no_folder(twinrig, monkeypatch):
     monkeypatch.setattr(single_run, "simulate", _failing("reference", KeyboardInterrupt()))
     assert twinrig("run", "release", *SHORT) == 130
     assert not Path("results").exists()
 
 
 @pytest.mark.parametrize("error", [MemoryError(), OSError(28, "No space left on device")], ids=["memory", "disk"])
-def test_a_machine_that_is_too_small_is_said_so(error, monkeypatch, capsys):
+def test_a_machine_that_is_too_small_is_said_so(twinrig, error, monkeypatch, capsys):
     monkeypatch.setattr(single_run, "simulate", _failing("reference", error))
     assert twinrig("run", "release", *SHORT) == 1
     said = capsys.readouterr().err

@@ -1,7 +1,6 @@
 """Contact scenes: what is read, shown, refused, and that both ways to name one contact are the same contact."""
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 from models.contact.of_scene import contact, hertz_of
 from models.contact.scene import build
 from models.errors import InputError
-from studies import command_line
 
 ELLIPSE = """
 title = "a contact"
@@ -26,19 +24,7 @@ xi_x = 1e-3
 """
 TABLE = {"title": "a contact", "system": "contact", "ellipse": {"a": 5e-3, "b": 4e-3},
          "contact": {"load": 8e4, "friction": 0.3}}  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
-def twinrig(*args):
-    """Exit code of ``twinrig ARGS`` within this process."""
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as ended:
-        patch.setattr(sys, "argv", ["twinrig", *args])
-        command_line.main()
-    return ended.value.code
+pytestmark = pytest.mark.usefixtures("empty_folder")
 
 
 @pytest.mark.parametrize(("change", "words"), [
@@ -59,7 +45,7 @@ def twinrig(*args):
     ("options.points=3", ("options.points = 3", "unknown key")),
     ("system=contcat", ("no such system", "did you mean 'contact'?")),
 ], ids=lambda value: value if isinstance(value, str) else "")  # fmt: skip
-def test_a_mistake_is_one_message_and_touches_nothing(change, words, capsys):
+def test_a_mistake_is_one_message_and_touches_nothing(twinrig, change, words, capsys):
     Path("c.toml").write_text(ELLIPSE)
     assert twinrig("run", "c.toml", "--set", change) == 2
     said = capsys.readouterr().err
@@ -85,13 +71,13 @@ def test_keys_that_do_not_belong_together():
     assert "needs an ellipse" in refused(ellipse=None, profiles={})
 
 
-def test_engines_are_refused_only_if_named(capsys):
+def test_engines_are_refused_only_if_named(twinrig, capsys):
     Path("c.toml").write_text(ELLIPSE)
     assert twinrig("run", "c.toml", "--engine", "mujoco") == 2
     assert "--engine = 'mujoco': has no meaning for contact" in capsys.readouterr().err
 
 
-def test_show_names_units_and_only_what_the_theory_reads(capsys):
+def test_show_names_units_and_only_what_the_theory_reads(twinrig, capsys):
     Path("c.toml").write_text(ELLIPSE)
     assert twinrig("show", "c.toml", "--set", "method.name=exact") == 0
     said = capsys.readouterr().out
@@ -99,7 +85,7 @@ def test_show_names_units_and_only_what_the_theory_reads(capsys):
     assert "march" not in said and not Path("results").exists()
 
 
-def test_too_unlike_materials_are_refused_before_anything_is_written(capsys):
+def test_too_unlike_materials_are_refused_before_anything_is_written(twinrig, capsys):
     Path("c.toml").write_text(ELLIPSE)
     assert twinrig("run", "c.toml", "--set", "bodies.wheel={E=1e9, nu=0.3}") == 2
     assert "unlike" in capsys.readouterr().err and not Path("results").exists()

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,6 @@ from models.contact.work_precision import Point, cheapest, exact
 from models.errors import InputError
 from models.table_stream import blocks
 from models.tables import NEWTONS, SHARES, read_table
-from studies import command_line
 from validation.cases import contact_price
 from validation.contact_set import FRICTION, LOAD, read
 
@@ -27,19 +25,7 @@ CASES = "a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [-],spin [1/mm]\n"
 ROW = "5,4,80,0.3,0.1,-2e-4,4e-4\n"
 TABLE = {"title": "a contact", "system": "contact", "ellipse": {"a": 5e-3, "b": 4e-3},
          "contact": {"load": 8e4, "friction": 0.3}}  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
-def twinrig(*args):
-    """Exit code of ``twinrig ARGS`` within this process."""
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as ended:
-        patch.setattr(sys, "argv", ["twinrig", *args])
-        command_line.main()
-    return ended.value.code
+pytestmark = pytest.mark.usefixtures("empty_folder")
 
 
 def answered(text, name="cases.csv", **method):
@@ -50,7 +36,7 @@ def answered(text, name="cases.csv", **method):
         return counts, list(csv.DictReader(file))
 
 
-def test_one_contact_saves_forces_fields_and_a_picture(capsys):
+def test_one_contact_saves_forces_fields_and_a_picture(twinrig, capsys):
     assert twinrig("run", "contact_ellipse", "--set", "method.cells=11", "--out", "out", "--json") == 0
     found = json.loads(capsys.readouterr().out)["answer"]
     assert {path.name for path in Path("out").iterdir()} == {"command.txt", "forces.csv", "fields.csv", "contact.png"}
@@ -64,7 +50,7 @@ def test_one_contact_saves_forces_fields_and_a_picture(capsys):
     assert (fields[:, 6] * area).sum() == pytest.approx(force["fy"], rel=1e-9)
 
 
-def test_a_sweep_saves_a_row_for_every_creepage(capsys):
+def test_a_sweep_saves_a_row_for_every_creepage(twinrig, capsys):
     args = ("--set", "sweep={of='xi_y', start=-1e-2, stop=1e-2, count=5}", "--set", "creepage={xi_x=0.0}",
             "--set", "options.exact=0", "--out", "out")  # fmt: skip
     assert twinrig("run", "contact_ellipse", *args) == 0
@@ -77,7 +63,7 @@ def test_a_sweep_saves_a_row_for_every_creepage(capsys):
     assert (np.diff(found["fy"]) <= 0).all() and Path("out/forces.png").exists()
 
 
-def test_profiles_touch_and_carry_the_load():
+def test_profiles_touch_and_carry_the_load(twinrig):
     """100 kN on S1002 and UIC 60 with no shift; the forces stay within mu N."""
     assert twinrig("run", "contact_profiles", "--set", "method.cells=15", "--out", "out") == 0
     fields = np.genfromtxt("out/fields.csv", delimiter=",", skip_header=1)
@@ -184,12 +170,12 @@ def test_blocks_join_to_the_whole_table():
     assert joined[:7] == pytest.approx(1e-3 * np.arange(1, 8)) and np.isnan(joined[7])
 
 
-def test_the_table_that_comes_with_twinrig_is_sound(capsys):
+def test_the_table_that_comes_with_twinrig_is_sound(twinrig, capsys):
     assert twinrig("run", "contact_table", "--out", "out") == 0
     assert "all of them sound" in capsys.readouterr().out and Path("out/forces.csv").exists()
 
 
-def test_a_table_is_found_in_the_folder_of_the_command(capsys):
+def test_a_table_is_found_in_the_folder_of_the_command(twinrig, capsys):
     Path("mine.csv").write_text(CASES + ROW)
     assert twinrig("run", "contact_table", "--set", "cases.file=mine.csv", "--out", "out") == 0
     assert twinrig("run", "contact_table", "--set", "cases.file=yours.csv") == 2

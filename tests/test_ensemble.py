@@ -23,7 +23,6 @@ from models.ensemble.statistics import deviation, quantile
 from models.errors import InputError, RunFailed
 from models.noise import normal
 from models.simulate import simulate
-from studies import command_line
 from validation.scenes import force_scene, road_scene, write_forces
 
 PATHS, BLOCK = 10, 3
@@ -357,15 +356,7 @@ SHORT = ("--set", "run.duration=1", "--set", "options.times=[0.5, 1.0]", "--set"
          "--set", "options.workers=1", "--engine", "reference")  # fmt: skip
 
 
-def twinrig(*args):
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as ended:
-        patch.setattr(sys, "argv", ["twinrig", *args])
-        command_line.main()
-    return ended.value.code
-
-
-def test_the_study_resumes_in_its_own_folder(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_the_study_resumes_in_its_own_folder(twinrig, tmp_path, capsys):
     assert twinrig("run", "ensemble", *SHORT, "--out", "first") == 0
     said = capsys.readouterr().out
     assert "60 paths of 1 s" in said and "50 %   never" in said
@@ -386,8 +377,7 @@ def test_the_study_resumes_in_its_own_folder(tmp_path, monkeypatch, capsys):
     (("ensemble", "--resume", "nowhere"), "holds no unfinished run"),
     (("ensemble", "--resume", "nowhere", "--out", "new"), "leave out --out"),
     (("six_runs", "--resume", "nowhere"), "keeps nothing that can be resumed")], ids=str)  # fmt: skip
-def test_what_cannot_be_resumed_is_refused(args, said, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_what_cannot_be_resumed_is_refused(twinrig, args, said, tmp_path, capsys):
     assert twinrig("run", *args) == 2
     assert said in capsys.readouterr().err and not list(tmp_path.iterdir())
 
