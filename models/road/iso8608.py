@@ -48,13 +48,30 @@ def iso8608_road(
     ------
     InputError : unknown class or level, a band, a seed or a number of waves that is not possible
     """
-    if road_class not in CLASSES:
-        raise InputError("", "road class", road_class, "must be a class of ISO 8608", tuple(CLASSES))
-    if level not in SIDES:
-        raise InputError("", "level", level, "must say how the density is to be read", tuple(SIDES))
+    _check_class(road_class, level)
     road = rough_road(CLASSES[road_class] * SIDES[level], seed, n_min, n_max, waves, window_length)
     name = f"ISO 8608 class {road_class} ({level}), seed {seed}"
     return SineProfile(road.amplitude, road.wavenumber, road.phase, road.window_length, name)
+
+
+def level_of_class(road_class: str, level: str = "one-sided") -> float:
+    """S0 (m) of a class: the density at its geometric mean is S0 / Omega^2, **two-sided** over Omega in rad/m.
+
+    One-sided Gd(n) = Gd(0.1) (n / 0.1)^-2 over waves per metre is 2 pi 0.01 Gd(0.1) / Omega^2 over Omega = 2 pi n,
+    half of it two-sided. ``level`` says how the standard's figure is read, see :func:`iso8608_road`. Raises
+    InputError for an unknown class or level.
+    """
+    _check_class(road_class, level)
+    return math.pi * 0.1**2 * CLASSES[road_class] * SIDES[level]
+
+
+def class_at_level(level: float) -> str:
+    """The class of a road of density S0 / Omega^2 (S0 in m, two-sided over rad/m), in words with the convention."""
+    if level <= 0.0:
+        return "smooth"
+    place = math.log(level / level_of_class("A"), 4.0)  # whole numbers: means; halves: the limits between classes
+    name = list(CLASSES)[min(max(round(place), 0), len(CLASSES) - 1)]
+    return f"{level / level_of_class(name):.2f} times the mean of ISO 8608 class {name}, one-sided"
 
 
 def rough_road(
@@ -75,6 +92,14 @@ def random_phases(seed: int, waves: int) -> np.ndarray:
     """
     words = np.random.Philox(key=seed).random_raw(waves)
     return 2.0 * math.pi * 2.0**-53 * (words >> np.uint64(11)).astype(float)
+
+
+def _check_class(road_class: str, level: str) -> None:
+    """Refuse what the standard does not know."""
+    if road_class not in CLASSES:
+        raise InputError("", "road class", road_class, "must be a class of ISO 8608", tuple(CLASSES))
+    if level not in SIDES:
+        raise InputError("", "level", level, "must say how the density is to be read", tuple(SIDES))
 
 
 def _check_band(gd: float, seed: int, n_min: float, n_max: float, waves: int) -> None:

@@ -1,0 +1,199 @@
+"""A road under two tracks: the mean process z_M and the roll process theta, and what every wheel meets of them.
+
+The height at y (m, to the left) of a straight lane is z = z_M + y theta, heights up, z_M and theta independent, each
+white noise through a shape filter in path (Rill, IAVSD extensive summary, eq. 3 to 7: z_l = z_M + b2 theta,
+z_r = z_M - b1 theta). Hence over the wavenumber Omega (rad/m), two-sided:
+
+    S(y1, y2) = S_M + y1 y2 S_theta,    coherency = |S(y1, y2)| / sqrt(S(y1, y1) S(y2, y2)),
+
+the square of which others call the coherence. A track's spectrum at y tends to S0(y) / Omega^2 with
+S0(y) = (q1 + y^2 q2) / (2 pi); one-sided, as ISO 8608 counts, twice that.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from models.errors import InputError
+from models.ride.excitation import Excitation
+from models.ride.linear_vehicle import Wheel
+from models.road.iso8608 import class_at_level
+from models.road.shape_filter import ShapeFilter
+
+MEAN_CORNER, ROLL_CORNER = 0.3, 1.5
+"""Corners of the paper, rad/m."""
+LEVEL = 1.6e-5
+"""S0 of the paper, m: what a bad scan of it lets one read; neither exponent nor split between the two is certain."""
+LEFT_RIGHT = ("modelled", "uncorrelated", "equal")
+FRONT_REAR = ("delayed", "uncorrelated", "equal")
+CASES = {
+    1: ("modelled", "uncorrelated"),
+    2: ("modelled", "equal"),
+    3: ("modelled", "delayed"),
+    4: ("uncorrelated", "delayed"),
+    5: ("equal", "delayed"),
+}
+"""The paper's five cases of correlation: left and right, front and rear."""
+
+
+@dataclass(frozen=True)
+class TwoTrackRoad:
+    """Mean process (m, intensity q1 in m) and roll process (rad, intensity q2 in 1/m)."""
+
+    mean: ShapeFilter
+    roll: ShapeFilter
+
+    def spectrum(self, wavenumber: np.ndarray, y: float) -> np.ndarray:
+        """Two-sided density (m^3) of the height at y over the wavenumber (rad/m)."""
+        return self.cross_spectrum(wavenumber, y, y)
+
+    def cross_spectrum(self, wavenumber: np.ndarray, y1: float, y2: float) -> np.ndarray:
+        """Two-sided cross density (m^3) of the heights at y1 and y2; real, for they lie side by side."""
+        return self.mean.spectrum(wavenumber) + y1 * y2 * self.roll.spectrum(wavenumber)
+
+    def coherency(self, wavenumber: np.ndarray, y1: float, y2: float) -> np.ndarray:
+        """|S12| / sqrt(S1 S2) of the heights at y1 and y2, 0 to 1."""
+        cross = self.cross_spectrum(wavenumber, y1, y2)
+        return np.abs(cross) / np.sqrt(self.spectrum(wavenumber, y1) * self.spectrum(wavenumber, y2))
+
+    def covariance(self, distance: np.ndarray, y1: float, y2: float) -> np.ndarray:
+        """Covariance (m^2) of the heights at y1 and y2 whose places are ``distance`` (m) apart along the path."""
+        roll = y1 * y2 * self.roll.covariance(distance) if y1 * y2 else 0.0
+        return self.mean.covariance(distance) + roll
+
+    def level(self, y: float) -> float:
+        """S0 (m): without cutoffs the spectrum at y tends to S0 / Omega^2, two-sided."""
+        return (self.mean.intensity + y * y * self.roll.intensity) / (2.0 * math.pi)
+
+    def label(self, y: float) -> str:
+        """What the road is, with the convention of its level."""
+        cutoffs = {f.cutoff for f in (self.mean, self.roll) if f.cutoff is not None}
+        steep = f", cut off at {' and '.join(f'{c:g}' for c in sorted(cutoffs))} rad/m" if cutoffs else ""
+        return (
+            f"two tracks, corners {self.mean.corner:g} and {self.roll.corner:g} rad/m{steep}; at y = {y:g} m the "
+            f"spectrum tends to {self.level(y):.4g} m / Omega^2 two-sided, {2.0 * self.level(y):.4g} m^3 one-sided at "
+            f"1 rad/m ({class_at_level(self.level(y))})"
+        )
+
+
+def road_of_level(
+    half_track: float,
+    level: float = LEVEL,
+    *,
+    corners: tuple[float, float] = (MEAN_CORNER, ROLL_CORNER),
+    cutoff: float | None = None,
+) -> TwoTrackRoad:
+    """Road whose tracks at y = +- half_track (m) have the level S0 (m, two-sided); the default is the paper's road.
+
+    Mean and roll share the level in halves, q1 = half_track^2 q2 = pi S0: only then does the coherency fall to 0 at
+    short waves, as the paper's Fig. 3 shows. The paper leaves the split open. Raises InputError for no track.
+    """
+    if not (math.isfinite(half_track) and half_track > 0.0):
+        raise InputError("", "half_track", half_track, "must be above 0, in m: half the distance of the two tracks")
+    half = math.pi * level
+    return TwoTrackRoad(ShapeFilter(corners[0], half, cutoff), ShapeFilter(corners[1], half / half_track**2, cutoff))
+
+
+def half_track(wheels: Sequence[Wheel]) -> float:
+    """Half the distance (m) of the outermost wheels of the first axle: 0 for wheels on the centre line."""
+    front = [wheel.y for wheel in wheels if wheel.axle == 0]
+    return (max(front) - min(front)) / 2.0
+
+
+def on_track(wheels: Sequence[Wheel], y: float) -> tuple[Wheel, ...]:
+    """The wheels all on the track at y (m): a quarter or half car, drawn on the centre line, on one track of a road.
+
+    Left on the centre line it would meet the mean process alone, which is smoother than any track.
+    """
+    return tuple(replace(wheel, y=y) for wheel in wheels)
+
+
+def excitation(
+    road: TwoTrackRoad, wheels: Sequence[Wheel], left_right: str = "modelled", front_rear: str = "delayed"
+) -> Excitation:
+    """The road under the wheels, one filter per axle, each wheel at its own y.
+
+    Parameters
+    ----------
+    left_right : "modelled", z = z_M + y theta; "uncorrelated", the left wheels and the right wheels each with a pair
+        (z_M, theta) of their own; "equal", z = z_M + abs(y) theta
+    front_rear : "delayed", every axle meets the noise of the first, its distance later; "uncorrelated", every axle
+        has noise of its own; "equal", every axle meets the noise of the first at once
+
+    Raises
+    ------
+    InputError : an unknown word; axles not numbered from the front, wheels of one axle at different x; wheels both on
+        and beside the centre line where left and right are uncorrelated
+    """
+    _check_word("left_right", left_right, LEFT_RIGHT)
+    _check_word("front_rear", front_rear, FRONT_REAR)
+    behind = _lengths(wheels)
+    F, G, mean, roll = _filters(road)
+    if left_right == "uncorrelated":
+        F, G = block_diag(F, F), block_diag(G, G)
+    rows = np.array([_row(wheel, mean, roll, left_right, wheels) for wheel in wheels])
+    axle = np.array([wheel.axle for wheel in wheels])
+    heights = tuple(np.where((axle == i)[:, None], rows, 0.0) for i in range(len(behind)))
+    lengths = tuple(0.0 for _ in behind) if front_rear == "equal" else behind
+    return Excitation(F, G, heights, lengths, front_rear == "uncorrelated")
+
+
+def input_covariance(
+    road: TwoTrackRoad, wheels: Sequence[Wheel], left_right: str = "modelled", front_rear: str = "delayed"
+) -> np.ndarray:
+    """Covariance (w, w) in m^2 of the heights under the wheels, in closed form; arguments and errors as above."""
+    behind = excitation(road, wheels, left_right, front_rear).lengths
+    out = np.zeros((len(wheels), len(wheels)))
+    for i, one in enumerate(wheels):
+        for j, two in enumerate(wheels):
+            if left_right == "uncorrelated" and (one.y < 0.0) != (two.y < 0.0):
+                continue
+            if front_rear == "uncorrelated" and one.axle != two.axle:
+                continue
+            y1, y2 = (abs(one.y), abs(two.y)) if left_right == "equal" else (one.y, two.y)
+            out[i, j] = float(road.covariance(np.array(behind[one.axle] - behind[two.axle]), y1, y2))
+    return out
+
+
+def _filters(road: TwoTrackRoad) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """F, G of both processes side by side and the rows that read z_M and theta; a silent process is left out."""
+    parts = [road.mean, road.roll] if road.roll.intensity else [road.mean]
+    F, G, H = (block_diag(*matrices) for matrices in zip(*(part.matrices() for part in parts), strict=True))
+    return F, G, H[0], H[1] if len(H) == 2 else np.zeros(len(F))
+
+
+def _row(wheel: Wheel, mean: np.ndarray, roll: np.ndarray, left_right: str, wheels: Sequence[Wheel]) -> np.ndarray:
+    """Factors of the filter's states in the height under one wheel."""
+    if left_right == "equal":
+        return mean + abs(wheel.y) * roll
+    own = mean + wheel.y * roll
+    if left_right == "modelled":
+        return own
+    if wheel.y == 0.0 and any(other.y for other in wheels):
+        raise InputError("", f"wheel {wheel.name}, y", 0.0, "is neither left nor right: these are uncorrelated here")
+    other = np.zeros(len(own))
+    return np.concatenate([own, other] if wheel.y >= 0.0 else [other, own])
+
+
+def _lengths(wheels: Sequence[Wheel]) -> tuple[float, ...]:
+    """How far (m) each axle runs behind the first."""
+    axles = sorted({wheel.axle for wheel in wheels})
+    if not axles or axles != list(range(len(axles))):
+        raise InputError("", "axles", axles, "must be numbered 0, 1, ... from the front, each with a wheel")
+    places = [{wheel.x for wheel in wheels if wheel.axle == axle} for axle in axles]
+    for axle, found in enumerate(places):
+        if len(found) > 1:
+            raise InputError("", f"axle {axle}, x", sorted(found), "the wheels of an axle must stand at one x")
+    behind = tuple(min(places[0]) - min(found) for found in places)
+    for axle in range(1, len(behind)):
+        if behind[axle] < behind[axle - 1]:
+            raise InputError("", f"axle {axle}, x", min(places[axle]), f"must not lie before axle {axle - 1}")
+    return behind
+
+
+def _check_word(place: str, word: str, known: tuple[str, ...]) -> None:
+    if word not in known:
+        raise InputError("", place, word, "must say how the wheels' roads go together", known)
