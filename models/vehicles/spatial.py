@@ -1,0 +1,214 @@
+"""Engine-neutral description of a vehicle in space: the one source of Exudyn, MuJoCo and the analytic M, D, K.
+
+Axes of ride (see ``models.ride``): x forward, y left, z up from the ground. Every point is given in metres where it
+lies in the **design position**, all coordinates zero, in which every body is parallel to the axes. The laws below are
+exact, not linearised; "along a" always means along a direction fixed in space.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from models.vehicles.curve import Curve
+
+Vector = tuple[float, float, float]
+Freedom = Literal["x", "y", "z", "rx", "ry", "rz"]
+
+FREEDOMS: tuple[Freedom, ...] = ("x", "y", "z", "rx", "ry", "rz")
+"""Order in which the freedoms of a body are applied and counted."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body with its centre of mass at ``position`` (m), its joint there, and what it may do.
+
+    mass in kg; inertia: tensor (kg m^2) about the centre of mass, axes parallel to the vehicle's, rows of the matrix
+    (products of inertia as tensor entries, -int x z dm). A body rides on its ``parent``, or on the space if None:
+
+        c = c_parent + R_parent (position - position_parent + (x, y, z)),    R = R_parent Rx(rx) Ry(ry) Rz(rz),
+
+    c its centre, R its rotation, with the coordinates of ``freedoms`` (in the order of FREEDOMS) and zero for every
+    other one: translation along the parent's axes, then turning about its own x, then new y, then new z.
+    """
+
+    name: str
+    mass: float
+    position: Vector
+    freedoms: tuple[Freedom, ...]
+    inertia: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    parent: str | None = None
+
+
+@dataclass(frozen=True)
+class SpringDamper:
+    """Spring, damper, curves and dry friction between p1 fixed to body ``one`` and p2 fixed to body ``two``.
+
+    With a = ``axis`` (a unit vector fixed in space) and d = a . (p2 - p1) less its value in the design position,
+
+        F = F0 + k d + c d' + travel_force(d) + rate_force(d') + friction tanh(d' / friction_rate),
+
+    acts as +F a at p1 on body one and as -F a at p2 on body two (None: the ground). With one above, two below and a
+    up, travel d and force F are positive in compression. F0 is the preload of ``spatial_linear.preloads``, 0 without
+    gravity. The two forces are equal and opposite but not on one line once p2 - p1 has left a: the couple
+    (p1 - p2) x F a is what the guide, which keeps a fixed in space, takes up. It vanishes in the design position
+    because p2 - p1 is there 0 or along a.
+
+    point_one, point_two (m), stiffness (N/m), damping (N s/m), friction (N), friction_rate (m/s).
+    """
+
+    name: str
+    one: str
+    two: str | None
+    point_one: Vector
+    point_two: Vector
+    axis: Vector
+    stiffness: float
+    damping: float
+    travel_force: Curve | None = None
+    rate_force: Curve | None = None
+    friction: float = 0.0
+    friction_rate: float = 0.01
+
+
+@dataclass(frozen=True)
+class AntiRollBar:
+    """A bar between a body that rolls and the points ``left`` and ``right`` of an axle's bodies.
+
+    With e = rx - (h_left - h_right) / (y_left - y_right), rx the body's own roll coordinate (rad) and h how far each
+    point has risen from its design position, the moment M = M0 + stiffness e + damping e' (N m) acts as -M on the
+    coordinate rx, as the vertical force +M / (y_left - y_right) at left and as the opposite one at right. The body
+    has no parent, so that -M turns it about the space's x. M0 is the preload.
+    """
+
+    name: str
+    body: str
+    left: str
+    right: str
+    point_left: Vector
+    point_right: Vector
+    stiffness: float
+    damping: float = 0.0
+
+    @property
+    def track(self) -> float:
+        """Lateral distance (m) of the two points, positive."""
+        return self.point_left[1] - self.point_right[1]
+
+
+@dataclass(frozen=True)
+class Tyre:
+    """A wheel on the road: F = F0 + stiffness (zeta - h) + damping (zeta' - h'), up, at ``point`` of ``body``.
+
+    h is how far the point has risen from its design position, zeta the height of the road under it (m). ``axle``
+    counts from the front, 0 first. The point is the centre of a wheel, or one end of a rigid axle. It never lifts off.
+    """
+
+    name: str
+    body: str
+    point: Vector
+    axle: int
+    stiffness: float
+    damping: float = 0.0
+
+
+@dataclass(frozen=True)
+class SideForce:
+    """Linear side force of a tyre at ``point`` (on the road, z = 0) fixed to ``body``, along the space's y.
+
+    F = stiffness (roll_steer rx + rz - y' / v), y' the velocity (m/s) of the point along y, v the vehicle's speed,
+    rx and rz coordinates of ``chassis``. stiffness in N/rad; roll_steer in rad/rad.
+    """
+
+    name: str
+    body: str
+    point: Vector
+    chassis: str
+    stiffness: float
+    roll_steer: float = 0.0
+
+
+@dataclass(frozen=True)
+class Drag:
+    """Force -coefficient v x' along x at the centre of ``body``; x' is its motion beside the speed v (m/s).
+
+    coefficient in N s^2/m^2.
+    """
+
+    body: str
+    coefficient: float
+
+
+PointKind = Literal["acceleration", "velocity", "displacement"]
+TurnKind = Literal["angular acceleration", "angular velocity", "angle"]
+PartKind = Literal["travel", "travel rate", "force"]
+TyreKind = Literal["tyre force", "tyre deflection"]
+
+
+@dataclass(frozen=True)
+class PointOutput:
+    """Acceleration (m/s^2), velocity (m/s) or displacement (m) of a point of a body along ``axis``."""
+
+    name: str
+    kind: PointKind
+    body: str
+    point: Vector
+    axis: Vector
+
+
+@dataclass(frozen=True)
+class TurnOutput:
+    """Turning of a body about ``axis``: its angular acceleration (rad/s^2), velocity (rad/s), or small angle (rad)."""
+
+    name: str
+    kind: TurnKind
+    body: str
+    axis: Vector
+
+
+@dataclass(frozen=True)
+class PartOutput:
+    """Travel d (m), its rate (m/s), or force less preload (N) of a spring-damper; e, e', moment of a bar."""
+
+    name: str
+    kind: PartKind
+    part: str
+
+
+@dataclass(frozen=True)
+class TyreOutput:
+    """Tyre force less its static part (N, positive when it presses harder), or deflection zeta - h (m)."""
+
+    name: str
+    kind: TyreKind
+    tyre: str
+
+
+SpatialOutput = PointOutput | TurnOutput | PartOutput | TyreOutput
+
+
+@dataclass(frozen=True)
+class SpatialVehicle:
+    """Bodies (parents before their children), what acts between them, and what is read.
+
+    ``gravity`` (m/s^2) acts along -z on every body. At 0 the vehicle is unloaded; above, the spring-dampers, bars
+    and tyres carry the preloads that make the design position the equilibrium on a flat road. ``axles``: places x (m)
+    of the axles from the front.
+    """
+
+    name: str
+    bodies: tuple[Body, ...]
+    springs: tuple[SpringDamper, ...]
+    tyres: tuple[Tyre, ...]
+    axles: tuple[float, ...]
+    bars: tuple[AntiRollBar, ...] = ()
+    side_forces: tuple[SideForce, ...] = ()
+    drags: tuple[Drag, ...] = ()
+    outputs: tuple[SpatialOutput, ...] = ()
+    gravity: float = 0.0
+
+    def coordinates(self) -> tuple[tuple[str, Freedom], ...]:
+        """Coordinates in the order of the state: body by body, freedoms in the order of FREEDOMS."""
+        return tuple((body.name, freedom) for body in self.bodies for freedom in FREEDOMS if freedom in body.freedoms)
+
+    def body(self, name: str) -> Body:
+        """The body of that name; KeyError if there is none."""
+        return {body.name: body for body in self.bodies}[name]
