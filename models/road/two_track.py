@@ -1,8 +1,9 @@
 """A road under two tracks: the mean process z_M and the roll process theta, and what every wheel meets of them.
 
 The height at y (m, to the left) of a straight lane is z = z_M + y theta, heights up, z_M and theta independent, each
-white noise through a shape filter in path (Rill, IAVSD extensive summary, eq. 3 to 7: z_l = z_M + b2 theta,
-z_r = z_M - b1 theta). Hence over the wavenumber Omega (rad/m), two-sided:
+white noise through a shape filter in path (G. Rill, The Influence of Correlated Random Road-Excitation Processes on
+Vehicle Vibrations, eq. 3 to 7: z_l = z_M + b2 theta, z_r = z_M - b1 theta). Hence over the wavenumber Omega (rad/m),
+two-sided:
 
     S(y1, y2) = S_M + y1 y2 S_theta,    coherency = |S(y1, y2)| / sqrt(S(y1, y1) S(y2, y2)),
 

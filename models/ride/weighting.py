@@ -1,0 +1,132 @@
+"""Frequency weightings of ISO 2631-1 as filters behind a vehicle's outputs: what a person feels of an acceleration.
+
+A weighting is a product of second-order sections: band limit (high-pass at f1, low-pass at f2), transition from
+acceleration to velocity (f3, f4), upward step (f5, f6) (ISO 2631-1:1997, Annex A; the parameters also in ISO 8041).
+Every section keeps two states scaled by its own frequency: as one polynomial of eighth order the same filter loses
+four digits in a Lyapunov equation, its coefficients lie twenty decades apart.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from models.errors import InputError
+from models.ride.delayed_system import DelayedSystem
+
+
+@dataclass(frozen=True)
+class Section:
+    """(n0 + n1 p + n2 p^2) / (1 + p / quality + p^2) with p = s / (2 pi frequency), frequency in Hz."""
+
+    frequency: float
+    quality: float
+    numerator: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Weighting:
+    """Sections in a row; the name is the standard's."""
+
+    name: str
+    sections: tuple[Section, ...]
+
+    def response(self, frequency: np.ndarray) -> np.ndarray:
+        """Complex factor at the frequencies (Hz), from the sections' formulas."""
+        out = np.ones(np.shape(frequency), complex)
+        for section in self.sections:
+            p = 1j * np.asarray(frequency) / section.frequency
+            n0, n1, n2 = section.numerator
+            out *= (n0 + n1 * p + n2 * p**2) / (1.0 + p / section.quality + p**2)
+        return out
+
+    def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A (n, n), B (n,), C (n,) of x' = A x + B u, y = C x, n = 2 per section; nothing passes at once."""
+        size = 2 * len(self.sections)
+        A, B = np.zeros((size, size)), np.zeros(size)
+        before, direct = np.zeros(size), 1.0  # what reaches the next section: before . x + direct u
+        for i, section in enumerate(self.sections):
+            rate = 2.0 * math.pi * section.frequency
+            x, v = 2 * i, 2 * i + 1  # p^2 x = before - x - p x / quality, v = p x
+            A[x, v] = rate
+            A[v] += rate * before
+            A[v, x], A[v, v] = -rate, -rate / section.quality
+            B[v] = rate * direct
+            n0, n1, n2 = section.numerator
+            before = n2 * before
+            before[x], before[v] = n0 - n2, n1 - n2 / section.quality
+            direct = n2 * direct
+        return A, B, before
+
+
+def weighting(
+    name: str,
+    transition: tuple[float, float, float] | None,
+    step: tuple[float, float, float, float] | None = None,
+) -> Weighting:
+    """Weighting from the standard's parameters: transition (f3, f4, Q4), step (f5, Q5, f6, Q6); Hz.
+
+    The band limit is that of all weightings for comfort and health: 0.4 to 100 Hz, Q = 1 / sqrt(2).
+    """
+    sections = [Section(100.0, 0.5**0.5, (1.0, 0.0, 0.0)), Section(0.4, 0.5**0.5, (0.0, 0.0, 1.0))]
+    if transition is not None:
+        f3, f4, q4 = transition
+        sections.append(Section(f4, q4, (1.0, f4 / f3, 0.0)))
+    if step is not None:
+        f5, q5, f6, q6 = step
+        sections.append(Section(f6, q6, ((f5 / f6) ** 2, f5 / f6 / q5, 1.0)))
+    return Weighting(name, tuple(sections))
+
+
+WEIGHTINGS = {
+    "Wk": weighting("Wk", (12.5, 12.5, 0.63), (2.37, 0.91, 3.35, 0.91)),
+    "Wd": weighting("Wd", (2.0, 2.0, 0.63)),
+    "Wc": weighting("Wc", (8.0, 8.0, 0.63)),
+    "We": weighting("We", (1.0, 1.0, 0.63)),
+    "Wj": weighting("Wj", None, (3.75, 0.91, 5.32, 0.91)),
+}
+"""Wk: vertical, seat and floor; Wd: fore and aft, sideways; Wc: backrest; We: rotations; Wj: under the head."""
+
+HEALTH = {"x": 1.4, "y": 1.4, "z": 1.0}
+"""Factors of the axes on the seat for health (Wd, Wd, Wk); for comfort all are 1."""
+
+
+def weighted(system: DelayedSystem, filters: Mapping[str, str]) -> DelayedSystem:
+    """The system with weighted outputs after its own: {"seat_z": "Wk"} adds the output "seat_z Wk".
+
+    Filter states stand after the system's. A weighted output is finite even where white noise reaches the output
+    itself: every weighting falls at high frequency. Raises InputError for an unknown output or weighting.
+    """
+    for output, name in filters.items():
+        if output not in system.names:
+            raise InputError("", "weighted output", output, "must be an output of the vehicle", system.names)
+        if name not in WEIGHTINGS:
+            raise InputError("", f"weighting of {output}", name, "must be a weighting", tuple(WEIGHTINGS))
+    if not filters:
+        return system
+    rows = [system.names.index(output) for output in filters]
+    own = [WEIGHTINGS[name].matrices() for name in filters.values()]
+    A, inputs, C = block_diag(*(a for a, _, _ in own)), _columns([b for _, b, _ in own]), _columns([c for *_, c in own])
+    n, p = len(system.A), len(filters)
+    corner, silent = np.zeros((n, len(A))), np.zeros((p, system.B[0].shape[1]))
+    return DelayedSystem(
+        A=np.block([[system.A, corner], [inputs @ system.C[rows], A]]),
+        B=tuple(np.vstack([B, inputs @ D[rows]]) for B, D in zip(system.B, system.D, strict=True)),
+        delays=system.delays,
+        C=np.block([[system.C, np.zeros((len(system.C), len(A)))], [np.zeros((p, n)), C.T]]),
+        D=tuple(np.vstack([D, silent]) for D in system.D),
+        names=(*system.names, *(f"{output} {name}" for output, name in filters.items())),
+        independent=system.independent,
+    )
+
+
+def total_value(accelerations: Mapping[str, float], factors: Mapping[str, float]) -> float:
+    """Vibration total value a_v = sqrt(sum (k a_w)^2) of weighted rms accelerations (m/s^2), by axis (eq. 10)."""
+    return math.sqrt(sum((factors[axis] * value) ** 2 for axis, value in accelerations.items()))
+
+
+def _columns(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Each vector in a column and in rows of its own."""
+    return np.asarray(block_diag(*(part[:, None] for part in parts)))
