@@ -1,0 +1,207 @@
+"""M, D, K, road columns and outputs of a described vehicle, written down for small motion about its design position."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from models.errors import InputError
+from models.ride.linear_vehicle import LinearVehicle, Output, Wheel
+from models.vehicles.kinematics import Kinematics
+from models.vehicles.spatial import (
+    AntiRollBar,
+    PartOutput,
+    PointOutput,
+    SpatialOutput,
+    SpatialVehicle,
+    SpringDamper,
+    TurnOutput,
+    TyreOutput,
+)
+
+Gains = tuple[float, float]
+"""Stiffness and damping."""
+
+
+def linearise(
+    vehicle: SpatialVehicle, speed: float | None = None, equivalent: Mapping[str, Gains] | None = None
+) -> LinearVehicle:
+    """M q'' + D q' + K q = R z + S z' about the design position: without gravity unloaded, with it the equilibrium.
+
+    speed : m/s, above 0, wanted by side forces and drag only; InputError where they miss it.
+    equivalent : stiffness (N/m) and damping (N s/m) that stand for springs of these names instead of their slopes at
+    rest, as statistical linearisation finds them.
+    """
+    motion = Kinematics(vehicle)
+    gains = {spring.name: slopes_at_rest(spring) for spring in vehicle.springs} | dict(equivalent or {})
+    parts = _parts(vehicle, motion, gains)
+    damping, stiffness = np.zeros((2, motion.size, motion.size))
+    for row, k, c in (*parts.values(), *_tyres(vehicle, motion).values()):
+        stiffness += k * np.outer(row, row)
+        damping += c * np.outer(row, row)
+    stiffness += _geometric(vehicle, motion)
+    _speed_forces(vehicle, motion, speed, damping, stiffness)
+    tyres = _tyres(vehicle, motion)
+    return LinearVehicle(
+        mass=mass(vehicle),
+        damping=damping,
+        stiffness=stiffness,
+        road_stiffness=np.column_stack([k * row for row, k, _ in tyres.values()]),
+        road_damping=np.column_stack([c * row for row, _, c in tyres.values()]),
+        coordinates=vehicle.coordinates(),
+        wheels=tuple(Wheel(tyre.name, tyre.point[0], tyre.point[1], tyre.axle) for tyre in vehicle.tyres),
+        outputs=tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs),
+        source="analytic, " + ("loaded" if vehicle.gravity else "unloaded"),
+    )
+
+
+def mass(vehicle: SpatialVehicle) -> np.ndarray:
+    """Mass matrix (n, n) in the design position: kg, kg m, kg m^2."""
+    motion = Kinematics(vehicle)
+    total = np.zeros((motion.size, motion.size))
+    for body in vehicle.bodies:
+        shift, turn = motion.shift(body.name, body.position), motion.turn(body.name)
+        total += body.mass * shift.T @ shift + turn.T @ np.array(body.inertia) @ turn
+    return total
+
+
+def slopes_at_rest(spring: SpringDamper) -> Gains:
+    """Stiffness (N/m) and damping (N s/m) of small motion: the lines, the curves' slopes and the friction's."""
+    travel, rate = spring.travel_force, spring.rate_force
+    return (
+        spring.stiffness + (travel.slope_at_rest() if travel else 0.0),
+        spring.damping + (rate.slope_at_rest() if rate else 0.0) + spring.friction / spring.friction_rate,
+    )
+
+
+def preloads(vehicle: SpatialVehicle) -> dict[str, float]:
+    """F0 (N; N m of a bar) of every spring-damper, bar and "tyre NAME", that holds the design position.
+
+    Shares that several could bear are those of the linear statics: what each would carry had the unloaded vehicle
+    sunk by K^-1 times the weights. InputError where no spring can carry a weight.
+    """
+    motion = Kinematics(vehicle)
+    gains = {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
+    tyres = {f"tyre {name}": part for name, part in _tyres(vehicle, motion).items()}
+    bearing = _parts(vehicle, motion, gains) | tyres
+    stiffness = sum(k * np.outer(row, row) for row, k, _ in bearing.values())
+    weight = sum(body.mass * vehicle.gravity * _height(motion, body.name, body.position) for body in vehicle.bodies)
+    sunk = -np.linalg.lstsq(stiffness, weight, rcond=1e-12)[0]
+    left = np.abs(stiffness @ sunk + weight)
+    if left.max() > 1e-8 * np.abs(weight).max():
+        name = ".".join(vehicle.coordinates()[int(left.argmax())])
+        raise InputError(vehicle.name, name, None, "no spring carries the weight along this freedom")
+    return {name: k * float(row @ sunk) for name, (row, k, _) in bearing.items()}
+
+
+Part = tuple[np.ndarray, float, float]
+"""Row (n,) of a deformation by the coordinates, stiffness, damping."""
+
+
+def _parts(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains]) -> dict[str, Part]:
+    """Spring-dampers and bars by name."""
+    springs = {spring.name: (_travel(motion, spring), *gains[spring.name]) for spring in vehicle.springs}
+    return springs | {bar.name: (_twist(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
+
+
+def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, Part]:
+    return {t.name: (_height(motion, t.body, t.point), t.stiffness, t.damping) for t in vehicle.tyres}
+
+
+def _height(motion: Kinematics, body: str, point: tuple[float, float, float]) -> np.ndarray:
+    return motion.shift(body, point)[2]
+
+
+def _travel(motion: Kinematics, spring: SpringDamper) -> np.ndarray:
+    apart = motion.shift(spring.two, spring.point_two) - motion.shift(spring.one, spring.point_one)
+    return np.array(spring.axis) @ apart
+
+
+def _twist(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
+    risen = _height(motion, bar.left, bar.point_left) - _height(motion, bar.right, bar.point_right)
+    return motion.coordinate(bar.body, "rx") - risen / bar.track
+
+
+def _geometric(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
+    """Stiffness that weights and preloads have because their arms turn: -sum of force times second derivative."""
+    total = np.zeros((motion.size, motion.size))
+    if not vehicle.gravity:
+        return total
+    held = preloads(vehicle)
+    for body in vehicle.bodies:
+        total += body.mass * vehicle.gravity * motion.bend(body.name, body.position)[2]
+    for spring in vehicle.springs:
+        apart = motion.bend(spring.two, spring.point_two) - motion.bend(spring.one, spring.point_one)
+        total += held[spring.name] * np.tensordot(spring.axis, apart, 1)
+    for bar in vehicle.bars:
+        risen = motion.bend(bar.left, bar.point_left)[2] - motion.bend(bar.right, bar.point_right)[2]
+        total -= held[bar.name] / bar.track * risen
+    for tyre in vehicle.tyres:
+        total -= held[f"tyre {tyre.name}"] * motion.bend(tyre.body, tyre.point)[2]
+    return total
+
+
+def _speed_forces(
+    vehicle: SpatialVehicle, motion: Kinematics, speed: float | None, damping: np.ndarray, stiffness: np.ndarray
+) -> None:
+    """Add side forces and drag in place."""
+    if not vehicle.side_forces and not vehicle.drags:
+        return
+    if speed is None or not speed > 0:
+        allowed = "a vehicle with side forces or drag needs a speed above 0 m/s: its damping depends on it"
+        raise InputError(vehicle.name, "speed", speed, allowed)
+    for force in vehicle.side_forces:
+        sideways = motion.shift(force.body, force.point)[1]
+        steered = force.roll_steer * motion.coordinate(force.chassis, "rx") + motion.coordinate(force.chassis, "rz")
+        damping += force.stiffness / speed * np.outer(sideways, sideways)
+        stiffness -= force.stiffness * np.outer(sideways, steered)
+    for drag in vehicle.drags:
+        along = motion.shift(drag.body, vehicle.body(drag.body).position)[0]
+        damping += drag.coefficient * speed * np.outer(along, along)
+
+
+UNITS = {
+    "acceleration": "m/s^2", "velocity": "m/s", "displacement": "m",
+    "angular acceleration": "rad/s^2", "angular velocity": "rad/s", "angle": "rad",
+    "travel": "m", "travel rate": "m/s", "force": "N", "tyre force": "N", "tyre deflection": "m",
+}  # fmt: skip
+"""Unit of each kind of output; of an anti-roll bar rad, rad/s and N m."""
+
+_ORDER = {"acceleration": 2, "velocity": 1, "displacement": 0,
+          "angular acceleration": 2, "angular velocity": 1, "angle": 0}  # fmt: skip
+
+
+def _output(
+    spec: SpatialOutput,
+    vehicle: SpatialVehicle,
+    motion: Kinematics,
+    parts: Mapping[str, Part],
+    tyres: Mapping[str, Part],
+) -> Output:
+    """Rows of one output."""
+    rows = np.zeros((3, motion.size))  # of q, q', q''
+    road = np.zeros((2, len(vehicle.tyres)))  # of z, z'
+    unit = UNITS[spec.kind]
+    if isinstance(spec, PointOutput):
+        rows[_ORDER[spec.kind]] = np.array(spec.axis) @ motion.shift(spec.body, spec.point)
+    elif isinstance(spec, TurnOutput):
+        rows[_ORDER[spec.kind]] = np.array(spec.axis) @ motion.turn(spec.body)
+    elif isinstance(spec, PartOutput):
+        _part_rows(spec, parts[spec.part], rows)
+        if any(bar.name == spec.part for bar in vehicle.bars):
+            unit = {"m": "rad", "m/s": "rad/s", "N": "N m"}[unit]
+    else:
+        _tyre_rows(spec, tyres[spec.tyre], rows, road[:, list(tyres).index(spec.tyre)])
+    return Output(spec.name, unit, spec.kind, rows[2], rows[1], rows[0], road[0], road[1])
+
+
+def _part_rows(spec: PartOutput, part: Part, rows: np.ndarray) -> None:
+    row, k, c = part
+    gains = {"travel": (1.0, 0.0), "travel rate": (0.0, 1.0), "force": (k, c)}[spec.kind]
+    rows[:2] = np.outer(gains, row)
+
+
+def _tyre_rows(spec: TyreOutput, part: Part, rows: np.ndarray, road: np.ndarray) -> None:
+    row, k, c = part
+    gains = {"tyre force": (k, c), "tyre deflection": (1.0, 0.0)}[spec.kind]
+    rows[:2] = -np.outer(gains, row)
+    road[:] = gains
