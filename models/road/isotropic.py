@@ -1,0 +1,126 @@
+"""Isotropic roads (Dodds and Robson 1973): the same statistics in every direction, so that one track tells all.
+
+The covariance of two heights depends on their distance r alone: R(r), the autocovariance of a track. Two parallel
+tracks a distance d apart then have the cross-covariance R(sqrt(x^2 + d^2)), and the cross density
+
+    S(Omega, d) = 1 / (2 pi) int R(sqrt(x^2 + d^2)) cos(Omega x) dx = int Phi(sqrt(Omega^2 + k^2)) cos(k d) dk,
+
+Phi being the two-dimensional density, the Hankel transform of R. For a track of the density
+g / (a^2 + Omega^2)^(w / 2), sigma = sqrt(a^2 + Omega^2), it is S(Omega) times the coherency
+
+    2 (sigma d / 2)^(w / 2) K_(w / 2)(sigma d) / Gamma(w / 2),        sigma d K_1(sigma d) for w = 2,
+
+K the modified Bessel function of the second kind: all falls exponentially with the distance over the wavelength.
+No finite filter has such a cross density: these roads are for the frequency route.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import quad
+from scipy.special import gamma, kv
+
+from models.errors import InputError
+from models.ride.linear_vehicle import Wheel
+from models.road.iso8608 import level_of_class
+from models.road.two_track import TwoTrackRoad
+
+
+@dataclass(frozen=True)
+class Part:
+    """Track density level / (corner^2 + Omega^2)^(waviness / 2), two-sided; its own cross density in closed form.
+
+    level : in m^3 (rad/m)^(waviness), S0 in m for waviness 2; corner in rad/m, 0 or more; waviness above 1
+    """
+
+    level: float
+    corner: float = 0.0
+    waviness: float = 2.0
+
+    def __post_init__(self) -> None:
+        """Raise InputError for what is no density."""
+        if not (math.isfinite(self.level) and math.isfinite(self.corner) and self.corner >= 0.0):
+            raise InputError("", "corner", self.corner, "must be 0 or more, in rad/m, and the level finite")
+        if not (math.isfinite(self.waviness) and self.waviness > 1.0):
+            raise InputError("", "waviness", self.waviness, "must be above 1: else the heights have no variance")
+
+    def density(self, wavenumber: np.ndarray, distance: float) -> np.ndarray:
+        """Cross density (m^3) of tracks ``distance`` (m) apart, at 0 that of one track; infinite at Omega = 0 = a."""
+        sigma, order = np.hypot(self.corner, wavenumber), self.waviness / 2.0
+        with np.errstate(divide="ignore"):
+            track = self.level * sigma**-self.waviness
+        x = np.asarray(sigma * abs(distance))
+        coherency = np.ones(x.shape)
+        apart = x > 1e-8  # below, the coherency is 1 to rounding
+        coherency[apart] = 2.0 * (x[apart] / 2.0) ** order * kv(order, x[apart]) / gamma(order)
+        return np.asarray(track * coherency)
+
+
+@dataclass(frozen=True)
+class IsotropicRoad:
+    """A road whose track density is the sum of parts."""
+
+    parts: tuple[Part, ...]
+
+    def spectrum(self, wavenumber: np.ndarray) -> np.ndarray:
+        """Two-sided density (m^3) of any track over the wavenumber (rad/m)."""
+        return self.cross_spectrum(wavenumber, 0.0)
+
+    def cross_spectrum(self, wavenumber: np.ndarray, distance: float) -> np.ndarray:
+        """Two-sided cross density (m^3) of two tracks ``distance`` (m) apart; real."""
+        return np.sum([part.density(wavenumber, distance) for part in self.parts], axis=0)
+
+    def coherency(self, wavenumber: np.ndarray, distance: float) -> np.ndarray:
+        """Cross density over the density of one track."""
+        return self.cross_spectrum(wavenumber, distance) / self.spectrum(wavenumber)
+
+
+def isotropic_like(road: TwoTrackRoad, y: float) -> IsotropicRoad:
+    """Isotropic road with the same spectrum as the two-track road's track at y (m): both of first order."""
+    if road.mean.cutoff is not None or road.roll.cutoff is not None:
+        raise InputError("", "cutoff", road.mean.cutoff or road.roll.cutoff, "is not known to isotropic roads")
+    shares = ((road.mean, 1.0), (road.roll, y * y))
+    return IsotropicRoad(
+        tuple(Part(share * f.intensity / (2.0 * math.pi), f.corner) for f, share in shares if share * f.intensity)
+    )
+
+
+def isotropic_class(road_class: str, corner: float = 0.0, level: str = "one-sided") -> IsotropicRoad:
+    """Isotropic road at the mean of an ISO 8608 class, levelled off below the corner (rad/m)."""
+    return IsotropicRoad((Part(level_of_class(road_class, level), corner),))
+
+
+def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence[float], distance: float) -> np.ndarray:
+    """Cross density (m^3) by quadrature, for any autocovariance R(r) in m^2 of a track; wavenumbers above 0 (rad/m).
+
+    Its error is about 1e-12 m times R(distance), whatever the density itself.
+    """
+    scale = covariance(abs(distance))
+
+    def part(k: float) -> float:
+        along = quad(
+            lambda x: covariance(math.hypot(x, distance)) / scale, 0.0, math.inf, weight="cos", wvar=k, epsabs=1e-12,
+            limlst=500,
+        )  # fmt: skip
+        return float(along[0]) * scale / math.pi
+
+    return np.array([part(k) for k in wavenumber])
+
+
+def spectral_matrix(road: IsotropicRoad | TwoTrackRoad, wheels: Sequence[Wheel], wavenumber: np.ndarray) -> np.ndarray:
+    """Densities (k, w, w) in m^3 of the heights under the wheels, rear axles delayed, over k wavenumbers (rad/m).
+
+    Entry ij is 1/(2 pi) int E[z_i(s) z_j(s + a)] exp(-i Omega a) da = S_ij exp(i Omega (x_j - x_i)): a response with
+    the transfer functions H_i has the density sum_ij conj(H_i) S_ij H_j.
+    """
+    out = np.empty((len(wavenumber), len(wheels), len(wheels)), complex)
+    for i, one in enumerate(wheels):
+        for j, two in enumerate(wheels):
+            if isinstance(road, TwoTrackRoad):
+                side = road.cross_spectrum(wavenumber, one.y, two.y)
+            else:
+                side = road.cross_spectrum(wavenumber, one.y - two.y)
+            out[:, i, j] = side * np.exp(1j * wavenumber * (two.x - one.x))
+    return out
