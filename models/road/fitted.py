@@ -1,0 +1,155 @@
+"""Mean and roll process fitted to two measured tracks, with what the measurement cannot tell said in words."""
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.special import digamma
+
+from models.errors import InputError
+from models.road.measured_tracks import MeasuredTracks, TrackSpectra, spectra
+from models.road.shape_filter import ShapeFilter
+from models.road.two_track import TwoTrackRoad
+
+PER_DECADE = 10
+"""Bands per decade in which a density is averaged before the fit, so that every octave counts the same."""
+HIGHEST = 2.0 * math.pi * 2.83
+"""Upper end of the standard's band, rad/m: shorter waves are the tyre's business."""
+
+
+@dataclass(frozen=True)
+class FilterFit:
+    """First-order filter fitted to a density between ``low`` and ``high`` (rad/m).
+
+    corner_error, intensity_error: relative standard errors from the scatter about the fit. ``residual``: rms of
+    ln(measured / fitted) over the bands; 0.69 is a factor of two. The corner is ``resolved`` if it lies within the
+    band and is known to half of itself; it is never sought below a tenth of ``low``.
+    """
+
+    filter: ShapeFilter
+    corner_error: float
+    intensity_error: float
+    residual: float
+    low: float
+    high: float
+    resolved: bool
+
+
+@dataclass(frozen=True)
+class FittedRoad:
+    """The road, both fits (None for a process that is not there), and sentences on what they are worth."""
+
+    road: TwoTrackRoad
+    mean: FilterFit
+    roll: FilterFit | None
+    notes: tuple[str, ...]
+
+
+def fit(
+    tracks: MeasuredTracks, window_length: float | None = None, low: float | None = None, high: float | None = None
+) -> FittedRoad:
+    """First-order mean and roll process by least squares on the logarithms of the measured densities.
+
+    low, high : band of the fit in rad/m; by default from twice the lowest wavenumber that a window holds, where the
+    straight line that was taken out is no longer felt, to the end of the standard's band
+
+    Raises
+    ------
+    InputError : too few windows, or fewer than four bands to fit two numbers to
+    """
+    found = spectra(tracks, window_length)
+    least = 2.0 * float(found.wavenumber[0]) if low is None else low
+    most = min(HIGHEST, 0.5 * float(found.wavenumber[-1])) if high is None else high
+    mean = _fit(found.wavenumber, found.mean, found.freedom, least, most, tracks.name)
+    apart = float(np.abs(tracks.left - tracks.right).max())
+    roll = _fit(found.wavenumber, found.roll, found.freedom, least, most, tracks.name) if apart > 0.0 else None
+    silent = ShapeFilter(mean.filter.corner, 0.0)
+    road = TwoTrackRoad(mean.filter, silent if roll is None else roll.filter)
+    return FittedRoad(road, mean, roll, (*_limits(tracks, found), *_doubts(found, mean, roll)))
+
+
+def _fit(k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float, name: str) -> FilterFit:
+    """ln S = ln(q / 2 pi) - ln(corner^2 + k^2), both unknowns as logarithms."""
+    middle, mean = _bands(k, density, freedom, low, high)
+    if len(middle) < 4:
+        allowed = f"four bands or more are needed between {low:.3g} and {high:.3g} rad/m: the road is too short"
+        raise InputError(name, "bands to fit", len(middle), allowed)
+
+    def error(p: np.ndarray) -> np.ndarray:
+        return np.asarray(p[1] - np.log(2.0 * math.pi * (np.exp(2.0 * p[0]) + middle**2)) - mean)
+
+    start = np.array([math.log(low), math.log(2.0 * math.pi) + float(np.mean(mean + 2.0 * np.log(middle)))])
+    bounds = ([math.log(low / 10.0), -np.inf], [math.log(high), np.inf])
+    best = least_squares(error, start, bounds=bounds, x_scale=1.0, xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    scatter = float(np.sum(best.fun**2)) / (len(middle) - 2)
+    sd = np.sqrt(np.diag(np.linalg.pinv(best.jac.T @ best.jac)) * scatter)
+    corner = math.exp(best.x[0])
+    resolved = bool(low < corner < high * (1.0 - 1e-6) and sd[0] < 0.5)
+    residual = math.sqrt(float(np.mean(best.fun**2)))
+    filter = ShapeFilter(corner, math.exp(best.x[1]))
+    return FilterFit(filter, float(sd[0]), float(sd[1]), residual, low, high, resolved)
+
+
+def _bands(
+    k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Middles (rad/m) and ln of the densities times k^2 averaged in bands, freed of the bias of a logarithm."""
+    count = max(1, round(PER_DECADE * math.log10(high / low))) if high > low else 0
+    edges = np.geomspace(low, high, count + 1)
+    middles, values = [], []
+    for start, end in itertools.pairwise(edges):
+        inside = (k >= start) & (k < end)
+        if inside.any():
+            half = freedom * inside.sum() / 2.0
+            middle = float(np.exp(np.log(k[inside]).mean()))
+            flat = float(np.mean(density[inside] * k[inside] ** 2))
+            middles.append(middle)
+            values.append(math.log(flat / middle**2) - (digamma(half) - math.log(half)))
+    return np.array(middles), np.array(values)
+
+
+def _limits(tracks: MeasuredTracks, found: TrackSpectra) -> list[str]:
+    """What no fit could change."""
+    least = found.wavenumber[0]
+    low, high = found.band()
+    return [
+        f"{tracks.length:g} m in {found.windows} windows: nothing is known of waves longer than "
+        f"{2.0 * math.pi / least:.3g} m ({least:.3g} rad/m)",
+        f"every single density is known to a factor {low:.2f} to {high:.2f} (95 %)",
+        f"a coherency below {found.chance_coherency():.2f} cannot be told from none (95 %)",
+    ]
+
+
+def _doubts(found: TrackSpectra, mean: FilterFit, roll: FilterFit | None) -> list[str]:
+    """Where the fitted road is not the measured one."""
+    said = []
+    for name, one in (("mean", mean), ("roll", roll)):
+        if one is None:
+            said.append(
+                "left and right are the same heights: there is no roll process, and the file says nothing of it"
+            )
+            continue
+        if not one.resolved:
+            said.append(
+                f"the corner of the {name} process is not told by this road: only its level above "
+                f"{one.low:.3g} rad/m is; do not read its variance"
+            )
+        if one.residual > math.log(2.0):
+            said.append(
+                f"the {name} process is not of first order: the fit is off by a factor {_factor(one):.1f} (rms)"
+            )
+    shared = np.abs(found.mean_roll) / np.sqrt(found.mean * np.maximum(found.roll, 1e-300))
+    used = (found.wavenumber >= mean.low) & (found.wavenumber <= mean.high)
+    often = float(np.mean(shared[used] > found.chance_coherency()))
+    if roll is not None and often > 0.2:
+        said.append(
+            f"mean and roll are coherent at {100.0 * often:.0f} % of the wavenumbers (5 % by chance): the tracks "
+            "differ in level or lean on one another, which two independent processes cannot show"
+        )
+    return said
+
+
+def _factor(one: FilterFit) -> float:
+    return math.exp(one.residual)

@@ -1,0 +1,136 @@
+"""Two measured tracks side by side: their spectra and coherency, with the bands of chance.
+
+Densities are two-sided over the wavenumber in rad/m, by Welch's method: Hann windows that overlap by half, a straight
+line taken from each. With K windows a density is chi-square distributed with about nu = 2 K / (1 + (1 - 1/K) / 18)
+degrees of freedom (Welch 1967; neighbours share 1/36 of their power's variance).
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import csd
+from scipy.stats import chi2
+
+from models.errors import InputError
+from models.road.csv_road import read_csv_tracks
+from models.road.opencrg import TRACK_WIDTH, read_opencrg
+
+WINDOWS = 8
+"""Windows that a road is cut into unless a window's length is given."""
+
+
+@dataclass(frozen=True)
+class MeasuredTracks:
+    """Heights left and right (n,) in m, **up**, every ``increment`` m; the tracks lie at y = +- half_track (m)."""
+
+    left: np.ndarray
+    right: np.ndarray
+    increment: float
+    half_track: float
+    name: str
+
+    @property
+    def length(self) -> float:
+        """First to last station, m."""
+        return (len(self.left) - 1) * self.increment
+
+
+@dataclass(frozen=True)
+class TrackSpectra:
+    """Two-sided densities over ``wavenumber`` (rad/m, above 0): tracks, mean and roll process, cross densities.
+
+    left, right, mean and the complex ``cross`` (left with right) in m^3, roll in m; ``mean_roll`` in m^2 is 0 for
+    the road of mean and roll process. ``freedom``: degrees of freedom of every density.
+    """
+
+    wavenumber: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+    cross: np.ndarray
+    mean: np.ndarray
+    roll: np.ndarray
+    mean_roll: np.ndarray
+    windows: int
+    freedom: float
+
+    @property
+    def coherency(self) -> np.ndarray:
+        """|S_lr| / sqrt(S_l S_r), biased up: pure chance gives about sqrt(2 / freedom)."""
+        return np.abs(self.cross) / np.sqrt(self.left * self.right)
+
+    def band(self, level: float = 0.95) -> tuple[float, float]:
+        """Factors on a density between which the true one lies with the probability ``level``."""
+        low, high = chi2.ppf([(1.0 - level) / 2.0, (1.0 + level) / 2.0], self.freedom)
+        return self.freedom / high, self.freedom / low
+
+    def chance_coherency(self, level: float = 0.95) -> float:
+        """Coherency that two tracks without anything in common stay below with the probability ``level``."""
+        independent = self.freedom / 2.0
+        return math.sqrt(1.0 - (1.0 - level) ** (1.0 / (independent - 1.0)))
+
+
+def read_tracks(
+    path: str | Path,
+    track_width: float = TRACK_WIDTH,
+    *,
+    offset: float = 0.0,
+    first: float | None = None,
+    last: float | None = None,
+) -> MeasuredTracks:
+    """Left and right track of an OpenCRG or CSV road, from ``first`` to ``last`` (m along the road).
+
+    track_width : m between the tracks; a CSV file does not tell it. offset : m, of their middle, to the left; OpenCRG
+    only. Heights between unevenly spaced stations come from the reader's spline, at the smallest spacing.
+
+    Raises
+    ------
+    InputError : as the readers; a file of another kind; a section that is not on the road; no width
+    """
+    if not (math.isfinite(track_width) and track_width > 0.0):
+        raise InputError(path, "track_width", track_width, "must be above 0, in m")
+    suffix = Path(path).suffix.lower()
+    if suffix == ".csv":
+        left, right = read_csv_tracks(path)
+    elif suffix == ".crg":
+        left, right = (read_opencrg(path, side, offset=offset, track_width=track_width) for side in ("left", "right"))
+    else:
+        raise InputError(path, "", None, "must be a road in OpenCRG (.crg) or in CSV (.csv)")
+    start, end = (left.start if first is None else first), (left.end if last is None else last)
+    if not left.start <= start < end <= left.end:
+        raise InputError(path, "section (m)", (start, end), f"must lie between {left.start:g} and {left.end:g}")
+    step = left.finest
+    count = math.floor((end - start) / step * (1.0 + 1e-12)) + 1
+    up = [-track.sample_uniform(start, step, count)[0] for track in (left, right)]
+    return MeasuredTracks(up[0], up[1], step, track_width / 2.0, Path(path).name)
+
+
+def spectra(tracks: MeasuredTracks, window_length: float | None = None) -> TrackSpectra:
+    """Densities by Welch's method; ``window_length`` in m, by default such that eight windows fit.
+
+    Raises InputError for windows of fewer than 16 stations or fewer than two of them: no density at all.
+    """
+    count = len(tracks.left)
+    wanted = 2.0 * tracks.length / (WINDOWS + 1) if window_length is None else window_length
+    size = math.floor(wanted / tracks.increment + 1e-9)
+    windows = (count - size // 2) // (size - size // 2) if size >= 16 else 0
+    if windows < 2:
+        allowed = f"two windows or more must fit on the {tracks.length:g} m, each of 16 stations or more"
+        raise InputError(tracks.name, "window_length (m)", wanted, allowed)
+    mean = (tracks.left + tracks.right) / 2.0
+    roll = (tracks.left - tracks.right) / (2.0 * tracks.half_track)
+
+    def density(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        n, both = csd(x, y, 1.0 / tracks.increment, "hann", size, size // 2, detrend="linear")
+        inner = (n > 0.0) & (n < n[-1])  # the ends stand once where all others stand for +- n
+        return np.asarray(both[inner] / (4.0 * math.pi))  # one-sided over n, to two-sided over 2 pi n
+
+    own = {"left": tracks.left, "right": tracks.right, "mean": mean, "roll": roll}
+    auto = {name: density(x, x).real for name, x in own.items()}
+    wavenumber = 2.0 * math.pi / (size * tracks.increment) * np.arange(1, len(auto["left"]) + 1)
+    freedom = 2.0 * windows / (1.0 + (1.0 - 1.0 / windows) / 18.0)
+    return TrackSpectra(
+        wavenumber, cross=density(tracks.left, tracks.right), mean_roll=density(mean, roll), windows=windows,
+        freedom=freedom, **auto,
+    )  # fmt: skip
