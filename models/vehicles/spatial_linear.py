@@ -33,14 +33,13 @@ def linearise(
     """
     motion = Kinematics(vehicle)
     gains = {spring.name: slopes_at_rest(spring) for spring in vehicle.springs} | dict(equivalent or {})
-    parts = _parts(vehicle, motion, gains)
+    tyres = _tyres(vehicle, motion)
     damping, stiffness = np.zeros((2, motion.size, motion.size))
-    for row, k, c in (*parts.values(), *_tyres(vehicle, motion).values()):
+    for row, k, c in (*_parts(vehicle, motion, gains).values(), *tyres.values()):
         stiffness += k * np.outer(row, row)
         damping += c * np.outer(row, row)
     stiffness += _geometric(vehicle, motion)
     _speed_forces(vehicle, motion, speed, damping, stiffness)
-    tyres = _tyres(vehicle, motion)
     return LinearVehicle(
         mass=mass(vehicle),
         damping=damping,
@@ -48,10 +47,24 @@ def linearise(
         road_stiffness=np.column_stack([k * row for row, k, _ in tyres.values()]),
         road_damping=np.column_stack([c * row for row, _, c in tyres.values()]),
         coordinates=vehicle.coordinates(),
-        wheels=tuple(Wheel(tyre.name, tyre.point[0], tyre.point[1], tyre.axle) for tyre in vehicle.tyres),
-        outputs=tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs),
+        wheels=wheels(vehicle),
+        outputs=outputs(vehicle, motion, gains),
         source="analytic, " + ("loaded" if vehicle.gravity else "unloaded"),
     )
+
+
+def wheels(vehicle: SpatialVehicle) -> tuple[Wheel, ...]:
+    """Where the tyres meet the road."""
+    return tuple(Wheel(tyre.name, tyre.point[0], tyre.point[1], tyre.axle) for tyre in vehicle.tyres)
+
+
+def outputs(
+    vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains] | None = None
+) -> tuple[Output, ...]:
+    """Rows of all outputs, from the ``motion`` of points (an engine's own, too) and the springs' slopes at rest."""
+    own = gains or {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
+    parts, tyres = _parts(vehicle, motion, own), _tyres(vehicle, motion)
+    return tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs)
 
 
 def mass(vehicle: SpatialVehicle) -> np.ndarray:
