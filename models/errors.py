@@ -34,7 +34,7 @@ def _shown(value: Any) -> str:
     """Return `` = value`` as a scene file would hold it, cut to a readable length."""
     if value is None:
         return ""
-    plain = value.item() if hasattr(value, "item") else value
+    plain = value.tolist() if hasattr(value, "tolist") else value
     text = str(plain).lower() if isinstance(plain, bool) else repr(plain)
     return f" = {text if len(text) <= LONGEST else text[: LONGEST - 3] + '...'}"
 

@@ -160,6 +160,14 @@ def test_invariants_of_random_contacts(options):
     assert found["power"] <= (1e-5 if options.get("cells", 21) < 20 else 1e-12)
 
 
+@pytest.mark.parametrize(("name", "value"), [("load", 1e-310), ("mu", 1e-300), ("mu", 1e-80)])
+def test_next_to_nothing_is_nothing(name, value):
+    """A slip by so small a bound, squared, would be beyond all numbers."""
+    assert (fastsim(**{**AT, name: value}, pair=PAIR).fx, Ellipse(1.5, PAIR)(6e-3, 1e-310, 0.3, 0.1, 0.1, 1.0)[0]) == (
+        0.0, 0.0)  # fmt: skip
+    assert fastsim(**{**AT, "xi_x": 1.0}, pair=PAIR).stick == 0.0
+
+
 @pytest.mark.parametrize(("name", "value"), [
     ("a", -1e-3), ("a", 600.0), ("b", math.nan), ("load", math.inf), ("mu", -0.1), ("mu", 30.0), ("xi_x", math.nan),
     ("xi_x", 50.0), ("spin", math.inf), ("a", 0.0), ("xi_y", [1e-3, 2e-3]), ("xi_x", "much")])  # fmt: skip

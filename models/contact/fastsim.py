@@ -27,8 +27,8 @@ import numpy as np
 from models.contact.fastsim_falling import Falling, forces_falling
 from models.contact.fastsim_grid import POWERS, Bound, Grid, grid, strips_of
 from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER
-from models.contact.fastsim_many import BLENDED, ONE, THREE, forces, point
-from models.contact.hertz import LARGEST_LOAD
+from models.contact.fastsim_many import BLENDED, NOTHING, ONE, THREE, forces, point
+from models.contact.hertz import LARGEST_LOAD, LEAST_AXIS
 from models.contact.inputs import Array, quantity, together
 from models.contact.linear_theory import flexibilities as linear_flexibilities
 from models.contact.material import Pair
@@ -142,7 +142,7 @@ def _second_order_only(march: str) -> None:
 
 def contacts_of(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair
              ) -> tuple[Array, tuple[int, ...]]:  # fmt: skip
-    """The contacts (n, 10) as the kernels read them, and the shape they had; those without load have axes of 1 m."""
+    """The contacts (n, 10) as the kernels read them, and the shape they had; those without load have axes of 0.1 m."""
     creepages = {name: quantity(name, value, f"a creepage within +-{LARGEST_CREEPAGE:g}", -LARGEST_CREEPAGE,
                                 LARGEST_CREEPAGE) for name, value in (("xi_x", xi_x), ("xi_y", xi_y))}  # fmt: skip
     axes = {name: quantity(name, value, "a semi-axis in m, zero or more", 0.0) for name, value in (("a", a), ("b", b))}
@@ -153,9 +153,9 @@ def contacts_of(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: 
         spin=quantity("spin", spin, f"a spin in 1/m within +-{LARGEST_SPIN:g}", -LARGEST_SPIN, LARGEST_SPIN),
     )  # fmt: skip
     columns = np.array([values.ravel() for values in given]).T.reshape(-1, 7)
-    loaded = columns[:, 2] > 0.0
-    quantity("a", columns[loaded, 0], "a semi-axis in m, above 0 where there is a load", np.nextafter(0.0, 1.0))
-    quantity("b", columns[loaded, 1], "a semi-axis in m, above 0 where there is a load", np.nextafter(0.0, 1.0))
+    loaded = columns[:, 2] > NOTHING
+    quantity("a", columns[loaded, 0], "a semi-axis in m, above 0 where there is a load", LEAST_AXIS)
+    quantity("b", columns[loaded, 1], "a semi-axis in m, above 0 where there is a load", LEAST_AXIS)
     columns[~loaded, :2] = 0.1
     flexible = linear_flexibilities(columns[:, 0], columns[:, 1], pair)
     return np.ascontiguousarray(np.column_stack([columns, *flexible])), given[0].shape
@@ -165,6 +165,6 @@ def _creep(found: Array, columns: Array, shape: tuple[int, ...]) -> Creep:
     """Rows (n, 4) of the kernels with the powers that follow from them."""
     fx, fy, mz, stick = found.T
     along, across = fx * columns[:, 4], fy * columns[:, 5]
-    lost = -(along + across + mz * columns[:, 6])
+    lost = 0.0 - (along + across + mz * columns[:, 6])
     named = (fx, fy, mz, stick, lost, np.abs(along) + np.abs(across))
     return Creep(*(values.reshape(shape)[()] for values in named))

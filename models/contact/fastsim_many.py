@@ -28,6 +28,8 @@ A, B, LOAD, MU, XI_X, XI_Y, SPIN, L1, L2, L3 = range(10)
 Y, HALF, SPREAD, PART = range(4)
 """Rows of the strips: y/b, half length by a, that by the bound in the strip's middle, share of the load per bound."""
 ONE, THREE, BLENDED = 0, 1, 2
+NOTHING = 1e-60
+"""N: what friction holds below this is zero; the slip by its bound, squared, would be beyond all numbers."""
 FIRST, SATURATED, OF_SPIN = 1.5, 3.0, 0.4
 """Reach of the linear theory's tractions, by the bound, where the blend begins and is done, and what spin counts in it:
 calibrated on 150 cases of the exact theory."""
@@ -55,17 +57,17 @@ def forces(contacts, strips, cells, middle, kind, march, found):
             march_plain(lanes, cells)
         _collect(lanes, first, count, contacts, strips, slips, found)
     area = 0.0
-    for s in range(m):
-        area += strips[HALF, s]
+    for s in range(m):  # summed as the slipping cells are, so that nothing is left where all slip
+        area += strips[HALF, s] * cells.shape[1]
     for c in range(len(contacts)):
         if touches(contacts[c]):
-            found[c, 3] = 1.0 - found[c, 3] / (cells.shape[1] * area)
+            found[c, 3] = 1.0 - found[c, 3] / area
 
 
 @njit(cache=True, error_model="numpy")
 def touches(contact):
     """Whether there is anything that friction could hold."""
-    return contact[LOAD] > 0.0 and contact[MU] > 0.0
+    return contact[MU] * contact[LOAD] > NOTHING
 
 
 @njit(cache=True, error_model="numpy")

@@ -30,6 +30,8 @@ LARGEST_LOAD = 1e10
 """N"""
 LARGEST_APPROACH = 0.05
 """m: beyond it no contact is small against its body; an approach in mm often is."""
+LEAST_AXIS, LARGEST_AXIS = 1e-30, 1e3
+"""m"""
 
 
 @dataclass(frozen=True)
@@ -83,12 +85,19 @@ def by_axes(a: float, b: float, pair: Pair, *, load: float | None = None, approa
     """Contact of known semi-axes a, b (m), plain numbers, under a load (N) or at an approach (m), above 0.
 
     The curvatures follow from both: the same axes under twice the load are those of bodies curved twice as much.
+    Raises InputError as ``by_load`` does.
     """
+    a, b = (float(quantity(name, value, "a semi-axis in m, above 0", LEAST_AXIS, LARGEST_AXIS))
+            for name, value in (("a", a), ("b", b)))  # fmt: skip
+    if (load is None) == (approach is None):
+        raise InputError("", "load", load, "give either the load (N) or the approach (m)")
     short, g = min(a, b), min(a, b) / max(a, b)
     cosine, sine = integrals(g)
     if approach is not None:
+        approach = float(quantity("approach", approach, "an approach in m, above 0", LEAST_AXIS, LARGEST_APPROACH))
         load = 2.0 / 3.0 * math.pi * a * b * approach * pair.modulus / (short * (cosine + sine))
-    curvature = 1.5 * (load or 0.0) / (math.pi * a * b) * cosine / (pair.modulus * short)
+    load = float(quantity("load", load, "a load in N, above 0", LEAST_AXIS, LARGEST_LOAD))
+    curvature = 1.5 * load / (math.pi * a * b) * cosine / (pair.modulus * short)
     other = curvature * g * g * sine / cosine
     return by_load(*((other, curvature) if a >= b else (curvature, other)), load, pair)
 

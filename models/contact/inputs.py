@@ -12,10 +12,14 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 def quantity(name: str, value: Any, allowed: str, least: float = -np.inf, most: float = np.inf) -> Array:
     """``value`` as a floating-point array of any shape, every element finite and from ``least`` to ``most``.
 
-    Raises InputError with the first value that is not, and ``allowed``: what is expected, with its unit.
+    Raises InputError with the first value that is not, and ``allowed``: what is expected, with its unit. Texts, complex
+    numbers and masked elements are none, and nothing is guessed in their place.
     """
     try:
-        found = np.asarray(value, dtype=float)
+        given = np.asanyarray(value)
+        if given.dtype.kind not in "fiuO" or np.ma.is_masked(given):
+            raise TypeError
+        found = np.asarray(given, dtype=float)
     except (TypeError, ValueError):
         raise InputError("", name, value, f"must be a number or an array of numbers: {allowed}") from None
     good = (found >= least) & (found <= most) & np.isfinite(found)

@@ -48,6 +48,11 @@ class Pair:
     one: Material = STEEL
     two: Material = STEEL
 
+    def __post_init__(self) -> None:
+        for name, body in (("one", self.one), ("two", self.two)):
+            if not isinstance(body, Material):
+                raise InputError("", f"pair.{name}", body, "must be a Material(E=..., nu=...)")
+
     @cached_property
     def modulus(self) -> float:
         """E* in Pa of normal contact: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2, which is (1 - nu)/G."""
