@@ -68,8 +68,8 @@ def _owner(model: type[BaseModel], keys: tuple[str, ...]) -> type[BaseModel] | N
         inner = None if field is None else _inner(field.annotation)
         if field is None or inner is None:
             return None
-        if get_origin(field.annotation) is dict:
-            next(parents, None)  # a name that the user chose
+        if get_origin(field.annotation) in (dict, list):
+            next(parents, None)  # a name that the user chose, or a place in a list
         model = inner
     return model
 
@@ -106,6 +106,8 @@ WORDS = {
     "bool_type": "must be true or false",
     "list_type": "must be a list in [ ]",
     "too_short": "must hold at least {min_length} value(s)",
+    "too_long": "must hold at most {max_length} value(s)",
+    "string_too_short": "must not be empty",
     "tuple_type": "must be a list in [ ]",
     "dict_type": "must be a table of keys and values",
     "model_type": "must be a table of keys and values",

@@ -1,6 +1,7 @@
 """M, D, K, road columns and outputs of a described vehicle, written down for small motion about its design position."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -86,24 +87,33 @@ def slopes_at_rest(spring: SpringDamper) -> Gains:
     )
 
 
-def preloads(vehicle: SpatialVehicle) -> dict[str, float]:
-    """F0 (N; N m of a bar) of every spring-damper, bar and "tyre NAME", that holds the design position.
+class Preloads(NamedTuple):
+    """F0 of every spring-damper (N) and bar (N m) by name, and of every tyre (N) by name: 0 without gravity."""
+
+    parts: dict[str, float]
+    tyres: dict[str, float]
+
+
+def preloads(vehicle: SpatialVehicle) -> Preloads:
+    """What holds the design position against gravity; a tyre's is its static wheel load.
 
     Shares that several could bear are those of the linear statics: what each would carry had the unloaded vehicle
     sunk by K^-1 times the weights. InputError where no spring can carry a weight.
     """
     motion = Kinematics(vehicle)
-    gains = {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
-    tyres = {f"tyre {name}": part for name, part in _tyres(vehicle, motion).items()}
-    bearing = _parts(vehicle, motion, gains) | tyres
-    stiffness = sum(k * np.outer(row, row) for row, k, _ in bearing.values())
+    parts = _parts(vehicle, motion, {spring.name: slopes_at_rest(spring) for spring in vehicle.springs})
+    tyres = _tyres(vehicle, motion)
+    stiffness = sum(k * np.outer(row, row) for row, k, _ in (*parts.values(), *tyres.values()))
     weight = sum(body.mass * vehicle.gravity * _height(motion, body.name, body.position) for body in vehicle.bodies)
     sunk = -np.linalg.lstsq(stiffness, weight, rcond=1e-12)[0]
     left = np.abs(stiffness @ sunk + weight)
     if left.max() > 1e-8 * np.abs(weight).max():
         name = ".".join(vehicle.coordinates()[int(left.argmax())])
         raise InputError(vehicle.name, name, None, "no spring carries the weight along this freedom")
-    return {name: k * float(row @ sunk) for name, (row, k, _) in bearing.items()}
+    return Preloads(
+        {name: k * float(row @ sunk) for name, (row, k, _) in parts.items()},
+        {name: -k * float(row @ sunk) for name, (row, k, _) in tyres.items()},
+    )
 
 
 Part = tuple[np.ndarray, float, float]
@@ -144,12 +154,12 @@ def _geometric(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
         total += body.mass * vehicle.gravity * motion.bend(body.name, body.position)[2]
     for spring in vehicle.springs:
         apart = motion.bend(spring.two, spring.point_two) - motion.bend(spring.one, spring.point_one)
-        total += held[spring.name] * np.tensordot(spring.axis, apart, 1)
+        total += held.parts[spring.name] * np.tensordot(spring.axis, apart, 1)
     for bar in vehicle.bars:
         risen = motion.bend(bar.left, bar.point_left)[2] - motion.bend(bar.right, bar.point_right)[2]
-        total -= held[bar.name] / bar.track * risen
+        total -= held.parts[bar.name] / bar.track * risen
     for tyre in vehicle.tyres:
-        total -= held[f"tyre {tyre.name}"] * motion.bend(tyre.body, tyre.point)[2]
+        total -= held.tyres[tyre.name] * motion.bend(tyre.body, tyre.point)[2]
     return total
 
 

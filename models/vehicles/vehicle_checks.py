@@ -1,0 +1,91 @@
+"""What a vehicle must be as a whole, before any number is computed from it."""
+
+from collections import defaultdict
+
+import numpy as np
+
+from models.errors import InputError
+from models.vehicles.kinematics import Kinematics
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import mass
+
+GROUND = "the ground"
+
+
+def check(vehicle: SpatialVehicle, file: str) -> None:
+    """Raise InputError that names the entry which makes the vehicle impossible."""
+    _bodies(vehicle, file)
+    _connected(vehicle, file)
+    _inert(vehicle, file)
+    _movable(vehicle, file)
+
+
+def _bodies(vehicle: SpatialVehicle, file: str) -> None:
+    for body in vehicle.bodies:
+        place = f"bodies[{body.name}]"
+        if len(set(body.freedoms)) < len(body.freedoms):
+            raise InputError(file, f"{place}.freedoms", list(body.freedoms), "a freedom is named twice")
+        if not body.freedoms and body.parent is None:
+            raise InputError(file, f"{place}.freedoms", [], "a body that rides on no other needs a freedom")
+        tensor = np.array(body.inertia)
+        least = float(np.linalg.eigvalsh(tensor).min())
+        if least < -1e-12 * np.abs(tensor).max():
+            said = f"the tensor is indefinite, its least principal inertia is {least:.6g} kg m^2: must be 0 or more"
+            raise InputError(file, f"{place}.inertia", tensor.tolist(), said)
+
+
+def _connected(vehicle: SpatialVehicle, file: str) -> None:
+    """Every body reaches the ground through springs, tyres and bars, and none that moves hangs on its joint alone."""
+    beside = defaultdict[str, set[str]](set)
+    for one, two in _links(vehicle):
+        beside[one].add(two)
+        beside[two].add(one)
+    touched = set(beside)
+    for body in vehicle.bodies:
+        if body.parent is not None:
+            beside[body.name].add(body.parent)
+            beside[body.parent].add(body.name)
+    reached, border = {GROUND}, [GROUND]
+    while border:
+        new = beside[border.pop()] - reached
+        reached |= new
+        border += new
+    carried = touched | {body.parent for body in vehicle.bodies}
+    for body in vehicle.bodies:
+        if body.name not in reached or (body.freedoms and body.name not in carried):
+            said = "unconnected: no spring, mount, seat or tyre leads from this body to the road"
+            raise InputError(file, f"bodies[{body.name}]", None, said)
+
+
+def _links(vehicle: SpatialVehicle) -> list[tuple[str, str]]:
+    springs = [(spring.one, spring.two or GROUND) for spring in vehicle.springs]
+    tyres = [(tyre.body, GROUND) for tyre in vehicle.tyres]
+    bars = [(bar.body, end) for bar in vehicle.bars for end in (bar.left, bar.right)]
+    return springs + tyres + bars
+
+
+def _inert(vehicle: SpatialVehicle, file: str) -> None:
+    """Every freedom moves some inertia: the mass matrix, scaled to a unit diagonal, is positive definite."""
+    matrix, coordinates = mass(vehicle), vehicle.coordinates()
+    for (name, freedom), own in zip(coordinates, matrix.diagonal(), strict=True):
+        if own <= 0:
+            said = f"nothing inert moves with the freedom {freedom}: give an inertia or leave the freedom out"
+            raise InputError(file, f"bodies[{name}].inertia", None, said)
+    scale = 1 / np.sqrt(matrix.diagonal())
+    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+    if values[0] < 1e-10:
+        name, freedom = coordinates[int(np.abs(vectors[:, 0]).argmax())]
+        said = f"nothing inert moves with a mixture of freedoms, {freedom} of this body most of all"
+        raise InputError(file, f"bodies[{name}].inertia", None, said)
+
+
+def _movable(vehicle: SpatialVehicle, file: str) -> None:
+    """A tyre moves up and down, a tyre with a side force sideways."""
+    motion = Kinematics(vehicle)
+    for tyre in vehicle.tyres:
+        if not motion.shift(tyre.body, tyre.point)[2].any():
+            raise InputError(file, f"tyres[{tyre.name}].body", tyre.body, "this body cannot move up and down")
+    for force in vehicle.side_forces:
+        if not motion.shift(force.body, force.point)[1].any():
+            said = "side force on a body that cannot move sideways: give it or its parent the freedom y"
+            raise InputError(file, f"tyres[{force.name}].cornering", force.stiffness, said)
