@@ -63,8 +63,7 @@ def load_vehicle(name: str, folder: str | Path = ".", file: str = "", place: str
 
 def build_vehicle(table: Mapping[str, Any], file: str) -> SpatialVehicle:
     """The vehicle of nested tables as a TOML file holds them; raises InputError for the first fault."""
-    entries = _read(table, file)
-    return _Builder(entries, file).vehicle()
+    return _Builder(_read(table, file), file).vehicle()
 
 
 def _read(table: Mapping[str, Any], file: str) -> VehicleTable:
@@ -102,8 +101,8 @@ class _Builder:
     def vehicle(self) -> SpatialVehicle:
         springs = (*self._springs(), *self._mounts(), *map(self._seat_spring, self.tables.seats))
         bars = self._bars()
-        self._unique("springs, mounts, seats, anti_roll_bars", [part.name for part in (*springs, *bars)])
-        parts = tuple(part.name for part in (*springs, *bars))
+        parts = tuple(spring.name for spring in springs) + tuple(bar.name for bar in bars)
+        self._unique("springs, mounts, seats, anti_roll_bars", parts)
         vehicle = SpatialVehicle(
             name=self.file,
             bodies=tuple(self.bodies.values()),
