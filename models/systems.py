@@ -28,6 +28,7 @@ class System:
 
 SYSTEMS = {
     DEFAULT: System("models.scene", "models.plan", ("reference", "exudyn", "mujoco")),
+    "ride": System("models.ride.scene", "models.ride.plan", ("reference", "exudyn", "mujoco")),
     "contact": System("models.contact.scene", "models.contact.plan"),
 }
 

@@ -1,0 +1,45 @@
+"""The linear vehicle on its road for other programs: matrices as npz and mat, and as python-control's StateSpace."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from models.ride.covariance import Covariance
+from models.ride.delayed_system import DelayedSystem
+
+if TYPE_CHECKING:
+    import control
+
+
+def matrices(system: DelayedSystem, covariance: Covariance) -> dict[str, Any]:
+    """A, C, B and D of every axle (B1, D1, ...), delays (s), names, covariance P and standard deviations."""
+    found: dict[str, Any] = {"A": system.A, "C": system.C}
+    for i, (B, D) in enumerate(zip(system.B, system.D, strict=True), start=1):
+        found |= {f"B{i}": B, f"D{i}": D}
+    return found | {"delays": np.array(system.delays), "independent": system.independent,
+                    "outputs": np.array(system.names), "P": covariance.P,
+                    "deviation": covariance.deviation}  # fmt: skip
+
+
+def save(system: DelayedSystem, covariance: Covariance, stem: Path) -> list[Path]:
+    """Write ``stem``.npz and ``stem``.mat; returns their paths."""
+    from scipy.io import savemat
+
+    content = matrices(system, covariance)
+    paths = [stem.with_suffix(".npz"), stem.with_suffix(".mat")]
+    np.savez(paths[0], **content)
+    savemat(paths[1], {**content, "outputs": content["outputs"].astype(object)})
+    return paths
+
+
+def state_space(system: DelayedSystem) -> "control.StateSpace":
+    """The system with the noise of each axle as inputs of its own, axle after axle; delays are for the user to apply.
+
+    Inputs are named w1.1, w1.2, ... (axle, channel); the noise of axle i is that of the first, ``delays[i]`` later.
+    """
+    from control import StateSpace
+
+    names = [f"w{i}.{k}" for i, B in enumerate(system.B, 1) for k in range(1, B.shape[1] + 1)]
+    return StateSpace(system.A, np.hstack(system.B), system.C, np.hstack(system.D), inputs=names,
+                      outputs=list(system.names))  # fmt: skip

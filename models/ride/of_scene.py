@@ -1,0 +1,89 @@
+"""From a scene of ride to its vehicle, its road and the system that both make at a speed."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import copysign
+
+from models.errors import InputError
+from models.ride.excitation import Excitation
+from models.ride.linear_vehicle import LinearVehicle, Wheel
+from models.ride.scene import RideScene
+from models.road.shape_filter import ShapeFilter
+from models.road.two_track import TwoTrackRoad, excitation, half_track, on_track, road_of_level
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.vehicle_file import load_vehicle
+
+GRAVITY = 9.81
+"""m/s^2, where a scene's operating point is the loaded one."""
+Linear = Callable[[float], LinearVehicle]
+"""A linear vehicle at a speed (m/s)."""
+BESIDE = 1.0
+"""Where (m) the one track of a vehicle without a width lies: its level is the same wherever that is."""
+
+
+def vehicle_of(scene: RideScene) -> SpatialVehicle:
+    """The scene's vehicle, with gravity where its operating point is the loaded one."""
+    vehicle = load_vehicle(scene.vehicle.file, scene.folder, scene.file, "vehicle.file")
+    return replace(vehicle, gravity=GRAVITY if scene.vehicle.operating_point == "loaded" else 0.0)
+
+
+def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear:
+    """The vehicle at a speed (m/s), linearised by an engine or from its equations; once, if no speed enters."""
+    fixed = not (vehicle.side_forces or vehicle.drags)
+    known: dict[float, LinearVehicle] = {}
+
+    def at(speed: float) -> LinearVehicle:
+        key = 0.0 if fixed else speed
+        if key not in known:
+            known[key] = _linearised(vehicle, engine, speed)
+        return known[key]
+
+    return at
+
+
+def _linearised(vehicle: SpatialVehicle, engine: str, speed: float) -> LinearVehicle:
+    if engine == "reference":
+        from models.vehicles.spatial_linear import linearise
+
+        return linearise(vehicle, speed)
+    from models.engines.spatial_protocol import build
+
+    return build(engine, vehicle, speed=speed).linearise()
+
+
+def road_of(scene: RideScene, wheels: tuple[Wheel, ...]) -> TwoTrackRoad:
+    """The scene's road; its level holds at half the front track where the scene does not say where."""
+    road = scene.road
+    if road.q_mean is not None and road.q_roll is not None:
+        return TwoTrackRoad(ShapeFilter(road.corner_mean, road.q_mean, road.cutoff),
+                            ShapeFilter(road.corner_roll, road.q_roll, road.cutoff))  # fmt: skip
+    return road_of_level(_half_track(scene, wheels), road.level, corners=(road.corner_mean, road.corner_roll),
+                         cutoff=road.cutoff)  # fmt: skip
+
+
+def _half_track(scene: RideScene, wheels: tuple[Wheel, ...]) -> float:
+    """Where (m) the road's tracks lie."""
+    return scene.road.half_track or half_track(wheels) or BESIDE
+
+
+def excitation_of(scene: RideScene, wheels: tuple[Wheel, ...], case: tuple[str, str] | None = None) -> Excitation:
+    """The road under the wheels, in the scene's case of correlation or another one."""
+    left_right, front_rear = case or (scene.road.left_right, scene.road.front_rear)
+    placed = placed_wheels(scene, wheels)
+    try:
+        return excitation(road_of(scene, wheels), placed, left_right, front_rear)
+    except InputError as error:
+        raise InputError(scene.file, f"road.{error.place}", error.value, error.allowed) from None
+
+
+def placed_wheels(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[Wheel, ...]:
+    """Where the wheels meet the road: at their own y, or all on the road's two tracks.
+
+    A vehicle without a width runs on one of the tracks where the road is given by their level.
+    """
+    y = _half_track(scene, wheels)
+    if not any(wheel.y for wheel in wheels):
+        return on_track(wheels, y) if scene.road.q_mean is None else wheels
+    if scene.road.wheels == "own":
+        return wheels
+    return tuple(replace(wheel, y=copysign(y, wheel.y) if wheel.y else 0.0) for wheel in wheels)

@@ -1,0 +1,85 @@
+"""What a scene of ride will compute: printed by ``twinrig show``, checked before any run."""
+
+from models.errors import InputError
+from models.ride.of_scene import excitation_of, road_of, vehicle_of
+from models.ride.scene import RideScene
+from models.road.two_track import half_track
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import linearise, wheels
+
+
+def check(scene: RideScene, engines: tuple[str, ...]) -> None:
+    """Everything that can be refused before a run is refused here, before any file is written."""
+    vehicle = vehicle_of(scene)
+    excitation_of(scene, wheels(vehicle))
+    names = tuple(output.name for output in vehicle.outputs)
+    for name in scene.weighting:
+        if name not in names:
+            raise InputError(scene.file, f"weighting.{name}", None, "is no output of the vehicle", names)
+
+
+def describe(scene: RideScene) -> str:
+    """The scene's plan as text: vehicle, freedoms, road, cases, outputs and what is not computed."""
+    vehicle = vehicle_of(scene)
+    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
+    lines += [_line("vehicle", f"{vehicle.name} ({scene.vehicle.file}), {scene.vehicle.operating_point}")]
+    lines += _bodies(vehicle)
+    lines += [_line("road", road_of(scene, wheels(vehicle)).label(_track(scene, vehicle)))]
+    lines += [_line("", f"left and right {scene.road.left_right}, axles {scene.road.front_rear}")]
+    lines += [_line("speed", _speed(scene))]
+    lines += [_line("outputs", ", ".join(output.name for output in vehicle.outputs))]
+    lines += [_line("weighting", ", ".join(f"{name} by {by}" for name, by in scene.weighting.items()) or "none")]
+    return "\n".join([*lines, _line("absent", ", ".join(absent(scene, vehicle)) + " (not computed)")])
+
+
+def absent(scene: RideScene, vehicle: SpatialVehicle) -> list[str]:
+    """Effects that the scene or its vehicle does not name."""
+    curves = any(s.travel_force or s.rate_force or s.friction for s in vehicle.springs)
+    present = {
+        "gravity and preload": scene.vehicle.operating_point == "loaded", "curves of springs and dampers": curves,
+        "tyre damping": any(tyre.damping for tyre in vehicle.tyres), "side forces": bool(vehicle.side_forces),
+        "roll steer": any(force.roll_steer for force in vehicle.side_forces), "drag": bool(vehicle.drags),
+        "second corner of the road": scene.road.cutoff is not None, "weighting": bool(scene.weighting),
+        "varying speed": scene.drive is not None,
+    }  # fmt: skip
+    return [name for name, there in present.items() if not there]
+
+
+def _line(head: str, text: str) -> str:
+    return f"  {head:<10} {text}"
+
+
+def _track(scene: RideScene, vehicle: SpatialVehicle) -> float:
+    return scene.road.half_track or half_track(wheels(vehicle))
+
+
+def _bodies(vehicle: SpatialVehicle) -> list[str]:
+    """A line per body, then the number of freedoms and their frequencies where no speed is needed."""
+    lines = []
+    for body in vehicle.bodies:
+        on = f" on {body.parent}" if body.parent else ""
+        lines.append(_line("  body", f"{body.name:<12} {body.mass:g} kg, {' '.join(body.freedoms)}{on}"))
+    parts = (len(vehicle.springs), len(vehicle.bars), len(vehicle.tyres))
+    lines.append(_line("  parts", "{} spring-dampers, {} anti-roll bars, {} tyres".format(*parts)))
+    return [*lines, _line("freedoms", f"{len(vehicle.coordinates())}{_frequencies(vehicle)}")]
+
+
+def _frequencies(vehicle: SpatialVehicle) -> str:
+    if vehicle.side_forces or vehicle.drags:
+        return ", frequencies depend on the speed"
+    import numpy as np
+    from scipy.linalg import eigvalsh
+
+    linear = linearise(vehicle)
+    squares = eigvalsh((linear.stiffness + linear.stiffness.T) / 2, linear.mass)
+    found = ", ".join(f"{f:.3g}" for f in np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi))
+    return f", undamped {found} Hz"
+
+
+def _speed(scene: RideScene) -> str:
+    if scene.drive is not None:
+        points = zip(scene.drive.time, scene.drive.speed, strict=True)
+        return ", ".join(f"{speed:g} m/s at {time:g} s" for time, speed in points) + ", straight between"
+    assert scene.speeds is not None
+    values = scene.speeds.values()
+    return f"{len(values)} from {values.min():g} to {values.max():g} m/s"

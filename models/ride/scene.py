@@ -1,0 +1,121 @@
+"""Scenes of ride: a vehicle, the road under its tracks, speeds, and the outputs that are weighted for people."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from models.errors import InputError
+from models.road.two_track import LEVEL, MEAN_CORNER, ROLL_CORNER
+from models.scene_file import SceneFile, checked
+from models.strict import Strict, quantity
+
+LeftRight = Literal["modelled", "uncorrelated", "equal"]
+FrontRear = Literal["delayed", "uncorrelated", "equal"]
+Places = Literal["own", "tracks"]
+
+
+class RideVehicle(Strict):
+    """[vehicle]: a vehicle file, and the point about which it is linear."""
+
+    file: str = Field(description="a vehicle that comes with twinrig, or a TOML file of your own")
+    operating_point: Literal["unloaded", "loaded"] = Field(default="unloaded", description="loaded: gravity, preload")
+
+
+class Road(Strict):
+    """[road]: two tracks from a mean and a roll process; every value has the default of the paper."""
+
+    level: float = quantity("m", "S0: a track's spectrum tends to S0 / Omega^2, two-sided", default=LEVEL)
+    q_mean: float | None = quantity("m", "intensity of the mean process instead of a level", default=None, zero=True)
+    q_roll: float | None = quantity("1/m", "intensity of the roll process", default=None, zero=True)
+    corner_mean: float = quantity("rad/m", "corner of the mean process", default=MEAN_CORNER)
+    corner_roll: float = quantity("rad/m", "corner of the roll process", default=ROLL_CORNER)
+    cutoff: float | None = quantity("rad/m", "second corner, where outputs see the road's rate", default=None)
+    half_track: float | None = quantity("m", "where the tracks have the level: half the front track", default=None)
+    left_right: LeftRight = Field(default="modelled", description="how the tracks go together")
+    front_rear: FrontRear = Field(default="delayed", description="how the axles' roads go together")
+    wheels: Places = Field(default="own", description="each wheel at its own y, or all on the two tracks")
+
+
+class Speeds(Strict):
+    """[speeds]: constant ones, from start to stop, or those of a list."""
+
+    start: float | None = quantity("m/s", "first speed", default=None)
+    stop: float | None = quantity("m/s", "last speed", default=None)
+    count: int = Field(default=25, ge=2, le=10_000, description="number of speeds")
+    list: tuple[float, ...] = Field(default=(), description="speeds in m/s instead")
+
+    def values(self) -> np.ndarray:
+        """All speeds, m/s."""
+        return np.array(self.list) if self.list else np.linspace(self.start, self.stop, self.count)  # type: ignore[arg-type]
+
+
+class Drive(Strict):
+    """[drive]: a speed that varies, from point to point along straight lines."""
+
+    time: tuple[float, ...] = Field(description="times in s, rising from 0")
+    speed: tuple[float, ...] = Field(description="speeds in m/s at these times, 0 for standstill")
+
+
+class RideScene(SceneFile):
+    """One scene of ride; it has either [speeds] or a [drive]."""
+
+    system: Literal["ride"] = "ride"
+    study: str = Field(default="ride", description="the study that runs the scene")
+    vehicle: RideVehicle
+    road: Road = Road()
+    speeds: Speeds | None = Field(default=None, description="constant speeds")
+    drive: Drive | None = Field(default=None, description="a speed that varies")
+    weighting: dict[str, Literal["Wk", "Wd"]] = Field(default_factory=dict, description="ISO 2631-1, output by output")
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> RideScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(RideScene, table, file, folder)
+    if (scene.speeds is None) == (scene.drive is None):
+        raise InputError(file, "speeds", None, "give either the table speeds or the table drive, and not both")
+    if scene.speeds is not None:
+        _check_speeds(file, scene.speeds)
+    if scene.drive is not None:
+        _check_drive(file, scene.drive)
+    _check_road(file, scene.road)
+    return scene
+
+
+def _check_speeds(file: str, speeds: Speeds) -> None:
+    for i, value in enumerate(speeds.list):
+        if not (np.isfinite(value) and value > 0.0):
+            raise InputError(file, f"speeds.list.{i}", value, "must be above 0, in m/s: at standstill nothing moves")
+    if speeds.list and speeds.start is not None:
+        raise InputError(file, "speeds.start", speeds.start, "is not read beside a list of speeds: drop one of them")
+    for name in ("start", "stop"):
+        if not speeds.list and getattr(speeds, name) is None:
+            raise InputError(file, f"speeds.{name}", None, "is missing (m/s)")
+
+
+def _check_drive(file: str, drive: Drive) -> None:
+    times, speeds = np.array(drive.time), np.array(drive.speed)
+    if len(times) < 2 or len(times) != len(speeds):
+        allowed = f"must have as many values as drive.speed, at least 2; found {len(times)} and {len(speeds)}"
+        raise InputError(file, "drive.time", None, allowed)
+    if times[0] != 0.0 or (np.diff(times) <= 0.0).any():
+        raise InputError(file, "drive.time", list(drive.time), "must rise from 0, in s")
+    if not np.isfinite(speeds).all() or (speeds < 0.0).any():
+        raise InputError(file, "drive.speed", list(drive.speed), "must be 0 or more, in m/s")
+
+
+def _check_road(file: str, road: Road) -> None:
+    given = [name for name in ("q_mean", "q_roll") if getattr(road, name) is not None]
+    if len(given) == 1:
+        other = "q_roll" if given == ["q_mean"] else "q_mean"
+        raise InputError(file, f"road.{other}", None, f"is missing: it belongs to road.{given[0]}")
+    if given:
+        for name in ("level", "half_track"):
+            if name in road.model_fields_set:
+                raise InputError(file, f"road.{name}", getattr(road, name), "is not read beside q_mean and q_roll")
+    for name in ("corner_mean", "corner_roll"):
+        if road.cutoff is not None and road.cutoff <= getattr(road, name):
+            allowed = f"must be above road.{name}, {getattr(road, name):g} rad/m"
+            raise InputError(file, "road.cutoff", road.cutoff, allowed)
