@@ -1,0 +1,238 @@
+"""Covariance of a vehicle on a random road while its speed varies, through standstill, delays exact.
+
+Noise lives in path, motion in time (``road_in_path``). In steps of time, E the transition of the state (y, f),
+
+    P(end) = E P E' + integral over the path of the step of sum_j b_j b_j' + sum_(i<j) (c_ij b_j' + b_j c_ij') ds,
+
+b_j the response, at the step's end, to a unit of noise that axle j meets at s, and c_ij to the same noise when axle i
+before it met it, L_j - L_i of path earlier: at another time, at another speed, perhaps before a standstill. The
+responses c wait in a queue and move with every step until axle j comes by. No distance is rounded, any number of
+axles is one sum, and at v = 0 the path of a step is empty and that is all.
+
+On the delay that varies with the speed see also J. K. Hammond and R. F. Harrison, J. Dyn. Syst. Meas. Control 108
+(1986).
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+
+import numpy as np
+from scipy.linalg import expm, solve_continuous_lyapunov
+
+from models.errors import InputError
+from models.ride.covariance import DIFFUSING, INFINITE, stationary
+from models.ride.excitation import Excitation
+from models.ride.linear_vehicle import LinearVehicle
+from models.ride.noise_cells import nodes, steps
+from models.ride.responses import Responses
+from models.ride.road_in_path import RoadInPath, at_speed, road_in_path
+from models.ride.speed_profile import SpeedProfile
+
+REACH = 1.0
+"""Fastest rate of vehicle or road times the step; half of it changes nothing above 1e-10."""
+BLOCK = 128
+"""Steps whose responses are made at once."""
+
+
+@dataclass(frozen=True)
+class VaryingSpeed:
+    """Standard deviations at every instant.
+
+    time, path, speed (N,): s, m, m/s; deviation (N, p) of the outputs in their units, inf where an output diffuses
+    and, while the road moves, where it holds white noise; height (N, w) of the road under each wheel, m, which may not
+    change; status (p,) of the outputs as in ``covariance``; P (n, n): covariance of the last state of ``excited``.
+    """
+
+    names: tuple[str, ...]
+    status: tuple[str, ...]
+    time: np.ndarray
+    path: np.ndarray
+    speed: np.ndarray
+    deviation: np.ndarray
+    height: np.ndarray
+    P: np.ndarray
+
+    def of(self, name: str) -> np.ndarray:
+        """Standard deviation (N,) of one output; raises InputError if there is none of that name."""
+        if name not in self.names:
+            raise InputError("", "output", name, "must be an output of the vehicle", self.names)
+        return self.deviation[:, self.names.index(name)]
+
+    def at(self, instants: Sequence[float]) -> np.ndarray:
+        """Standard deviations (k, p) at instants (s), each the nearest one of ``time``."""
+        return self.deviation[np.abs(self.time[:, None] - np.asarray(instants)).argmin(axis=0)]
+
+
+def varying_speed(
+    vehicle: LinearVehicle,
+    excitation: Excitation,
+    profile: SpeedProfile,
+    *,
+    weightings: Mapping[str, str] | None = None,
+    instants: Sequence[float] = (),
+    reach: float = REACH,
+) -> VaryingSpeed:
+    """Standard deviations along a drive that begins in the stationary state of its first speed, or at rest.
+
+    The vehicle's matrices are those of one speed. The cost grows with the time that the last axle needs to where the
+    first one is: below a crawl of about 0.3 m/s it is long.
+
+    Parameters
+    ----------
+    weightings : weighted outputs to add, as in ``weighting.weighted``
+    instants : times (s) within the drive that shall be among those of the result
+    reach : fastest rate times step; the change at half of it tells the error
+
+    Raises
+    ------
+    Unstable : a vehicle that leaves its equilibrium on its own
+    InputError : a drive that never moves; a vehicle that knows no rest but is asked to begin there
+    """
+    first, fastest = float(profile.speeds[0]), float(profile.speeds.max())
+    if fastest == 0.0:
+        raise InputError("", "drive.speed", 0.0, "must be above 0 somewhere: at standstill nothing moves")
+    form = road_in_path(vehicle, excitation, weightings)
+    status = stationary(at_speed(vehicle, excitation, fastest, weightings)).status
+    if first == 0.0:
+        P = _at_rest(form)
+    else:
+        P = stationary(at_speed(vehicle, excitation, first, weightings)).P
+        P = np.linalg.solve(form.basis, np.linalg.solve(form.basis, P).T)
+    seen = [_seen(form, P, first, status)]
+    time = [profile.times[0]]
+    moments = _moments(form, profile, P, instants, reach)
+    for end, P in moments:
+        time.append(end)
+        seen.append(_seen(form, P, float(profile.speed(np.array(end))), status))
+    deviation, height = np.split(np.sqrt(seen), [len(status)], axis=1)
+    at = np.array(time)
+    return VaryingSpeed(form.names, status, at, profile.path(at), profile.speed(at), deviation, height,
+                        form.basis @ P @ form.basis.T)  # fmt: skip
+
+
+def _moments(form: RoadInPath, profile: SpeedProfile, P: np.ndarray, instants: Sequence[float],
+             reach: float) -> Iterator[tuple[float, np.ndarray]]:  # fmt: skip
+    """End of each step of the drive and the covariance there, from P at its beginning on.
+
+    Where the vehicle moves from the beginning, the steps begin earlier: the first axle is ahead of the last one.
+    """
+    road, first = form.excitation, float(profile.speeds[0])
+    pairs = [] if road.independent else list(combinations(range(len(road.lengths)), 2))
+    apart = [road.lengths[j] - road.lengths[i] for i, j in pairs]
+    lead = max(apart, default=0.0) / first if first else 0.0
+    motion, path = (float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in (form.A, road.F))
+    ends = steps(profile, profile.times[0] - lead, instants, motion, path, reach)
+    points = nodes(profile, ends, sorted({distance for distance in apart if distance}))
+    responses = Responses(form, profile)
+    hits = [_Met(responses, axle, points.time, ends) for axle in range(len(road.heights))]
+    queues = [_Queue(responses, i, j, points.time, ends) for i, j in pairs]
+    for step, (start, end) in enumerate(pairwise(ends)):
+        E = responses.transition(start, end)
+        for queue in queues:
+            queue.move(E, step)
+        if end > profile.times[0]:
+            b, weight = [hit.of(step) for hit in hits], points.weight[hits[0].within(step)]
+            half = [_product(own, own, weight) / 2.0 for own in b]
+            half += [_product(queue.take(len(weight)), b[queue.last], weight) for queue in queues]
+            Q = np.sum(half, axis=0)
+            P = E @ P @ E.T + Q + Q.T
+            yield end, P
+
+
+class _Met:
+    """Responses, at the ends of the steps, to noise that an axle meets at given times (s), rising."""
+
+    def __init__(self, responses: Responses, axle: int, time: np.ndarray, ends: np.ndarray) -> None:
+        self.responses, self.axle, self.time, self.ends = responses, axle, time, ends
+        self.first = np.searchsorted(time, ends)
+        self.made, self.block = np.zeros((0, 0, 0)), -1
+
+    def within(self, step: int) -> slice:
+        """Which of the times lie in a step."""
+        return slice(self.first[step], self.first[step + 1])
+
+    def of(self, step: int) -> np.ndarray:
+        """Responses (n, c, k) to what is met in a step."""
+        block = step // BLOCK
+        last = min((block + 1) * BLOCK, len(self.ends) - 1)
+        begin = self.first[block * BLOCK]
+        if block != self.block:
+            time = self.time[begin : self.first[last]]
+            end = np.repeat(self.ends[block * BLOCK + 1 : last + 1], np.diff(self.first[block * BLOCK : last + 1]))
+            self.made, self.block = self.responses.to_noise(self.axle, time, end), block
+        return self.made[:, self.first[step] - begin : self.first[step + 1] - begin]
+
+
+class _Queue:
+    """Responses (n, q, k) to noise that one axle has met and another, the ``last``, meets at given times (s)."""
+
+    def __init__(self, responses: Responses, axle: int, last: int, time: np.ndarray, ends: np.ndarray) -> None:
+        profile, form, self.last = responses.profile, responses.form, last
+        distance = form.excitation.lengths[last] - form.excitation.lengths[axle]
+        place = profile.path(time) - distance
+        met = profile.time(place) if distance else time
+        before = np.isneginf(met)
+        self.waiting = _met_before(form, axle, -place[before])
+        self.met = _Met(responses, axle, met[~before], ends)
+
+    def move(self, E: np.ndarray, step: int) -> None:
+        """All go on for one step, those that are met in it join."""
+        n, _, k = self.waiting.shape
+        moved = (E @ self.waiting.reshape(n, -1)).reshape(n, -1, k)
+        self.waiting = np.concatenate([moved, self.met.of(step)], axis=1)
+
+    def take(self, count: int) -> np.ndarray:
+        """The first of the queue leave it."""
+        taken, self.waiting = self.waiting[:, :count], self.waiting[:, count:]
+        return taken
+
+
+def _product(one: np.ndarray, other: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Sum over points and channels of one times other, both (n, c, k), with the points' weights (c,)."""
+    n = len(one)
+    return (one * weight[:, None]).reshape(n, -1) @ other.reshape(n, -1).T
+
+
+def _met_before(form: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
+    """Responses (n, q, k) of a vehicle at rest to noise that the axle met ``behind`` (m) its place, long ago."""
+    F, G = form.excitation.F, form.excitation.G
+    road = np.array([expm(F * distance) @ G for distance in behind]).reshape(-1, *G.shape)
+    _, axles, m = form.inputs.shape
+    own = np.zeros((axles * m, len(behind), G.shape[1]))
+    own[axle * m : (axle + 1) * m] = road.transpose(1, 0, 2)
+    return np.tensordot(_rest(form), own, 1)
+
+
+def _rest(form: RoadInPath) -> np.ndarray:
+    """State (y, f) of a vehicle at rest over the states f of its road: (n + a m, a m)."""
+    if np.linalg.cond(form.A) > 1.0 / (1e3 * np.finfo(float).eps):
+        raise InputError("", "drive.speed.0", 0.0, "must be above 0: this vehicle has a motion that nothing pulls "
+                         "back, so it knows no state of rest to begin in")  # fmt: skip
+    inputs = form.inputs.reshape(len(form.A), -1)
+    return np.vstack([-np.linalg.solve(form.A, inputs), np.eye(inputs.shape[1])])
+
+
+def _at_rest(form: RoadInPath) -> np.ndarray:
+    """Covariance of (y, f) where the vehicle stands, at rest."""
+    road = form.excitation
+    own, m = solve_continuous_lyapunov(road.F, -road.G @ road.G.T), len(road.F)
+    axles = range(len(road.heights))
+    P = np.zeros((len(axles), m, len(axles), m))
+    for i in axles:
+        for j in axles[i:]:
+            if i == j or not road.independent:
+                P[i, :, j] = expm(road.F * (road.lengths[j] - road.lengths[i])) @ own
+                P[j, :, i] = P[i, :, j].T
+    rest = _rest(form)
+    return rest @ P.reshape(rest.shape[1], -1) @ rest.T
+
+
+def _seen(form: RoadInPath, P: np.ndarray, speed: float, status: Sequence[str]) -> np.ndarray:
+    """Variances of all outputs and of the road's height under each wheel."""
+    n, C = len(form.A), form.C + speed * form.rate
+    H = np.hstack(form.excitation.heights)
+    variance = np.einsum("pi,pi->p", C @ P, C)
+    lost = [found == DIFFUSING or (found == INFINITE and speed > 0.0) for found in status]
+    height = np.einsum("wi,wi->w", H @ P[n:, n:], H)
+    return np.concatenate([np.where(lost, np.inf, np.maximum(variance, 0.0)), np.maximum(height, 0.0)])
