@@ -5,6 +5,8 @@ import numpy as np
 from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle, Vector
 
 UNIT = np.eye(3)
+TURN = np.array([np.cross(unit, UNIT).T for unit in UNIT])
+"""(3, 3, 3): e_i x v = TURN[i] @ v."""
 
 
 class Kinematics:
@@ -30,16 +32,17 @@ class Kinematics:
         """(3, n): displacement of a point (m) by the coordinates; zeros on the ground, None."""
         columns = np.zeros((3, self.size))
         for rider, freedom, i in self._motions(body):
-            unit = UNIT[FREEDOMS.index(freedom) % 3]
-            columns[:, i] = np.cross(unit, np.subtract(point, rider.position)) if freedom.startswith("r") else unit
+            along = FREEDOMS.index(freedom)
+            columns[:, i] = UNIT[along] if along < 3 else TURN[along - 3] @ np.subtract(point, rider.position)
         return columns
 
     def turn(self, body: str) -> np.ndarray:
         """(3, n): small rotation of a body (rad) by the coordinates."""
         columns = np.zeros((3, self.size))
         for _, freedom, i in self._motions(body):
-            if freedom.startswith("r"):
-                columns[:, i] = UNIT[FREEDOMS.index(freedom) % 3]
+            along = FREEDOMS.index(freedom)
+            if along >= 3:
+                columns[:, i] = UNIT[along - 3]
         return columns
 
     def bend(self, body: str | None, point: Vector) -> np.ndarray:
@@ -48,10 +51,10 @@ class Kinematics:
         second = np.zeros((3, self.size, self.size))
         motions = self._motions(body)
         for k, (_, freedom, outer) in enumerate(motions):
-            if freedom.startswith("r"):
-                unit = UNIT[FREEDOMS.index(freedom) % 3]
+            along = FREEDOMS.index(freedom)
+            if along >= 3:
                 for _, _, inner in motions[k:]:
-                    second[:, outer, inner] = second[:, inner, outer] = np.cross(unit, first[:, inner])
+                    second[:, outer, inner] = second[:, inner, outer] = TURN[along - 3] @ first[:, inner]
         return second
 
     def _motions(self, body: str | None) -> list[tuple[Body, str, int]]:
