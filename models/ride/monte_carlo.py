@@ -1,0 +1,200 @@
+"""Many copies of a vehicle on random roads of their own, stepped exactly from one cell of the road to the next.
+
+Within a cell the road's white noise is what its Legendre series says: coefficients of unit variance, independent, the
+same for every axle that crosses the cell, however much later and at whatever speed. The response to each coefficient
+is a sum of powers of the cell's matrix, and products of these responses are the joint covariance of all axles'
+responses to the cell, down to ``MODES``: no step error, at any length of cell that the series converges for.
+
+A cell of length d crossed in time h has the matrix h A0 + d A1 of x' = (A0 + v A1) x: exact at constant speed; where
+the speed varies, it is taken as even within one cell.
+"""
+
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+from models.errors import InputError
+from models.noise import BLOCK, ROAD, normal
+from models.ride.covariance import FINITE, stationary
+from models.ride.delayed_system import DelayedSystem
+from models.ride.excitation import Excitation
+from models.ride.linear_vehicle import LinearVehicle
+from models.ride.responses import powers
+from models.ride.road_in_path import at_speed
+from models.ride.speed_profile import SpeedProfile
+
+MODES = 8
+"""Legendre coefficients of noise in a cell: the next one adds 1e-9 of a cell's variance where REACH is full."""
+REACH = 2.0
+"""Fastest rate of vehicle or road times the cell, at most."""
+TERMS = 30
+"""Of the series in powers of a cell's matrix: 2^30 / 30! = 4e-24."""
+FORGOTTEN = 9.0
+"""Slowest rate times the time that copies, begun at zero, run before they count: e^-18 of a variance is missing."""
+TOLERANCE = 1e-3
+"""How far (m) an axle may be moved so that all distances are whole numbers of cells: 0.1 ms at 10 m/s."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Variances of outputs over the copies: time (N,), s; variance, error (N, p), unit^2, inf where there is none.
+
+    ``error`` is the standard error. The mean is known to be zero.
+    """
+
+    names: tuple[str, ...]
+    time: np.ndarray
+    variance: np.ndarray
+    error: np.ndarray
+    copies: int
+
+    def z(self, deviation: np.ndarray) -> np.ndarray:
+        """How many standard errors (N, p) the estimate lies above the variance of these standard deviations (N, p)."""
+        known = np.isfinite(self.variance)
+        off = np.subtract(self.variance, deviation**2, out=np.zeros_like(self.variance), where=known)
+        return np.divide(off, self.error, out=np.full_like(off, np.nan), where=known)
+
+
+def along(
+    vehicle: LinearVehicle,
+    excitation: Excitation,
+    profile: SpeedProfile,
+    instants: Sequence[float],
+    *,
+    copies: int = 4000,
+    seed: int = 0,
+    weightings: Mapping[str, str] | None = None,
+) -> Estimate:
+    """Variances along a drive, over the copies, where a cell ends next to each of the instants (s).
+
+    The drive begins in the stationary state of its first speed. Raises InputError for a standstill: a cell that
+    takes for ever.
+    """
+    slowest = float(profile.speeds.min())
+    if slowest == 0.0:
+        raise InputError("", "drive.speed", 0.0, "must be above 0 for Monte Carlo, which steps along the road")
+    cells = _Cells(vehicle, excitation, weightings, slowest)
+    ends = profile.time(cells.length * np.arange(1, int(profile.paths[-1] / cells.length) + 1))
+    wanted = np.unique(np.abs(ends[:, None] - np.asarray(instants)).argmin(axis=0))
+    first = float(profile.speeds[0])
+    lead = np.full(cells.to_forget(first), cells.length / first)
+    rows = []
+    durations = np.append(lead, np.diff(ends[: wanted[-1] + 1], prepend=profile.times[0]))
+    for number, x in enumerate(cells.states(durations, copies, seed)):
+        if number - len(lead) in wanted:
+            y = cells.outputs(x, float(profile.speed(ends[number - len(lead)])))
+            rows.append(((y**2).mean(axis=1), (y**2).std(axis=1) / copies**0.5))
+    return cells.estimate(ends[wanted], np.array(rows), copies)
+
+
+def at_constant_speed(
+    vehicle: LinearVehicle,
+    excitation: Excitation,
+    speed: float,
+    duration: float,
+    *,
+    copies: int = 4000,
+    seed: int = 0,
+    weightings: Mapping[str, str] | None = None,
+) -> Estimate:
+    """Stationary variances (1, p) over the copies and, in each of them, over ``duration`` (s)."""
+    cells = _Cells(vehicle, excitation, weightings, speed)
+    skipped, counted = cells.to_forget(speed), max(1, round(duration * speed / cells.length))
+    total = np.zeros(())
+    for number, x in enumerate(cells.states(np.full(skipped + counted, cells.length / speed), copies, seed)):
+        if number >= skipped:
+            total = total + cells.outputs(x, speed) ** 2
+    mean = total / counted
+    rows = np.array([[mean.mean(axis=1), mean.std(axis=1) / copies**0.5]])
+    return cells.estimate(np.array([duration]), rows, copies)
+
+
+def path_cell(lengths: Sequence[float], longest: float, tolerance: float = TOLERANCE) -> tuple[float, np.ndarray]:
+    """Length (m) of a cell, at most ``longest``, and how many cells each axle runs behind the first.
+
+    All distances are whole numbers of cells up to ``tolerance`` (m), the last axle's exactly.
+    """
+    behind = np.asarray(lengths)
+    if behind[-1] == 0.0:
+        return longest, np.zeros(len(behind), int)
+    count = int(np.ceil(behind[-1] / longest))
+    while True:
+        cell = behind[-1] / count
+        if np.abs(np.rint(behind / cell) * cell - behind).max() <= tolerance:
+            return cell, np.rint(behind / cell).astype(int)
+        count += 1
+
+
+class _Cells:
+    """A system cut into cells of path that suit its axles and its slowest speed (m/s)."""
+
+    def __init__(
+        self, vehicle: LinearVehicle, excitation: Excitation, weightings: Mapping[str, str] | None, slowest: float
+    ) -> None:
+        def system(speed: float) -> DelayedSystem:
+            return at_speed(vehicle, excitation, speed, weightings)
+
+        self.one, self.two = system(1.0), system(2.0)
+        self.finite = np.array([status == FINITE for status in stationary(system(slowest)).status])
+        fastest = np.abs(np.linalg.eigvals(system(slowest).A)).max() / slowest
+        self.length, self.shifts = path_cell(excitation.lengths, REACH / fastest)
+        self.at_rest, self.per_speed = 2.0 * self.one.A - self.two.A, self.two.A - self.one.A
+
+    def to_forget(self, speed: float) -> int:
+        """Cells at a constant speed after which a copy has forgotten its beginning."""
+        slowest = -np.linalg.eigvals(self.at_rest + speed * self.per_speed).real.max()
+        return int(np.ceil(FORGOTTEN / slowest * speed / self.length))
+
+    def states(self, durations: np.ndarray, copies: int, seed: int) -> Iterator[np.ndarray]:
+        """States (n, copies) at the end of each cell, crossed by the first axle in the given times (s)."""
+        k, axles = self.one.B[0].shape[1], len(self.one.B)
+        independent = self.one.independent
+        draws = _drawn(seed, copies, k * MODES * (axles if independent else 1))
+        last = int(self.shifts[-1])
+        met = deque((next(draws) for _ in range(last)), maxlen=last + 1)
+        x, before = np.zeros((len(self.at_rest), copies)), None
+        for duration in durations:
+            met.append(next(draws))
+            if duration != before:
+                E, R = self._crossed(duration)
+                before = duration
+            noise = [met[-1]] if independent else [met[-1 - shift] for shift in self.shifts]
+            x = E @ x + R @ np.concatenate(noise)
+            yield x
+
+    def _crossed(self, duration: float) -> tuple[np.ndarray, np.ndarray]:
+        """Transition (n, n) over a cell and responses (n, a k MODES) to its noise, axle by axle."""
+        matrix = duration * self.at_rest + self.length * self.per_speed
+        rows = [np.stack(self.one.B, axis=1) * self.length**0.5]
+        for _ in range(TERMS - 1):
+            rows.append(np.tensordot(matrix, rows[-1], 1))
+        responses = np.einsum("jnak,jl->nakl", np.stack(rows), _legendre())
+        return expm(matrix), responses.reshape(len(matrix), -1)
+
+    def outputs(self, x: np.ndarray, speed: float) -> np.ndarray:
+        """Outputs (p, copies) without white noise."""
+        return (self.one.C + (speed - 1.0) * (self.two.C - self.one.C)) @ x
+
+    def estimate(self, time: np.ndarray, rows: np.ndarray, copies: int) -> Estimate:
+        """From variances and their errors (N, 2, p), inf where an output has none."""
+        found = np.where(self.finite, rows, np.inf)
+        return Estimate(self.one.names, time, found[:, 0], found[:, 1], copies)
+
+
+def _legendre() -> np.ndarray:
+    """Integrals (TERMS, MODES) of (1 - u)^j / j! times the orthonormal Legendre polynomials over 0 to 1."""
+    points, weights = np.polynomial.legendre.leggauss(TERMS)
+    degree = np.sqrt(2.0 * np.arange(MODES) + 1.0)
+    basis = np.polynomial.legendre.legvander(points, MODES - 1) * degree
+    return np.einsum("u,uj,ul->jl", weights / 2.0, powers((1.0 - points) / 2.0, TERMS), basis)
+
+
+def _drawn(seed: int, copies: int, channels: int) -> Iterator[np.ndarray]:
+    """Coefficients (channels, copies) of cell after cell; cells share a block of noise if copies are few."""
+    together, path = max(1, BLOCK // copies), 0
+    while True:
+        yield from normal(seed, path, together * copies, channels, source=ROAD).reshape(together, copies, -1).mT
+        path += 1
