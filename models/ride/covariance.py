@@ -1,0 +1,196 @@
+"""Stationary covariance of a vehicle on a random road, delays exact, and for every output whether it has one.
+
+The response of the state to a unit of noise that the first axle meets now is e^(A s) R_j between the hits of the
+axles j and j + 1: R_1 = B_1, F_j = e^(A (tau_j - tau_(j-1))) R_(j-1), R_j = F_j + B_j. The covariance, the integral
+of the response times its transpose, so obeys one Lyapunov equation for any number of axles:
+
+    A P + P A' + sum_j (B_j B_j' + F_j B_j' + B_j F_j') = 0.
+
+Delays of zero make the axles one input; those without end make them independent.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+from models.ride.delayed_system import DelayedSystem
+from models.ride.marginal import ACCURACY, TOLD, Growth, Parts, growth, parts
+
+FINITE, INFINITE, DIFFUSING = "finite", "infinite", "diffusing"
+"""What an output can be."""
+
+
+@dataclass(frozen=True)
+class Covariance:
+    """State and outputs in the stationary state.
+
+    P (n, n): covariance of the state, without motions that diffuse. Per output (p,): ``variance`` (unit^2), inf where
+    there is none; ``status`` and a sentence on its ``reason``; ``rate`` and ``power`` of a variance that grows as
+    rate * t^power (unit^2 / s^power). ``residual`` of the Lyapunov equation, relative to its largest term;
+    ``error`` (p,): relative change of each variance by the last refinement, which leaves less than that.
+    """
+
+    names: tuple[str, ...]
+    P: np.ndarray
+    variance: np.ndarray
+    status: tuple[str, ...]
+    reason: tuple[str, ...]
+    rate: np.ndarray
+    power: np.ndarray
+    residual: float
+    error: np.ndarray
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """Standard deviations (p,) of the outputs, inf where there is none."""
+        return np.sqrt(self.variance)
+
+
+def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
+    """Covariance of a system that meets unit white noise, axle after axle.
+
+    ``accuracy`` of the system's matrices, relative: 1e-12 suits matrices from formulas, 1e-8 those from differences.
+    Raises Unstable, with growth rate and frequency, if the system leaves its equilibrium on its own.
+    """
+    B, D, delays = hits(system)
+    split = parts(system.A, accuracy)
+    grown = growth(split, B, delays, system.C, system.independent, accuracy)
+    P, correction, residual = _stable(split, B, delays, system.independent)
+    V = split.V
+    if split.marginal:
+        P, correction, V = _with_marginal(split, B, delays, system.independent, P, correction)
+    C = system.C @ V
+    variance, change = _seen(C, P).clip(0.0), _seen(C, correction)
+    floor = SILENT * (abs(C) ** 2).max(axis=1) * abs(P).max()
+    status, reason = verdicts(D, variance, floor, grown, np.linalg.norm(split.S, 2), accuracy, split)
+    finite = np.array([found == FINITE for found in status])
+    error = np.divide(abs(change), variance, out=np.zeros(len(variance)), where=finite & (variance > 0))
+    V, P = V.astype(float), P.astype(float)
+    return Covariance(system.names, V @ P @ V.T, np.where(finite, variance, np.inf), status, reason,
+                      grown.rate, grown.power, residual, error)  # fmt: skip
+
+
+def hits(system: DelayedSystem) -> tuple[list[np.ndarray], list[np.ndarray], list[float]]:
+    """B, D and delays of the instants at which noise arrives: axles that meet the same noise at once are one."""
+    if system.independent:
+        return list(system.B), list(system.D), [0.0] * len(system.B)
+    delays = sorted(set(system.delays))
+    at = [[i for i, delay in enumerate(system.delays) if delay == hit] for hit in delays]
+    return [sum(system.B[i] for i in own) for own in at], [sum(system.D[i] for i in own) for own in at], delays
+
+
+def _responses(A: np.ndarray, B: Sequence[np.ndarray], delays: Sequence[float],
+               independent: bool) -> list[np.ndarray]:  # fmt: skip
+    """F_j, the response just before each hit: zero for noise that no axle has met before."""
+    before = [np.zeros_like(B[0])]
+    for j in range(1, len(B)):
+        none = independent or len(A) == 0
+        before.append(np.zeros_like(B[0]) if none else
+                      expm(A * (delays[j] - delays[j - 1])) @ (before[-1] + B[j - 1]))  # fmt: skip
+    return before
+
+
+def _stable(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float],
+            independent: bool) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
+    """Covariance of the stable part, its last correction, and the residual that is left."""
+    own = [(split.W @ b).astype(float) for b in B]
+    before = _responses(split.S, own, delays, independent)
+    Q = sum(b @ b.T + f @ b.T + b @ f.T for f, b in zip(before, own, strict=True))
+    return lyapunov(split.S, Q)
+
+
+def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """P of A P + P A' + Q = 0 in extended precision, the last correction, and the residual by its largest term.
+
+    python-control with its method named (left alone it takes another where slycot is installed), then refined: the
+    residual, in extended precision, is solved for what is missing.
+    """
+    from control import lyap
+
+    wide, right = A.astype(np.longdouble), ((Q + Q.T) / 2).astype(np.longdouble)
+    P = lyap(A, right.astype(float), method="scipy").astype(np.longdouble)
+    for _ in range(REFINEMENTS):
+        half = wide @ P
+        correction = lyap(A, (half + half.T + right).astype(float), method="scipy").astype(np.longdouble)
+        P = P + correction
+    half = wide @ P
+    left = abs(half + half.T + right).max(initial=0.0)
+    return P, correction, float(left / max(abs(half).max(initial=0.0), np.finfo(float).tiny))
+
+
+REFINEMENTS = 1
+"""Corrections of the first solution: one is exact to double precision wherever the equation can be solved at all."""
+
+
+def _with_marginal(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float], independent: bool, P: np.ndarray,
+                   correction: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """The same for the whole state (marginal first), its correction and basis, motions that diffuse left out.
+
+    A motion that does not diffuse lives from the first hit to the last: integrals over that window.
+    """
+    k = split.marginal
+    G, H = [split.W0 @ b for b in B], [(split.W @ b).astype(float) for b in B]
+    before = _responses(split.M, G, delays, independent), _responses(split.S, H, delays, independent)
+    after = [[f + g for f, g in zip(*pair, strict=True)] for pair in ((before[0], G), (before[1], H))]
+    own, cross = np.zeros((k, k)), np.zeros((k, len(split.S)))
+    for j in range(0 if independent else len(B) - 1):
+        own += _window(split.M, after[0][j], delays[j + 1] - delays[j])
+        cross += after[0][j] @ after[1][j].T - before[0][j + 1] @ before[1][j + 1].T
+    if len(split.S):
+        from control import lyap
+
+        cross = lyap(split.M, split.S.T, cross, method="scipy")
+    whole = np.block([[own.astype(np.longdouble), cross], [cross.T, P]])
+    changed = np.zeros_like(whole)
+    changed[k:, k:] = correction
+    return whole, changed, np.hstack([split.V0, split.V])
+
+
+def _window(M: np.ndarray, R: np.ndarray, length: float) -> np.ndarray:
+    """Integral of e^(M s) R R' e^(M' s) from 0 to ``length`` by van Loan's block; M neither grows nor decays."""
+    k = len(M)
+    block = expm(np.block([[-M, R @ R.T], [np.zeros((k, k)), M.T]]) * length)
+    found = block[k:, k:].T @ block[:k, k:]
+    return (found + found.T) / 2
+
+
+def _seen(C: np.ndarray, P: np.ndarray) -> np.ndarray:
+    """Variances (p,) of y = C x."""
+    return np.einsum("pi,ij,pj->p", C.astype(np.longdouble), P, C.astype(np.longdouble)).astype(float)
+
+
+SILENT = 1e-24
+"""A variance this much smaller than its largest term could make it is zero by symmetry, and all of it rounding."""
+
+
+def verdicts(D: Sequence[np.ndarray], variance: np.ndarray, floor: np.ndarray, grown: Growth, fastest: float,
+             accuracy: float, split: Parts | None = None) -> tuple[tuple[str, ...], tuple[str, ...]]:  # fmt: skip
+    """Status and reason of every output.
+
+    White noise that comes through D counts if, up to the ``fastest`` rate of the system (1/s), it carries more than
+    rounding could of the output's variance without it; ``floor`` (p,) is what rounding makes of a variance of zero.
+    """
+    direct = sum((d**2).sum(axis=1) for d in D) * fastest
+    white = direct > (TOLD * accuracy) ** 2 * variance + floor
+    found = [_verdict(*each, split) for each in zip(white, grown.rate, grown.power, strict=True)]
+    return tuple(status for status, _ in found), tuple(reason for _, reason in found)
+
+
+def _verdict(white: bool, rate: float, power: int, split: Parts | None) -> tuple[str, str]:
+    if white:
+        return INFINITE, WHITE
+    if power:
+        after = np.sqrt(rate * 100.0**power)
+        return DIFFUSING, (f"the road drives a motion that nothing pulls back and that this output sees: its variance "
+                           f"grows as {rate:.4g} t^{power} (t in s), a standard deviation of {after:.3g} after "
+                           "100 s")  # fmt: skip
+    if split is None or not split.marginal:
+        return FINITE, "every motion dies out"
+    return FINITE, (f"{split.marginal} states are of motions that nothing pulls back, but this output does not see "
+                    "them, or sees only what the road does not drive in the long run")  # fmt: skip
+
+
+WHITE = ("white noise of the road reaches this output directly, at all frequencies alike (tyre damping under a road "
+         "filter of first order does that): take a road filter of second order, or a limited band")  # fmt: skip

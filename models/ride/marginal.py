@@ -1,0 +1,213 @@
+"""Motions that nothing pulls back: found in the system matrix, taken out of it, and what the road makes of them.
+
+A vehicle that is free to drive away has eigenvalues at zero (its place, its heading, the two coupled as a Jordan
+pair); an undamped spring has a pair on the imaginary axis. A Lyapunov equation has no solution then, although most
+outputs have a variance: all that do not see such a motion, or that see one which the road leaves alone.
+
+Zero eigenvalues are found from singular values: those of a Jordan pair come out of an eigenvalue solver as large as
+the root of its rounding, while the singular values stay within the rounding itself.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import factorial
+
+import numpy as np
+from scipy.linalg import expm, matrix_balance, schur, svd, svdvals
+
+from models.errors import InputError
+
+ACCURACY = 1e-12
+"""Relative accuracy of a system matrix where nothing else is known; central differences reach 1e-9."""
+TOLD = 1e3
+"""What should vanish is told from zero if it is this many times larger than the accuracy allows."""
+
+
+class Unstable(InputError):
+    """A system that leaves its equilibrium on its own: ``growth`` in 1/s, ``frequency`` in Hz."""
+
+    def __init__(self, growth: float, frequency: float) -> None:
+        self.growth, self.frequency = growth, frequency
+        how = f"that swings at {frequency:.4g} Hz" if frequency else "that does not swing"
+        super().__init__(
+            "", "vehicle", None, f"is unstable: a motion {how} grows at a rate of {growth:.4g} 1/s, twofold in "
+            f"{np.log(2) / growth:.3g} s, so nothing has a stationary variance; it must be stable at this speed"
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Parts:
+    """x' = A x + u in two parts that know nothing of one another: x = V0 a + V b, a' = M a + W0 u, b' = S b + W u.
+
+    M (k, k) has its eigenvalues on the imaginary axis, the first ``zeros`` of its rows those at 0 (nilpotent), the
+    others undamped oscillations; S is stable. V and W are in extended precision.
+    scale (n,): sizes of the states that balance A; rounding is relative to them.
+    """
+
+    M: np.ndarray
+    V0: np.ndarray
+    W0: np.ndarray
+    S: np.ndarray
+    V: np.ndarray
+    W: np.ndarray
+    zeros: int
+    scale: np.ndarray
+
+    @property
+    def marginal(self) -> int:
+        """Number of marginal states."""
+        return len(self.M)
+
+
+def parts(A: np.ndarray, accuracy: float = ACCURACY) -> Parts:
+    """Marginal and stable part of x' = A x + u, A (n, n); raises Unstable.
+
+    ``accuracy`` of A, relative to its norm once its states are scaled: what is smaller counts as zero.
+    """
+    balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    norm = np.linalg.norm(balanced, 2)
+    V, form, zeros = _zeros_first(balanced, accuracy * norm)
+    U, rest, undamped = _undamped_first(form[zeros:, zeros:], 10 * accuracy * norm)
+    k = zeros + undamped
+    V[:, zeros:] = V[:, zeros:] @ U
+    form[:zeros, zeros:] = form[:zeros, zeros:] @ U
+    form[zeros:, zeros:] = rest
+    W = V.T.copy()
+    for size in {k, zeros}:
+        _decouple(form, V, W, size)
+    S, T, back = _by_motions(form[k:, k:])
+    stable = (V[:, k:] @ T, back @ W[k:]) if k else (T, back)
+    return Parts(form[:k, :k], scale[:, None] * V[:, :k], W[:k] / scale, S, scale[:, None] * stable[0],
+                 stable[1] / scale, zeros, scale)  # fmt: skip
+
+
+def _zeros_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int]:
+    """Orthogonal Q, the form Q' A Q with its zero eigenvalues first (strictly upper triangular in blocks), their number.
+
+    Null space, then null space of what remains, until nothing remains to be found: the staircase of Jordan chains.
+    """
+    Q, form, found = np.eye(len(A)), A.copy(), 0
+    while found < len(A):
+        null = int(np.count_nonzero(svdvals(form[found:, found:]) <= tolerance))
+        if null == 0:
+            break
+        turn = svd(form[found:, found:])[2][::-1].T  # null space first
+        Q[:, found:] = Q[:, found:] @ turn
+        form[:, found:] = form[:, found:] @ turn
+        form[found:, found:] = turn.T @ form[found:, found:]
+        form[found:, found : found + null] = 0.0
+        found += null
+    return Q, form, found
+
+
+def _undamped_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int]:
+    """Orthogonal U, the ordered real Schur form U' A U with its undamped pairs first, their eigenvalues' number.
+
+    Raises Unstable if any eigenvalue lies beyond them, on the right.
+    """
+
+    def on_axis(re: np.ndarray, im: np.ndarray) -> np.ndarray:
+        return (im != 0) & (abs(re) <= tolerance)
+
+    values = np.linalg.eigvals(A)
+    own = on_axis(values.real, values.imag)
+    growing = values[~own & (values.real >= 0)]
+    if len(growing):
+        worst = growing[growing.real.argmax()]
+        raise Unstable(worst.real, abs(worst.imag) / (2 * np.pi))
+    if not own.any():
+        return np.eye(len(A)), A, 0
+    form, U, undamped = schur(A, output="real", sort=on_axis)
+    return U, form, undamped
+
+
+def _decouple(form: np.ndarray, V: np.ndarray, W: np.ndarray, k: int) -> None:
+    """Take the coupling form[:k, k:] out of a block triangular form = W A V, by a Sylvester equation, in place."""
+    if 0 < k < len(form):
+        from control import lyap
+
+        Z = lyap(form[:k, :k], -form[k:, k:], form[:k, k:], method="scipy")
+        V[:, k:] += V[:, :k] @ Z
+        W[:k] -= Z @ W[k:]
+        form[:k, k:] = 0.0
+
+
+def _by_motions(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A in coordinates close to its own motions, T^-1 A T, with T and its inverse: real, in extended precision.
+
+    In positions and velocities an acceleration is a small difference of large forces, and a rounding of the state
+    is multiplied by stiffnesses; in these coordinates each motion has its own size. They need not be exact, and
+    where eigenvectors are nearly parallel all stays as it is.
+    """
+    values, vectors = np.linalg.eig(A)
+    T = np.where(values.imag < 0, vectors.imag, vectors.real)
+    same = np.eye(len(A), dtype=np.longdouble)
+    if len(A) == 0 or not np.linalg.cond(T) < PARALLEL:
+        return A, same, same
+    back = np.linalg.inv(T).astype(np.longdouble)
+    wide = T.astype(np.longdouble)
+    back = back @ (2 * same - wide @ back)
+    return (back @ A.astype(np.longdouble) @ wide).astype(float), wide, back
+
+
+PARALLEL = 1e8
+"""Condition beyond which eigenvectors are of no use as coordinates."""
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Per output, of its variance in the long run: rate * t^power (t in s), power 0 where it does not grow."""
+
+    rate: np.ndarray
+    power: np.ndarray
+
+
+def growth(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float], C: np.ndarray, independent: bool,
+           accuracy: float = ACCURACY) -> Growth:  # fmt: skip
+    """What noise through B_i (n, k), delays tau_i (s), does to y = C x along the marginal motions.
+
+    Axles that meet the same noise act as one input, the sum of e^(-M tau_i) W0 B_i: what the first one starts, the
+    last one may stop. C (p, n). Products no larger than TOLD times their accuracy are zero.
+    """
+    join = np.hstack if independent else sum
+    carried = [np.eye(split.marginal) if independent else expm(-split.M * delay) for delay in delays]
+    G = join([E @ split.W0 @ b for E, b in zip(carried, B, strict=True)])
+    reach = np.linalg.norm(split.W0 * split.scale, axis=1, keepdims=True)
+    G_size = join([abs(E) @ reach * np.linalg.norm(b / split.scale[:, None], axis=0)
+                   for E, b in zip(carried, B, strict=True)])  # fmt: skip
+    seen = C @ split.V0
+    seen_size = np.linalg.norm(C * split.scale, axis=1, keepdims=True) * np.ones(split.marginal)
+    z, least = split.zeros, TOLD * accuracy
+    rate, power = _of_zeros(split.M[:z, :z], G[:z], G_size[:z], seen[:, :z], seen_size[:, :z], least)
+    swung = _of_undamped(split.M[z:, z:], G[z:], G_size[z:], seen[:, z:], seen_size[:, z:], least)
+    rate = np.where(power <= 1, rate + swung, rate)
+    return Growth(rate, np.where((power == 0) & (swung > 0), 1, power))
+
+
+def _of_zeros(N: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray, C_size: np.ndarray,
+              least: float) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Rates and powers (p,): h(t) = sum of C N^l G t^l / l!, whose highest power wins."""
+    rate, power = np.zeros(len(C)), np.zeros(len(C), int)
+    step, step_size = G, G_size
+    for level in range(len(N)):
+        factor = C @ step / factorial(level)
+        told = (abs(factor) * factorial(level) > least * (C_size @ step_size)).any(axis=1)
+        rate[told] = (factor[told] ** 2).sum(axis=1) / (2 * level + 1)
+        power[told] = 2 * level + 1
+        step, step_size = N @ step, abs(N) @ step_size
+    return rate, power
+
+
+def _of_undamped(T: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray, C_size: np.ndarray,
+                 least: float) -> np.ndarray:  # fmt: skip
+    """Rates (p,): the mean square of the response C e^(T t) G, frequency by frequency."""
+    rate = np.zeros(len(C))
+    values, vectors = np.linalg.eig(T)
+    right, left = C @ vectors, np.linalg.solve(vectors, G.astype(complex)) if len(T) else G
+    for value in values[values.imag > 0]:
+        same = abs(values - value) < 1e-6 * abs(value)
+        first = bool(same[: np.flatnonzero(values == value)[0]].any())
+        amplitude = right[:, same] @ left[same]
+        told = (abs(amplitude) > least * (C_size @ G_size)).any(axis=1)
+        rate[told] += 0.0 if first else 2 * (abs(amplitude[told]) ** 2).sum(axis=1)
+    return rate

@@ -1,0 +1,134 @@
+"""The covariance in closed form from eigenvectors: fast where many roads and speeds share one vehicle.
+
+A vehicle behind road filters, with weightings behind it, has a block triangular matrix. Each block is diagonalised
+on its own (the vehicle's and the weightings' once for all roads and speeds, a road's in path), and divisions by
+differences of eigenvalues join them. Every covariance then is a sum over pairs, -Q_mn / (s_m + s_n*).
+
+Digits are lost where eigenvectors are nearly parallel, where two eigenvalues of different blocks nearly meet and
+where terms of a sum cancel. ``loss`` estimates how many; who asks decides whether to take the direct way instead.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import matrix_balance
+from scipy.sparse.csgraph import connected_components
+
+from models.ride.covariance import SILENT, hits
+from models.ride.delayed_system import DelayedSystem
+
+
+@dataclass(frozen=True)
+class Modes:
+    """A = V diag(values) V^-1, and the condition of V as it was balanced."""
+
+    A: np.ndarray
+    values: np.ndarray
+    V: np.ndarray
+    inverse: np.ndarray
+    condition: float
+
+
+def modes(A: np.ndarray) -> Modes:
+    """Eigenvalues and vectors of A (n, n), of every part that stands alone for itself: equal parts stay exact."""
+    count, label = connected_components(A != 0, directed=False)
+    values, V, inverse = (np.zeros(shape, complex) for shape in (len(A), A.shape, A.shape))
+    worst = 1.0
+    for part in range(count):
+        at = np.flatnonzero(label == part)
+        balanced, (scale, _) = matrix_balance(A[np.ix_(at, at)], permute=False, separate=True)
+        values[at], own = np.linalg.eig(balanced)
+        worst = max(worst, np.linalg.cond(own))
+        if not np.isfinite(worst) or worst * EPS > 1:
+            return Modes(A, values, V, inverse, np.inf)
+        V[np.ix_(at, at)], inverse[np.ix_(at, at)] = scale[:, None] * own, np.linalg.inv(own) / scale
+    return Modes(A, values, V, inverse, worst)
+
+
+EPS = float(np.finfo(float).eps)
+
+
+class Shared:
+    """Eigen-decompositions of the blocks met so far: roads and speeds that share a block share its modes."""
+
+    def __init__(self) -> None:
+        self.known: dict[bytes, Modes] = {}
+
+    def of(self, A: np.ndarray) -> Modes:
+        """Modes of a block."""
+        key = A.tobytes()
+        if key not in self.known:
+            self.known[key] = modes(A)
+        return self.known[key]
+
+
+@dataclass(frozen=True)
+class Modal:
+    """Per output (p,): variance, ``floor`` that rounding makes of zero, relative error that it may have left (``loss``).
+
+    fastest : rate of the system in 1/s
+    """
+
+    variance: np.ndarray
+    floor: np.ndarray
+    loss: np.ndarray
+    fastest: float
+
+
+def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, shared: Shared) -> Modal | str:
+    """Variances of a system as ``excited`` and ``weighted`` build it, or the reason in words why there are none here.
+
+    vehicle : number of its states, which stand first; road : the filter F (m, m) in path, one per axle behind them;
+    the states of weightings stand last.
+    """
+    axles = len(system.B)
+    last = vehicle + axles * len(road)
+    A = system.A
+    own = shared.of(A[:vehicle, :vehicle])
+    path = shared.of(road)
+    behind = shared.of(A[last:, last:])
+    if max(each.condition for each in (own, path, behind)) * EPS > 1e-6:
+        return "eigenvectors are nearly parallel"
+    values = [own.values, np.tile(speed * path.values, axles), behind.values]
+    if max(each.real.max(initial=-np.inf) for each in values) > -1e-6:
+        return "a motion does not die out"
+    V, back = np.kron(np.eye(axles), path.V), np.kron(np.eye(axles), path.inverse)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        met = _joined(own, A[:vehicle, vehicle:last] @ V, values[1])
+        felt = _joined(behind, A[last:, :vehicle] @ own.V, values[0])
+        heard = _joined(behind, A[last:, :vehicle] @ met + A[last:, vehicle:last] @ V, values[1])
+    C = [system.C[:, :vehicle], system.C[:, vehicle:last], system.C[:, last:]]
+    C = np.hstack([C[0] @ own.V + C[2] @ felt, C[0] @ met + C[1] @ V + C[2] @ heard, C[2] @ behind.V])
+    B, _, delays = hits(system)
+    inputs = []
+    for b in B:
+        of_road = back @ b[vehicle:last]
+        of_vehicle = own.inverse @ (b[:vehicle] - met @ of_road)
+        of_weighting = behind.inverse @ (b[last:] - felt @ of_vehicle - heard @ of_road)
+        inputs.append(np.vstack([of_vehicle, of_road, of_weighting]))
+    condition = own.condition * path.condition * behind.condition
+    return _summed(np.concatenate(values), C, inputs, delays, system.independent, condition)
+
+
+def _joined(block: Modes, coupling: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """X of A X + coupling = X diag(values) for a diagonalised A."""
+    return block.V @ ((block.inverse @ coupling) / (values - block.values[:, None]))
+
+
+def _summed(s: np.ndarray, C: np.ndarray, inputs: list[np.ndarray], delays: list[float], independent: bool,
+            condition: float) -> Modal | str:  # fmt: skip
+    """Variances of y = C x, x_m' = s_m x_m + noise through the inputs, hit after hit."""
+    before = np.zeros_like(inputs[0])
+    Q = np.zeros((len(s), len(s)), complex)
+    for j, b in enumerate(inputs):
+        if j and not independent:
+            before = np.exp(s * (delays[j] - delays[j - 1]))[:, None] * (before + inputs[j - 1])
+        Q += b @ b.conj().T + before @ b.conj().T + b @ before.conj().T
+    P = -Q / (s[:, None] + s.conj())
+    variance = ((C @ P) * C.conj()).sum(axis=1).real
+    size = ((abs(C) @ abs(P)) * abs(C)).sum(axis=1)
+    if not np.isfinite(size).all():
+        return "two eigenvalues of vehicle, road and weighting meet"
+    floor = SILENT * (abs(C) ** 2).max(axis=1) * abs(P).max()
+    loss = EPS * condition * np.divide(size, abs(variance), out=np.full(len(C), np.inf), where=variance != 0)
+    return Modal(variance.clip(0.0), floor, np.where(size > floor, loss, 0.0), float(abs(s).max()))
