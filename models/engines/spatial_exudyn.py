@@ -1,0 +1,416 @@
+"""A vehicle in space in Exudyn: kinematic trees with a link per coordinate, native spring-dampers between points.
+
+A body without parent and all that ride on it are one tree; only the last link of a body has mass. (Rigid bodies whose
+missing freedoms are constrained would be wrong: the explicit solvers drop constrained rows after solving with the
+full mass matrix, which couples them.) What Exudyn has no item for is a function in Python: curves and friction,
+inclined axes between two bodies that turn, anti-roll bars, side forces, the road.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import exudyn as exu
+import exudyn.itemInterface as typed_items
+import numpy as np
+
+from models.engines.protocol import Settings
+from models.engines.spatial_protocol import (
+    DIFFERENCES,
+    EngineKinematics,
+    SpatialRun,
+    curves,
+    difference_step,
+    linear_vehicle,
+    sound,
+    timed,
+)
+from models.ride.linear_vehicle import LinearVehicle
+from models.vehicles.spatial import (
+    FREEDOMS,
+    AntiRollBar,
+    Body,
+    PointOutput,
+    SideForce,
+    SpatialVehicle,
+    SpringDamper,
+    TurnOutput,
+    Tyre,
+    Vector,
+)
+from models.vehicles.spatial_linear import Preloads, preloads
+
+exu.config.printToConsole = False
+KINDS = exu.OutputVariableType
+lists: Any = exu
+items: Any = typed_items
+"""Exudyn's type hints know neither how its lists are made nor that a function is a user function."""
+JOINTS = dict(zip(FREEDOMS, (
+    exu.JointType.PrismaticX, exu.JointType.PrismaticY, exu.JointType.PrismaticZ,
+    exu.JointType.RevoluteX, exu.JointType.RevoluteY, exu.JointType.RevoluteZ), strict=True))  # fmt: skip
+
+
+@dataclass
+class RoadTable:
+    """Heights and rates under the tyres as the loads read them: columns of values per half step."""
+
+    columns: list[list[float]]
+    per_time: float
+
+    def force(self, wheel: int, stiffness: float, damping: float, t: float) -> float:
+        """Force (N) of the road through one tyre at a time."""
+        row, count = round(t * self.per_time), len(self.columns) // 2
+        return stiffness * self.columns[wheel][row] + damping * self.columns[count + wheel][row]
+
+
+@dataclass
+class Build:
+    """Exudyn's system while it is put together.
+
+    links: (tree, last link) of every body; places: (node, index within it) of every coordinate; markers by body and
+    point.
+    """
+
+    vehicle: SpatialVehicle
+    mbs: Any
+    held: Preloads
+    ground: Any
+    links: dict[str, tuple[Any, int]] = field(default_factory=dict)
+    places: dict[tuple[str, str], tuple[Any, int]] = field(default_factory=dict)
+    markers: dict[tuple[str | None, Vector], Any] = field(default_factory=dict)
+    callbacks: int = 0
+
+    def marker(self, body: str | None, point: Vector) -> Any:
+        """Marker of a point, made once."""
+        key = (body, point)
+        if key not in self.markers:
+            self.markers[key] = self.mbs.AddMarker(self._new_marker(body, point))
+        return self.markers[key]
+
+    def _new_marker(self, body: str | None, point: Vector) -> Any:
+        if body is None:
+            return items.MarkerBodyRigid(bodyNumber=self.ground, localPosition=list(point))
+        (tree, link), local = self.links[body], np.subtract(point, self.vehicle.body(body).position)
+        return items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localPosition=local)
+
+    def reader(self, body: str, freedom: str, kind: Any = KINDS.Coordinates) -> Callable[[], float]:
+        """Function that reads a coordinate, or its rate, at the stage; 0 where the body does not have it."""
+        if (body, freedom) not in self.places:
+            return lambda: 0.0
+        read, (node, index) = self.mbs.GetNodeOutput, self.places[body, freedom]
+        return lambda: read(node, kind)[index]
+
+    def steady(self, body: str | None) -> bool:
+        """Whether a body never turns."""
+        if body is None:
+            return True
+        own = self.vehicle.body(body)
+        return not any(freedom.startswith("r") for freedom in own.freedoms) and self.steady(own.parent)
+
+    def connect(self, first: Any, second: Any, law: Callable[[Any, Any], list[float]]) -> None:
+        """Two points and the force (N, space's axes) on the first by the second's position and rate beside it."""
+        self.mbs.AddObject(items.CartesianSpringDamper(
+            markerNumbers=[first, second],
+            springForceUserFunction=lambda mbs, t, item, apart, rate, k, d, offset: law(apart, rate)))  # fmt: skip
+        self.callbacks += 1
+
+
+def _tree(built: Build, bodies: list[Body]) -> None:
+    """A body without parent and its riders: a link per coordinate, mass on the last one of each body."""
+    joints, parents, offsets, inertias, masses = [], [], [], [], []
+    last: dict[str, int] = {}
+    places = []
+    for body in bodies:
+        parent = -1 if body.parent is None else last[body.parent]
+        origin = (0.0, 0.0, 0.0) if body.parent is None else built.vehicle.body(body.parent).position
+        for freedom in (freedom for freedom in FREEDOMS if freedom in body.freedoms):
+            joints.append(JOINTS[freedom])
+            parents.append(parent)
+            offsets.append(np.subtract(body.position, origin))
+            inertias.append(np.zeros((3, 3)))
+            masses.append(0.0)
+            places.append((body.name, freedom))
+            parent, origin = len(joints) - 1, body.position
+        inertias[-1], masses[-1] = np.array(body.inertia, float), body.mass
+        last[body.name] = len(joints) - 1
+    n, zero = len(joints), [0.0] * len(joints)
+    node = built.mbs.AddNode(items.NodeGenericODE2(
+        referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero, numberOfODE2Coordinates=n))
+    tree = built.mbs.AddObject(items.ObjectKinematicTree(
+        nodeNumber=node, gravity=[0, 0, -built.vehicle.gravity], jointTypes=joints, linkParents=parents,
+        jointTransformations=lists.Matrix3DList([np.eye(3)] * n), jointOffsets=lists.Vector3DList(offsets),
+        linkInertiasCOM=lists.Matrix3DList(inertias), linkCOMs=lists.Vector3DList([np.zeros(3)] * n),
+        linkMasses=masses))  # fmt: skip
+    built.links |= {name: (tree, link) for name, link in last.items()}
+    built.places |= {place: (node, i) for i, place in enumerate(places)}
+
+
+def _trees(vehicle: SpatialVehicle) -> list[list[Body]]:
+    """Bodies without parent, each with all that ride on it, parents first."""
+    roots: dict[str, str] = {}
+    for body in vehicle.bodies:
+        roots[body.name] = body.name if body.parent is None else roots[body.parent]
+    return [[body for body in vehicle.bodies if roots[body.name] == root] for root in dict.fromkeys(roots.values())]
+
+
+def _spring(built: Build, spring: SpringDamper) -> None:
+    """Native where Exudyn has an item for it: along a global axis, or along any axis of a body that never turns."""
+    axis, ends = np.array(spring.axis), [spring.one, spring.two]
+    one, two = built.marker(spring.one, spring.point_one), built.marker(spring.two, spring.point_two)
+    rest = np.subtract(spring.point_two, spring.point_one)
+    curved = spring.travel_force or spring.rate_force or spring.friction
+    if curved or not (np.count_nonzero(axis) == 1 or any(built.steady(end) for end in ends)):
+        built.connect(one, two, _law(spring, axis, rest, built.held.parts[spring.name]))
+        return
+    sunk = built.held.parts[spring.name] / spring.stiffness if spring.stiffness else 0.0
+    if np.count_nonzero(axis) == 1:
+        built.mbs.AddObject(items.CartesianSpringDamper(
+            markerNumbers=[one, two], stiffness=spring.stiffness * axis**2, damping=spring.damping * axis**2,
+            offset=rest - sunk * axis))  # fmt: skip
+        return
+    sign = 1 if built.steady(spring.one) else -1  # the axis is one of the first marker's body
+    built.mbs.AddObject(items.LinearSpringDamper(
+        markerNumbers=[one, two][::sign], axisMarker0=sign * axis, stiffness=spring.stiffness, damping=spring.damping,
+        offset=float(axis @ rest) - sunk))  # fmt: skip
+
+
+def _law(spring: SpringDamper, axis: np.ndarray, rest: np.ndarray, held: float) -> Callable[[Any, Any], list[float]]:
+    """All terms of a spring-damper's force."""
+    (ax, ay, az), design = axis.tolist(), float(axis @ rest)
+    k, c, dry, dry_rate = spring.stiffness, spring.damping, spring.friction, spring.friction_rate
+    travel_force, rate_force = spring.travel_force, spring.rate_force
+
+    def law(apart: Any, rates: Any) -> list[float]:
+        travel = ax * apart[0] + ay * apart[1] + az * apart[2] - design
+        rate = ax * rates[0] + ay * rates[1] + az * rates[2]
+        force = held + k * travel + c * rate
+        if travel_force is not None:
+            force += travel_force(travel)
+        if rate_force is not None:
+            force += rate_force(rate)
+        if dry:
+            force += dry * float(np.tanh(rate / dry_rate))
+        return [force * ax, force * ay, force * az]
+
+    return law
+
+
+def _bar(built: Build, bar: AntiRollBar) -> None:
+    """Vertical forces between the two points, and the moment on the body's roll coordinate."""
+    left, right = built.marker(bar.left, bar.point_left), built.marker(bar.right, bar.point_right)
+    roll, turning = built.reader(bar.body, "rx"), built.reader(bar.body, "rx", KINDS.Coordinates_t)
+    rest, held, track, read = bar.point_right[2] - bar.point_left[2], built.held.parts[bar.name], bar.track, built.mbs
+    k, c = bar.stiffness, bar.damping
+
+    def moment(apart: float, rate: float) -> float:
+        """From the right point's height and its rate beside the left one's."""
+        twisting = c * (rate / track + turning()) if c else 0.0
+        return held + k * ((apart - rest) / track + roll()) + twisting
+
+    def on_body(mbs: Any, t: float, item: int, angle: float, rate: float, k: float, d: float, offset: float) -> float:
+        heights = [read.GetMarkerOutput(marker, KINDS.Position)[2] for marker in (right, left)]
+        rates = [read.GetMarkerOutput(marker, KINDS.Velocity)[2] for marker in (right, left)] if c else [0.0, 0.0]
+        return moment(heights[0] - heights[1], rates[0] - rates[1])
+
+    built.connect(left, right, lambda apart, rate: [0.0, 0.0, moment(apart[2], rate[2]) / track])
+    if (bar.body, "rx") in built.places:
+        node, index = built.places[bar.body, "rx"]
+        still = built.mbs.AddMarker(items.MarkerNodeCoordinate(
+            nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
+        rolling = built.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=index))
+        built.mbs.AddObject(items.CoordinateSpringDamper(
+            markerNumbers=[still, rolling], springForceUserFunction=on_body))  # fmt: skip
+        built.callbacks += 1
+
+
+def _tyre(built: Build, tyre: Tyre, wheel: int, road: RoadTable) -> None:
+    """A spring-damper to the flat ground, and what the road adds as a load."""
+    marker, held = built.marker(tyre.body, tyre.point), built.held.tyres[tyre.name]
+    sunk = held / tyre.stiffness if tyre.stiffness else 0.0
+    built.mbs.AddObject(items.CartesianSpringDamper(
+        markerNumbers=[built.marker(None, tyre.point), marker], stiffness=[0, 0, tyre.stiffness],
+        damping=[0, 0, tyre.damping], offset=[0, 0, sunk]))  # fmt: skip
+    k, c = tyre.stiffness, tyre.damping
+
+    def lift(mbs: Any, t: float, load: Any) -> Any:
+        return [0.0, 0.0, road.force(wheel, k, c, t)]
+
+    built.mbs.AddLoad(items.LoadForceVector(markerNumber=marker, loadVectorUserFunction=lift))
+    built.callbacks += 1
+
+
+def _side_force(built: Build, force: SideForce, speed: float) -> None:
+    roll, yaw = (built.reader(force.chassis, freedom) for freedom in ("rx", "rz"))
+
+    def law(apart: Any, rate: Any) -> list[float]:
+        return [0.0, force.stiffness * (rate[1] / speed - force.roll_steer * roll() - yaw()), 0.0]
+
+    built.connect(built.marker(None, force.point), built.marker(force.body, force.point), law)
+
+
+def _assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadTable) -> Build:
+    mbs = exu.SystemContainer().AddSystem()
+    built = Build(vehicle, mbs, preloads(vehicle), mbs.AddObject(items.ObjectGround()))
+    for bodies in _trees(vehicle):
+        _tree(built, bodies)
+    for spring in vehicle.springs:
+        _spring(built, spring)
+    for bar in vehicle.bars:
+        _bar(built, bar)
+    for wheel, tyre in enumerate(vehicle.tyres):
+        _tyre(built, tyre, wheel, road)
+    for force in vehicle.side_forces:
+        _side_force(built, force, float(speed or 0.0))
+    for drag in vehicle.drags:
+        centre = vehicle.body(drag.body).position
+        built.mbs.AddObject(items.CartesianSpringDamper(
+            markerNumbers=[built.marker(None, centre), built.marker(drag.body, centre)],
+            damping=[drag.coefficient * float(speed or 0.0), 0, 0]))  # fmt: skip
+    for output in vehicle.outputs:
+        if isinstance(output, PointOutput | TurnOutput):
+            built.marker(output.body, getattr(output, "point", vehicle.body(output.body).position))
+    return built
+
+
+class SpatialExudyn:
+    """One vehicle in one Exudyn system."""
+
+    def __init__(self, vehicle: SpatialVehicle, settings: Settings | None, speed: float | None,
+                 road: np.ndarray | None) -> None:  # fmt: skip
+        self.vehicle, self.settings = vehicle, settings
+        self.size = len(vehicle.coordinates())
+        per_time = 2.0 / settings.step if settings is not None and road is not None else 0.0
+        self._flat = np.zeros((1, 2 * len(vehicle.tyres)))
+        self.road = RoadTable((self._flat if road is None else road).T.tolist(), per_time)
+        self.built = _assemble(vehicle, speed, self.road)
+        mbs = self.mbs = self.built.mbs
+        places = [self.built.places[place] for place in vehicle.coordinates()]
+        self._nodes = list(dict.fromkeys(node for node, _ in places))
+        self._sensors = [[mbs.AddSensor(items.SensorNode(
+            nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind)) for node in self._nodes]
+            for kind in (KINDS.Coordinates, KINDS.Coordinates_t)]  # fmt: skip
+        mbs.Assemble()
+        self._columns = [mbs.GetNodeODE2Index(node) + index for node, index in places]
+
+    def _all(self, values: np.ndarray) -> np.ndarray:
+        """Values (n,) in Exudyn's own order, tree by tree."""
+        out = np.empty(self.size)
+        out[self._columns] = values
+        return out
+
+    def _start(self, q: np.ndarray, v: np.ndarray) -> None:
+        data, initial = self.mbs.systemData, exu.ConfigurationType.Initial
+        data.SetODE2Coordinates(self._all(q), initial)
+        data.SetODE2Coordinates_t(self._all(v), initial)
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
+        """Accelerations (n,) from Exudyn's own residual and mass matrix; ``road`` (2 w,) as in the protocol."""
+        mass, force = self._mass_and_force(q, v, self._flat[0] if road is None else road)
+        return np.linalg.solve(mass, force)
+
+    def _mass_and_force(self, q: np.ndarray, v: np.ndarray, road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        table = self.road.columns, self.road.per_time
+        self.road.columns, self.road.per_time = [[float(value)] for value in road], 0.0
+        self._start(q, v)
+        solver: Any = exu.MainSolverImplicitSecondOrder()
+        options = exu.SimulationSettings()
+        options.solution.file.write = options.solution.sensors.active = False
+        solver.InitializeSolver(self.mbs, options)
+        solver.ComputeMassMatrix(self.mbs)
+        solver.ComputeODE2RHS(self.mbs)
+        mass = np.asarray(solver.GetSystemMassMatrix(), dtype=float)[np.ix_(self._columns, self._columns)]
+        force = np.asarray(solver.GetSystemResidual(), dtype=float)[self._columns]
+        solver.FinalizeSolver(self.mbs, options)
+        self.road.columns, self.road.per_time = table
+        return mass, force
+
+    def linearise(self) -> LinearVehicle:
+        """Exudyn's own linearised system about the design position, on a flat road.
+
+        Of a tree Exudyn differentiates by one forward difference, which loses half of the digits. Asked at several
+        steps to both sides, its answers combine to central differences of order six.
+        """
+        zero, h = np.zeros(self.size), difference_step(self.vehicle)
+        table = self.road.columns, self.road.per_time
+        self.road.columns, self.road.per_time = self._flat.T.tolist(), 0.0
+        self._start(zero, zero)
+        found = {i: self._linearised(i * h) for weight in DIFFERENCES for i in (weight, -weight)}
+        self.road.columns, self.road.per_time = table
+        stiffness, damping = (sum(w * i * (found[i][part] + found[-i][part]) for i, w in DIFFERENCES.items())
+                              for part in (1, 2))  # fmt: skip
+        motion = EngineKinematics(self.vehicle, self._shift, self._turn)
+        return linear_vehicle("exudyn", self.vehicle, motion, found[1][0], damping, stiffness, self._road_columns())
+
+    def _linearised(self, step: float) -> list[np.ndarray]:
+        """[M, K, D] of Exudyn with forward differences of this step; it may be negative."""
+        options = exu.SimulationSettings()
+        options.solution.file.write = options.solution.sensors.active = False
+        numerical = options.staticSolver.newton.numericalDifferentiation
+        numerical.forODE2 = numerical.doSystemWideDifferentiation = True
+        checks = exu.special.exceptions.parameterRangeChecks
+        exu.special.exceptions.parameterRangeChecks = False  # a negative step is outside of the range
+        numerical.relativeEpsilon, numerical.minimumCoordinateSize = step, 1.0
+        exu.special.exceptions.parameterRangeChecks = checks
+        own = np.ix_(self._columns, self._columns)
+        return [np.asarray(part)[own] for part in self.mbs.ComputeLinearizedSystem(simulationSettings=options)]
+
+    def _road_columns(self) -> np.ndarray:
+        """Generalised forces (n, 2 w) per metre and per m/s of the road under each tyre: loads are linear in it."""
+        zero = np.zeros(self.size)
+        flat = self._mass_and_force(zero, zero, self._flat[0])[1]
+        units = np.eye(2 * len(self.vehicle.tyres))
+        return np.column_stack([self._mass_and_force(zero, zero, unit)[1] - flat for unit in units])
+
+    def _shift(self, body: str, point: Vector) -> np.ndarray:
+        return self._jacobian(self.built.marker(body, point), KINDS.Velocity)
+
+    def _turn(self, body: str) -> np.ndarray:
+        return self._jacobian(self.built.marker(body, self.vehicle.body(body).position), KINDS.AngularVelocity)
+
+    def _jacobian(self, marker: Any, kind: Any) -> np.ndarray:
+        """(3, n) of a marker in the design position: its velocity by each rate of 1."""
+        data, columns = self.mbs.systemData, []
+        data.SetODE2Coordinates(np.zeros(self.size))
+        for unit in np.eye(self.size):
+            data.SetODE2Coordinates_t(self._all(unit))
+            columns.append(np.array(self.mbs.GetMarkerOutput(marker, kind)))
+        return np.column_stack(columns)
+
+    def run(self, q: np.ndarray, v: np.ndarray) -> SpatialRun:
+        """March from positions and rates (n,) over the duration; RunFailed unless all of it is finite and sane."""
+        own, options, note = timed("exudyn", self.settings), exu.SimulationSettings(), ""
+        options.solution.file.write = False
+        options.solution.sensors.active, options.solution.sensors.writePeriod = True, own.step
+        ti = options.timeIntegration
+        ti.numberOfSteps, ti.endTime, ti.verboseMode = own.steps, own.duration, 0
+        ti.adaptiveStep = ti.automaticStepSize = False
+        ti.explicit.computeEndOfStepAccelerations = False
+        self._start(q, v)
+        try:
+            if not self.mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, own.integrator)):
+                note = "; the solver reported failure"
+        except (exu.ExudynError, RuntimeError, ValueError) as error:
+            if "KeyboardInterrupt" in str(error):
+                raise KeyboardInterrupt from error
+            note = f"; the solver stopped: {str(error).strip().splitlines()[0]}"
+        times, states = self._recorded(own)
+        return sound("exudyn", own, times, states, note, {"steps": own.steps, "force calls": 4 * own.steps})
+
+    def _recorded(self, own: Settings) -> tuple[np.ndarray, np.ndarray]:
+        """Times (m,) and states (m, 2 n) from the sensors. Steps are counted: Exudyn's sum of them ends 1e-13 early."""
+        read = self.mbs.GetSensorStoredData
+        halves = [np.hstack([read(sensor)[:, 1:] for sensor in sensors])[:, self._columns] for sensors in self._sensors]
+        found, times = read(self._sensors[0][0])[:, 0], own.step * np.arange(len(halves[0]))
+        times = times if np.allclose(found, times, rtol=0, atol=1e-9 * own.duration) else found
+        return times, np.hstack(halves)
+
+    def plan(self) -> dict[str, int]:
+        """What was built: degrees of freedom, native items, callbacks, and curves among these."""
+        return {"degrees of freedom": self.size, "native items": self.mbs.systemData.NumberOfObjects(),
+                "callbacks": self.built.callbacks, "curves": curves(self.vehicle)}  # fmt: skip
+
+
+def build(vehicle: SpatialVehicle, settings: Settings | None, speed: float | None,
+          road: np.ndarray | None) -> SpatialExudyn:  # fmt: skip
+    """The Exudyn model of a vehicle in space."""
+    return SpatialExudyn(vehicle, settings, speed, road)

@@ -1,0 +1,298 @@
+"""A vehicle in space in MuJoCo: native bodies and joints; forces through one compiled callback.
+
+World axes are those of ride, z up. A body has one joint per freedom, in their order, so that MuJoCo's coordinates are
+the vehicle's own. Masses and inertias are written into the compiled model: MuJoCo refuses bodies without inertia,
+even where they never turn, and tensors that no distribution of mass has, which published vehicles contain.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+
+from models.engines.mujoco import CHUNK, quiet
+from models.engines.mujoco_callback import installed
+from models.engines.mujoco_layout import check
+from models.engines.protocol import Settings, guard
+from models.engines.spatial_mujoco_callback import spatial_law
+from models.engines.spatial_protocol import (
+    EngineKinematics,
+    SpatialRun,
+    curves,
+    difference_step,
+    jacobian,
+    linear_vehicle,
+    sound,
+    timed,
+)
+from models.errors import RunFailed
+from models.ride.linear_vehicle import LinearVehicle
+from models.vehicles.curve import Curve
+from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle, Vector
+from models.vehicles.spatial_linear import preloads
+
+UP: Vector = (0.0, 0.0, 1.0)
+AXES = {freedom: np.eye(3)[i % 3].tolist() for i, freedom in enumerate(FREEDOMS)}
+Place = tuple[str | None, Vector, Vector]
+"""Body, point and axis."""
+
+
+def _spec(vehicle: SpatialVehicle, step: float) -> mujoco.MjSpec:
+    """Bodies and joints, with masses and inertias of 1 for the moment (see ``_weigh``)."""
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.option.gravity = [0, 0, -vehicle.gravity]
+    spec.option.timestep, spec.option.integrator = step, mujoco.mjtIntegrator.mjINT_RK4
+    off = mujoco.mjtDisableBit
+    spec.option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT
+    for body in vehicle.bodies:
+        below = spec.worldbody if body.parent is None else spec.body(body.parent)
+        origin = (0.0, 0.0, 0.0) if body.parent is None else vehicle.body(body.parent).position
+        own = below.add_body(name=body.name, pos=np.subtract(body.position, origin), mass=1.0, ipos=[0, 0, 0],
+                             iquat=_principal(body)[1], inertia=[1.0, 1.0, 1.0], explicitinertial=True)  # fmt: skip
+        for freedom in (freedom for freedom in FREEDOMS if freedom in body.freedoms):
+            turns = freedom.startswith("r")
+            kind = mujoco.mjtJoint.mjJNT_HINGE if turns else mujoco.mjtJoint.mjJNT_SLIDE
+            own.add_joint(name=f"{body.name} {freedom}", type=kind, axis=AXES[freedom])
+    return spec
+
+
+def _principal(body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Principal inertias (3,) and the quaternion of their axes; nothing turns where there are no products."""
+    tensor, quaternion = np.array(body.inertia, float), np.array([1.0, 0.0, 0.0, 0.0])
+    if np.array_equal(tensor, np.diag(tensor.diagonal())):
+        return tensor.diagonal(), quaternion
+    principal, axes = np.linalg.eigh(tensor)
+    axes[:, 0] *= np.sign(np.linalg.det(axes))
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
+    return principal, quaternion
+
+
+def _weigh(model: mujoco.MjModel, bodies: tuple[Body, ...]) -> None:
+    """Give the bodies their masses and principal inertias."""
+    for body in bodies:
+        number = model.body(body.name).id
+        model.body_mass[number], model.body_inertia[number] = body.mass, _principal(body)[0]
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+
+
+@dataclass(frozen=True)
+class Element:
+    """A force F against the travel s = own coordinate + sum of axis . point - value at rest, less the tyre's road.
+
+    F = held + stiffness s + damping s' + curves + friction + sum of gain * coordinate (``steered``): what acts on
+    every coordinate q is -F ds/dq.
+    """
+
+    points: tuple[Place, ...]
+    stiffness: float = 0.0
+    damping: float = 0.0
+    held: float = 0.0
+    friction: tuple[float, float] = (0.0, 1.0)
+    tyre: int = -1
+    own: tuple[tuple[str, str], float] | None = None
+    steered: tuple[tuple[tuple[str, str], float], ...] = ()
+    on_travel: Curve | None = None
+    on_rate: Curve | None = None
+
+
+def elements(vehicle: SpatialVehicle, speed: float | None) -> list[Element]:
+    """Everything that acts in a vehicle besides weights and inertia."""
+    held, v, found = preloads(vehicle), float(speed or 0.0), []
+    for s in vehicle.springs:
+        points = ((s.two, s.point_two, s.axis), (s.one, s.point_one, _scaled(s.axis, -1.0)))
+        found.append(Element(points, s.stiffness, s.damping, held.parts[s.name], (s.friction, s.friction_rate),
+                             on_travel=s.travel_force, on_rate=s.rate_force))  # fmt: skip
+    for bar in vehicle.bars:
+        down, up = _scaled(UP, -1.0 / bar.track), _scaled(UP, 1.0 / bar.track)
+        found.append(Element(((bar.left, bar.point_left, down), (bar.right, bar.point_right, up)), bar.stiffness,
+                             bar.damping, held.parts[bar.name], own=((bar.body, "rx"), 1.0)))  # fmt: skip
+    for i, tyre in enumerate(vehicle.tyres):
+        found.append(Element(((tyre.body, tyre.point, UP),), tyre.stiffness, tyre.damping,
+                             -held.tyres[tyre.name], tyre=i))  # fmt: skip
+    for f in vehicle.side_forces:
+        steered = (((f.chassis, "rx"), -f.stiffness * f.roll_steer), ((f.chassis, "rz"), -f.stiffness))
+        found.append(Element(((f.body, f.point, (0.0, 1.0, 0.0)),), damping=f.stiffness / v, steered=steered))
+    for drag in vehicle.drags:
+        centre = vehicle.body(drag.body).position
+        found.append(Element(((drag.body, centre, (1.0, 0.0, 0.0)),), damping=drag.coefficient * v))
+    return found
+
+
+def _scaled(axis: Vector, factor: float) -> Vector:
+    return (factor * axis[0], factor * axis[1], factor * axis[2])
+
+
+def _packed(element: Element, vehicle: SpatialVehicle, model: mujoco.MjModel) -> list[float]:
+    """An element as the callback reads it."""
+    places: dict[tuple[str, str], int] = {place: i for i, place in enumerate(vehicle.coordinates())}
+    points = [(body, point, axis) for body, point, axis in element.points if body is not None]
+    rest = sum(float(np.dot(point, axis)) for _, point, axis in points)
+    own = places.get(element.own[0], -1) if element.own else -1
+    steered = [value for place, gain in element.steered for value in (places.get(place, -1), gain)]
+    of_points = [value for body, point, axis in points for value in (
+        model.body(body).id, _last(model, model.body(body).id),
+        *np.subtract(point, vehicle.body(body).position), *axis)]  # fmt: skip
+    curves = [element.on_travel, element.on_rate]
+    counts = [len(curve.arguments) if curve else 0 for curve in curves]
+    pairs = [value for curve in curves if curve for pair in zip(curve.arguments, curve.forces, strict=True)
+             for value in pair]  # fmt: skip
+    gain = element.own[1] if element.own else 0.0
+    law = [element.stiffness, element.damping, element.held, *element.friction, element.tyre, own, gain, rest,
+           *(steered or [-1, 0.0, -1, 0.0]), len(points), *counts]  # fmt: skip
+    return [1.0 + len(law) + len(of_points) + len(pairs), *law, *of_points, *pairs]
+
+
+def _last(model: mujoco.MjModel, body: int) -> int:
+    """The last joint that moves a body, -1 if none does."""
+    while body and not model.body_jntnum[body]:
+        body = model.body_parentid[body]
+    return int(model.body_jntadr[body] + model.body_jntnum[body] - 1) if body else -1
+
+
+def _compiled(vehicle: SpatialVehicle, step: float, speed: float | None, road: np.ndarray,
+              per_time: float) -> mujoco.MjModel:  # fmt: skip
+    """The model with all numbers of the callback in its numeric data."""
+    spec = _spec(vehicle, step)
+    plain = spec.compile()
+    tree = [value for i in range(plain.njnt) for value in (
+        float(plain.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE), float(plain.dof_parentid[i]))]  # fmt: skip
+    packed = [_packed(element, vehicle, plain) for element in elements(vehicle, speed)]
+    content = np.concatenate([tree, *packed])
+    begins = 8 + len(content)
+    header = [per_time, len(road), len(vehicle.tyres), plain.njnt, plain.nbody, len(packed), begins, begins + road.size]
+    spec.add_numeric(name="vehicle", size=begins + road.size, data=[0.0])
+    model = spec.compile()
+    model.numeric_data[:] = np.concatenate([header, content, road.ravel()])
+    _weigh(model, vehicle.bodies)
+    return model
+
+
+class SpatialMujoco:
+    """One vehicle in one MuJoCo model."""
+
+    def __init__(self, vehicle: SpatialVehicle, settings: Settings | None, speed: float | None,
+                 road: np.ndarray | None) -> None:  # fmt: skip
+        self.vehicle, self.settings = vehicle, settings
+        self._flat = np.zeros(2 * len(vehicle.tyres))
+        step = settings.step if settings else 1e-3
+        table = self._flat[None, :] if road is None else road
+        self.model = _compiled(vehicle, step, speed, table, 0.0 if road is None else 2.0 / step)
+        self.data = mujoco.MjData(self.model)
+        self.law: Any = spatial_law()
+        check(self.model, self.data)
+
+    @contextmanager
+    def _forces(self) -> Iterator[None]:
+        """The callback is installed; refused where another one is."""
+        if mujoco.get_mjcb_control() is not None or mujoco.get_mjcb_passive() is not None:
+            raise RunFailed("mujoco", "another callback is installed in this process: its forces would act here, too")
+        with installed(self.law):
+            yield
+
+    @contextmanager
+    def _still(self) -> Iterator[np.ndarray]:
+        """The callback reads the row (2 w,) of the road that is given here, at every time."""
+        numbers = self.model.numeric_data
+        first = int(numbers[6])
+        row = numbers[first : first + len(self._flat)]
+        before = numbers[0], row.copy()
+        numbers[0] = 0.0
+        try:
+            with self._forces():
+                yield row
+        finally:
+            numbers[0], row[:] = before
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
+        """Accelerations (n,) at positions and rates (n,); ``road`` (2 w,) as in the protocol."""
+        with self._still() as row:
+            row[:] = self._flat if road is None else road
+            return self._acceleration(q, v)
+
+    def _acceleration(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        self.data.time, self.data.qpos[:], self.data.qvel[:] = 0.0, q, v
+        mujoco.mj_forward(self.model, self.data)
+        return self.data.qacc.copy()
+
+    def linearise(self) -> LinearVehicle:
+        """M from MuJoCo; D, K and the road's columns by central differences of the acceleration, callback included."""
+        n, zero, h = self.model.nv, np.zeros(self.model.nv), difference_step(self.vehicle)
+        with self._still() as row:
+            row[:] = 0.0
+            stiffness = jacobian(lambda q: self._acceleration(q, zero), n, h)
+            damping = jacobian(lambda v: self._acceleration(zero, v), n, h)
+            road = jacobian(lambda z: self._on_road(row, z), len(row), h)
+            row[:] = 0.0
+            self._acceleration(zero, zero)
+        mass = np.empty((n, n))
+        mujoco.mj_fullM(self.model, self.data, mass)
+        motion = EngineKinematics(self.vehicle, self._shift, self._turn)
+        return linear_vehicle("mujoco", self.vehicle, motion, mass, -mass @ damping, -mass @ stiffness,
+                              mass @ road)  # fmt: skip
+
+    def _on_road(self, row: np.ndarray, road: np.ndarray) -> np.ndarray:
+        """Accelerations in the design position on a road (2 w,)."""
+        row[:] = road
+        return self._acceleration(np.zeros(self.model.nv), np.zeros(self.model.nv))
+
+    def _shift(self, body: str, point: Vector) -> np.ndarray:
+        return self._jacobians(body, np.array(point, float))[0]
+
+    def _turn(self, body: str) -> np.ndarray:
+        return self._jacobians(body, np.zeros(3))[1]
+
+    def _jacobians(self, body: str, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(3, n) of a point and of its body's turning, in the design position."""
+        shift, turn = np.empty((2, 3, self.model.nv))
+        self.data.qpos[:] = 0.0
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_jac(self.model, self.data, shift, turn, point, self.model.body(body).id)
+        return shift, turn
+
+    def run(self, q: np.ndarray, v: np.ndarray) -> SpatialRun:
+        """March from positions and rates (n,) over the duration; RunFailed unless all of it is finite and sane."""
+        own = timed("mujoco", self.settings)
+        states = np.empty((own.steps + 1, 2 * self.model.nv))
+        states[0] = np.concatenate((q, v))
+        for warning in self.data.warning:
+            warning.number = 0
+        with self._forces(), quiet():
+            self._advance(states, own)
+        times = own.step * np.arange(own.steps + 1)
+        return sound("mujoco", own, times, states, self._warned(), {"steps": own.steps, "force calls": 4 * own.steps})
+
+    def _advance(self, states: np.ndarray, own: Settings) -> None:
+        """March in chunks, so that a run that has failed is not carried to its end."""
+        state = np.concatenate(([0.0], states[0]))
+        for first in range(0, own.steps, CHUNK):
+            count = min(CHUNK, own.steps - first)
+            path = rollout.rollout(self.model, self.data, state[None, :], nstep=count)[0][0, :, : len(state)]
+            states[first + 1 : first + 1 + count] = path[:, 1:]
+            late = np.abs(path[:, 0] - own.step * (first + 1 + np.arange(count))) > 1e-6 * own.duration
+            if late.any() or self._warned():
+                last = first + (int(np.argmax(late)) if late.any() else count)
+                guard("mujoco", own.step * np.arange(last + 1), states[: last + 1], last * own.step)
+                raise RunFailed("mujoco", f"the engine gave up{self._warned()}", last * own.step, states[last])
+            state = path[-1]
+
+    def _warned(self) -> str:
+        """What MuJoCo itself noticed, as a phrase; empty if nothing."""
+        found = [mujoco.mjtWarning(i).name for i in range(len(self.data.warning)) if self.data.warning[i].number]
+        return f"; MuJoCo warned {', '.join(found)}" if found else ""
+
+    def plan(self) -> dict[str, int]:
+        """What was built: degrees of freedom, native items, callbacks, and curves within them."""
+        return {"degrees of freedom": self.model.nv, "native items": self.model.nbody - 1 + self.model.njnt,
+                "callbacks": 1, "curves": curves(self.vehicle)}  # fmt: skip
+
+
+def build(vehicle: SpatialVehicle, settings: Settings | None, speed: float | None,
+          road: np.ndarray | None) -> SpatialMujoco:  # fmt: skip
+    """The MuJoCo model of a vehicle in space."""
+    return SpatialMujoco(vehicle, settings, speed, road)

@@ -1,0 +1,161 @@
+"""What an engine is to a vehicle in space: it is linearised there and runs in time on a given road.
+
+An engine's module ``spatial_NAME`` has ``build(vehicle, settings, speed, road)``. Both engines march with the same
+tableau, the classical Runge-Kutta one, and read the road from one table at half steps, so that they may be compared
+to rounding. Nothing is integrated here.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Protocol
+
+import numpy as np
+
+from models.engines.protocol import Settings, guard
+from models.engines.stability import GROWTH, growth, limit
+from models.errors import Refused, RunFailed
+from models.ride.linear_vehicle import LinearVehicle
+from models.steps import divides, fitting
+from models.vehicles.kinematics import Kinematics
+from models.vehicles.spatial import SpatialVehicle, Vector
+from models.vehicles.spatial_linear import linearise, outputs, wheels
+
+INTEGRATORS = {"exudyn": "RK44", "mujoco": "RK4"}
+"""What each engine calls the classical Runge-Kutta method."""
+DIFFERENCES = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
+"""Weights of f(i h) - f(-i h) in h f'(0): central differences of order six (by their defining equations)."""
+SMOOTH_STEP, CORNERED_STEP = 4e-3, 1e-5
+"""Their step h (m, rad, m/s, rad/s): on sines and lines the first errs by h^6 / 140 and by rounding, both below 1e-13;
+curves with corners and friction need the second, which rounding keeps to 1e-11."""
+
+
+@dataclass(frozen=True)
+class SpatialRun:
+    """times (m,) in s; positions and rates (m, n) in the vehicle's coordinates; what the run cost in counts."""
+
+    times: np.ndarray
+    positions: np.ndarray
+    rates: np.ndarray
+    counts: dict[str, int] = field(default_factory=dict)
+
+
+class SpatialModel(Protocol):
+    """A vehicle in space built in one engine."""
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
+        """Accelerations (n,) at positions and rates (n,) with road heights (m), then their rates, (2 w,)."""
+        ...
+
+    def linearise(self) -> LinearVehicle:
+        """The engine's own linear vehicle about the design position."""
+        ...
+
+    def run(self, q: np.ndarray, v: np.ndarray) -> SpatialRun:
+        """March from positions and rates (n,) over the duration; RunFailed unless all of it is finite and sane."""
+        ...
+
+    def plan(self) -> dict[str, int]:
+        """What was built: degrees of freedom, native items, callbacks, curves."""
+        ...
+
+
+def build(engine: str, vehicle: SpatialVehicle, settings: Settings | None = None, speed: float | None = None,
+          road: np.ndarray | None = None) -> SpatialModel:  # fmt: skip
+    """Build a vehicle in "exudyn" or "mujoco".
+
+    settings : wanted for runs in time; Refused where the step does not fit or a mode would grow.
+    speed : m/s, for side forces and drag; InputError where they miss it.
+    road : heights (m) under the tyres, then their rates (m/s), at every half step: (2 steps + 1, 2 w); None: flat.
+    """
+    linear = linearise(vehicle, speed)
+    if settings is not None:
+        _check(engine, linear, settings, road)
+    return import_module(f"models.engines.spatial_{engine}").build(vehicle, settings, speed, road)
+
+
+def _check(engine: str, linear: LinearVehicle, settings: Settings, road: np.ndarray | None) -> None:
+    """Refuse what would run and be wrong."""
+    if settings.integrator != INTEGRATORS[engine]:
+        raise Refused(engine, f"vehicles in space march with {INTEGRATORS[engine]}, not with {settings.integrator}")
+    if not divides(settings.step, settings.duration):
+        raise Refused(engine, f"the step {settings.step:g} s does not divide the duration {settings.duration:g} s; "
+                              f"use for example {fitting(settings.step, settings.duration)} s")
+    shape = (2 * settings.steps + 1, 2 * len(linear.wheels))
+    if road is not None and (road.shape != shape or not np.isfinite(road).all()):
+        raise Refused(engine, f"the road must be {shape[0]} rows (half steps) of {shape[1]} finite numbers (heights, "
+                              f"then rates under {len(linear.wheels)} tyres)")
+    _check_step(engine, linear, settings)
+
+
+def _check_step(engine: str, linear: LinearVehicle, settings: Settings) -> None:
+    """Refuse a step at which a mode of the linear vehicle grows that does not grow by itself."""
+    n = len(linear.mass)
+    damping, stiffness = np.split(np.linalg.solve(linear.mass, np.hstack([linear.damping, linear.stiffness])), 2, 1)
+    own = (np.eye(n), damping, stiffness, damping, damping)
+    name, h, duration = settings.integrator, settings.step, settings.duration
+    poles = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
+    if growth(name, h, duration, own) > math.log(GROWTH) + max(0.0, float(poles.real.max())) * duration:
+        raise Refused(engine, f"at a step of {h:g} s {name} lets a mode of the vehicle grow; use at most "
+                              f"{limit(name, h, duration, own):.3g} s")
+
+
+def difference_step(vehicle: SpatialVehicle) -> float:
+    """Step of central differences that fits the vehicle's laws."""
+    return CORNERED_STEP if curves(vehicle) else SMOOTH_STEP
+
+
+def curves(vehicle: SpatialVehicle) -> int:
+    """How many curves and dry frictions a vehicle has."""
+    return sum(
+        (s.travel_force is not None) + (s.rate_force is not None) + (s.friction != 0) for s in vehicle.springs
+    )
+
+
+def jacobian(function: Callable[[np.ndarray], np.ndarray], size: int, step: float) -> np.ndarray:
+    """(outputs, size) of a function of (size,) at 0, by the central differences of DIFFERENCES."""
+    columns = [sum(weight * (function(i * step * unit) - function(-i * step * unit))
+                   for i, weight in DIFFERENCES.items()) / step for unit in np.eye(size)]  # fmt: skip
+    return np.column_stack(columns)
+
+
+class EngineKinematics(Kinematics):
+    """Motion of points and bodies as an engine gives it: its Jacobians in the design position."""
+
+    def __init__(self, vehicle: SpatialVehicle, shift: Callable[[str, Vector], np.ndarray],
+                 turn: Callable[[str], np.ndarray]) -> None:  # fmt: skip
+        super().__init__(vehicle)
+        self._shift, self._turn = shift, turn
+
+    def shift(self, body: str | None, point: Vector) -> np.ndarray:
+        """(3, n): displacement of a point (m) by the coordinates; zeros on the ground, None."""
+        return np.zeros((3, self.size)) if body is None else self._shift(body, point)
+
+    def turn(self, body: str) -> np.ndarray:
+        """(3, n): small rotation of a body (rad) by the coordinates."""
+        return self._turn(body)
+
+
+def linear_vehicle(engine: str, vehicle: SpatialVehicle, motion: EngineKinematics, mass: np.ndarray,
+                   damping: np.ndarray, stiffness: np.ndarray, road: np.ndarray) -> LinearVehicle:  # fmt: skip
+    """An engine's linear vehicle; ``road`` (n, 2 w): generalised forces per road height, then per rate."""
+    by_height, by_rate = np.split(road, 2, axis=1)
+    source = f"{engine}, " + ("loaded" if vehicle.gravity else "unloaded")
+    return LinearVehicle(mass, damping, stiffness, by_height, by_rate, vehicle.coordinates(), wheels(vehicle),
+                         outputs(vehicle, motion), source)  # fmt: skip
+
+
+def sound(engine: str, settings: Settings, times: np.ndarray, states: np.ndarray, note: str,
+          counts: dict[str, int]) -> SpatialRun:  # fmt: skip
+    """The run, where it passes the guard of all runs."""
+    guard(engine, times, states, settings.duration, note)
+    positions, rates = np.split(states, 2, axis=1)
+    return SpatialRun(times, positions, rates, counts)
+
+
+def timed(engine: str, settings: Settings | None) -> Settings:
+    """Settings of a run; RunFailed where the model was built without."""
+    if settings is None:
+        raise RunFailed(engine, "the model was built without settings: it knows no step and no duration")
+    return settings

@@ -1,0 +1,126 @@
+"""Accelerations of a vehicle in space written down by hand: what both engines are compared with.
+
+Every body's centre and turning velocity as rows of the rates, body by body from the ground outwards; the sums of
+Jourdain's principle over bodies and forces; one linear solve. The laws are those of ``models.vehicles.spatial``, read
+straight from the description.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.vehicles.spatial import FREEDOMS, SpatialVehicle, SpringDamper, Vector
+from models.vehicles.spatial_linear import preloads
+
+UNIT = np.eye(3)
+
+
+@dataclass
+class Motion:
+    """A body: its centre, rotation, and the rows (3, n) of centre and turning velocity with their rates' parts (3,)."""
+
+    centre: np.ndarray
+    rotation: np.ndarray
+    shift: np.ndarray
+    turn: np.ndarray
+    shift_rest: np.ndarray
+    turn_rest: np.ndarray
+
+    def at(self, arm: np.ndarray, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Place, rows and the acceleration without q'' of a point at ``arm`` (body's axes) from the centre."""
+        r = self.rotation @ arm
+        rows = self.shift + np.cross(self.turn.T, r).T
+        rest = self.shift_rest + np.cross(self.turn_rest, r) + np.cross(omega, np.cross(omega, r))
+        return self.centre + r, rows, rest
+
+
+def _turned(axis: int, angle: float) -> np.ndarray:
+    """Rotation about a unit axis (Rodrigues)."""
+    cross = np.cross(UNIT, UNIT[axis])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+class SpatialReference:
+    """A vehicle in space as its equations."""
+
+    def __init__(self, vehicle: SpatialVehicle, speed: float | None = None) -> None:
+        self.vehicle, self.speed, self.held = vehicle, float(speed or 0.0), preloads(vehicle)
+        self.index = {place: i for i, place in enumerate(vehicle.coordinates())}
+        self.size = len(self.index)
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
+        """Accelerations (n,) at positions and rates (n,); ``road`` (2 w,): heights (m), then their rates (m/s)."""
+        self.q, self.v, self.motions = q, v, self._motions(q, v)
+        mass, force = np.zeros((self.size, self.size)), np.zeros(self.size)
+        for body in self.vehicle.bodies:
+            m = self.motions[body.name]
+            inertia, omega = m.rotation @ np.array(body.inertia) @ m.rotation.T, m.turn @ v
+            mass += body.mass * m.shift.T @ m.shift + m.turn.T @ inertia @ m.turn
+            force -= body.mass * m.shift.T @ (m.shift_rest + self.vehicle.gravity * UNIT[2])
+            force -= m.turn.T @ (inertia @ m.turn_rest + np.cross(omega, inertia @ omega))
+        force += self._forces(np.zeros(2 * len(self.vehicle.tyres)) if road is None else road)
+        return np.linalg.solve(mass, force)
+
+    def _motions(self, q: np.ndarray, v: np.ndarray) -> dict[str, Motion]:
+        """All bodies, parents first: each freedom shifts along, or turns about, an axis that those before it turned."""
+        found: dict[str, Motion] = {}
+        for body in self.vehicle.bodies:
+            rows = np.zeros((3, self.size))
+            below = found[body.parent] if body.parent else Motion(np.zeros(3), UNIT, rows, rows, rows[:, 0], rows[:, 0])
+            origin = self.vehicle.body(body.parent).position if body.parent else (0.0, 0.0, 0.0)
+            arm, own, omega = np.subtract(body.position, origin), rows.copy(), below.turn @ v
+            for k, freedom in enumerate(FREEDOMS[:3]):
+                if freedom in body.freedoms:
+                    arm[k] += q[self.index[body.name, freedom]]
+                    own[:, self.index[body.name, freedom]] = below.rotation[:, k]
+            centre, shift, rest = below.at(arm, omega)
+            m = Motion(centre, below.rotation, shift + own, below.turn.copy(),
+                       rest + 2 * np.cross(omega, own @ v), below.turn_rest.copy())  # fmt: skip
+            for k, freedom in enumerate(FREEDOMS[3:]):
+                if freedom in body.freedoms:
+                    i, axis = self.index[body.name, freedom], m.rotation[:, k]
+                    m.turn_rest += np.cross(m.turn @ v, axis) * v[i]
+                    m.turn[:, i] += axis
+                    m.rotation = m.rotation @ _turned(k, q[i])
+            found[body.name] = m
+        return found
+
+    def _point(self, body: str | None, point: Vector) -> tuple[np.ndarray, np.ndarray]:
+        """Place (3,) and rows (3, n) of a point given in the design position."""
+        if body is None:
+            return np.array(point), np.zeros((3, self.size))
+        return self.motions[body].at(np.subtract(point, self.vehicle.body(body).position), np.zeros(3))[:2]
+
+    def _forces(self, road: np.ndarray) -> np.ndarray:
+        """Generalised forces (n,) of all that acts besides weights."""
+        out, heights, rates = np.zeros(self.size), *np.split(road, 2)
+        for spring in self.vehicle.springs:
+            out += self._spring(spring)
+        for bar in self.vehicle.bars:
+            (left, rows), (right, others) = (self._point(bar.left, bar.point_left),
+                                             self._point(bar.right, bar.point_right))  # fmt: skip
+            apart, row = left[2] - bar.point_left[2] - right[2] + bar.point_right[2], (rows - others)[2] / bar.track
+            roll = np.eye(self.size)[self.index[bar.body, "rx"]]
+            moment = self.held.parts[bar.name] + bar.stiffness * (roll @ self.q - apart / bar.track)
+            out += (moment + bar.damping * (roll - row) @ self.v) * (row - roll)
+        for tyre, height, rate in zip(self.vehicle.tyres, heights, rates, strict=True):
+            place, rows = self._point(tyre.body, tyre.point)
+            pressed = tyre.stiffness * (height - place[2] + tyre.point[2]) + tyre.damping * (rate - rows[2] @ self.v)
+            out += (self.held.tyres[tyre.name] + pressed) * rows[2]
+        for side in self.vehicle.side_forces:
+            rows = self._point(side.body, side.point)[1]
+            roll, yaw = (self.q[self.index[side.chassis, f]] if (side.chassis, f) in self.index else 0.0
+                         for f in ("rx", "rz"))  # fmt: skip
+            out += side.stiffness * (side.roll_steer * roll + yaw - rows[1] @ self.v / self.speed) * rows[1]
+        for drag in self.vehicle.drags:
+            row = self.motions[drag.body].shift[0]
+            out -= drag.coefficient * self.speed * (row @ self.v) * row
+        return out
+
+    def _spring(self, s: SpringDamper) -> np.ndarray:
+        (one, of_one), (two, of_two) = self._point(s.one, s.point_one), self._point(s.two, s.point_two)
+        row = np.array(s.axis) @ (of_two - of_one)
+        travel, rate = np.dot(s.axis, two - one - np.subtract(s.point_two, s.point_one)), row @ self.v
+        force = self.held.parts[s.name] + s.stiffness * travel + s.damping * rate
+        force += (s.travel_force(travel) if s.travel_force else 0.0) + (s.rate_force(rate) if s.rate_force else 0.0)
+        return -(force + s.friction * np.tanh(rate / s.friction_rate)) * row
