@@ -21,6 +21,10 @@ SYSTEM = "contact"
 Progress = Callable[[str, float], None]
 UNITS = {"fx": "N", "fy": "N", "mz": "N m", "stick": "-", "dissipation": "N"}
 """Of the forces; the power lost is the dissipation times the rolling speed."""
+ERRORS = {"error_of_cells": ("N", "cells"), "error_of_theory": ("N", "theory"),
+          "moment_error_of_cells": ("N m", "moment_cells"),
+          "moment_error_of_theory": ("N m", "moment_theory")}  # fmt: skip
+"""Columns of the errors with their units and names in ``Error``: of the force, and of the moment."""
 ROWS = 12
 """Rows of a sweep that are printed, about; the file has all."""
 
@@ -71,8 +75,8 @@ def _save(motions: list[Motion], found: list[tuple[Rolled, Error]], folder: Path
     columns = {name.partition(" ")[0]: (name.partition("[")[2][:-1], values) for name, values in creepages}
     for name, unit in UNITS.items():
         columns[name] = (unit, np.array([getattr(one, name) for one, _ in found]))
-    columns["error_of_cells"] = ("N", np.array([error.cells for _, error in found]))
-    columns["error_of_theory"] = ("N", np.array([error.theory for _, error in found]))
+    for name, (unit, key) in ERRORS.items():
+        columns[name] = (unit, np.array([getattr(error, key) for _, error in found]))
     write_table(folder / "forces.csv", columns)
     fields = found[-1][0].fields
     if fields:
@@ -84,7 +88,7 @@ def _save(motions: list[Motion], found: list[tuple[Rolled, Error]], folder: Path
 def _answer(body: Contact, motions: list[Motion], found: list[tuple[Rolled, Error]]) -> dict[str, Any]:
     """Everything that was computed, as plain numbers in SI."""
     rows = [{**dict(zip(("xi_x", "xi_y", "spin"), motion, strict=True)), **{name: getattr(one, name) for name in UNITS},
-             "error_of_cells": error.cells, "error_of_theory": error.theory}
+             **{name: getattr(error, key) for name, (_, key) in ERRORS.items()}}
             for motion, (one, error) in zip(motions, found, strict=True)]  # fmt: skip
     return {**asdict(body.pressing), "friction": body.friction, "forces": rows}
 
@@ -99,13 +103,14 @@ def _table(scene: ContactScene, body: Contact, motions: list[Motion], found: lis
              f"  forces on the wheel by {scene.method.name}, {scene.method.cells} cells along each axis, "
              f"{1e3 * seconds:.3g} ms in all; mu N = {limit:,.0f} N",
              f"    {'xi_x [-]':>10}{'xi_y [-]':>10}{'spin [1/m]':>11}{'Fx [N]':>10}{'Fy [N]':>10}{'Mz [N m]':>10}"
-             f"{'stick':>7}{'loss [N]':>10}   error of cells, of theory [% of mu N]"]  # fmt: skip
+             f"{'stick':>7}{'loss [N]':>10}   errors: of cells, of theory [% of mu N], of Mz [N m]"]  # fmt: skip
     step = max(1, (len(motions) - 1) // ROWS)
     for motion, (one, error) in list(zip(motions, found, strict=True))[::step]:
         lines.append(f"    {motion[0]:>10.3g}{motion[1]:>10.3g}{motion[2]:>11.3g}{round(one.fx):>10,}"
                      f"{round(one.fy):>10,}{one.mz:>10.3f}{one.stick:>7.0%}{one.dissipation:>10.3g}"
-                     f"   {_percent(error.cells, limit):>6}{_percent(error.theory, limit):>8}")  # fmt: skip
-    return [*lines, "  loss: power by the rolling speed; errors are of the force (Fx, Fy)"]
+                     f"   {_percent(error.cells, limit):>6}{_percent(error.theory, limit):>8}"
+                     f"{error.moment:>9.2g}")  # fmt: skip
+    return [*lines, "  loss: power by the rolling speed; errors are of the force, that of Mz has both together"]
 
 
 def _percent(error: float, limit: float) -> str:

@@ -121,7 +121,9 @@ def sweep_figure(sweep: Sweep, body: Contact, found: list[tuple[Rolled, Error]],
         axes[0].plot(values, 1e-3 * force, color=COLOURS[name], linewidth=1.6, label=text)
         axes[0].plot(at, [1e-3 * getattr(one, name) for _, one in checks], "o",
                      color=COLOURS[name], markerfacecolor="white", markersize=5)  # fmt: skip
-    axes[1].plot(values, [one.mz for one, _ in found], color=COLOURS["mz"], linewidth=1.6)
+    moment, off = np.array([[one.mz, error.moment] for one, error in found]).T
+    axes[1].fill_between(values, moment - off, moment + off, color=COLOURS["mz"], alpha=0.18, linewidth=0)
+    axes[1].plot(values, moment, color=COLOURS["mz"], linewidth=1.6)
     axes[1].plot(at, [one.mz for _, one in checks], "o", color=COLOURS["mz"],
                  markerfacecolor="white", markersize=5)  # fmt: skip
     for sign in (-1, 1):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.contact.accuracy import BANDS, KNOTS, band, rolled, spin_share
+from models.contact.accuracy import BANDS, KNOTS, MOMENT_BANDS, band, moment_band, rolled, spin_share
 from models.contact.cases_table import BY_AXES, HEADER, answer
 from models.contact.fastsim import fastsim
 from models.contact.fastsim_fields import fastsim_fields
@@ -56,10 +56,11 @@ def test_a_sweep_saves_a_row_for_every_creepage(twinrig, capsys):
     assert twinrig("run", "contact_ellipse", *args) == 0
     units = {"xi_x": SHARES, "xi_y": SHARES, "spin": {"1/m": 1.0}, "stick": SHARES,
              **dict.fromkeys(("fx", "fy", "dissipation", "error_of_cells", "error_of_theory"), NEWTONS),
-             "mz": {"N m": 1.0}}  # fmt: skip
+             **{name: {"N m": 1.0} for name in ("mz", "moment_error_of_cells", "moment_error_of_theory")}}  # fmt: skip
     found = read_table("out/forces.csv", units)
     assert found["xi_y"].tolist() == pytest.approx([-1e-2, -5e-3, 0.0, 5e-3, 1e-2])
     assert found["fy"] == pytest.approx(-found["fy"][::-1]) and found["fy"][2] == 0 == found["error_of_theory"][2]
+    assert (found["moment_error_of_theory"] > 0).tolist() == [True, True, False, True, True]
     assert (np.diff(found["fy"]) <= 0).all() and Path("out/forces.png").exists()
 
 
@@ -78,6 +79,17 @@ def test_the_stated_error_of_the_cells_is_of_the_size_of_the_true_one():
     found, error = rolled(body, motion, 21)
     true = np.linalg.norm(found.force - body.roll(motion, 201).force)
     assert 0.2 * error.cells < true < 5 * error.cells and error.total == error.cells + error.theory
+    turned = abs(found.mz - body.roll(motion, 201).mz)
+    assert 0.2 * error.moment_cells < turned < 5 * error.moment_cells
+
+
+def test_the_stated_error_of_the_moment_holds_on_an_ellipse_outside_of_the_set():
+    """a/b = 0.3 under spin, where the moment of FASTSIM is off by some 8 % of mu N max(a, b)."""
+    table = {**TABLE, "ellipse": {"a": 3e-3, "b": 1e-2}, "method": {"cells": 41}}
+    fast, true = contact(build(table)), contact(build({**table, "method": {"name": "exact", "cells": 24}}))
+    found, error = rolled(fast, (0.0, 1e-3, 1.5), 41)
+    off, limit = abs(found.mz - true.roll((0.0, 1e-3, 1.5), 24).mz), 0.3 * 8e4 * fast.lever
+    assert 0.02 * limit < off < error.moment < 0.2 * limit
 
 
 def test_bands_are_zero_without_creepage_and_those_of_the_table_at_the_knots():
@@ -85,6 +97,10 @@ def test_bands_are_zero_without_creepage_and_those_of_the_table_at_the_knots():
     for name, (without, with_spin) in BANDS.items():
         assert band(name, np.array(KNOTS), np.array(0.0)) == pytest.approx(without)
         assert band(name, np.array(KNOTS), np.array(1.0)) == pytest.approx(with_spin)
+    for name, (without, with_spin) in MOMENT_BANDS.items():
+        assert moment_band(name, np.array(0.0), np.array(1.0)) == 0.0
+        assert moment_band(name, np.array(KNOTS), np.array(0.0)) == pytest.approx(without)
+        assert moment_band(name, np.array(KNOTS), np.array(1.0)) == pytest.approx(with_spin)
     one = np.array(5e-3)
     assert spin_share(one, one, np.array([1e-3, 0.0, 0.0]), 0.28) == 0.0 == spin_share(one, one, np.zeros(3), 0.28)
     assert spin_share(one, one, np.array([0.0, 0.0, 0.1]), 0.28) == 1.0
@@ -92,8 +108,9 @@ def test_bands_are_zero_without_creepage_and_those_of_the_table_at_the_knots():
 
 def test_the_linear_theory_states_how_far_it_is_beyond_friction():
     body = contact(build({**TABLE, "method": {"name": "linear"}}))
-    found, error = rolled(body, (1e-2, 0.0, 0.0), 21)
+    found, error = rolled(body, (1e-2, 0.0, 2.0), 21)
     assert error.total >= abs(found.fx) - 0.3 * 8e4  # no force is beyond mu N
+    assert error.moment >= abs(found.mz) - 0.3 * 8e4 * 5e-3  # nor a moment beyond mu N times the longer semi-axis
 
 
 def test_fields_of_fastsim_are_those_of_its_forces():
@@ -117,6 +134,8 @@ def test_a_row_of_a_table_is_the_contact_with_its_units():
     error = rolled(body, (1e-3, -2e-4, 0.4), 21)[1]
     assert float(rows[0]["error_of_cells [N]"]) == pytest.approx(error.cells, rel=1e-3)
     assert float(rows[0]["error_of_theory [N]"]) == pytest.approx(error.theory, rel=1e-3)
+    assert float(rows[0]["moment_error_of_cells [N m]"]) == pytest.approx(error.moment_cells, rel=1e-3)
+    assert float(rows[0]["moment_error_of_theory [N m]"]) == pytest.approx(error.moment_theory, rel=1e-3)
 
 
 WRONG = {"x,4,80,0.3,0,0,0\n": "column 'a [mm]' = 'x'", "1,2\n": "7 values are needed, found 2",
@@ -189,9 +208,9 @@ def test_the_cheapest_is_the_fastest_that_meets_the_target():
 
 
 def test_kept_forces_are_what_the_exact_theory_gives_and_the_set_is_complete():
-    """The second grid's own error after its first order is taken out: below 1 % of mu N."""
+    """Against the second grid, its own error taken out: 1 % of mu N."""
     cases = read()
-    assert len(cases) == 360 and max(case.error for case in cases) < 0.01
+    assert len(cases) == 360 and max(case.error for case in cases) < 0.005
     case = next(one for one in cases if one.kind == "y" and one.level == 0.5 and one.a == one.b)
     assert np.linalg.norm(exact(case, (20,)).force - case.force) < 0.01
     assert case.limit == FRICTION * LOAD

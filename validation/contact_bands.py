@@ -1,4 +1,4 @@
-"""Bands of error of the simplified theories, from their forces on ``contact_set``.
+"""Bands of error of the simplified theories, from their forces and moments on ``contact_set``.
 
 ``python -m validation.contact_bands`` prints what ``models.contact.accuracy`` keeps.
 """
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.accuracy import KNOTS, band, spin_share
+from models.contact.accuracy import KNOTS, band, moment_band, spin_share, used_with_moment
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_axes
 from models.contact.of_scene import interpenetrating
@@ -20,16 +20,23 @@ CELLS = 101
 """In each strip of FASTSIM: its own error is then below 0.05 % of mu N."""
 SHARE, NEAR = 0.95, 0.96
 """Part of the contacts that a band is to hold; of those between the neighbours of each knot."""
+ROUNDING = 1e-9
+"""Of a moment that is zero by symmetry."""
 FASTSIM = [f"{kind} {bound}" for kind in ("blended", "one", "three")
            for bound in ("intermediate", "parabolic", "elliptic")]  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Held:
-    """A theory against the exact one; all by mu N. force : (n, 2). error : (n,). spinning : (n,) share of spin."""
+    """A theory against the exact one: force (n, 2) by mu N, moment (n,) by mu N times the lever.
+
+    error, moment_error : (n,) of both, in the same units. spinning : (n,) share of spin.
+    """
 
     force: np.ndarray
+    moment: np.ndarray
     error: np.ndarray
+    moment_error: np.ndarray
     spinning: np.ndarray
 
     @property
@@ -37,17 +44,23 @@ class Held:
         """Size of the force, (n,)."""
         return np.linalg.norm(self.force, axis=1)
 
+    @property
+    def used_with_moment(self) -> np.ndarray:
+        """Size of force and moment, (n,)."""
+        return used_with_moment(self.used, self.moment)
+
 
 def forces(name: str, cases: list[Case], cells: int) -> np.ndarray:
-    """Force (n, 2) by mu N of a theory, one of those in FASTSIM or "simplified"."""
-    if name == "simplified":
-        found = [_simplified(c).roll(c.motion, cells).force for c in cases]
-        return np.array(found) / (FRICTION * LOAD)
+    """Force by mu N and moment by mu N and the longer semi-axis (n, 3) of a theory, of FASTSIM or "simplified"."""
     axes, motions = _arrays(cases)
+    unit = FRICTION * LOAD * np.array([np.ones(len(cases)), np.ones(len(cases)), axes.max(axis=0)]).T
+    if name == "simplified":
+        found = [_simplified(c).roll(c.motion, cells) for c in cases]
+        return np.array([(one.fx, one.fy, one.mz) for one in found]) / unit
     kind, bound = name.split()
     choices: dict[str, Any] = {"cells": cells, "bound": bound, "flexibilities": kind}
     one = fastsim(axes[0], axes[1], LOAD, FRICTION, motions[0], motions[1], motions[2], PAIR, **choices)
-    return np.stack([one.fx, one.fy], axis=1) / (FRICTION * LOAD)
+    return np.stack([one.fx, one.fy, one.mz], axis=1) / unit
 
 
 def _arrays(cases: list[Case]) -> tuple[np.ndarray, np.ndarray]:
@@ -60,29 +73,42 @@ def _simplified(case: Case) -> Simplified:
 
 
 def held(name: str, cases: list[Case], cells: int = CELLS) -> Held:
-    """A theory's forces and errors."""
-    force = forces(name, cases, cells)
-    exact = np.array([c.force for c in cases])
+    """A theory's forces, moments and errors."""
+    found = forces(name, cases, cells)
     axes, motions = _arrays(cases)
-    return Held(force, np.linalg.norm(force - exact, axis=1), spin_share(axes[0], axes[1], motions, PAIR.nu))
+    exact = np.array([(*c.force, c.mz * np.sqrt(c.a * c.b) / max(c.a, c.b)) for c in cases])
+    off, share = found - exact, spin_share(axes[0], axes[1], motions, PAIR.nu)
+    return Held(found[:, :2], found[:, 2], np.linalg.norm(off[:, :2], axis=1), np.abs(off[:, 2]), share)
 
 
-def kept(name: str, one: Held) -> float:
-    """Part of the contacts whose error lies within the band that ``models.contact.accuracy`` states."""
-    return float(np.mean(one.error <= band(name, one.used, one.spinning)))
+def kept(name: str, one: Held) -> tuple[float, float]:
+    """Parts of the contacts whose errors of force and moment lie within what ``models.contact.accuracy`` states."""
+    moment = moment_band(name, one.used_with_moment, one.spinning)
+    return (float(np.mean(one.error <= band(name, one.used, one.spinning))),
+            float(np.mean(one.moment_error <= moment + ROUNDING)))  # fmt: skip
 
 
-def measured(one: Held) -> tuple[tuple[float, ...], ...]:
+def measured(error: np.ndarray, used: np.ndarray, spinning: np.ndarray) -> tuple[tuple[float, ...], ...]:
     """Quantiles of the error at each knot, without spin and with it; a knot that no contact is near has the largest."""
     found, ends = [], (0.0, *KNOTS, 1.1)
-    for rows in (one.spinning < 0.5, one.spinning >= 0.5):
-        within = [rows & (one.used >= low) & (one.used <= high) for low, high in zip(ends, ends[2:], strict=False)]
-        whole = float(np.quantile(one.error[rows], NEAR))
-        found.append(tuple(round(float(np.quantile(one.error[some], NEAR)) if some.sum() > 3 else whole, 4)
+    for rows in (spinning < 0.5, spinning >= 0.5):
+        within = [rows & (used >= low) & (used <= high) for low, high in zip(ends, ends[2:], strict=False)]
+        whole = float(np.quantile(error[rows], NEAR))
+        found.append(tuple(round(float(np.quantile(error[some], NEAR)) if some.sum() > 3 else whole, 4)
                            for some in within))  # fmt: skip
     return tuple(found)
 
 
+def main() -> None:
+    """Print both tables."""
+    theories = {name: held(name, read()) for name in (*FASTSIM, "simplified")}
+    print("BANDS")
+    for name, one in theories.items():
+        print(f'    "{name}": {measured(one.error, one.used, one.spinning)},')
+    print("MOMENT_BANDS")
+    for name, one in theories.items():
+        print(f'    "{name}": {measured(one.moment_error, one.used_with_moment, one.spinning)},')
+
+
 if __name__ == "__main__":
-    for theory in (*FASTSIM, "simplified"):
-        print(f'    "{theory}": {measured(held(theory, read()))},')
+    main()

@@ -11,7 +11,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from models.contact.accuracy import band, spin_share
+from models.contact.accuracy import band, moment_band, spin_share, used_with_moment
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_load
 from models.contact.material import Pair
@@ -24,8 +24,8 @@ MOTION = {"load": NEWTONS, "friction": SHARES, "xi_x": SHARES, "xi_y": SHARES, "
 BY_AXES = {"a": METRES, "b": METRES, **MOTION}
 BY_CURVATURES = {"A": PER_METRE, "B": PER_METRE, **MOTION}
 HEADER = ("line [-]", "fx [N]", "fy [N]", "mz [N m]", "stick [-]", "dissipation [N]", "error_of_cells [N]",
-          "error_of_theory [N]", "status")  # fmt: skip
-ANSWERS = 7
+          "error_of_theory [N]", "moment_error_of_cells [N m]", "moment_error_of_theory [N m]", "status")  # fmt: skip
+ANSWERS = 9
 """Columns of numbers behind the line."""
 Progress = Callable[[int], None]
 
@@ -96,12 +96,17 @@ def _forces(values: dict[str, Any], pair: Pair, method: Method) -> np.ndarray:
     half = (method.cells + 1) // 2
     fine, coarse = (fastsim(a, b, load, friction, xi_x, xi_y, spin, pair, cells=n, **choices)
                     for n in (method.cells, half))  # fmt: skip
-    left = np.hypot(fine.fx - coarse.fx, fine.fy - coarse.fy) / ((method.cells / half) ** method.order - 1.0)
+    gained = (method.cells / half) ** method.order - 1.0
+    left = np.stack([np.hypot(fine.fx - coarse.fx, fine.fy - coarse.fy), np.abs(fine.mz - coarse.mz)]) / gained
     limit = friction * np.maximum(load, 0.0)
-    used = np.divide(np.hypot(fine.fx, fine.fy), limit, out=np.zeros_like(limit), where=limit > 0)
     a, b = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
-    theory = limit * band(method.band, used, spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu))
-    return np.column_stack([fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation, left, theory]) + 0.0
+    most, share = limit * np.maximum(a, b), spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu)
+    used, turned = (np.divide(size, whole, out=np.zeros_like(limit), where=limit > 0)
+                    for size, whole in ((np.hypot(fine.fx, fine.fy), limit), (fine.mz, most)))  # fmt: skip
+    theory = limit * band(method.band, used, share)
+    moment = most * moment_band(method.band, used_with_moment(used, turned), share)
+    return np.column_stack([fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation, left[0], theory, left[1],
+                            moment]) + 0.0  # fmt: skip
 
 
 def _write(file: TextIO, block: Block, found: np.ndarray, wrong: dict[int, str]) -> None:
@@ -109,7 +114,7 @@ def _write(file: TextIO, block: Block, found: np.ndarray, wrong: dict[int, str])
         if i in wrong:
             file.write(f'{line}{"," * (ANSWERS + 1)}"{_plain(wrong[i])}"\n')
         else:
-            file.write(f"{line}," + "%.9g,%.9g,%.9g,%.6g,%.9g,%.4g,%.4g,ok\n" % tuple(row))  # noqa: UP031
+            file.write(f"{line}," + "%.9g,%.9g,%.9g,%.6g,%.9g,%.4g,%.4g,%.4g,%.4g,ok\n" % tuple(row))  # noqa: UP031
 
 
 def _plain(text: str) -> str:

@@ -63,6 +63,11 @@ class Contact(ABC):
     def __init__(self, pressing: Pressing, friction: float, pair: Pair) -> None:
         self.pressing, self.friction, self.pair = pressing, friction, pair
 
+    @property
+    @abstractmethod
+    def lever(self) -> float:
+        """Largest distance along an axis from where moments count to the edge of the contact (m)."""
+
     @abstractmethod
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces at creepages and spin; with ``fields`` also what happens in every cell, patch by patch."""
@@ -75,6 +80,11 @@ class OnEllipse(Contact):
         self.hertz, self.a, self.b = hertz, float(hertz.a), float(hertz.b)
         pressing = Pressing(float(hertz.load), float(np.pi * self.a * self.b), float(hertz.p0), float(hertz.approach))
         super().__init__(pressing, friction, pair)
+
+    @property
+    def lever(self) -> float:
+        """The longer semi-axis (m)."""
+        return max(self.a, self.b)
 
 
 class Linear(OnEllipse):
@@ -119,6 +129,11 @@ class Simplified(Contact):
         super().__init__(pressing, friction, pressed.pair)
         self.pressed = pressed
 
+    @property
+    def lever(self) -> float:
+        """Of the patch that reaches farthest (m)."""
+        return _lever(self.pressed.patches)
+
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces on ``cells`` strips and cells in each patch; fields lie where the patches do on the contour."""
         found = roll_simplified(self.pressed, self.friction, *motion, cells=cells)
@@ -137,6 +152,11 @@ class Exact(Contact):
         approach = alone if len(found) == 1 else pressed.approach
         pressing = Pressing(_normal_load(pressed), sum(one.area for one in found), peak, approach)
         super().__init__(pressing, friction, pressed.pair)
+
+    @property
+    def lever(self) -> float:
+        """Of the patch that reaches farthest (m)."""
+        return _lever(self.parts)
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces on ``cells`` x ``cells`` cells about each patch."""
@@ -196,3 +216,7 @@ def _on_grid(part: PatchPressure, cells: int, margin: float, pair: Pair) -> Norm
 def _normal_load(pressed: NormalContact) -> float:
     """Load across all patches, each along its own normal (N)."""
     return sum(part.load for part in pressed.patches)
+
+
+def _lever(parts: Sequence[PatchPressure]) -> float:
+    return max((abs(side) for part in parts for side in part.box), default=0.0)
