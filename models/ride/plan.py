@@ -81,5 +81,5 @@ def _speed(scene: RideScene) -> str:
         points = zip(scene.drive.time, scene.drive.speed, strict=True)
         return ", ".join(f"{speed:g} m/s at {time:g} s" for time, speed in points) + ", straight between"
     assert scene.speeds is not None
-    values = scene.speeds.values()
+    values = scene.speeds.all()
     return f"{len(values)} from {values.min():g} to {values.max():g} m/s"

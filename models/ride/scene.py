@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from models.errors import InputError
+from models.ride.speed_profile import SpeedProfile
 from models.road.two_track import LEVEL, MEAN_CORNER, ROLL_CORNER
 from models.scene_file import SceneFile, checked
 from models.strict import Strict, quantity
@@ -40,23 +41,27 @@ class Road(Strict):
 
 
 class Speeds(Strict):
-    """[speeds]: constant ones, from start to stop, or those of a list."""
+    """[speeds]: constant ones, from start to stop, or the values of a list."""
 
     start: float | None = quantity("m/s", "first speed", default=None)
     stop: float | None = quantity("m/s", "last speed", default=None)
     count: int = Field(default=25, ge=2, le=10_000, description="number of speeds")
-    list: tuple[float, ...] = Field(default=(), description="speeds in m/s instead")
+    values: list[float] = Field(default_factory=list, description="speeds in m/s instead")
 
-    def values(self) -> np.ndarray:
+    def all(self) -> np.ndarray:
         """All speeds, m/s."""
-        return np.array(self.list) if self.list else np.linspace(self.start, self.stop, self.count)  # type: ignore[arg-type]
+        return np.array(self.values) if self.values else np.linspace(self.start, self.stop, self.count)  # type: ignore[arg-type]
 
 
 class Drive(Strict):
     """[drive]: a speed that varies, from point to point along straight lines."""
 
-    time: tuple[float, ...] = Field(description="times in s, rising from 0")
-    speed: tuple[float, ...] = Field(description="speeds in m/s at these times, 0 for standstill")
+    time: list[float] = Field(description="times in s, rising from 0")
+    speed: list[float] = Field(description="speeds in m/s at these times, 0 for standstill")
+
+    def profile(self, file: str = "") -> SpeedProfile:
+        """The drive itself; raises InputError for what is none."""
+        return SpeedProfile(self.time, self.speed, file)
 
 
 class RideScene(SceneFile):
@@ -79,31 +84,20 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ri
     if scene.speeds is not None:
         _check_speeds(file, scene.speeds)
     if scene.drive is not None:
-        _check_drive(file, scene.drive)
+        scene.drive.profile(file)
     _check_road(file, scene.road)
     return scene
 
 
 def _check_speeds(file: str, speeds: Speeds) -> None:
-    for i, value in enumerate(speeds.list):
+    for i, value in enumerate(speeds.values):
         if not (np.isfinite(value) and value > 0.0):
-            raise InputError(file, f"speeds.list.{i}", value, "must be above 0, in m/s: at standstill nothing moves")
-    if speeds.list and speeds.start is not None:
+            raise InputError(file, f"speeds.values.{i}", value, "must be above 0, in m/s: at standstill nothing moves")
+    if speeds.values and speeds.start is not None:
         raise InputError(file, "speeds.start", speeds.start, "is not read beside a list of speeds: drop one of them")
     for name in ("start", "stop"):
-        if not speeds.list and getattr(speeds, name) is None:
+        if not speeds.values and getattr(speeds, name) is None:
             raise InputError(file, f"speeds.{name}", None, "is missing (m/s)")
-
-
-def _check_drive(file: str, drive: Drive) -> None:
-    times, speeds = np.array(drive.time), np.array(drive.speed)
-    if len(times) < 2 or len(times) != len(speeds):
-        allowed = f"must have as many values as drive.speed, at least 2; found {len(times)} and {len(speeds)}"
-        raise InputError(file, "drive.time", None, allowed)
-    if times[0] != 0.0 or (np.diff(times) <= 0.0).any():
-        raise InputError(file, "drive.time", list(drive.time), "must rise from 0, in s")
-    if not np.isfinite(speeds).all() or (speeds < 0.0).any():
-        raise InputError(file, "drive.speed", list(drive.speed), "must be 0 or more, in m/s")
 
 
 def _check_road(file: str, road: Road) -> None:

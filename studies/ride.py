@@ -1,0 +1,216 @@
+"""How much a vehicle on a random road moves: standard deviations of all its outputs, over speed, without simulation."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.errors import InputError
+from models.ride.excitation import excited
+from models.ride.measures import dynamic_load_factor, exceedances, share_beyond
+from models.ride.of_scene import GRAVITY, Linear, excitation_of, linear_vehicle, vehicle_of
+from models.ride.scene import RideScene
+from models.ride.sweep import Sweep, sweep
+from models.ride.weighting import weighted
+from models.strict import Strict, quantity, read
+from models.vehicles.spatial import PartOutput, PointOutput, SpatialVehicle, TyreOutput
+from models.vehicles.spatial_linear import preloads, wheels
+
+SYSTEM = "ride"
+Progress = Callable[[str, float], None]
+SIMPLER = {
+    "axles independent": ("", "uncorrelated"),
+    "axles alike": ("", "equal"),
+    "tracks independent": ("uncorrelated", ""),
+    "tracks alike": ("equal", ""),
+}
+"""What is often assumed instead of the scene's own road: left and right, front and rear; empty as in the scene."""
+ALONG = 13
+"""Points along the body at which its vertical acceleration is drawn."""
+OVERHANG = 0.2
+"""How far (m) these points reach beyond the axles."""
+
+
+class Options(Strict):
+    """[options] of this study."""
+
+    speed: float | None = quantity("m/s", "of tables, spectra and export; the middle one if not given", default=None)
+    free_travel: float | None = quantity("m", "free travel of every output that is a travel", default=None)
+
+
+def check(scene: RideScene, engines: tuple[str, ...]) -> None:
+    """Refuse a varying speed, which is another study's."""
+    if scene.speeds is None:
+        raise InputError(scene.file, "study", scene.study, "runs at constant speeds; with a drive use ride_drive")
+
+
+def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Sweep speeds and correlations; saves ``deviations.nc`` and ``.csv``, ``system.npz`` and ``.mat``, figures."""
+    from studies.ride_figures import along_figure, outputs_figure, spectra_figure
+
+    options = read(Options, scene.options, scene.file, "options")
+    assert scene.speeds is not None
+    vehicle, speeds = vehicle_of(scene), scene.speeds.all()
+    speed = options.speed or float(speeds[len(speeds) // 2])
+    cases = {"as in the scene": excitation_of(scene, wheels(vehicle))}
+    cases |= {name: excitation_of(scene, wheels(vehicle), _simpler(scene, case)) for name, case in SIMPLER.items()}
+    found = {}
+    for i, engine in enumerate(engines):
+        progress(f"linear vehicle of {engine}", 0.6 * i / len(engines))
+        found[engine] = sweep(linear_vehicle(vehicle, engine), cases, [*speeds, speed], scene.weighting)
+    first = found[engines[0]]
+    linear = linear_vehicle(vehicle, engines[0])
+    progress("figures", 0.7)
+    _save(scene, vehicle, linear, found, speed, folder)
+    along = _along(vehicle)
+    if along is not None:
+        at = sweep(linear_vehicle(along, "reference"), cases, [speed])
+        places = [output.point[0] for output in along.outputs if isinstance(output, PointOutput)]
+        along_figure(places, at, first, vehicle, speed, scene.title, folder / "body_acceleration.png")
+    outputs_figure(first, vehicle, _static(vehicle), scene.title, folder / "over_speed.png")
+    spectra_figure(vehicle, linear(speed), cases["as in the scene"], speed, scene.title, folder / "spectra.png")
+    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(found),
+            "table": _table(scene, vehicle, found, speed, options)}  # fmt: skip
+
+
+def _simpler(scene: RideScene, case: tuple[str, str]) -> tuple[str, str]:
+    return case[0] or scene.road.left_right, case[1] or scene.road.front_rear
+
+
+def _along(vehicle: SpatialVehicle) -> SpatialVehicle | None:
+    """The vehicle with the vertical acceleration of points along its heaviest body that pitches, if there is one."""
+    bodies = [body for body in vehicle.bodies if "ry" in body.freedoms and "z" in body.freedoms]
+    if not bodies or len(vehicle.axles) < 2:
+        return None
+    body = max(bodies, key=lambda body: body.mass)
+    places = np.linspace(vehicle.axles[-1] - OVERHANG, vehicle.axles[0] + OVERHANG, ALONG)
+    points = [(float(x), 0.0, body.position[2]) for x in places]
+    outputs = [PointOutput(f"x = {p[0]:.2f} m", "acceleration", body.name, p, (0.0, 0.0, 1.0)) for p in points]
+    return replace(vehicle, outputs=tuple(outputs))
+
+
+def _static(vehicle: SpatialVehicle) -> dict[str, float]:
+    """Static load (N) of the tyre behind each output that is a tyre force."""
+    loads = preloads(replace(vehicle, gravity=GRAVITY)).tyres
+    return {output.name: loads[output.tyre] for output in vehicle.outputs
+            if isinstance(output, TyreOutput) and output.kind == "tyre force"}  # fmt: skip
+
+
+def _save(scene: RideScene, vehicle: SpatialVehicle, linear: Linear, found: dict[str, Sweep], speed: float,
+          folder: Path) -> None:  # fmt: skip
+    """Deviations of every engine over case, speed and output; the system at one speed for other programs."""
+    import xarray as xr
+
+    from models.result import provenance
+    from models.ride.covariance import stationary
+    from models.ride.export import save
+
+    engines, one = list(found), next(iter(found.values()))
+    axes = {"engine": engines, "correlation": list(one.cases), "speed": one.speeds[:-1], "output": list(one.outputs)}
+    values = np.stack([each.deviation[:, :-1] for each in found.values()])
+    data = xr.Dataset({"deviation": (tuple(axes), values)}, axes)
+    data["speed"].attrs["units"] = "m/s"
+    data["unit"] = ("output", list(units(vehicle, linear(speed), one)))
+    data.attrs = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
+    data.to_netcdf(folder / "deviations.nc", engine="h5netcdf")
+    data["deviation"].to_dataframe().to_csv(folder / "deviations.csv")
+    at = linear(speed)
+    system = weighted(excited(at, excitation_of(scene, at.wheels), speed), scene.weighting)
+    save(system, stationary(system), folder / "system")
+
+
+def units(vehicle: SpatialVehicle, linear: Any, found: Sweep) -> list[str]:
+    """Unit of every output, weighted ones after the vehicle's own."""
+    own = [output.unit for output in linear.outputs]
+    return [*own, *["m/s^2"] * (len(found.outputs) - len(own))]
+
+
+def _answer(found: dict[str, Sweep]) -> dict[str, Any]:
+    """Standard deviations at all speeds in the scene's own case, SI; None where an output has none."""
+    one = next(iter(found.values()))
+    finite = np.where(np.isfinite(one.deviation[0, :-1]), one.deviation[0, :-1], np.nan)
+    values = {name: [None if np.isnan(value) else float(value) for value in finite[:, i]]
+              for i, name in enumerate(one.outputs)}  # fmt: skip
+    return {"speed": one.speeds[:-1].tolist(), "deviation": values}
+
+
+def _table(scene: RideScene, vehicle: SpatialVehicle, found: dict[str, Sweep], speed: float,
+           options: Options) -> list[str]:  # fmt: skip
+    """What each output does at one speed, and how wrong simpler roads are."""
+    first = next(iter(found.values()))
+    linear = linear_vehicle(vehicle)(speed)
+    width = max(map(len, first.outputs))
+    lines = [f"  at {speed:g} m/s, standard deviations; then what simpler roads make of them",
+             f"    {'':<{width}}{'':>20}" + "".join(f"{name:>20}" for name in first.cases[1:])]  # fmt: skip
+    for i, (name, unit) in enumerate(zip(first.outputs, units(vehicle, linear, first), strict=True)):
+        own = first.deviation[0, -1, i]
+        changes = "".join(f"{_change(first.deviation[j, -1, i], own):>20}" for j in range(1, len(first.cases)))
+        lines.append(f"    {name:<{width}}{_value(own, unit, str(first.status[0, -1, i])):>20}{changes}")
+    lines += [f"  {name}: {reason}" for name, reason in _notes(first)]
+    lines += _travels(vehicle, first, options) + _loads(vehicle, first)
+    return [*lines, *_agreement(found)]
+
+
+def _value(value: float, unit: str, status: str) -> str:
+    """A deviation with its unit, lengths in mm; the status where there is none."""
+    if status != "finite":
+        return status
+    return f"{1e3 * value:.3g} mm" if unit == "m" else f"{value:.4g} {unit}"
+
+
+def _change(value: float, own: float) -> str:
+    return f"{100 * (value / own - 1):+.1f} %" if np.isfinite(value) and np.isfinite(own) and own > 0 else "-"
+
+
+def _notes(found: Sweep) -> list[tuple[str, str]]:
+    """Why an output has no standard deviation."""
+    at = range(len(found.outputs))
+    return [(found.outputs[i], str(found.reason[0, -1, i])) for i in at if found.status[0, -1, i] != "finite"]
+
+
+def _travels(vehicle: SpatialVehicle, found: Sweep, options: Options) -> list[str]:
+    """How often each travel passes the free travel; how fast it moves where the vehicle file asks for its rate."""
+    if options.free_travel is None:
+        return []
+    rates = {output.part: output.name for output in vehicle.outputs
+             if isinstance(output, PartOutput) and output.kind == "travel rate"}  # fmt: skip
+    lines = []
+    for output in vehicle.outputs:
+        if not isinstance(output, PartOutput) or output.kind != "travel":
+            continue
+        own = float(found.of(found.cases[0], output.name)[-1])
+        share = share_beyond(own, options.free_travel)
+        text = f"  {output.name}: beyond {1e3 * options.free_travel:g} mm for {share:.3g} of the time"
+        if output.part in rates:
+            rate = float(found.of(found.cases[0], rates[output.part])[-1])
+            text += f", {3600 * exceedances(own, rate, options.free_travel):.3g} times an hour"
+        lines.append(text)
+    return lines
+
+
+def _loads(vehicle: SpatialVehicle, found: Sweep) -> list[str]:
+    """Dynamic wheel load factors in a line."""
+    static = _static(vehicle)
+    own = {name: float(found.of(found.cases[0], name)[-1]) for name in static}
+    parts = [f"{name} {dynamic_load_factor(own[name], load):.3f}" for name, load in static.items()]
+    return [f"  dynamic wheel load factor: {', '.join(parts)}"] if parts else []
+
+
+def _agreement(found: dict[str, Sweep]) -> list[str]:
+    """How far the engines' own linearisations lie from the first one."""
+    (name, first), *others = found.items()
+    lines = []
+    for engine, other in others:
+        finite = np.isfinite(first.deviation) & (first.deviation > 0)
+        gap = np.max(np.abs(other.deviation[finite] / first.deviation[finite] - 1.0), initial=0.0)
+        same = "" if (other.status == first.status).all() else "; but what is finite differs"
+        lines.append(f"  {engine}'s own linear vehicle: standard deviations within {gap:.1e} of {name}'s{same}")
+    return lines
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("ride")

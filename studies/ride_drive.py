@@ -1,0 +1,148 @@
+"""How much a vehicle moves while it accelerates, brakes and stands, and how wrong it is to take each speed by itself."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.errors import InputError
+from models.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
+from models.ride.scene import RideScene
+from models.ride.sweep import sweep
+from models.ride.varying_speed import VaryingSpeed, varying_speed
+from models.strict import Strict, read
+from models.vehicles.spatial_linear import wheels
+
+SYSTEM = "ride"
+Progress = Callable[[str, float], None]
+SPEEDS = 60
+"""Constant speeds, from the largest down, at which the quasi-stationary answer is computed; straight between them."""
+SLOWEST = 0.5
+"""m/s below which no speed is taken by itself: the delay between the axles grows without bound."""
+
+
+class Options(Strict):
+    """[options] of this study."""
+
+    outputs: list[str] = []
+
+
+def check(scene: RideScene, engines: tuple[str, ...]) -> None:
+    """Refuse constant speeds, which are another study's, a vehicle whose matrices change, unknown outputs."""
+    if scene.drive is None:
+        raise InputError(scene.file, "study", scene.study, "runs along a drive; at constant speeds use ride")
+    vehicle = vehicle_of(scene)
+    if vehicle.side_forces or vehicle.drags:
+        allowed = "has side forces or drag, which change with the speed: this study takes matrices that do not"
+        raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
+    names = tuple(output.name for output in vehicle.outputs)
+    for i, name in enumerate(_options(scene).outputs):
+        if name not in names:
+            raise InputError(scene.file, f"options.outputs.{i}", name, "is no output of the vehicle", names)
+
+
+def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Follow the drive; saves ``drive.nc`` and a figure."""
+    from studies.ride_figures import drive_figure
+
+    check(scene, engines)
+    assert scene.drive is not None
+    vehicle = vehicle_of(scene)
+    found = {}
+    for i, engine in enumerate(engines):
+        progress(f"drive, linear vehicle of {engine}", 0.8 * i / len(engines))
+        excitation = excitation_of(scene, wheels(vehicle))
+        found[engine] = varying_speed(linear_vehicle(vehicle, engine)(1.0), excitation, scene.drive.profile(scene.file),
+                                      weightings=scene.weighting)  # fmt: skip
+    first = next(iter(found.values()))
+    progress("each speed by itself", 0.8)
+    alone = quasi_stationary(scene, engines[0], first)
+    _save(scene, first, alone, folder / "drive.nc")
+    shown = _options(scene).outputs or [o.name for o in vehicle.outputs if o.kind in ("acceleration", "tyre force")]
+    drive_figure(first, alone, shown, {o.name: (o.kind, u) for o, u in _units(scene)}, scene.title,
+                 folder / "drive.png")  # fmt: skip
+    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(first, alone),
+            "table": [*_table(first, alone), *_agreement(found)]}  # fmt: skip
+
+
+def _options(scene: RideScene) -> Options:
+    return read(Options, scene.options, scene.file, "options")
+
+
+def _units(scene: RideScene) -> list[tuple[Any, str]]:
+    vehicle = vehicle_of(scene)
+    linear = linear_vehicle(vehicle)(1.0)
+    return [(output, own.unit) for output, own in zip(vehicle.outputs, linear.outputs, strict=True)]
+
+
+def quasi_stationary(scene: RideScene, engine: str, found: VaryingSpeed) -> np.ndarray:
+    """Deviations (N, p) if every speed had always been driven; nan below SLOWEST."""
+    vehicle = vehicle_of(scene)
+    fastest = float(found.speed.max())
+    if fastest <= SLOWEST:
+        return np.full_like(found.deviation, np.nan)
+    speeds = np.linspace(SLOWEST, fastest, SPEEDS)
+    road = {"drive": excitation_of(scene, wheels(vehicle))}
+    values = sweep(linear_vehicle(vehicle, engine), road, list(speeds), scene.weighting).deviation[0]
+    own = np.column_stack([np.interp(found.speed, speeds, column) for column in values.T])
+    return np.where(found.speed[:, None] >= SLOWEST, own, np.nan)
+
+
+def _save(scene: RideScene, found: VaryingSpeed, alone: np.ndarray, path: Path) -> None:
+    import xarray as xr
+
+    from models.result import provenance
+
+    axes = ("time", "output")
+    data = xr.Dataset(
+        {"deviation": (axes, found.deviation), "quasi_stationary": (axes, alone),
+         "speed": ("time", found.speed, {"units": "m/s"}), "path": ("time", found.path, {"units": "m"})},
+        {"time": ("time", found.time, {"units": "s"}), "output": list(found.names)},
+    )  # fmt: skip
+    data.attrs = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
+    data.to_netcdf(path, engine="h5netcdf")
+
+
+def _gaps(found: VaryingSpeed, alone: np.ndarray) -> np.ndarray:
+    """Relative error (N, p) of the quasi-stationary answer; 0 where there is none to compare."""
+    both = np.isfinite(alone) & np.isfinite(found.deviation) & (found.deviation > 0)
+    return np.where(both, alone / np.where(both, found.deviation, 1.0) - 1.0, 0.0)
+
+
+def _answer(found: VaryingSpeed, alone: np.ndarray) -> dict[str, Any]:
+    gaps = _gaps(found, alone)
+    return {name: {"largest error of the quasi-stationary answer": float(gaps[np.abs(gaps[:, i]).argmax(), i])}
+            for i, name in enumerate(found.names)}  # fmt: skip
+
+
+def _table(found: VaryingSpeed, alone: np.ndarray) -> list[str]:
+    """Largest deviation of each output, and where taking each speed by itself is most wrong."""
+    width = max(map(len, found.names))
+    lines = [f"    {'':<{width}}{'largest':>12}{'at [s]':>8}   taking each speed by itself is most wrong"]
+    gaps = _gaps(found, alone)
+    for i, name in enumerate(found.names):
+        own = found.deviation[:, i]
+        if not np.isfinite(own).all():
+            lines.append(f"    {name:<{width}}{found.status[i]:>12}")
+            continue
+        top, worst = int(own.argmax()), int(np.abs(gaps[:, i]).argmax())
+        lines.append(f"    {name:<{width}}{own[top]:>12.4g}{found.time[top]:>8.2f}   by {100 * gaps[worst, i]:+.1f} % "
+                     f"at {found.time[worst]:.2f} s, {found.speed[worst]:.1f} m/s")  # fmt: skip
+    return lines
+
+
+def _agreement(found: dict[str, VaryingSpeed]) -> list[str]:
+    (name, first), *others = found.items()
+    lines = []
+    for engine, other in others:
+        finite = np.isfinite(first.deviation) & (first.deviation > 1e-3 * first.deviation.max(axis=0))
+        gap = np.max(np.abs(other.deviation[finite] / first.deviation[finite] - 1.0), initial=0.0)
+        lines.append(f"  {engine}'s own linear vehicle: standard deviations within {gap:.1e} of {name}'s")
+    return lines
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("ride_drive")

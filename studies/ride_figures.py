@@ -1,0 +1,145 @@
+"""Figures of the ride studies."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from models.ride.excitation import Excitation, excited
+from models.ride.linear_vehicle import LinearVehicle
+from models.ride.sweep import Sweep
+from models.ride.varying_speed import VaryingSpeed
+from models.vehicles.spatial import SpatialVehicle
+from studies.figures import plt, save
+
+COLOURS = ("#222222", "#0072b2", "#56b4e9", "#d55e00", "#cc79a7")
+"""One colour per correlation: the scene's own, then two of the axles and two of the tracks."""
+STYLES = ("-", "--", ":", "--", ":")
+
+
+def along_figure(places: Sequence[float], at: Sweep, over: Sweep, vehicle: SpatialVehicle, speed: float, title: str,
+                 path: Path) -> None:  # fmt: skip
+    """Vertical acceleration of the body, along it at one speed and at its middle output over speed, by correlation."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
+    name = _middle(vehicle)
+    for i, case in enumerate(at.cases):
+        left.plot(places, at.deviation[i, 0], STYLES[i], color=COLOURS[i], label=case)
+        if name:
+            right.plot(over.speeds[:-1], over.of(case, name)[:-1], STYLES[i], color=COLOURS[i])
+    for x in vehicle.axles:
+        left.axvline(x, color="0.8", zorder=0)
+    left.set(xlabel="x forward [m]  (grey: axles)", ylabel="standard deviation [m/s²]", ylim=(0, None),
+             title=f"Vertical acceleration along the body at {speed:g} m/s")
+    right.set(xlabel="speed [m/s]", ylabel="standard deviation [m/s²]", ylim=(0, None),
+              title=f"At {name!r} over speed" if name else "")
+    left.legend(title="the axles' and tracks' roads")
+    figure.suptitle(f"{title}: which correlations of the road matter where", fontsize=11)
+    save(figure, path)
+
+
+def _middle(vehicle: SpatialVehicle) -> str:
+    """The vertical acceleration nearest to the middle of the axles."""
+    middle = (vehicle.axles[0] + vehicle.axles[-1]) / 2
+    points = [o for o in vehicle.outputs if o.kind == "acceleration" and getattr(o, "axis", None) == (0.0, 0.0, 1.0)]
+    heaviest = max(vehicle.bodies, key=lambda body: body.mass).name
+    points = [o for o in points if o.body == heaviest] or points
+    return min(points, key=lambda o: abs(o.point[0] - middle)).name if points else ""
+
+
+GROUPS = (("acceleration", "m/s²", 1.0), ("angular acceleration", "rad/s²", 1.0), ("travel", "mm", 1e3),
+          ("tyre force", "share of the static load", 1.0))  # fmt: skip
+
+
+def outputs_figure(found: Sweep, vehicle: SpatialVehicle, static: Mapping[str, float], title: str, path: Path) -> None:
+    """Standard deviations of the outputs over speed in the scene's own case, a panel per kind."""
+    kinds = {output.name: output.kind for output in vehicle.outputs}
+    kinds |= {name: "acceleration" for name in found.outputs if name not in kinds}
+    groups = [group for group in GROUPS if group[0] in kinds.values()]
+    rows = -(-len(groups) // 2)
+    figure, axes = plt.subplots(rows, 2, figsize=(12, 3.6 * rows), squeeze=False)
+    for axis, (kind, unit, factor) in zip(axes.ravel(), groups, strict=False):
+        curves = {name: factor * found.of(found.cases[0], name)[:-1] / static.get(name, 1.0)
+                  for name, own in kinds.items() if own == kind}  # fmt: skip
+        for label, values in _distinct(curves).items():
+            axis.plot(found.speeds[:-1], values, label=label)
+        axis.set(xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=kind.capitalize())
+        axis.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    for axis in axes.ravel()[len(groups) :]:
+        axis.remove()
+    figure.suptitle(f"{title}: standard deviations over speed", fontsize=11)
+    save(figure, path)
+
+
+def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Curves by name; those that lie on one another (left and right, mostly) as one with both names."""
+    groups: list[tuple[list[str], np.ndarray]] = []
+    for name, values in curves.items():
+        for names, known in groups:
+            if np.allclose(values, known, rtol=1e-6, equal_nan=True):
+                names.append(name)
+                break
+        else:
+            groups.append(([name], values))
+    return {"\n= ".join(names): values for names, values in groups}
+
+
+def spectra_figure(vehicle: SpatialVehicle, linear: LinearVehicle, excitation: Excitation, speed: float, title: str,
+                   path: Path) -> None:  # fmt: skip
+    """One-sided spectra of the accelerations and tyre forces over frequency at one speed."""
+    from models.ride.frequency import spectra
+
+    frequency = np.geomspace(0.1, 100.0, 800)
+    found = spectra(excited(linear, excitation, speed), frequency)
+    kinds = [output.kind for output in linear.outputs]
+    shown = [kind for kind in ("acceleration", "tyre force") if kind in kinds]
+    figure, axes = plt.subplots(1, len(shown), figsize=(5.0 * len(shown), 4.2), squeeze=False)
+    units = {"acceleration": "(m/s²)²/Hz", "tyre force": "N²/Hz"}
+    for axis, kind in zip(axes[0], shown, strict=True):
+        for i, output in enumerate(linear.outputs):
+            if output.kind == kind:
+                axis.loglog(frequency, found[:, i], label=output.name)
+        axis.set(xlabel="frequency [Hz]", ylabel=f"one-sided density [{units[kind]}]", title=kind.capitalize())
+        axis.legend(fontsize=7.5)
+    figure.suptitle(f"{title}: spectra at {speed:g} m/s", fontsize=11)
+    save(figure, path)
+
+
+def detail_figure(errors: Mapping[tuple[str, str], np.ndarray], names: Sequence[str], cost: Mapping[str, float],
+                  title: str, path: Path) -> None:  # fmt: skip
+    """Errors of all outputs by model and road as a table of colours, with what a covariance costs."""
+    heads = [f"{model}\n{1e3 * cost[model]:.2g} ms\n" + road.replace(", ", ",\n") for model, road in errors]
+    values = 100 * np.array(list(errors.values())).T
+    figure, axis = plt.subplots(figsize=(1.35 * len(heads) + 2.4, 0.36 * len(names) + 1.8))
+    picture = axis.imshow(values, cmap="RdBu_r", vmin=-60, vmax=60, aspect="auto")
+    for i, j in np.ndindex(values.shape):
+        if np.isfinite(values[i, j]):
+            dark = abs(values[i, j]) > 40
+            axis.text(j, i, f"{values[i, j]:+.0f}", ha="center", va="center", fontsize=8, color="w" if dark else "k")
+    axis.set_xticks(range(len(heads)), heads, fontsize=7.5)
+    axis.set_yticks(range(len(names)), names)
+    axis.grid(visible=False)
+    figure.colorbar(picture, label="error [%]", extend="both")
+    what = "largest error of each standard deviation over the speeds [%], and the time of one covariance"
+    axis.set_title(f"{title}\n{what.capitalize()}")
+    save(figure, path)
+
+
+def drive_figure(found: VaryingSpeed, alone: np.ndarray, shown: Sequence[str], kinds: Mapping[str, tuple[str, str]],
+                 title: str, path: Path) -> None:  # fmt: skip
+    """Standard deviations along a drive, dashed if every speed is taken by itself, above the speed."""
+    groups = list(dict.fromkeys(kinds[name] for name in shown))
+    heights = [3.0] * len(groups) + [1.3]
+    figure, axes = plt.subplots(len(heights), 1, figsize=(9, sum(heights) + 0.8), sharex=True, height_ratios=heights)
+    for axis, (kind, unit) in zip(axes, groups, strict=False):
+        own = {name: found.names.index(name) for name in shown if kinds[name] == (kind, unit)}
+        pairs = {name: np.concatenate([found.deviation[:, i], alone[:, i]]) for name, i in own.items()}
+        for label, both in _distinct(pairs).items():
+            exact, quasi = np.split(both, 2)
+            (line,) = axis.plot(found.time, exact, label=label)
+            axis.plot(found.time, quasi, "--", color=line.get_color(), linewidth=0.8)
+        axis.set(ylabel=f"standard deviation [{unit}]", title=kind.capitalize(), ylim=(0, None))
+        axis.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes[-1].plot(found.time, found.speed, color="0.3")
+    axes[-1].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
+    figure.suptitle(f"{title}\nsolid: exact; dashed: each speed taken by itself", fontsize=11)
+    save(figure, path)
