@@ -1,0 +1,80 @@
+"""Variances of a quarter car and of a half car in closed form, against which every other route is held.
+
+A body m_s on spring k and damper c, a wheel m_u, a tyre k_t without damping; the road's height is white noise of
+intensity q per second through z' = -corner z + w (corner in rad/s; 0: a random walk, whose height has no variance,
+while the outputs here have one). The integrals over the rational spectra were solved by computer algebra.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+
+@dataclass(frozen=True)
+class QuarterCar:
+    """Masses in kg, stiffnesses in N/m, damping in N s/m."""
+
+    m_s: float
+    m_u: float
+    k: float
+    c: float
+    k_t: float
+
+    @property
+    def mass(self) -> float:
+        """Body and wheel, kg."""
+        return self.m_s + self.m_u
+
+    def body_acceleration(self, q: float, corner: float = 0.0) -> float:
+        """Variance, m^2/s^4. q in m^2/s."""
+        s, u, k, c, t, w = self.m_s, self.m_u, self.k, self.c, self.k_t, corner
+        top = c**3 * t * w + c**2 * k * t + c**2 * t * s * w**2 + c * k**2 * self.mass * w + k**3 * self.mass
+        return q * t / (2 * c * s**2) * (top + k**2 * s * u * w**2) / self._common(w)
+
+    def suspension_travel(self, q: float, corner: float = 0.0) -> float:
+        """Variance of body height less wheel height, m^2."""
+        slow = self.mass * (self.c * corner + self.k) + self.m_s * self.m_u * corner**2
+        return q * self.k_t / (2 * self.c) * slow / self._common(corner)
+
+    def tyre_deflection(self, q: float) -> float:
+        """Variance of wheel height less road height, m^2, on a random walk; k_t^2 times it is that of the wheel load."""
+        s, u, k, c, t, m = self.m_s, self.m_u, self.k, self.c, self.k_t, self.mass
+        return q / 2 * (c * m**2 / (t * s**2) + (k**2 * m**3 / (t * s) ** 2 - 2 * k * m * u / (t * s) + u) / c)
+
+    def _common(self, w: float) -> float:
+        s, u, k, c, t = self.m_s, self.m_u, self.k, self.c, self.k_t
+        slow = c * t * w + k * t + (k * self.mass + t * s) * w**2
+        return slow + c * self.mass * w**3 + s * u * w**4
+
+    def correlation_of_acceleration(self, q: float, delay: float) -> float:
+        """E[a(t) a(t + delay)] of the body on a random walk, m^2/s^4: C e^(A delay) P C' of four states.
+
+        States: tyre deflection, wheel speed, suspension travel, body speed. None of them walks with the road, so P
+        solves a Lyapunov equation without cancellation.
+        """
+        from control import lyap
+
+        s, u, k, c, t = self.m_s, self.m_u, self.k, self.c, self.k_t
+        A = np.array([[0, 1, 0, 0], [-t / u, -c / u, k / u, c / u], [0, -1, 0, 1], [0, c / s, -k / s, -c / s]])
+        P = lyap(A, np.diag([q, 0.0, 0.0, 0.0]), method="scipy")
+        return float(A[3] @ expm(A * delay) @ P @ A[3])
+
+
+def half_car_acceleration(corner: QuarterCar, q: float, a: float, b: float, speed: float) -> float:
+    """Variance (m^2/s^4) of the acceleration of a half car's centre of gravity, a (m) behind the front axle, b before
+    the rear one, that splits into two identical quarter cars.
+
+    It does so if its pitch inertia is m a b and each axle's spring, damper, tyre and wheel are in the ratio of its
+    share of the mass, front b / (a + b), rear a / (a + b); ``corner`` is the quarter car of either, to that scale.
+    """
+    base = a + b
+    own = corner.body_acceleration(q)
+    after = corner.correlation_of_acceleration(q, base / speed)
+    return ((a**2 + b**2) * own + 2 * a * b * after) / base**2
+
+
+def split_half_car(corner: QuarterCar, a: float, b: float) -> tuple[QuarterCar, QuarterCar, float]:
+    """Front and rear corner of that half car, 2 b / (a + b) and 2 a / (a + b) times ``corner``; pitch inertia, kg m^2."""
+    front, rear = (QuarterCar(*(2 * share / (a + b) * value for value in vars(corner).values())) for share in (b, a))
+    return front, rear, 2 * corner.m_s * a * b

@@ -1,0 +1,144 @@
+"""Spectra of a vehicle's outputs, and variances as integrals over them: a route that shares nothing with the covariance.
+
+Transfer functions come from the dynamic stiffness K + i w D - w^2 M, frequency by frequency; the road is put in front
+as a factor. The integrand of a delay, f(w) e^(i w tau), is smooth but for its oscillation: f is interpolated by
+Legendre polynomials on panels, and the product with the oscillation is integrated exactly (Filon's idea, through
+spherical Bessel functions), so that panels need not follow the delay. They are halved until halving changes nothing.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import eval_legendre, spherical_jn
+
+from models.ride.excitation import Excitation
+from models.ride.linear_vehicle import LinearVehicle
+
+POINTS = 16
+"""Gauss points of a panel."""
+LOW, HIGH = 1e-4, 1e12
+"""First and last frequency by the lowest and the highest one of vehicle and road; below the spectrum is flat."""
+TOLERANCE = 1e-11
+"""A panel is halved while that changes any variance by more than this share; PANELS at most in all."""
+PANELS = 1500
+SILENT = 1e-24
+"""Share of its terms' squares below which an output is zero by symmetry, and rounding is all of it."""
+
+Weights = Mapping[str, Callable[[np.ndarray], np.ndarray]]
+"""By output, the complex factor of a weighting as a function of the frequency in Hz."""
+
+
+@dataclass(frozen=True)
+class Quadrature:
+    """variance (p,) with its own estimate of the relative error (p,); frequencies that it took."""
+
+    variance: np.ndarray
+    error: np.ndarray
+    frequencies: int
+
+
+def transfer(vehicle: LinearVehicle, omega: np.ndarray) -> np.ndarray:
+    """Outputs by heights under the wheels (n, p, w) at angular frequencies (n,) in rad/s, from the dynamic stiffness."""
+    s = 1j * np.asarray(omega, float)[:, None, None]
+    stiffness = vehicle.stiffness + s * vehicle.damping + s**2 * vehicle.mass
+    motion = np.linalg.solve(stiffness, vehicle.road_stiffness + s * vehicle.road_damping)
+    of = {key: np.array([getattr(output, key) for output in vehicle.outputs])
+          for key in ("acceleration", "rate", "displacement", "road", "road_rate")}  # fmt: skip
+    rows = of["displacement"] + s * of["rate"] + s**2 * of["acceleration"]
+    return rows @ motion + of["road"] + s * of["road_rate"]
+
+
+def road(excitation: Excitation, speed: float, omega: np.ndarray) -> np.ndarray:
+    """Heights under the wheels by the noise (a, n, w, k), axle by axle, each without its delay; m / sqrt(1/s)."""
+    s = 1j * np.asarray(omega, float)[:, None, None]
+    shape = s * np.eye(len(excitation.F)) - speed * excitation.F
+    filtered = np.linalg.solve(shape, speed**0.5 * excitation.G.astype(complex)[None])
+    return np.array([heights @ filtered for heights in excitation.heights])
+
+
+def spectra(vehicle: LinearVehicle, excitation: Excitation, speed: float, omega: np.ndarray,
+            weights: Weights | None = None) -> np.ndarray:  # fmt: skip
+    """Two-sided densities (n, p) over the angular frequency (rad/s): a variance is the integral over all, both signs."""
+    parts = _parts(vehicle, excitation, speed, omega, weights or {})
+    if excitation.independent:
+        return (abs(parts) ** 2).sum(axis=(0, 3)) / (2 * np.pi)
+    delays = np.array(excitation.lengths) / speed
+    turned = parts * np.exp(-1j * delays[:, None] * omega)[:, :, None, None]
+    return (abs(turned.sum(axis=0)) ** 2).sum(axis=2) / (2 * np.pi)
+
+
+def _parts(vehicle: LinearVehicle, excitation: Excitation, speed: float, omega: np.ndarray,
+           weights: Weights) -> np.ndarray:  # fmt: skip
+    """Outputs by the noise of each axle (a, n, p, k), smooth: without the delays."""
+    return _weighted(vehicle, omega, weights) @ road(excitation, speed, omega)
+
+
+def _weighted(vehicle: LinearVehicle, omega: np.ndarray, weights: Weights) -> np.ndarray:
+    whole = transfer(vehicle, omega)
+    for i, output in enumerate(vehicle.outputs):
+        if output.name in weights:
+            whole[:, i] *= weights[output.name](omega / (2 * np.pi))[:, None]
+    return whole
+
+
+def quadrature(vehicle: LinearVehicle, excitation: Excitation, speed: float,
+               weights: Weights | None = None) -> Quadrature:  # fmt: skip
+    """Variances as integrals over all frequencies, weighted outputs in place of their own; inf where one diverges."""
+
+    def over(edges: np.ndarray) -> np.ndarray:
+        """Shares (panels, p) of the variances between the two frequencies of each row."""
+        centre, half = edges.mean(axis=1), np.diff(edges, axis=1)[:, 0] / 2
+        parts = _parts(vehicle, excitation, speed, (centre[:, None] + half[:, None] * NODES).ravel(), weights or {})
+        parts = parts.reshape(len(parts), len(centre), POINTS, *parts.shape[2:])
+        return _integrals(parts, centre, half, excitation, speed)
+
+    frequencies = _breaks(vehicle, excitation, speed)
+    edges = np.column_stack([frequencies[:-1], frequencies[1:]])
+    whole, taken = over(edges), len(edges)
+    seen = abs(_weighted(vehicle, frequencies[1:], weights or {})) @ abs(road(excitation, speed, frequencies[1:]))
+    terms = np.einsum("ambk,ambk,m->b", seen, seen, frequencies[1:])
+    total = np.maximum(abs(whole).sum(axis=0), SILENT * terms)
+    diverges = (abs(whole[[0, -1]]) > 0.1 * total).any(axis=0)
+    variance, error = np.zeros(len(total)), abs(whole[-1])  # beyond the last panel lies as much as in it
+    while len(edges):
+        finer = np.column_stack([edges[:, 0], edges.mean(axis=1), edges.mean(axis=1), edges[:, 1]]).reshape(-1, 2)
+        parts = over(finer)
+        halved = parts.reshape(len(edges), 2, -1).sum(axis=1)
+        taken += len(finer)
+        rough = (abs(halved - whole) > TOLERANCE * total).any(axis=1) & (taken < PANELS)
+        variance += halved[~rough].sum(axis=0)
+        error += abs(halved - whole)[~rough].sum(axis=0)
+        edges, whole = finer[np.repeat(rough, 2)], parts[np.repeat(rough, 2)]
+    known = np.divide(error, variance, out=np.zeros(len(total)), where=variance > 0)
+    return Quadrature(np.where(diverges, np.inf, variance), known, taken * POINTS)
+
+
+NODES, GAUSS = np.polynomial.legendre.leggauss(POINTS)
+DEGREES = np.arange(POINTS)
+TO_LEGENDRE = (DEGREES[:, None] + 0.5) * eval_legendre(DEGREES[:, None], NODES) * GAUSS
+"""Coefficients of the Legendre polynomials (degree, node) by the values at the nodes."""
+
+
+def _integrals(parts: np.ndarray, centre: np.ndarray, half: np.ndarray, excitation: Excitation,
+               speed: float) -> np.ndarray:  # fmt: skip
+    """Variances (panels, p) of the sum of delayed parts (a, panels, nodes, p, k); both signs of the frequency."""
+    found = np.einsum("ambpk,ambpk,b->mp", parts, parts.conj(), GAUSS).real
+    for j in range(1, len(parts)) if not excitation.independent else ():
+        for i in range(j):
+            gap = (excitation.lengths[j] - excitation.lengths[i]) / speed
+            moments = 2 * 1j**DEGREES * spherical_jn(DEGREES, (half * gap)[:, None])
+            weight = np.exp(1j * centre * gap)[:, None] * (moments @ TO_LEGENDRE)
+            found += 2 * np.einsum("mbpk,mbpk,mb->mp", parts[i], parts[j].conj(), weight).real
+    return found * half[:, None] / np.pi
+
+
+def _breaks(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> np.ndarray:
+    """Edges (rad/s) of the first panels: doublings from almost 0 to beyond all, and the undamped frequencies."""
+    squares = abs(np.linalg.eigvals(np.linalg.solve(vehicle.mass, vehicle.stiffness)))
+    own = np.sqrt(squares[squares > 1e-8 * squares.max()])
+    corners = speed * abs(np.linalg.eigvals(excitation.F))
+    marks = np.concatenate([own, corners[corners > 0]])
+    low, high = LOW * marks.min(), HIGH * marks.max()
+    doublings = np.geomspace(low, high, int(np.ceil(np.log2(high / low))))
+    return np.unique(np.concatenate([[0.0], doublings, own]))
