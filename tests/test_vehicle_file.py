@@ -98,7 +98,7 @@ def test_every_table_is_built():
     assert vehicle.bodies[0].inertia == ((300, 0, -10), (0, 1100, 0), (-10, 0, 1200))
     assert vehicle.tyres[3].point == (-1.4, -0.6, 0.31)
     (side,) = vehicle.side_forces
-    assert (side.body, side.point, side.roll_steer) == ("left", (1.2, 0.7, 0.0), 0.05)
+    assert (side.body, side.point, side.roll_steer) == ("body", (1.2, 0.7, 0.0), 0.05)
     assert vehicle.bars[0].track == 1.4
     assert vehicle.drags[0].coefficient == 0.5
     assert vehicle.outputs[1].axis == (1, 0, 0)
@@ -189,6 +189,7 @@ BAD = {
     "no chassis": ('chassis = "body"', "", "chassis: is missing: tyre 'fl' has a side force"),
     "unknown chassis": ('chassis = "body"', 'chassis = "boddy"', "chassis = 'boddy': no such body"),
     "roll steer of nothing": (", cornering = 5e4", "", "axles[front].roll_steer = 0.05: steers nothing"),
+    "side force on a wheel that slides": ('{ name = "left", mass = 38, position = [1.2, 0.7, 0.31], freedoms = ["z"]', '{ name = "left", mass = 38, position = [1.2, 0.7, 0.31], freedoms = ["z", "y"]', "tyres[fl].cornering = 50000.0: its side force acts on the chassis"),
     "drag on unknown body": ('drag = { body = "body"', 'drag = { body = "bodi"', "drag.body = 'bodi': no such body"),
     "output on unknown body": ('body = "driver" }', 'body = "diver" }', "outputs[driver].body = 'diver': no such body (allowed: body, driver, engine, left, rear, right); did you mean 'driver'?"),
     "output of unknown part": ('"mount.z"', '"mount"', "outputs[mount].part = 'mount': no such part"),
@@ -227,7 +228,9 @@ def test_two_bodies_that_only_hold_one_another():
         built(text)
 
 
-def test_side_force_on_a_wheel_that_cannot_move_sideways():
+def test_side_force_on_a_chassis_that_cannot_move_sideways():
     text = EXAMPLE.replace("stiffness = 190e3, source", "stiffness = 190e3, cornering = 5e4, source", 1)
-    with pytest.raises(InputError, match=r"tyres\[front\].cornering = 50000.0: side force on a body that cannot move"):
+    with pytest.raises(
+        InputError, match=r"tyres\[front\].cornering = 50000.0: side force on a chassis that cannot move"
+    ):
         built(text.replace("bodies =", 'chassis = "body"\nbodies =', 1))

@@ -80,12 +80,12 @@ def _inert(vehicle: SpatialVehicle, file: str) -> None:
 
 
 def _movable(vehicle: SpatialVehicle, file: str) -> None:
-    """A tyre moves up and down, a tyre with a side force sideways."""
+    """A tyre moves up and down, a chassis with side forces sideways."""
     motion = Kinematics(vehicle)
     for tyre in vehicle.tyres:
         if not motion.shift(tyre.body, tyre.point)[2].any():
             raise InputError(file, f"tyres[{tyre.name}].body", tyre.body, "this body cannot move up and down")
     for force in vehicle.side_forces:
         if not motion.shift(force.body, force.point)[1].any():
-            said = "side force on a body that cannot move sideways: give it or its parent the freedom y"
+            said = "side force on a chassis that cannot move sideways: give it the freedom y, or leave it out"
             raise InputError(file, f"tyres[{force.name}].cornering", force.stiffness, said)

@@ -288,11 +288,15 @@ class _Builder:
         if self.tables.chassis is None:
             raise self._fault("chassis", None, f"is missing: tyre {rolling[0].name!r} has a side force")
         chassis = self._body("chassis", self.tables.chassis)
-        found = []
-        for tyre in rolling:
-            (x, y, _), axle = self.tyres[tyre.name].point, self.axles[tyre.axle]
-            found.append(SideForce(tyre.name, tyre.body, (x, y, 0.0), chassis, tyre.cornering, axle.roll_steer))
-        return tuple(found)
+        return tuple(self._side_force(tyre, chassis) for tyre in rolling)
+
+    def _side_force(self, tyre: TyreTable, chassis: str) -> SideForce:
+        """On the chassis, which guides the wheel sideways."""
+        (x, y, _), axle = self.tyres[tyre.name].point, self.axles[tyre.axle]
+        if tyre.body != chassis and "y" in self.bodies[tyre.body].freedoms:
+            allowed = f"its side force acts on the chassis: body {tyre.body!r} must not have the freedom y"
+            raise self._fault(_place("tyres", tyre.name, "cornering"), tyre.cornering, allowed)
+        return SideForce(tyre.name, chassis, (x, y, 0.0), chassis, tyre.cornering, axle.roll_steer)
 
     def _drags(self) -> tuple[Drag, ...]:
         drag = self.tables.drag

@@ -110,7 +110,7 @@ class TyreTable(Entry):
     y: float | None = quantity("m", "place to the left, by default the body's", default=None, signed=True)
     stiffness: float = quantity("N/m", "vertical stiffness")
     damping: float = quantity("N s/m", "vertical damping", default=0.0, zero=True)
-    cornering: float = quantity("N/rad", "side force over slip angle", default=0.0, zero=True)
+    cornering: float = quantity("N/rad", "side force on the chassis over slip angle", default=0.0, zero=True)
 
 
 class DragTable(Strict):
@@ -144,7 +144,9 @@ class VehicleTable(Strict):
 
     title: str = Field(description="what the vehicle is")
     notes: str = Field("", description="what a reader should know")
-    chassis: str | None = Field(None, description="body whose roll and yaw the tyres' side forces see")
+    chassis: str | None = Field(
+        None, description="body on which the tyres' side forces act, and whose roll and yaw they see"
+    )
     bodies: list[BodyTable] = Field(min_length=1)
     axles: list[AxleTable] = Field(min_length=1)
     tyres: list[TyreTable] = Field(min_length=1)
