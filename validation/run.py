@@ -20,7 +20,7 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "drift_off", "drift_solvers", "holding_spring", "point_mass",
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
          "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
-         "contact_simplified", "contact_profiles", "contact_price",
+         "contact_simplified", "contact_profiles", "ride_road", "contact_price",
          "fastsim")  # fmt: skip
 """Case modules in the order of the report."""
 
@@ -93,7 +93,7 @@ def _broken(name: str, error: BaseException) -> Row:
 def seeds() -> dict[str, int]:
     """Every seed that the rows depend on; with them and the versions all counts and states repeat exactly."""
     from studies.six_runs import Options
-    from validation import checks, timing
+    from validation import checks, fitted_roads, timing
     from validation.cases import (
         contact_price,
         drift_off,
@@ -119,7 +119,8 @@ def seeds() -> dict[str, int]:
             "loads of the score": score.SEED, "stabilisers": stabilisers.SEED, "index reduction": index_reduction.SEED,
             "growth of noise": growth.SEED, "drift-off": drift_off.SEED, "drift by solver": drift_solvers.SEED,
             "holding spring": holding_spring.SEED,
-            "random contacts": fastsim.SEED, "table of contacts": contact_price.SEED}  # fmt: skip
+            "random contacts": fastsim.SEED, "table of contacts": contact_price.SEED,
+            "made road": fitted_roads.SEED}  # fmt: skip
 
 
 def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:

@@ -13,7 +13,7 @@ from models.ride.linear_vehicle import LinearVehicle
 
 Densities = Callable[[np.ndarray], np.ndarray]
 """From wavenumbers (k,) in rad/m to the two-sided densities (k, w, w) of heights, see models/road/isotropic.py."""
-POINTS = 12
+POINTS = 10
 """Gauss points per panel; a panel is at most a quarter of an octave wide and half a wave of the longest delay."""
 
 

@@ -39,12 +39,13 @@ class FilterFit:
 
 @dataclass(frozen=True)
 class FittedRoad:
-    """The road, both fits (None for a process that is not there), and sentences on what they are worth."""
+    """The road, both fits (None for a process that is not there), sentences on what they are worth, the spectra."""
 
     road: TwoTrackRoad
     mean: FilterFit
     roll: FilterFit | None
     notes: tuple[str, ...]
+    spectra: TrackSpectra
 
 
 def fit(
@@ -67,7 +68,7 @@ def fit(
     roll = _fit(found.wavenumber, found.roll, found.freedom, least, most, tracks.name) if apart > 0.0 else None
     silent = ShapeFilter(mean.filter.corner, 0.0)
     road = TwoTrackRoad(mean.filter, silent if roll is None else roll.filter)
-    return FittedRoad(road, mean, roll, (*_limits(tracks, found), *_doubts(found, mean, roll)))
+    return FittedRoad(road, mean, roll, (*_limits(tracks, found), *_doubts(found, mean, roll)), found)
 
 
 def _fit(k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float, name: str) -> FilterFit:

@@ -118,19 +118,17 @@ def spectra(tracks: MeasuredTracks, window_length: float | None = None) -> Track
     if windows < 2:
         allowed = f"two windows or more must fit on the {tracks.length:g} m, each of 16 stations or more"
         raise InputError(tracks.name, "window_length (m)", wanted, allowed)
-    mean = (tracks.left + tracks.right) / 2.0
-    roll = (tracks.left - tracks.right) / (2.0 * tracks.half_track)
+    b = tracks.half_track
 
     def density(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         n, both = csd(x, y, 1.0 / tracks.increment, "hann", size, size // 2, detrend="linear")
         inner = (n > 0.0) & (n < n[-1])  # the ends stand once where all others stand for +- n
         return np.asarray(both[inner] / (4.0 * math.pi))  # one-sided over n, to two-sided over 2 pi n
 
-    own = {"left": tracks.left, "right": tracks.right, "mean": mean, "roll": roll}
-    auto = {name: density(x, x).real for name, x in own.items()}
-    wavenumber = 2.0 * math.pi / (size * tracks.increment) * np.arange(1, len(auto["left"]) + 1)
+    left, right = density(tracks.left, tracks.left).real, density(tracks.right, tracks.right).real
+    cross = density(tracks.left, tracks.right)
+    wavenumber = 2.0 * math.pi / (size * tracks.increment) * np.arange(1, len(left) + 1)
+    mean, roll = (left + right + 2.0 * cross.real) / 4.0, (left + right - 2.0 * cross.real) / (4.0 * b**2)
+    mean_roll = (left - right - 2j * cross.imag) / (4.0 * b)
     freedom = 2.0 * windows / (1.0 + (1.0 - 1.0 / windows) / 18.0)
-    return TrackSpectra(
-        wavenumber, cross=density(tracks.left, tracks.right), mean_roll=density(mean, roll), windows=windows,
-        freedom=freedom, **auto,
-    )  # fmt: skip
+    return TrackSpectra(wavenumber, left, right, cross, mean, roll, mean_roll, windows, freedom)
