@@ -1,7 +1,7 @@
 """Outputs from the spectral densities of the heights under the wheels: for roads that no finite filter makes.
 
-No state and no noise: the dynamic stiffness K + i w D - w^2 M is solved frequency by frequency. It serves isotropic
-roads and measured densities, and checks the covariances of filtered ones by a route of its own.
+No state and no noise: the transfer functions of the vehicle alone, between the densities of heights and of outputs. It
+serves isotropic roads and measured densities; roads of filters have an exact quadrature of their own (frequency.py).
 """
 
 from collections.abc import Callable
@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
+from models.ride.frequency import transfer
 from models.ride.linear_vehicle import LinearVehicle
 
 Densities = Callable[[np.ndarray], np.ndarray]
@@ -17,20 +18,9 @@ POINTS = 10
 """Gauss points per panel; a panel is at most a quarter of an octave wide and half a wave of the longest delay."""
 
 
-def responses(vehicle: LinearVehicle, omega: np.ndarray) -> np.ndarray:
-    """Transfer functions (k, p, w) from heights (m) to outputs at the angular frequencies omega (k,) in rad/s."""
-    iw = 1j * omega[:, None, None]
-    stiffness = vehicle.stiffness + iw * vehicle.damping + iw**2 * vehicle.mass
-    motion = np.linalg.solve(stiffness, vehicle.road_stiffness + iw * vehicle.road_damping)
-    of = {key: np.array([getattr(output, key) for output in vehicle.outputs]) for key in
-          ("acceleration", "rate", "displacement", "road", "road_rate")}  # fmt: skip
-    own = of["displacement"] + iw * of["rate"] + iw**2 * of["acceleration"]
-    return np.asarray(own @ motion + of["road"] + iw * of["road_rate"])
-
-
 def output_densities(vehicle: LinearVehicle, road: Densities, speed: float, wavenumber: np.ndarray) -> np.ndarray:
     """Two-sided densities (k, p) of the outputs over the wavenumber (rad/m), in unit^2 m, at a speed in m/s."""
-    H = responses(vehicle, speed * wavenumber)
+    H = transfer(vehicle, speed * wavenumber)
     return np.einsum("kpi,kij,kpj->kp", H.conj(), road(wavenumber), H, optimize=True).real
 
 
