@@ -67,15 +67,15 @@ class RoadTable:
 class Build:
     """Exudyn's system while it is put together.
 
-    links: (tree, last link) of every body; places: (node, index within it) of every coordinate; markers by body and
-    point.
+    links: (tree, last link, where its joint is) of every body; places: (node, index within it) of every coordinate;
+    markers by body and point.
     """
 
     vehicle: SpatialVehicle
     mbs: Any
     held: Preloads
     ground: Any
-    links: dict[str, tuple[Any, int]] = field(default_factory=dict)
+    links: dict[str, tuple[Any, int, Vector]] = field(default_factory=dict)
     places: dict[tuple[str, str], tuple[Any, int]] = field(default_factory=dict)
     markers: dict[tuple[str | None, Vector], Any] = field(default_factory=dict)
     callbacks: int = 0
@@ -90,7 +90,8 @@ class Build:
     def _new_marker(self, body: str | None, point: Vector) -> Any:
         if body is None:
             return items.MarkerBodyRigid(bodyNumber=self.ground, localPosition=list(point))
-        (tree, link), local = self.links[body], np.subtract(point, self.vehicle.body(body).position)
+        tree, link, origin = self.links[body]
+        local = np.subtract(point, origin)
         return items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localPosition=local)
 
     def reader(self, body: str, freedom: str, kind: Any = KINDS.Coordinates) -> Callable[[], float]:
@@ -115,33 +116,58 @@ class Build:
         self.callbacks += 1
 
 
+@dataclass
+class Link:
+    """A joint of a tree and the mass behind it; ``centre`` counts from the joint, ``inertia`` about the centre."""
+
+    joint: Any
+    parent: int
+    offset: np.ndarray
+    mass: float = 0.0
+    centre: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    inertia: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
+
+    def load(self, body: Body, at: np.ndarray) -> None:
+        """Add a body's mass with its centre there."""
+        mass = self.mass + body.mass
+        centre = (self.mass * self.centre + body.mass * at) / mass if mass else at
+        self.inertia = (self.inertia + _carried(self.mass, self.centre - centre)
+                        + np.array(body.inertia, float) + _carried(body.mass, at - centre))  # fmt: skip
+        self.mass, self.centre = mass, centre
+
+
+def _carried(mass: float, arm: np.ndarray) -> np.ndarray:
+    """Inertia (3, 3) of a point mass at an arm (Steiner)."""
+    return mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+
+
 def _tree(built: Build, bodies: list[Body]) -> None:
-    """A body without parent and its riders: a link per coordinate, mass on the last one of each body."""
-    joints, parents, offsets, inertias, masses = [], [], [], [], []
-    last: dict[str, int] = {}
+    """A body without parent and its riders: a link per coordinate, mass on the last one of each body.
+
+    A rider without freedoms adds its mass to the last link of what it rides on.
+    """
+    links: list[Link] = []
     places = []
+    last: dict[str | None, tuple[int, Vector]] = {None: (-1, (0.0, 0.0, 0.0))}
     for body in bodies:
-        parent = -1 if body.parent is None else last[body.parent]
-        origin = (0.0, 0.0, 0.0) if body.parent is None else built.vehicle.body(body.parent).position
+        parent, origin = last[body.parent]
         for freedom in (freedom for freedom in FREEDOMS if freedom in body.freedoms):
-            joints.append(JOINTS[freedom])
-            parents.append(parent)
-            offsets.append(np.subtract(body.position, origin))
-            inertias.append(np.zeros((3, 3)))
-            masses.append(0.0)
+            links.append(Link(JOINTS[freedom], parent, np.subtract(body.position, origin)))
             places.append((body.name, freedom))
-            parent, origin = len(joints) - 1, body.position
-        inertias[-1], masses[-1] = np.array(body.inertia, float), body.mass
-        last[body.name] = len(joints) - 1
-    n, zero = len(joints), [0.0] * len(joints)
+            parent, origin = len(links) - 1, body.position
+        links[parent].load(body, np.subtract(body.position, origin))
+        last[body.name] = parent, origin
+    n, zero = len(links), [0.0] * len(links)
     node = built.mbs.AddNode(items.NodeGenericODE2(
         referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero, numberOfODE2Coordinates=n))
     tree = built.mbs.AddObject(items.ObjectKinematicTree(
-        nodeNumber=node, gravity=[0, 0, -built.vehicle.gravity], jointTypes=joints, linkParents=parents,
-        jointTransformations=lists.Matrix3DList([np.eye(3)] * n), jointOffsets=lists.Vector3DList(offsets),
-        linkInertiasCOM=lists.Matrix3DList(inertias), linkCOMs=lists.Vector3DList([np.zeros(3)] * n),
-        linkMasses=masses))  # fmt: skip
-    built.links |= {name: (tree, link) for name, link in last.items()}
+        nodeNumber=node, gravity=[0, 0, -built.vehicle.gravity], jointTypes=[link.joint for link in links],
+        linkParents=[link.parent for link in links], jointTransformations=lists.Matrix3DList([np.eye(3)] * n),
+        jointOffsets=lists.Vector3DList([link.offset for link in links]),
+        linkInertiasCOM=lists.Matrix3DList([link.inertia for link in links]),
+        linkCOMs=lists.Vector3DList([link.centre for link in links]),
+        linkMasses=[link.mass for link in links]))  # fmt: skip
+    built.links |= {body.name: (tree, *last[body.name]) for body in bodies}
     built.places |= {place: (node, i) for i, place in enumerate(places)}
 
 

@@ -1,8 +1,9 @@
 """A vehicle in space in MuJoCo: native bodies and joints; forces through one compiled callback.
 
-World axes are those of ride, z up. A body has one joint per freedom, in their order, so that MuJoCo's coordinates are
-the vehicle's own. Masses and inertias are written into the compiled model: MuJoCo refuses bodies without inertia,
-even where they never turn, and tensors that no distribution of mass has, which published vehicles contain.
+World axes are those of ride, z up. A body has one joint per freedom, in their order. MuJoCo counts bodies and joints
+from the root of a tree to its leaves: a rider may come earlier there than in the vehicle. Masses and inertias are
+written into the compiled model: MuJoCo refuses bodies without inertia, even where they never turn, and tensors that
+no distribution of mass has, which published vehicles contain.
 """
 
 from collections.abc import Iterator
@@ -42,7 +43,11 @@ Place = tuple[str | None, Vector, Vector]
 
 
 def _spec(vehicle: SpatialVehicle, step: float) -> mujoco.MjSpec:
-    """Bodies and joints, with masses and inertias of 1 for the moment (see ``_weigh``)."""
+    """Bodies and joints, with masses and inertias of 1 for the moment (see ``_weigh``).
+
+    Their names are numbers: a user's body may be called "world".
+    """
+    numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = [0, 0, -vehicle.gravity]
@@ -50,14 +55,14 @@ def _spec(vehicle: SpatialVehicle, step: float) -> mujoco.MjSpec:
     off = mujoco.mjtDisableBit
     spec.option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT
     for body in vehicle.bodies:
-        below = spec.worldbody if body.parent is None else spec.body(body.parent)
+        below = spec.worldbody if body.parent is None else spec.body(numbers[body.parent])
         origin = (0.0, 0.0, 0.0) if body.parent is None else vehicle.body(body.parent).position
-        own = below.add_body(name=body.name, pos=np.subtract(body.position, origin), mass=1.0, ipos=[0, 0, 0],
+        own = below.add_body(name=numbers[body.name], pos=np.subtract(body.position, origin), ipos=[0, 0, 0], mass=1.0,
                              iquat=_principal(body)[1], inertia=[1.0, 1.0, 1.0], explicitinertial=True)  # fmt: skip
         for freedom in (freedom for freedom in FREEDOMS if freedom in body.freedoms):
             turns = freedom.startswith("r")
             kind = mujoco.mjtJoint.mjJNT_HINGE if turns else mujoco.mjtJoint.mjJNT_SLIDE
-            own.add_joint(name=f"{body.name} {freedom}", type=kind, axis=AXES[freedom])
+            own.add_joint(name=f"{numbers[body.name]} {freedom}", type=kind, axis=AXES[freedom])
     return spec
 
 
@@ -72,10 +77,21 @@ def _principal(body: Body) -> tuple[np.ndarray, np.ndarray]:
     return principal, quaternion
 
 
-def _weigh(model: mujoco.MjModel, bodies: tuple[Body, ...]) -> None:
+class Numbers:
+    """Where MuJoCo keeps a vehicle's bodies and coordinates: ids by name, columns (n,) by the vehicle's order."""
+
+    def __init__(self, vehicle: SpatialVehicle, model: mujoco.MjModel) -> None:
+        order = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
+        self.bodies = {name: int(model.body(number).id) for name, number in order.items()}
+        self.joints: dict[tuple[str, str], int] = {
+            (name, freedom): int(model.joint(f"{order[name]} {freedom}").id) for name, freedom in vehicle.coordinates()}
+        self.columns = np.array(list(self.joints.values()))
+
+
+def _weigh(model: mujoco.MjModel, numbers: Numbers, bodies: tuple[Body, ...]) -> None:
     """Give the bodies their masses and principal inertias."""
     for body in bodies:
-        number = model.body(body.name).id
+        number = numbers.bodies[body.name]
         model.body_mass[number], model.body_inertia[number] = body.mass, _principal(body)[0]
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
@@ -127,15 +143,15 @@ def _scaled(axis: Vector, factor: float) -> Vector:
     return (factor * axis[0], factor * axis[1], factor * axis[2])
 
 
-def _packed(element: Element, vehicle: SpatialVehicle, model: mujoco.MjModel) -> list[float]:
+def _packed(element: Element, vehicle: SpatialVehicle, model: mujoco.MjModel, numbers: Numbers) -> list[float]:
     """An element as the callback reads it."""
-    places: dict[tuple[str, str], int] = {place: i for i, place in enumerate(vehicle.coordinates())}
+    places = numbers.joints
     points = [(body, point, axis) for body, point, axis in element.points if body is not None]
     rest = sum(float(np.dot(point, axis)) for _, point, axis in points)
     own = places.get(element.own[0], -1) if element.own else -1
     steered = [value for place, gain in element.steered for value in (places.get(place, -1), gain)]
     of_points = [value for body, point, axis in points for value in (
-        model.body(body).id, _last(model, model.body(body).id),
+        numbers.bodies[body], _last(model, numbers.bodies[body]),
         *np.subtract(point, vehicle.body(body).position), *axis)]  # fmt: skip
     curves = [element.on_travel, element.on_rate]
     counts = [len(curve.arguments) if curve else 0 for curve in curves]
@@ -161,14 +177,15 @@ def _compiled(vehicle: SpatialVehicle, step: float, speed: float | None, road: n
     plain = spec.compile()
     tree = [value for i in range(plain.njnt) for value in (
         float(plain.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE), float(plain.dof_parentid[i]))]  # fmt: skip
-    packed = [_packed(element, vehicle, plain) for element in elements(vehicle, speed)]
+    numbers = Numbers(vehicle, plain)
+    packed = [_packed(element, vehicle, plain, numbers) for element in elements(vehicle, speed)]
     content = np.concatenate([tree, *packed])
     begins = 8 + len(content)
     header = [per_time, len(road), len(vehicle.tyres), plain.njnt, plain.nbody, len(packed), begins, begins + road.size]
     spec.add_numeric(name="vehicle", size=begins + road.size, data=[0.0])
     model = spec.compile()
     model.numeric_data[:] = np.concatenate([header, content, road.ravel()])
-    _weigh(model, vehicle.bodies)
+    _weigh(model, numbers, vehicle.bodies)
     return model
 
 
@@ -183,6 +200,7 @@ class SpatialMujoco:
         table = self._flat[None, :] if road is None else road
         self.model = _compiled(vehicle, step, speed, table, 0.0 if road is None else 2.0 / step)
         self.data = mujoco.MjData(self.model)
+        self.numbers = Numbers(vehicle, self.model)
         self.law: Any = spatial_law()
         check(self.model, self.data)
 
@@ -215,9 +233,10 @@ class SpatialMujoco:
             return self._acceleration(q, v)
 
     def _acceleration(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        self.data.time, self.data.qpos[:], self.data.qvel[:] = 0.0, q, v
+        columns = self.numbers.columns
+        self.data.time, self.data.qpos[columns], self.data.qvel[columns] = 0.0, q, v
         mujoco.mj_forward(self.model, self.data)
-        return self.data.qacc.copy()
+        return self.data.qacc[columns]
 
     def linearise(self) -> LinearVehicle:
         """M from MuJoCo; D, K and the road's columns by central differences of the acceleration, callback included."""
@@ -231,6 +250,7 @@ class SpatialMujoco:
             self._acceleration(zero, zero)
         mass = np.empty((n, n))
         mujoco.mj_fullM(self.model, self.data, mass)
+        mass = mass[np.ix_(self.numbers.columns, self.numbers.columns)]
         motion = EngineKinematics(self.vehicle, self._shift, self._turn)
         return linear_vehicle("mujoco", self.vehicle, motion, mass, -mass @ damping, -mass @ stiffness,
                               mass @ road)  # fmt: skip
@@ -252,20 +272,22 @@ class SpatialMujoco:
         self.data.qpos[:] = 0.0
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
-        mujoco.mj_jac(self.model, self.data, shift, turn, point, self.model.body(body).id)
-        return shift, turn
+        mujoco.mj_jac(self.model, self.data, shift, turn, point, self.numbers.bodies[body])
+        return shift[:, self.numbers.columns], turn[:, self.numbers.columns]
 
     def run(self, q: np.ndarray, v: np.ndarray) -> SpatialRun:
         """March from positions and rates (n,) over the duration; RunFailed unless all of it is finite and sane."""
         own = timed("mujoco", self.settings)
         states = np.empty((own.steps + 1, 2 * self.model.nv))
-        states[0] = np.concatenate((q, v))
+        both = np.concatenate((self.numbers.columns, self.model.nv + self.numbers.columns))
+        states[0, both] = np.concatenate((q, v))
         for warning in self.data.warning:
             warning.number = 0
         with self._forces(), quiet():
             self._advance(states, own)
         times = own.step * np.arange(own.steps + 1)
-        return sound("mujoco", own, times, states, self._warned(), {"steps": own.steps, "force calls": 4 * own.steps})
+        counts = {"steps": own.steps, "force calls": 4 * own.steps}
+        return sound("mujoco", own, times, states[:, both], self._warned(), counts)
 
     def _advance(self, states: np.ndarray, own: Settings) -> None:
         """March in chunks, so that a run that has failed is not carried to its end."""

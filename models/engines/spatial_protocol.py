@@ -72,6 +72,8 @@ def build(engine: str, vehicle: SpatialVehicle, settings: Settings | None = None
     linear = linearise(vehicle, speed)
     if settings is not None:
         _check(engine, linear, settings, road)
+    elif road is not None:
+        raise Refused(engine, "a road is read by half steps: it needs settings with a step")
     return import_module(f"models.engines.spatial_{engine}").build(vehicle, settings, speed, road)
 
 

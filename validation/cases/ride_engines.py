@@ -1,0 +1,219 @@
+"""Vehicles in space in both engines: linearised by each, compared at states and along paths, at rest under gravity."""
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.engines.protocol import Settings
+from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
+from models.engines.spatial_reference import SpatialReference
+from models.noise import normal
+from models.parameters import spatial_twin
+from models.ride.linear_vehicle import LinearVehicle
+from models.vehicles.curve import Curve
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import linearise
+from models.vehicles.vehicle_file import load_vehicle
+from validation.rows import Row, System, Table, at_most, behaves, finding
+
+TITLE = "Vehicles in space: both engines, the analytic matrices and equations written by hand"
+SYSTEM: System = "ride"
+ENGINES = ("exudyn", "mujoco")
+SPEED, GRAVITY = 20.0, 9.81
+SEED = 20261121
+STATES, STEP = 100, 1e-3
+SHARES = (("quarter_car", "r19_ride"), ("quarter_car", "seven_freedoms", "r19_ride", "r19_free", "three_axle_truck",
+                                        "spatial twin"))  # fmt: skip
+"""Vehicles of the full report behind those of the quick one."""
+BOUNDS = {"exudyn": 1e-12, "mujoco": 1e-9}
+FREQUENCIES = (
+    1.357622, 1.47076, 2.152076, 2.738235, 2.89083, 5.917883, 6.426765, 9.707712, 10.419969, 10.434258, 11.280234,
+    11.401383, 11.656264, 12.007752, 12.667486, 15.478222, 15.487798, 15.526984, 15.535278,
+)  # fmt: skip
+"""|lambda| / 2 pi (Hz) of R19-ride, given with its data."""
+DIGRESSIVE = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-1500.0, -400.0, 0.0, 700.0, 2500.0))
+BUMP_STOPS = Curve((-0.2, -0.05, 0.05, 0.2), (-8000.0, 0.0, 0.0, 8000.0))
+FRICTION = 40.0
+BY_DIFFERENCES = "central differences of order six leave 1e-13 of smooth laws, 1e-11 of curves with corners"
+SAME = "the same laws, added up in another order: 1e-16 of the largest force per operation"
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Matrices always; states, paths, rest and price in the full share."""
+    rows: list[Row] = []
+    for name in SHARES[not quick]:
+        rows += _matrices(name, 0.0)
+    rows += _frequencies()
+    if quick:
+        return rows, {"price": []}
+    for name in SHARES[1]:
+        rows += _matrices(name, GRAVITY) + _states(name)
+    bent = curved(of_name("r19_ride", GRAVITY))
+    rows += _linearised(bent, "r19_ride", "loaded and curved", dict.fromkeys(ENGINES, 1e-9))
+    path, price = _path()
+    return rows + path + _at_rest() + _shift() + _without_curves(), {"price": price}
+
+
+def of_name(name: str, gravity: float = 0.0) -> SpatialVehicle:
+    """A shipped vehicle or the twin, unloaded or under gravity."""
+    return spatial_twin.vehicle(gravity) if name == "spatial twin" else replace(load_vehicle(name), gravity=gravity)
+
+
+def curved(vehicle: SpatialVehicle) -> SpatialVehicle:
+    """Digressive and asymmetric dampers, bump stops and dry friction in the first four springs."""
+    bent = [replace(spring, damping=0.0, rate_force=DIGRESSIVE, travel_force=BUMP_STOPS, friction=FRICTION)
+            for spring in vehicle.springs[:4]]  # fmt: skip
+    return replace(vehicle, springs=(*bent, *vehicle.springs[4:]))
+
+
+def difference(found: LinearVehicle, expected: LinearVehicle) -> float:
+    """Largest error of M, D, K, the road's columns and the outputs, each relative to its own largest entry."""
+    names = ("mass", "damping", "stiffness", "road_stiffness", "road_damping")
+    pairs = [(getattr(found, name), getattr(expected, name)) for name in names]
+    for name in ("acceleration", "rate", "displacement", "road", "road_rate"):
+        pairs += [(getattr(a, name), getattr(b, name)) for a, b in zip(found.outputs, expected.outputs, strict=True)]
+    return max(relative(a, b) for a, b in pairs)
+
+
+def relative(found: np.ndarray, expected: np.ndarray) -> float:
+    """Largest difference over the largest expected entry, or the difference where all of these are 0."""
+    size = float(np.abs(expected).max(initial=0.0))
+    return float(np.abs(found - expected).max(initial=0.0)) / (size or 1.0)
+
+
+def random_state(vehicle: SpatialVehicle, path: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions of 0.05 m and rad, rates of 0.5 per s, and a road of 0.05 m and m/s: all standard deviations."""
+    n, w = len(vehicle.coordinates()), len(vehicle.tyres)
+    drawn = normal(SEED, path, 1, 2 * n + 2 * w)[0]
+    return 0.05 * drawn[:n], 0.5 * drawn[n : 2 * n], 0.05 * drawn[2 * n :]
+
+
+def _matrices(name: str, gravity: float) -> list[Row]:
+    return _linearised(of_name(name, gravity), name, "loaded" if gravity else "unloaded", BOUNDS)
+
+
+def _linearised(vehicle: SpatialVehicle, name: str, loaded: str, bounds: dict[str, float]) -> list[Row]:
+    expected = linearise(vehicle, SPEED)
+    return [at_most(f"ride_engines.matrices.{name}.{loaded}.{engine}", SYSTEM,
+                    f"M, D, K, road columns and outputs of {name}, {loaded}, {engine} against analytic",
+                    difference(build(engine, vehicle, speed=SPEED).linearise(), expected), "relative",
+                    bounds[engine], BY_DIFFERENCES, "native") for engine in ENGINES]  # fmt: skip
+
+
+def poles(linear: LinearVehicle) -> np.ndarray:
+    """Eigenvalues (2 n,) in 1/s, sorted by size and then by imaginary part."""
+    n = len(linear.mass)
+    own = np.linalg.solve(linear.mass, np.hstack([-linear.stiffness, -linear.damping]))
+    found = np.linalg.eigvals(np.vstack([np.hstack([np.zeros((n, n)), np.eye(n)]), own]))
+    return found[np.lexsort((found.imag, np.round(np.abs(found), 6)))]
+
+
+def _frequencies() -> list[Row]:
+    rows = []
+    for engine in ENGINES:
+        found = np.abs(poles(build(engine, of_name("r19_ride")).linearise()))[::2] / (2 * np.pi)
+        rows.append(at_most(f"ride_engines.frequencies.{engine}", SYSTEM, f"19 eigenfrequencies of R19-ride, {engine}",
+                            float(np.abs(found / FREQUENCIES - 1).max()), "relative", 1e-5,
+                            "six decimals of the expected ones are known", "published"))  # fmt: skip
+    return rows
+
+
+def _states(name: str) -> list[Row]:
+    """Accelerations with curves, gravity and a road, both engines against each other and the equations."""
+    vehicle = curved(of_name(name, GRAVITY)) if name != "quarter_car" else of_name(name, GRAVITY)
+    built = (build(engine, vehicle, speed=SPEED) for engine in ENGINES)
+    models: list[SpatialModel | SpatialReference] = [*built, SpatialReference(vehicle, SPEED)]
+    worst = np.zeros(3)
+    for path in range(STATES):
+        exudyn, mujoco, reference = (model.acceleration(*random_state(vehicle, path)) for model in models)
+        pairs = ((exudyn, mujoco), (exudyn, reference), (mujoco, reference))
+        worst = np.maximum(worst, [relative(*pair) for pair in pairs])
+    names = ("exudyn against mujoco", "exudyn against equations", "mujoco against equations")
+    return [at_most(f"ride_engines.states.{name}.{what}", SYSTEM,
+                    f"accelerations of {name} at {STATES} random states, {what}", float(value), "relative", 1e-12, SAME,
+                    "native") for what, value in zip(names, worst, strict=True)]  # fmt: skip
+
+
+def _settings(engine: str, duration: float = 1.0) -> Settings:
+    return Settings(INTEGRATORS[engine], STEP, duration)
+
+
+def _path() -> tuple[list[Row], list[list[str]]]:
+    """Paths from a random start over 1 s on a random road, with curves and without."""
+    rows, price = [], []
+    for what in ("linear", "curved"):
+        vehicle = of_name("r19_ride", GRAVITY)
+        vehicle = curved(vehicle) if what == "curved" else vehicle
+        road = 1e-4 * np.cumsum(normal(SEED, 0, 2 * round(1.0 / STEP) + 1, 2 * len(vehicle.tyres)), axis=0)
+        runs = {}
+        for engine in ENGINES:
+            model = build(engine, vehicle, _settings(engine), None, road)
+            start = time.process_time()
+            runs[engine] = model.run(*random_state(vehicle, STATES)[:2])
+            price.append([engine, what, f"{1e3 * (time.process_time() - start):.0f}", str(model.plan()["callbacks"])])
+        gap = max(np.abs(getattr(runs["exudyn"], part) - getattr(runs["mujoco"], part)).max()
+                  for part in ("positions", "rates"))  # fmt: skip
+        rows.append(at_most(f"ride_engines.path.{what}", SYSTEM,
+                            f"states of R19-ride over 1 s, {what} springs, RK4 at 1 ms, exudyn against mujoco",
+                            float(gap), "m, rad, m/s, rad/s", 1e-12, SAME, "native"))  # fmt: skip
+    return rows, price
+
+
+def _at_rest() -> list[Row]:
+    """The design position under gravity: nothing accelerates, and 1 s later nothing has moved."""
+    rows = []
+    vehicle = curved(of_name("r19_ride", GRAVITY))
+    zero = np.zeros(len(vehicle.coordinates()))
+    for engine in ENGINES:
+        model = build(engine, vehicle, _settings(engine))
+        rows.append(at_most(f"ride_engines.rest.{engine}", SYSTEM, f"acceleration in the design position, {engine}",
+                            float(np.abs(model.acceleration(zero, zero)).max()), "m/s^2, rad/s^2", 1e-10,
+                            "preloads hold the weights to rounding", "none"))  # fmt: skip
+        mean = np.abs(model.run(zero, zero).positions.mean(axis=0)).max()
+        rows.append(at_most(f"ride_engines.mean.{engine}", SYSTEM, f"mean position over 1 s from there, {engine}",
+                            float(mean), "m, rad", 1e-10, "nothing moves it", "none"))  # fmt: skip
+    return rows
+
+
+def shift(model: SpatialModel, loaded: SpatialModel) -> float:
+    """Largest move (1/s) of an eigenvalue from unloaded to loaded."""
+    return float(np.abs(poles(loaded.linearise()) - poles(model.linearise())).max())
+
+
+def _shift() -> list[Row]:
+    """What gravity and preload change."""
+    rows = []
+    for name in SHARES[1]:
+        if name not in ("r19_free", "spatial twin"):  # their poles need a pairing that two sorts do not give
+            analytic = np.abs(poles(linearise(of_name(name, GRAVITY))) - poles(linearise(of_name(name)))).max()
+            found = shift(*(build("exudyn", of_name(name, gravity)) for gravity in (0.0, GRAVITY)))
+            rows.append(finding(f"ride_engines.shift.{name}", SYSTEM,
+                                f"largest shift of an eigenvalue of {name} from unloaded to loaded, exudyn", found,
+                                "1/s", float(analytic), "operating point: stated with every linear vehicle",
+                                "native"))  # fmt: skip
+    return rows
+
+
+def _without_curves() -> list[Row]:
+    """A vehicle without curves has no curve code; with them one function per spring that bends."""
+    plain, bent = (build("exudyn", vehicle).plan() for vehicle in (of_name("r19_ride"), curved(of_name("r19_ride"))))
+    counts = f"{plain['curves']} curves, {bent['callbacks'] - plain['callbacks']} functions more with curves"
+    return [behaves("ride_engines.curves", SYSTEM, "curve code of R19-ride, counted", counts,
+                    "0 curves, 4 functions more with curves", "four springs are bent")]  # fmt: skip
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """What a simulated second costs."""
+    if not data["price"]:
+        return []
+    note = "CPU milliseconds per simulated second of R19-ride, RK4 at 1 ms on a random road, and functions called back."
+    heads = ("engine", "springs", "ms per s", "callbacks")
+    return [Table("R19-ride in time", note, heads, tuple(tuple(row) for row in data["price"]))]
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Nothing to draw."""
+    return []
