@@ -103,12 +103,14 @@ def _slopes(contacts, rows, strips, cells, middle, kind, found, slopes):
             _strip(own, strips[:, s], cells, slip, sums, moved)
             part = own[MU] * own[LOAD] * strips[PART, s]
             arm, off = own[A] * strips[HALF, s], own[B] * strips[Y, s]
-            for f in range(2):
-                found[c, f] += part * sums[f]
-                total[f] += part * moved[f]
+            found[c, 0] += part * sums[0]
+            found[c, 1] += part * sums[1]
             found[c, 2] += part * (slip[4] * arm * sums[2] - slip[3] * off * sums[0])
-            total[2] += part * (slip[4] * arm * moved[2] - slip[3] * off * moved[0])
-            slopes[c, 2, :3] += part * (weights[1] * arm * sums[2] - weights[0] * off * sums[0])
+            for k in range(3):  # loops, as array expressions take seconds to compile
+                total[0, k] += part * moved[0, k]
+                total[1, k] += part * moved[1, k]
+                total[2, k] += part * (slip[4] * arm * moved[2, k] - slip[3] * off * moved[0, k])
+                slopes[c, 2, k] += part * (weights[1, k] * arm * sums[2] - weights[0, k] * off * sums[0])
         for f in range(3):
             for k in range(3):
                 slopes[c, f, k] += total[f, 0] * scale[0, k] + total[f, 1] * scale[1, k] + total[f, 2] * scale[2, k]
@@ -182,11 +184,11 @@ def _strip(own, strip, cells, slip, sums, moved):
                 angle = (tx * (dy[k] - share * dv) - ty * (dx[k] - share * du[k])) / (tx * tx + ty * ty)
             dx[k], dy[k] = -angle * y, angle * x
         px, py, slips = x, y, now
-        for f, value, slope in ((0, px, dx), (1, py, dy)):
-            sums[f] += value
-            moved[f] += slope
-        sums[2] += t * py
-        moved[2] += t * dy
+        sums[0], sums[1], sums[2] = sums[0] + px, sums[1] + py, sums[2] + t * py
+        for k in range(3):
+            moved[0, k] += dx[k]
+            moved[1, k] += dy[k]
+            moved[2, k] += t * dy[k]
 
 
 @njit(cache=True, error_model="numpy")

@@ -140,7 +140,7 @@ def aspects(curvatures: Array) -> tuple[Array, Array, Array]:
 def _aspects(curvatures: Array) -> Array:
     found = np.empty((3, curvatures.size))
     for i in range(curvatures.size):
-        found[:, i] = aspect(curvatures[i])
+        found[0, i], found[1, i], found[2, i] = aspect(curvatures[i])
     return found
 
 

@@ -142,9 +142,17 @@ def flexibilities_at(a: float, b: float, modulus: float, nu: float) -> tuple[flo
     """L1, L2, L3 of one patch, ``modulus`` the shear modulus G (Pa); for compiled callers, nothing is checked."""
     if a <= 0.0 or b <= 0.0:
         return 0.0, 0.0, 0.0
-    c11, c22, c23 = (coefficient_at(0, a / b, nu), coefficient_at(1, a / b, nu), coefficient_at(2, a / b, nu))
     unit = a / modulus
-    return 8.0 * unit / (3.0 * c11), 8.0 * unit / (3.0 * c22), math.pi * unit * math.sqrt(a / b) / (4.0 * c23)
+    along = across = turning = 0.0
+    for kind in range(3):  # a loop, as numba compiles one function for each number that is written out
+        c = coefficient_at(kind, a / b, nu)
+        if kind == 0:
+            along = 8.0 * unit / (3.0 * c)
+        elif kind == 1:
+            across = 8.0 * unit / (3.0 * c)
+        else:
+            turning = math.pi * unit * math.sqrt(a / b) / (4.0 * c)
+    return along, across, turning
 
 
 @njit(cache=True)
@@ -164,7 +172,9 @@ def coefficient_at(kind: int, ratio: float, nu: float) -> float:
 @njit(cache=True)
 def _tabulated(kind: int, ratio: float, nu: float) -> float:
     """Cubic Hermite interpolation of ln C in ln(a/b), then the parabola of a power of C through nu = 0, 1/4, 1/2."""
-    i = min(int(np.searchsorted(RATIOS, ratio, side="right")), RATIOS.size - 1) - 1
+    i = 0
+    while i < RATIOS.size - 2 and RATIOS[i + 1] <= ratio:
+        i += 1
     width = math.log(RATIOS[i + 1] / RATIOS[i])
     t = math.log(ratio / RATIOS[i]) / width
     rise, low, high = t * t * (3.0 - 2.0 * t), t * (1.0 - t) ** 2 * width, t * t * (t - 1.0) * width
