@@ -212,8 +212,3 @@ def tables(data: dict[str, Any]) -> list[Table]:
     note = "CPU milliseconds per simulated second of R19-ride, RK4 at 1 ms on a random road, and functions called back."
     heads = ("engine", "springs", "ms per s", "callbacks")
     return [Table("R19-ride in time", note, heads, tuple(tuple(row) for row in data["price"]))]
-
-
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Nothing to draw."""
-    return []

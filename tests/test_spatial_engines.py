@@ -1,0 +1,194 @@
+"""Vehicles in space in both engines: the analytic matrices, the equations by hand, and what they must refuse."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from models.engines.protocol import Settings
+from models.engines.spatial_protocol import INTEGRATORS, build, jacobian
+from models.engines.spatial_reference import SpatialReference
+from models.errors import InputError, Refused, RunFailed
+from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre
+from models.vehicles.spatial_linear import linearise
+from validation.cases.ride_engines import GRAVITY, SPEED, curved, difference, of_name, random_state, relative
+
+ENGINES = ("exudyn", "mujoco")
+
+
+def settings(engine, duration=0.02, step=1e-3):
+    return Settings(INTEGRATORS[engine], step, duration)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("name", "gravity"), [("r19_ride", 0.0), ("spatial twin", GRAVITY)])
+def test_linear_vehicle_is_the_analytic_one(engine, name, gravity):
+    """1e-11: a factor of 7 above what MuJoCo's differences leave of a force of 1 N beside preloads of 5 kN."""
+    vehicle = of_name(name, gravity)
+    found = build(engine, vehicle, speed=SPEED).linearise()
+    assert difference(found, linearise(vehicle, SPEED)) < 1e-11
+    assert found.source == f"{engine}, " + ("loaded" if gravity else "unloaded")
+
+
+def test_curves_are_linearised_by_their_mean_slope_at_rest():
+    """Short steps keep 1e-11; a one-sided slope would miss by (1786 - 700 / 0.1) / max D, over 1e-2."""
+    vehicle = curved(of_name("quarter_car", GRAVITY))
+    for engine in ENGINES:
+        assert difference(build(engine, vehicle).linearise(), linearise(vehicle)) < 1e-9
+
+
+def test_accelerations_agree_with_the_equations_by_hand():
+    """Large random motion of the vehicle that no symmetry helps, curves, gravity, road: rounding only."""
+    vehicle = curved(of_name("spatial twin", GRAVITY))
+    exudyn, mujoco_, reference = (*(build(engine, vehicle, speed=SPEED) for engine in ENGINES),
+                                  SpatialReference(vehicle, SPEED))  # fmt: skip
+    for path in range(5):
+        state = random_state(vehicle, path)
+        expected = reference.acceleration(*state)
+        assert relative(exudyn.acceleration(*state), expected) < 1e-12
+        assert relative(mujoco_.acceleration(*state), expected) < 1e-12
+
+
+def test_equations_by_hand_keep_energy():
+    """Without damping, friction, speed and road: kinetic energy grows by what weights and springs give.
+
+    The power is measured along the motion itself, d/dt (T + U) by differences of order six: 1e-9 of its parts.
+    """
+    plain = of_name("spatial twin", GRAVITY)
+    vehicle = replace(
+        plain, side_forces=(), drags=(), tyres=tuple(replace(tyre, damping=0.0) for tyre in plain.tyres),
+        springs=tuple(replace(s, damping=0.0) for s in plain.springs),
+        bars=tuple(replace(bar, damping=0.0) for bar in plain.bars))  # fmt: skip
+    model = SpatialReference(vehicle)
+    q, v, _ = random_state(vehicle, 0)
+    a = model.acceleration(q, v)
+
+    def energy(t):
+        at, rate = q + t[0] * v + t[0] ** 2 / 2 * a, v + t[0] * a
+        motions = model._motions(at, rate)
+        kinetic = sum(0.5 * body.mass * np.sum((m.shift @ rate) ** 2) + 0.5 * (w := m.rotation.T @ m.turn @ rate)
+                      @ np.array(body.inertia) @ w for body, m in motions_of(vehicle, motions))  # fmt: skip
+        return np.array([kinetic])
+
+    def motions_of(vehicle, motions):
+        return [(body, motions[body.name]) for body in vehicle.bodies]
+
+    gained = jacobian(energy, 1, 1e-4)[0, 0]
+    model.acceleration(q, v)  # leaves the motion at (q, v) behind
+    weights = sum(-body.mass * GRAVITY * (m.shift @ v)[2] for body, m in motions_of(vehicle, model.motions))
+    given = float(model._forces(np.zeros(2 * len(vehicle.tyres))) @ v) + weights
+    assert gained == pytest.approx(given, rel=1e-7)
+
+
+def test_paths_agree():
+    """R19-ride with curves under gravity on a random road from a random start: 20 steps of the same tableau."""
+    vehicle = curved(of_name("r19_ride", GRAVITY))
+    road = 1e-4 * np.cumsum(np.ones((41, 8)), axis=0)
+    exudyn, other = (build(engine, vehicle, settings(engine), None, road).run(*random_state(vehicle, 1)[:2])
+                     for engine in ENGINES)  # fmt: skip
+    assert len(exudyn.times) == 21
+    assert exudyn.counts["force calls"] == 80
+    assert np.abs(exudyn.positions - other.positions).max() < 1e-13
+    assert np.abs(exudyn.rates - other.rates).max() < 1e-12
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_road_is_read_at_half_steps(engine):
+    """One RK4 step of a mass on a spring over a road z = t^3, whose stages are written down here."""
+    mass, k, h = 2.0, 50.0, 0.01
+    vehicle = SpatialVehicle("one mass", (Body("m", mass, (0, 0, 0.3), ("z",)),), (),
+                             (Tyre("t", "m", (0.0, 0.0, 0.3), 0, k),), (0.0,))  # fmt: skip
+    times = h / 2 * np.arange(3)
+    found = build(engine, vehicle, settings(engine, h, h), None, np.column_stack([times**3, 3 * times**2])).run(
+        np.array([0.1]), np.array([0.0])
+    )
+
+    def rate(y, z):
+        return np.array([y[1], k / mass * (z - y[0])])
+
+    y = np.array([0.1, 0.0])
+    k1 = rate(y, 0.0)
+    k2 = rate(y + h / 2 * k1, times[1] ** 3)
+    k3 = rate(y + h / 2 * k2, times[1] ** 3)
+    k4 = rate(y + h * k3, times[2] ** 3)
+    expected = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    assert [found.positions[-1, 0], found.rates[-1, 0]] == pytest.approx(expected, rel=1e-14, abs=1e-16)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_design_position_is_an_equilibrium(engine):
+    vehicle = of_name("spatial twin", GRAVITY)
+    zero = np.zeros(len(vehicle.coordinates()))
+    assert np.abs(build(engine, vehicle, speed=SPEED).acceleration(zero, zero)).max() < 1e-10
+
+
+def test_no_curve_code_without_curves():
+    plain, bent = of_name("r19_ride"), curved(of_name("r19_ride"))
+    of_plain, of_bent = (build("exudyn", vehicle).plan() for vehicle in (plain, bent))
+    assert of_plain["curves"] == 0
+    # four springs with two curves and a friction each, one function for each spring
+    assert of_bent["curves"] == 12
+    assert of_bent["callbacks"] - of_plain["callbacks"] == 4
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_what_would_be_wrong_is_refused(engine):
+    vehicle = of_name("quarter_car")
+    with pytest.raises(Refused, match="lets a mode of the vehicle grow; use at most"):
+        build(engine, vehicle, settings(engine, 2.0, 0.1))
+    with pytest.raises(Refused, match="does not divide"):
+        build(engine, vehicle, settings(engine, 0.0205))
+    with pytest.raises(Refused, match="41 rows"):
+        build(engine, vehicle, settings(engine), None, np.zeros((21, 2)))
+    with pytest.raises(Refused, match="41 rows"):
+        build(engine, vehicle, settings(engine), None, np.full((41, 2), np.nan))
+    with pytest.raises(Refused, match="march with"):
+        build(engine, vehicle, Settings("Euler", 1e-3, 1.0))
+    with pytest.raises(Refused, match="needs settings"):
+        build(engine, vehicle, None, None, np.zeros((41, 2)))
+    with pytest.raises(InputError, match="needs a speed above 0"):
+        build(engine, of_name("r19_free"))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_failed_runs_raise(engine):
+    model, n = build(engine, of_name("quarter_car"), settings(engine)), 2
+    for start in (1e6, np.nan):
+        with pytest.raises(RunFailed):
+            model.run(np.full(n, start), np.zeros(n))
+    model.run(np.zeros(n), np.zeros(n))  # and leave no trace
+    with pytest.raises(RunFailed, match="without settings"):
+        build(engine, of_name("quarter_car")).run(np.zeros(n), np.zeros(n))
+
+
+def test_other_callback_is_not_overruled():
+    model = build("mujoco", of_name("quarter_car"))
+    mujoco.set_mjcb_passive(lambda model, data: None)
+    try:
+        with pytest.raises(RunFailed, match="another callback"):
+            model.acceleration(np.zeros(2), np.zeros(2))
+    finally:
+        mujoco.set_mjcb_passive(None)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_answers_do_not_depend_on_what_was_asked_before(engine):
+    """A linearisation and a state on a road in between leave a run what it was, to the bit."""
+    vehicle = of_name("quarter_car", GRAVITY)
+    road = 0.01 * np.ones((41, 2))
+    model = build(engine, vehicle, settings(engine), None, road)
+    start = random_state(vehicle, 2)
+    first = model.run(*start[:2])
+    model.linearise()
+    model.acceleration(*start)
+    assert np.array_equal(model.run(*start[:2]).positions, first.positions)
+
+
+def test_body_may_bear_any_name():
+    """MuJoCo's own ground is called "world"."""
+    vehicle = SpatialVehicle("two", (Body("world", 2.0, (0, 0, 0.3), ("z",)), Body("0 z", 1.0, (0, 0, 0.6), ("z",))),
+                             (SpringDamper("s", "0 z", "world", (0, 0, 0.6), (0, 0, 0.3), (0, 0, 1), 30.0, 1.0),),
+                             (Tyre("t", "world", (0.0, 0.0, 0.3), 0, 50.0),), (0.0,))  # fmt: skip
+    for engine in ENGINES:
+        assert difference(build(engine, vehicle).linearise(), linearise(vehicle)) < 1e-12
