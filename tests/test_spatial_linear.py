@@ -48,7 +48,7 @@ def twin():
         SpringDamper("right", "body", "axle", (1.1, -0.6, 0.5), (1.1, -0.6, 0.5), (0.0, 0.0, 1.0), 3e4, 700.0),
         SpringDamper("rear", "body", "arm", (-1.3, 0.5, 0.4), (-1.3, 0.5, 0.4), (0.6, 0.0, 0.8), 4e4, 800.0),
         SpringDamper("bush", "body", "arm", (-1.2, 0.4, 0.2), (-1.2, 0.4, 0.2), (0.8, 0.0, -0.6), 9e4, 300.0),
-        SpringDamper("belt", "alternator", None, (1.2, 0.3, 0.9), (1.2, 0.3, 0.1), (0.0, 0.0, 1.0), 5e3, 20.0),
+        SpringDamper("belt", "alternator", None, (1.2, 0.3, 0.9), (1.3, 0.1, 0.1), (0.0, 0.0, 1.0), 5e3, 20.0),
     )
     for name, (one, two), at in (
         ("mount", ("engine", "body"), (0.7, 0.3, 0.5)), ("stay", ("engine", "body"), (1.2, -0.2, 0.4)),
@@ -300,6 +300,8 @@ def test_curves_and_friction_have_their_slopes():
     given = linearise(replace(vehicle, springs=(spring,)), equivalent={"front left": (1000.0, 10.0)})
     np.testing.assert_allclose(given.stiffness[0], [1000.0, -1000.0], atol=1e-9)
     np.testing.assert_allclose(given.damping, 10.0 * pair, atol=1e-12)
+    with pytest.raises(InputError, match=r"equivalent = 'front lefd': no such spring .*did you mean 'front left'"):
+        linearise(vehicle, equivalent={"front lefd": (1000.0, 10.0)})
 
 
 def test_weight_that_nothing_carries():

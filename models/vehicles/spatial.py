@@ -48,9 +48,9 @@ class SpringDamper:
 
     acts as +F a at p1 on body one and as -F a at p2 on body two (None: the ground). With one above, two below and a
     up, travel d and force F are positive in compression. F0 is the preload of ``spatial_linear.preloads``, 0 without
-    gravity. The two forces are equal and opposite but not on one line once p2 - p1 has left a: the couple
-    (p1 - p2) x F a is what the guide, which keeps a fixed in space, takes up. It vanishes in the design position
-    because p2 - p1 is there 0 or along a.
+    gravity. The two forces are equal and opposite; the couple (p1 - p2) x F a of the pair is what the guide takes up
+    that keeps a fixed in space. It is 0 where p2 - p1 is 0 or along a, as in most suspensions at rest; elsewhere, as
+    with a spring beside the wheel that it carries, bodies that turn together strain it.
 
     point_one, point_two (m), stiffness (N/m), damping (N s/m), friction (N), friction_rate (m/s).
     """

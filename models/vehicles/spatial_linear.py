@@ -30,10 +30,13 @@ def linearise(
 
     speed : m/s, above 0, wanted by side forces and drag only; InputError where they miss it.
     equivalent : stiffness (N/m) and damping (N s/m) that stand for springs of these names instead of their slopes at
-    rest, as statistical linearisation finds them.
+    rest, as statistical linearisation finds them; InputError for a name that no spring has.
     """
     motion = Kinematics(vehicle)
-    gains = {spring.name: slopes_at_rest(spring) for spring in vehicle.springs} | dict(equivalent or {})
+    gains = {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
+    for name in set(equivalent or {}) - set(gains):
+        raise InputError(vehicle.name, "equivalent", name, "no such spring", tuple(gains))
+    gains |= equivalent or {}
     tyres = _tyres(vehicle, motion)
     damping, stiffness = np.zeros((2, motion.size, motion.size))
     for row, k, c in (*_parts(vehicle, motion, gains).values(), *tyres.values()):
