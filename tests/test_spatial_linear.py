@@ -100,11 +100,11 @@ def pose(vehicle, name, q):
     return centre + np.einsum("mij,mj->mi", turned, arm), turned @ turn
 
 
-def place(vehicle, name, point, q):
+def place(vehicle, name, point, q, poses=None):
     """(m, 3): where a point of a body is."""
     if name is None:
         return np.broadcast_to(np.array(point), (len(q), 3))
-    centre, turn = pose(vehicle, name, q)
+    centre, turn = poses[name] if poses else pose(vehicle, name, q)
     return centre + turn @ (np.array(point) - vehicle.body(name).position)
 
 
@@ -112,13 +112,17 @@ def deformations(vehicle, q):
     """(m, p): d of every spring-damper, e of every bar, how far every tyre's point has risen, less those at rest."""
 
     def at(x):
-        springs = [(place(vehicle, s.two, s.point_two, x) - place(vehicle, s.one, s.point_one, x)) @ s.axis
-                   for s in vehicle.springs]  # fmt: skip
+        poses = {body.name: pose(vehicle, body.name, x) for body in vehicle.bodies}
+
+        def where(name, point):
+            return place(vehicle, name, point, x, poses)
+
         own = dict(zip(vehicle.coordinates(), x.T, strict=True))
-        risen = [(place(vehicle, b.left, b.point_left, x) - place(vehicle, b.right, b.point_right, x))[:, 2]
-                 / (b.point_left[1] - b.point_right[1]) for b in vehicle.bars]  # fmt: skip
-        bars = [own[b.body, "rx"] - twist for b, twist in zip(vehicle.bars, risen, strict=True)]
-        return np.stack(springs + bars + [place(vehicle, t.body, t.point, x)[:, 2] for t in vehicle.tyres], axis=-1)
+        springs = [(where(s.two, s.point_two) - where(s.one, s.point_one)) @ s.axis for s in vehicle.springs]
+        risen = [(where(b.left, b.point_left) - where(b.right, b.point_right))[:, 2] for b in vehicle.bars]
+        tracks = [b.point_left[1] - b.point_right[1] for b in vehicle.bars]
+        bars = [own[b.body, "rx"] - up / track for b, up, track in zip(vehicle.bars, risen, tracks, strict=True)]
+        return np.stack(springs + bars + [where(t.body, t.point)[:, 2] for t in vehicle.tyres], axis=-1)
 
     return at(q) - at(np.zeros_like(q[:1]))
 
