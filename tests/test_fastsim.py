@@ -160,6 +160,14 @@ def test_invariants_of_random_contacts(options):
     assert found["power"] <= (1e-5 if options.get("cells", 21) < 20 else 1e-12)
 
 
+def test_a_call_takes_whole_numbers_and_names_what_it_does_not_take():
+    call = Ellipse(1.5, PAIR)
+    assert call(6e-3, 80_000, 0.3, np.float32(0.5), 0, 0) == call(6e-3, 8e4, 0.3, 0.5, 0.0, 0.0)
+    for value in ("much", [1e-3], None, math.nan):
+        with pytest.raises(InputError, match="xi_y = "):
+            call(6e-3, 8e4, 0.3, 0.0, value, 0.0)
+
+
 @pytest.mark.parametrize(("name", "value"), [("load", 1e-310), ("mu", 1e-300), ("mu", 1e-80)])
 def test_next_to_nothing_is_nothing(name, value):
     """A slip by so small a bound, squared, would be beyond all numbers."""

@@ -79,6 +79,27 @@ def test_nothing_from_nothing():
     assert solve_rolling(apart, MU, 0.01, 0.0, 0.0, PAIR).fx == 0.0
 
 
+@pytest.mark.parametrize("part", [1e-9, 1e-15, 1e-70])
+def test_next_to_no_friction_turns_with_the_slip(part):
+    """A slip of 1e9 times what the tractions make: its rounding must not be taken for a task of Newton's step."""
+    motion = (1e-4, 1e-3, 100.0)
+    found, other = (solve_rolling(PRESSED, MU * share, *motion, PAIR) for share in (part, 1e-8))
+    whole = other.fy * part / 1e-8 if part > 1e-60 else 0.0
+    assert found.fy == pytest.approx(whole, rel=1e-6)
+
+
+@pytest.mark.parametrize(("wrong", "words"), [
+    (lambda: solve_rolling(PRESSED, MU, [1e-3, 2e-3], 0.0, 0.0, PAIR), r"xi_x = .*one number, not an array"),
+    (lambda: solve_rolling(PRESSED, MU, 0.0, 0.0, 1e12, PAIR), r"spin = 1000000000000.0: must be a spin in 1/m"),
+    (lambda: Pressed(np.zeros((5, 4)), centres(5, 1e-3), centres(4, 1e-3)), r"pressure = \[5, 4\]: .*\(4, 5\)"),
+    (lambda: Pressed(np.zeros((4, 5)), centres(5, 1e-3)[::-1], centres(4, 1e-3)), r"x: must ascend"),
+    (lambda: Pressed(np.full((4, 5), -1.0), centres(5, 1e-3), centres(4, 1e-3)), r"pressure\[0, 0\] = -1.0"),
+])  # fmt: skip
+def test_wrong_input_is_named(wrong, words):
+    with pytest.raises(InputError, match=words):
+        wrong()
+
+
 def test_size_and_stiffness_do_not_matter():
     """Forces by mu N depend on creepage by mu N / (G ab) alone."""
     found = solve_rolling(PRESSED, MU, 0.2 * SCALE, 0.0, 0.1 * SCALE / A, PAIR)

@@ -204,7 +204,7 @@ BAD = {
         lambda: from_arrays(np.arange(5.0), np.arange(6.0), np.zeros((5, 6))),
         r"\(6, 5\), rows along y",
     ),
-    "uneven": (lambda: from_arrays(np.array([0.0, 1.0, 3.0, 4.0]), np.arange(4.0), np.zeros((4, 4))), "even steps"),
+    "uneven": (lambda: from_arrays(np.array([0.0, 0.1, 0.3, 0.4]), np.arange(4) / 4, np.zeros((4, 4))), "even steps"),
     "not finite": (lambda: from_arrays(np.arange(4.0), np.arange(4.0), np.full((4, 4), np.nan)), "finite"),
     "outside": (lambda: ELLIPSE.at(np.array(1.0), np.array(0.0)), "where h is known"),
 }

@@ -27,9 +27,9 @@ import numpy as np
 from models.contact.fastsim_falling import Falling, forces_falling
 from models.contact.fastsim_grid import POWERS, Bound, Grid, grid, strips_of
 from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER
-from models.contact.fastsim_many import BLENDED, NOTHING, ONE, THREE, forces, point
+from models.contact.fastsim_many import BLENDED, ONE, THREE, forces, point
 from models.contact.hertz import LARGEST_LOAD, LEAST_AXIS
-from models.contact.inputs import Array, quantity, together
+from models.contact.inputs import NOTHING, Array, creepages, number, quantity, together
 from models.contact.linear_theory import flexibilities as linear_flexibilities
 from models.contact.material import Pair
 from models.errors import InputError
@@ -39,9 +39,6 @@ March = Literal["second-order", "plain"]
 KINDS = {"blended": BLENDED, "one": ONE, "three": THREE}
 MARCHES = {"second-order": SECOND_ORDER, "plain": PLAIN}
 LEAST_CELLS, MOST_CELLS = 3, 2000
-LARGEST_CREEPAGE = 10.0
-LARGEST_SPIN = 1e9
-"""1/m"""
 
 
 @dataclass(frozen=True)
@@ -108,7 +105,7 @@ class Ellipse:
     def __init__(self, ratio: float, pair: Pair, *, cells: int = 21, bound: Bound = "intermediate",
                  flexibilities: Flexibilities = "blended", march: March = "second-order") -> None:  # fmt: skip
         check_choices(cells, bound, flexibilities, march)
-        self.ratio = float(quantity("ratio", ratio, "a ratio a/b of semi-axes from 1e-6 to 1e6", 1e-6, 1e6))
+        self.ratio = number("ratio", ratio, "a ratio a/b of semi-axes from 1e-6 to 1e6", 1e-6, 1e6)
         self.net: Grid = grid(cells, int(strips_of(np.array(self.ratio), cells)), bound)
         unit = 1e-3
         self._unit = tuple(float(value) / unit for value in linear_flexibilities(unit, unit / self.ratio, pair))
@@ -118,8 +115,14 @@ class Ellipse:
     def __call__(self, a: float, load: float, mu: float, xi_x: float, xi_y: float, spin: float
                  ) -> tuple[float, float, float]:  # fmt: skip
         """Forces and moment; a : semi-axis along the direction of rolling (m)."""
-        found = point(a, load, mu, xi_x, xi_y, spin, *self._fixed)
+        given = (a, load, mu, xi_x, xi_y, spin)
+        try:
+            found = point(*map(float, given), *self._fixed)
+        except (TypeError, ValueError):
+            found = (math.nan,) * 3
         if not math.isfinite(found[0] + found[1] + found[2]):
+            for name, value in zip(("a", "load", "mu", "xi_x", "xi_y", "spin"), given, strict=True):
+                number(name, value, "finite")
             contacts_of(a, a / self.ratio, load, mu, xi_x, xi_y, spin, Pair())
             raise InputError("", "a", a, "must be a semi-axis in m, above 0 where there is a load")
         return found
@@ -143,15 +146,13 @@ def _second_order_only(march: str) -> None:
 def contacts_of(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair
              ) -> tuple[Array, tuple[int, ...]]:  # fmt: skip
     """The contacts (n, 10) as the kernels read them, and the shape they had; those without load have axes of 0.1 m."""
-    creepages = {name: quantity(name, value, f"a creepage within +-{LARGEST_CREEPAGE:g}", -LARGEST_CREEPAGE,
-                                LARGEST_CREEPAGE) for name, value in (("xi_x", xi_x), ("xi_y", xi_y))}  # fmt: skip
     axes = {name: quantity(name, value, "a semi-axis in m, zero or more", 0.0) for name, value in (("a", a), ("b", b))}
     given = together(
         **axes,
         load=quantity("load", load, f"a load in N, at most {LARGEST_LOAD:g}", most=LARGEST_LOAD),
-        mu=quantity("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0), **creepages,
-        spin=quantity("spin", spin, f"a spin in 1/m within +-{LARGEST_SPIN:g}", -LARGEST_SPIN, LARGEST_SPIN),
-    )  # fmt: skip
+        mu=quantity("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0),
+        **creepages(xi_x, xi_y, spin),
+    )
     columns = np.array([values.ravel() for values in given]).T.reshape(-1, 7)
     loaded = columns[:, 2] > NOTHING
     quantity("a", columns[loaded, 0], "a semi-axis in m, above 0 where there is a load", LEAST_AXIS)

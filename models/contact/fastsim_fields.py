@@ -11,6 +11,7 @@ from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, MIDDLE, PLAIN,
 from models.contact.fastsim_many import HALF, SPREAD, A, B, Y, rigid_slip
 from models.contact.fields import Fields
 from models.contact.material import Pair
+from models.errors import InputError
 
 
 def fastsim_fields(a: float, b: float, load: float, mu: float, xi_x: float, xi_y: float, spin: float, pair: Pair, *,
@@ -22,7 +23,10 @@ def fastsim_fields(a: float, b: float, load: float, mu: float, xi_x: float, xi_y
     bound: Hertz's only if it is elliptic. Raises InputError as ``fastsim`` does.
     """
     check_choices(cells, bound, flexibilities, march)
-    contact = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)[0][0]
+    contacts, given = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)
+    if given:
+        raise InputError("", "a, b, load, mu, xi_x, xi_y, spin", list(given), "must be plain numbers: one ellipse")
+    contact = contacts[0]
     net = grid(cells, int(strips_of(contact[A] / contact[B], cells)), bound)
     slip = np.zeros(5)
     rigid_slip(contact, cells, net.middle, KINDS[flexibilities], slip)

@@ -22,14 +22,13 @@ from models.contact.fastsim_kernels import (
     march_plain,
     march_second_order,
 )
+from models.contact.inputs import NOTHING
 
 A, B, LOAD, MU, XI_X, XI_Y, SPIN, L1, L2, L3 = range(10)
 """Columns of contacts; L1 to L3 are the flexibilities (m^3/N) along x, along y and in spin."""
 Y, HALF, SPREAD, PART = range(4)
 """Rows of the strips: y/b, half length by a, that by the bound in the strip's middle, share of the load per bound."""
 ONE, THREE, BLENDED = 0, 1, 2
-NOTHING = 1e-60
-"""N: what friction holds below this is zero; the slip by its bound, squared, would be beyond all numbers."""
 FIRST, SATURATED, OF_SPIN = 1.5, 3.0, 0.4
 """Reach of the linear theory's tractions, by the bound, where the blend begins and is done, and what spin counts in it:
 calibrated on 150 cases of the exact theory."""
@@ -172,7 +171,10 @@ def point(a, load, mu, xi_x, xi_y, spin, by_ratio, l1, l2, l3, strips, cells, mi
     contacts, found = np.empty((1, 10)), np.empty((1, 4))
     if not (mu >= 0.0 and (a > 0.0 or load <= 0.0)):
         return math.nan, math.nan, math.nan
-    contacts[0] = (a, a * by_ratio, load, mu, xi_x, xi_y, spin, a * l1, a * l2, a * l3)
+    own = contacts[0]
+    own[A], own[B], own[LOAD], own[MU] = a, a * by_ratio, load, mu
+    own[XI_X], own[XI_Y], own[SPIN] = xi_x, xi_y, spin
+    own[L1], own[L2], own[L3] = a * l1, a * l2, a * l3
     forces(contacts, strips, cells, middle, kind, march, found)
     bad = 0.0 * (load + mu + xi_x + xi_y + spin)  # zero, or NaN where one of them is not finite
     return found[0, 0] + bad, found[0, 1] + bad, found[0, 2] + bad

@@ -1,5 +1,6 @@
 """Arrays that a user hands to a function of this package: finite, within what is plausible in SI, of one shape."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,11 @@ import numpy as np
 from models.errors import InputError
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+LARGEST_CREEPAGE = 10.0
+LARGEST_SPIN = 1e9
+"""1/m"""
+NOTHING = 1e-60
+"""N: what friction holds below this is zero; the slip by its bound, squared, would be beyond all numbers."""
 
 
 def quantity(name: str, value: Any, allowed: str, least: float = -np.inf, most: float = np.inf) -> Array:
@@ -28,6 +34,22 @@ def quantity(name: str, value: Any, allowed: str, least: float = -np.inf, most: 
         place = f"{name}[{', '.join(map(str, first))}]" if first else name
         raise InputError("", place, float(found[first]), f"must be {allowed}")
     return found
+
+
+def number(name: str, value: Any, allowed: str, least: float = -np.inf, most: float = np.inf) -> float:
+    """``quantity`` of a function that takes one number and no array."""
+    found = quantity(name, value, allowed, least, most)
+    if found.ndim:
+        raise InputError("", name, value, f"must be one number, not an array: {allowed}")
+    return float(found)
+
+
+def creepages(xi_x: Any, xi_y: Any, spin: Any, read: Callable[..., Any] = quantity) -> dict[str, Any]:
+    """Creepages and spin (1/m) by their names, each read by ``quantity`` or by ``number``."""
+    allowed, turn = f"a creepage within +-{LARGEST_CREEPAGE:g}", f"a spin in 1/m within +-{LARGEST_SPIN:g}"
+    return {"xi_x": read("xi_x", xi_x, allowed, -LARGEST_CREEPAGE, LARGEST_CREEPAGE),
+            "xi_y": read("xi_y", xi_y, allowed, -LARGEST_CREEPAGE, LARGEST_CREEPAGE),
+            "spin": read("spin", spin, turn, -LARGEST_SPIN, LARGEST_SPIN)}  # fmt: skip
 
 
 def together(**arrays: Array) -> tuple[Array, ...]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.contact.half_space import Convolution, Z, influence, offsets
-from models.contact.inputs import quantity
+from models.contact.inputs import number, quantity
 from models.errors import InputError, RunFailed
 
 if TYPE_CHECKING:
@@ -26,6 +26,8 @@ TOLERANCE = 1e-9
 MOST_ITERATIONS = 2000
 LARGEST_CELL, LARGEST_APPROACH = 0.1, 0.1
 """In m; larger ones are usually in mm."""
+UNEVEN = 4e-3
+"""Largest difference between steps of a grid, as a part of them."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,17 @@ class Pressed:
     pressure: np.ndarray
     x: np.ndarray
     y: np.ndarray
+
+    def __post_init__(self) -> None:
+        shape = (np.size(self.y), np.size(self.x))
+        if np.shape(self.pressure) != shape or min(shape) < 2:
+            raise InputError("", "pressure", list(np.shape(self.pressure)),
+                             f"must have the shape (ny, nx) of y and x = {shape}, two cells or more each")
+        quantity("pressure", self.pressure, "a pressure in Pa, zero or more", 0.0)
+        for name, nodes in (("x", self.x), ("y", self.y)):
+            steps = np.diff(quantity(name, nodes, "a place in m"))
+            if not (steps.min() > 0.0 and np.ptp(steps) <= UNEVEN * steps.mean()):
+                raise InputError("", name, None, "must ascend in even steps (m)")
 
     @property
     def dx(self) -> float:
@@ -117,17 +130,15 @@ def solve_normal(distance: np.ndarray, dx: float, dy: float, pair: "Pair", *, lo
 
 def _checked(distance: np.ndarray, dx: float, dy: float, load: float | None, approach: float | None) -> np.ndarray:
     """The distance as an array of numbers; raises InputError."""
-    distance = np.asarray(distance, float)
+    distance = quantity("distance", distance, "finite everywhere (m); use a large distance outside the bodies")
     if distance.ndim != 2 or min(distance.shape) < 2:
         raise InputError("", "distance", list(distance.shape), "must have the shape (ny, nx), two cells or more each")
-    if not np.isfinite(distance).all():
-        raise InputError("", "distance", None, "must be finite everywhere (m); use a large distance outside the bodies")
     for name, value in (("dx", dx), ("dy", dy)):
-        quantity(name, value, f"the size of a cell in m, above 0 and at most {LARGEST_CELL:g}", 1e-12, LARGEST_CELL)
+        number(name, value, f"the size of a cell in m, above 0 and at most {LARGEST_CELL:g}", 1e-12, LARGEST_CELL)
     if (load is None) == (approach is None):
         raise InputError("", "load", load, "give either the load (N) or the approach (m)")
-    quantity("load", 0.0 if load is None else load, "a load in N")
-    quantity("approach", 0.0 if approach is None else approach, "an approach in m", -LARGEST_APPROACH, LARGEST_APPROACH)
+    number("load", 0.0 if load is None else load, "a load in N")
+    number("approach", 0.0 if approach is None else approach, "an approach in m", -LARGEST_APPROACH, LARGEST_APPROACH)
     return distance
 
 

@@ -79,7 +79,8 @@ def solve_on(operator: SlipOperator, free: np.ndarray, stiff: np.ndarray, wanted
     def precondition(flat: np.ndarray) -> np.ndarray:
         return substitute(factors, (flat.reshape(shape) / scale).reshape(shape[0], -1)).ravel()
 
-    right = (scale * _times(free, wanted)).ravel()
+    # twice: of a large slip all but normal to a free direction, the first projection leaves rounding aside of it
+    right = (scale * _times(free, _times(free, wanted))).ravel()
     return krylov.solve(apply, precondition, right, INNER_TOLERANCE, MOST_PRODUCTS).reshape(shape)
 
 
@@ -89,9 +90,12 @@ def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def _strip_systems(operator: SlipOperator, free: np.ndarray, stiff: np.ndarray) -> np.ndarray:
-    """Matrix of the system within every strip, (ny, 2 nx, 2 nx), with ones on the directions that are not free."""
+    """Matrix of the system within every strip, (ny, 2 nx, 2 nx).
+
+    On the directions that are not free it is 1 + stiff: a one would be lost in the rounding of a large stiffness.
+    """
     rows, columns = stiff.shape
     system = np.einsum("riab,ibjc,rjcd->riajd", free, operator.strip, free, optimize=True)
     index = np.arange(columns)
-    system[:, index, :, index, :] += np.moveaxis(np.eye(2) + (stiff[..., None, None] - 1.0) * free, 1, 0)
+    system[:, index, :, index, :] += np.moveaxis((1.0 + stiff[..., None, None]) * np.eye(2) - free, 1, 0)
     return np.ascontiguousarray(system.reshape(rows, 2 * columns, 2 * columns))

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.contact.inputs import quantity
+from models.contact.inputs import NOTHING, creepages, number
 from models.contact.normal_problem import Pressed
 from models.contact.rolling_kernels import sweep
 from models.contact.rolling_operator import IN_PLACE, UPSTREAM, SlipOperator, solve_on
@@ -79,12 +79,10 @@ def solve_rolling(pressed: Pressed, mu: float, xi_x: float, xi_y: float, spin: f
 
     Raises
     ------
-    InputError : a value that is not finite, a negative coefficient of friction, too unlike materials
+    InputError : a value that is not one number in its range, too unlike materials
     RunFailed : the conditions of stick and slip were not met to ``TOLERANCE``
     """
-    mu = float(quantity("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0))
-    motion = [float(quantity(name, value, told)) for name, value, told in
-              (("xi_x", xi_x, "a creepage"), ("xi_y", xi_y, "a creepage"), ("spin", spin, "in 1/m"))]  # fmt: skip
+    motion = creepages(xi_x, xi_y, spin, number).values()
     return _rubbed(pressed, mu, rigid_slip(pressed.x, pressed.y, *motion), pair, UPSTREAM)
 
 
@@ -94,8 +92,7 @@ def solve_shift(pressed: Pressed, mu: float, shift_x: float, shift_y: float, pai
     The problem of Cattaneo (1938) and Mindlin (1949): s = shift + u. Arguments and errors as of ``solve_rolling``, with
     shifts in m; in the result ``slip`` is in m and ``power`` the work of friction in J.
     """
-    mu = float(quantity("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0))
-    way_x, way_y = (float(quantity(name, value, "a shift in m, at most 0.1", -0.1, 0.1)) for name, value in
+    way_x, way_y = (number(name, value, "a shift in m, at most 0.1", -0.1, 0.1) for name, value in
                     (("shift_x", shift_x), ("shift_y", shift_y)))  # fmt: skip
     by_cell = _rubbed(pressed, mu, rigid_slip(pressed.x, pressed.y, way_x, way_y, 0.0) / pressed.dx, pair, IN_PLACE)
     return replace(by_cell, slip=by_cell.slip * pressed.dx, power=by_cell.power * pressed.dx)
@@ -104,10 +101,11 @@ def solve_shift(pressed: Pressed, mu: float, shift_x: float, shift_y: float, pai
 def _rubbed(pressed: Pressed, mu: float, rigid: np.ndarray, pair: "Pair",
             weights: tuple[float, ...]) -> RollingSolution:  # fmt: skip
     """Solution for a rigid slip (ny, nx, 2), on the cells in contact."""
+    mu = number("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0)
     pair.require_likeness()
     box = _box(pressed.contact)
     bound = mu * pressed.pressure[box] / pair.G
-    if not bound.any():
+    if mu * pressed.load <= NOTHING:
         return _frictionless(pressed)
     operator = SlipOperator(bound.shape[1], bound.shape[0], pressed.dx, pressed.dy, pair, weights)
     state, rounds = _solve(operator, rigid[box], bound)

@@ -12,12 +12,15 @@ from functools import cached_property
 import numpy as np
 
 from models.contact.distance_kernels import valley, values
+from models.contact.inputs import quantity
 from models.errors import InputError
 
 NODES = 97
 """Nodes along each axis of a distance that is made here: 48 spacings on each side of the centre."""
-EVEN = 1e-6
-"""Nodes count as even if no spacing differs from the mean by more than this share of it."""
+EVEN = 2e-3
+"""Nodes count as even if none is farther from its even place than this share of a step, as rounding in a file does."""
+LARGEST = 1.0
+"""m, of places and heights: no contact is so large, and larger ones are usually in mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +91,7 @@ def from_function(height: Callable[[np.ndarray, np.ndarray], np.ndarray], x: tup
         if not (np.isfinite([first, last]).all() and first < last):
             raise InputError("", name, [first, last], "must be two finite bounds in m, the lower first")
     nodes_x, nodes_y = np.linspace(*x, nodes), np.linspace(*y, nodes)
-    found = np.asarray(height(nodes_x[None, :], nodes_y[:, None]), float)
+    found = quantity("height", height(nodes_x[None, :], nodes_y[:, None]), "finite everywhere (m)")
     try:
         found = np.broadcast_to(found, (nodes, nodes))
     except ValueError:
@@ -101,22 +104,19 @@ def from_arrays(x: np.ndarray, y: np.ndarray, height: np.ndarray) -> Distance:
 
     Raises InputError for a wrong shape, uneven nodes, fewer than four of them, or values that are not finite.
     """
-    nodes = {"x": np.asarray(x, float), "y": np.asarray(y, float)}
-    height = np.array(height, dtype=float)
+    nodes = {name: quantity(name, array, f"places in m within +-{LARGEST:g}", -LARGEST, LARGEST)
+             for name, array in (("x", x), ("y", y))}  # fmt: skip
+    height = quantity("height", height, f"finite everywhere, in m within +-{LARGEST:g}", -LARGEST, LARGEST)
     for name, array in nodes.items():
         if array.ndim != 1 or array.size < 4:
             raise InputError("", name, list(array.shape), "must have the shape (n,) with n of 4 or more")
-        steps = np.diff(array)
-        if not (np.isfinite(array).all() and steps.min() > 0 and np.ptp(steps) <= 2 * EVEN * steps.mean()):
+        even = np.linspace(array[0], array[-1], array.size)
+        if not np.abs(array - even).max() < EVEN * (even[1] - even[0]):
             raise InputError("", name, None, "must ascend in even steps (m)")
     shape = (nodes["y"].size, nodes["x"].size)
     if height.shape != shape:
         raise InputError("", "height", list(height.shape), f"must have the shape (ny, nx) = {shape}, rows along y")
-    if not np.isfinite(height).all():
-        raise InputError("", "height", None, "must be finite everywhere (m)")
-    if np.abs(height).max() > 1.0:
-        raise InputError("", "height", float(np.abs(height).max()), "must be in m, not mm: no contact is 1 m deep")
-    return Distance(nodes["x"], nodes["y"], height)
+    return Distance(nodes["x"], nodes["y"], height.copy())
 
 
 def quadratic(A: float, B: float, x: float, y: float, nodes: int = NODES) -> Distance:
