@@ -38,7 +38,7 @@ class QuarterCar:
         return q * self.k_t / (2 * self.c) * slow / self._common(corner)
 
     def tyre_deflection(self, q: float) -> float:
-        """Variance of wheel height less road height, m^2, on a random walk; k_t^2 times it is that of the wheel load."""
+        """Variance of wheel height less road height, m^2, on a random walk; times k_t^2 that of the wheel load."""
         s, u, k, c, t, m = self.m_s, self.m_u, self.k, self.c, self.k_t, self.mass
         return q / 2 * (c * m**2 / (t * s**2) + (k**2 * m**3 / (t * s) ** 2 - 2 * k * m * u / (t * s) + u) / c)
 
@@ -62,8 +62,8 @@ class QuarterCar:
 
 
 def half_car_acceleration(corner: QuarterCar, q: float, a: float, b: float, speed: float) -> float:
-    """Variance (m^2/s^4) of the acceleration of a half car's centre of gravity, a (m) behind the front axle, b before
-    the rear one, that splits into two identical quarter cars.
+    """Variance (m^2/s^4) at the centre of gravity, a (m) behind the front axle, b before the rear one, of a half car
+    that splits into two identical quarter cars.
 
     It does so if its pitch inertia is m a b and each axle's spring, damper, tyre and wheel are in the ratio of its
     share of the mass, front b / (a + b), rear a / (a + b); ``corner`` is the quarter car of either, to that scale.
@@ -75,6 +75,6 @@ def half_car_acceleration(corner: QuarterCar, q: float, a: float, b: float, spee
 
 
 def split_half_car(corner: QuarterCar, a: float, b: float) -> tuple[QuarterCar, QuarterCar, float]:
-    """Front and rear corner of that half car, 2 b / (a + b) and 2 a / (a + b) times ``corner``; pitch inertia, kg m^2."""
+    """Front and rear corner of that half car, 2 b / (a + b) and 2 a / (a + b) times ``corner``; inertia in kg m^2."""
     front, rear = (QuarterCar(*(2 * share / (a + b) * value for value in vars(corner).values())) for share in (b, a))
     return front, rear, 2 * corner.m_s * a * b

@@ -64,7 +64,7 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
     C = system.C @ V
     variance, change = _seen(C, P).clip(0.0), _seen(C, correction)
     floor = SILENT * (abs(C) ** 2).max(axis=1) * abs(P).max()
-    status, reason = verdicts(D, variance, floor, grown, np.linalg.norm(split.S, 2), accuracy, split)
+    status, reason = verdicts(D, variance, floor, grown, float(np.linalg.norm(split.S)), accuracy, split)
     finite = np.array([found == FINITE for found in status])
     error = np.divide(abs(change), variance, out=np.zeros(len(variance)), where=finite & (variance > 0))
     V, P = V.astype(float), P.astype(float)
@@ -78,7 +78,8 @@ def hits(system: DelayedSystem) -> tuple[list[np.ndarray], list[np.ndarray], lis
         return list(system.B), list(system.D), [0.0] * len(system.B)
     delays = sorted(set(system.delays))
     at = [[i for i, delay in enumerate(system.delays) if delay == hit] for hit in delays]
-    return [sum(system.B[i] for i in own) for own in at], [sum(system.D[i] for i in own) for own in at], delays
+    B, D = ([np.sum([each[i] for i in own], axis=0) for own in at] for each in (system.B, system.D))
+    return B, D, delays
 
 
 def _responses(A: np.ndarray, B: Sequence[np.ndarray], delays: Sequence[float],
@@ -109,6 +110,8 @@ def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, floa
     """
     from control import lyap
 
+    if len(A) == 0:
+        return Q.astype(np.longdouble), Q.astype(np.longdouble), 0.0
     wide, right = A.astype(np.longdouble), ((Q + Q.T) / 2).astype(np.longdouble)
     P = lyap(A, right.astype(float), method="scipy").astype(np.longdouble)
     for _ in range(REFINEMENTS):

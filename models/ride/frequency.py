@@ -1,4 +1,4 @@
-"""Spectra of a vehicle's outputs, and variances as integrals over them: a route that shares nothing with the covariance.
+"""Spectra of a vehicle's outputs, and variances as integrals over them: a route of its own beside the covariance.
 
 Transfer functions come from the dynamic stiffness K + i w D - w^2 M, frequency by frequency; the road is put in front
 as a factor. The integrand of a delay, f(w) e^(i w tau), is smooth but for its oscillation: f is interpolated by
@@ -7,7 +7,7 @@ spherical Bessel functions), so that panels need not follow the delay. They are 
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import eval_legendre, spherical_jn
@@ -22,6 +22,7 @@ LOW, HIGH = 1e-4, 1e12
 TOLERANCE = 1e-11
 """A panel is halved while that changes any variance by more than this share; PANELS at most in all."""
 PANELS = 1500
+EPS = float(np.finfo(float).eps)
 SILENT = 1e-24
 """Share of its terms' squares below which an output is zero by symmetry, and rounding is all of it."""
 
@@ -39,7 +40,7 @@ class Quadrature:
 
 
 def transfer(vehicle: LinearVehicle, omega: np.ndarray) -> np.ndarray:
-    """Outputs by heights under the wheels (n, p, w) at angular frequencies (n,) in rad/s, from the dynamic stiffness."""
+    """Outputs by heights under the wheels (n, p, w) at angular frequencies (n,) in rad/s, by the dynamic stiffness."""
     s = 1j * np.asarray(omega, float)[:, None, None]
     stiffness = vehicle.stiffness + s * vehicle.damping + s**2 * vehicle.mass
     motion = np.linalg.solve(stiffness, vehicle.road_stiffness + s * vehicle.road_damping)
@@ -59,7 +60,7 @@ def road(excitation: Excitation, speed: float, omega: np.ndarray) -> np.ndarray:
 
 def spectra(vehicle: LinearVehicle, excitation: Excitation, speed: float, omega: np.ndarray,
             weights: Weights | None = None) -> np.ndarray:  # fmt: skip
-    """Two-sided densities (n, p) over the angular frequency (rad/s): a variance is the integral over all, both signs."""
+    """Two-sided densities (n, p) over the angular frequency (rad/s): a variance is the integral over both signs."""
     parts = _parts(vehicle, excitation, speed, omega, weights or {})
     if excitation.independent:
         return (abs(parts) ** 2).sum(axis=(0, 3)) / (2 * np.pi)
@@ -84,9 +85,13 @@ def _weighted(vehicle: LinearVehicle, omega: np.ndarray, weights: Weights) -> np
 
 def quadrature(vehicle: LinearVehicle, excitation: Excitation, speed: float,
                weights: Weights | None = None) -> Quadrature:  # fmt: skip
-    """Variances as integrals over all frequencies, weighted outputs in place of their own; inf where one diverges."""
+    """Variances as integrals over all frequencies, weighted outputs in place of their own; inf where one diverges.
 
-    def over(edges: np.ndarray) -> np.ndarray:
+    The error holds what halving the panels changes, the tail beyond the last one, and what a last digit of the
+    stiffness changes: that is much for places of a vehicle that is free to drive away.
+    """
+
+    def over(edges: np.ndarray, vehicle: LinearVehicle = vehicle) -> np.ndarray:
         """Shares (panels, p) of the variances between the two frequencies of each row."""
         centre, half = edges.mean(axis=1), np.diff(edges, axis=1)[:, 0] / 2
         parts = _parts(vehicle, excitation, speed, (centre[:, None] + half[:, None] * NODES).ravel(), weights or {})
@@ -95,23 +100,37 @@ def quadrature(vehicle: LinearVehicle, excitation: Excitation, speed: float,
 
     frequencies = _breaks(vehicle, excitation, speed)
     edges = np.column_stack([frequencies[:-1], frequencies[1:]])
-    whole, taken = over(edges), len(edges)
+    first = over(edges)
+    digit = EPS * np.cos(np.arange(vehicle.stiffness.size)).reshape(vehicle.stiffness.shape)
+    nudged = over(edges, replace(vehicle, stiffness=vehicle.stiffness * (1 + digit)))
+    rounding = abs((nudged - first).sum(axis=0))
     seen = abs(_weighted(vehicle, frequencies[1:], weights or {})) @ abs(road(excitation, speed, frequencies[1:]))
     terms = np.einsum("ambk,ambk,m->b", seen, seen, frequencies[1:])
-    total = np.maximum(abs(whole).sum(axis=0), SILENT * terms)
-    diverges = (abs(whole[[0, -1]]) > 0.1 * total).any(axis=0)
-    variance, error = np.zeros(len(total)), abs(whole[-1])  # beyond the last panel lies as much as in it
+    total = abs(first).sum(axis=0)
+    limit = np.maximum(TOLERANCE * np.maximum(total, SILENT * terms), rounding)
+    variance, error, taken = _halved(over, edges, first, limit)
+    error += abs(first[-1]) + rounding  # beyond the last panel lies as much as in it
+    known = np.divide(error, variance, out=np.zeros(len(total)), where=variance > 0)
+    diverges = (abs(first[[0, -1]]) > 0.1 * total).any(axis=0)
+    return Quadrature(np.where(diverges, np.inf, variance), known, taken * POINTS)
+
+
+def _halved(over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, whole: np.ndarray,
+            limit: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:  # fmt: skip
+    """Sums (p,) over panels, each halved until that changes it by no more than ``limit`` (p,); the last changes."""
+    variance, error = np.zeros_like(limit), np.zeros_like(limit)
+    taken = 2 * len(edges)
     while len(edges):
         finer = np.column_stack([edges[:, 0], edges.mean(axis=1), edges.mean(axis=1), edges[:, 1]]).reshape(-1, 2)
         parts = over(finer)
-        halved = parts.reshape(len(edges), 2, -1).sum(axis=1)
         taken += len(finer)
-        rough = (abs(halved - whole) > TOLERANCE * total).any(axis=1) & (taken < PANELS)
-        variance += halved[~rough].sum(axis=0)
-        error += abs(halved - whole)[~rough].sum(axis=0)
+        halves = parts.reshape(len(edges), 2, -1).sum(axis=1)
+        change = abs(halves - whole)
+        rough = (change > limit).any(axis=1) & (taken < PANELS)
+        variance += halves[~rough].sum(axis=0)
+        error += change[~rough].sum(axis=0)
         edges, whole = finer[np.repeat(rough, 2)], parts[np.repeat(rough, 2)]
-    known = np.divide(error, variance, out=np.zeros(len(total)), where=variance > 0)
-    return Quadrature(np.where(diverges, np.inf, variance), known, taken * POINTS)
+    return variance, error, taken
 
 
 NODES, GAUSS = np.polynomial.legendre.leggauss(POINTS)

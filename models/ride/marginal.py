@@ -65,7 +65,7 @@ def parts(A: np.ndarray, accuracy: float = ACCURACY) -> Parts:
     ``accuracy`` of A, relative to its norm once its states are scaled: what is smaller counts as zero.
     """
     balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
-    norm = np.linalg.norm(balanced, 2)
+    norm = float(np.linalg.norm(balanced, 2))
     V, form, zeros = _zeros_first(balanced, accuracy * norm)
     U, rest, undamped = _undamped_first(form[zeros:, zeros:], 10 * accuracy * norm)
     k = zeros + undamped
@@ -82,7 +82,7 @@ def parts(A: np.ndarray, accuracy: float = ACCURACY) -> Parts:
 
 
 def _zeros_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int]:
-    """Orthogonal Q, the form Q' A Q with its zero eigenvalues first (strictly upper triangular in blocks), their number.
+    """Orthogonal Q, the form Q' A Q with its zero eigenvalues first, those strictly upper triangular, and their number.
 
     Null space, then null space of what remains, until nothing remains to be found: the staircase of Jordan chains.
     """

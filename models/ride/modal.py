@@ -64,7 +64,7 @@ class Shared:
 
 @dataclass(frozen=True)
 class Modal:
-    """Per output (p,): variance, ``floor`` that rounding makes of zero, relative error that it may have left (``loss``).
+    """Per output (p,): variance, ``floor`` that rounding makes of zero, relative error it may have left (``loss``).
 
     fastest : rate of the system in 1/s
     """
@@ -97,8 +97,8 @@ def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, s
         met = _joined(own, A[:vehicle, vehicle:last] @ V, values[1])
         felt = _joined(behind, A[last:, :vehicle] @ own.V, values[0])
         heard = _joined(behind, A[last:, :vehicle] @ met + A[last:, vehicle:last] @ V, values[1])
-    C = [system.C[:, :vehicle], system.C[:, vehicle:last], system.C[:, last:]]
-    C = np.hstack([C[0] @ own.V + C[2] @ felt, C[0] @ met + C[1] @ V + C[2] @ heard, C[2] @ behind.V])
+    C0, C1, C2 = system.C[:, :vehicle], system.C[:, vehicle:last], system.C[:, last:]
+    C = np.hstack([C0 @ own.V + C2 @ felt, C0 @ met + C1 @ V + C2 @ heard, C2 @ behind.V])
     B, _, delays = hits(system)
     inputs = []
     for b in B:

@@ -43,13 +43,16 @@ class Sweep:
 
 
 def sweep(vehicle: Callable[[float], LinearVehicle], excitations: Mapping[str, Excitation], speeds: Sequence[float],
-          filters: Mapping[str, str] | None = None, accuracy: float = ACCURACY, fast: bool = True) -> Sweep:  # fmt: skip
+          filters: Mapping[str, str] | None = None, accuracy: float = ACCURACY,
+          fast: bool = True) -> Sweep:  # fmt: skip
     """Stationary variances of a vehicle, given as a function of the speed (m/s), on each road at each speed.
 
     filters : weightings by output, as ``weighted`` takes them. fast : False sends every point the direct way.
     Raises Unstable.
     """
-    shared, direct, names = Shared(), dict[str, int](), ()
+    shared = Shared()
+    direct: dict[str, int] = {}
+    names: tuple[str, ...] = ()
     shape = (len(excitations), len(speeds))
     found = np.empty(shape, object)
     for j, speed in enumerate(speeds):
@@ -63,9 +66,7 @@ def sweep(vehicle: Callable[[float], LinearVehicle], excitations: Mapping[str, E
                 exact = stationary(system, accuracy)
                 point = exact.variance, exact.status, exact.reason
             found[i, j], names = point, system.names
-    variance, status, reason = (
-        np.array([[point[part] for point in row] for row in found]) for part in range(3)
-    )
+    variance, status, reason = (np.array([[point[part] for point in row] for row in found]) for part in range(3))
     return Sweep(tuple(excitations), np.array(speeds), names, variance, status, reason, direct)
 
 
