@@ -199,13 +199,13 @@ BAD = {
     "creepage": (lambda: roll(press(ELLIPSE, PAIR, load=1e3), 0.3, math.inf, 0.0, 0.0), "creepage"),
     "net": (lambda: Options(net=2), "3 to 100"),
     "shape": (lambda: Options(shape="eliptic"), "did you mean 'elliptic'"),
-    "millimetres": (lambda: quadratic(A, A, 20.0, 20.0), "in m, not mm"),
+    "millimetres": (lambda: quadratic(A, A, 20.0, 20.0), "places in m"),
     "shape of height": (
-        lambda: from_arrays(np.arange(5.0), np.arange(6.0), np.zeros((5, 6))),
+        lambda: from_arrays(np.arange(5) / 9, np.arange(6) / 9, np.zeros((5, 6))),
         r"\(6, 5\), rows along y",
     ),
     "uneven": (lambda: from_arrays(np.array([0.0, 0.1, 0.3, 0.4]), np.arange(4) / 4, np.zeros((4, 4))), "even steps"),
-    "not finite": (lambda: from_arrays(np.arange(4.0), np.arange(4.0), np.full((4, 4), np.nan)), "finite"),
+    "not finite": (lambda: from_arrays(np.arange(4) / 4, np.arange(4) / 4, np.full((4, 4), np.nan)), "finite"),
     "outside": (lambda: ELLIPSE.at(np.array(1.0), np.array(0.0)), "where h is known"),
 }
 
