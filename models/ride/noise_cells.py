@@ -25,7 +25,7 @@ class Nodes:
     step: np.ndarray
 
 
-def steps(profile: SpeedProfile, begin: float, instants: Sequence[float], motion: float, road: float,
+def steps(profile: SpeedProfile, begin: float, instants: Sequence[float] | np.ndarray, motion: float, road: float,
           reach: float) -> np.ndarray:  # fmt: skip
     """Ends (N + 1,) of steps (s) from ``begin`` to the profile's end; its points and ``instants`` are among them.
 

@@ -29,20 +29,21 @@ class Responses:
 
     def transition(self, start: float, end: float) -> np.ndarray:
         """E (n + a m, n + a m) over a step from start to end (s)."""
-        motion, inputs = self.of_length(round(end - start, 12))
+        motion, inputs = self.of_length(round(end - start, 14))
         driven = self.path(start + (end - start) * np.append(POINTS, 1.0)) - self.path(start)
-        decay = (powers(driven, TERMS) @ self.decay).reshape(-1, self.m, self.m)
+        decay = (powers(driven, TERMS) @ self.decay).reshape(-1, self.m)
         E = np.zeros((self.n + self.axles * self.m,) * 2)
         E[: self.n, : self.n] = motion
-        E[: self.n, self.n :] = np.einsum("gnam,gmp->nap", inputs, decay[:-1]).reshape(self.n, -1)
-        E[self.n :, self.n :] = np.kron(np.eye(self.axles), decay[-1])
+        E[: self.n, self.n :] = (inputs @ decay[: -self.m]).reshape(self.n, -1)
+        for first in range(self.n, len(E), self.m):
+            E[first : first + self.m, first : first + self.m] = decay[-self.m :]
         return E
 
     def _of_length(self, length: float) -> tuple[np.ndarray, np.ndarray]:
-        """e^(A h) and, point by point of the integral over the step, what e^(A (h - u)) makes of the inputs."""
+        """e^(A h) and what e^(A (h - u)) makes of inputs at the points of the step: (n a, g m)."""
         left = np.stack([expm(self.form.A * length * (1.0 - point)) for point in POINTS])
-        inputs = np.einsum("g,gij,jam->giam", WEIGHTS * length, left, self.form.inputs)
-        return expm(self.form.A * length), inputs
+        inputs = np.einsum("g,gij,jam->iagm", WEIGHTS * length, left, self.form.inputs, optimize=True)
+        return expm(self.form.A * length), inputs.reshape(self.n * self.axles, -1)
 
     def to_noise(self, axle: int, met: np.ndarray, end: np.ndarray) -> np.ndarray:
         """States (n + a m, L, k) at ``end`` (L,) after a unit of noise that the axle has met at ``met`` (L,), s.
@@ -74,5 +75,6 @@ def series(A: np.ndarray, B: np.ndarray) -> np.ndarray:
 
 def powers(t: np.ndarray, count: int) -> np.ndarray:
     """t^j / j! along a new last axis, j = 0 to count - 1."""
-    factors = np.asarray(t)[..., None] / np.arange(1, count)
-    return np.concatenate([np.ones_like(factors[..., :1]), np.cumprod(factors, axis=-1)], axis=-1)
+    out = np.ones((*np.shape(t), count))
+    out[..., 1:] = np.asarray(t)[..., None] / np.arange(1, count)
+    return np.cumprod(out, axis=-1, out=out)

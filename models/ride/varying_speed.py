@@ -21,9 +21,10 @@ import numpy as np
 from scipy.linalg import expm, solve_continuous_lyapunov
 
 from models.errors import InputError
-from models.ride.covariance import DIFFUSING, INFINITE, stationary
+from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary
 from models.ride.excitation import Excitation
 from models.ride.linear_vehicle import LinearVehicle
+from models.ride.marginal import ACCURACY
 from models.ride.noise_cells import nodes, steps
 from models.ride.responses import Responses
 from models.ride.road_in_path import RoadInPath, at_speed, road_in_path
@@ -59,7 +60,7 @@ class VaryingSpeed:
             raise InputError("", "output", name, "must be an output of the vehicle", self.names)
         return self.deviation[:, self.names.index(name)]
 
-    def at(self, instants: Sequence[float]) -> np.ndarray:
+    def at(self, instants: Sequence[float] | np.ndarray) -> np.ndarray:
         """Standard deviations (k, p) at instants (s), each the nearest one of ``time``."""
         return self.deviation[np.abs(self.time[:, None] - np.asarray(instants)).argmin(axis=0)]
 
@@ -70,7 +71,8 @@ def varying_speed(
     profile: SpeedProfile,
     *,
     weightings: Mapping[str, str] | None = None,
-    instants: Sequence[float] = (),
+    instants: Sequence[float] | np.ndarray = (),
+    accuracy: float = ACCURACY,
     reach: float = REACH,
 ) -> VaryingSpeed:
     """Standard deviations along a drive that begins in the stationary state of its first speed, or at rest.
@@ -82,6 +84,7 @@ def varying_speed(
     ----------
     weightings : weighted outputs to add, as in ``weighting.weighted``
     instants : times (s) within the drive that shall be among those of the result
+    accuracy : of the vehicle's matrices, relative, as in ``stationary``
     reach : fastest rate times step; the change at half of it tells the error
 
     Raises
@@ -93,11 +96,11 @@ def varying_speed(
     if fastest == 0.0:
         raise InputError("", "drive.speed", 0.0, "must be above 0 somewhere: at standstill nothing moves")
     form = road_in_path(vehicle, excitation, weightings)
-    status = stationary(at_speed(vehicle, excitation, fastest, weightings)).status
+    status = stationary(at_speed(vehicle, excitation, fastest, weightings), accuracy).status
     if first == 0.0:
         P = _at_rest(form)
     else:
-        P = stationary(at_speed(vehicle, excitation, first, weightings)).P
+        P = stationary(at_speed(vehicle, excitation, first, weightings), accuracy).P
         P = np.linalg.solve(form.basis, np.linalg.solve(form.basis, P).T)
     seen = [_seen(form, P, first, status)]
     time = [profile.times[0]]
@@ -111,7 +114,30 @@ def varying_speed(
                         form.basis @ P @ form.basis.T)  # fmt: skip
 
 
-def _moments(form: RoadInPath, profile: SpeedProfile, P: np.ndarray, instants: Sequence[float],
+def quasi_stationary(
+    vehicle: LinearVehicle,
+    excitation: Excitation,
+    speeds: np.ndarray,
+    *,
+    weightings: Mapping[str, str] | None = None,
+    accuracy: float = ACCURACY,
+) -> np.ndarray:
+    """Standard deviations (N, p) as if each of the speeds (N,) had always been driven; at 0 those at rest.
+
+    Errors are those of ``varying_speed``.
+    """
+    form = road_in_path(vehicle, excitation, weightings)
+    different, which = np.unique(speeds, return_inverse=True)
+    rows = []
+    for speed in different:
+        if speed > 0.0:
+            rows.append(stationary(at_speed(vehicle, excitation, float(speed), weightings), accuracy).deviation)
+        else:
+            rows.append(np.sqrt(_seen(form, _at_rest(form), 0.0, [FINITE] * len(form.names))[: len(form.names)]))
+    return np.array(rows)[which]
+
+
+def _moments(form: RoadInPath, profile: SpeedProfile, P: np.ndarray, instants: Sequence[float] | np.ndarray,
              reach: float) -> Iterator[tuple[float, np.ndarray]]:  # fmt: skip
     """End of each step of the drive and the covariance there, from P at its beginning on.
 
@@ -232,7 +258,7 @@ def _seen(form: RoadInPath, P: np.ndarray, speed: float, status: Sequence[str]) 
     """Variances of all outputs and of the road's height under each wheel."""
     n, C = len(form.A), form.C + speed * form.rate
     H = np.hstack(form.excitation.heights)
-    variance = np.einsum("pi,pi->p", C @ P, C)
+    variance = ((C @ P) * C).sum(axis=1)
     lost = [found == DIFFUSING or (found == INFINITE and speed > 0.0) for found in status]
-    height = np.einsum("wi,wi->w", H @ P[n:, n:], H)
+    height = ((H @ P[n:, n:]) * H).sum(axis=1)
     return np.concatenate([np.where(lost, np.inf, np.maximum(variance, 0.0)), np.maximum(height, 0.0)])

@@ -1,0 +1,260 @@
+"""Ride at varying speed: the covariance against its stationary limit, an adjoint, and Monte Carlo; cost of both."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from models.ride.covariance import stationary
+from models.ride.excitation import Excitation
+from models.ride.linear_vehicle import LinearVehicle
+from models.ride.monte_carlo import along, at_constant_speed
+from models.ride.road_in_path import at_speed
+from models.ride.speed_profile import SpeedProfile
+from models.ride.varying_speed import REACH, quasi_stationary, varying_speed
+from models.road.two_track import excitation, half_track, on_track, road_of_level
+from models.vehicles.spatial_linear import linearise
+from models.vehicles.vehicle_file import load_vehicle
+from validation.rows import Row, System, Table, at_most, behaves, finding
+
+TITLE = "Ride at varying speed, through standstill, and by Monte Carlo"
+SYSTEM: System = "ride"
+SEED = 21
+COPIES = 4000
+POINTS = ("body front", "body centre", "body rear")
+DRIVES = {
+    "accelerating": SpeedProfile((0.0, 25.0 / 3.0), (5.0, 30.0)),
+    "braking": SpeedProfile((0.0, 3.0), (30.0, 6.0)),
+}
+"""At 3 and at -8 m/s^2."""
+STOPS = SpeedProfile((0.0, 1.0, 11.0, 12.0, 15.75, 18.0), (0.0, 0.0, 30.0, 30.0, 0.0, 0.0))
+"""Standing, to 30 m/s at 3 m/s^2, to standstill at -8 m/s^2, standing."""
+SHORT_STOPS = SpeedProfile((0.0, 0.2, 2.2, 2.4, 3.4, 4.0), (0.0, 0.0, 30.0, 30.0, 0.0, 0.0))
+SETTLED = 13.0
+"""Slowest rate times the time after a change of speed: e^-26 of it is left in a variance."""
+EVEN = SpeedProfile((0.0, 0.5), (20.0, 20.0))
+STOP_AND_GO = SpeedProfile((0.0, 0.5, 1.0, 1.3, 2.0), (12.0, 12.0, 0.0, 0.0, 5.0))
+"""The last axle meets what the first one met before the stop."""
+STEADY = 20.0
+"""Speed (m/s) of the Monte Carlo at constant speed."""
+LASTING = 10.0
+"""Its length, s."""
+REPEATS = 20
+"""Of the covariance, which is too short to time once."""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Limits and the adjoint with a half car; in full also with larger vehicles, Monte Carlo, and the cost."""
+    rows = [*_limits("half_car", SHORT_STOPS), _adjoint(), _damped()]
+    if quick:
+        return rows, {}
+    for name in ("r19_ride", "three_axle_truck"):
+        rows += _limits(name, STOPS)
+    data = {name: _drive(profile) for name, profile in DRIVES.items()}
+    for name, found in data.items():
+        rows += _copies(name, found)
+    return rows + _constant(), data
+
+
+@cache
+def ride(name: str, tyre_damping: float = 0.0) -> tuple[LinearVehicle, Excitation]:
+    """A shipped vehicle and the paper's road under it, rear wheels delayed; one without a width runs on one track."""
+    spatial = load_vehicle(name)
+    vehicle = linearise(replace(spatial, tyres=tuple(replace(t, damping=tyre_damping) for t in spatial.tyres)))
+    y = half_track(vehicle.wheels)
+    return vehicle, excitation(road_of_level(y or 1.0), vehicle.wheels if y else on_track(vehicle.wheels, 1.0))
+
+
+def _limits(name: str, stops: SpeedProfile) -> list[Row]:
+    """Stationary after a change of speed and at constant speed; the road itself, always; half the step."""
+    vehicle, road = ride(name)
+    system = at_speed(vehicle, road, STEADY)
+    exact, settling = stationary(system).deviation, -SETTLED / np.linalg.eigvals(system.A).real.max()
+    change = SpeedProfile((0.0, 0.5, 0.5 + settling), (STEADY / 2.0, STEADY, STEADY))
+    settled, even = (varying_speed(vehicle, road, profile).deviation for profile in (change, EVEN))
+    often = np.linspace(stops.times[0], stops.times[-1], 41)
+    stopped, fine = (varying_speed(vehicle, road, stops, instants=often, reach=reach) for reach in (REACH, REACH / 2))
+    step = np.abs(stopped.at(often) ** 2 - fine.at(often) ** 2) / stopped.deviation.max(axis=0) ** 2
+    return [
+        at_most(f"ride_varying_speed.settled.{name}", SYSTEM, f"{name}, long after a change from 10 to 20 m/s: "
+                "all outputs against the Lyapunov equation", float(np.abs(settled[-1] / exact - 1.0).max()), "", 1e-10,
+                "the stationary limit, relative", "closed form"),
+        at_most(f"ride_varying_speed.even.{name}", SYSTEM, f"{name}, at 20 m/s all the time: likewise, worst instant",
+                float(np.abs(even / exact - 1.0).max()), "", 1e-10, "nothing may drift", "closed form"),
+        at_most(f"ride_varying_speed.road.{name}", SYSTEM, f"{name}, through 0, 30 and 0 m/s, standing included: "
+                "variance of the road under each wheel, worst instant",
+                float(np.abs((stopped.height / stopped.height[0]) ** 2 - 1.0).max()), "", 1e-10,
+                "the road does not know how fast it is driven over; relative", "closed form"),
+        at_most(f"ride_varying_speed.step.{name}", SYSTEM, f"{name}, the same drive at half the step: change of all "
+                "variances, by their largest value", float(step.max()), "", 1e-8,
+                "ten times what was seen: the delay bends like a root where an axle passes the place of a start",
+                "none"),
+    ]  # fmt: skip
+
+
+def _adjoint() -> Row:
+    """The end of a drive with a stop in it by the other route."""
+    vehicle, road = ride("half_car")
+    found = varying_speed(vehicle, road, STOP_AND_GO)
+    exact = by_adjoint(vehicle, road, STOP_AND_GO, "body rear")
+    return at_most("ride_varying_speed.adjoint", SYSTEM, "half_car, a stop within its wheelbase and off again: body "
+                   "rear against the adjoint, relative", abs(float(found.of("body rear")[-1]) / exact - 1.0), "", 1e-8,
+                   "the adjoint's solver is good to 1e-10", "closed form")  # fmt: skip
+
+
+def _damped() -> Row:
+    """Tyre damping brings white noise into the tyre force, while the road moves."""
+    found = varying_speed(*ride("half_car", 100.0), SHORT_STOPS)
+    force, moving = found.of("tyre force front left"), found.speed > 0.0
+    said = "infinite" if np.isinf(force[moving]).all() else "finite"
+    said += ", finite" if np.isfinite(force[~moving]).all() else ", infinite"
+    return behaves("ride_varying_speed.damped", SYSTEM, "half_car with tyre damping: variance of the tyre force while "
+                   "driving, and at standstill", said, "infinite, finite",
+                   "white noise of the road's rate, which standstill turns off")  # fmt: skip
+
+
+def _drive(profile: SpeedProfile) -> dict[str, Any]:
+    """The 19 freedoms along a drive: covariance, quasi-stationary, copies, and the seconds."""
+    vehicle, road = ride("r19_ride")
+    instants = profile.times[-1] * np.array([0.25, 0.6, 0.95])
+    copies, slow = _timed(lambda: along(vehicle, road, profile, instants, copies=COPIES, seed=SEED))
+    found, fast = _timed(lambda: varying_speed(vehicle, road, profile, instants=copies.time))
+    often = np.linspace(profile.times[0], profile.times[-1], 101)
+    columns = [found.names.index(point) for point in POINTS]
+    near = np.abs(found.time[:, None] - often).argmin(axis=0)
+    return {
+        "time": found.time[near].tolist(), "speed": found.speed[near].tolist(),
+        "deviation": found.deviation[near][:, columns].tolist(),
+        "quasi": quasi_stationary(vehicle, road, found.speed[near])[:, columns].tolist(),
+        "instants": copies.time.tolist(), "copies": np.sqrt(copies.variance[:, columns]).tolist(),
+        "error": (copies.error / 2.0 / np.sqrt(copies.variance))[:, columns].tolist(),
+        "z": copies.z(found.at(copies.time))[:, columns].tolist(),
+        "all": float(np.abs(copies.z(found.at(copies.time))).max()), "seconds": [fast, slow],
+    }  # fmt: skip
+
+
+def _copies(name: str, found: dict[str, Any]) -> list[Row]:
+    """Copies at three instants in three points, all outputs beside, and the error of the quasi-stationary answer."""
+    quasi, true = np.array(found["quasi"]), np.array(found["deviation"])
+    off = np.abs(quasi / true - 1.0)
+    return [
+        at_most(f"ride_varying_speed.copies.{name}", SYSTEM, f"r19_ride {name}: Monte Carlo of {COPIES} copies at 3 "
+                "instants in 3 points of the body, largest |z|", float(np.abs(found["z"]).max()), "", 4.0,
+                "of 9 normal values one beyond 4 in 1800 times", "none"),
+        finding(f"ride_varying_speed.outputs.{name}", SYSTEM, f"r19_ride {name}: the same for all 16 outputs, largest "
+                "|z| of 48", found["all"], "", "below 4", "wheel loads and travels follow the same law", "none"),
+        finding(f"ride_varying_speed.quasi.{name}", SYSTEM, f"r19_ride {name}: largest error of the quasi-stationary "
+                "standard deviation in 3 points", float(off.max()), "", {"accelerating": 0.017, "braking": 0.15}[name],
+                "beside what a prototype sampled; the largest over all instants", "none"),
+    ]  # fmt: skip
+
+
+def _constant() -> list[Row]:
+    """Copies at constant speed, and what one digit costs by either way."""
+    vehicle, road = ride("r19_ride")
+    exact = stationary(at_speed(vehicle, road, STEADY))
+    fast = _timed(lambda: [stationary(at_speed(vehicle, road, STEADY)) for _ in range(REPEATS)])[1] / REPEATS
+    copies, slow = _timed(lambda: at_constant_speed(vehicle, road, STEADY, LASTING, copies=COPIES, seed=SEED))
+    columns = [copies.names.index(point) for point in POINTS]
+    z = copies.z(exact.deviation[None])[0]
+    error = float((copies.error[0] / 2.0 / copies.variance[0])[columns].max())
+    return [
+        at_most("ride_varying_speed.constant", SYSTEM, f"r19_ride at 20 m/s, {COPIES} copies of {LASTING:g} s: largest "
+                "|z| in 3 points of the body", float(np.abs(z[columns]).max()), "", 4.0,
+                "of 3 normal values one beyond 4 in 5000 times", "none"),
+        finding("ride_varying_speed.constant.outputs", SYSTEM, "the same for all 16 outputs", float(np.abs(z).max()),
+                "", "below 4", "as above", "none"),
+        finding("ride_varying_speed.constant.error", SYSTEM, "the same: standard error of these standard deviations, "
+                "relative", error, "", "falls as 1 / sqrt(copies x length)", "what its time buys", "none"),
+        finding("ride_varying_speed.cost", SYSTEM, "the same: processor seconds of Monte Carlo for a standard error of "
+                "1e-3, by those of the covariance, which is exact", slow * (error / 1e-3) ** 2 / fast, "",
+                "thousands", "every further digit costs Monte Carlo a hundredfold, the covariance nothing", "none"),
+    ]  # fmt: skip
+
+
+def _timed(run: Callable[[], Any]) -> tuple[Any, float]:
+    start = time.process_time()
+    return run(), time.process_time() - start
+
+
+def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, output: str) -> float:
+    """Standard deviation of one output at a drive's end, from what it sees of the noise at each place of the road.
+
+    Backward in time l' = -A' l from l = C: noise that axle i meets at t moves the output by l(t) . B_i. The drive
+    begins in motion and is taken as even long before.
+    """
+    one, two = (at_speed(vehicle, road, speed) for speed in (1.0, 2.0))
+    steady, per_speed = (2.0 * one.A - two.A).T, (two.A - one.A).T
+    row = one.names.index(output)
+    seen = one.C[row] + (profile.speeds[-1] - 1.0) * (two.C - one.C)[row]
+    slowest = -np.linalg.eigvals(at_speed(vehicle, road, float(profile.speeds[0])).A).real.max()
+    pieces, cuts = {}, [profile.times[0] - 10.0 / slowest, *profile.times]
+    for start, stop in reversed(list(pairwise(cuts))):
+        back = solve_ivp(lambda t, x: -(steady @ x + profile.speed(t) * (per_speed @ x)), (stop, start), seen,
+                         method="DOP853", rtol=1e-10, atol=1e-11 * np.abs(one.C[row]).max(),
+                         dense_output=True)  # fmt: skip
+        pieces[start, stop], seen = back.sol, back.y[:, -1]
+    places, weights = _path_points(profile, cuts, road.lengths)
+    response = np.zeros((len(places), one.B[0].shape[1]))
+    for B, length in zip(one.B, road.lengths, strict=True):
+        met = profile.time(places + length)
+        for (start, stop), adjoint in pieces.items():
+            own = np.flatnonzero((met > start) & (met < stop))
+            if len(own):
+                response[own] += adjoint(met[own]).T @ B
+    return float(np.sqrt(weights @ (response**2).sum(axis=1)))
+
+
+def _path_points(profile: SpeedProfile, cuts: list[float], lengths: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Places (m) and weights of an integral over the road, fine in the time of every axle."""
+    fine = [np.linspace(start, stop, int(np.ceil((stop - start) / 0.02)) + 1) for start, stop in pairwise(cuts)]
+    passed = profile.path(np.unique(np.concatenate(fine)))
+    cells = np.unique(np.concatenate([passed - length for length in lengths]))
+    points, weights = np.polynomial.legendre.leggauss(6)
+    half = np.diff(cells)[:, None] / 2.0
+    return (cells[:-1, None] + half * (points + 1.0)).ravel(), (half * weights).ravel()
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """z of the copies, instant by instant."""
+    rows = [
+        (name, f"{t:.2f} s", *(f"{value:.2f}" for value in z))
+        for name, found in data.items()
+        for t, z in zip(found["instants"], found["z"], strict=True)
+    ]
+    if not rows:
+        return []
+    note = f"How many standard errors the variance over {COPIES} copies lies above the covariance along the drive."
+    return [Table("Monte Carlo at varying speed", note, ("drive", "time", *POINTS), tuple(rows))]
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Standard deviations over time, quasi-stationary beside."""
+    if not data:
+        return []
+    from studies.figures import plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.8), sharey=True)
+    for axis, (name, found) in zip(axes, data.items(), strict=True):
+        for column, point in enumerate(POINTS):
+            pick = [row[column] for row in found["deviation"]]
+            (line,) = axis.plot(found["time"], pick, label=point)
+            colour = line.get_color()
+            axis.plot(found["time"], [row[column] for row in found["quasi"]], "--", color=colour, linewidth=1.0)
+            spread = [2.0 * row[column] for row in found["error"]]
+            axis.errorbar(found["instants"], [row[column] for row in found["copies"]], spread, fmt="o", color=colour,
+                          markersize=3, capsize=2)  # fmt: skip
+        axis.set(title=f"{name}, {found['speed'][0]:.0f} to {found['speed'][-1]:.0f} m/s", xlabel="time [s]")
+    axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s$^2$]")
+    axes[0].plot([], [], "k--", linewidth=1.0, label="quasi-stationary")
+    axes[0].plot([], [], "ko", markersize=3, label=f"{COPIES} copies, 2 standard errors")
+    axes[0].legend(fontsize=8)
+    caption = ("Standard deviation of the body's vertical acceleration (19 freedoms, the paper's road) while the speed "
+               "varies; dashed as if the momentary speed had always been driven.")  # fmt: skip
+    return [(caption, figure)]
