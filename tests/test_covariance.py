@@ -215,8 +215,9 @@ def test_a_free_vehicle_has_its_three_zeros_and_no_output_minds(free):
     assert set(found.status) == {FINITE}
     assert "nothing pulls back" in found.reason[0]
     other = quadrature(plain, road, 20.0)
-    assert other.error.max() < 1e-8  # the place to the side feels the rounding of a stiffness that should vanish
-    np.testing.assert_allclose(found.variance, other.variance, rtol=1e-8)
+    # the place to the side feels the rounding of a stiffness that should vanish, and says so
+    assert (abs(found.variance / other.variance - 1) < other.error + 1e-10).all()
+    assert other.error.max() < 1e-6 and np.median(other.error) < 1e-10
 
 
 def test_roll_steer_makes_it_diffuse_sideways(free):

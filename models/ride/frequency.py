@@ -103,7 +103,7 @@ def quadrature(vehicle: LinearVehicle, excitation: Excitation, speed: float,
     first = over(edges)
     digit = EPS * np.cos(np.arange(vehicle.stiffness.size)).reshape(vehicle.stiffness.shape)
     nudged = over(edges, replace(vehicle, stiffness=vehicle.stiffness * (1 + digit)))
-    rounding = abs((nudged - first).sum(axis=0))
+    rounding = 10 * abs((nudged - first).sum(axis=0))  # one draw of many
     seen = abs(_weighted(vehicle, frequencies[1:], weights or {})) @ abs(road(excitation, speed, frequencies[1:]))
     terms = np.einsum("ambk,ambk,m->b", seen, seen, frequencies[1:])
     total = abs(first).sum(axis=0)
