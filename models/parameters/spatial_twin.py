@@ -39,13 +39,14 @@ def vehicle(gravity: float = 0.0) -> SpatialVehicle:
 
 def _bodies() -> tuple[Body, ...]:
     return (
+        Body("axle", 90.0, (-1.4, 0.0, 0.35), ("z", "rx"), SMALL),
         Body("body", 800.0, (0.1, 0.02, 0.6), ("z", "rx", "ry"), LARGE),
         Body("box", 50.0, (-1.2, 0.3, 0.9), (), SMALL, "body"),
         Body("engine", 120.0, (0.9, 0.05, 0.5), ("x", "z", "rx", "ry", "rz"), SMALL, "body"),
-        Body("axle", 90.0, (-1.4, 0.0, 0.35), ("z", "rx"), SMALL),
         Body("fl", 40.0, FRONT_LEFT, ("x", "z")),
         Body("fr", 42.0, FRONT_RIGHT, ("x", "z")),
         Body("pump", 10.0, (1.1, 0.1, 0.7), ("ry",), SMALL, "engine"),
+        Body("hub", 12.0, (-1.5, 0.6, 0.4), ("ry",), SMALL, "axle"),
         Body("lid", 5.0, (1.1, 0.3, 0.9), (), SMALL, "pump"),
     )
 
@@ -72,6 +73,7 @@ def _springs() -> tuple[SpringDamper, ...]:
     )
     riders = (
         _spring("pump", "pump", "engine", (1.3, 0.1, 0.5), UP, 5.0e4, 200.0),
+        _spring("hub", "hub", "axle", (-1.1, 0.6, 0.5), UP, 4.0e4, 150.0),
         _spring("lid", "lid", "body", (1.4, 0.2, 0.6), SKEW, 5.0e3, 20.0),
     )
     return suspensions + mounts + riders
