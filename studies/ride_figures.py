@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.ride.excitation import Excitation, excited
+from models.ride.excitation import Excitation
 from models.ride.linear_vehicle import LinearVehicle
 from models.ride.sweep import Sweep
 from models.ride.varying_speed import VaryingSpeed
@@ -83,22 +83,24 @@ def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {"\n= ".join(names): values for names, values in groups}
 
 
-def spectra_figure(vehicle: SpatialVehicle, linear: LinearVehicle, excitation: Excitation, speed: float, title: str,
+def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, title: str,
                    path: Path) -> None:  # fmt: skip
     """One-sided spectra of the accelerations and tyre forces over frequency at one speed."""
     from models.ride.frequency import spectra
 
     frequency = np.geomspace(0.1, 100.0, 800)
-    found = spectra(excited(linear, excitation, speed), frequency)
+    found = 4 * np.pi * spectra(linear, excitation, speed, 2 * np.pi * frequency)  # one-sided, over Hz
     kinds = [output.kind for output in linear.outputs]
     shown = [kind for kind in ("acceleration", "tyre force") if kind in kinds]
     figure, axes = plt.subplots(1, len(shown), figsize=(5.0 * len(shown), 4.2), squeeze=False)
     units = {"acceleration": "(m/s²)²/Hz", "tyre force": "N²/Hz"}
     for axis, kind in zip(axes[0], shown, strict=True):
-        for i, output in enumerate(linear.outputs):
-            if output.kind == kind:
-                axis.loglog(frequency, found[:, i], label=output.name)
+        curves = {output.name: found[:, i] for i, output in enumerate(linear.outputs) if output.kind == kind}
+        for label, values in _distinct(curves).items():
+            axis.loglog(frequency, values, label=label)
         axis.set(xlabel="frequency [Hz]", ylabel=f"one-sided density [{units[kind]}]", title=kind.capitalize())
+        top = max(values.max() for values in curves.values())
+        axis.set_ylim(1e-6 * top, 2 * top)
         axis.legend(fontsize=7.5)
     figure.suptitle(f"{title}: spectra at {speed:g} m/s", fontsize=11)
     save(figure, path)

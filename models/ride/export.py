@@ -36,10 +36,10 @@ def save(system: DelayedSystem, covariance: Covariance, stem: Path) -> list[Path
 def state_space(system: DelayedSystem) -> "control.StateSpace":
     """The system with the noise of each axle as inputs of its own, axle after axle; delays are for the user to apply.
 
-    Inputs are named w1.1, w1.2, ... (axle, channel); the noise of axle i is that of the first, ``delays[i]`` later.
+    Inputs are named w1_1, w1_2, ... (axle, channel); the noise of axle i is that of the first, ``delays[i]`` later.
     """
     from control import StateSpace
 
-    names = [f"w{i}.{k}" for i, B in enumerate(system.B, 1) for k in range(1, B.shape[1] + 1)]
+    names = [f"w{i}_{k}" for i, B in enumerate(system.B, 1) for k in range(1, B.shape[1] + 1)]
     return StateSpace(system.A, np.hstack(system.B), system.C, np.hstack(system.D), inputs=names,
                       outputs=list(system.names))  # fmt: skip

@@ -1,0 +1,132 @@
+"""Scenes and studies of ride: what they save, what they say, what they refuse."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.errors import InputError
+from models.ride.export import state_space
+from models.ride.measures import exceedances, share_beyond
+from models.ride.of_scene import excitation_of, placed_wheels, vehicle_of
+from models.ride.scene import build
+from models.vehicles.spatial_linear import wheels
+
+pytestmark = pytest.mark.usefixtures("empty_folder")
+TABLE = {"title": "a ride", "system": "ride", "vehicle": {"file": "seven_freedoms"},
+         "speeds": {"values": [10.0, 20.0]}}  # fmt: skip
+SMALL = ("--set", "vehicle.file=half_car", "--set", "speeds={values=[10.0, 20.0]}", "--set", "weighting={}")
+
+
+def test_a_run_saves_deviations_figures_and_the_system(twinrig, capsys):
+    import xarray as xr
+
+    assert twinrig("run", "ride", *SMALL, "--engine", "reference", "--out", "out", "--json") == 0
+    found = json.loads(capsys.readouterr().out)["answer"]
+    names = {"command.txt", "deviations.nc", "deviations.csv", "system.npz", "system.mat", "body_acceleration.png",
+             "over_speed.png", "spectra.png"}  # fmt: skip
+    assert {path.name for path in Path("out").iterdir()} == names
+    with xr.open_dataset("out/deviations.nc", engine="h5netcdf") as data:
+        saved = data["deviation"].sel(engine="reference", correlation="as in the scene", output="body centre").values
+    assert saved == pytest.approx(found["deviation"]["body centre"]) and found["speed"] == [10.0, 20.0]
+    with np.load("out/system.npz") as system:  # at the middle speed: the second of two
+        at = list(system["outputs"]).index("body centre")
+        assert system["deviation"][at] == pytest.approx(saved[1], rel=1e-9)
+        assert system["delays"][1] == pytest.approx((1.1561957064 + 1.4227170936) / 20.0, rel=1e-12)
+
+
+def test_engines_linear_vehicles_agree_in_what_is_printed(twinrig, capsys):
+    assert twinrig("run", "ride", *SMALL, "--out", "out") == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if "own linear vehicle" in line]
+    gaps = [float(line.split("within ")[1].split()[0]) for line in lines]
+    assert len(gaps) == 2 and max(gaps) < 1e-9  # matrices agree to 1e-12; the sweep is exact to 1e-10
+
+
+def test_detail_compares_outputs_of_the_same_name(twinrig, capsys):
+    given = ("--set", "speeds={values=[15.0]}", "--set", "options.simpler=['quarter_car']",
+             "--set", "vehicle.file=half_car", "--json")  # fmt: skip
+    assert twinrig("run", "ride_detail", *given, "--out", "out") == 0
+    found = json.loads(capsys.readouterr().out)["answer"]
+    assert found["4 freedoms, one track"]["body centre"] == 0.0  # the scene's vehicle against itself
+    assert found["2 freedoms, one track"]["pitch acceleration"] is None
+    assert abs(found["2 freedoms, one track"]["tyre force front left"]) < 0.05
+
+
+def test_a_drive_rests_at_standstill_and_is_saved(twinrig):
+    import xarray as xr
+
+    drive = "drive={time=[0.0, 0.5, 2.0], speed=[0.0, 0.0, 12.0]}"
+    given = ("--set", "vehicle.file=quarter_car", "--set", drive, "--set", "weighting={}", "--engine", "reference")
+    assert twinrig("run", "ride_drive", *given, "--out", "out") == 0
+    with xr.open_dataset("out/drive.nc", engine="h5netcdf") as data:
+        body = data["deviation"].sel(output="body front")
+        # At rest a variance is zero to rounding, 1e-16 of others; its root is 1e-8 m/s^2 of 1 m/s^2.
+        assert float(body.sel(time=0.25, method="nearest")) < 1e-7 < 1.0 < float(body[-1])
+        assert np.isnan(data["quasi_stationary"].sel(output="body front")[0])
+    assert Path("out/drive.png").exists()
+
+
+def test_a_vehicle_without_width_runs_on_a_track():
+    scene = build({**TABLE, "vehicle": {"file": "quarter_car"}, "road": {"half_track": 0.6}})
+    assert {wheel.y for wheel in placed_wheels(scene, wheels(vehicle_of(scene)))} == {0.6}
+
+
+def test_wheels_stand_at_their_own_place_or_on_the_tracks():
+    tables = {"own": {"wheels": "own"}, "tracks": {"wheels": "tracks"}}
+    found = {}
+    for name, road in tables.items():
+        scene = build({**TABLE, "road": road})
+        found[name] = [wheel.y for wheel in placed_wheels(scene, wheels(vehicle_of(scene)))]
+    assert sorted(set(map(abs, found["own"]))) == [0.68199, 0.69342]  # rear and front track of the vehicle
+    assert found["tracks"] == [0.69342, -0.69342, 0.69342, -0.69342]
+
+
+def test_the_system_as_python_control_has_it():
+    from models.ride.excitation import excited
+    from models.vehicles.spatial_linear import linearise
+
+    scene = build(TABLE)
+    linear = linearise(vehicle_of(scene))
+    system = excited(linear, excitation_of(scene, linear.wheels), 20.0)
+    found = state_space(system)
+    assert found.ninputs == 4 and found.noutputs == len(system.names) and found.input_labels[2] == "w2_1"
+    assert np.array_equal(found.A, system.A) and np.array_equal(found.B[:, 2:], system.B[1])
+
+
+def test_exceedance_of_a_gaussian_process():
+    """Of a standard normal, 4.55 % lies beyond 2; a sine-like process of 1 Hz passes it 2 exp(-2) times a second."""
+    assert share_beyond(1.0, 2.0) == pytest.approx(0.0455003, rel=1e-6)
+    assert exceedances(1.0, 2 * np.pi, 2.0) == pytest.approx(2 * np.exp(-2.0))
+    assert share_beyond(0.0, 1.0) == exceedances(0.0, 1.0, 1.0) == 0.0
+
+
+REFUSED = [
+    ({"speeds": None}, "speeds: give either the table speeds or the table drive"),
+    ({"drive": {"time": [0.0, 1.0], "speed": [0.0, 1.0]}}, "give either the table speeds or the table drive"),
+    ({"speeds": {"values": [10.0, 0.0]}}, "speeds.values.1 = 0.0: must be above 0"),
+    ({"speeds": {"start": 5.0}}, "speeds.stop: is missing"),
+    ({"speeds": {"values": [5.0], "start": 5.0}}, "is not read beside"),
+    ({"road": {"q_mean": 1e-5}}, "road.q_roll: is missing"),
+    ({"road": {"q_mean": 1e-5, "q_roll": 1e-5, "level": 1e-5}}, "road.level"),
+    ({"road": {"cutoff": 1.0}}, "road.cutoff = 1.0: must be above road.corner_roll, 1.5"),
+    ({"road": {"left_right": "same"}}, "left_right"),
+    ({"weighting": {"body centre": "Wx"}}, "weighting"),
+    ({"vehicle": {"file": "r19_rode"}}, "did you mean 'r19_ride'"),
+]
+
+
+@pytest.mark.parametrize(("change", "said"), REFUSED, ids=[said[:30] for _, said in REFUSED])
+def test_a_scene_that_cannot_be_is_told_why(change, said):
+    from models.ride.plan import check
+
+    table = {key: value for key, value in {**TABLE, **change}.items() if value is not None}
+    with pytest.raises(InputError, match=said.replace("(", r"\(")) as caught:
+        check(build(table, "my.toml"), ("reference",))
+    assert str(caught.value).startswith("my.toml")
+
+
+def test_weighting_of_no_output_offers_the_nearest(twinrig, capsys):
+    assert twinrig("run", "ride", *SMALL[:-2], "--set", "weighting={'body center'='Wk'}") == 2
+    assert "did you mean 'body centre'" in capsys.readouterr().err
+    assert not Path("results").exists()
