@@ -6,16 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.contact.material import Pair
-from models.contact.normal_problem import NormalSolution, solve_normal
+from models.contact.normal_problem import NormalSolution, centres, solve_normal
+from models.contact.patches import Patch
 from models.contact.rolling_problem import RollingSolution, solve_rolling
+from models.contact.simplified_theory import NormalContact
 from models.contact.standard_profiles import s1002, uic60
 from models.contact.undeformed_distance import Distance, from_function
-from models.contact.wheel_on_rail import wheel_on_rail
-from models.errors import RunFailed
+from models.contact.wheel_on_rail import Touch, wheel_on_rail
+from models.errors import InputError, RunFailed
 
 PAIR = Pair()
 FRICTION = 0.3
-GROWN = "two grooves, grown together"
 CURVATURE = 1.0 / 0.92
 """A of a wheel of 0.46 m radius (1/m)."""
 LEVELS = (0.5, 2.0)
@@ -47,9 +48,10 @@ def _hertz(name: str, ratio: float, x: float, y: float) -> Shape:
     return _over(name, lambda u, v: CURVATURE * (u**2 + ratio * v**2), 1e5, x, y)
 
 
-def _well(name: str, ridge: float, load: float) -> Shape:
-    """Two grooves 3 mm to each side of the middle, a ridge of this height (m) between them."""
-    return _over(name, lambda u, v: CURVATURE * u**2 + ridge * ((v / 3e-3) ** 2 - 1.0) ** 2, load, 0.0135, 0.0075)
+def _well(name: str, ridge: float, load: float, half: float = 3e-3, tilt: float = 0.0) -> Shape:
+    """Two grooves ``half`` (m) to each side of the middle, a ridge (m) between, one of them ``tilt`` (m) higher."""
+    return _over(name, lambda u, v: CURVATURE * u**2 + ridge * ((v / half) ** 2 - 1.0) ** 2
+                 + tilt * (v / half + 1.0) / 2.0, load, 0.0135, 2.2 * half + 9e-4)  # fmt: skip
 
 
 def formulas() -> list[Shape]:
@@ -64,7 +66,25 @@ def formulas() -> list[Shape]:
         _over("two patches", lambda u, v: CURVATURE * u**2 + np.minimum(1.7 * (v - apart) ** 2,
               1.7 * (v + apart) ** 2 + 5e-6), 2e4, 0.0058, 0.0138),
         _well("two grooves, apart", 1e-5, 1e4),
-        _well(GROWN, 1e-5, 1e5),
+        _well("two grooves, grown together", 1e-5, 1e5),
+    ]  # fmt: skip
+
+
+def grown() -> list[Shape]:
+    """Areas that have grown together, by ridges and distances of many sizes; the last along x and three at once."""
+    wells = ((2, 3, 100, 0), (5, 2, 50, 0), (10, 3, 30, 0), (10, 3, 200, 0), (20, 3, 100, 0), (20, 4, 100, 0),
+             (10, 3, 100, 4), (20, 4, 120, 10), (30, 5, 150, 0), (8, 2.5, 50, -3), (3, 4, 40, 0),
+             (10, 5, 80, 5))  # fmt: skip
+    found = [_well(f"grooves {2 * half:g} mm apart, ridge {ridge:g} um, one {tilt:g} um higher, {load:g} kN",
+                   1e-6 * ridge, 1e3 * load, 1e-3 * half, 1e-6 * tilt)
+             for ridge, half, load, tilt in wells]  # fmt: skip
+    return [
+        *found,
+        _over("two arcs that meet in an edge", lambda u, v: CURVATURE * u**2 + 1.7 * (np.abs(v) - 3e-3) ** 2, 6e4,
+              0.012, 0.012),
+        _over("two grooves along x", lambda u, v: 4.0 * v**2 + 6e-6 * ((u / 4e-3) ** 2 - 1.0) ** 2, 4e4, 0.011, 7.5e-3),
+        _over("three grooves", lambda u, v: CURVATURE * u**2 + 4e-6 * (1.0 + np.cos(np.pi * (v / 2.5e-3 + 1.0)))
+              + np.maximum(np.abs(v) - 5e-3, 0.0) ** 2 + 0.15 * v**2, 8e4, 0.0135, 0.0115),
     ]  # fmt: skip
 
 
@@ -74,6 +94,73 @@ def profiles() -> list[Shape]:
     for shift, load in ((0.002, 5e4), (0.004, 5e4), (0.006, 2e4), (0.008, 2e4)):
         distance = wheel_on_rail(s1002(), uic60(), lateral_shift=shift)[0].patch.distance
         found.append(Shape(f"S1002 on UIC 60, {1e3 * shift:g} mm", distance, load))
+    return found
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A wheelset on a track: lateral shift (m), yaw (rad), load on the right wheel (N), where that wheel touches."""
+
+    shift: float
+    yaw: float
+    load: float
+    touches: list[Touch]
+
+
+def placed() -> list[Placed]:
+    """S1002 on UIC 60 with and without yaw, where the wheel's normals are all but the track's vertical.
+
+    Half-spaces are joined along the contour there; flange and tread lie on none.
+    """
+    found = []
+    for yaw in (0.0, 0.01, -0.02):
+        for shift in np.arange(-4e-3, 8.1e-3, 2e-3):
+            touches = wheel_on_rail(s1002(), uic60(), lateral_shift=float(shift), yaw=yaw)
+            if max(touch.patch.lean for touch in touches) < UPRIGHT or len(touches) == 1:
+                found += [Placed(float(shift), yaw, load, touches) for load in (2e4, 1e5)]
+    return found
+
+
+UPRIGHT = 0.15
+"""Angle (rad) between patch and track up to which several patches are joined to one half-space."""
+
+
+def exact_placed(one: Placed, pressed: NormalContact, cells: int) -> NormalSolution:
+    """The exact contact of profiles: each height counts along the track's vertical."""
+    for margin in MARGINS[:-1]:
+        try:
+            return _exact_placed(one, pressed, cells, margin)
+        except InputError:  # the contact reaches the edge of the grid
+            continue
+    return _exact_placed(one, pressed, cells, MARGINS[-1])
+
+
+MARGINS = (1.4, 2.0, 3.0)
+"""Sides of the exact grid by those of the simplified theory's area."""
+
+
+def _exact_placed(one: Placed, pressed: NormalContact, cells: int, margin: float) -> NormalSolution:
+    boxes = [(part.box, part.patch) for part in pressed.patches]
+    x0, x1 = (pick(box[k] for box, _ in boxes) for pick, k in ((min, 0), (max, 1)))
+    y0, y1 = (pick(box[k] + patch.place for box, patch in boxes) for pick, k in ((min, 2), (max, 3)))
+    step_x, step_y = margin * (x1 - x0) / cells, margin * (y1 - y0 + 2e-3) / (2 * cells)
+    x, y = (x0 + x1) / 2 + centres(cells, step_x), (y0 + y1) / 2 + centres(2 * cells, step_y)
+    heights = np.min([_height(touch.patch, x, y) for touch in one.touches], axis=0)
+    slope = float(np.cos(min(patch.lean for _, patch in boxes)))
+    return solve_normal(heights * slope, step_x, step_y, PAIR, load=one.load / slope)
+
+
+FAR = 1e-3
+"""Height (m) where a distance is not known."""
+
+
+def _height(patch: Patch, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Heights (ny, nx) of a patch along the track's vertical, on the common contour."""
+    known, own = patch.distance, y - patch.place
+    over = (own >= known.y[0]) & (own <= known.y[-1])
+    found = np.full((y.size, x.size), FAR)
+    inside = np.clip(x, known.x[0], known.x[-1])
+    found[over] = known.at(inside[None, :], own[over][:, None]) / np.cos(patch.lean)
     return found
 
 

@@ -96,10 +96,23 @@ def displacement(pressure, dx, dy, modulus):
 @njit(cache=True)
 def covariances(u, h, cover):
     """Mean of u, covariance of u and h and variance of u, weighted by the covered shares (the last two not divided)."""
-    total = cover.sum()
-    mean_u, mean_h = (cover * u).sum() / total, (cover * h).sum() / total
-    du, dh = u - mean_u, h - mean_h
-    return mean_u, (cover * du * dh).sum(), (cover * du * du).sum()
+    mean_u, mean_h = weighted_mean(u, cover), weighted_mean(h, cover)
+    both = square = 0.0
+    for k in range(u.size):
+        du = u.flat[k] - mean_u
+        both += cover.flat[k] * du * (h.flat[k] - mean_h)
+        square += cover.flat[k] * du * du
+    return mean_u, both, square
+
+
+@njit(cache=True)
+def weighted_mean(values, weights):
+    """Mean of values with weights of the same shape; loops compile in a tenth of an array expression's time."""
+    total = weight = 0.0
+    for k in range(values.size):
+        total += weights.flat[k] * values.flat[k]
+        weight += weights.flat[k]
+    return total / weight
 
 
 @njit(cache=True)
@@ -136,25 +149,36 @@ def crude_fit(padded, origin, step, box, depth, low, cells, shape, kind, modulus
     least = LEAST * (depth - low) / mean_u
     stiffness = max(-both / square, least) if square > 0.0 else least
     total = resultant(padded, origin, step, box, depth, low, FINER * cells, shape)
-    approach = (pressure * (u * stiffness + height)).sum() / pressure.sum()
+    approach = stiffness * weighted_mean(u, pressure) + weighted_mean(height, pressure)
     return stiffness, approach, total
 
 
 @njit(cache=True)
-def mean_push(x, y, force, at_x, at_y, weight):
-    """Weighted mean of sum(force / r) over points: times 1 / (pi E*) the displacement by loads of another patch.
+def push(x, y, force, at_x, at_y):
+    """Sum of force / r at points: times 1 / (pi E*) the normal displacement by loads (N) of another patch.
 
-    All arguments are flat: loads (N) at x, y, points at_x, at_y (m).
+    All arguments are flat: loads at x, y, points at_x, at_y (m).
     """
-    total = 0.0
+    found = np.zeros(at_x.size)
     for k in range(at_x.size):
-        if weight[k] > 0.0:
-            pushed = 0.0
-            for m in range(x.size):
-                if force[m] > 0.0:
-                    pushed += force[m] / math.hypot(x[m] - at_x[k], y[m] - at_y[k])
-            total += weight[k] * pushed
-    return total / weight.sum()
+        for m in range(x.size):
+            if force[m] > 0.0:
+                found[k] += force[m] / math.hypot(x[m] - at_x[k], y[m] - at_y[k])
+    return found
+
+
+@njit(cache=True)
+def drag(x, y, force, at_x, at_y, nu):
+    """The same of tangential loads (2, n), times 1 / (pi G), (2, points) (Cerruti; Johnson, section 3.6)."""
+    found = np.zeros((2, at_x.size))
+    for k in range(at_x.size):
+        for m in range(x.size):
+            u, v = at_x[k] - x[m], at_y[k] - y[m]
+            r = math.hypot(u, v)
+            along = nu * (u * force[0, m] + v * force[1, m]) / r**3
+            found[0, k] += (1.0 - nu) * force[0, m] / r + u * along
+            found[1, k] += (1.0 - nu) * force[1, m] / r + v * along
+    return found
 
 
 @njit(cache=True)

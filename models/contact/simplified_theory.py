@@ -24,14 +24,14 @@ Continuity
     make it jump whenever a mesh comes into contact.
 
 Several patches
-    Each has a net, W_3 and depth of its own. They share the rigid approach, and each is pushed down by the others'
-    pressure as the half-space has it, as a whole. Where patches lean (tread and flange), the approach
-    and the load are those along the common direction, the track's vertical.
+    Each has a net, W_3 and depth of its own. They share the rigid approach and the half-space: least squares see the
+    displacement by all of them (``several_patches``). Where patches lean (tread and flange), the approach and the load
+    are those along the common direction, the track's vertical.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.optimize import brentq
@@ -41,32 +41,28 @@ from models.contact.half_space import Convolution, influence, offsets
 from models.contact.inputs import quantity
 from models.contact.material import Pair
 from models.contact.patches import Box, Patch, separate, whole
+from models.contact.several_patches import crude, dragged, settled
 from models.contact.simplified_kernels import (
     DISPLACEMENT,
     ELLIPTIC,
     GRADIENT,
     PARABOLIC,
     crude_fit,
-    crude_net,
     gather,
     march,
-    mean_push,
     strips,
 )
 from models.contact.undeformed_distance import Distance
-from models.errors import InputError, RunFailed
+from models.errors import InputError
 
 NET = 15
 """Meshes of the crude net along each axis."""
 CELLS = 45
 """Strips of the fine net, and cells along each strip."""
 SHAPES = {"parabolic": PARABOLIC, "elliptic": ELLIPTIC}
+ABOUT = 0.6
+"""Depth by approach of a patch, about; where several are sought, the search starts there."""
 FITS = {"displacement": DISPLACEMENT, "gradient": GRADIENT}
-CLOSE = 1e-13
-"""Change of the depths, as a share of the approach, at which patches that press on each other have settled."""
-PASSES = 200
-ROUNDING = 1e-12
-"""Depth (m) above the bottom below which rounding spoils the ratio of approach and depth."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +98,8 @@ PAPER = Options(shape="parabolic")
 class PatchPressure:
     """Normal contact of one patch.
 
-    depth : d = -a_3 (m). stiffness : 1 / W_3 (Pa/m). approach : rigid approach that the fit finds for this pressure
-    alone (m). load : N. box : x0, x1, y0, y1 of its net (m).
+    depth : d = -a_3 (m). stiffness : 1 / W_3 (Pa/m). approach : rigid approach that the fit finds, along its normal
+    (m). load : N. box : x0, x1, y0, y1 of its net (m).
     """
 
     patch: Patch
@@ -171,7 +167,9 @@ def press(bodies: Distance | Sequence[Patch], pair: Pair, *, load: float | None 
             return _gathered(lowest, (), pair, options)
         return _by_load(patches, lowest, wanted, pair, options)
     reached = float(quantity("approach", approach, "an approach in m, up to 0.1", -0.1, 0.1))
-    return _gathered(reached, _share(patches, reached, pair, options), pair, options)
+    if reached <= lowest:
+        return _gathered(reached, (), pair, options)
+    return _shared(patches, reached, None, pair, options)
 
 
 def load_at_depth(patch: Patch, depth: float, pair: Pair, options: Options = PLAIN) -> PatchPressure:
@@ -194,14 +192,18 @@ def _grid(patch: Patch) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, options: Options) -> NormalContact:
-    """Find the depth of a single patch, or the common approach of several, that carries the load."""
+    """Find the depth of a single patch, or the depths and the common approach of several, that carry the load."""
     if len(patches) == 1:
         patch, along = patches[0], np.cos(patches[0].lean)
         depth = _found(lambda d: load_at_depth(patch, d, pair, options).load, load / along, patch.low, patch.edge)
         alone = load_at_depth(patch, depth, pair, options)
         return _gathered(alone.approach / along, (alone,), pair, options)
-    approach = _found(lambda reached: _total(_share(patches, reached, pair, options)), load, lowest, np.inf)
-    return _gathered(approach, _share(patches, approach, pair, options), pair, options)
+
+    def alone_at(reached: float) -> float:
+        return _total([load_at_depth(patch, depth, pair, options)
+                       for patch, depth in zip(patches, _shallow(patches, reached), strict=True)])  # fmt: skip
+
+    return _shared(patches, _found(alone_at, load, lowest, np.inf), load, pair, options)
 
 
 def _found(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
@@ -215,68 +217,26 @@ def _found(load_at: Callable[[float], float], load: float, lowest: float, limit:
     return lowest + float(brentq(lambda over: load_at(lowest + over) - load, low, high, xtol=1e-20, rtol=1e-14))
 
 
-def _total(parts: tuple[PatchPressure, ...]) -> float:
+def _total(parts: Sequence[PatchPressure]) -> float:
     return float(sum(part.load * np.cos(part.patch.lean) for part in parts))
 
 
-def _share(patches: list[Patch], approach: float, pair: Pair, options: Options) -> tuple[PatchPressure, ...]:
-    """The patches at a common rigid approach, each pushed down by the others.
-
-    A patch alone follows approach - low = ratio (depth - low) with a ratio that hardly changes, which gives the next
-    depth; the displacements by the others are less than their own, so passing on converges, relaxed by Aitken's rule
-    where patches that grow together make the ratio turn sharply.
-    """
-    low = np.array([patch.low for patch in patches])
-    reached = approach * np.cos([patch.lean for patch in patches])
-    depths, ratios = low + 0.6 * (reached - low), np.full(len(patches), 1.0 / 0.6)
-    before, share = np.zeros(len(patches)), 1.0
-    for _ in range(PASSES):
-        parts = tuple(load_at_depth(p, float(d), pair, options) for p, d in zip(patches, depths, strict=True))
-        for k, part in enumerate(parts):
-            if part.load > 0.0 and part.depth - low[k] > ROUNDING:
-                ratios[k] = (part.approach - low[k]) / (part.depth - low[k])
-        off = np.maximum(low + (reached - _pushed(parts, pair, options) - low) / ratios, low) - np.maximum(depths, low)
-        if np.abs(off).max() <= CLOSE * abs(approach):
-            return tuple(part for part in parts if part.load > 0.0)
-        share = _relaxed(share, before, off)
-        depths, before = np.maximum(depths, low) + share * off, off
-    raise RunFailed("simplified theory", f"patches that share an approach of {approach:.4g} m did not settle")
+def _shallow(patches: list[Patch], approach: float) -> list[float]:
+    """Depths (m) of patches at an approach (m), about: a part of what is left above the bottom."""
+    over = [approach * np.cos(patch.lean) - patch.low for patch in patches]
+    return [float(patch.low + (ABOUT * o if o > 0.0 else o)) for patch, o in zip(patches, over, strict=True)]
 
 
-def _relaxed(share: float, before: np.ndarray, off: np.ndarray) -> float:
-    """Share of the next change that is taken: Aitken's, from how the last change changed it (Irons and Tuck, 1969)."""
-    turned = off - before
-    square = float(turned @ turned)
-    return float(np.clip(-share * (before @ turned) / square, 0.02, 1.5)) if before.any() and square > 0.0 else 1.0
-
-
-def _pushed(parts: tuple[PatchPressure, ...], pair: Pair, options: Options) -> np.ndarray:
-    """Displacement (m) of each patch, weighted by its pressure, by the others', each mesh a load N / (pi E* r)."""
-    nets = [_net(part, options) for part in parts]
-    found = np.zeros(len(parts))
-    for k, (x, y, _, weight) in enumerate(nets):
-        for m, (other_x, other_y, force, _) in enumerate(nets):
-            if m != k and parts[m].load > 0.0:
-                found[k] += mean_push(other_x, other_y, force, x, y, weight) / (np.pi * pair.modulus)
-    return found
-
-
-def _net(part: PatchPressure, options: Options) -> tuple[np.ndarray, ...]:
-    """Crude net of one patch, flat: x, y along the common contour (m), load (N) and weight of every mesh.
-
-    A patch that carries nothing is its bottom, which it shrinks to, and which the others push.
-    """
-    if part.load == 0.0:
-        bottom = part.patch.bottom
-        return np.array([bottom[0]]), np.array([bottom[1] + part.patch.place]), np.zeros(1), np.ones(1)
-    x0, x1, y0, y1 = part.box
-    middles = (np.arange(options.net) + 0.5) / options.net
-    y, x = np.meshgrid(y0 + middles * (y1 - y0) + part.patch.place, x0 + middles * (x1 - x0), indexing="ij")
-    origin, step = _grid(part.patch)
-    pressure = crude_net(part.patch.distance.padded, origin, step, part.box, part.depth, part.patch.low, options.net,
-                         SHAPES[options.shape])[1]  # fmt: skip
-    weight = (pressure / pressure.sum()).ravel()
-    return x.ravel(), y.ravel(), part.load * weight, weight
+def _shared(patches: list[Patch], approach: float, load: float | None, pair: Pair, options: Options) -> NormalContact:
+    """The patches at their common approach (m), or near it where a load (N) is given."""
+    start = np.array([*_shallow(patches, approach), approach])
+    ways = (options.net, SHAPES[options.shape], FITS[options.fit])
+    (*depths, reached), stiffnesses, loads = settled(patches, start, load, pair, ways)
+    parts = [PatchPressure(patch, float(depth), float(stiffness), float(reached * np.cos(patch.lean)), float(carried),
+                           patch.box(float(depth)))
+             for patch, depth, stiffness, carried in zip(patches, depths, stiffnesses, loads, strict=True)
+             if carried > 0.0]  # fmt: skip
+    return _gathered(float(reached), tuple(parts), pair, options)
 
 
 def _gathered(approach: float, parts: tuple[PatchPressure, ...], pair: Pair, options: Options) -> NormalContact:
@@ -309,40 +269,53 @@ def roll(pressed: NormalContact, friction: float, xi_x: float, xi_y: float, spin
     for name, value in (("xi_x", xi_x), ("xi_y", xi_y)):
         quantity(name, value, "a creepage from -10 to 10", -10.0, 10.0)
     quantity("spin", spin, "a spin in rad/m from -1e4 to 1e4", -1e4, 1e4)
-    rolled = [_roll_patch(part, pressed, friction, (xi_x, xi_y, spin), cells) for part in pressed.patches]
-    fx, fy, mz, stuck, area = (float(sum(found[0][k] for found in rolled)) for k in range(5))
-    power = -(fx * xi_x + fy * xi_y + mz * spin)
-    return Rolling(fx, fy, mz, stuck / area if area > 0.0 else 0.0, power, tuple(found[1] for found in rolled),
-                   tuple(found[2] for found in rolled))  # fmt: skip
-
-
-def _roll_patch(part: PatchPressure, pressed: NormalContact, friction: float, creepage: tuple[float, float, float],
-                cells: int) -> tuple[tuple[float, ...], float, Fields]:  # fmt: skip
-    """Forces, flexibility and fields of one patch."""
-    y, low, high, pressure = _strips(part, cells, cells, SHAPES[pressed.options.shape])
-    width = (part.box[3] - part.box[2]) / cells
-    pressure *= part.load / (pressure.sum(axis=1) @ (high - low) * width / cells)  # full sliding gives mu N exactly
-    traction = np.zeros((*pressure.shape, 2))
+    fine = [_fine(part, pressed.options, cells) for part in pressed.patches]
+    tractions = [np.zeros((*strip[-1].shape, 2)) for strip in fine]
+    creepage = (friction, xi_x, xi_y, spin)
     # W_1 = W_2 = W_3 is the paper's first estimate. a_1 and a_2 drop out: rolling feels du/dx alone, and they are
     # constant over the patch.
-    flexibility = 1.0 / part.stiffness
-    march(y, low, high, width, pressure, friction, flexibility, *creepage, traction)
-    flexibility = _refitted(part, pressed, gather(y, low, high, width, traction, part.box, pressed.options.net))
-    found = march(y, low, high, width, pressure, friction, flexibility, *creepage, traction)
-    return found, flexibility, _fields(y, low, high, width, pressure, traction, friction)
+    for part, strip, traction in zip(pressed.patches, fine, tractions, strict=True):
+        _march(strip, 1.0 / part.stiffness, creepage, traction)
+    crude_tractions = [gather(*strip[:4], traction, part.box, pressed.options.net)
+                       for part, strip, traction in zip(pressed.patches, fine, tractions, strict=True)]  # fmt: skip
+    flexibilities = _refitted(pressed, crude_tractions)
+    rolled = [_march(*one) for one in zip(fine, flexibilities, [creepage] * len(fine), tractions, strict=True)]
+    fx, fy, mz, stuck, area = (float(sum(found[k] for found in rolled)) for k in range(5))
+    power = -(fx * xi_x + fy * xi_y + mz * spin)
+    fields = tuple(_fields(strip, traction, friction) for strip, traction in zip(fine, tractions, strict=True))
+    return Rolling(fx, fy, mz, stuck / area if area > 0.0 else 0.0, power, tuple(flexibilities), fields)
 
 
-def _refitted(part: PatchPressure, pressed: NormalContact, traction: np.ndarray) -> float:
-    """W_1 = W_2 (m/Pa) by least squares of u = W p + a against the half-space; W_3 where no traction can be fitted."""
-    net, (x0, x1, y0, y1), pair = pressed.options.net, part.box, pressed.pair
-    dx, dy = (x1 - x0) / net, (y1 - y0) / net
-    kernel = influence(offsets(net, dx), offsets(net, dy)[:, None], dx, dy, pair)[..., :2, :2]
-    u = np.moveaxis(Convolution(kernel)(np.moveaxis(traction, 0, -1)), -1, 0)
-    origin, step = _grid(part.patch)
-    cover = crude_net(part.patch.distance.padded, origin, step, part.box, part.depth, part.patch.low, net, PARABOLIC)[2]
-    products = _slopes(u, traction, cover) if pressed.options.fit == "gradient" else _spread(u, traction, cover)
-    both, square = products
-    return both / square if square > 0.0 and both > 0.0 else 1.0 / part.stiffness
+def _fine(part: PatchPressure, options: Options, cells: int) -> tuple[Any, ...]:
+    """Strips of a patch as ``march`` takes them: y, low, high, width and pressure."""
+    y, low, high, pressure = _strips(part, cells, cells, SHAPES[options.shape])
+    width = (part.box[3] - part.box[2]) / cells
+    pressure *= part.load / (pressure.sum(axis=1) @ (high - low) * width / cells)  # full sliding gives mu N exactly
+    return y, low, high, width, pressure
+
+
+def _march(fine: tuple[Any, ...], flexibility: float, creepage: tuple[float, ...],
+           traction: np.ndarray) -> tuple[float, ...]:  # fmt: skip
+    """FASTSIM on the strips of a patch, into its tractions; creepage: friction first."""
+    friction, *motion = creepage
+    return march(*fine, friction, flexibility, *motion, traction)
+
+
+def _refitted(pressed: NormalContact, tractions: list[np.ndarray]) -> list[float]:
+    """W_1 = W_2 (m/Pa) of each patch by least squares of u = W p + a, u by the tractions of all, on the crude nets.
+
+    W_3 where no traction can be fitted.
+    """
+    options, pair = pressed.options, pressed.pair
+    nets = [crude(part.patch, part.depth, options.net, PARABOLIC) for part in pressed.patches]
+    measured, found = _slopes if options.fit == "gradient" else _spread, []
+    for k, (part, net, traction) in enumerate(zip(pressed.patches, nets, tractions, strict=True)):
+        dx, dy = net.step
+        kernel = influence(offsets(options.net, dx), offsets(options.net, dy)[:, None], dx, dy, pair)[..., :2, :2]
+        u = np.moveaxis(Convolution(kernel)(np.moveaxis(traction, 0, -1)), -1, 0) + dragged(nets, tractions, k, pair)
+        both, square = measured(u, traction, net.cover)
+        found.append(both / square if square > 0.0 and both > 0.0 else 1.0 / part.stiffness)
+    return found
 
 
 def _spread(u: np.ndarray, p: np.ndarray, cover: np.ndarray) -> tuple[float, float]:
@@ -359,9 +332,9 @@ def _slopes(u: np.ndarray, p: np.ndarray, cover: np.ndarray) -> tuple[float, flo
     return float((share * du * dp).sum()), float((share * dp * dp).sum())
 
 
-def _fields(y: np.ndarray, low: np.ndarray, high: np.ndarray, width: float, pressure: np.ndarray, traction: np.ndarray,
-            friction: float) -> Fields:  # fmt: skip
+def _fields(fine: tuple[Any, ...], traction: np.ndarray, friction: float) -> Fields:
     """Pressure and tractions by strip and cell."""
+    y, low, high, width, pressure = fine
     cells = pressure.shape[1]
     length = ((high - low) / cells)[:, None]
     x = high[:, None] - (np.arange(cells) + 0.5) * length

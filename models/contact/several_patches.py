@@ -1,0 +1,150 @@
+"""Several patches of one contact in the theory of 1983: each has a net and a W of its own, the half-space is common.
+
+What the springs are made like is the displacement of the half-space by the pressure of all patches. With p* = W_3 p of
+each, the conditions u^H + h = delta are fitted in the meshes of patch k by
+
+    sum over m of cov(u*_k, u*_km) / W_m = -cov(u*_k, h_k),    delta_k = mean(sum over m of u*_km / W_m + h_k),
+
+u*_km the displacement in patch k by p*_m and u*_k their sum. For one patch this is the fit of ``simplified_theory``.
+Far apart the others' displacement is even and leaves the covariances; two patches that have grown together are what one
+net over both would be. The depths are such that all patches have the same approach. A patch that carries nothing is its
+bottom, which the others push.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import root
+
+from models.contact.material import Pair
+from models.contact.patches import Patch
+from models.contact.simplified_kernels import (
+    FINER,
+    GRADIENT,
+    LEAST,
+    covariances,
+    crude_net,
+    displacement,
+    drag,
+    push,
+    resultant,
+    slope_products,
+)
+from models.errors import RunFailed
+
+CLOSE = 1e-11
+"""Share of approach and load to which patches settle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Net:
+    """Crude net of one patch, rows along y; without a load only x and y of its bottom.
+
+    x, y : meshes along the common contour (m). height : h (m). pressure : W p (m). cover : covered shares. step :
+    dx, dy of a mesh (m). volume : W times the load (m^3).
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    height: np.ndarray
+    pressure: np.ndarray
+    cover: np.ndarray
+    step: tuple[float, float]
+    volume: float
+
+    @property
+    def forces(self) -> np.ndarray:
+        """W times the load of every mesh, flat (m^3)."""
+        return (self.pressure * (self.volume / self.pressure.sum())).ravel()
+
+
+def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
+    """Net of a patch at a depth (m)."""
+    x, y, low = patch.bottom
+    nothing = np.zeros((1, 1))
+    empty = Net(nothing + x, nothing + y + patch.place, nothing + low, nothing, nothing, (0.0, 0.0), 0.0)
+    if depth <= low:
+        return empty
+    known, box = patch.distance, patch.box(depth)
+    net = (known.padded, (float(known.x[0]), float(known.y[0])), (known.dx, known.dy), box, depth, low)
+    height, pressure, cover = crude_net(*net, cells, shape)
+    volume = float(resultant(*net, FINER * cells, shape))
+    if not (volume > 0.0 and pressure.sum() > 0.0):  # so shallow that rounding leaves nothing of it
+        return empty
+    dx, dy = (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
+    middles = np.arange(cells) + 0.5
+    y, x = np.meshgrid(box[2] + middles * dy + patch.place, box[0] + middles * dx, indexing="ij")
+    return Net(x, y, height, pressure, cover, (dx, dy), volume)
+
+
+def together(nets: Sequence[Net], pair: Pair, kind: int, lows: np.ndarray, depths: np.ndarray
+             ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Stiffnesses 1/W (Pa/m), zero where there is no load, and approaches (m) of patches at their depths (m)."""
+    loaded = [k for k, net in enumerate(nets) if net.volume > 0.0]
+    pushed = {(k, m): _by(nets[m], net, pair) for k, net in enumerate(nets) for m in loaded}
+    products, right = np.zeros((len(loaded), len(loaded))), np.zeros(len(loaded))
+    for i, k in enumerate(loaded):
+        whole = np.sum([pushed[k, m] for m in loaded], axis=0)
+        products[i] = [_product(nets[k], whole, pushed[k, m], kind) for m in loaded]
+        right[i] = -_product(nets[k], whole, nets[k].height, kind)
+    stiffness = np.zeros(len(nets))
+    if loaded:
+        least = LEAST * (depths - lows)[loaded] / [np.mean(pushed[k, k]) for k in loaded]
+        stiffness[loaded] = np.maximum(np.linalg.lstsq(products, right, rcond=None)[0], least)
+    raised = [sum((stiffness[m] * pushed[k, m] for m in loaded), nets[k].height) for k in range(len(nets))]
+    approach = [(net.pressure * u).sum() / net.pressure.sum() if net.volume > 0.0 else float(u[0, 0]) + depth - low
+                for net, u, depth, low in zip(nets, raised, depths, lows, strict=True)]  # fmt: skip
+    return stiffness, np.array(approach)
+
+
+def _by(source: Net, target: Net, pair: Pair) -> np.ndarray:
+    """Displacement (m) in the meshes of one net by W times the pressure of another, or of its own."""
+    if source is target:
+        return displacement(source.pressure, *source.step, pair.modulus)
+    found = push(source.x.ravel(), source.y.ravel(), source.forces, target.x.ravel(), target.y.ravel())
+    return found.reshape(target.x.shape) / (np.pi * pair.modulus)
+
+
+def _product(net: Net, one: np.ndarray, other: np.ndarray, kind: int) -> float:
+    """What least squares sum up: products of the slopes, or of what differs from the mean."""
+    if kind == GRADIENT:
+        return float(slope_products(one, other, net.cover, *net.step, True)[0])
+    return float(covariances(one, other, net.cover)[1])
+
+
+def settled(patches: Sequence[Patch], start: np.ndarray, load: float | None, pair: Pair, options: tuple[int, int, int]
+            ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """Depths (m) of patches with the rigid approach (m) last, their stiffnesses (Pa/m) and loads (N).
+
+    start : depths and approach near the answer, the approach the answer itself if there is no load. load : N along the
+    common direction. options : cells of a net, shape and kind of fit.
+    """
+    lows, along = np.array([patch.low for patch in patches]), np.cos([patch.lean for patch in patches])
+    zero, (cells, shape, kind) = np.append(lows, lows.min()), options
+    unit = float(start[-1] - lows.min())
+
+    def state(over: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        *depths, approach = found = zero + unit * over
+        nets = [crude(patch, float(d), cells, shape) for patch, d in zip(patches, depths, strict=True)]
+        stiffness, reached = together(nets, pair, kind, lows, found[:-1])
+        loads = stiffness * [net.volume for net in nets]
+        last = (approach - start[-1]) / unit if load is None else loads @ along / load - 1.0
+        return np.append((reached - approach * along) / unit, last), found, stiffness, loads
+
+    solved = root(lambda over: state(over)[0], (start - zero) / unit, options={"xtol": 1e-14, "factor": 0.3})
+    off, found, stiffness, loads = state(solved.x)
+    if np.abs(off).max() > CLOSE:
+        raise RunFailed("simplified theory", f"patches at an approach near {found[-1]:.4g} m did not settle")
+    return found, stiffness, loads
+
+
+def dragged(nets: Sequence[Net], tractions: Sequence[np.ndarray], k: int, pair: Pair) -> np.ndarray:
+    """Displacement (2, cells, cells) (m) in net k by the tractions (2, cells, cells) (Pa) of all others."""
+    found, target = np.zeros_like(tractions[k]), nets[k]
+    for m, (source, traction) in enumerate(zip(nets, tractions, strict=True)):
+        if m != k:
+            forces = traction.reshape(2, -1) * (source.step[0] * source.step[1])
+            places = source.x.ravel(), source.y.ravel(), target.x.ravel(), target.y.ravel()
+            found += drag(*places[:2], forces, *places[2:], pair.nu).reshape(found.shape) / (np.pi * pair.G)
+    return found
