@@ -9,6 +9,7 @@ import pytest
 from models.engines.protocol import Settings
 from models.engines.spatial_protocol import INTEGRATORS, build, jacobian
 from models.engines.spatial_reference import SpatialReference
+from models.engines.spatial_speeds import at_speeds
 from models.errors import InputError, Refused, RunFailed
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre
 from models.vehicles.spatial_linear import linearise
@@ -29,6 +30,16 @@ def test_linear_vehicle_is_the_analytic_one(engine, name, gravity):
     found = build(engine, vehicle, speed=SPEED).linearise()
     assert difference(found, linearise(vehicle, SPEED)) < 1e-11
     assert found.source == f"{engine}, " + ("loaded" if gravity else "unloaded")
+
+
+@pytest.mark.parametrize("speed", [0.5, 30.0, 70.0])
+def test_three_linearisations_give_every_speed(speed):
+    """Within and beyond the three speeds; 1e-11 of the largest damping as above."""
+    vehicle = of_name("r19_free")
+    at = at_speeds("mujoco", vehicle)
+    assert difference(at(speed), linearise(vehicle, speed)) < 1e-11
+    with pytest.raises(InputError, match="above 0"):
+        at(0.0)
 
 
 def test_curves_are_linearised_by_their_mean_slope_at_rest():
