@@ -71,6 +71,20 @@ def test_the_road_keeps_its_variance_and_the_vehicle_comes_to_rest():
     assert accelerations[np.isclose(found.time, 2.2)].max() > 0.1, "it still swings when it has just stopped"
 
 
+def test_the_road_is_cut_where_an_axle_passes_the_place_of_a_stop():
+    vehicle, road = ride("half_car")
+    halt = SpeedProfile((0.0, 0.3, 0.8, 1.3), (10.0, 0.0, 0.0, 15.0))  # the rear axle is there at 1.2 s
+    coarse, fine = (varying_speed(vehicle, road, halt, instants=(1.25,), reach=reach) for reach in (1.0, 0.2))
+    # seen: 5e-11; 1e-8 if cells did not shrink towards that place, 5e-4 if they ran across it
+    assert coarse.at([1.25])[0] == pytest.approx(fine.at([1.25])[0], rel=1e-9)
+
+
+def test_a_road_of_second_order_shows_its_rate_to_the_tyre():
+    vehicle, road = ride("half_car", 500.0, 10.0)
+    found = varying_speed(vehicle, road, STOP_AND_GO).of("tyre force rear left")[-1]
+    assert found == pytest.approx(by_adjoint(vehicle, road, STOP_AND_GO, "tyre force rear left"), rel=1e-8)
+
+
 def test_white_noise_is_off_at_standstill():
     found = varying_speed(*ride("half_car", 100.0), STOPS)
     force = found.of("tyre force front left")

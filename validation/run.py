@@ -20,7 +20,7 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "drift_off", "drift_solvers", "holding_spring", "point_mass",
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
          "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
-         "contact_simplified", "contact_profiles", "ride_road", "ride_engines", "contact_price",
+         "contact_simplified", "contact_profiles", "ride_road", "ride_engines", "ride_varying_speed", "contact_price",
          "fastsim")  # fmt: skip
 """Case modules in the order of the report."""
 
@@ -108,6 +108,7 @@ def seeds() -> dict[str, int]:
         motion,
         point_mass,
         ride_engines,
+        ride_varying_speed,
         roads,
         score,
         stabilisers,
@@ -121,7 +122,8 @@ def seeds() -> dict[str, int]:
             "growth of noise": growth.SEED, "drift-off": drift_off.SEED, "drift by solver": drift_solvers.SEED,
             "holding spring": holding_spring.SEED,
             "random contacts": fastsim.SEED, "table of contacts": contact_price.SEED,
-            "made road": fitted_roads.SEED, "states of ride": ride_engines.SEED}  # fmt: skip
+            "made road": fitted_roads.SEED, "states of ride": ride_engines.SEED,
+            "copies of ride": ride_varying_speed.SEED}  # fmt: skip
 
 
 def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:

@@ -15,6 +15,9 @@ POINTS, WEIGHTS = (half / 2.0 for half in (np.polynomial.legendre.leggauss(NODES
 CLOSE = 1e-11
 """Cuts (s) nearer to one another than this are one: 1e-9 m of road at most."""
 
+SHRINKING = np.outer((-1.0, 1.0), 4.0 ** -np.arange(1.0, 7.0)).ravel()
+"""Cuts about a place of standstill, over the longest step."""
+
 
 @dataclass(frozen=True)
 class Nodes:
@@ -44,17 +47,25 @@ def nodes(profile: SpeedProfile, ends: np.ndarray, distances: Sequence[float]) -
     """Points on cells that end with every step and wherever an axle passes the place of a step's end.
 
     ``distances`` (m) of axles behind others: at such a place the other one's speed may bend, or it may have stood.
+    Towards a place of standstill, where its time goes like the root of the distance, cells shrink.
     """
-    places = np.unique(profile.path(ends))
-    behind = np.concatenate([profile.time(places + distance) for distance in distances] or [places[:0]])
-    behind = np.sort(behind[(behind > profile.times[0]) & (behind < ends[-1])])
-    own = ends[ends >= profile.times[0]]
-    after = np.searchsorted(own, behind)
-    apart = np.minimum(own[after] - behind, behind - own[after - 1]) > CLOSE
-    apart &= np.diff(behind, prepend=-np.inf) > CLOSE
-    cuts = np.sort(np.concatenate([own, behind[apart]]))
+    path, own = profile.path(ends), ends[ends >= profile.times[0]]
+    stops = _passing(profile, path[profile.speed(ends) == 0.0], distances)
+    shrinking = (stops[:, None] + np.diff(own).max() * SHRINKING).ravel()
+    more = np.sort(np.concatenate([_passing(profile, path, distances), shrinking]))
+    more = more[(more > own[0]) & (more < own[-1])]
+    after = np.searchsorted(own, more)
+    apart = np.minimum(own[after] - more, more - own[after - 1]) > CLOSE
+    apart &= np.diff(more, prepend=-np.inf) > CLOSE
+    cuts = np.sort(np.concatenate([own, more[apart]]))
     time = cuts[:-1, None] + np.diff(cuts)[:, None] * POINTS
     weight = np.diff(cuts)[:, None] * WEIGHTS * profile.speed(time)
     moving = weight.any(axis=1)
     time, weight = time[moving].ravel(), weight[moving].ravel()
     return Nodes(time, weight, np.searchsorted(ends, time, side="right") - 1)
+
+
+def _passing(profile: SpeedProfile, places: np.ndarray, distances: Sequence[float]) -> np.ndarray:
+    """Times (s) at which an axle that is one of the ``distances`` behind passes the places of the first."""
+    different = np.unique(places)
+    return np.concatenate([profile.time(different + distance) for distance in distances] or [np.zeros(0)])

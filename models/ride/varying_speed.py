@@ -29,6 +29,7 @@ from models.ride.noise_cells import nodes, steps
 from models.ride.responses import Responses
 from models.ride.road_in_path import RoadInPath, at_speed, road_in_path
 from models.ride.speed_profile import SpeedProfile
+from models.ride.sweep import sweep
 
 REACH = 1.0
 """Fastest rate of vehicle or road times the step; half of it changes nothing above 1e-10."""
@@ -128,13 +129,14 @@ def quasi_stationary(
     """
     form = road_in_path(vehicle, excitation, weightings)
     different, which = np.unique(speeds, return_inverse=True)
-    rows = []
-    for speed in different:
-        if speed > 0.0:
-            rows.append(stationary(at_speed(vehicle, excitation, float(speed), weightings), accuracy).deviation)
-        else:
-            rows.append(np.sqrt(_seen(form, _at_rest(form), 0.0, [FINITE] * len(form.names))[: len(form.names)]))
-    return np.array(rows)[which]
+    moving = different > 0.0
+    found = np.empty((len(different), len(form.names)))
+    if moving.any():
+        over = sweep(lambda _: vehicle, {"road": excitation}, different[moving].tolist(), weightings, accuracy)
+        found[moving] = over.deviation[0]
+    if not moving.all():
+        found[~moving] = np.sqrt(_seen(form, _at_rest(form), 0.0, [FINITE] * len(form.names)))[: len(form.names)]
+    return found[which]
 
 
 def _moments(form: RoadInPath, profile: SpeedProfile, P: np.ndarray, instants: Sequence[float] | np.ndarray,
