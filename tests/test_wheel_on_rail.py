@@ -140,7 +140,7 @@ spline.end
 
 def test_every_format_gives_the_same_profile(tmp_path):
     rail = uic60()
-    (tmp_path / "rail.txt").write_text("# y z\n" + columns(rail).replace(" ", " ; "))
+    (tmp_path / "rail.txt").write_text("\ufeff# y z\n" + columns(rail).replace(" ", " ; "))
     (tmp_path / "rail.prr").write_text(SIMPACK.format(mirror=0, inversion=0, factor=1000.0, points=columns(rail)))
     mirrored = "".join(f"{-y:.9f}\t{z:.9f} 1.0\n" for y, z in zip(rail.y[::4], rail.z[::4], strict=True))
     (tmp_path / "mirrored.prr").write_text(SIMPACK.format(mirror=1, inversion=1, factor=1.0, points=mirrored))
@@ -159,12 +159,23 @@ def test_a_wheel_is_laid_with_its_flange_down_and_inwards(tmp_path):
     found = read_profile(tmp_path / "wheel.txt", "wheel")
     at = np.linspace(-0.06, 0.05, 50)
     assert found.curve(at) == pytest.approx(wheel.curve(at), abs=5e-6)
+    from_the_back = "".join(f"{70 - 1e3 * y:.4f} {-1e3 * z:.4f}\n" for y, z in zip(wheel.y, wheel.z, strict=True))
+    (tmp_path / "wheel.txt").write_text(from_the_back)
+    with pytest.raises(InputError, match="must count from the taping line"):
+        read_profile(tmp_path / "wheel.txt", "wheel")
 
 
 BAD_FILES = {
     "word": ("rail.txt", "1.0 2.0\n3.0 four\n", r"rail.txt: line 2 = '3.0 four': must hold 2 or more finite numbers"),
     "one column": ("rail.txt", "1.0\n", "line 1 = '1.0'"),
     "not finite": ("rail.txt", "1.0 nan\n", "line 1"),
+    "decimal commas": ("rail.txt", columns(uic60()).replace(".", ","), "line 1 = '.*,.*': has decimal commas"),
+    "three columns": ("rail.txt", "1 0.5 0.1\n", "line 1 = '1 0.5 0.1': must hold y and z, found 3"),
+    "columns exchanged": (
+        "rail.txt",
+        "".join(f"{1e3 * z:.4f} {1e3 * y:.4f}\n" for y, z in zip(uic60().y, uic60().z, strict=True)),
+        "against it: points must follow the contour, y before z",
+    ),
     "empty": ("rail.txt", "# nothing\n", "0: points found; a profile needs ten"),
     "no points": ("rail.prr", "header.begin\nheader.end\n", "no points between point.begin"),
     "unit": ("rail.prr", SIMPACK.format(mirror=0, inversion=0, factor=0.0, points=columns(uic60())), "must be above 0"),

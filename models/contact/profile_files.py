@@ -1,8 +1,8 @@
 """Readers of profile files: two columns of text, Simpack (.prw, .prr) and MiniProf (.whl, .ban).
 
-two columns   y and z per line, apart by blanks, commas or semicolons; lines from #, ! or % on are comments Simpack
-keys "name = value" and the points between point.begin and point.end; "!" starts a comment. Shift, rotation,
-              bounds, mirrors, order and unit of the header are applied, in this order
+two columns   y and z per line and nothing else, apart by blanks, commas or semicolons; from #, ! or % on a comment
+Simpack       keys "name = value" and the points between point.begin and point.end; "!" starts a comment. Shift,
+              rotation, bounds, mirrors, order and unit of the header are applied, in this order
 MiniProf      a header of lines "key=value", an empty line, then the points x y ...; y upwards
 
 Lengths are in mm unless a Simpack header says otherwise. What a file leaves open is found from the shape: a wheel's
@@ -13,7 +13,7 @@ rail's gauge corner cannot be told from its shape, so a rail that is drawn the o
 import math
 import re
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -27,8 +27,12 @@ SIMPACK, MINIPROF = (".prw", ".prr"), (".whl", ".ban")
 OF_KIND = {".prw": "wheel", ".prr": "rail", ".whl": "wheel", ".ban": "rail"}
 COMMENTS = re.compile(r"[#!%].*")
 APART = re.compile(r"[\s,;]+")
+DECIMAL_COMMA = re.compile(r"\d,\d.*(?<!,)[\s;]|(?<!,)[\s;].*\d,\d")
+"""A comma between digits where something else parts the numbers."""
 SHOWN = 40
 """Characters of a line that a message shows."""
+OFF_TAPING = 5e-3
+"""Largest |z| (m) of a wheel at y = 0: its radius is measured there."""
 
 
 def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror: bool = False) -> Profile:
@@ -37,6 +41,8 @@ def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror
     kind : "wheel" or "rail". smoothing : wavelength (m) of which half is left. mirror : exchange left and right.
     Raises InputError for a file that cannot be read or understood, naming the line and its text.
     """
+    if kind not in get_args(Kind):
+        raise InputError("", "kind", kind, "is not known", get_args(Kind))
     path = Path(path)
     ending = path.suffix.lower()
     if OF_KIND.get(ending, kind) != kind:
@@ -47,12 +53,23 @@ def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror
     if y.size < 10:
         raise InputError(path, "", int(y.size), "points found; a profile needs ten or more, two numbers a line")
     y, z = _laid(y, z, kind)
-    return profile(-y if mirror else y, z, smoothing, path)
+    found = profile(-y if mirror else y, z, smoothing, path)
+    if kind == "wheel":
+        _check_taping(found, path)
+    return found
+
+
+def _check_taping(wheel: Profile, path: Path) -> None:
+    """Refuse a wheel whose y and z count from elsewhere, its flange's back or the axle."""
+    middle = float(np.interp(0.0, wheel.y, wheel.z, left=np.nan, right=np.nan))
+    if not abs(middle) <= OFF_TAPING:
+        raise InputError(path, "profile at y = 0, in m", middle, "y must count from the taping line and z from the "
+                         f"tread there, to within {OFF_TAPING:g} m: shift the profile")  # fmt: skip
 
 
 def _lines(path: Path) -> list[str]:
     try:
-        return path.read_text(encoding="utf-8", errors="replace").splitlines()
+        return path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
     except OSError as error:
         reason = error.strerror or "cannot be read"
         raise InputError(path, "", None, f"{reason[0].lower()}{reason[1:]}{similar_file(path)}") from None
@@ -60,6 +77,8 @@ def _lines(path: Path) -> list[str]:
 
 def _numbers(text: str, number: int, path: Path, least: int = 2) -> list[float]:
     """The numbers of one line; raises InputError with the line where it holds anything else or too few."""
+    if DECIMAL_COMMA.search(text.strip()):
+        raise InputError(path, f"line {number}", text.strip()[:SHOWN], "has decimal commas: write decimal points")
     try:
         found = [float(part) for part in APART.split(text.strip(" \t,;"))]
     except ValueError:
@@ -76,7 +95,12 @@ def _points(rows: list[list[float]], first: int = 0, second: int = 1) -> Points:
 def _columns(lines: list[str], path: Path) -> Points:
     """Two columns of text, in m."""
     plain = [(k, COMMENTS.sub("", line)) for k, line in enumerate(lines, 1)]
-    y, z = _points([_numbers(line, k, path) for k, line in plain if line.strip()])
+    rows = [(k, _numbers(line, k, path)) for k, line in plain if line.strip()]
+    for k, row in rows:
+        if len(row) > 2:
+            raise InputError(path, f"line {k}", lines[k - 1].strip()[:SHOWN], f"must hold y and z, found {len(row)} "
+                             "numbers")  # fmt: skip
+    y, z = _points([row for _, row in rows])
     return y * MM, z * MM
 
 

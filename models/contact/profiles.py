@@ -16,6 +16,8 @@ from models.errors import InputError
 
 SPACING = 1e-4
 """Distance (m) of the points along a profile's contour."""
+TURNING = 0.3
+"""Largest way of a contour against its direction by the way along it: a rail with web and foot turns by 0.27."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +76,11 @@ def _check(y: np.ndarray, z: np.ndarray, smoothing: float, file: object) -> None
     if not 0.01 <= width <= 0.5:
         raise InputError(file, "profile", width, "is its width in m, which must be from 0.01 to 0.5: is the unit "
                          "right?")  # fmt: skip
+    steps = np.diff(y)
+    there, back = float(steps[steps > 0.0].sum()), float(-steps[steps < 0.0].sum())
+    if min(there, back) > TURNING * max(there, back):
+        raise InputError(file, "profile", None, f"runs {there:.3g} m along y and {back:.3g} m against it: points must "
+                         "follow the contour, y before z")  # fmt: skip
     if not 0.0 <= smoothing <= 0.05:
         raise InputError(file, "smoothing", smoothing, "must be a wavelength from 0 to 0.05 m")
 
