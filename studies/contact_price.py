@@ -32,6 +32,8 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
     for name in ("creepage", "sweep", "method"):
         if name in scene.model_fields_set:
             raise InputError(scene.file, name, None, "this study goes through all of them itself: drop this table")
+    if scene.falling_friction is not None:
+        raise InputError(scene.file, "falling_friction", None, "the exact theory here has constant friction: drop this")
     if not all(0 < level <= 100 for level in options.levels):
         raise InputError(scene.file, "options.levels", options.levels, "must be above 0 and at most 100")
 

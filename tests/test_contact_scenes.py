@@ -1,6 +1,7 @@
 """Contact scenes: what is read, shown, refused, and that both ways to name one contact are the same contact."""
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -102,6 +103,38 @@ def test_radii_curvatures_ellipse_and_approach_name_the_same_contact():
     for other in same:
         for name in ("a", "b", "p0", "approach", "load", "A", "B"):
             assert getattr(other, name) == pytest.approx(getattr(one, name), rel=1e-12), name
+
+
+FALLING = {"floor": 0.4, "decay": 0.6, "speed": 20.0}
+KERNELS = "models.contact.fastsim_falling"
+
+
+def test_falling_friction_is_computed_only_where_a_scene_names_it(monkeypatch):
+    """In full sliding without spin it is known: mu N (0.4 + 0.6 exp(-0.6 * 20 * 0.1)), in the fields as well."""
+    monkeypatch.delitem(sys.modules, KERNELS, raising=False)
+    constant = contact(build(TABLE)).roll((0.1, 0.0, 0.0), 21, fields=True)
+    assert KERNELS not in sys.modules and constant.fx == pytest.approx(-0.3 * 8e4)
+    found = contact(build({**TABLE, "falling_friction": FALLING})).roll((0.1, 0.0, 0.0), 21, fields=True)
+    assert KERNELS in sys.modules
+    assert found.fx == pytest.approx(-0.3 * 8e4 * (0.4 + 0.6 * np.exp(-1.2)), rel=1e-9)
+    (field,) = found.fields
+    assert (field.px * field.dx * field.dy).sum() == pytest.approx(found.fx, rel=1e-9)
+
+
+def test_falling_friction_is_refused_where_it_would_not_be_read():
+    assert "has no meaning for exact" in refused(falling_friction=FALLING, method={"name": "exact"})
+    assert "second-order" in refused(falling_friction=FALLING, method={"march": "plain"})
+    with pytest.raises(InputError) as of_cases:
+        build({"title": "t", "system": "contact", "cases": {"file": "x.csv"}, "falling_friction": FALLING}, "c.toml")
+    assert "constant friction" in str(of_cases.value)
+    assert "floor" in refused(falling_friction={"decay": 0.6, "speed": 20.0})
+
+
+def test_falling_friction_is_shown_if_it_is_there(twinrig, capsys):
+    Path("c.toml").write_text(ELLIPSE)
+    assert twinrig("show", "c.toml") == 0 and "speed of slip" not in capsys.readouterr().out
+    assert twinrig("show", "c.toml", "--set", "falling_friction={floor=0.4, decay=0.6, speed=20}") == 0
+    assert "floor = 0.4, decay = 0.6 s/m, speed = 20 m/s" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", ["fastsim", "simplified", "exact", "linear"])

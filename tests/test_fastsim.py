@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from models.contact import hertz
+from models.contact.falling_friction import Falling
 from models.contact.fastsim import Ellipse, fastsim
 from models.contact.fastsim_derivatives import derivatives
-from models.contact.fastsim_falling import Falling
 from models.contact.fastsim_grid import POWERS, grid, strips_of
 from models.contact.linear_theory import flexibilities
 from models.contact.material import Pair

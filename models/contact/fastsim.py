@@ -24,7 +24,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.contact.fastsim_falling import Falling, forces_falling
+from models.contact.falling_friction import Falling
 from models.contact.fastsim_grid import POWERS, Bound, Grid, grid, strips_of
 from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER
 from models.contact.fastsim_many import BLENDED, ONE, THREE, forces, point
@@ -80,6 +80,9 @@ def fastsim(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any,
     InputError : names the value that is not finite, not plausible in SI, or of no common shape, or the word not known
     """
     check_choices(cells, bound, flexibilities, march)
+    if falling is not None:
+        require_second_order(march)
+        from models.contact.fastsim_falling import forces_falling
     columns, shape = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)
     found = np.zeros((len(columns), 4))
     strips = strips_of(columns[:, 0] / columns[:, 1], cells)
@@ -89,7 +92,6 @@ def fastsim(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any,
         if falling is None:
             forces(columns[rows], net.strips, net.cells, net.middle, KINDS[flexibilities], MARCHES[march], some)
         else:
-            _second_order_only(march)
             forces_falling(columns[rows], net.strips, net.cells, net.middle, KINDS[flexibilities], *falling.law, some)
         found[rows] = some
     return _creep(found, columns, shape)
@@ -138,7 +140,8 @@ def check_choices(cells: int, bound: str, flexibilities: str, march: str) -> Non
             raise InputError("", name, value, "is not known", known)
 
 
-def _second_order_only(march: str) -> None:
+def require_second_order(march: str) -> None:
+    """Raise InputError for a march that knows no falling friction."""
     if march != "second-order":
         raise InputError("", "march", march, "must be second-order where friction falls with the speed of slip")
 

@@ -5,7 +5,16 @@ from typing import Any
 import numpy as np
 
 from models.compiled import njit
-from models.contact.fastsim import KINDS, MARCHES, Flexibilities, March, check_choices, contacts_of
+from models.contact.falling_friction import Falling
+from models.contact.fastsim import (
+    KINDS,
+    MARCHES,
+    Flexibilities,
+    March,
+    check_choices,
+    contacts_of,
+    require_second_order,
+)
 from models.contact.fastsim_grid import Bound, grid, strips_of
 from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, MIDDLE, PLAIN, RATE, advance, cut
 from models.contact.fastsim_many import HALF, SPREAD, A, B, Y, rigid_slip
@@ -16,7 +25,7 @@ from models.errors import InputError
 
 def fastsim_fields(a: float, b: float, load: float, mu: float, xi_x: float, xi_y: float, spin: float, pair: Pair, *,
                    cells: int = 21, bound: Bound = "intermediate", flexibilities: Flexibilities = "blended",
-                   march: March = "second-order") -> Fields:  # fmt: skip
+                   march: March = "second-order", falling: Falling | None = None) -> Fields:  # fmt: skip
     """Pressure, traction and slip of one ellipse, plain numbers, as ``fastsim`` marches them.
 
     Arrays of the shape (strips, cells in a strip), each strip from its leading edge back. The pressure is that of the
@@ -32,8 +41,15 @@ def fastsim_fields(a: float, b: float, load: float, mu: float, xi_x: float, xi_y
     rigid_slip(contact, cells, net.middle, KINDS[flexibilities], slip)
     y, half, spread = (net.strips[row][:, None] for row in (Y, HALF, SPREAD))
     relative = np.zeros((3, y.size, cells))
-    for strip in range(y.size):
-        _strip(contact, net.strips[:, strip], net.cells, slip, MARCHES[march], relative[:, strip])
+    if falling is None:
+        for strip in range(y.size):
+            _strip(contact, net.strips[:, strip], net.cells, slip, MARCHES[march], relative[:, strip])
+    else:
+        require_second_order(march)
+        from models.contact.fastsim_falling import strip_falling
+
+        for strip in range(y.size):
+            strip_falling(contact, net.strips[:, strip], net.cells, slip, *falling.law, relative[:, strip])
     peak = max(load, 0.0) * net.middle / (contact[A] * contact[B]) * half / spread
     scale, shape = mu * peak, (y.size, cells)
     whole = np.ones(shape)

@@ -33,7 +33,7 @@ def contact(scene: ContactScene) -> Contact:
         return Simplified(interpenetrating(hertz, scene.pair), friction)
     if method.name == "fastsim":
         choices = method.model_dump(include={"march", "bound", "flexibilities"})
-        return Fastsim(hertz, friction, scene.pair, **choices)
+        return Fastsim(hertz, friction, scene.pair, **choices, falling=scene.falling_friction)
     return (Linear if method.name == "linear" else ExactOnEllipse)(hertz, friction, scene.pair)
 
 

@@ -23,7 +23,12 @@ def describe(scene: ContactScene) -> str:
              _line("rail", _material(rail))]  # fmt: skip
     lines.append(_line(scene.geometry, _values(getattr(scene, scene.geometry))))
     if scene.contact is not None:
-        lines += [_line("contact", _values(scene.contact)), _line("creepage", _values(scene.creepage))]
+        lines.append(_line("contact", _values(scene.contact)))
+    if scene.falling_friction is not None:
+        law = "by the speed of slip s: floor + (1 - floor) exp(-decay s) of it is left"
+        lines.append(_line("friction", f"{law}; {_values(scene.falling_friction)}"))
+    if scene.contact is not None:
+        lines.append(_line("creepage", _values(scene.creepage)))
     if scene.sweep is not None:
         lines.append(_line("sweep", _values(scene.sweep)))
     method = _values(scene.method, {"name", *scene.method.unread()})

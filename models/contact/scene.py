@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
+from models.contact.falling_friction import Falling
 from models.contact.material import STEEL, Material, Pair
 from models.errors import InputError
 from models.scene_file import SceneFile, checked
@@ -149,6 +150,7 @@ class ContactScene(SceneFile):
     profiles: Profiles | None = Field(default=None, description="cross-sections of wheel and rail")
     cases: Cases | None = Field(default=None, description="a contact in every row of a file")
     contact: Contact | None = Field(default=None, description="table with load or approach, and friction")
+    falling_friction: Falling | None = Field(default=None, description="friction that falls with the speed of slip")
     creepage: Creepage = Creepage()
     sweep: Sweep | None = Field(default=None, description="one creepage through a range")
     method: Method = Method()
@@ -178,6 +180,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Co
     _check_geometry(scene)
     _check_sweep(scene)
     _check_method(scene)
+    _check_friction(scene)
     return scene
 
 
@@ -237,3 +240,16 @@ def _check_method(scene: ContactScene) -> None:
     if scene.profiles is not None and method.name not in ON_PROFILES:
         raise InputError(scene.file, "method.name", method.name, "needs an ellipse; for profiles use "
                          + " or ".join(ON_PROFILES))  # fmt: skip
+
+
+def _check_friction(scene: ContactScene) -> None:
+    """Friction falls in FASTSIM alone, marched to second order, and not in a table of cases."""
+    method = scene.method
+    if scene.falling_friction is None:
+        return
+    if scene.cases is not None:
+        raise InputError(scene.file, "falling_friction", None, "a table of cases has constant friction")
+    if method.name != "fastsim":
+        raise InputError(scene.file, "falling_friction", None, f"has no meaning for {method.name}: use fastsim")
+    if method.march != "second-order":
+        raise InputError(scene.file, "method.march", method.march, "must be second-order where friction falls")
