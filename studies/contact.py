@@ -11,8 +11,9 @@ from pydantic import Field
 
 from models.contact.accuracy import Error, rolled
 from models.contact.of_scene import contact, touches
-from models.contact.scene import ContactScene
+from models.contact.scene import ContactScene, Method
 from models.contact.theories import Contact, ExactOnEllipse, Fastsim, Motion, OnEllipse, Rolled
+from models.contact.work_precision import duration
 from models.errors import InputError
 from models.strict import Strict, read
 from models.tables import write_table
@@ -45,21 +46,23 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
 def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Press the bodies, roll them; saves ``forces.csv``, ``fields.csv`` and figures."""
     check(scene, engines)
-    progress("pressing", 0.0)
+    motions, cells = creepages(scene), scene.method.cells
+    progress("loading", 0.0)
+    shown = rolled(contact(scene), motions[-1], cells, fields=True)  # compiles first: no part of the times below
     start = time.perf_counter()
     body = contact(scene)
-    motions = creepages(scene)
-    last = len(motions) - 1
+    pressed = time.perf_counter()
     found = []
     for i, motion in enumerate(motions):
         progress("rolling", i / len(motions))
-        found.append(rolled(body, motion, scene.method.cells, fields=i == last))
-    seconds = time.perf_counter() - start
+        found.append(rolled(body, motion, cells))
+    times = pressed - start, (time.perf_counter() - pressed) / len(motions)
+    found[-1] = shown
     _save(motions, found, folder)
     progress("figures", 0.9)
     _figures(scene, body, motions, found, folder)
     return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(body, motions, found),
-            "table": _table(scene, body, motions, found, seconds)}  # fmt: skip
+            "table": _table(scene, body, motions, found, times)}  # fmt: skip
 
 
 def creepages(scene: ContactScene) -> list[Motion]:
@@ -94,14 +97,17 @@ def _answer(body: Contact, motions: list[Motion], found: list[tuple[Rolled, Erro
 
 
 def _table(scene: ContactScene, body: Contact, motions: list[Motion], found: list[tuple[Rolled, Error]],
-           seconds: float) -> list[str]:  # fmt: skip
-    """Normal contact, then forces with their errors: all of one creepage, or some rows of a sweep."""
+           times: tuple[float, float]) -> list[str]:  # fmt: skip
+    """Normal contact, then forces with their errors: all of one creepage, or some rows of a sweep.
+
+    times : of pressing, and of rolling at one creepage with its errors (s)
+    """
     p, limit = body.pressing, body.friction * body.pressing.load
     size = f"a = {1e3 * body.a:.3f} mm, b = {1e3 * body.b:.3f} mm, " if isinstance(body, OnEllipse) else ""
     lines = [f"  normal load {p.load:,.0f} N, approach {1e6 * p.approach:.2f} um, {size}area {1e6 * p.area:.2f} mm^2, "
              f"largest pressure {1e-6 * p.peak:,.0f} MPa", *_places(scene),
-             f"  forces on the wheel by {scene.method.name}, {scene.method.cells} cells along each axis, "
-             f"{1e3 * seconds:.3g} ms in all; mu N = {limit:,.0f} N",
+             f"  pressed in {duration(times[0])}, rolled in {duration(times[1])} at each creepage, errors included",
+             f"  forces on the wheel by {theory(scene.method)}; mu N = {limit:,.0f} N",
              f"    {'xi_x [-]':>10}{'xi_y [-]':>10}{'spin [1/m]':>11}{'Fx [N]':>10}{'Fy [N]':>10}{'Mz [N m]':>10}"
              f"{'stick':>7}{'loss [N]':>10}   errors: of cells, of theory [% of mu N], of Mz [N m]"]  # fmt: skip
     step = max(1, (len(motions) - 1) // ROWS)
@@ -111,6 +117,15 @@ def _table(scene: ContactScene, body: Contact, motions: list[Motion], found: lis
                      f"   {_percent(error.cells, limit):>6}{_percent(error.theory, limit):>8}"
                      f"{error.moment:>9.2g}")  # fmt: skip
     return [*lines, "  loss: power by the rolling speed; errors are of the force, that of Mz has both together"]
+
+
+NAMES = {"fastsim": "FASTSIM", "linear": "the linear theory", "simplified": "the theory of 1983",
+         "exact": "the exact theory"}  # fmt: skip
+
+
+def theory(method: Method) -> str:
+    """Name of the theory, and its cells."""
+    return NAMES[method.name] + ("" if method.name == "linear" else f", {method.cells} cells along each axis")
 
 
 def _percent(error: float, limit: float) -> str:
@@ -135,20 +150,32 @@ def _figures(scene: ContactScene, body: Contact, motions: list[Motion], found: l
         contact_figure(fields, body.friction, _caption(scene, motions[-1], one),
                        _pressure(body), folder / "contact.png")
     if scene.sweep is not None:
-        sweep_figure(scene.sweep, body, found, _checks(scene, body), scene.title, folder / "forces.png")
+        title = f"{scene.title}\nForces by {theory(scene.method)}{_kept(scene)}"
+        sweep_figure(scene.sweep, body, found, _checks(scene, body), title, folder / "forces.png")
+
+
+SYMBOLS = {"xi_x": (r"$\xi_x$", ""), "xi_y": (r"$\xi_y$", ""), "spin": ("spin", " 1/m")}
+
+
+def _kept(scene: ContactScene) -> str:
+    """The creepages that are not swept, where they are not zero."""
+    assert scene.sweep is not None
+    kept = [f"{symbol} = {value:.3g}{unit}" for (symbol, unit), (name, value) in
+            zip(SYMBOLS.values(), scene.creepage, strict=True) if value and name != scene.sweep.of]  # fmt: skip
+    return "".join(f"; {text}" for text in kept)
 
 
 def _pressure(body: Contact) -> str:
     """Which pressure the cells have."""
     if isinstance(body, Fastsim) and body.choices["bound"] != "elliptic":
-        return f"pressure of the {body.choices['bound']} bound"
+        return f"FASTSIM's pressure ({body.choices['bound']} bound)"
     return "pressure"
 
 
 def _caption(scene: ContactScene, motion: Motion, one: Rolled) -> str:
     return (f"{scene.title}\n" rf"$\xi_x$ = {motion[0]:.3g}, $\xi_y$ = {motion[1]:.3g}, spin = {motion[2]:.3g} 1/m: "
             f"$F_x$ = {1e-3 * one.fx:.2f} kN, $F_y$ = {1e-3 * one.fy:.2f} kN, $M_z$ = {one.mz:.1f} N m "
-            f"({scene.method.name})")  # fmt: skip
+            f"by {NAMES[scene.method.name]}")  # fmt: skip
 
 
 CHECKED = 40
@@ -159,6 +186,8 @@ def _checks(scene: ContactScene, body: Contact) -> list[tuple[float, Rolled]]:
     """The exact theory at a few values of a sweep on an ellipse."""
     points = read(Options, scene.options, scene.file, "options").exact
     if scene.sweep is None or not isinstance(body, OnEllipse) or isinstance(body, ExactOnEllipse) or not points:
+        return []
+    if scene.falling_friction is not None:  # the exact theory here has constant friction
         return []
     exact = ExactOnEllipse(body.hertz, body.friction, body.pair)
     values, motions = scene.sweep.values(), creepages(scene)

@@ -75,13 +75,13 @@ def _tractions(axis: Any, patches: list[Fields], friction: float) -> None:
         axis.add_collection(PolyCollection(_rectangles(f), facecolor=colours, edgecolor="face", linewidth=0.2))
         x, y, px, py = _arrows(f, spacing / MILLI)
         arrows = axis.quiver(MILLI * x, MILLI * y, px, py, angles="xy", scale_units="xy",
-                             scale=largest / (1.6 * spacing), width=0.003, color="#222222")  # fmt: skip
+                             scale=largest / (1.35 * spacing), width=0.003, color="#222222")  # fmt: skip
     axis.quiverkey(arrows, 0.88, 0.035, largest, f"{MEGA * largest:,.0f} MPa", labelpos="W")
     marks = [plt.Rectangle((0, 0), 1, 1, facecolor=colour) for colour in (STICK, SLIP)]
     share = np.concatenate([f.slips[f.inside] for f in patches])
     weight = np.concatenate([(f.dx * f.dy)[f.inside] for f in patches])
     slip = float(weight[share].sum() / weight.sum())
-    labels = [f"stick, {1 - slip:.0%} of the area", f"slip, {slip:.0%}"]
+    labels = [f"stick, {100 * (1 - slip):.0f} % of the area", f"slip, {100 * slip:.0f} %"]
     axis.figure.legend(marks, labels, loc="outside lower right", ncols=2)
     axis.set_title("traction on the wheel")
 
@@ -109,7 +109,7 @@ COLOURS = {"fx": "#0072b2", "fy": "#d55e00", "mz": "#009e73"}
 def sweep_figure(sweep: Sweep, body: Contact, found: list[tuple[Rolled, Error]], checks: list[tuple[float, Rolled]],
                  title: str, path: Path) -> None:  # fmt: skip
     """Forces and moment against a creepage, with the band of their error, and points of the exact theory."""
-    figure, axes = plt.subplots(1, 2, figsize=(11.0, 4.4))
+    figure, axes = plt.subplots(1, 2, figsize=(11.0, 4.8))
     scale = 1.0 if sweep.of == "spin" else 100.0
     values, limit = scale * sweep.values(), body.friction * body.pressing.load
     at = [scale * value for value, _ in checks]
@@ -128,8 +128,10 @@ def sweep_figure(sweep: Sweep, body: Contact, found: list[tuple[Rolled, Error]],
                  markerfacecolor="white", markersize=5)  # fmt: skip
     for sign in (-1, 1):
         axes[0].axhline(sign * 1e-3 * limit, color="black", linewidth=0.7, linestyle=":")
-    axes[0].set_title(r"tangential force on the wheel [kN]; dotted: $\mu N$")
-    axes[1].set_title("moment on the wheel about the normal [N m]")
+    axes[0].set_title(r"tangential force on the wheel; dotted: $\pm\mu N$")
+    axes[0].set_ylabel("force [kN]")
+    axes[1].set_title("moment on the wheel about the normal")
+    axes[1].set_ylabel("$M_z$ [N m]")
     for axis in axes:
         axis.set_xlabel(LABELS[sweep.of])
         axis.set_xscale("log" if sweep.spacing == "logarithmic" and sweep.start > 0 else "linear")
@@ -139,10 +141,10 @@ def sweep_figure(sweep: Sweep, body: Contact, found: list[tuple[Rolled, Error]],
 
 
 def _legend(axis: Any, checked: bool) -> None:
-    axis.fill_between([], [], color="#888888", alpha=0.3, linewidth=0, label="error: cells and theory")
+    axis.fill_between([], [], color="#888888", alpha=0.3, linewidth=0, label="error of cells and theory")
     if checked:
         axis.plot([], [], "o", color="#444444", markerfacecolor="white", markersize=5, label="exact theory")
-    axis.legend(loc="best")
+    axis.figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=4)
 
 
 STYLES = {"linear theory": ("#888888", "x"), "FASTSIM 1982": ("#d55e00", "s"), "FASTSIM, plain march": ("#e69f00", "v"),

@@ -50,6 +50,12 @@ def answer(path: Path, out: Path, pair: Pair, method: Method, progress: Progress
     return counts
 
 
+def compile_first(pair: Pair, method: Method) -> None:
+    """Have the kernels behind ``answer`` compiled or loaded, for times that are those of the rows."""
+    one = np.ones(1)
+    _forces({"A": one, "B": one, **{name: one for name in MOTION}}, pair, method)
+
+
 def _with(first: Block | None, others: Iterator[Block]) -> Iterator[Block]:
     """All blocks; the first was read before the answer's file was made, so that a wrong header leaves none."""
     if first is not None:
