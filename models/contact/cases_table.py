@@ -53,7 +53,7 @@ def answer(path: Path, out: Path, pair: Pair, method: Method, progress: Progress
 def compile_first(pair: Pair, method: Method) -> None:
     """Have the kernels behind ``answer`` compiled or loaded, for times that are those of the rows."""
     one = np.ones(1)
-    _forces({"A": one, "B": one, **{name: one for name in MOTION}}, pair, method)
+    _forces({"A": one, "B": one, **dict.fromkeys(MOTION, one)}, pair, method)
 
 
 def _with(first: Block | None, others: Iterator[Block]) -> Iterator[Block]:
