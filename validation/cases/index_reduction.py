@@ -209,5 +209,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         right.plot([10 * STEP * j for j in range(len(error))], error, label=name, linewidth=4 - 1.5 * i)
     right.set(xlabel="time [s]", ylabel="pitch - true pitch [rad]", title="No guidance, noise on the forces")
     right.legend(fontsize="small")
+    for axis in (left, right):
+        axis.locator_params(axis="x", nbins=5)  # runs of the quick report are short, their times have many digits
     return [("Drift by index reduction is the constraint's own and can be cured; drift by noise is the data's, and "
              "no formulation and no solver sees it.", figure)]
