@@ -10,45 +10,18 @@ from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary
 from models.ride.delayed_system import DelayedSystem
 from models.ride.excitation import Excitation, excited
 from models.ride.frequency import quadrature, spectra
-from models.ride.linear_vehicle import LinearVehicle, Output, Wheel
+from models.ride.linear_vehicle import Output
 from models.ride.marginal import Unstable, parts
 from models.ride.sweep import ASKED, sweep
 from models.ride.weighting import WEIGHTINGS, weighted
 from models.road.two_track import CASES, excitation, road_of_level
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
+from validation.ride_corners import corners
 
 CORNER = QuarterCar(300.0, 40.0, 2e4, 1500.0, 2e5)
 Q = 1e-4
 """Intensity of the walking road, m^2 per m."""
-
-
-def car(corners, mass=None, tyre_damping=0.0):
-    """Quarter car, or a half car of corners (x, QuarterCar) under a body of the given mass matrix."""
-    mass = np.array([[corners[0][1].m_s]]) if mass is None else mass
-    b, n, w = len(mass), len(mass) + len(corners), len(corners)
-    M = np.diag([*np.diag(mass), *(c.m_u for _, c in corners)])
-    D, K, R, S = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, w)), np.zeros((n, w))
-    for i, (x, c) in enumerate(corners):
-        travel = np.zeros(n)
-        travel[:b], travel[b + i] = [1.0, -x][:b], -1.0
-        K += c.k * np.outer(travel, travel)
-        D += c.c * np.outer(travel, travel)
-        K[b + i, b + i] += c.k_t
-        D[b + i, b + i] += tyre_damping
-        R[b + i, i], S[b + i, i] = c.k_t, tyre_damping
-    unit, no, none = np.eye(n), np.zeros(n), np.zeros(w)
-    first = np.eye(w)[0]
-    outputs = (
-        Output("body", "m/s2", "acceleration", unit[0], no, no, none, none),
-        Output("travel", "m", "travel", no, no, unit[0] - unit[b], none, none),
-        Output("tyre", "m", "deflection", no, no, unit[b], -first, none),
-        Output("height", "m", "displacement", no, no, unit[0], none, none),
-        Output("load", "N", "force", no, -S[b, 0] * unit[b], -R[b, 0] * unit[b], R[b, 0] * first, S[b, 0] * first),
-        Output("wheel", "m/s2", "acceleration", unit[b], no, no, none, none),
-    )
-    wheels = tuple(Wheel(f"wheel {i}", x, 0.0, i) for i, (x, _) in enumerate(corners))
-    return LinearVehicle(M, D, K, R, S, tuple(("body", str(i)) for i in range(n)), wheels, outputs)
 
 
 def walk(corner=0.0, places=(0.0,)):
@@ -66,7 +39,7 @@ def system(A, B, delays=(0.0,), C=None, D=None, independent=False):
 
 @pytest.mark.parametrize("corner", [0.0, 1e-9, 1e-3, 0.3, 3.0])
 def test_quarter_car_has_its_closed_forms_down_to_a_walking_road(corner):
-    found = stationary(excited(car([(0.0, CORNER)]), walk(corner), 20.0))
+    found = stationary(excited(corners([(0.0, CORNER)]), walk(corner), 20.0))
     q, w = 20.0 * Q, 20.0 * corner
     # the matrices themselves are rounded to 1e-16, which the ratio of height to travel multiplies
     assert found.variance[0] == pytest.approx(CORNER.body_acceleration(q, w), rel=1e-10)
@@ -80,7 +53,7 @@ def test_quarter_car_has_its_closed_forms_down_to_a_walking_road(corner):
 def test_half_car_splits_into_quarter_cars():
     a, b, v = 1.2, 1.5, 17.0
     front, rear, inertia = split_half_car(CORNER, a, b)
-    vehicle = car([(a, front), (-b, rear)], np.diag([front.m_s + rear.m_s, inertia]))
+    vehicle = corners([(a, front), (-b, rear)], np.diag([front.m_s + rear.m_s, inertia]))
     found = stationary(excited(vehicle, walk(0.0, (a, -b)), v)).variance[0]
     assert found == pytest.approx(half_car_acceleration(CORNER, v * Q, a, b, v), rel=1e-10)
 
@@ -145,7 +118,7 @@ def test_the_five_covariances_of_the_road_itself(truck):
 
 
 def test_tyre_damping_under_a_road_of_first_order_leaves_wheel_and_load_without_a_variance():
-    vehicle = car([(0.0, CORNER)], tyre_damping=100.0)
+    vehicle = corners([(0.0, CORNER)], tyre_damping=100.0)
     found = stationary(excited(vehicle, walk(0.3), 20.0))
     assert found.status == (FINITE, FINITE, FINITE, FINITE, INFINITE, INFINITE)
     assert np.isinf(found.variance[4:]).all() and np.isfinite(found.variance[:4]).all()
@@ -246,7 +219,7 @@ def test_results_do_not_depend_on_slycot(free, truck, monkeypatch, installed):
 
 def test_an_unstable_vehicle_is_refused_in_words():
     with pytest.raises(Unstable, match=r"swings at 11\.8\d? Hz grows at a rate of 0\.06\d+ 1/s") as told:
-        stationary(excited(car([(0.0, replace(CORNER, c=-5.0))]), walk(0.3), 20.0))
+        stationary(excited(corners([(0.0, replace(CORNER, c=-5.0))]), walk(0.3), 20.0))
     assert told.value.growth == pytest.approx(0.064, rel=0.01)
     with pytest.raises(Unstable, match="does not swing"):
         stationary(system(np.array([[0.5]]), [np.ones((1, 1))]))

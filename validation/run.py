@@ -20,8 +20,8 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "drift_off", "drift_solvers", "holding_spring", "point_mass",
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
          "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
-         "contact_simplified", "contact_profiles", "ride_road", "ride_engines", "ride_varying_speed", "contact_price",
-         "fastsim")  # fmt: skip
+         "contact_simplified", "contact_profiles", "ride_road", "ride_covariance", "ride_engines",
+         "ride_varying_speed", "contact_price", "fastsim")  # fmt: skip
 """Case modules in the order of the report."""
 
 
@@ -107,6 +107,7 @@ def seeds() -> dict[str, int]:
         kalman,
         motion,
         point_mass,
+        ride_covariance,
         ride_engines,
         ride_varying_speed,
         roads,
@@ -122,7 +123,7 @@ def seeds() -> dict[str, int]:
             "growth of noise": growth.SEED, "drift-off": drift_off.SEED, "drift by solver": drift_solvers.SEED,
             "holding spring": holding_spring.SEED,
             "random contacts": fastsim.SEED, "table of contacts": contact_price.SEED,
-            "made road": fitted_roads.SEED, "states of ride": ride_engines.SEED,
+            "made road": fitted_roads.SEED, "states of ride": ride_engines.SEED, "twins of ride": ride_covariance.SEED,
             "copies of ride": ride_varying_speed.SEED}  # fmt: skip
 
 

@@ -51,7 +51,7 @@ class Covariance:
 def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
     """Covariance of a system that meets unit white noise, axle after axle.
 
-    ``accuracy`` of the system's matrices, relative: 1e-12 suits matrices from formulas, 1e-8 those from differences.
+    ``accuracy`` of the system's matrices, relative: what is smaller counts as zero, so that free motions are found.
     Raises Unstable, with growth rate and frequency, if the system leaves its equilibrium on its own.
     """
     B, D, delays = hits(system)

@@ -17,8 +17,9 @@ from models.ride.linear_vehicle import LinearVehicle
 
 POINTS = 16
 """Gauss points of a panel."""
-LOW, HIGH = 1e-4, 1e12
-"""First and last frequency by the lowest and the highest one of vehicle and road; below the spectrum is flat."""
+LOW, HIGH = 0.02, 1e12
+"""Ends of the first and of the last panel, by the lowest and the highest frequency of vehicle and road. Not lower: near
+zero the stiffness of a free vehicle is all rounding, so that the first panel is not halved for ever either."""
 TOLERANCE = 1e-11
 """A panel is halved while that changes any variance by more than this share; PANELS at most in all."""
 PANELS = 1500
@@ -119,14 +120,14 @@ def _halved(over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, whole: 
             limit: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:  # fmt: skip
     """Sums (p,) over panels, each halved until that changes it by no more than ``limit`` (p,); the last changes."""
     variance, error = np.zeros_like(limit), np.zeros_like(limit)
-    taken = 2 * len(edges)
+    taken, lowest = 2 * len(edges), edges[0, 1] / 64
     while len(edges):
         finer = np.column_stack([edges[:, 0], edges.mean(axis=1), edges.mean(axis=1), edges[:, 1]]).reshape(-1, 2)
         parts = over(finer)
         taken += len(finer)
         halves = parts.reshape(len(edges), 2, -1).sum(axis=1)
         change = abs(halves - whole)
-        rough = (change > limit).any(axis=1) & (taken < PANELS)
+        rough = (change > limit).any(axis=1) & (edges[:, 1] > lowest) & (taken < PANELS)
         variance += halves[~rough].sum(axis=0)
         error += change[~rough].sum(axis=0)
         edges, whole = finer[np.repeat(rough, 2)], parts[np.repeat(rough, 2)]

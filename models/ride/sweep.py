@@ -42,7 +42,7 @@ class Sweep:
         return self.deviation[self.cases.index(case), :, self.outputs.index(output)]
 
 
-def sweep(vehicle: Callable[[float], LinearVehicle], excitations: Mapping[str, Excitation], speeds: Sequence[float],
+def sweep(vehicle: Callable[[float], LinearVehicle], excitations: Mapping[str, Excitation], speeds: Sequence[float] | np.ndarray,
           filters: Mapping[str, str] | None = None, accuracy: float = ACCURACY,
           fast: bool = True) -> Sweep:  # fmt: skip
     """Stationary variances of a vehicle, given as a function of the speed (m/s), on each road at each speed.
