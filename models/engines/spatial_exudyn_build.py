@@ -1,0 +1,287 @@
+"""A vehicle in space as Exudyn's items: kinematic trees, native spring-dampers between points, user functions.
+
+A body without parent and all that ride on it are one tree with a link per coordinate; only the last link of a body has
+mass. (Rigid bodies whose missing freedoms are constrained would be wrong: the explicit solvers drop constrained rows
+after solving with the full mass matrix, which couples them.) What Exudyn has no item for is a function in Python:
+curves and friction, inclined axes between two bodies that turn, anti-roll bars, side forces, the road.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import exudyn as exu
+import exudyn.itemInterface as typed_items
+import numpy as np
+
+from models.vehicles.spatial import (
+    FREEDOMS,
+    AntiRollBar,
+    Body,
+    PointOutput,
+    SideForce,
+    SpatialVehicle,
+    SpringDamper,
+    TurnOutput,
+    Tyre,
+    Vector,
+)
+from models.vehicles.spatial_linear import Preloads, preloads
+
+exu.config.printToConsole = False
+KINDS = exu.OutputVariableType
+lists: Any = exu
+items: Any = typed_items
+"""Exudyn's type hints know neither how its lists are made nor that a function is a user function."""
+JOINTS = dict(zip(FREEDOMS, (
+    exu.JointType.PrismaticX, exu.JointType.PrismaticY, exu.JointType.PrismaticZ,
+    exu.JointType.RevoluteX, exu.JointType.RevoluteY, exu.JointType.RevoluteZ), strict=True))  # fmt: skip
+
+
+@dataclass
+class RoadTable:
+    """Heights and rates under the tyres as the loads read them: columns of values per half step."""
+
+    columns: list[list[float]]
+    per_time: float
+
+    def force(self, wheel: int, stiffness: float, damping: float, t: float) -> float:
+        """Force (N) of the road through one tyre at a time."""
+        row, count = round(t * self.per_time), len(self.columns) // 2
+        return stiffness * self.columns[wheel][row] + damping * self.columns[count + wheel][row]
+
+
+@dataclass
+class Build:
+    """Exudyn's system while it is put together.
+
+    links: (tree, last link, where its joint is) of every body; places: (node, index within it) of every coordinate;
+    markers by body and point.
+    """
+
+    vehicle: SpatialVehicle
+    mbs: Any
+    held: Preloads
+    ground: Any
+    links: dict[str, tuple[Any, int, Vector]] = field(default_factory=dict)
+    places: dict[tuple[str, str], tuple[Any, int]] = field(default_factory=dict)
+    markers: dict[tuple[str | None, Vector], Any] = field(default_factory=dict)
+    callbacks: int = 0
+
+    def marker(self, body: str | None, point: Vector) -> Any:
+        """Marker of a point, made once."""
+        key = (body, point)
+        if key not in self.markers:
+            self.markers[key] = self.mbs.AddMarker(self._new_marker(body, point))
+        return self.markers[key]
+
+    def _new_marker(self, body: str | None, point: Vector) -> Any:
+        if body is None:
+            return items.MarkerBodyRigid(bodyNumber=self.ground, localPosition=list(point))
+        tree, link, origin = self.links[body]
+        local = np.subtract(point, origin)
+        return items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localPosition=local)
+
+    def reader(self, body: str, freedom: str, kind: Any = KINDS.Coordinates) -> Callable[[], float]:
+        """Function that reads a coordinate, or its rate, at the stage; 0 where the body does not have it."""
+        if (body, freedom) not in self.places:
+            return lambda: 0.0
+        read, (node, index) = self.mbs.GetNodeOutput, self.places[body, freedom]
+        return lambda: read(node, kind)[index]
+
+    def steady(self, body: str | None) -> bool:
+        """Whether a body never turns."""
+        if body is None:
+            return True
+        own = self.vehicle.body(body)
+        return not any(freedom.startswith("r") for freedom in own.freedoms) and self.steady(own.parent)
+
+    def connect(self, first: Any, second: Any, law: Callable[[Any, Any], list[float]]) -> None:
+        """Two points and the force (N, space's axes) on the first by the second's position and rate beside it."""
+        self.mbs.AddObject(items.CartesianSpringDamper(
+            markerNumbers=[first, second],
+            springForceUserFunction=lambda mbs, t, item, apart, rate, k, d, offset: law(apart, rate)))  # fmt: skip
+        self.callbacks += 1
+
+
+@dataclass
+class Link:
+    """A joint of a tree and the mass behind it; ``centre`` counts from the joint, ``inertia`` about the centre."""
+
+    joint: Any
+    parent: int
+    offset: np.ndarray
+    mass: float = 0.0
+    centre: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    inertia: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
+
+    def load(self, body: Body, at: np.ndarray) -> None:
+        """Add a body's mass with its centre there."""
+        mass = self.mass + body.mass
+        centre = (self.mass * self.centre + body.mass * at) / mass if mass else at
+        self.inertia = (self.inertia + _carried(self.mass, self.centre - centre)
+                        + np.array(body.inertia, float) + _carried(body.mass, at - centre))  # fmt: skip
+        self.mass, self.centre = mass, centre
+
+
+def _carried(mass: float, arm: np.ndarray) -> np.ndarray:
+    """Inertia (3, 3) of a point mass at an arm (Steiner)."""
+    return mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+
+
+def _tree(built: Build, bodies: list[Body]) -> None:
+    """A body without parent and its riders: a link per coordinate, mass on the last one of each body.
+
+    A rider without freedoms adds its mass to the last link of what it rides on.
+    """
+    links: list[Link] = []
+    places = []
+    last: dict[str | None, tuple[int, Vector]] = {None: (-1, (0.0, 0.0, 0.0))}
+    for body in bodies:
+        parent, origin = last[body.parent]
+        for freedom in (freedom for freedom in FREEDOMS if freedom in body.freedoms):
+            links.append(Link(JOINTS[freedom], parent, np.subtract(body.position, origin)))
+            places.append((body.name, freedom))
+            parent, origin = len(links) - 1, body.position
+        links[parent].load(body, np.subtract(body.position, origin))
+        last[body.name] = parent, origin
+    n, zero = len(links), [0.0] * len(links)
+    node = built.mbs.AddNode(items.NodeGenericODE2(
+        referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero, numberOfODE2Coordinates=n))
+    tree = built.mbs.AddObject(items.ObjectKinematicTree(
+        nodeNumber=node, gravity=[0, 0, -built.vehicle.gravity], jointTypes=[link.joint for link in links],
+        linkParents=[link.parent for link in links], jointTransformations=lists.Matrix3DList([np.eye(3)] * n),
+        jointOffsets=lists.Vector3DList([link.offset for link in links]),
+        linkInertiasCOM=lists.Matrix3DList([link.inertia for link in links]),
+        linkCOMs=lists.Vector3DList([link.centre for link in links]),
+        linkMasses=[link.mass for link in links]))  # fmt: skip
+    built.links |= {body.name: (tree, *last[body.name]) for body in bodies}
+    built.places |= {place: (node, i) for i, place in enumerate(places)}
+
+
+def _trees(vehicle: SpatialVehicle) -> list[list[Body]]:
+    """Bodies without parent, each with all that ride on it, parents first."""
+    roots: dict[str, str] = {}
+    for body in vehicle.bodies:
+        roots[body.name] = body.name if body.parent is None else roots[body.parent]
+    return [[body for body in vehicle.bodies if roots[body.name] == root] for root in dict.fromkeys(roots.values())]
+
+
+def _spring(built: Build, spring: SpringDamper) -> None:
+    """Native where Exudyn has an item for it: along a global axis, or along any axis of a body that never turns."""
+    axis, ends = np.array(spring.axis), [spring.one, spring.two]
+    one, two = built.marker(spring.one, spring.point_one), built.marker(spring.two, spring.point_two)
+    rest = np.subtract(spring.point_two, spring.point_one)
+    curved = spring.travel_force or spring.rate_force or spring.friction
+    if curved or not (np.count_nonzero(axis) == 1 or any(built.steady(end) for end in ends)):
+        built.connect(one, two, _law(spring, axis, rest, built.held.parts[spring.name]))
+        return
+    sunk = built.held.parts[spring.name] / spring.stiffness if spring.stiffness else 0.0
+    if np.count_nonzero(axis) == 1:
+        built.mbs.AddObject(items.CartesianSpringDamper(
+            markerNumbers=[one, two], stiffness=spring.stiffness * axis**2, damping=spring.damping * axis**2,
+            offset=rest - sunk * axis))  # fmt: skip
+        return
+    sign = 1 if built.steady(spring.one) else -1  # the axis is one of the first marker's body
+    built.mbs.AddObject(items.LinearSpringDamper(
+        markerNumbers=[one, two][::sign], axisMarker0=sign * axis, stiffness=spring.stiffness, damping=spring.damping,
+        offset=float(axis @ rest) - sunk))  # fmt: skip
+
+
+def _law(spring: SpringDamper, axis: np.ndarray, rest: np.ndarray, held: float) -> Callable[[Any, Any], list[float]]:
+    """All terms of a spring-damper's force."""
+    (ax, ay, az), design = axis.tolist(), float(axis @ rest)
+    k, c, dry, dry_rate = spring.stiffness, spring.damping, spring.friction, spring.friction_rate
+    travel_force, rate_force = spring.travel_force, spring.rate_force
+
+    def law(apart: Any, rates: Any) -> list[float]:
+        travel = ax * apart[0] + ay * apart[1] + az * apart[2] - design
+        rate = ax * rates[0] + ay * rates[1] + az * rates[2]
+        force = held + k * travel + c * rate
+        if travel_force is not None:
+            force += travel_force(travel)
+        if rate_force is not None:
+            force += rate_force(rate)
+        if dry:
+            force += dry * float(np.tanh(rate / dry_rate))
+        return [force * ax, force * ay, force * az]
+
+    return law
+
+
+def _bar(built: Build, bar: AntiRollBar) -> None:
+    """Vertical forces between the two points, and the moment on the body's roll coordinate."""
+    left, right = built.marker(bar.left, bar.point_left), built.marker(bar.right, bar.point_right)
+    roll, turning = built.reader(bar.body, "rx"), built.reader(bar.body, "rx", KINDS.Coordinates_t)
+    rest, held, track, read = bar.point_right[2] - bar.point_left[2], built.held.parts[bar.name], bar.track, built.mbs
+    k, c = bar.stiffness, bar.damping
+
+    def moment(apart: float, rate: float) -> float:
+        """From the right point's height and its rate beside the left one's."""
+        twisting = c * (rate / track + turning()) if c else 0.0
+        return held + k * ((apart - rest) / track + roll()) + twisting
+
+    def on_body(mbs: Any, t: float, item: int, angle: float, rate: float, k: float, d: float, offset: float) -> float:
+        heights = [read.GetMarkerOutput(marker, KINDS.Position)[2] for marker in (right, left)]
+        rates = [read.GetMarkerOutput(marker, KINDS.Velocity)[2] for marker in (right, left)] if c else [0.0, 0.0]
+        return moment(heights[0] - heights[1], rates[0] - rates[1])
+
+    built.connect(left, right, lambda apart, rate: [0.0, 0.0, moment(apart[2], rate[2]) / track])
+    if (bar.body, "rx") in built.places:
+        node, index = built.places[bar.body, "rx"]
+        still = built.mbs.AddMarker(items.MarkerNodeCoordinate(
+            nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
+        rolling = built.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=index))
+        built.mbs.AddObject(items.CoordinateSpringDamper(
+            markerNumbers=[still, rolling], springForceUserFunction=on_body))  # fmt: skip
+        built.callbacks += 1
+
+
+def _tyre(built: Build, tyre: Tyre, wheel: int, road: RoadTable) -> None:
+    """A spring-damper to the flat ground, and what the road adds as a load."""
+    marker, held = built.marker(tyre.body, tyre.point), built.held.tyres[tyre.name]
+    sunk = held / tyre.stiffness if tyre.stiffness else 0.0
+    built.mbs.AddObject(items.CartesianSpringDamper(
+        markerNumbers=[built.marker(None, tyre.point), marker], stiffness=[0, 0, tyre.stiffness],
+        damping=[0, 0, tyre.damping], offset=[0, 0, sunk]))  # fmt: skip
+    k, c = tyre.stiffness, tyre.damping
+
+    def lift(mbs: Any, t: float, load: Any) -> Any:
+        return [0.0, 0.0, road.force(wheel, k, c, t)]
+
+    built.mbs.AddLoad(items.LoadForceVector(markerNumber=marker, loadVectorUserFunction=lift))
+    built.callbacks += 1
+
+
+def _side_force(built: Build, force: SideForce, speed: float) -> None:
+    roll, yaw = (built.reader(force.chassis, freedom) for freedom in ("rx", "rz"))
+
+    def law(apart: Any, rate: Any) -> list[float]:
+        return [0.0, force.stiffness * (rate[1] / speed - force.roll_steer * roll() - yaw()), 0.0]
+
+    built.connect(built.marker(None, force.point), built.marker(force.body, force.point), law)
+
+
+def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadTable) -> Build:
+    """The vehicle in a system of its own, which is not assembled yet: sensors may follow."""
+    mbs = exu.SystemContainer().AddSystem()
+    built = Build(vehicle, mbs, preloads(vehicle), mbs.AddObject(items.ObjectGround()))
+    for bodies in _trees(vehicle):
+        _tree(built, bodies)
+    for spring in vehicle.springs:
+        _spring(built, spring)
+    for bar in vehicle.bars:
+        _bar(built, bar)
+    for wheel, tyre in enumerate(vehicle.tyres):
+        _tyre(built, tyre, wheel, road)
+    for force in vehicle.side_forces:
+        _side_force(built, force, float(speed or 0.0))
+    for drag in vehicle.drags:
+        centre = vehicle.body(drag.body).position
+        built.mbs.AddObject(items.CartesianSpringDamper(
+            markerNumbers=[built.marker(None, centre), built.marker(drag.body, centre)],
+            damping=[drag.coefficient * float(speed or 0.0), 0, 0]))  # fmt: skip
+    for output in vehicle.outputs:
+        if isinstance(output, PointOutput | TurnOutput):
+            built.marker(output.body, getattr(output, "point", vehicle.body(output.body).position))
+    return built
