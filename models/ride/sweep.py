@@ -42,9 +42,9 @@ class Sweep:
         return self.deviation[self.cases.index(case), :, self.outputs.index(output)]
 
 
-def sweep(vehicle: Callable[[float], LinearVehicle], excitations: Mapping[str, Excitation], speeds: Sequence[float] | np.ndarray,
-          filters: Mapping[str, str] | None = None, accuracy: float = ACCURACY,
-          fast: bool = True) -> Sweep:  # fmt: skip
+def sweep(vehicle: Callable[[float], LinearVehicle], excitations: Mapping[str, Excitation],
+          speeds: Sequence[float] | np.ndarray, filters: Mapping[str, str] | None = None,
+          accuracy: float = ACCURACY, fast: bool = True) -> Sweep:  # fmt: skip
     """Stationary variances of a vehicle, given as a function of the speed (m/s), on each road at each speed.
 
     filters : weightings by output, as ``weighted`` takes them. fast : False sends every point the direct way.
