@@ -75,7 +75,7 @@ def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     groups: list[tuple[list[str], np.ndarray]] = []
     for name, values in curves.items():
         for names, known in groups:
-            if np.allclose(values, known, rtol=1e-6, equal_nan=True):
+            if np.allclose(values, known, rtol=1e-6, atol=1e-6 * np.nanmax(known), equal_nan=True):
                 names.append(name)
                 break
         else:

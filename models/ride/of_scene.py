@@ -11,6 +11,7 @@ from models.ride.scene import RideScene
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad, excitation, half_track, on_track, road_of_level
 from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 
 GRAVITY = 9.81
@@ -28,27 +29,15 @@ def vehicle_of(scene: RideScene) -> SpatialVehicle:
 
 
 def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear:
-    """The vehicle at a speed (m/s), linearised by an engine or from its equations; once, if no speed enters."""
-    fixed = not (vehicle.side_forces or vehicle.drags)
-    known: dict[float, LinearVehicle] = {}
+    """The vehicle at a speed (m/s), linearised by an engine or from its equations."""
+    if engine != "reference":
+        from models.engines.spatial_speeds import at_speeds
 
-    def at(speed: float) -> LinearVehicle:
-        key = 0.0 if fixed else speed
-        if key not in known:
-            known[key] = _linearised(vehicle, engine, speed)
-        return known[key]
-
-    return at
-
-
-def _linearised(vehicle: SpatialVehicle, engine: str, speed: float) -> LinearVehicle:
-    if engine == "reference":
-        from models.vehicles.spatial_linear import linearise
-
-        return linearise(vehicle, speed)
-    from models.engines.spatial_protocol import build
-
-    return build(engine, vehicle, speed=speed).linearise()
+        return at_speeds(engine, vehicle)
+    if vehicle.side_forces or vehicle.drags:
+        return lambda speed: linearise(vehicle, speed)
+    only = linearise(vehicle)
+    return lambda speed: only
 
 
 def road_of(scene: RideScene, wheels: tuple[Wheel, ...]) -> TwoTrackRoad:
