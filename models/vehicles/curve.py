@@ -1,6 +1,7 @@
 """A force given as a curve through points: a digressive damper, a bump stop, an asymmetric strut."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,12 @@ class Curve:
         if self.arguments[at] == 0.0 and at > 0:
             return 0.5 * (slopes[at - 1] + slopes[at])
         return slopes[at]
+
+    def hinges(self) -> tuple[float, float, tuple[float, ...], tuple[float, ...]]:
+        """Offset (N), first slope, corners and bends of force = offset + slope x + sum of bend max(x - corner, 0)."""
+        slopes, x = self._slopes(), self.arguments
+        bends = tuple(after - before for before, after in pairwise(slopes))
+        return self.forces[0] - slopes[0] * x[0], slopes[0], x[1:-1], bends
 
     def _slopes(self) -> list[float]:
         x, f = self.arguments, self.forces

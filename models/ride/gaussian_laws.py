@@ -1,0 +1,82 @@
+"""Mean force and best linear gain of a bent law whose argument is a Gaussian process.
+
+Of all lines through the mean, F = E[f(x)] + g (x - E[x]) misses f(x) least in the mean square if
+
+    g = E[f(x) (x - E[x])] / var x = E[f'(x)],
+
+the second by Gauss's own integral by parts. For a law straight between its corners both are sums over the corners of
+the normal density and distribution; for dry friction, which has no corners, an integral.
+"""
+
+import numpy as np
+from scipy.special import ndtr
+
+from models.vehicles.curve import Curve
+from models.vehicles.spatial import SpringDamper
+
+NODES = np.linspace(-1.0, 1.0, 801)
+"""Of the trapezoidal rule, which converges geometrically for smooth integrands that vanish at both ends."""
+WIDE, TALL = 20.0, 9.0
+"""Where it ends: sech^2 is 4 e^-40 there, the normal density e^-40."""
+
+
+def of_curve(curve: Curve | None, mean: float, deviation: float) -> tuple[float, float]:
+    """E[f(x)] (N) and E[f'(x)] (N by the unit of x) of a curve, x normal; no curve gives zeros."""
+    if curve is None:
+        return 0.0, 0.0
+    if deviation == 0.0:
+        return curve(mean), curve.slope_at_rest() if mean == 0.0 else _slope(curve, mean)
+    offset, slope, corners, bends = curve.hinges()
+    bent, above = np.array(bends), (mean - np.array(corners)) / deviation
+    density = np.exp(-(above**2) / 2.0) / np.sqrt(2.0 * np.pi)
+    beyond = deviation * (density + above * ndtr(above))  # mean of max(x - corner, 0)
+    return offset + slope * mean + float(bent @ beyond), slope + float(bent @ ndtr(above))
+
+
+def _slope(curve: Curve, at: float) -> float:
+    """Slope away from rest, to the right of a corner."""
+    _, slope, corners, bends = curve.hinges()
+    return slope + sum(bend for corner, bend in zip(corners, bends, strict=True) if at >= corner)
+
+
+def of_friction(friction: float, friction_rate: float, deviation: float) -> float:
+    """E[f'(v)] (N s/m) of f(v) = friction tanh(v / friction_rate), v normal with mean 0 and this deviation (m/s).
+
+    With t = v / friction_rate the integrand sech^2(t) times the density of t is smooth at any ratio of the two.
+    """
+    ratio = deviation / friction_rate
+    if ratio == 0.0:
+        return friction / friction_rate
+    t = min(WIDE, TALL * ratio) * NODES
+    density = np.exp(-((t / ratio) ** 2) / 2.0) / (np.sqrt(2.0 * np.pi) * ratio)
+    return friction / friction_rate * float((density / np.cosh(t) ** 2).sum() * (t[1] - t[0]))
+
+
+def of_travel(spring: SpringDamper, mean: float, deviation: float) -> tuple[float, float, float]:
+    """Mean force (N), gain (N/m) and variance (N^2) that the gain leaves out, of the curve over travel (m)."""
+    force, gain = of_curve(spring.travel_force, mean, deviation)
+    x = deviation * POINTS
+    law = _at(spring.travel_force, mean + x)
+    return force, gain, float(WEIGHTS @ (law - force - gain * x) ** 2)
+
+
+def of_rate(spring: SpringDamper, deviation: float) -> tuple[float, float, float]:
+    """Mean force (N), gain (N s/m) and variance (N^2) left out, of curve and friction over the rate (m/s)."""
+    force, gain = of_curve(spring.rate_force, 0.0, deviation)
+    gain += of_friction(spring.friction, spring.friction_rate, deviation)
+    x = deviation * POINTS
+    law = _at(spring.rate_force, x) + spring.friction * np.tanh(x / spring.friction_rate)
+    return force, gain, float(WEIGHTS @ (law - force - gain * x) ** 2)
+
+
+POINTS = np.linspace(-8.0, 8.0, 2001)
+WEIGHTS = np.exp(-(POINTS**2) / 2.0) / np.exp(-(POINTS**2) / 2.0).sum()
+"""Of expectations over the normal distribution: good to 1e-4 for laws with corners, enough for what is left out."""
+
+
+def _at(curve: Curve | None, x: np.ndarray) -> np.ndarray:
+    """The curve at many arguments."""
+    if curve is None:
+        return np.zeros_like(x)
+    offset, slope, corners, bends = curve.hinges()
+    return offset + slope * x + np.maximum(x[:, None] - np.array(corners), 0.0) @ np.array(bends)

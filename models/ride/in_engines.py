@@ -1,0 +1,73 @@
+"""A vehicle on a random road in time, in both engines: everything nonlinear, gravity where the vehicle has it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.engines.protocol import Settings
+from models.engines.spatial_protocol import INTEGRATORS, SpatialRun, build
+from models.errors import Refused
+from models.ride.linear_vehicle import Output
+from models.ride.road_path import RoadPath
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import linearise
+
+
+@dataclass(frozen=True)
+class Ride:
+    """A run: states at every step, and outputs (m, p) at ``times`` (m,) in s, counted from the first one.
+
+    Outputs are read by the rows of ``spatial_linear`` from the engine's own positions, rates and accelerations; those
+    of small motion, which a ride is. The force of a bent spring is no linear function of them: it is left nan.
+    """
+
+    names: tuple[str, ...]
+    run: SpatialRun
+    times: np.ndarray
+    outputs: np.ndarray
+
+    @property
+    def interval(self) -> float:
+        """Time (s) from one row of outputs to the next."""
+        return float(self.times[1] - self.times[0])
+
+
+def ridden(engine: str, vehicle: SpatialVehicle, road: RoadPath, duration: float, *, seed: int = 0, path: int = 0,
+           skipped: float = 0.0, every: int = 1) -> Ride:  # fmt: skip
+    """Drive over a road from rest for about ``duration`` (s); outputs ``every`` so many steps after ``skipped`` (s).
+
+    Raises Refused for damped tyres on a road whose heights have no rates.
+    """
+    if not road.has_rates and any(tyre.damping for tyre in vehicle.tyres):
+        raise Refused(engine, "damped tyres ask for the road's rate, which is white noise here: give the road a cutoff")
+    steps = int(np.ceil(duration / road.step))
+    table = road.table(steps, seed, path)
+    settings = Settings(INTEGRATORS[engine], road.step, steps * road.step)
+    model = build(engine, vehicle, settings, road.speed, table)
+    zero = np.zeros(len(vehicle.coordinates()))
+    run = model.run(zero, zero)
+    own = linearise(vehicle, road.speed).outputs
+    at = np.arange(int(np.ceil(skipped / road.step)), steps + 1, every)
+    states = [(run.positions[i], run.rates[i], table[2 * i]) for i in at]
+    accelerations = np.array([model.acceleration(*state) for state in states])
+    rows = np.column_stack([accelerations, run.rates[at], run.positions[at], table[2 * at]])
+    outputs = rows @ np.array([_row(output) for output in own]).T
+    for i, spec in enumerate(vehicle.outputs):
+        if spec.kind == "force" and _bent(vehicle, spec.part):
+            outputs[:, i] = np.nan
+    return Ride(tuple(output.name for output in own), run, at * road.step - at[0] * road.step, outputs)
+
+
+def _row(output: Output) -> np.ndarray:
+    return np.concatenate([output.acceleration, output.rate, output.displacement, output.road, output.road_rate])
+
+
+def _bent(vehicle: SpatialVehicle, part: str) -> bool:
+    return any(s.name == part and (s.travel_force or s.rate_force or s.friction) for s in vehicle.springs)
+
+
+def blocks(ride: Ride, length: float) -> np.ndarray:
+    """Outputs (blocks, samples, p) in blocks of ``length`` (s), what is left over at the end dropped."""
+    samples = max(1, round(length / ride.interval))
+    count = len(ride.outputs) // samples
+    return ride.outputs[: count * samples].reshape(count, samples, -1)

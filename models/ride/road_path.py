@@ -1,0 +1,109 @@
+"""The random road under all wheels in time, at equal half steps, for runs in time at a constant speed.
+
+From one half step to the next a shape filter moves by its exact transition and by noise of its exact covariance: the
+heights at the half steps are those of the road itself, whatever the step. An axle behind the first meets what that
+one met a whole number of half steps before.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg import block_diag, expm, solve_continuous_lyapunov
+
+from models.noise import ROAD, normal
+from models.ride.excitation import Excitation
+from models.ride.monte_carlo import path_cell
+
+
+@dataclass(frozen=True)
+class RoadPath:
+    """A road met at a constant ``speed`` (m/s) and read every ``half`` step (s)."""
+
+    excitation: Excitation
+    speed: float
+    half: float
+
+    @property
+    def step(self) -> float:
+        """Step (s) of a run that reads it."""
+        return 2.0 * self.half
+
+    @property
+    def has_rates(self) -> bool:
+        """Whether the heights have rates, as those of filters of second order: no noise reaches them at once."""
+        return not any((H @ self.excitation.G).any() for H in self.excitation.heights)
+
+    def table(self, steps: int, seed: int, path: int = 0) -> np.ndarray:
+        """Heights (m) under the wheels, then their rates (m/s), at every half step: (2 steps + 1, 2 w).
+
+        Rates that are white noise are left 0, which is right for tyres without damping only.
+        """
+        return next(self.blocks(steps, 1, seed, path))[:, :, 0]
+
+    def blocks(self, steps: int, copies: int, seed: int, path: int = 0) -> Iterator[np.ndarray]:
+        """Roads (2 steps + 1, 2 w, copies) under as many copies, without end; each begins where the last one ended.
+
+        The first begins in the road's stationary state, or at 0 where it has none; they draw the noise paths ``path``,
+        ``path`` + 1 and so on.
+        """
+        F, G, heights = _axles(self.excitation)
+        move, root = _over(F, G, self.speed * self.half)
+        lags = np.rint(np.array(self.excitation.lengths) / (self.speed * self.half)).astype(int)
+        lags = 0 * lags if self.excitation.independent else lags
+        met = np.empty((0, len(F), copies))
+        while True:
+            fresh = 2 * steps + (0 if len(met) else 1 + max(lags))
+            own = normal(seed, path, fresh * copies, len(F), source=ROAD).reshape(fresh, copies, -1)
+            own = np.concatenate([met[-1:] if len(met) else _start(F, G) @ own[:1].mT, root @ own[len(met) == 0 :].mT])
+            for before, after in pairwise(own):
+                after += move @ before
+            met = np.concatenate([met[:-1], own])
+            yield self._under(F, heights, met, lags, 2 * steps + 1)
+            met, path = met[2 * steps :], path + 1
+
+    def _under(self, F: np.ndarray, heights: Sequence[np.ndarray], met: np.ndarray, lags: np.ndarray,
+               count: int) -> np.ndarray:  # fmt: skip
+        """Heights and rates (count, 2 w, copies) of what the filters met, every axle after its lag."""
+        out = np.zeros((count, 2 * len(heights[0]), met.shape[2]))
+        for lag, H in zip(lags, heights, strict=True):
+            rates = self.speed * H @ F if self.has_rates else 0.0 * H
+            first = max(lags) - lag
+            out += np.vstack([H, rates]) @ met[first : first + count]
+        return out
+
+
+def road_path(excitation: Excitation, speed: float, longest: float) -> RoadPath:
+    """The road for runs at a step (s) of at most ``longest``, whose halves fit the distances of the axles."""
+    return RoadPath(excitation, speed, path_cell(excitation.lengths, speed * longest / 2.0)[0] / speed)
+
+
+def _axles(excitation: Excitation) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
+    """F, G and heights of all noise that there is: one filter, or one for each axle where they are independent."""
+    F, G, heights = excitation.F, excitation.G, excitation.heights
+    if not excitation.independent:
+        return F, G, heights
+    own = [np.hstack([H if i == j else 0.0 * H for j in range(len(heights))]) for i, H in enumerate(heights)]
+    return block_diag(*[F] * len(heights)), block_diag(*[G] * len(heights)), tuple(own)
+
+
+def _over(F: np.ndarray, G: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Transition over a length (m) of road and root of the covariance of the noise met there (van Loan)."""
+    m = len(F)
+    block = expm(length * np.block([[-F, G @ G.T], [np.zeros((m, m)), F.T]]))
+    move = block[m:, m:].T
+    return move, _root(move @ block[:m, m:])
+
+
+def _start(F: np.ndarray, G: np.ndarray) -> np.ndarray:
+    """Root of the stationary covariance; zeros if the road is a random walk."""
+    if np.linalg.eigvals(F).real.max() >= 0.0:
+        return np.zeros_like(F)
+    return _root(solve_continuous_lyapunov(F, -G @ G.T))
+
+
+def _root(P: np.ndarray) -> np.ndarray:
+    """S of S S' = P, P not negative up to rounding."""
+    values, vectors = np.linalg.eigh((P + P.T) / 2.0)
+    return vectors * np.sqrt(values.clip(0.0))
