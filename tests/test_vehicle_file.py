@@ -129,7 +129,7 @@ def test_shipped_vehicles():
     assert shipped() == ("half_car", "quarter_car", "quarter_car_nonlinear", "r19_free", "r19_ride", "seven_freedoms",
                          "three_axle_truck")  # fmt: skip
     sizes = [len(load_vehicle(name).coordinates()) for name in shipped()]
-    assert sizes == [4, 2, 19, 19, 7, 13]
+    assert sizes == [4, 2, 2, 19, 19, 7, 13]
 
 
 def test_a_file_of_ones_own(tmp_path):
