@@ -140,6 +140,13 @@ def test_a_free_heading_turns_into_a_lateral_walk():
     assert "standard deviation of 1.15e+04 after 100 s" in found.reason[0]
 
 
+def test_three_integrators_in_a_row_walk_with_the_fifth_power():
+    """The response t^2 / 2 to a unit of noise has the square integral t^5 / 20."""
+    found = stationary(system(np.eye(3, k=1), [np.array([[0.0], [0.0], [1.0]])]))
+    np.testing.assert_allclose(found.rate, [1 / 20, 1 / 3, 1.0])
+    assert tuple(found.power) == (5, 3, 1)
+
+
 def test_what_the_first_axle_starts_the_second_may_stop():
     """psi' = w(t) - w(t - tau) stays: variance tau; y' = v psi then walks by v tau; b' = -a b + w(t) goes with it."""
     v, tau, a = 20.0, 0.13, 2.0
@@ -151,6 +158,10 @@ def test_what_the_first_axle_starts_the_second_may_stop():
     assert (found.rate[0], found.power[0]) == (pytest.approx((v * tau) ** 2, rel=1e-9), 1)
     assert found.variance[1] == pytest.approx(tau, rel=1e-12)
     assert found.variance[2] == pytest.approx(tau + 1 / (2 * a) + 2 * (1 - np.exp(-a * tau)) / a, rel=1e-12)
+    put_back = np.array([[-v * tau], [-1.0], [0.0]])  # y returns to where it was: nothing is left of the first hit
+    stopped = stationary(system(A, [first, put_back], (0.0, tau), C))
+    assert stopped.status == (FINITE,) * 3
+    assert stopped.variance[0] == pytest.approx(v**2 * tau**3 / 3, rel=1e-12)
     apart = stationary(system(A, [first, second], (0.0, tau), C, independent=True))
     assert apart.status == (DIFFUSING,) * 3 and apart.rate[1] == pytest.approx(2.0)
 
