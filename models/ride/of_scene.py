@@ -66,13 +66,17 @@ def excitation_of(scene: RideScene, wheels: tuple[Wheel, ...], case: tuple[str, 
 
 
 def placed_wheels(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[Wheel, ...]:
-    """Where the wheels meet the road: at their own y, or all on the road's two tracks.
+    """Where the wheels meet the road: at their own y, or all in the tracks of the first axle's wheels.
 
     A vehicle without a width runs on one of the tracks where the road is given by their level.
     """
-    y = _half_track(scene, wheels)
     if not any(wheel.y for wheel in wheels):
-        return on_track(wheels, y) if scene.road.q_mean is None else wheels
-    if scene.road.wheels == "own":
-        return wheels
-    return tuple(replace(wheel, y=copysign(y, wheel.y) if wheel.y else 0.0) for wheel in wheels)
+        return on_track(wheels, _half_track(scene, wheels)) if scene.road.q_mean is None else wheels
+    return wheels if scene.road.wheels == "own" else in_tracks(wheels)
+
+
+def in_tracks(wheels: tuple[Wheel, ...]) -> tuple[Wheel, ...]:
+    """The wheels of every axle in the tracks of the first one, side by side: its outermost wheel leads."""
+    first = [wheel.y for wheel in wheels if wheel.axle == 0]
+    tracks = {1.0: max(first), -1.0: min(first)}
+    return tuple(replace(wheel, y=tracks[copysign(1.0, wheel.y)] if wheel.y else 0.0) for wheel in wheels)

@@ -37,7 +37,7 @@ class Road(Strict):
     half_track: float | None = quantity("m", "where the tracks have the level: half the front track", default=None)
     left_right: LeftRight = Field(default="modelled", description="how the tracks go together")
     front_rear: FrontRear = Field(default="delayed", description="how the axles' roads go together")
-    wheels: Places = Field(default="own", description="each wheel at its own y, or all on the two tracks")
+    wheels: Places = Field(default="own", description="each at its own y, or in the front wheels' tracks")
 
 
 class Speeds(Strict):
