@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
+from models.errors import InputError
 from models.ride.delayed_system import DelayedSystem
 from models.ride.marginal import ACCURACY, TOLD, Growth, Parts, growth, parts
 
@@ -29,7 +30,8 @@ class Covariance:
     P (n, n): covariance of the state, without motions that diffuse. Per output (p,): ``variance`` (unit^2), inf where
     there is none; ``status`` and a sentence on its ``reason``; ``rate`` and ``power`` of a variance that grows as
     rate * t^power (unit^2 / s^power). ``residual`` of the Lyapunov equation, relative to its largest term;
-    ``error`` (p,): relative change of each variance by the last refinement, which leaves less than that.
+    ``error`` (p,): relative change of each variance by the last refinement, which leaves less than that, and what
+    slow motions that count as free would change if they were not.
     """
 
     names: tuple[str, ...]
@@ -52,21 +54,25 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
     """Covariance of a system that meets unit white noise, axle after axle.
 
     ``accuracy`` of the system's matrices, relative: what is smaller counts as zero, so that free motions are found.
-    Raises Unstable, with growth rate and frequency, if the system leaves its equilibrium on its own.
+    Raises Unstable, with growth rate and frequency, if the system leaves its equilibrium on its own, and InputError
+    where a variance cannot be told to UNCERTAIN of itself.
     """
     B, D, delays = hits(system)
     split = parts(system.A, accuracy)
-    grown = growth(split, B, delays, system.C, system.independent, accuracy)
     P, correction, residual = _stable(split, B, delays, system.independent)
     V = split.V
     if split.marginal:
         P, correction, V = _with_marginal(split, B, delays, system.independent, P, correction)
     C = system.C @ V
     variance, change = _seen(C, P).clip(0.0), _seen(C, correction)
-    floor = SILENT * (abs(C) ** 2).max(axis=1) * abs(P).max()
+    floor = SILENT * (abs(C) ** 2).max(axis=1) * abs(P).max(initial=0.0)
+    grown = growth(split, B, delays, system.C, system.independent, variance + floor, accuracy)
     status, reason = verdicts(D, variance, floor, grown, float(np.linalg.norm(split.S)), accuracy, split)
     finite = np.array([found == FINITE for found in status])
-    error = np.divide(abs(change), variance, out=np.zeros(len(variance)), where=finite & (variance > 0))
+    error = np.divide(abs(change), variance, out=np.zeros(len(variance)), where=finite & (variance > floor))
+    error += split.neglected
+    if (error[finite] > UNCERTAIN).any():
+        _refuse(system.names[int(np.where(finite, error, 0.0).argmax())], float(error[finite].max()))
     V, P = V.astype(float), P.astype(float)
     return Covariance(system.names, V @ P @ V.T, np.where(finite, variance, np.inf), status, reason,
                       grown.rate, grown.power, residual, error)  # fmt: skip
@@ -113,18 +119,33 @@ def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, floa
     if len(A) == 0:
         return Q.astype(np.longdouble), Q.astype(np.longdouble), 0.0
     wide, right = A.astype(np.longdouble), ((Q + Q.T) / 2).astype(np.longdouble)
-    P = lyap(A, right.astype(float), method="scipy").astype(np.longdouble)
-    for _ in range(REFINEMENTS):
+    P = np.zeros_like(right)
+    for _ in range(1 + REFINEMENTS):
         half = wide @ P
         correction = lyap(A, (half + half.T + right).astype(float), method="scipy").astype(np.longdouble)
-        P = P + correction
+        P = P + (correction + correction.T) / 2  # rounding leaves it askew, and half + half.T takes it to be symmetric
+        if abs(correction).max() <= REFINED * abs(P).max():
+            break
     half = wide @ P
     left = abs(half + half.T + right).max(initial=0.0)
     return P, correction, float(left / max(abs(half).max(initial=0.0), np.finfo(float).tiny))
 
 
-REFINEMENTS = 1
-"""Corrections of the first solution: one is exact to double precision wherever the equation can be solved at all."""
+UNCERTAIN = 1e-6
+"""Relative error of a variance beyond which none is given."""
+
+
+def _refuse(name: str, error: float) -> None:
+    raise InputError(
+        "", f"output {name}", None, f"its variance would be known to {error:.1g} of itself only: the rates of the "
+        "vehicle's motions lie too many decades apart, or one hardly dies out; look for a stiffness, damping or mass "
+        "that is far off"
+    )  # fmt: skip
+
+
+REFINEMENTS, REFINED = 6, 1e-11
+"""Corrections of the first solution at most, and the size of the last by that of P: what is left is its square. One
+is enough but where a motion hardly dies out; each takes as many digits off the error as the first solution had."""
 
 
 def _with_marginal(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float], independent: bool, P: np.ndarray,

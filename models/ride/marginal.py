@@ -42,7 +42,8 @@ class Parts:
 
     M (k, k) has its eigenvalues on the imaginary axis, the first ``zeros`` of its rows those at 0 (nilpotent), the
     others undamped oscillations; S is stable. V and W are in extended precision.
-    scale (n,): sizes of the states that balance A; rounding is relative to them.
+    scale (n,): sizes of the states that balance A; rounding is relative to them. fastest: norm of A, 1/s.
+    neglected: largest rate that was taken for 0, by the slowest of the stable part.
     """
 
     M: np.ndarray
@@ -53,6 +54,8 @@ class Parts:
     W: np.ndarray
     zeros: int
     scale: np.ndarray
+    fastest: float
+    neglected: float
 
     @property
     def marginal(self) -> int:
@@ -65,9 +68,8 @@ def parts(A: np.ndarray, accuracy: float = ACCURACY) -> Parts:
 
     ``accuracy`` of A, relative to its norm once its states are scaled: what is smaller counts as zero.
     """
-    balanced, scale = _balanced(A)
-    norm = float(np.linalg.norm(balanced, 2))
-    V, form, zeros = _zeros_first(balanced, accuracy * norm)
+    balanced, scale, norm = _balanced(A)
+    V, form, zeros, left = _zeros_first(balanced, accuracy * norm)
     U, rest, undamped = _undamped_first(form[zeros:, zeros:], 10 * accuracy * norm)
     k = zeros + undamped
     V[:, zeros:] = V[:, zeros:] @ U
@@ -79,37 +81,44 @@ def parts(A: np.ndarray, accuracy: float = ACCURACY) -> Parts:
     S, T, back = _by_motions(form[k:, k:])
     stable = (V[:, k:] @ T, back @ W[k:]) if k else (T, back)
     return Parts(form[:k, :k], scale[:, None] * V[:, :k], W[:k] / scale, S, scale[:, None] * stable[0],
-                 stable[1] / scale, zeros, scale)  # fmt: skip
+                 stable[1] / scale, zeros, scale, norm, _by_slowest(left, rest[undamped:, undamped:]))  # fmt: skip
 
 
-def _balanced(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A in states of like size, and these sizes (n,).
+def _balanced(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """A in states of like size, these sizes (n,), and the norm of A as LAPACK balances it (1/s).
 
     LAPACK counts diagonals in: a road filter whose corner is almost 0 would get a size of almost 0, and beside its
     noise, which does not shrink, nothing could be told from rounding. The fastest rate on all diagonals prevents it.
     """
-    fastest = np.linalg.norm(matrix_balance(A, permute=False)[0], 2)
+    fastest = float(np.linalg.norm(matrix_balance(A, permute=False)[0], 2))
     _, (scale, _) = matrix_balance(A + fastest * np.eye(len(A)), permute=False, separate=True)
-    return A * scale / scale[:, None], scale
+    return A * scale / scale[:, None], scale, fastest
 
 
-def _zeros_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int]:
-    """Orthogonal Q, the form Q' A Q with its zero eigenvalues first, those strictly upper triangular, and their number.
+def _by_slowest(rate: float, S: np.ndarray) -> float:
+    return rate / float(-np.linalg.eigvals(S).real.max()) if len(S) else 0.0
+
+
+def _zeros_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int, float]:
+    """Orthogonal Q, the form Q' A Q with its zero eigenvalues first, those strictly upper triangular, their number,
+    and the largest singular value that was taken for 0.
 
     Null space, then null space of what remains, until nothing remains to be found: the staircase of Jordan chains.
     """
-    Q, form, found = np.eye(len(A)), A.copy(), 0
+    Q, form, found, left = np.eye(len(A)), A.copy(), 0, 0.0
     while found < len(A):
-        null = int(np.count_nonzero(svdvals(form[found:, found:]) <= tolerance))
+        small = [value for value in svdvals(form[found:, found:]) if value <= tolerance]
+        null = len(small)
         if null == 0:
             break
+        left = max(left, *small)
         turn = svd(form[found:, found:])[2][::-1].T  # null space first
         Q[:, found:] = Q[:, found:] @ turn
         form[:, found:] = form[:, found:] @ turn
         form[found:, found:] = turn.T @ form[found:, found:]
         form[found:, found : found + null] = 0.0
         found += null
-    return Q, form, found
+    return Q, form, found, left
 
 
 def _undamped_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int]:
@@ -175,11 +184,12 @@ class Growth:
 
 
 def growth(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float], C: np.ndarray, independent: bool,
-           accuracy: float = ACCURACY) -> Growth:  # fmt: skip
+           variance: np.ndarray, accuracy: float = ACCURACY) -> Growth:  # fmt: skip
     """What noise through B_i (n, k), delays tau_i (s), does to y = C x along the marginal motions.
 
     Axles that meet the same noise act as one input, the sum of e^(-M tau_i) W0 B_i: what the first one starts, the
-    last one may stop. C (p, n). Products no larger than TOLD times their accuracy are zero.
+    last one may stop. C (p, n). Products no larger than TOLD times their accuracy are zero, unless the motion, if it is
+    not free but dies out too slowly to tell, would still add to the ``variance`` (p,) of all others.
     """
     join = np.hstack if independent else sum
     carried = [np.eye(split.marginal) if independent else expm(-split.M * delay) for delay in delays]
@@ -190,20 +200,22 @@ def growth(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float], C: np
     seen = C @ split.V0
     seen_size = np.linalg.norm(C * split.scale, axis=1, keepdims=True) * np.ones(split.marginal)
     z, least = split.zeros, TOLD * accuracy
-    rate, power = _of_zeros(split.M[:z, :z], G[:z], G_size[:z], seen[:, :z], seen_size[:, :z], least)
-    swung = _of_undamped(split.M[z:, z:], G[z:], G_size[z:], seen[:, z:], seen_size[:, z:], least)
+    most = least * variance * 2 * accuracy * split.fastest
+    rate, power = _of_zeros(split.M[:z, :z], G[:z], G_size[:z], seen[:, :z], seen_size[:, :z], least, most)
+    swung = _of_undamped(split.M[z:, z:], G[z:], G_size[z:], seen[:, z:], seen_size[:, z:], least, most)
     rate = np.where(power <= 1, rate + swung, rate)
     return Growth(rate, np.where((power == 0) & (swung > 0), 1, power))
 
 
 def _of_zeros(N: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray, C_size: np.ndarray,
-              least: float) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Rates and powers (p,): h(t) = sum of C N^l G t^l / l!, whose highest power wins."""
+              least: float, most: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Rates and powers (p,): h(t) = sum of C N^l G t^l / l!, whose highest power wins; a rate above ``most`` counts."""
     rate, power = np.zeros(len(C)), np.zeros(len(C), int)
     step, step_size = G, G_size
     for level in range(len(N)):
         factor = C @ step / factorial(level)
         told = (abs(factor) * factorial(level) > least * (C_size @ step_size)).any(axis=1)
+        told |= (level == 0) & ((factor**2).sum(axis=1) > most)
         rate[told] = (factor[told] ** 2).sum(axis=1) / (2 * level + 1)
         power[told] = 2 * level + 1
         step, step_size = N @ step, abs(N) @ step_size
@@ -211,8 +223,8 @@ def _of_zeros(N: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray, C
 
 
 def _of_undamped(T: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray, C_size: np.ndarray,
-                 least: float) -> np.ndarray:  # fmt: skip
-    """Rates (p,): the mean square of the response C e^(T t) G, frequency by frequency."""
+                 least: float, most: np.ndarray) -> np.ndarray:  # fmt: skip
+    """Rates (p,): the mean square of the response C e^(T t) G, frequency by frequency; one above ``most`` counts."""
     rate = np.zeros(len(C))
     values, vectors = np.linalg.eig(T)
     right, left = C @ vectors, np.linalg.solve(vectors, G.astype(complex)) if len(T) else G
@@ -221,5 +233,6 @@ def _of_undamped(T: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray
         first = bool(same[: np.flatnonzero(values == value)[0]].any())
         amplitude = right[:, same] @ left[same]
         told = (abs(amplitude) > least * (C_size @ G_size)).any(axis=1)
+        told |= 2 * (abs(amplitude) ** 2).sum(axis=1) > most
         rate[told] += 0.0 if first else 2 * (abs(amplitude[told]) ** 2).sum(axis=1)
     return rate

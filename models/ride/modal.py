@@ -28,6 +28,11 @@ class Modes:
     inverse: np.ndarray
     condition: float
 
+    @property
+    def blurred(self) -> float:
+        """Relative rounding of the slowest decay: the fastest motion's, times the condition."""
+        return EPS * self.condition * float(abs(self.values).max(initial=0.0) / abs(self.values.real).min(initial=1.0))
+
 
 def modes(A: np.ndarray) -> Modes:
     """Eigenvalues and vectors of A (n, n), of every part that stands alone for itself: equal parts stay exact."""
@@ -46,6 +51,8 @@ def modes(A: np.ndarray) -> Modes:
 
 
 EPS = float(np.finfo(float).eps)
+BLURRED = 1e-11
+"""Largest relative rounding of the slowest decay with which the sums are still made."""
 
 
 class Shared:
@@ -92,6 +99,8 @@ def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, s
     values = [own.values, np.tile(speed * path.values, axles), behind.values]
     if max(each.real.max(initial=-np.inf) for each in values) > -1e-6:
         return "a motion does not die out"
+    if max(each.blurred for each in (own, path, behind)) > BLURRED:
+        return "rates lie too far apart"
     V, back = np.kron(np.eye(axles), path.V), np.kron(np.eye(axles), path.inverse)
     with np.errstate(divide="ignore", invalid="ignore"):
         met = _joined(own, A[:vehicle, vehicle:last] @ V, values[1])
