@@ -33,6 +33,9 @@ pytestmark = pytest.mark.usefixtures("empty_folder")
     ("ellipse.c=1e-3", ("ellipse.c", "unknown key", "a, b")),
     ("curvatures.A=1.0", ("curvatures.B", "is missing")),
     ("contact.load=-1", ("contact.load = -1", "above 0", "in N")),
+    ("contact.load=1e12", ("c.toml", "contact.load = 1000000000000.0", "at most 1e+10 N")),
+    ("contact.friction=30", ("contact.friction = 30", "at most 10")),
+    ("creepage.spin=-1e12", ("creepage.spin", "1e+09 1/m")),
     ("contact.approach=1e-4", ("contact.load = 80000.0", "either the load in N or contact.approach in m")),
     ("contact.frction=0.3", ("unknown key", "did you mean 'friction'?")),
     ("bodies.wheel.E=2.1e5", ("bodies.wheel", "E = 210000.0", "Young's modulus", "Pa")),
@@ -70,6 +73,9 @@ def test_keys_that_do_not_belong_together():
     assert "found none" in refused(ellipse=None)
     assert "in the file of cases" in refused(ellipse=None, cases={"file": "x.csv"})
     assert "needs an ellipse" in refused(ellipse=None, profiles={})
+    assert "no meaning for built-in profiles" in refused(ellipse=None, profiles={"smoothing": 0.01})
+    assert "profiles.gauge = 1435.0: must be from 0.1 to 3 m" in refused(ellipse=None, profiles={"gauge": 1435.0})
+    assert "profiles.inclination = 2.3" in refused(ellipse=None, profiles={"inclination": 2.3})
 
 
 def test_engines_are_refused_only_if_named(twinrig, capsys):

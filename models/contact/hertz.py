@@ -20,16 +20,12 @@ from typing import Any
 import numpy as np
 
 from models.compiled import njit
-from models.contact.inputs import Array, quantity, together
+from models.contact.inputs import LARGEST_APPROACH, LARGEST_LOAD, Array, quantity, together
 from models.contact.material import Pair
 from models.errors import InputError
 
 FLATTEST = 0.01
 """The larger curvature (1/m) of real bodies is not below this, a radius of 50 m: one in 1/mm usually is."""
-LARGEST_LOAD = 1e10
-"""N"""
-LARGEST_APPROACH = 0.05
-"""m: beyond it no contact is small against its body; an approach in mm often is."""
 LEAST_AXIS, LARGEST_AXIS = 1e-30, 1e3
 """m"""
 

@@ -8,6 +8,10 @@ import numpy as np
 from models.errors import InputError
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+LARGEST_LOAD = 1e10
+"""N"""
+LARGEST_APPROACH = 0.05
+"""m: beyond it no contact is small against its body; an approach in mm often is."""
 LARGEST_CREEPAGE = 10.0
 LARGEST_SPIN = 1e9
 """1/m"""
@@ -55,7 +59,8 @@ def creepages(xi_x: Any, xi_y: Any, spin: Any, read: Callable[..., Any] = quanti
 def together(**arrays: Array) -> tuple[Array, ...]:
     """The arrays broadcast to their common shape; raises InputError that names the shapes where there is none."""
     try:
-        return tuple(np.broadcast_arrays(*arrays.values()))
+        shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
+        return tuple(a if a.shape == shape else np.broadcast_to(a, shape).copy() for a in arrays.values())
     except ValueError:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise InputError("", ", ".join(arrays), None, f"have no common shape: {shapes}") from None

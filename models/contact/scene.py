@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from models.contact.falling_friction import Falling
+from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN
 from models.contact.material import STEEL, Material, Pair
 from models.errors import InputError
 from models.scene_file import SceneFile, checked
@@ -85,7 +86,7 @@ class Cases(Strict):
 class Contact(Strict):
     """[contact]: how hard the bodies press, and what friction there is."""
 
-    load: float | None = quantity("N", "normal load", default=None)
+    load: float | None = quantity("N", "normal load, on profiles the vertical one", default=None)
     approach: float | None = quantity("m", "approach of the bodies instead of a load", default=None)
     friction: float = quantity("", "coefficient of friction")
 
@@ -160,13 +161,17 @@ class ContactScene(SceneFile):
         """Name of the one table that says where the bodies touch."""
         return next(name for name in GEOMETRIES if getattr(self, name) is not None)
 
-    def cases_file(self) -> Path:
-        """The file of cases: beside the scene, or else in the folder in which the command runs."""
-        assert self.cases is not None
-        here = Path(self.cases.file)
+    def file_of(self, name: str, place: str) -> Path:
+        """A file that the scene names: beside the scene, or else in the folder in which the command runs."""
+        here = Path(name)
         if here.is_file() and not (Path(self.folder) / here).exists():
             return here
-        return self.path(str(here), "cases.file")
+        return self.path(name, place)
+
+    def cases_file(self) -> Path:
+        """The file of cases."""
+        assert self.cases is not None
+        return self.file_of(self.cases.file, "cases.file")
 
     @property
     def pair(self) -> Pair:
@@ -178,6 +183,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Co
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(ContactScene, table, file, folder)
     _check_geometry(scene)
+    _check_size(scene)
     _check_sweep(scene)
     _check_method(scene)
     _check_friction(scene)
@@ -192,11 +198,44 @@ def _check_geometry(scene: ContactScene) -> None:
         raise InputError(scene.file, "", None, allowed)
     if scene.radii is not None:
         scene.radii.curvatures(scene.file)
+    if scene.profiles is not None:
+        _check_profiles(scene.profiles, scene.file)
     _check_contact(scene)
+
+
+def _check_profiles(profiles: Profiles, file: str) -> None:
+    """A turned or mirrored rail, and a wheel in mm, are told as what they are."""
+    for key, least, most in (("inclination", -0.5, 0.5), ("radius", 0.02, 5.0), ("gauge", 0.1, 3.0),
+                             ("back_to_back", 0.1, 3.0), ("gauge_depth", 0.0, 0.1)):  # fmt: skip
+        value = getattr(profiles, key)
+        if not least <= value <= most:
+            unit = "rad" if key == "inclination" else "m"
+            raise InputError(file, f"profiles.{key}", value, f"must be from {least:g} to {most:g} {unit}")
+    if profiles.smoothing and "." not in profiles.wheel + profiles.rail:
+        raise InputError(file, "profiles.smoothing", profiles.smoothing, "has no meaning for built-in profiles")
 
 
 OF_CASES = ("contact", "creepage", "sweep")
 """Tables whose content every row of a table of cases has itself."""
+
+
+LARGEST = {"contact.load": LARGEST_LOAD, "contact.approach": LARGEST_APPROACH, "contact.friction": 10.0,
+           "creepage.xi_x": LARGEST_CREEPAGE, "creepage.xi_y": LARGEST_CREEPAGE,
+           "creepage.spin": LARGEST_SPIN}  # fmt: skip
+"""What the theories take, of either sign."""
+
+
+def _check_size(scene: ContactScene) -> None:
+    """The theories refuse what is larger, but know neither the file nor the key."""
+    for place, most in LARGEST.items():
+        table, key = place.split(".")
+        found = {place: getattr(getattr(scene, table), key, None)}
+        if scene.sweep is not None and scene.sweep.of == key:
+            found = {f"sweep.{end}": getattr(scene.sweep, end) for end in ("start", "stop")}
+        for where, value in found.items():
+            if value is not None and abs(value) > most:
+                unit = {"load": " N", "approach": " m", "spin": " 1/m"}.get(key, "")
+                raise InputError(scene.file, where, value, f"must be at most {most:g}{unit}, of either sign")
 
 
 def _check_contact(scene: ContactScene) -> None:
@@ -223,7 +262,8 @@ def _check_sweep(scene: ContactScene) -> None:
         raise InputError(scene.file, "sweep.spacing", sweep.spacing, allowed)
     if sweep.of in scene.creepage.model_fields_set:
         value = getattr(scene.creepage, sweep.of)
-        raise InputError(scene.file, f"creepage.{sweep.of}", value, "is swept: drop this key")
+        raise InputError(scene.file, f"creepage.{sweep.of}", value, "is swept: drop this key; on the command line "
+                         "give the whole table, as in --set creepage={xi_x=1e-3}")  # fmt: skip
 
 
 ON_PROFILES = ("simplified", "exact")

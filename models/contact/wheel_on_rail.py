@@ -153,8 +153,10 @@ def wheel_on_rail(wheel: Profile, rail: Profile, *, lateral_shift: float = 0.0, 
     quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
     quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
     side = Side(wheel, laid(rail, track), wheelset)
-    pose = _placed(side, lateral_shift, yaw)
-    return _touches(side, pose)
+    found = _touches(side, _placed(side, lateral_shift, yaw))
+    if not found:
+        raise InputError("", "lateral_shift", lateral_shift, "lets wheel and rail touch at the end of a profile only")
+    return found
 
 
 def laid(rail: Profile, track: Track) -> Profile:
