@@ -26,6 +26,10 @@ class Ride:
     times: np.ndarray
     outputs: np.ndarray
 
+    def of(self, name: str) -> np.ndarray:
+        """One output (m,)."""
+        return self.outputs[:, self.names.index(name)]
+
     @property
     def interval(self) -> float:
         """Time (s) from one row of outputs to the next."""
@@ -65,9 +69,3 @@ def _row(output: Output) -> np.ndarray:
 def _bent(vehicle: SpatialVehicle, part: str) -> bool:
     return any(s.name == part and (s.travel_force or s.rate_force or s.friction) for s in vehicle.springs)
 
-
-def blocks(ride: Ride, length: float) -> np.ndarray:
-    """Outputs (blocks, samples, p) in blocks of ``length`` (s), what is left over at the end dropped."""
-    samples = max(1, round(length / ride.interval))
-    count = len(ride.outputs) // samples
-    return ride.outputs[: count * samples].reshape(count, samples, -1)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.compiled import njit
 from models.ride.excitation import Excitation
 from models.ride.linear_vehicle import LinearVehicle
 from models.ride.road_path import road_path
@@ -17,10 +16,14 @@ from models.vehicles.curve import Curve
 from models.vehicles.spatial import PartOutput, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import Gains, linearise
 
-REACH = 0.25
+REACH = 0.5
 """Fastest rate of the vehicle with its springs as steep as they get, times the step, at most."""
 BLOCK = 200
 """Steps between two portions of road."""
+EVERY = 4
+"""Steps from one reading of the outputs to the next, which know of each other anyway."""
+POWERS = np.arange(1, 5)[:, None, None]
+"""Of the outputs that are averaged."""
 SETTLE = 9.0
 """Slowest rate times the time that copies, begun at rest, run before they count."""
 HELD = 1e-6
@@ -94,17 +97,19 @@ def copies_in_time(vehicle: SpatialVehicle, excitation: Excitation, speed: float
     slowest = own[own > HELD * own.max()].min()
     road = road_path(excitation, speed, longest or REACH / float(fastest))
     settling, counted = int(np.ceil(SETTLE / slowest / road.step)), int(np.ceil(duration / road.step))
-    laws = _laws(vehicle, plain, springs)
-    state, sums = np.zeros((copies, 2 * len(plain.mass))), np.zeros((4, copies, len(plain.outputs)))
-    done = 0
-    for portion in road.blocks(BLOCK, copies, seed):
-        steps = min(BLOCK, settling + counted - done)
-        met = np.ascontiguousarray(np.moveaxis(portion[: 2 * steps + 1], 2, 0))
-        _march(state, met, road.step, min(steps, max(0, settling - done)), sums, *laws)
-        done += steps
-        if done == settling + counted:
-            break
-    return Copies(tuple(o.name for o in plain.outputs), sums / counted, road.step, counted * road.step)
+    laws = _Laws(vehicle, plain, springs, speed)
+    x, sums, seen = np.zeros((2 * len(plain.mass), copies)), np.zeros((4, len(plain.outputs), copies)), 0
+    for number, portion in enumerate(road.blocks(BLOCK, copies, seed)):
+        for i in range(BLOCK):
+            if (done := number * BLOCK + i) == settling + counted:
+                return Copies(tuple(o.name for o in plain.outputs), sums.swapaxes(1, 2) / seen, road.step,
+                              counted * road.step)  # fmt: skip
+            rate, force = laws.rate(x, portion[2 * i])
+            if done >= settling and (done - settling) % EVERY == 0:
+                sums += laws.outputs(x, rate, portion[2 * i], force) ** POWERS
+                seen += 1
+            x = laws.stepped(x, rate, portion[2 * i + 1], portion[2 * i + 2], road.step)
+    raise AssertionError("roads have no end")
 
 
 def _rates(linear: LinearVehicle) -> np.ndarray:
@@ -127,97 +132,60 @@ def _slopes(curve: Curve | None) -> np.ndarray:
     return slope + np.cumsum([0.0, *bends])
 
 
-def _laws(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[SpringDamper, ...]) -> tuple[np.ndarray, ...]:
-    """What the march wants: accelerations by state, road and bent forces, travels, laws, outputs."""
-    n = len(plain.mass)
-    watched = replace(vehicle, outputs=tuple(PartOutput(s.name, "travel", s.name) for s in springs))
-    speed = 1.0  # travels do not depend on it
-    rows = np.array([o.displacement for o in linearise(watched, speed).outputs]).reshape(-1, n)
-    by_state = np.linalg.solve(plain.mass, np.hstack([-plain.stiffness, -plain.damping]))
-    by_road = np.linalg.solve(plain.mass, np.hstack([plain.road_stiffness, plain.road_damping]))
-    outputs = np.array([np.concatenate([o.displacement, o.rate, o.acceleration, o.road, o.road_rate])
-                        for o in plain.outputs])  # fmt: skip
-    read = np.array([[float(isinstance(o, PartOutput) and o.kind == "force" and o.part == s.name) for s in springs]
-                     for o in vehicle.outputs]).reshape(len(plain.outputs), -1)  # fmt: skip
-    friction = np.array([(s.friction, s.friction_rate) for s in springs]).reshape(-1, 2)
-    travel, rate = (_hinges([getattr(s, name) for s in springs]) for name in ("travel_force", "rate_force"))
-    return (by_state, by_road, np.linalg.solve(plain.mass, -rows.T), rows, travel, rate, friction,
-            np.hstack([outputs, read]))  # fmt: skip
+class _Laws:
+    """Motion of many copies at once; states (2 n, copies) are positions, then rates."""
+
+    def __init__(self, vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[SpringDamper, ...],
+                 speed: float) -> None:  # fmt: skip
+        n = len(plain.mass)
+        watched = replace(vehicle, outputs=tuple(PartOutput(s.name, "travel", s.name) for s in springs))
+        self.rows = np.array([o.displacement for o in linearise(watched, speed).outputs]).reshape(-1, n)
+        forced = (-plain.stiffness, -plain.damping, plain.road_stiffness, plain.road_damping, -self.rows.T)
+        self.motion = np.linalg.solve(plain.mass, np.hstack(forced))
+        read = np.array([[float(isinstance(o, PartOutput) and o.kind == "force" and o.part == s.name) for s in springs]
+                         for o in vehicle.outputs]).reshape(len(plain.outputs), -1)  # fmt: skip
+        self.read = np.hstack([[np.concatenate([o.displacement, o.rate, o.road, o.road_rate, o.acceleration])
+                                for o in plain.outputs], read])  # fmt: skip
+        self.by_travel = _Hinges([s.travel_force for s in springs])
+        self.by_rate = _Hinges([s.rate_force for s in springs])
+        self.friction, self.friction_rate = np.array([(s.friction, s.friction_rate) for s in springs]).reshape(-1, 2).T
+
+    def rate(self, x: np.ndarray, road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rates (2 n, copies) of the state on a road (2 w, copies), and the bent forces (springs, copies), N."""
+        q, v = x[: len(x) // 2], x[len(x) // 2 :]
+        slip = self.rows @ v
+        force = self.by_travel(self.rows @ q) + self.by_rate(slip)
+        if self.friction.any():
+            force += self.friction[:, None] * np.tanh(slip / self.friction_rate[:, None])
+        return np.concatenate([v, self.motion @ np.concatenate([x, road, force])]), force
+
+    def stepped(self, x: np.ndarray, k1: np.ndarray, half: np.ndarray, whole: np.ndarray, h: float) -> np.ndarray:
+        """The state after a step h (s) of the classical Runge-Kutta method with the road at its half and its end."""
+        k2 = self.rate(x + h / 2 * k1, half)[0]
+        k3 = self.rate(x + h / 2 * k2, half)[0]
+        k4 = self.rate(x + h * k3, whole)[0]
+        return np.asarray(x + h / 6 * (k1 + 2 * (k2 + k3) + k4))
+
+    def outputs(self, x: np.ndarray, rate: np.ndarray, road: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Outputs (p, copies)."""
+        return np.asarray(self.read @ np.concatenate([x, road, rate[len(x) // 2 :], force]))
 
 
-def _hinges(curves: list[Curve | None]) -> np.ndarray:
-    """Offset, first slope, then corners and bends in turn (springs, 2 + 2 corners), filled up with bends of 0."""
-    known = [curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in curves]
-    out = np.zeros((len(curves), 2 + 2 * max((len(corners) for _, _, corners, _ in known), default=0)))
-    for row, (offset, slope, corners, bends) in zip(out, known, strict=True):
-        row[:2] = offset, slope
-        row[2 : 2 + 2 * len(corners)] = np.column_stack([corners, bends]).ravel()
-    return out
+class _Hinges:
+    """Curves as offset, first slope, corners and bends, filled up with bends of 0."""
 
+    def __init__(self, curves: list[Curve | None]) -> None:
+        known = [curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in curves]
+        most = max((len(corners) for _, _, corners, _ in known), default=0)
+        self.offset, self.slope = np.zeros((2, len(known), 1))
+        self.corners, self.bends = np.zeros((2, most, len(known), 1))
+        for i, (offset, slope, corners, bends) in enumerate(known):
+            self.offset[i], self.slope[i] = offset, slope
+            self.corners[: len(corners), i, 0], self.bends[: len(bends), i, 0] = corners, bends
 
-@njit(cache=True, error_model="numpy")
-def _law(hinges, x):
-    """Force of a curve in the form of ``_hinges``."""
-    force = hinges[0] + hinges[1] * x
-    for i in range(2, len(hinges), 2):
-        force += hinges[i + 1] * max(x - hinges[i], 0.0)
-    return force
-
-
-@njit(cache=True, error_model="numpy")
-def _accelerate(x, road, by_state, by_road, by_force, rows, travel, rate, friction, force, out):
-    """Rates (2 n,) of the state x = (q, q') into ``out``, bent forces (springs,) into ``force``."""
-    n = len(x) // 2
-    for s in range(len(force)):
-        d, v = 0.0, 0.0
-        for j in range(n):
-            d += rows[s, j] * x[j]
-            v += rows[s, j] * x[n + j]
-        force[s] = _law(travel[s], d) + _law(rate[s], v)
-        if friction[s, 0] != 0.0:
-            force[s] += friction[s, 0] * np.tanh(v / friction[s, 1])
-    for i in range(n):
-        a = 0.0
-        for j in range(2 * n):
-            a += by_state[i, j] * x[j]
-        for j in range(len(road)):
-            a += by_road[i, j] * road[j]
-        for s in range(len(force)):
-            a += by_force[i, s] * force[s]
-        out[i], out[n + i] = x[n + i], a
-
-
-@njit(cache=True, error_model="numpy")
-def _march(state, met, h, skipped, sums, by_state, by_road, by_force, rows, travel, rate, friction, outputs):
-    """Move every copy along its road ``met`` (copies, 2 steps + 1, 2 w); add powers of outputs after ``skipped``."""
-    size, n, count, wheels = state.shape[1], state.shape[1] // 2, len(rows), met.shape[2]
-    k1, k2, k3, k4, at = np.empty(size), np.empty(size), np.empty(size), np.empty(size), np.empty(size)
-    force, unused, seen = np.empty(count), np.empty(count), np.empty(outputs.shape[1])
-    for c in range(len(state)):
-        x = state[c]
-        for step in range(met.shape[1] // 2):
-            road = met[c, 2 * step]
-            _accelerate(x, road, by_state, by_road, by_force, rows, travel, rate, friction, force, k1)
-            if step >= skipped:
-                seen[:size], seen[size : size + n], seen[size + n : size + n + wheels] = x, k1[n:], road
-                seen[size + n + wheels :] = force
-                for p in range(len(outputs)):
-                    y = 0.0
-                    for j in range(len(seen)):
-                        y += outputs[p, j] * seen[j]
-                    sums[0, c, p] += y
-                    sums[1, c, p] += y**2
-                    sums[2, c, p] += y**3
-                    sums[3, c, p] += y**4
-            half = met[c, 2 * step + 1]
-            for j in range(size):
-                at[j] = x[j] + h / 2 * k1[j]
-            _accelerate(at, half, by_state, by_road, by_force, rows, travel, rate, friction, unused, k2)
-            for j in range(size):
-                at[j] = x[j] + h / 2 * k2[j]
-            _accelerate(at, half, by_state, by_road, by_force, rows, travel, rate, friction, unused, k3)
-            for j in range(size):
-                at[j] = x[j] + h * k3[j]
-            _accelerate(at, met[c, 2 * step + 2], by_state, by_road, by_force, rows, travel, rate, friction, unused, k4)
-            for j in range(size):
-                x[j] += h / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j])
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        """Forces (springs, copies) at arguments of this shape."""
+        force = self.offset + self.slope * x
+        for corner, bend in zip(self.corners, self.bends, strict=True):
+            force += bend * np.maximum(x - corner, 0.0)
+        return np.asarray(force)
