@@ -14,6 +14,8 @@ from scipy.special import eval_legendre, spherical_jn
 
 from models.ride.excitation import Excitation
 from models.ride.linear_vehicle import LinearVehicle
+from models.ride.marginal import Unstable
+from models.ride.operating_point import poles
 
 POINTS = 16
 """Gauss points of a panel."""
@@ -24,6 +26,8 @@ TOLERANCE = 1e-11
 """A panel is halved while that changes any variance by more than this share; PANELS at most in all."""
 PANELS = 1500
 EPS = float(np.finfo(float).eps)
+GROWING = 1e-6
+"""Share of the fastest rate: a Jordan pair of zeros comes out at the root of rounding."""
 SILENT = 1e-24
 """Share of its terms' squares below which an output is zero by symmetry, and rounding is all of it."""
 
@@ -89,8 +93,10 @@ def quadrature(vehicle: LinearVehicle, excitation: Excitation, speed: float,
     """Variances as integrals over all frequencies, weighted outputs in place of their own; inf where one diverges.
 
     The error holds what halving the panels changes, the tail beyond the last one, and what a last digit of the
-    stiffness changes: that is much for places of a vehicle that is free to drive away.
+    stiffness changes: that is much for places of a vehicle that is free to drive away. Raises Unstable: an integral
+    over frequencies is finite then, and means nothing.
     """
+    _check_stable(vehicle)
 
     def over(edges: np.ndarray, vehicle: LinearVehicle = vehicle) -> np.ndarray:
         """Shares (panels, p) of the variances between the two frequencies of each row."""
@@ -114,6 +120,14 @@ def quadrature(vehicle: LinearVehicle, excitation: Excitation, speed: float,
     known = np.divide(error, variance, out=np.zeros(len(total)), where=variance > 0)
     diverges = (abs(first[[0, -1]]) > 0.1 * total).any(axis=0)
     return Quadrature(np.where(diverges, np.inf, variance), known, taken * POINTS)
+
+
+def _check_stable(vehicle: LinearVehicle) -> None:
+    """Raise Unstable for a motion that grows faster than rounding makes a free one grow."""
+    own = poles(vehicle)
+    worst = own[own.real.argmax()]
+    if worst.real > GROWING * abs(own).max():
+        raise Unstable(worst.real, abs(worst.imag) / (2 * np.pi))
 
 
 def _halved(over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, whole: np.ndarray,

@@ -33,6 +33,8 @@ REACH = 2.0
 """Fastest rate of vehicle or road times the cell, at most."""
 TERMS = 30
 """Of the series in powers of a cell's matrix: 2^30 / 30! = 4e-24."""
+STEADY = 1e-6
+"""Rate (1/s) below which a motion does not die out in any run."""
 FORGOTTEN = 9.0
 """Slowest rate times the time that copies, begun at zero, run before they count: e^-18 of a variance is missing."""
 TOLERANCE = 1e-3
@@ -154,6 +156,9 @@ class _Cells:
     def to_forget(self, speed: float) -> int:
         """Cells at a constant speed after which a copy has forgotten its beginning."""
         slowest = -np.linalg.eigvals(self.at_rest + speed * self.per_speed).real.max()
+        if slowest < STEADY:
+            said = "has a motion that does not die out: a copy never forgets its beginning"
+            raise InputError("", "vehicle", None, said)
         return int(np.ceil(FORGOTTEN / slowest * speed / self.length))
 
     def states(self, durations: np.ndarray, copies: int, seed: int) -> Iterator[np.ndarray]:

@@ -226,7 +226,9 @@ def _met_before(form: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
     """Responses (n, q, k) of a vehicle at rest to noise that the axle met ``behind`` (m) its place, long ago."""
     F, G = form.excitation.F, form.excitation.G
     road = np.array([expm(F * distance) @ G for distance in behind]).reshape(-1, *G.shape)
-    _, axles, m = form.inputs.shape
+    n, axles, m = form.inputs.shape
+    if not len(behind):
+        return np.zeros((n + axles * m, 0, G.shape[1]))  # of a vehicle that may know no rest
     own = np.zeros((axles * m, len(behind), G.shape[1]))
     own[axle * m : (axle + 1) * m] = road.transpose(1, 0, 2)
     return np.tensordot(_rest(form), own, 1)
