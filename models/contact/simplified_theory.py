@@ -71,9 +71,9 @@ class Options:
 
     net : meshes of the crude net along each axis. shape : of the pressure over the depth: "parabolic", proportional to
     d - h as the paper has it, or "elliptic", proportional to its root as in Hertz's contact. The latter is nearer to
-    the half-space in area, peak pressure and forces, so it is what is used where nothing else is said. fit : least
-    squares of the displacement or of its gradient, which is what rolling feels. separate : a net and constants for
-    each patch, or one for all.
+    the half-space in area and forces, on ellipses in the peak pressure too, so it is what is used where nothing else
+    is said. fit : least squares of the displacement or of its gradient, which is what rolling feels. separate : a net
+    and constants for each patch, or one for all.
     """
 
     net: int = NET

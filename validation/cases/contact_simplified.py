@@ -284,9 +284,10 @@ def _said(shapes: dict[str, dict[str, Any]]) -> str:
         return f"{scale * np.nanmean([abs(case['ways'][way][key]) for case in shapes.values()]):.1f} %"
 
     apart = shapes["two patches"]["ways"]
-    return (f"In the mean, Hertz's profile of the pressure instead of the paper's brings the area from "
-            f"{mean('paper', 'area')} to {mean('elliptic', 'area')} and the peak from {mean('paper', 'peak')} to "
-            f"{mean('elliptic', 'peak')}, the force from {mean('paper', 'force')} to {mean('elliptic', 'force')}. "
+    return (f"Mean errors over all shapes: Hertz's profile of the pressure instead of the paper's makes "
+            f"{mean('elliptic', 'area')} of {mean('paper', 'area')} in the area, {mean('elliptic', 'force')} of "
+            f"{mean('paper', 'force')} in the force and {mean('elliptic', 'peak')} of {mean('paper', 'peak')} in the "
+            "peak, which is nearer on ellipses and farther where there are several valleys. "
             f"Fitting the gradient changes the force to {mean('elliptic, gradient', 'force')} and the approach from "
             f"{mean('elliptic', 'approach')} to {mean('elliptic, gradient', 'approach')}. One W for two patches apart "
             f"makes the approach wrong by {100.0 * apart['elliptic, one net']['approach']:+.0f} % instead of "
@@ -323,5 +324,5 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     axes[0].invert_yaxis()
     axes[0].legend(loc="upper right")
     caption = ("Errors of the theory of 1983 against the exact contact: with Hertz's profile of the pressure "
-               "(elliptic) area and peak are much nearer than with the paper's.")  # fmt: skip
+               "(elliptic) area and forces are nearer than with the paper's, the peak on ellipses alone.")  # fmt: skip
     return [(caption, figure)]
