@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,23 @@ import numpy as np
 
 from models.errors import InputError
 from models.ride.excitation import excited
+from models.ride.height_densities import variances
 from models.ride.measures import dynamic_load_factor, exceedances, share_beyond
-from models.ride.of_scene import GRAVITY, Linear, excitation_of, linear_vehicle, vehicle_of
+from models.ride.of_scene import (
+    GRAVITY,
+    Linear,
+    excitation_of,
+    fitted_road,
+    half_track_of,
+    linear_vehicle,
+    placed_wheels,
+    road_of,
+    vehicle_of,
+)
 from models.ride.scene import RideScene
 from models.ride.sweep import Sweep, sweep
 from models.ride.weighting import weighted
+from models.road.isotropic import isotropic_like, spectral_matrix
 from models.strict import Strict, quantity, read
 from models.vehicles.spatial import PartOutput, PointOutput, SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import preloads, wheels
@@ -27,6 +40,9 @@ SIMPLER = {
     "tracks alike": ("equal", ""),
 }
 """What is often assumed instead of the scene's own road: left and right, front and rear; empty as in the scene."""
+ISOTROPIC = "isotropic road"
+LONGEST, SHORTEST = 1e-2, 500.0
+"""Band of the comparison with the isotropic road: a share of the smallest corner, and rad/m."""
 ALONG = 13
 """Points along the body at which its vertical acceleration is drawn."""
 OVERHANG = 0.2
@@ -48,7 +64,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Sweep speeds and correlations; saves ``deviations.nc`` and ``.csv``, ``system.npz`` and ``.mat``, figures."""
-    from studies.ride_figures import along_figure, outputs_figure, spectra_figure
+    from studies.ride_figures import along_figure, outputs_figure, road_figure, spectra_figure
 
     options = read(Options, scene.options, scene.file, "options")
     assert scene.speeds is not None
@@ -71,8 +87,12 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         along_figure(places, at, first, vehicle, speed, scene.title, folder / "body_acceleration.png")
     outputs_figure(first, vehicle, _static(vehicle), scene.title, folder / "over_speed.png")
     spectra_figure(linear(speed), cases["as in the scene"], speed, scene.title, folder / "spectra.png")
+    fitted = fitted_road(scene) if scene.road.file else None
+    road, y = road_of(scene, wheels(vehicle)), half_track_of(scene, wheels(vehicle))
+    road_figure(road, y, fitted, scene.title, folder / "road.png")
+    notes = [f"  road: {road.label(y)}", *(f"  road: {note}" for note in (fitted.notes if fitted else ()))]
     return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(found),
-            "table": _table(scene, vehicle, found, speed, options)}  # fmt: skip
+            "table": [*_table(scene, vehicle, found, speed, options), *notes]}  # fmt: skip
 
 
 def _simpler(scene: RideScene, case: tuple[str, str]) -> tuple[str, str]:
@@ -142,11 +162,13 @@ def _table(scene: RideScene, vehicle: SpatialVehicle, found: dict[str, Sweep], s
     first = next(iter(found.values()))
     linear = linear_vehicle(vehicle)(speed)
     width = max(map(len, first.outputs))
-    lines = [f"  at {speed:g} m/s, standard deviations; then what simpler roads make of them",
-             f"    {'':<{width}}{'':>20}" + "".join(f"{name:>20}" for name in first.cases[1:])]  # fmt: skip
+    heads = "".join(f"{name:>20}" for name in (*first.cases[1:], ISOTROPIC))
+    lines = [f"  at {speed:g} m/s, standard deviations; then what other roads make of them", " " * (width + 24) + heads]
+    alike = isotropic_change(scene, vehicle, speed)
     for i, (name, unit) in enumerate(zip(first.outputs, units(vehicle, linear, first), strict=True)):
         own = first.deviation[0, -1, i]
         changes = "".join(f"{_change(first.deviation[j, -1, i], own):>20}" for j in range(1, len(first.cases)))
+        changes += f"{f'{100 * alike[name]:+.1f} %' if np.isfinite(alike.get(name, np.nan)) else '-':>20}"
         lines.append(f"    {name:<{width}}{_value(own, unit, str(first.status[0, -1, i])):>20}{changes}")
     lines += [f"  {name}: {reason}" for name, reason in _notes(first)]
     lines += _travels(vehicle, first, options) + _loads(vehicle, first)
@@ -160,6 +182,24 @@ def curved(vehicle: SpatialVehicle) -> list[str]:
         return []
     return [f"  small motion only: {', '.join(names)} have curves or friction, taken by their slopes at rest; "
             "ride_nonlinear takes them as they are"]  # fmt: skip
+
+
+def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) -> dict[str, float]:
+    """What an isotropic road with the same track spectrum makes of every output, relative, both up to SHORTEST.
+
+    Empty where there is none: a vehicle without a width, a road of second order, axles or tracks not as modelled.
+    """
+    placed = placed_wheels(scene, wheels(vehicle))
+    road, y = road_of(scene, placed), half_track_of(scene, placed)
+    modelled = (scene.road.left_right, scene.road.front_rear) == ("modelled", "delayed")
+    if not modelled or road.mean.cutoff is not None or len({wheel.y for wheel in placed}) < 2:
+        return {}
+    linear = linear_vehicle(vehicle)(speed)
+    low = LONGEST * min(f.corner for f in (road.mean, road.roll) if f.corner) if road.mean.corner else 0.01
+    found = [variances(linear, partial(spectral_matrix, one, placed), speed, low, SHORTEST)
+             for one in (road, isotropic_like(road, y))]  # fmt: skip
+    names = [output.name for output in vehicle.outputs]
+    return {name: float(np.sqrt(iso / own) - 1.0) for name, own, iso in zip(names, *found, strict=True) if own > 0}
 
 
 def _value(value: float, unit: str, status: str) -> str:

@@ -9,6 +9,9 @@ from models.ride.excitation import Excitation
 from models.ride.linear_vehicle import LinearVehicle
 from models.ride.sweep import Sweep
 from models.ride.varying_speed import VaryingSpeed
+from models.road.fitted import FittedRoad
+from models.road.isotropic import isotropic_like
+from models.road.two_track import TwoTrackRoad
 from models.vehicles.spatial import SpatialVehicle
 from studies.figures import plt, save
 
@@ -103,6 +106,27 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
         axis.set_ylim(1e-6 * top, 2 * top)
         axis.legend(fontsize=7.5)
     figure.suptitle(f"{title}: spectra at {speed:g} m/s", fontsize=11)
+    save(figure, path)
+
+
+def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, title: str, path: Path) -> None:
+    """Spectrum of the left track and coherency of both, measured and fitted; the isotropic road beside them."""
+    wavenumber = np.geomspace(0.02, 100.0, 300)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
+    if fitted is not None:
+        own = fitted.spectra
+        left.loglog(own.wavenumber, own.left, color="0.6", linewidth=0.8, label="measured")
+        right.semilogx(own.wavenumber, own.coherency, color="0.6", linewidth=0.8, label="measured")
+        right.axhline(own.chance_coherency(), color="0.6", linestyle=":", label="what chance alone shows (95 %)")
+    left.loglog(wavenumber, road.spectrum(wavenumber, y), "k", label="mean and roll process")
+    right.semilogx(wavenumber, road.coherency(wavenumber, y, -y), "k", label="mean and roll process")
+    if road.mean.cutoff is None:
+        alike = isotropic_like(road, y)
+        right.semilogx(wavenumber, alike.coherency(wavenumber, 2 * y), "k--", label="isotropic, same track spectrum")
+    left.set(xlabel="wavenumber [rad/m]", ylabel="two-sided density [m³]", title="Spectrum of the left track")
+    right.set(xlabel="wavenumber [rad/m]", ylabel="coherency", ylim=(0, 1.05), title="Left and right track")
+    left.legend(), right.legend(fontsize=8)
+    figure.suptitle(f"{title}: the road", fontsize=11)
     save(figure, path)
 
 

@@ -25,7 +25,7 @@ def test_a_run_saves_deviations_figures_and_the_system(twinrig, capsys):
     assert twinrig("run", "ride", *SMALL, "--engine", "reference", "--out", "out", "--json") == 0
     found = json.loads(capsys.readouterr().out)["answer"]
     names = {"command.txt", "deviations.nc", "deviations.csv", "system.npz", "system.mat", "body_acceleration.png",
-             "over_speed.png", "spectra.png"}  # fmt: skip
+             "over_speed.png", "spectra.png", "road.png"}  # fmt: skip
     assert {path.name for path in Path("out").iterdir()} == names
     with xr.open_dataset("out/deviations.nc", engine="h5netcdf") as data:
         saved = data["deviation"].sel(engine="reference", correlation="as in the scene", output="body centre").values

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import copysign
+from typing import TYPE_CHECKING
 
 from models.errors import InputError
 from models.ride.excitation import Excitation
@@ -13,6 +14,9 @@ from models.road.two_track import TwoTrackRoad, excitation, half_track, on_track
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
+
+if TYPE_CHECKING:
+    from models.road.fitted import FittedRoad
 
 GRAVITY = 9.81
 """m/s^2, where a scene's operating point is the loaded one."""
@@ -43,15 +47,31 @@ def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear
 def road_of(scene: RideScene, wheels: tuple[Wheel, ...]) -> TwoTrackRoad:
     """The scene's road; its level holds at half the front track where the scene does not say where."""
     road = scene.road
+    if road.file is not None:
+        fitted = fitted_road(scene).road
+        return TwoTrackRoad(replace(fitted.mean, cutoff=road.cutoff), replace(fitted.roll, cutoff=road.cutoff))
     if road.q_mean is not None and road.q_roll is not None:
         return TwoTrackRoad(ShapeFilter(road.corner_mean, road.q_mean, road.cutoff),
                             ShapeFilter(road.corner_roll, road.q_roll, road.cutoff))  # fmt: skip
-    return road_of_level(_half_track(scene, wheels), road.level, corners=(road.corner_mean, road.corner_roll),
+    return road_of_level(half_track_of(scene, wheels), road.level, corners=(road.corner_mean, road.corner_roll),
                          cutoff=road.cutoff)  # fmt: skip
 
 
-def _half_track(scene: RideScene, wheels: tuple[Wheel, ...]) -> float:
+def fitted_road(scene: RideScene) -> "FittedRoad":
+    """The measured road of a scene with what was fitted to it; InputError where nothing can be."""
+    from models.road.fitted import fit
+    from models.road.measured_tracks import read_tracks
+
+    road = scene.road
+    assert road.file is not None
+    path = scene.path(road.file, "road.file")
+    return fit(read_tracks(path, road.track_width, first=road.first, last=road.last))
+
+
+def half_track_of(scene: RideScene, wheels: tuple[Wheel, ...]) -> float:
     """Where (m) the road's tracks lie."""
+    if scene.road.file is not None:
+        return scene.road.track_width / 2.0
     return scene.road.half_track or half_track(wheels) or BESIDE
 
 
@@ -71,7 +91,7 @@ def placed_wheels(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[Wheel, .
     A vehicle without a width runs on one of the tracks where the road is given by their level.
     """
     if not any(wheel.y for wheel in wheels):
-        return on_track(wheels, _half_track(scene, wheels)) if scene.road.q_mean is None else wheels
+        return on_track(wheels, half_track_of(scene, wheels)) if scene.road.q_mean is None else wheels
     return wheels if scene.road.wheels == "own" else in_tracks(wheels)
 
 

@@ -50,6 +50,8 @@ def _line(head: str, text: str) -> str:
 
 
 def _track(scene: RideScene, vehicle: SpatialVehicle) -> float:
+    if scene.road.file is not None:
+        return scene.road.track_width / 2.0
     return scene.road.half_track or half_track(wheels(vehicle))
 
 

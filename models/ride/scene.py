@@ -9,6 +9,7 @@ from pydantic import Field
 
 from models.errors import InputError
 from models.ride.speed_profile import SpeedProfile
+from models.road.opencrg import TRACK_WIDTH
 from models.road.two_track import LEVEL, MEAN_CORNER, ROLL_CORNER
 from models.scene_file import SceneFile, checked
 from models.strict import Strict, quantity
@@ -26,7 +27,12 @@ class RideVehicle(Strict):
 
 
 class Road(Strict):
-    """[road]: two tracks from a mean and a roll process; every value has the default of the paper."""
+    """[road]: two tracks from a mean and a roll process, with the paper's values or fitted to a measured road."""
+
+    file: str | None = Field(default=None, description="OpenCRG, or CSV of two tracks, to which both are fitted")
+    track_width: float = quantity("m", "between the measured tracks", default=TRACK_WIDTH)
+    first: float | None = quantity("m", "where along the file to begin", default=None, zero=True)
+    last: float | None = quantity("m", "where along the file to end", default=None)
 
     level: float = quantity("m", "S0: a track's spectrum tends to S0 / Omega^2, two-sided", default=LEVEL)
     q_mean: float | None = quantity("m", "intensity of the mean process instead of a level", default=None, zero=True)
@@ -100,16 +106,30 @@ def _check_speeds(file: str, speeds: Speeds) -> None:
             raise InputError(file, f"speeds.{name}", None, "is missing (m/s)")
 
 
+OF_FILE = ("track_width", "first", "last")
+"""Keys of [road] that belong to its file."""
+OF_FORMULA = ("level", "q_mean", "q_roll", "corner_mean", "corner_roll", "half_track")
+"""Keys of [road] that a file answers."""
+
+
 def _check_road(file: str, road: Road) -> None:
-    given = [name for name in ("q_mean", "q_roll") if getattr(road, name) is not None]
-    if len(given) == 1:
-        other = "q_roll" if given == ["q_mean"] else "q_mean"
-        raise InputError(file, f"road.{other}", None, f"is missing: it belongs to road.{given[0]}")
-    if given:
-        for name in ("level", "half_track"):
-            if name in road.model_fields_set:
-                raise InputError(file, f"road.{name}", getattr(road, name), "is not read beside q_mean and q_roll")
+    foreign = OF_FILE if road.file is None else OF_FORMULA
+    for name in foreign:
+        if name in road.model_fields_set:
+            allowed = "has no meaning without road.file" if road.file is None else "is fitted to road.file: drop it"
+            raise InputError(file, f"road.{name}", getattr(road, name), allowed)
+    _check_intensities(file, road)
     for name in ("corner_mean", "corner_roll"):
         if road.cutoff is not None and road.cutoff <= getattr(road, name):
             allowed = f"must be above road.{name}, {getattr(road, name):g} rad/m"
             raise InputError(file, "road.cutoff", road.cutoff, allowed)
+
+
+def _check_intensities(file: str, road: Road) -> None:
+    given = [name for name in ("q_mean", "q_roll") if getattr(road, name) is not None]
+    if len(given) == 1:
+        other = "q_roll" if given == ["q_mean"] else "q_mean"
+        raise InputError(file, f"road.{other}", None, f"is missing: it belongs to road.{given[0]}")
+    for name in ("level", "half_track") if given else ():
+        if name in road.model_fields_set:
+            raise InputError(file, f"road.{name}", getattr(road, name), "is not read beside q_mean and q_roll")
