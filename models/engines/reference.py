@@ -34,7 +34,8 @@ def _compile_fixed(rhs, key):
         """Classical Runge-Kutta; ``rows`` says where the middle, the end and the next step's input lie."""
         k1, k2, k3, k4 = np.empty(8), np.empty(8), np.empty(8), np.empty(8)
         stage = np.empty(8)
-        states[0] = y
+        for j in range(8):  # a row assigned at once takes seconds to compile
+            states[0, j] = y[j]
         to_middle, to_end, to_next = rows
         for i in range(count):
             row = i * to_next
@@ -51,7 +52,7 @@ def _compile_fixed(rhs, key):
             rhs(stage, end, p, k4)
             for j in range(8):
                 y[j] += step / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j])
-            states[i + 1] = y
+                states[i + 1, j] = y[j]
 
     return compiled(march, key)
 

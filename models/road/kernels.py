@@ -83,8 +83,8 @@ def sines_uniform(start, step, amplitude, wavenumber, phase, window, height, slo
     n = amplitude.size
     work = np.zeros((5, (n + LANES - 1) // LANES * LANES))
     sine, cosine, turn_sine, turn_cosine, number = work[0], work[1], work[2], work[3], work[4]
-    number[:n] = wavenumber
-    for i in range(n):
+    for i in range(n):  # a slice assigned at once takes seconds to compile
+        number[i] = wavenumber[i]
         turn_sine[i], turn_cosine[i] = math.sin(number[i] * step), math.cos(number[i] * step)
     for first in range(0, height.size, RESYNCHRONISE):
         s = start + first * step
