@@ -32,8 +32,8 @@ WHY = ("K and E by the arithmetic-geometric mean in 60 decimal digits, which lea
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for axes, pressure, approach and load over all ratios of axes, for one published contact, for refusals."""
     errors = _errors((*RANGE, *NEAR_CIRCLE))
-    rows = [at_most(f"contact_hertz.{name}", SYSTEM, f"{NAMES.get(name, name)}, axis ratios 1e-6 to 1e6: worst relative error",
-                    max(found), "", BOUND, WHY, "closed form")
+    rows = [at_most(f"contact_hertz.{name}", SYSTEM, f"{NAMES.get(name, name)}, axis ratios 1e-6 "
+                    "to 1e6: worst relative error", max(found), "", BOUND, WHY, "closed form")
             for name, found in errors.items()]  # fmt: skip
     return rows + _published() + _behaviour(), {"ratio": [*RANGE, *NEAR_CIRCLE], "errors": errors}
 
