@@ -5,11 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from control import lyap
 
 from models import signals
 from models.effects import contact_points as contact_effect
 from models.engines import exudyn as exudyn_engine
 from models.engines import protocol, stability
+from models.ride import covariance, marginal
 from models.vehicles import pitch_plane
 from validation.cases import hard_cases
 from validation.hard_cases import (
@@ -19,6 +21,7 @@ from validation.hard_cases import (
     extremes,
     invariants,
     prescribed_pitch,
+    ride,
     sampled_input,
     stepping,
 )
@@ -96,6 +99,30 @@ def test_an_equilibrium_off_by_a_micrometre_is_found(implementation, monkeypatch
 def test_without_the_growth_check_an_undamped_run_is_silent(monkeypatch, tmp_path):
     monkeypatch.setattr(stability, "GROWTH", np.inf)
     assert found(extremes, "no damping, first order", "exudyn", tmp_path) == "SILENT"
+
+
+def test_a_refinement_that_takes_a_solution_for_symmetric_is_silent(monkeypatch, tmp_path):
+    def askew(A, Q):
+        P = lyap(A, Q, method="scipy").astype(np.longdouble)
+        for _ in range(covariance.REFINEMENTS):
+            half = A.astype(np.longdouble) @ P
+            left = lyap(A, (half + half.T + Q).astype(float), method="scipy")
+            P = P + left
+        return P, left, 0.0
+
+    monkeypatch.setattr(covariance, "lyapunov", askew)
+    assert found(ride, "next to no damping", "reference", tmp_path) == "SILENT"
+
+
+def test_without_sizes_of_their_own_road_states_hide_an_undamped_motion(monkeypatch, tmp_path):
+    def balanced(A):
+        form, (scale, _) = marginal.matrix_balance(A, permute=False, separate=True)
+        return form, scale, float(np.linalg.norm(form, 2))
+
+    undamped = marginal._of_undamped
+    monkeypatch.setattr(marginal, "_balanced", balanced)
+    monkeypatch.setattr(marginal, "_of_undamped", lambda *own: undamped(*own[:-1], np.inf))
+    assert found(ride, "no damping, road that next to walks", "reference", tmp_path) == "SILENT"
 
 
 def broken(engine, folder):

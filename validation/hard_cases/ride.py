@@ -1,0 +1,351 @@
+"""Ride: roads without a variance, motions that nothing pulls back or holds, rates many decades apart, bad vehicles.
+
+Where an implementation takes part, the linear vehicle is its own; the covariance behind it is the same for all.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm
+
+from models.errors import InputError
+from models.ride.closed_forms import QuarterCar
+from models.ride.covariance import DIFFUSING, INFINITE, stationary
+from models.ride.delayed_system import DelayedSystem
+from models.ride.excitation import Excitation, excited
+from models.ride.frequency import quadrature
+from models.ride.linear_vehicle import LinearVehicle
+from models.ride.marginal import Unstable
+from models.ride.of_scene import linear_vehicle
+from models.ride.operating_point import poles
+from models.ride.speed_profile import SpeedProfile
+from models.ride.varying_speed import varying_speed
+from models.ride.weighting import WEIGHTINGS, weighted
+from models.road.two_track import excitation, half_track, on_track, road_of_level
+from models.scene_file import parse
+from models.vehicles.spatial import Body, PointOutput, SpatialVehicle, SpringDamper, TurnOutput, Tyre
+from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
+from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+
+Change = Callable[[dict[str, Any]], object]
+SPEED = 20.0
+Q = 1e-4
+"""Intensity of a road of one state, m^2 per m."""
+BODY, CORNER = (0.0, 0.0, 1.0), (300.0, 40.0, 2e4, 1500.0, 2e5)
+"""Where a body of one freedom lies; masses of body and wheel, spring, damper and tyre of a quarter car."""
+
+
+def linear(vehicle: SpatialVehicle, implementation: str, speed: float = SPEED) -> LinearVehicle:
+    """The linear vehicle of an implementation."""
+    return linear_vehicle(vehicle, implementation)(speed)
+
+
+def track(corner: float, axles: int = 1) -> Excitation:
+    """One track with one state, all axles at one place: z' = -corner z + w in path, corner in rad/m."""
+    heights = tuple(np.eye(axles)[:, [i]] for i in range(axles))
+    return Excitation(np.array([[-corner]]), np.array([[Q**0.5]]), heights, (0.0,) * axles)
+
+
+def quarter(m_s: float, m_u: float, k: float, c: float, k_t: float, c_t: float = 0.0) -> SpatialVehicle:
+    """A quarter car; outputs: acceleration of the body, travel, and force of the tyre."""
+    own = replace(load_vehicle("quarter_car"), name="quarter")
+    bodies = tuple(replace(body, mass=m) for body, m in zip(own.bodies, (m_s, m_u), strict=True))
+    springs = (replace(own.springs[0], stiffness=k, damping=c),)
+    return replace(own, bodies=bodies, springs=springs,
+                   tyres=(replace(own.tyres[0], stiffness=k_t, damping=c_t),))  # fmt: skip
+
+
+def single(mass: float, stiffness: float, damping: float) -> SpatialVehicle:
+    """A body on a tyre, held by a damper to the ground; outputs: its acceleration and its height."""
+    outputs = tuple(PointOutput(kind, kind, "body", BODY, (0.0, 0.0, 1.0)) for kind in ("acceleration", "displacement"))
+    damper = SpringDamper("damper", "body", None, BODY, BODY, (0.0, 0.0, 1.0), 0.0, damping)
+    return SpatialVehicle("single", (Body("body", mass, BODY, ("z",)),), (damper,),
+                          (Tyre("tyre", "body", BODY, 0, stiffness),), (0.0,), outputs=outputs)  # fmt: skip
+
+
+def own_road(vehicle: LinearVehicle, **words: str) -> Excitation:
+    """The paper's road under a vehicle's own wheels; a vehicle without a width runs on one track."""
+    y = half_track(vehicle.wheels)
+    return excitation(road_of_level(y or 1.0), vehicle.wheels if y else on_track(vehicle.wheels, 1.0), **words)
+
+
+def from_closed_form(car: tuple[float, ...], corner: float, speed: float, implementation: str) -> float:
+    """Acceleration and travel of a quarter car against their closed forms, relative."""
+    found = stationary(excited(linear(quarter(*car), implementation), track(corner), speed)).variance[:2]
+    exact, q, w = QuarterCar(*car), Q * speed, corner * speed
+    wanted = np.array([exact.body_acceleration(q, w), exact.suspension_travel(q, w)])
+    return float(np.abs(found / wanted - 1.0).max())
+
+
+def closed_form(corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **car: float) -> Callable[..., float]:
+    """A case of a quarter car with some of its values changed."""
+    values = dict(zip(("m_s", "m_u", "k", "c", "k_t"), CORNER, strict=True)) | car
+
+    def error(implementation: str, folder: Path) -> float:
+        return max(from_closed_form(tuple(values.values()), corner, speed, implementation) for speed in speeds)
+
+    return error
+
+
+def damped_tyre(implementation: str, folder: Path) -> float:
+    """Acceleration of the body against quadrature, where the force of the tyre, and it alone, is called infinite."""
+    vehicle, road = linear(quarter(*CORNER, c_t=100.0), implementation), track(0.3)
+    found = stationary(excited(vehicle, road, SPEED))
+    if [status == INFINITE for status in found.status] != [False, False, True]:
+        return np.inf
+    return float(np.abs(found.variance[:2] / quadrature(vehicle, road, SPEED).variance[:2] - 1.0).max())
+
+
+def damped_tyre_naive(folder: Path) -> str:
+    """Lyapunov's equation and the outputs without what reaches them directly."""
+    system = excited(linear(quarter(*CORNER, c_t=100.0), "reference"), track(0.3), SPEED)
+    silent = replace(system, D=tuple(0.0 * D for D in system.D))
+    return f"C P C' gives the tyre force a standard deviation of {stationary(silent).deviation[2]:.0f} N"
+
+
+def free(implementation: str, folder: Path) -> float:
+    """Accelerations of R19-free against the exact covariance after an hour, axles independent, relative."""
+    vehicle = linear(load_vehicle("r19_free"), implementation)
+    system = excited(vehicle, own_road(vehicle, front_rear="uncorrelated"), SPEED)
+    rows = [i for i, output in enumerate(vehicle.outputs) if "acceleration" in output.kind]
+    found, wanted = stationary(system), after_hours(system)[0]
+    return float(np.abs(found.variance[rows] / wanted[rows] - 1.0).max())
+
+
+def after_hours(system: DelayedSystem) -> tuple[np.ndarray, np.ndarray]:
+    """Variances (p,) 1 and 2 hours after rest, axles independent: a step of 3 ms by van Loan's block, then doubled."""
+    n, Q, step = len(system.A), sum(b @ b.T for b in system.B), 3600.0 / 2**20
+    block = expm(np.block([[-system.A, Q], [np.zeros((n, n)), system.A.T]]) * step)
+    E, P = block[n:, n:].T, block[n:, n:].T @ block[:n, n:]
+    found = []
+    for _ in range(22):
+        found.append(np.einsum("pi,ij,pj->p", system.C, P, system.C))
+        E, P = E @ E, P + E @ P @ E.T
+    return found[-2], found[-1]
+
+
+@cache
+def steered() -> SpatialVehicle:
+    """R19-free with roll steer in front; outputs: its heading and its place sideways."""
+    table = parse(SHIPPED / "r19_free.toml")
+    table["axles"][0]["roll_steer"] = 0.05
+    vehicle = build_vehicle(table, "steered")
+    outputs = (
+        TurnOutput("heading", "angle", "body", (0.0, 0.0, 1.0)),
+        PointOutput("place", "displacement", "body", vehicle.body("body").position, (0.0, 1.0, 0.0)),
+    )
+    return replace(vehicle, outputs=outputs)
+
+
+def drifting(implementation: str, folder: Path) -> float:
+    """Rates of heading (t) and place (t^3) against the exact covariance after 1 and 2 hours, axles independent."""
+    vehicle = linear(steered(), implementation)
+    system = excited(vehicle, own_road(vehicle, front_rear="uncorrelated"), SPEED)
+    found = stationary(system)
+    if found.status != (DIFFUSING, DIFFUSING) or found.power.tolist() != [1, 3]:
+        return np.inf
+    one, two = after_hours(system)
+    grown = (two - one) / (2.0**found.power - 1.0) / 3600.0**found.power
+    return float(np.abs(grown / found.rate - 1.0).max())
+
+
+def undamped(corner: float) -> Callable[..., float]:
+    """A case of a body on a tyre without a damper: rates at which its motion grows, against S(w) / 2 w^2."""
+
+    def error(implementation: str, folder: Path) -> float:
+        own = replace(single(300.0, 2e5, 0.0), springs=())
+        found = stationary(excited(linear(own, implementation), track(corner), SPEED))
+        if found.status != (DIFFUSING, DIFFUSING):
+            return np.inf
+        w2 = 2e5 / 300.0
+        height = w2 * Q * SPEED / (2.0 * (w2 + (corner * SPEED) ** 2))
+        return float(np.abs(found.rate / (np.array([w2**2, 1.0]) * height) - 1.0).max())
+
+    return error
+
+
+def triple(implementation: str, folder: Path) -> float:
+    """Critically damped, and the road's corner at the same place: 3 q w^3 / 16 and 3 q / 16 w, relative."""
+    w = 6.0
+    found = stationary(excited(linear(single(300.0, 300.0 * w**2, 600.0 * w), implementation), track(w / SPEED), SPEED))
+    return float(np.abs(found.variance / (3.0 * Q * SPEED / 16.0 * np.array([w**3, 1.0 / w])) - 1.0).max())
+
+
+def triple_naive(folder: Path) -> str:
+    """The condition of the eigenvectors."""
+    system = excited(linear(single(300.0, 10800.0, 3600.0), "reference"), track(0.3), SPEED)
+    with np.errstate(all="ignore"):
+        condition = np.linalg.cond(np.linalg.eig(system.A)[1])
+    return f"sums over eigenvectors have a condition of {condition:.0e} there"
+
+
+def unstable(implementation: str, folder: Path) -> float:
+    """A damper of the wrong sign: refused, with the growth rate of its fastest motion."""
+    return _refused_by_growth(linear(quarter(300.0, 40.0, 2e4, -1500.0, 2e5), implementation))
+
+
+def toppling(implementation: str, folder: Path) -> float:
+    """A body 30 m above its springs under gravity: refused, with the rate at which it topples."""
+    own = load_vehicle("seven_freedoms")
+    x, y, _ = own.bodies[0].position
+    tall = replace(own, gravity=9.81, bodies=(replace(own.bodies[0], position=(x, y, 30.0)), *own.bodies[1:]))
+    return _refused_by_growth(linear(tall, implementation))
+
+
+def _refused_by_growth(vehicle: LinearVehicle) -> float:
+    road, growing = own_road(vehicle), float(poles(vehicle).real.max())
+    for route in (lambda: stationary(excited(vehicle, road, SPEED)), lambda: quadrature(vehicle, road, SPEED)):
+        try:
+            route()
+        except Unstable as error:
+            said = error
+            if abs(error.growth / growing - 1.0) > 1e-9:
+                return np.inf
+        else:
+            return np.inf
+    raise said
+
+
+def crawling(implementation: str, folder: Path) -> float:
+    """A delay of 26,000 s between the axles against independent ones, relative."""
+    vehicle = linear(load_vehicle("half_car"), implementation)
+    late, apart = (_deviation(vehicle, 1e-4, front_rear=word) for word in ("delayed", "uncorrelated"))
+    return float(np.abs(late / apart - 1.0).max())
+
+
+def same_place(implementation: str, folder: Path) -> float:
+    """Two axles at one x, delayed by nothing, against one input, relative."""
+    vehicle = linear(load_vehicle("half_car"), implementation)
+    here = replace(vehicle, wheels=tuple(replace(wheel, x=0.0) for wheel in vehicle.wheels))
+    delayed, equal = (_deviation(here, SPEED, front_rear=word) for word in ("delayed", "equal"))
+    return float(np.abs(delayed / equal - 1.0).max())
+
+
+def _deviation(vehicle: LinearVehicle, speed: float, **words: str) -> np.ndarray:
+    return stationary(excited(vehicle, own_road(vehicle, **words), speed)).deviation
+
+
+def mirrored(implementation: str, folder: Path) -> float:
+    """Left springs twice as stiff, then the right ones: outputs on the centre line, relative."""
+    own = load_vehicle("seven_freedoms")
+    found = []
+    for side in (1.0, -1.0):
+        springs = tuple(replace(s, stiffness=s.stiffness * (2.0 if side * s.point_one[1] > 0 else 1.0))
+                        for s in own.springs)  # fmt: skip
+        vehicle = linear(replace(own, springs=springs), implementation)
+        rows = [o.name == "body centre" or "angular" in o.kind for o in vehicle.outputs]
+        found.append(_answer(vehicle)[rows])
+    return float(np.abs(found[0] / found[1] - 1.0).max())
+
+
+def _answer(vehicle: LinearVehicle) -> np.ndarray:
+    return stationary(excited(vehicle, own_road(vehicle), SPEED)).deviation
+
+
+def slow_weighting(implementation: str, folder: Path) -> float:
+    """Body acceleration weighted by Wk at 1 mm/s against quadrature, relative."""
+    vehicle = linear(quarter(*CORNER), implementation)
+    road, name = track(0.3), vehicle.outputs[0].name
+    found = stationary(weighted(excited(vehicle, road, 1e-3), {name: "Wk"})).variance[-1]
+    wanted = quadrature(vehicle, road, 1e-3, {name: WEIGHTINGS["Wk"].response}).variance[0]
+    return float(abs(found / wanted - 1.0))
+
+
+def standstill(implementation: str, folder: Path) -> float:
+    """Variance of the road under each wheel from a stop to 10 m/s to a stop, relative to the first."""
+    vehicle = linear(load_vehicle("half_car"), implementation)
+    drive = SpeedProfile((0.0, 0.1, 1.1, 1.6, 2.0), (0.0, 0.0, 10.0, 0.0, 0.0))
+    height = varying_speed(vehicle, own_road(vehicle), drive).height
+    return float(np.abs((height / height[0]) ** 2 - 1.0).max())
+
+
+def no_speed(implementation: str, folder: Path) -> float:
+    """0, -1 and not a number: each must be refused by its name."""
+    vehicle = linear(load_vehicle("half_car"), implementation)
+    for speed in (-1.0, float("nan"), float("inf"), 0.0):
+        try:
+            _deviation(vehicle, speed)
+        except InputError as error:
+            said = error
+        else:
+            return np.inf
+    raise said
+
+
+def bad(change: Change, place: str) -> Callable[..., float]:
+    """A case of the half car's file with something wrong: refused by the entry's name."""
+
+    def error(implementation: str, folder: Path) -> float:
+        table = parse(SHIPPED / "half_car.toml")
+        change(table)
+        try:
+            vehicle = build_vehicle(table, "half_car.toml")
+        except InputError as refusal:
+            if place not in refusal.place:
+                return np.inf
+            raise
+        return float(np.isfinite(_answer(linear(vehicle, implementation))).all()) + 1.0
+
+    return error
+
+
+def _unconnected(table: dict[str, Any]) -> None:
+    table["bodies"].append({"name": "box", "mass": 5.0, "position": [0.0, 0.0, 1.0], "freedoms": ["z"]})
+
+
+REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
+CLOSED, ROUNDED = "closed form", "rounding, and that of an engine's differences"
+CASES = (
+    Case("tyre damping on a road of first order", "the road's rate is white noise: a force without a variance",
+         "body by quadrature; tyre force called infinite", "", 1e-9, ROUNDED, damped_tyre, naive=damped_tyre_naive),
+    Case("road that walks at random", "its height has no variance, the vehicle's motion has one", CLOSED, "", 1e-10,
+         ROUNDED, closed_form(corner=0.0)),
+    Case("road that next to walks at random", "a corner of 1e-9 rad/m", CLOSED, "", 1e-6,
+         "counts as none: 2e-8 1/s beside 3 1/s", closed_form(corner=1e-9)),
+    Case("car that is free on the road", "three zero eigenvalues, two of them a Jordan pair",
+         "exact covariance after an hour", "", 1e-6, "rounding, doubled twenty times", free),
+    Case("roll steer on a free car", "its heading diffuses, its place sideways goes with t^3",
+         "exact covariance after 1 and 2 hours", "", 1e-3, "what is left of its first seconds", drifting),
+    Case("no damping at all", "an undamped motion under white noise: Lyapunov's equation has no solution",
+         "growth by S(w) / 2 w^2", "", 1e-9, ROUNDED, undamped(0.3)),
+    Case("no damping, road that next to walks", "undamped beside a pole at -2e-8 1/s", "growth by S(w) / 2 w^2", "",
+         1e-9, ROUNDED, undamped(1e-9)),
+    Case("next to no damping", "a damper of 0.1 mN s/m: ratio 2e-8", CLOSED, "", 1e-6, "asked for", closed_form(c=1e-4)),
+    Case("threefold eigenvalue", "critical damping at the road's own corner: eigenvectors are parallel",
+         CLOSED, "", 1e-9, ROUNDED, triple, naive=triple_naive),
+    Case("stiffness ratio of 1e9", "a tyre of 2e13 N/m on a spring of 2e4 N/m", CLOSED, "", 1e-6, "asked for",
+         closed_form(k_t=2e13)),
+    Case("wheel of a milligram", "a rate of 1.5e9 1/s beside one of 1 1/s", CLOSED, "", 1e-6, "asked for",
+         closed_form(m_u=1e-6)),
+    Case("speeds of 1 mm/s and 300 m/s", "the road's rates lie five decades apart", CLOSED, "", 1e-10, ROUNDED,
+         closed_form(speeds=(1e-3, 300.0))),
+    Case("weighting at 1 mm/s", "eight states with rates of 600 1/s behind a road of 3e-4 1/s", "quadrature", "", 1e-9,
+         ROUNDED, slow_weighting),
+    Case("delay of hours", "e^(A tau) underflows", "independent axles", "", 1e-12, "rounding", crawling),
+    Case("two axles at one place", "a delay of nothing", "one input", "", 0.0, "exact", same_place),
+    Case("left springs twice the right ones", "roll and heave are coupled", "its mirror image", "", 1e-10, ROUNDED,
+         mirrored),
+    Case("drive from stop to stop", "path stands still while time goes on", "the road's own variance", "", 1e-10,
+         "rounding", standstill),
+    Case("damper of the wrong sign", "integrals over frequencies stay finite", "growth rate", "", 0.0, "exact",
+         unstable, REFUSED),
+    Case("top-heavy body under gravity", "stable unloaded, toppling loaded", "growth rate", "", 0.0, "exact",
+         toppling, REFUSED),
+    Case("no speed", "0, below 0, not a number", "refused by name", "", 0.0, "exact", no_speed, REFUSED),
+    *(Case(name, "a number from a singular or senseless matrix", f"refused at {place}", "", 0.0, "exact",
+           bad(change, place), REFUSED)
+      for name, place, change in (
+          ("negative mass", "bodies[rl].mass", lambda t: t["bodies"][2].update(mass=-1.0)),
+          ("mass of zero", "bodies[rl].mass", lambda t: t["bodies"][2].update(mass=0.0)),
+          ("missing mass", "bodies[rl].mass", lambda t: t["bodies"][2].pop("mass")),
+          ("body without inertia", "bodies[body].inertia", lambda t: t["bodies"][0].pop("inertia")),
+          ("unconnected body", "bodies[box]", _unconnected),
+          ("output on an unknown body", "outputs[body rear].body", lambda t: t["outputs"][2].update(body="bdoy")),
+          ("axle behind axle", "axles[rear].x", lambda t: t["axles"][1].update(x=2.0)),
+          ("negative damper in a file", "springs[rear left].damping", lambda t: t["springs"][1].update(damping=-1.0)),
+      )),
+)  # fmt: skip
