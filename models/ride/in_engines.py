@@ -6,9 +6,8 @@ import numpy as np
 
 from models.engines.protocol import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialRun, build
-from models.errors import Refused
 from models.ride.linear_vehicle import Output
-from models.ride.road_path import RoadPath
+from models.ride.road_path import RoadPath, check_rates
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 
@@ -40,10 +39,9 @@ def ridden(engine: str, vehicle: SpatialVehicle, road: RoadPath, duration: float
            skipped: float = 0.0, every: int = 1) -> Ride:  # fmt: skip
     """Drive over a road from rest for about ``duration`` (s); outputs ``every`` so many steps after ``skipped`` (s).
 
-    Raises Refused for damped tyres on a road whose heights have no rates.
+    Raises InputError for damped tyres on a road whose heights have no rates.
     """
-    if not road.has_rates and any(tyre.damping for tyre in vehicle.tyres):
-        raise Refused(engine, "damped tyres ask for the road's rate, which is white noise here: give the road a cutoff")
+    check_rates(vehicle, road.excitation)
     steps = int(np.ceil(duration / road.step))
     table = road.table(steps, seed, path)
     settings = Settings(INTEGRATORS[engine], road.step, steps * road.step)

@@ -12,9 +12,11 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import block_diag, expm, solve_continuous_lyapunov
 
+from models.errors import InputError
 from models.noise import ROAD, normal
 from models.ride.excitation import Excitation
 from models.ride.monte_carlo import path_cell
+from models.vehicles.spatial import SpatialVehicle
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,13 @@ class RoadPath:
             first = max(lags) - lag
             out += np.vstack([H, rates]) @ met[first : first + count]
         return out
+
+
+def check_rates(vehicle: SpatialVehicle, excitation: Excitation, file: str = "") -> None:
+    """Raise InputError for damped tyres on a road whose heights have no rates: a run in time cannot read them."""
+    if any(tyre.damping for tyre in vehicle.tyres) and not RoadPath(excitation, 1.0, 1.0).has_rates:
+        raise InputError(file, "road.cutoff", None, "is missing: damped tyres see the road's rate, which without "
+                         "a second corner is white noise and has no values in time")  # fmt: skip
 
 
 def road_path(excitation: Excitation, speed: float, longest: float) -> RoadPath:

@@ -1,0 +1,174 @@
+"""Statistical linearisation: gains, a case with an exact answer, means, roads in time, copies and engines."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.errors import InputError, RunFailed
+from models.ride.covariance import stationary
+from models.ride.excitation import excited
+from models.ride.gaussian_laws import of_curve, of_friction
+from models.ride.in_engines import ridden
+from models.ride.nonlinear_copies import copies_in_time
+from models.ride.road_path import road_path
+from models.ride.statistical_linearisation import GRADES, promised, statistically_linear
+from models.ride.time_averages import standard_errors
+from models.road.two_track import CASES, excitation, half_track, input_covariance, on_track, road_of_level
+from models.vehicles.curve import Curve
+from models.vehicles.spatial_linear import linearise, wheels
+from models.vehicles.vehicle_file import load_vehicle
+from validation.cases.ride_nonlinear import NONLINEAR, expected, ride
+
+SPEED = 20.0
+
+
+def sprung(vehicle, **laws):
+    """The vehicle with these laws in its first spring."""
+    return replace(vehicle, springs=(replace(vehicle.springs[0], **laws), *vehicle.springs[1:]))
+
+
+def test_hinges_are_the_curve():
+    curve = Curve((-1.0, -0.2, 0.0, 0.3, 2.0), (-500.0, -300.0, 0.0, 60.0, 90.0))
+    offset, slope, corners, bends = curve.hinges()
+    for x in (-3.0, -0.5, -0.1, 0.1, 1.0, 5.0):
+        hinged = offset + slope * x + sum(b * max(x - c, 0.0) for c, b in zip(corners, bends, strict=True))
+        assert hinged == pytest.approx(curve(x), rel=1e-12)
+
+
+@pytest.mark.parametrize(("mean", "deviation"), [(0.0, 0.5), (0.4, 0.05), (-2.0, 3.0)])
+def test_moments_of_a_curve_are_their_integrals(mean, deviation):
+    curve = Curve((-1.0, -0.2, 0.0, 0.3, 2.0), (-500.0, -300.0, 0.0, 60.0, 90.0))
+    cuts = [(x - mean) / deviation for x in curve.arguments[1:-1]]
+    force, gain = of_curve(curve, mean, deviation)
+    assert force == pytest.approx(expected(lambda x: curve(mean + deviation * x), cuts), rel=1e-9)
+    assert gain == pytest.approx(expected(lambda x: curve(mean + deviation * x) * x, cuts) / deviation, rel=1e-9)
+
+
+def test_still_springs_have_their_slope_at_rest():
+    curve = Curve((-1.0, 0.0, 1.0), (-500.0, 0.0, 100.0))
+    assert of_curve(curve, 0.0, 0.0) == (0.0, 300.0)
+    assert of_curve(curve, 0.5, 0.0) == pytest.approx((50.0, 100.0))
+    assert of_curve(curve, 0.0, 1e-9)[1] == pytest.approx(300.0)
+    assert of_friction(40.0, 0.01, 0.0) == 4000.0
+    assert of_friction(40.0, 0.01, 1e-9) == pytest.approx(4000.0)
+
+
+def test_laws_that_are_lines_give_the_linear_vehicle():
+    """A spring and a damper written as curves: the covariance itself, nothing left out, no mean."""
+    vehicle, road = ride("quarter_car")
+    spring = vehicle.springs[0]
+    lines = {"travel_force": Curve((-1.0, 0.0, 1.0), (-spring.stiffness, 0.0, spring.stiffness)),
+             "rate_force": Curve((-1.0, 1.0), (-spring.damping, spring.damping))}  # fmt: skip
+    found = statistically_linear(sprung(vehicle, stiffness=0.0, damping=0.0, **lines), road, SPEED)
+    exact = stationary(excited(linearise(vehicle), road, SPEED))
+    assert found.covariance.deviation == pytest.approx(exact.deviation, rel=1e-12)
+    assert found.left_out.max() < 1e-12
+    assert np.abs(found.mean).max() < 1e-12
+    assert all("good to 2 %" in sentence for sentence in found.sentences)
+
+
+def test_gains_are_those_of_their_own_covariance():
+    """The definition of the fixed point, read back from the answer; the spring carries what the damper pulls."""
+    vehicle, road = ride(NONLINEAR, 4.0)
+    found = statistically_linear(vehicle, road, SPEED)
+    spring, own = vehicle.springs[0], found.springs["front left"]
+    travel = found.covariance.deviation[found.covariance.names.index("travel front left")]
+    assert own.deviation == pytest.approx(travel, rel=1e-11)
+    stops, damper = of_curve(spring.travel_force, own.travel, travel), of_curve(spring.rate_force, 0.0, own.rate)
+    dry = of_friction(spring.friction, spring.friction_rate, own.rate)
+    assert own.gains == pytest.approx((spring.stiffness + stops[1], damper[1] + dry), rel=1e-11)
+    assert spring.stiffness * own.travel + stops[0] + damper[0] == pytest.approx(0.0, abs=1e-8)
+    assert own.travel > 0.005, "a damper that is harder in rebound pulls the body down: mm, in compression"
+    assert found.mean[found.covariance.names.index("travel front left")] == pytest.approx(own.travel, rel=1e-12)
+    assert 0.0 < found.contraction < 0.5
+    assert found.distance < 1e-11
+
+
+def test_sentences_say_when_the_covariance_is_no_longer_good():
+    vehicle, road = ride(NONLINEAR, 16.0)
+    found = statistically_linear(vehicle, road, SPEED)
+    assert all("no longer good" in sentence and "Monte Carlo" in sentence for sentence in found.sentences)
+    assert promised(0.0) == GRADES[0][1] < promised(GRADES[1][0]) < promised(0.2)
+
+
+def test_no_fixed_point_is_told(monkeypatch):
+    monkeypatch.setattr("models.ride.statistical_linearisation.MOST", 3)
+    with pytest.raises(RunFailed, match="no one way to move"):
+        statistically_linear(*ride(NONLINEAR), SPEED)
+
+
+@pytest.mark.parametrize("case", [*CASES.values()], ids=str)
+def test_road_in_time_has_the_roads_covariance(case):
+    """Heights at the first and the last of 200 half steps, over 4000 copies: 4.5 standard errors of 2.2 %."""
+    vehicle = load_vehicle("seven_freedoms")
+    own = wheels(vehicle)
+    road = road_of_level(half_track(own))
+    blocks = road_path(excitation(road, own, *case), SPEED, 4e-3).blocks(50, 4000, 1)
+    first, second = next(blocks), next(blocks)
+    assert np.array_equal(first[-1], second[0]), "blocks go on where they ended"
+    exact = input_covariance(road, own, *case)
+    for heights in (first[0, :4], second[-1, :4]):
+        assert np.abs(heights @ heights.T / 4000 - exact).max() < 0.1 * exact.max()
+
+
+def test_rear_wheels_meet_the_road_later_and_rates_are_its_slopes():
+    vehicle = load_vehicle("half_car")
+    own = on_track(wheels(vehicle), 1.0)
+    road = road_path(excitation(road_of_level(1.0, cutoff=3.0), own), SPEED, 1e-3)
+    table = road.table(400, 3)
+    lag = round((own[0].x - own[1].x) / SPEED / road.half)
+    assert np.abs(table[lag:, 1] - table[:-lag, 0]).max() == 0.0
+    slope = (table[2:, 0] - table[:-2, 0]) / (2 * road.half)
+    assert road.has_rates
+    # the rate walks by cutoff v (q v h)^(1/2) = 0.06 m/s over a half step; a sum over 800 of them tells
+    assert np.std(slope - table[1:-1, 2]) < 0.06 < np.std(table[:, 2])
+    assert np.corrcoef(slope, table[1:-1, 2])[0, 1] > 0.98
+
+
+def test_damped_tyres_need_a_road_with_rates():
+    vehicle, road = ride("quarter_car")
+    damped = replace(vehicle, tyres=tuple(replace(tyre, damping=50.0) for tyre in vehicle.tyres))
+    for run in (lambda: copies_in_time(damped, road, SPEED, 1.0),
+                lambda: ridden("mujoco", damped, road_path(road, SPEED, 1e-3), 0.1)):  # fmt: skip
+        with pytest.raises(InputError, match=r"road.cutoff: is missing"):
+            run()
+
+
+def test_copies_of_a_linear_vehicle_have_its_covariance():
+    """A half car with the delay between its axles, 60 copies of 3 s: variances and means within 4 standard errors."""
+    vehicle, road = ride("half_car")
+    copies = copies_in_time(vehicle, road, SPEED, 3.0, copies=60, seed=4)
+    exact = stationary(excited(linearise(vehicle), road, SPEED))
+    assert np.abs(copies.z(exact.deviation)).max() < 4.0
+    assert np.abs(copies.mean / copies.mean_error).max() < 4.0
+    assert copies.deviation == pytest.approx(exact.deviation, rel=0.1)
+
+
+def test_engines_agree_where_springs_are_bent():
+    vehicle, excitation_ = ride(NONLINEAR, 4.0)
+    road = road_path(excitation_, SPEED, 1e-3)
+    one, other = (ridden(engine, vehicle, road, 0.3, seed=5, every=20) for engine in ("exudyn", "mujoco"))
+    assert np.abs(one.run.positions - other.run.positions).max() < 1e-13
+    assert np.abs(one.run.rates - other.run.rates).max() < 1e-12
+    # the strut is all that pulls at the body: its output would be -m a, and is not read by a gain
+    assert np.isnan(one.of("strut force front left")).all()
+    assert one.interval == pytest.approx(20 * road.step)
+    travel = one.run.positions[::20, 1] - one.run.positions[::20, 0]
+    assert one.of("travel front left") == pytest.approx(travel, abs=1e-15)
+
+
+def test_standard_errors_of_a_run():
+    """Of white noise through 1/(1 + s/a), R = P e^(-a t): var(mean) = 2 P / (a T), var(mean square) = 2 P^2 / (a T).
+
+    The height under a quarter car's wheel on a road of one corner is that process.
+    """
+    vehicle, _ = ride("quarter_car")
+    linear = linearise(vehicle)
+    height = replace(linear.outputs[0], acceleration=np.zeros(2), rate=np.zeros(2), displacement=np.zeros(2),
+                     road=np.ones(1))  # fmt: skip
+    road = excitation(road_of_level(1.0, corners=(0.3, 0.3)), on_track(wheels(vehicle), 1.0))
+    P, a, T = stationary(excited(replace(linear, outputs=(height,)), road, 10.0)).variance[0], 3.0, 200.0
+    mean, square = standard_errors(replace(linear, outputs=(height,)), road, 10.0, T)
+    assert mean[0] == pytest.approx(np.sqrt(2 * P / (a * T)), rel=0.01)  # ends cost 1 / (a T)
+    assert square[0] == pytest.approx(np.sqrt(2 * P**2 / (a * T)), rel=1e-3)
