@@ -213,7 +213,7 @@ def _study(scene: Any) -> Any:
 
 
 NOT_STUDIES = ("__init__", "command_line", "contact_figures", "figures", "folders", "ride_figures",
-               "stabiliser_figures", "virtual_measurement")  # fmt: skip
+               "ride_nonlinear_figures", "stabiliser_figures", "virtual_measurement")  # fmt: skip
 
 
 @contextmanager

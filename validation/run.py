@@ -21,7 +21,7 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
          "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
          "contact_simplified", "contact_profiles", "ride_road", "ride_covariance", "ride_engines",
-         "ride_varying_speed", "contact_price", "fastsim")  # fmt: skip
+         "ride_varying_speed", "ride_nonlinear", "contact_price", "fastsim")  # fmt: skip
 """Case modules in the order of the report."""
 
 
@@ -109,6 +109,7 @@ def seeds() -> dict[str, int]:
         point_mass,
         ride_covariance,
         ride_engines,
+        ride_nonlinear,
         ride_varying_speed,
         roads,
         score,
@@ -124,7 +125,7 @@ def seeds() -> dict[str, int]:
             "holding spring": holding_spring.SEED,
             "random contacts": fastsim.SEED, "table of contacts": contact_price.SEED,
             "made road": fitted_roads.SEED, "states of ride": ride_engines.SEED, "twins of ride": ride_covariance.SEED,
-            "copies of ride": ride_varying_speed.SEED}  # fmt: skip
+            "copies of ride": ride_varying_speed.SEED, "nonlinear ride": ride_nonlinear.SEED}  # fmt: skip
 
 
 def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:
