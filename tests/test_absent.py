@@ -11,6 +11,7 @@ import pytest
 import models
 from models.assembly import assemble
 from models.scene import effect_names
+from validation.absence import ride
 from validation.absence.hand_built import mujoco_model
 from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, user_functions
 from validation.cases import absent
@@ -170,3 +171,13 @@ def test_the_price_list_reads_as_a_table():
     (table,) = absent.tables({"price": [entry]})
     assert table.rows == (("road", "exudyn", "+4 callbacks", "2.50", "+1.25 +/- 0.10", "1.50 (1.40 to 1.60)"),)
     assert len(table.headings) == len(table.rows[0])
+
+
+def test_a_ride_has_no_more_than_it_names():
+    assert [(row.id, row.reason) for row in ride.rows() if row.status != "passed"] == []
+
+
+@pytest.mark.full
+def test_a_ride_by_an_engine_imports_that_one_alone():
+    """Positive control of the modules that must be absent above."""
+    assert ride.imported("mujoco") == ["mujoco", "numba", "models.engines"]

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from models.errors import InputError
 from models.ride.speed_profile import SpeedProfile
-from models.road.opencrg import TRACK_WIDTH
+from models.road import TRACK_WIDTH
 from models.road.two_track import LEVEL, MEAN_CORNER, ROLL_CORNER
 from models.scene_file import SceneFile, checked
 from models.strict import Strict, quantity

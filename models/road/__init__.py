@@ -5,6 +5,21 @@ Every profile answers in the same way, whatever it was made from: ``height_and_s
 zeta is the height in m, positive **down** (a rise is negative); the slope is d(zeta)/ds.
 """
 
-from models.road.profile import Profile, SineProfile, SplineProfile
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from models.road.profile import Profile, SineProfile, SplineProfile
 
 __all__ = ["Profile", "SineProfile", "SplineProfile"]
+
+TRACK_WIDTH = 1.5
+"""Default distance between the two tracks of a measured surface, m."""
+
+
+def __getattr__(name: str) -> Any:
+    """The classes above, when first asked for: their kernels bring the compiler, which random roads do without."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from models.road import profile
+
+    return getattr(profile, name)

@@ -7,12 +7,14 @@ Annex C). Some texts give two-sided densities, half as high at each n and standi
 """
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.errors import InputError
-from models.road.profile import SineProfile
-from models.road.study import roughness
+
+if TYPE_CHECKING:
+    from models.road.profile import SineProfile
 
 CLASSES = {name: 16e-6 * 4.0**i for i, name in enumerate("ABCDEFGH")}
 """Geometric mean of Gd(0.1 waves per metre), m^3, one-sided; the upper limit of a class is twice that."""
@@ -30,7 +32,7 @@ def iso8608_road(
     waves: int = 100,
     level: str = "one-sided",
     window_length: float = 40.0,
-) -> SineProfile:
+) -> "SineProfile":
     """Road at the geometric mean of an ISO 8608 class.
 
     Parameters
@@ -51,6 +53,8 @@ def iso8608_road(
     _check_class(road_class, level)
     road = rough_road(CLASSES[road_class] * SIDES[level], seed, n_min, n_max, waves, window_length)
     name = f"ISO 8608 class {road_class} ({level}), seed {seed}"
+    from models.road.profile import SineProfile
+
     return SineProfile(road.amplitude, road.wavenumber, road.phase, road.window_length, name)
 
 
@@ -76,9 +80,12 @@ def class_at_level(level: float) -> str:
 
 def rough_road(
     gd: float, seed: int, n_min: float, n_max: float, waves: int, window_length: float = 40.0
-) -> SineProfile:
+) -> "SineProfile":
     """Road with the **one-sided** density gd (n / 0.1)^-2, gd in m^3; the rest as :func:`iso8608_road`."""
     _check_band(gd, seed, n_min, n_max, waves)
+    from models.road.profile import SineProfile
+    from models.road.study import roughness
+
     amplitude, wavenumber = roughness(gd, n_min, n_max, waves)
     name = f"Gd = {gd:g} m^3 (one-sided), seed {seed}"
     return SineProfile(amplitude, wavenumber, random_phases(seed, waves), window_length, name)

@@ -24,10 +24,9 @@ import pyopencrg
 from pyopencrg.io import IplData, cut_block, read_ipl
 
 from models.errors import InputError
+from models.road import TRACK_WIDTH
 from models.road.profile import Profile, SplineProfile
 
-TRACK_WIDTH = 1.5
-"""Default distance between the two tracks, m."""
 SMALLEST_INCREMENT = 1e-3
 """Smallest distance of stations that the format's own checks accept, m."""
 

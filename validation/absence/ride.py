@@ -1,0 +1,122 @@
+"""Ride: what a scene and its vehicle do not name is not imported, has no state and no callback.
+
+Positive controls stand beside: what is named changes the counts by what it says.
+"""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from functools import cache
+from unittest import mock
+
+from models.engines.spatial_protocol import build
+from models.ride import of_scene
+from models.ride.excitation import excited
+from models.ride.linear_vehicle import LinearVehicle
+from models.ride.weighting import weighted
+from models.road.two_track import excitation, half_track, on_track, road_of_level
+from models.vehicles.spatial_linear import linearise
+from models.vehicles.vehicle_file import load_vehicle
+from validation.absence.probes import user_functions
+from validation.rows import Row, System, at_most, behaves
+
+SYSTEM: System = "effects"
+SPEEDS = (10.0, 20.0, 30.0)
+FOREIGN = ("exudyn", "mujoco", "numba", "pyopencrg", "slycot", "models.engines", "models.contact", "models.effects",
+           "models.drift", "models.road.fitted", "models.road.isotropic", "models.ride.varying_speed",
+           "models.ride.monte_carlo", "models.ride.frequency")  # fmt: skip
+"""What a linear ride of the reference at constant speeds does without."""
+
+PROBE = """
+import json, sys
+from models.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
+from models.ride.scene import build
+from models.ride.sweep import sweep
+from models.vehicles.spatial_linear import wheels
+scene = build({"title": "probe", "system": "ride", "vehicle": {"file": "r19_ride"},
+               "speeds": {"start": 10.0, "stop": 20.0, "count": 2}})
+vehicle = vehicle_of(scene)
+linear = linear_vehicle(vehicle, sys.argv[1])
+sweep(linear, {"own": excitation_of(scene, wheels(vehicle))}, scene.speeds.all(), scene.weighting)
+print(json.dumps(sorted(sys.modules)))
+"""
+"""Runs a linear ride by an engine in a process of its own and says what it imported."""
+
+
+def imported(engine: str) -> list[str]:
+    """Modules of FOREIGN after a linear ride in a fresh process."""
+    command = [sys.executable, "-c", PROBE, engine]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    modules = json.loads(done.stdout.splitlines()[-1])
+    return [name for name in FOREIGN if any(found == name or found.startswith(f"{name}.") for found in modules)]
+
+
+def states(filters: dict[str, str]) -> int:
+    """States of R19-ride behind two road filters, with weightings."""
+    vehicle = _linear("r19_ride")
+    road = excitation(road_of_level(half_track(vehicle.wheels)), vehicle.wheels)
+    return len(weighted(excited(vehicle, road, SPEEDS[0]), filters).A)
+
+
+def linearised(name: str) -> int:
+    """How many linear vehicles a sweep over SPEEDS needs."""
+    with mock.patch.object(of_scene, "linearise", wraps=linearise) as made:
+        linear = of_scene.linear_vehicle(load_vehicle(name))
+        for speed in SPEEDS:
+            linear(speed)
+    return made.call_count
+
+
+def noisy(damping: float) -> int:
+    """Outputs of the half car that white noise reaches at once, with this tyre damping (N s/m)."""
+    own = load_vehicle("half_car")
+    damped = replace(own, tyres=tuple(replace(tyre, damping=damping) for tyre in own.tyres))
+    vehicle = of_scene.linear_vehicle(damped)(SPEEDS[0])
+    system = excited(vehicle, excitation(road_of_level(1.0), on_track(vehicle.wheels, 1.0)), SPEEDS[0])
+    return sum(any(d[i].any() for d in system.D) for i in range(len(system.C)))
+
+
+def callbacks(name: str) -> dict[str, tuple[int, int]]:
+    """Curves and callbacks of a vehicle in both engines, Exudyn's counted over its own items."""
+    found = {}
+    for engine in ("exudyn", "mujoco"):
+        model = build(engine, load_vehicle(name))
+        plan = model.plan()
+        counted = user_functions(model) if engine == "exudyn" else plan["callbacks"]
+        found[engine] = (plan["curves"], counted)
+    return found
+
+
+@cache
+def _linear(name: str) -> LinearVehicle:
+    return of_scene.linear_vehicle(load_vehicle(name))(SPEEDS[0])
+
+
+def rows() -> list[Row]:
+    """All counts, each beside its positive control."""
+    names = ("quarter_car", "quarter_car_nonlinear")
+    bare, curved = (callbacks(name) for name in names)
+    why = "counted from outside, in the modules of a fresh process, in the engine's items, in the system's size"
+    return [
+        at_most("absent.ride.imports", SYSTEM, "modules of engines, of the compiler and of other routes that a linear "
+                "ride of the reference imports", len(imported("reference")), "", 0, why, "none"),
+        behaves("absent.ride.states", SYSTEM, "states of R19-ride: alone, with Wk, with Wk and Wd",
+                ", ".join(str(states(f)) for f in ({}, {"body centre": "Wk"},
+                                                   {"body centre": "Wk", "left occupant": "Wd"})),
+                "42, 50, 56", "twice 19 freedoms, two filters at each of two axles; Wk has 8 states, Wd 6"),
+        behaves("absent.ride.speed", SYSTEM, "linear vehicles that three speeds need: R19-ride, R19-free",
+                f"{linearised('r19_ride')}, {linearised('r19_free')}", "1, 3",
+                "without side forces and drag nothing depends on the speed"),
+        behaves("absent.ride.curves", SYSTEM, "curves and callbacks of a quarter car, then of one with three curves",
+                f"{_counts(bare)}; {_counts(curved)}",
+                "exudyn 0, 1, mujoco 0, 1; exudyn 3, 2, mujoco 3, 1",
+                "one callback reads the road, in MuJoCo all forces stand in it; a bent spring of Exudyn has its own"),
+        behaves("absent.ride.noise", SYSTEM, "outputs of a half car that white noise reaches: tyres without damping, "
+                "with it", f"{noisy(0.0)}, {noisy(100.0)}", "0, 2",
+                "the road's rate goes through tyre damping alone"),
+    ]  # fmt: skip
+
+
+def _counts(found: dict[str, tuple[int, int]]) -> str:
+    return ", ".join(f"{engine} {curves}, {called}" for engine, (curves, called) in found.items())
