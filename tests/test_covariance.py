@@ -204,6 +204,15 @@ def test_a_free_vehicle_has_its_three_zeros_and_no_output_minds(free):
     assert other.error.max() < 1e-6 and np.median(other.error) < 1e-10
 
 
+def test_what_symmetry_keeps_at_rest_does_not_diffuse_by_rounding(free):
+    """Alike tracks move nothing sideways, with roll steer or without: such variances are zero, up to rounding."""
+    for vehicle in free[:2]:
+        alike = excitation(road_of_level(0.69342), vehicle.wheels, "equal", "delayed")
+        found = stationary(excited(vehicle, alike, 30.0))
+        assert set(found.status) == {FINITE}
+        assert found.variance[found.names.index("lateral position")] < 1e-24  # m^2
+
+
 def test_roll_steer_makes_it_diffuse_sideways(free):
     _, steered, road = free
     found = stationary(excited(steered, road, 20.0))

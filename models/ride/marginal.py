@@ -24,6 +24,10 @@ TOLD = 1e3
 """What should vanish is told from zero if it is this many times larger than the accuracy allows."""
 
 
+ROUNDING = 10 * float(np.finfo(float).eps)
+"""A product of rows and columns no larger than this share of its terms is zero by symmetry, and all of it rounding."""
+
+
 class Unstable(InputError):
     """A system that leaves its equilibrium on its own: ``growth`` in 1/s, ``frequency`` in Hz."""
 
@@ -215,7 +219,8 @@ def _of_zeros(N: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray, C
     for level in range(len(N)):
         factor = C @ step / factorial(level)
         told = (abs(factor) * factorial(level) > least * (C_size @ step_size)).any(axis=1)
-        told |= (level == 0) & ((factor**2).sum(axis=1) > most)
+        real = (abs(factor) > ROUNDING * (C_size @ step_size)).any(axis=1)
+        told |= (level == 0) & real & ((factor**2).sum(axis=1) > most)
         rate[told] = (factor[told] ** 2).sum(axis=1) / (2 * level + 1)
         power[told] = 2 * level + 1
         step, step_size = N @ step, abs(N) @ step_size
@@ -233,6 +238,7 @@ def _of_undamped(T: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray
         first = bool(same[: np.flatnonzero(values == value)[0]].any())
         amplitude = right[:, same] @ left[same]
         told = (abs(amplitude) > least * (C_size @ G_size)).any(axis=1)
-        told |= 2 * (abs(amplitude) ** 2).sum(axis=1) > most
+        real = (abs(amplitude) > ROUNDING * (C_size @ G_size)).any(axis=1)
+        told |= real & (2 * (abs(amplitude) ** 2).sum(axis=1) > most)
         rate[told] += 0.0 if first else 2 * (abs(amplitude[told]) ** 2).sum(axis=1)
     return rate
