@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from validation.faults import ride
 from validation.faults.bench import CHECKS, Bench, size
 from validation.faults.planting import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, Fault, planted
 from validation.rows import Row, System, Table, finding, within
@@ -22,7 +23,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     benches = [Bench(name, QUICK_DURATION if quick else DURATION) for name in (TWIN, SYMMETRIC)]
     clean = [_record(fault, benches) for fault in CLEAN]
     found = [_record(fault, benches) for fault in FAULTS]
-    return _rows(clean, found), {"clean": clean, "faults": found}
+    of_ride = ride.measure()
+    return _rows(clean, found) + ride.rows(of_ride), {"clean": clean, "faults": found, "ride": of_ride}
 
 
 def _record(fault: Fault, benches: list[Bench]) -> dict[str, Any]:
@@ -93,7 +95,7 @@ def _listed(records: list[dict[str, Any]]) -> str:
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """The checks with their tolerances, and every fault with what sees it."""
-    return [_check_table(data), _fault_table(data)]
+    return [_check_table(data), _fault_table(data), ride.table(data["ride"])]
 
 
 def _check_table(data: dict[str, Any]) -> Table:

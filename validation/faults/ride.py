@@ -1,0 +1,342 @@
+"""Faults of ride, planted one at a time into road, vehicle, covariance and weighting, and the checks that see them.
+
+What a check compares with is computed once without a fault, by a route that the fault does not touch.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from models.engines.spatial_reference import SpatialReference
+from models.ride.closed_forms import QuarterCar
+from models.ride.covariance import stationary
+from models.ride.delayed_system import DelayedSystem
+from models.ride.excitation import Excitation
+from models.ride.frequency import quadrature
+from models.ride.linear_vehicle import LinearVehicle, Output, Wheel
+from models.ride.operating_point import poles
+from models.ride.weighting import WEIGHTINGS, weighting
+from models.road import two_track
+from models.vehicles import spatial_linear, vehicle_file
+from models.vehicles.spatial import SpatialVehicle
+from validation.faults.patches import Patch, attribute
+from validation.rows import Row, System, Table, finding, within
+
+SYSTEM: System = "ride"
+SPEED = 17.0
+INERTIA = np.diag([207.26524557936952, 1565.8178787125541, 1791.5995300122856])
+"""Published inertia (kg m^2) of the whole sprung mass of R19, which body and engine share."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """measure() -> size; what exceeds ``tolerance`` is seen."""
+
+    title: str
+    unit: str
+    tolerance: float
+    measure: Callable[[], float]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault in words, where it is planted, and what it changes meanwhile."""
+
+    name: str
+    place: str
+    inside: Patch
+
+
+def _system(name: str, road: Callable[[LinearVehicle], Excitation]) -> tuple[LinearVehicle, Excitation, DelayedSystem]:
+    from models.ride import excitation  # the name may be patched
+
+    vehicle = spatial_linear.linearise(vehicle_file.load_vehicle(name))
+    met = road(vehicle)
+    return vehicle, met, excitation.excited(vehicle, met, SPEED)
+
+
+def _one_track(vehicle: LinearVehicle) -> Excitation:
+    return two_track.excitation(two_track.road_of_level(1.0), two_track.on_track(vehicle.wheels, 1.0))
+
+
+@cache
+def _by_frequency() -> np.ndarray:
+    vehicle, road, _ = _system("half_car", _one_track)
+    return quadrature(vehicle, road, SPEED).variance
+
+
+def _quadrature() -> float:
+    """Variances of the half car against the integrals over its spectra."""
+    return _off(stationary(_system("half_car", _one_track)[2]).variance, _by_frequency())
+
+
+def _closed_form() -> float:
+    """Body acceleration of the quarter car on a road of one state, from the values of its file."""
+    q, corner = 1e-4, 0.3
+    road = Excitation(np.array([[-corner]]), np.array([[q**0.5]]), (np.ones((1, 1)),), (0.0,))
+    found = stationary(_system("quarter_car", lambda vehicle: road)[2]).variance[0]
+    car = QuarterCar(297.15222009894956, 31.8960913028392, 24453.137879749014, 1786.2441002440723, 158294.1398119115)
+    return _off(found, car.body_acceleration(q * SPEED, corner * SPEED))
+
+
+@cache
+def _covariance_of_heights() -> np.ndarray:
+    """Of each wheel of R19-ride, and of the sum of the left ones."""
+    wheels = spatial_linear.wheels(vehicle_file.load_vehicle("r19_ride"))
+    P = two_track.input_covariance(two_track.road_of_level(two_track.half_track(wheels)), wheels)
+    left = [i for i, wheel in enumerate(wheels) if wheel.y > 0]
+    return np.append(np.diag(P), P[np.ix_(left, left)].sum())
+
+
+def _heights() -> float:
+    """Road under the wheels of R19-ride, through filters and delays, against its covariance in closed form."""
+    vehicle = spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride"))
+    no, unit = np.zeros(len(vehicle.mass)), np.eye(len(vehicle.wheels))
+    left = sum(unit[i] for i, wheel in enumerate(vehicle.wheels) if wheel.y > 0)
+    rows = [*unit, left]
+    outputs = tuple(Output(str(i), "m", "road", no, no, no, row, 0.0 * row) for i, row in enumerate(rows))
+    road = two_track.excitation(two_track.road_of_level(two_track.half_track(vehicle.wheels)), vehicle.wheels)
+    from models.ride import excitation
+
+    found = stationary(excitation.excited(replace(vehicle, outputs=outputs), road, SPEED)).variance
+    return _off(found, _covariance_of_heights())
+
+
+def _published_road() -> float:
+    """Variance of a track of the paper's road: pi S0 / 2 (1 / 0.3 + 1 / 1.5)."""
+    found = float(two_track.road_of_level(0.7).covariance(np.array(0.0), 0.7, 0.7))
+    return _off(found, np.pi * 1.6e-5 / 2.0 * (1.0 / 0.3 + 1.0 / 1.5))
+
+
+def _frequencies() -> float:
+    """19 eigenfrequencies of R19-ride as its data have them."""
+    from validation.cases.ride_engines import FREQUENCIES
+
+    own = spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride"))
+    return _off(np.sort(np.abs(poles(own)))[::2] / (2 * np.pi), np.array(FREQUENCIES))
+
+
+def _whole_inertia() -> float:
+    """Inertia of body and engine of R19-free about their common centre, by its largest entry."""
+    vehicle = vehicle_file.load_vehicle("r19_free")
+    parts = [vehicle.body(name) for name in ("body", "engine")]
+    centre = sum(part.mass * np.array(part.position) for part in parts) / sum(part.mass for part in parts)
+    total = np.zeros((3, 3))
+    for part in parts:
+        arm = np.array(part.position) - centre
+        total += np.array(part.inertia) + part.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return float(np.abs(total - INERTIA).max() / INERTIA.max())
+
+
+@cache
+def _by_hand(name: str) -> np.ndarray:
+    vehicle = vehicle_file.load_vehicle(name)
+    return SpatialReference(vehicle, SPEED).acceleration(*_state(vehicle))
+
+
+def _state(vehicle: SpatialVehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Small positions, rates and road: no two alike, so that nothing cancels."""
+    n, w = len(vehicle.coordinates()), len(vehicle.tyres)
+    return 1e-7 * np.cos(np.arange(n)), 1e-6 * np.sin(1.0 + np.arange(n)), 1e-7 * np.cos(0.7 * np.arange(2 * w))
+
+
+def _equations() -> float:
+    """Accelerations of R19-ride and R19-free at a small state against the equations written by hand."""
+    sizes = []
+    for name in ("r19_ride", "r19_free"):
+        vehicle = vehicle_file.load_vehicle(name)
+        own, (q, v, road) = spatial_linear.linearise(vehicle, SPEED), _state(vehicle)
+        z, rate = np.split(road, 2)
+        force = own.road_stiffness @ z + own.road_damping @ rate - own.stiffness @ q - own.damping @ v
+        found, wanted = np.linalg.solve(own.mass, force), _by_hand(name)
+        sizes.append(float(np.abs(found - wanted).max() / np.abs(wanted).max()))
+    return max(sizes)
+
+
+def _states_of_weighting() -> float:
+    """Wk's states against the formulas of its sections, at eight frequencies."""
+    A, B, C = WEIGHTINGS["Wk"].matrices()
+    frequency = np.geomspace(0.3, 200.0, 8)
+    found = np.array([C @ np.linalg.solve(2j * np.pi * f * np.eye(len(A)) - A, B) for f in frequency])
+    return float(np.abs(found / WEIGHTINGS["Wk"].response(frequency) - 1.0).max())
+
+
+def _table_of_weighting() -> float:
+    """Wk against the standard's table, relative."""
+    from validation.cases.ride_road import STANDARD
+
+    frequency, wk, _ = np.array(STANDARD).T
+    return float(np.abs(1e3 * np.abs(WEIGHTINGS["Wk"].response(frequency)) / wk - 1.0).max())
+
+
+def _off(found: Any, wanted: Any) -> float:
+    return float(np.abs(np.asarray(found) / wanted - 1.0).max())
+
+
+CHECKS = {
+    "quadrature": Check("half car: variances, spectra integrated", "relative", 1e-9, _quadrature),
+    "closed form": Check("quarter car: body acceleration in closed form", "relative", 1e-10, _closed_form),
+    "heights": Check("R19-ride: road under its wheels in closed form", "relative", 1e-10, _heights),
+    "paper's road": Check("variance of a track of the paper's road", "relative", 1e-12, _published_road),
+    "frequencies": Check("R19-ride: 19 eigenfrequencies of its data", "relative", 1e-5, _frequencies),
+    "whole inertia": Check("R19-free: published inertia of body with engine", "of the largest", 1e-9, _whole_inertia),
+    "equations": Check("R19: accelerations by hand-written equations", "of the largest", 1e-5, _equations),
+    "Wk's formula": Check("Wk: states against its sections", "relative", 1e-12, _states_of_weighting),
+    "Wk's table": Check("Wk: the standard's table", "relative", 5e-3, _table_of_weighting),
+}
+
+
+def _vehicle(change: Callable[[SpatialVehicle], SpatialVehicle]) -> Patch:
+    """Every vehicle that is loaded changed."""
+    return attribute("models.vehicles.vehicle_file:load_vehicle", lambda real: lambda *own: change(real(*own)))
+
+
+def _excited(change: Callable[[DelayedSystem, float], DelayedSystem]) -> Patch:
+    """Every system changed, with its speed at hand."""
+    return attribute(
+        "models.ride.excitation:excited", lambda real: lambda v, e, speed: change(real(v, e, speed), speed)
+    )
+
+
+def _reversed(real: Any) -> Any:
+    def hits(system: DelayedSystem) -> Any:
+        B, D, delays = real(system)
+        return B[::-1], D[::-1], [delays[-1] - delay for delay in delays[::-1]]
+
+    return hits
+
+
+def _on_front_track(real: Any) -> Any:
+    def row(wheel: Wheel, mean: Any, roll: Any, word: str, wheels: tuple[Wheel, ...]) -> Any:
+        y = np.copysign(abs(wheels[0].y), wheel.y)
+        return real(replace(wheel, y=y), mean, roll, word, wheels)
+
+    return row
+
+
+def _other_twist(real: Any) -> Any:
+    return lambda motion, bar: 2.0 * motion.coordinate(bar.body, "rx") - real(motion, bar)
+
+
+def _mirrored(vehicle: SpatialVehicle) -> SpatialVehicle:
+    """Places of the centre of mass by axle exchanged: the heaviest body lies as far behind as it lay before."""
+    heavy = max(vehicle.bodies, key=lambda body: body.mass)
+    x, y, z = heavy.position
+    moved = replace(heavy, position=(vehicle.axles[0] + vehicle.axles[-1] - x, y, z))
+    return replace(vehicle, bodies=tuple(moved if body is heavy else body for body in vehicle.bodies))
+
+
+def _other_products(vehicle: SpatialVehicle) -> SpatialVehicle:
+    """Products of inertia with the other sign."""
+
+    def tensor(inertia: Any) -> Any:
+        return tuple(map(tuple, 2.0 * np.diag(np.diag(inertia)) - np.array(inertia)))
+
+    return replace(vehicle, bodies=tuple(replace(body, inertia=tensor(body.inertia)) for body in vehicle.bodies))
+
+
+def _wrong_wk(real: Any) -> Any:
+    return {**real, "Wk": weighting("Wk", (12.5, 12.5, 0.63), (3.35, 0.91, 2.37, 0.91))}
+
+
+def _lossy(real: Any) -> Any:
+    def matrices(own: Any) -> Any:
+        A, B, C = real(own)
+        A = A.copy()
+        A[5, 2:4] = 0.0  # what the third section hears of the second
+        return A, B, C
+
+    return matrices
+
+
+FAULTS = (
+    Fault("rear axle ahead of the front one", "covariance",
+          attribute("models.ride.covariance:hits", _reversed)),
+    Fault("cross terms of the axles missing", "covariance",
+          attribute("models.ride.covariance:_responses",
+                    lambda real: lambda A, B, delays, independent: [np.zeros_like(b) for b in B])),
+    Fault("noise without the root of the speed", "road",
+          _excited(lambda own, v: replace(own, B=tuple(b / v**0.5 for b in own.B)))),
+    Fault("noise with the speed, not its root", "road",
+          _excited(lambda own, v: replace(own, B=tuple(b * v**0.5 for b in own.B)))),
+    Fault("delay by the speed in km/h", "road",
+          _excited(lambda own, v: replace(own, delays=tuple(tau / 3.6 for tau in own.delays)))),
+    Fault("rear wheels on the front track", "road", attribute("models.road.two_track:_row", _on_front_track)),
+    Fault("one-sided level taken for two-sided", "road",
+          attribute("models.road.two_track:road_of_level",
+                    lambda real: lambda y, level=two_track.LEVEL, **own: real(y, 2.0 * level, **own))),
+    Fault("a and b swapped", "vehicle", _vehicle(_mirrored)),
+    Fault("sign of the products of inertia", "vehicle", _vehicle(_other_products)),
+    Fault("sign of the anti-roll bar", "vehicle", attribute("models.vehicles.spatial_linear:_twist", _other_twist)),
+    Fault("tyre stiffness per axle for per wheel", "vehicle",
+          _vehicle(lambda own: replace(own, tyres=tuple(replace(t, stiffness=2 * t.stiffness) for t in own.tyres)))),
+    Fault("Wk: upward step turned round", "weighting", attribute("validation.faults.ride:WEIGHTINGS", _wrong_wk)),
+    Fault("Wk: a section hears too little", "weighting",
+          attribute("models.ride.weighting:Weighting.matrices", _lossy)),
+)  # fmt: skip
+
+
+def measure() -> list[dict[str, Any]]:
+    """Size over tolerance of every check, without a fault first and then with each."""
+    clean = {"fault": "no fault", "place": "nowhere", "ratios": _ratios()}
+    return [clean, *({"fault": own.name, "place": own.place, "ratios": _with(own.inside)} for own in FAULTS)]
+
+
+def _with(fault: Patch) -> dict[str, float]:
+    with fault()():
+        return _ratios()
+
+
+def _ratios() -> dict[str, float]:
+    return {name: check.measure() / check.tolerance for name, check in CHECKS.items()}
+
+
+def seen(record: dict[str, Any]) -> list[str]:
+    """Checks that see a fault."""
+    return [name for name, ratio in record["ratios"].items() if not ratio <= 1.0]
+
+
+def rows(records: list[dict[str, Any]]) -> list[Row]:
+    """Caught, false alarms, and what one check alone catches."""
+    clean, *found = records
+    single = [f"{record['fault']} ({seen(record)[0]})" for record in found if len(seen(record)) == 1]
+    return [
+        within("planted.ride.caught", SYSTEM, "faults planted in ride that a check catches",
+               sum(bool(seen(record)) for record in found), "faults", len(FAULTS), 0,
+               "every one of them is a wrong vehicle, road or covariance", "native"),
+        within("planted.ride.false_alarms", SYSTEM, "alarms of the checks of ride without a fault", len(seen(clean)),
+               "alarms", 0, 0, "a check that cries without a fault is no check", "native"),
+        finding("planted.ride.single", SYSTEM, "faults planted in ride that one check alone catches", len(single),
+                "faults", "few", "what would pass if that check were dropped: " + (", ".join(single) or "none"),
+                "native"),
+    ]  # fmt: skip
+
+
+def table(records: list[dict[str, Any]]) -> Table:
+    """Every fault with what sees it."""
+    lines = tuple(
+        (
+            record["fault"],
+            record["place"],
+            _sizes(record),
+            ", ".join(name for name in CHECKS if name not in seen(record)),
+        )
+        for record in records[1:]
+    )
+    note = (
+        "Sizes relative, as each check takes them: "
+        + "; ".join(f"{name}: {check.title} (allowed {check.tolerance:g})" for name, check in CHECKS.items())
+        + "."
+    )
+    return Table("Faults of ride, one at a time", note, ("fault", "planted in", "caught by", "not seen by"), lines)
+
+
+def _blind(record: dict[str, Any]) -> str:
+    return ", ".join(name for name in CHECKS if name not in seen(record))
+
+
+def _sizes(record: dict[str, Any]) -> str:
+    return ", ".join(f"{name} {record['ratios'][name] * CHECKS[name].tolerance:.1g}" for name in seen(record))

@@ -1,0 +1,199 @@
+"""What accuracy costs in ride: standard deviations of R19-ride by every route, error beside counts and seconds.
+
+All routes take the same linear vehicle on the paper's road at one speed. The reference is the quadrature that halves
+its panels until nothing changes, an integral over frequencies with the delay in closed form; it knows its own error.
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
+from unittest import mock
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from models.ride.covariance import stationary
+from models.ride.excitation import Excitation, excited
+from models.ride.frequency import quadrature, spectra
+from models.ride.linear_vehicle import LinearVehicle
+from models.ride.monte_carlo import at_constant_speed
+from models.ride.sweep import sweep
+from models.road.two_track import CASES, excitation, half_track, road_of_level
+from models.vehicles.spatial_linear import linearise
+from models.vehicles.vehicle_file import load_vehicle
+from validation.rows import Row, System, Table, at_most, finding, within
+from validation.timing import describe, interleave
+
+SYSTEM: System = "cost"
+SPEED, LOWEST = 20.0, 1e-2
+"""m/s; first frequency of the grids, Hz."""
+SEED = 5
+SWEPT = 60
+"""Speeds of the sweep, in five cases of correlation each: its cost is that of one point."""
+GRIDS = {True: ((200, 100.0), (2000, 1000.0)), False: ((200, 100.0), (2000, 1000.0), (20_000, 10_000.0))}
+"""Frequencies, evenly spaced in their logarithm, and the last of them in Hz, by ``quick``."""
+UNIFORM = (500, 50.0)
+COPIES = {True: ((16, 4.0),), False: ((2, 100.0), (20, 100.0), (100, 100.0))}
+"""Copies and how long each runs (s)."""
+KINDS = {"accelerations": "acceleration", "tyre forces": "tyre force"}
+
+
+@dataclass(frozen=True)
+class Point:
+    """One route. count : of what it is made, solves, points, frequencies or copies; errors : largest of each of KINDS,
+    relative; z : of the variances of a random one, largest; seconds : median."""
+
+    name: str
+    unit: str
+    count: int
+    errors: dict[str, float]
+    seconds: float
+    z: float = 0.0
+
+
+@dataclass(frozen=True)
+class Ride:
+    """The vehicle, the road in the paper's five cases, and the true standard deviations of the third."""
+
+    vehicle: LinearVehicle
+    roads: dict[str, Excitation]
+    truth: np.ndarray
+    uncertainty: float
+
+    @property
+    def road(self) -> Excitation:
+        """Two tracks as modelled, the rear delayed."""
+        return self.roads["3"]
+
+    def errors(self, found: np.ndarray) -> dict[str, float]:
+        """Largest relative error of the standard deviations (p,) by kind of output."""
+        off = np.abs(found / self.truth - 1.0)
+        return {name: float(max(e for e, o in zip(off, self.vehicle.outputs, strict=True) if o.kind == kind))
+                for name, kind in KINDS.items()}  # fmt: skip
+
+
+def problem() -> Ride:
+    """R19-ride at 20 m/s."""
+    vehicle = linearise(load_vehicle("r19_ride"))
+    road = road_of_level(half_track(vehicle.wheels))
+    roads = {str(number): excitation(road, vehicle.wheels, *case) for number, case in CASES.items()}
+    true = quadrature(vehicle, roads["3"], SPEED)
+    return Ride(vehicle, roads, np.sqrt(true.variance), float(true.error.max()))
+
+
+def direct(ride: Ride) -> np.ndarray:
+    """By one Lyapunov equation."""
+    return stationary(excited(ride.vehicle, ride.road, SPEED)).deviation
+
+
+def fast(ride: Ride, count: int) -> np.ndarray:
+    """Five cases at ``count`` speeds by eigenvectors; those at SPEED."""
+    speeds = [*np.linspace(5.0, 50.0, count - 1), SPEED]
+    return sweep(lambda speed: ride.vehicle, ride.roads, speeds).deviation[list(ride.roads).index("3"), -1]
+
+
+def grid(ride: Ride, count: int, last: float, even: bool = False) -> np.ndarray:
+    """By the trapezoidal rule on a grid of frequencies up to ``last`` (Hz), in their logarithm or evenly."""
+    frequency = np.linspace(last / count, last, count) if even else np.geomspace(LOWEST, last, count)
+    omega = 2 * np.pi * frequency
+    return np.sqrt(2 * np.trapezoid(spectra(ride.vehicle, ride.road, SPEED, omega), omega, axis=0))
+
+
+def measure(quick: bool, rounds: int, least: float) -> tuple[list[Row], dict[str, Any]]:
+    """All routes; counts and errors are judged, seconds are not."""
+    ride = problem()
+    swept = 3 if quick else SWEPT
+    points = [_lyapunov(ride), _swept(ride, swept)]
+    jobs: list[Callable[[], Any]] = [partial(direct, ride), partial(fast, ride, swept)]
+    for count, last, even in (*((*one, False) for one in GRIDS[quick]), (*UNIFORM, True)):
+        name = f"{'uniform' if even else 'logarithmic'} grid to {last:g} Hz"
+        points.append(Point(name, "frequencies", count, ride.errors(grid(ride, count, last, even)), 0.0))
+        jobs.append(partial(grid, ride, count, last, even))
+    for copies, lasting in COPIES[quick]:
+        points.append(_copies(ride, copies, lasting))
+        jobs.append(partial(at_constant_speed, ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED))
+    few = [i for i, p in enumerate(points) if p.unit != "copies" and p.count < 10_000]
+    taken = {
+        i: float(np.median(s)) for i, s in zip(few, interleave([jobs[i] for i in few], rounds, least), strict=True)
+    }
+    taken |= {i: describe(interleave([jobs[i]], 1, 0.0)[0])["median"] for i in range(len(jobs)) if i not in taken}
+    per = {1: 5 * swept}  # of the sweep a point
+    points = [Point(**{**asdict(p), "seconds": taken[i] / per.get(i, 1)}) for i, p in enumerate(points)]
+    return _rows(ride, points), {"points": [asdict(p) for p in points], "uncertainty": ride.uncertainty}
+
+
+def _lyapunov(ride: Ride) -> Point:
+    import control
+
+    with mock.patch.object(control, "lyap", wraps=control.lyap) as solve:
+        found = direct(ride)
+    return Point("Lyapunov, delay exact", "solves", solve.call_count, ride.errors(found), 0.0)
+
+
+def _swept(ride: Ride, speeds: int) -> Point:
+    from models.ride import modal
+
+    with mock.patch.object(modal, "modes", wraps=modal.modes) as made:
+        found = fast(ride, speeds)
+    return Point(f"sweep, one of {5 * speeds} points", "decompositions", made.call_count, ride.errors(found), 0.0)
+
+
+def _copies(ride: Ride, copies: int, lasting: float) -> Point:
+    found = at_constant_speed(ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED)
+    errors = ride.errors(np.sqrt(found.variance[0]))
+    return Point(f"Monte Carlo, {lasting:g} s each", "copies", copies, errors, 0.0,
+                 float(np.abs(found.z(ride.truth[None])).max()))  # fmt: skip
+
+
+def _rows(ride: Ride, points: list[Point]) -> list[Row]:
+    by_name = {p.name.split(",")[0]: p for p in points}
+    exact = [by_name["Lyapunov"], by_name["sweep"]]
+    grids = [p for p in points if p.name.startswith("logarithmic")]
+    rows = [at_most(f"price.ride.error.{p.name.split(',')[0]}", SYSTEM, f"R19-ride at {SPEED:g} m/s, {p.name}: largest "
+                    "error of a standard deviation of accelerations and tyre forces", max(p.errors.values()),
+                    "relative", 1e-9, f"quadrature knows its variances to {ride.uncertainty:.0e}",
+                    "closed form") for p in exact]  # fmt: skip
+    rows += [within("price.ride.counts.solves", SYSTEM, "Lyapunov equations solved for one road at one speed",
+                    exact[0].count, "solves", 2, 0, "the first solution and one correction", "none"),
+             within("price.ride.counts.decompositions", SYSTEM, "eigenvectors made for all points of the sweep",
+                    exact[1].count, "decompositions", 4, 0,
+                    "the vehicle; the road with its tracks alike or not, and apart; no weighting", "none")]  # fmt: skip
+    falls = [a.errors[kind] / b.errors[kind] for kind in KINDS for a, b in zip(grids, grids[1:], strict=False)]
+    rows.append(within("price.ride.grids", SYSTEM, "grids of ten times the frequencies whose error is not smaller",
+                       sum(ratio <= 1.0 for ratio in falls), "", 0, 0, "they converge", "none"))  # fmt: skip
+    rows += [finding(f"price.ride.copies.{p.count}", SYSTEM, f"{p.name}, {p.count} copies: largest error of a standard "
+                     f"deviation, one draw, |z| up to {p.z:.1f}", max(p.errors.values()), "relative",
+                     "one over the root of copies times seconds", "statistics of few copies: the judged ones are in "
+                     "the case of varying speed", "none") for p in points if p.unit == "copies"]  # fmt: skip
+    return rows
+
+
+def table(data: dict[str, Any]) -> Table:
+    """Every route with its errors, counts and seconds."""
+    lines = tuple((p["name"], f"{p['count']:,} {p['unit']}", *(f"{p['errors'][kind]:.1e}" for kind in KINDS),
+                   f"{1e3 * p['seconds']:.3g}") for p in data["points"])  # fmt: skip
+    note = ("Largest relative error of a standard deviation over all outputs of the kind. Part of a grid's error in "
+            "the tyre forces is what lies beyond its last frequency, which some users do not want. Monte Carlo is one "
+            "draw. Milliseconds are those of one run on this machine, and wander.")  # fmt: skip
+    return Table(f"Standard deviations of R19-ride at {SPEED:g} m/s", note, ("route", "count", *KINDS, "ms"), lines)
+
+
+def draw(data: dict[str, Any]) -> tuple[str, Figure]:
+    """Error over milliseconds, a panel per kind of output."""
+    from studies.figures import plt
+
+    figure, axes = plt.subplots(1, len(KINDS), figsize=(11, 4.8), sharey=True)
+    markers = {"solves": "*", "decompositions": "D", "frequencies": "o", "copies": "s"}
+    for ax, kind in zip(axes, KINDS, strict=True):
+        for p in data["points"]:
+            x, y = 1e3 * p["seconds"], p["errors"][kind]
+            ax.plot(x, y, markers[p["unit"]], markersize=8, label=f"{p['name']}, {p['count']:,} {p['unit']}")
+        ax.axhspan(1e-30, data["uncertainty"], color="#bbbbbb", alpha=0.4, linewidth=0)
+        ax.set(xscale="log", yscale="log", xlabel="milliseconds (median)", title=kind)
+        ax.set_ylim(1e-15, 1.0)
+    axes[0].set_ylabel("largest relative error of a standard deviation")
+    figure.suptitle(f"What accuracy costs in ride: R19-ride at {SPEED:g} m/s, rear axle delayed")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8.5)
+    caption = "Standard deviations by every route against quadrature with the delay exact (grey: its own error)."
+    return caption, figure
