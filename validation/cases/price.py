@@ -1,6 +1,7 @@
 """What accuracy costs: work and precision of every integrator, cheapest settings, and what defaults lose.
 
-Another system joins by a problem in ``validation/problems`` and its name in ``PROBLEMS``.
+Another system that marches joins by a problem in ``validation/price/problems`` and its name in ``PROBLEMS``; ride,
+which does not, has routes of its own beside them.
 """
 
 from collections.abc import Callable
@@ -8,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from models.assembly import Assembly
+from validation.price import ride, speed
 from validation.price import runner as cost
-from validation.price import speed
 from validation.price.figure import draw as draw_figure
 from validation.price.force_calls import counted
 from validation.price.problems import Problem, Setting, force_excited, road_excited
@@ -42,9 +43,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         saved.append({"problem": cost.describe(problem, ROUNDS[quick]), "points": [p.as_dict() for p in points]})
         rows += rows_of(problem, points, quick)
     road = road_excited.problem(quick)
-    data = {"problems": saved, **_speeds(road.assembly, 2 * ROUNDS[quick], 2 * LEAST[quick])}
+    ride_rows, ride_data = ride.measure(quick, ROUNDS[True], LEAST[True])
+    data = {"problems": saved, "ride": ride_data, **_speeds(road.assembly, 2 * ROUNDS[quick], 2 * LEAST[quick])}
     settings = list(dict.fromkeys(_at_1_ms(one) for one in road.settings(quick) if one.method != "DVERK6"))
-    return rows + _road_rows(saved[0]) + _counts(settings, road.assembly) + _speed_rows(data), data
+    return rows + _road_rows(saved[0]) + _counts(settings, road.assembly) + _speed_rows(data) + ride_rows, data
 
 
 def _speeds(assembly: Assembly, rounds: int, least: float) -> dict[str, Any]:
@@ -112,15 +114,16 @@ def _speed_rows(data: dict[str, Any]) -> list[Row]:
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """Cheapest settings, losses, curves and failures of every problem."""
-    return [table for one in data["problems"]
-            for table in cost_tables(one["problem"], [cost.point(saved) for saved in one["points"]])]  # fmt: skip
+    """Cheapest settings, losses, curves and failures of every problem; the routes of ride."""
+    return [*(table for one in data["problems"]
+              for table in cost_tables(one["problem"], [cost.point(saved) for saved in one["points"]])),
+            ride.table(data["ride"])]  # fmt: skip
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """A work-precision figure per problem."""
-    return [(_caption(one["problem"]), draw_figure(one["problem"], [cost.point(saved) for saved in one["points"]]))
-            for one in data["problems"]]  # fmt: skip
+    """A work-precision figure per problem, and one of the routes of ride."""
+    return [*((_caption(one["problem"]), draw_figure(one["problem"], [cost.point(saved) for saved in one["points"]]))
+              for one in data["problems"]), ride.draw(data["ride"])]  # fmt: skip
 
 
 def _caption(problem: dict[str, Any]) -> str:
