@@ -9,7 +9,7 @@ import pytest
 from models.errors import InputError
 from models.ride.export import state_space
 from models.ride.measures import exceedances, share_beyond
-from models.ride.of_scene import excitation_of, placed_wheels, vehicle_of
+from models.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
 from models.ride.scene import build
 from models.vehicles.spatial_linear import wheels
 
@@ -82,6 +82,13 @@ def test_wheels_stand_at_their_own_place_or_on_the_tracks():
     assert found["tracks"] == [0.69342, -0.69342, 0.69342, -0.69342]
 
 
+def test_a_road_of_an_iso_class_has_its_level():
+    """Class C: one-sided 256e-6 m^3 at 0.1 waves per metre are 2 pi 0.01 256e-6 = 16.1e-6 m^3 at 1 rad/m."""
+    scene = build({**TABLE, "road": {"iso8608": "C"}})
+    there = wheels(vehicle_of(scene))
+    assert 2 * road_of(scene, there).level(there[0].y) == pytest.approx(2 * np.pi * 0.01 * 256e-6, rel=1e-12)
+
+
 def test_the_system_as_python_control_has_it():
     from models.ride.excitation import excited
     from models.vehicles.spatial_linear import linearise
@@ -109,6 +116,10 @@ REFUSED = [
     ({"speeds": {"values": [5.0], "start": 5.0}}, "is not read beside"),
     ({"road": {"q_mean": 1e-5}}, "road.q_roll: is missing"),
     ({"road": {"q_mean": 1e-5, "q_roll": 1e-5, "level": 1e-5}}, "road.level"),
+    ({"road": {"iso8608": "C", "level": 1e-5}}, "is that of class C already"),
+    ({"road": {"iso8608": "I"}}, "road.iso8608"),
+    ({"road": {"track_width": 1.4}}, "road.track_width = 1.4: has no meaning without road.file"),
+    ({"road": {"file": "a.crg", "level": 1e-5}}, "road.level = 1e-05: is fitted to road.file"),
     ({"road": {"cutoff": 1.0}}, "road.cutoff = 1.0: must be above road.corner_roll, 1.5"),
     ({"road": {"left_right": "same"}}, "left_right"),
     ({"weighting": {"body centre": "Wx"}}, "weighting"),

@@ -9,6 +9,7 @@ from models.errors import InputError
 from models.ride.excitation import Excitation
 from models.ride.linear_vehicle import LinearVehicle, Wheel
 from models.ride.scene import RideScene
+from models.road.iso8608 import level_of_class
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad, excitation, half_track, on_track, road_of_level
 from models.vehicles.spatial import SpatialVehicle
@@ -53,7 +54,8 @@ def road_of(scene: RideScene, wheels: tuple[Wheel, ...]) -> TwoTrackRoad:
     if road.q_mean is not None and road.q_roll is not None:
         return TwoTrackRoad(ShapeFilter(road.corner_mean, road.q_mean, road.cutoff),
                             ShapeFilter(road.corner_roll, road.q_roll, road.cutoff))  # fmt: skip
-    return road_of_level(half_track_of(scene, wheels), road.level, corners=(road.corner_mean, road.corner_roll),
+    level = road.level if road.iso8608 is None else level_of_class(road.iso8608)
+    return road_of_level(half_track_of(scene, wheels), level, corners=(road.corner_mean, road.corner_roll),
                          cutoff=road.cutoff)  # fmt: skip
 
 

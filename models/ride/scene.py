@@ -35,6 +35,8 @@ class Road(Strict):
     last: float | None = quantity("m", "where along the file to end", default=None)
 
     level: float = quantity("m", "S0: a track's spectrum tends to S0 / Omega^2, two-sided", default=LEVEL)
+    iso8608: Literal["A", "B", "C", "D", "E", "F", "G", "H"] | None = Field(
+        default=None, description="class instead of a level: its mean, one-sided as the standard has it")
     q_mean: float | None = quantity("m", "intensity of the mean process instead of a level", default=None, zero=True)
     q_roll: float | None = quantity("1/m", "intensity of the roll process", default=None, zero=True)
     corner_mean: float = quantity("rad/m", "corner of the mean process", default=MEAN_CORNER)
@@ -108,7 +110,7 @@ def _check_speeds(file: str, speeds: Speeds) -> None:
 
 OF_FILE = ("track_width", "first", "last")
 """Keys of [road] that belong to its file."""
-OF_FORMULA = ("level", "q_mean", "q_roll", "corner_mean", "corner_roll", "half_track")
+OF_FORMULA = ("level", "iso8608", "q_mean", "q_roll", "corner_mean", "corner_roll", "half_track")
 """Keys of [road] that a file answers."""
 
 
@@ -130,6 +132,8 @@ def _check_intensities(file: str, road: Road) -> None:
     if len(given) == 1:
         other = "q_roll" if given == ["q_mean"] else "q_mean"
         raise InputError(file, f"road.{other}", None, f"is missing: it belongs to road.{given[0]}")
-    for name in ("level", "half_track") if given else ():
+    for name in ("level", "iso8608", "half_track") if given else ():
         if name in road.model_fields_set:
             raise InputError(file, f"road.{name}", getattr(road, name), "is not read beside q_mean and q_roll")
+    if road.iso8608 is not None and "level" in road.model_fields_set:
+        raise InputError(file, "road.level", road.level, f"is that of class {road.iso8608} already: drop one of them")
