@@ -1,0 +1,201 @@
+"""One contact, from curvatures and load to creep forces, for compiled callers: nothing is allocated, nothing raised.
+
+Hertz' contact (``hertz``), Kalker's coefficients (``linear_theory``) and the second-order march of FASTSIM with the
+blended flexibilities and the intermediate bound (``fastsim``), to the last digits the numbers of these modules. What
+they refuse by an exception is refused here by a status, and every result is then not a number.
+
+The net of cells is a table of doubles that ``net`` makes for a number of cells, good for ellipses of every shape. That
+of zero cells stands for the linear theory: forces of small creepages, which no friction limits.
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numba import carray
+
+from models.compiled import njit
+from models.contact.fastsim import LEAST_CELLS, MOST_CELLS
+from models.contact.fastsim_grid import MOST_STRIPS, grid, strips_of
+from models.contact.fastsim_kernels import LANES, ROWS, march_second_order
+from models.contact.fastsim_many import (
+    BLENDED,
+    HALF,
+    L1,
+    L2,
+    L3,
+    LOAD,
+    MU,
+    SPIN,
+    XI_X,
+    XI_Y,
+    A,
+    B,
+    _collect,
+    _fill,
+    rigid_slip,
+)
+from models.contact.hertz import FLATTEST, LARGEST_AXIS, LEAST_AXIS, aspect, integrals
+from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN, NOTHING, Array
+from models.contact.linear_theory import LARGEST_PATCH, coefficient_at, flexibilities_at
+from models.contact.stack import beyond, doubles
+from models.errors import InputError
+
+(SHAPE_X, SHAPE_Y, PRESSING, FRICTION, CREEP_X, CREEP_Y, TURNING, MODULUS, POISSON) = range(9)
+"""What goes in: A, B (1/m) or a, b (m); load (N) or approach (m); mu; xi_x, xi_y; spin (1/m); G (Pa), nu."""
+INPUTS = 9
+FX, FY, MZ, AXIS_A, AXIS_B, APPROACH, NORMAL, STICK = range(8)
+"""What comes out: fx, fy (N), mz (N m), a, b, approach (m), load (N), share of the area that sticks."""
+OUTPUTS = 8
+BY_LOAD, BY_APPROACH, AXES_BY_LOAD, AXES_BY_APPROACH = range(4)
+"""What the first three inputs are: A, B, load; A, B, approach; a, b, load; a, b, approach."""
+FINE, NOT_FINITE, NOT_PLAUSIBLE, NOT_KNOWN = range(4)
+"""Status: an answer; an input that is not finite; one out of its range; a word for the inputs that is none."""
+LARGEST_CURVATURE, SLENDEREST, LARGEST_FRICTION = 1e12, 1e9, 10.0
+_CELLS, _FIRST, _COUNT, _ALONG = range(4)
+"""Places in the net: cells per strip, strips of the first net, how many nets, where the rows of the cells begin."""
+_LANES, _CONTACT, _SLIPS, _FOUND = ROWS * LANES, 10, 5, 4
+
+
+@lru_cache(maxsize=64)
+def net(cells: int) -> Array:
+    """Table for ``cells`` per strip, from 3 to 2000, or 0 for the linear theory; raises InputError. Not to be changed.
+
+    Narrow ellipses have more strips: there is one net for every number of strips that may be asked for.
+    """
+    if isinstance(cells, bool) or not isinstance(cells, int) or not (cells == 0 or LEAST_CELLS <= cells <= MOST_CELLS):
+        raise InputError("", "cells", cells, f"must be a whole number from {LEAST_CELLS} to {MOST_CELLS}, or 0 for the "
+                         "linear theory")  # fmt: skip
+    parts, counts = [], range(0)
+    if cells:
+        counts = range(int(strips_of(np.array(1.0), cells)), int(strips_of(np.array(1e-9), cells)) + 2, 2)
+        nets = [grid(cells, count, "intermediate") for count in counts]
+        parts = [nets[0].cells.ravel(), *(np.append(one.middle, one.strips) for one in nets)]
+    table = np.concatenate(([cells, counts.start, len(counts)], *parts))
+    table.setflags(write=False)
+    return table
+
+
+@njit(cache=True, error_model="numpy")
+def contact(given, inputs, table, outputs):
+    """Status of one contact, FINE or another; fills ``outputs``.
+
+    given : BY_LOAD or another; inputs : pointer to INPUTS doubles; table : pointer to a ``net``; outputs : pointer to
+    OUTPUTS doubles. A load or an approach of zero or less has zeros all over.
+    """
+    own, out = carray(inputs, (INPUTS,)), carray(outputs, (OUTPUTS,))
+    status = _status(given, own)
+    out[:] = 0.0 if status == FINE else math.nan
+    if status != FINE or own[PRESSING] <= 0.0:
+        return status
+    if not _press(given, own, out):
+        out[:] = math.nan
+        return NOT_PLAUSIBLE
+    if carray(table, (1,))[_CELLS] == 0.0:
+        _linear(own, out)
+    elif own[FRICTION] * out[NORMAL] > NOTHING:
+        _creep(own, table, out)
+    return FINE
+
+
+@njit(cache=True, error_model="numpy")
+def _status(given, own):
+    """Whether the inputs are numbers, and numbers in SI."""
+    if not BY_LOAD <= given <= AXES_BY_APPROACH:
+        return NOT_KNOWN
+    for value in own:
+        if not math.isfinite(value):
+            return NOT_FINITE
+    most = LARGEST_LOAD if given in (BY_LOAD, AXES_BY_LOAD) else LARGEST_APPROACH
+    small, large = min(own[SHAPE_X], own[SHAPE_Y]), max(own[SHAPE_X], own[SHAPE_Y])
+    if given in (BY_LOAD, BY_APPROACH):
+        shaped = small > 0.0 and FLATTEST <= large <= LARGEST_CURVATURE
+    else:  # without a load the axes may be none
+        shaped = (small >= LEAST_AXIS or own[PRESSING] <= 0.0) and small >= 0.0 and large <= LARGEST_AXIS
+    plausible = (
+        shaped and own[PRESSING] <= most and 0.0 <= own[FRICTION] <= LARGEST_FRICTION
+        and abs(own[CREEP_X]) <= LARGEST_CREEPAGE and abs(own[CREEP_Y]) <= LARGEST_CREEPAGE
+        and abs(own[TURNING]) <= LARGEST_SPIN and own[MODULUS] > 0.0 and 0.0 <= own[POISSON] <= 0.5
+    )  # fmt: skip
+    return FINE if plausible else NOT_PLAUSIBLE
+
+
+@njit(cache=True, error_model="numpy")
+def _press(given, own, out):
+    """Axes, approach and load by Hertz; whether the ellipse is one that the theories of rolling take."""
+    x, y, elastic = own[SHAPE_X], own[SHAPE_Y], own[MODULUS] / (1.0 - own[POISSON])
+    small, large = min(x, y), max(x, y)
+    if given in (BY_LOAD, BY_APPROACH):
+        if large > SLENDEREST**1.6 * small:  # beyond it a/b, about the power 2/3 of this, is so in any case
+            return False
+        ratio, cosine, sine = aspect(small / large)
+        whole = cosine + sine
+        if given == BY_LOAD:
+            load = own[PRESSING]
+            short = np.cbrt(1.5 * load * cosine / (math.pi * elastic * large) * ratio)
+        else:
+            short = np.sqrt(own[PRESSING] * cosine / (large * whole))
+            load = 2.0 / 3.0 * math.pi * elastic * own[PRESSING] * short / (ratio * whole)
+        long = short / ratio
+        out[AXIS_A], out[AXIS_B] = (long, short) if x <= y else (short, long)
+    else:
+        cosine, sine = integrals(small / large) if small * SLENDEREST >= large else (1.0, 1.0)
+        whole, short, long = cosine + sine, small, large
+        by_load = given == AXES_BY_LOAD
+        load = own[PRESSING] if by_load else 2.0 / 3.0 * math.pi * x * y * own[PRESSING] * elastic / (small * whole)
+        out[AXIS_A], out[AXIS_B] = x, y
+    out[NORMAL] = load
+    out[APPROACH] = 1.5 * load / (math.pi * short * long) * short * whole / elastic
+    rolls = short >= LEAST_AXIS and long <= SLENDEREST * short and short * long <= LARGEST_PATCH**2
+    return rolls and load <= LARGEST_LOAD
+
+
+@njit(cache=True, error_model="numpy")
+def _linear(own, out):
+    """Forces as long as nothing slips."""
+    a, b, shear = out[AXIS_A], out[AXIS_B], own[MODULUS]
+    area, ratio, nu = a * b, a / b, own[POISSON]
+    along = across = mixed = turn = 0.0
+    for kind in range(4):  # a loop, as numba compiles one function for each number that is written out
+        c = coefficient_at(kind, ratio, nu)
+        if kind == 0:
+            along = c
+        elif kind == 1:
+            across = c
+        elif kind == 2:
+            mixed = c
+        else:
+            turn = c
+    out[FX] = -shear * area * along * own[CREEP_X]
+    out[FY] = -shear * (area * across * own[CREEP_Y] + area**1.5 * mixed * own[TURNING])
+    out[MZ] = shear * (area**1.5 * mixed * own[CREEP_Y] - area**2 * turn * own[TURNING])
+    out[STICK] = 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def _creep(own, table, out):
+    """FASTSIM on one ellipse: as ``fastsim_many.forces``, all arrays on the stack."""
+    head = carray(table, (_ALONG,))
+    n, first = int(head[_CELLS]), int(head[_FIRST])
+    wide = n * min(max((0.5 / (out[AXIS_A] / out[AXIS_B])) ** 0.6, 1.0), 1.0 * MOST_STRIPS)
+    m = 2 * math.ceil(wide / 2.0 - 1e-9)
+    k = (m - first) // 2
+    at = _ALONG + 5 * n + k * (1 + 4 * first) + 4 * k * (k - 1)
+    cells, strips = carray(beyond(table, _ALONG), (5, n)), carray(beyond(table, at + 1), (4, m))
+    contacts, slips = carray(doubles(_CONTACT), (1, _CONTACT)), carray(doubles(_SLIPS), (1, _SLIPS))
+    found, lanes = carray(doubles(_FOUND), (1, _FOUND)), carray(doubles(_LANES), (_LANES,))
+    one = contacts[0]
+    one[A], one[B], one[LOAD], one[MU] = out[AXIS_A], out[AXIS_B], out[NORMAL], own[FRICTION]
+    one[XI_X], one[XI_Y], one[SPIN] = own[CREEP_X], own[CREEP_Y], own[TURNING]
+    one[L1], one[L2], one[L3] = flexibilities_at(one[A], one[B], own[MODULUS], own[POISSON])
+    rigid_slip(one, n, carray(beyond(table, at), (1,))[0], BLENDED, slips[0])
+    found[0] = 0.0
+    area = 0.0
+    for start in range(0, m, LANES):
+        count = min(LANES, m - start)
+        _fill(lanes, start, count, contacts, strips, slips)
+        march_second_order(lanes, cells)
+        _collect(lanes, start, count, contacts, strips, slips, found)
+    for s in range(m):
+        area += strips[HALF, s] * n
+    out[FX], out[FY], out[MZ], out[STICK] = found[0, 0], found[0, 1], found[0, 2], 1.0 - found[0, 3] / area

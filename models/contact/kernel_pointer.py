@@ -1,0 +1,57 @@
+"""The contact kernel as a C function pointer, for engines and programs that are not written in Python.
+
+``pointer(cells)`` has the address of the function and that of the table of cells it marches on. The signature, the
+structures and the status are in ``kernel.h`` beside this file, a program that uses them in ``kernel_example.c``:
+
+    int32_t twinrig_contact(int32_t given, const double *net, const twinrig_in *in, twinrig_out *out);
+
+The function allocates nothing, takes no lock, holds nothing between two calls and enters Python nowhere, so that any
+number of threads may call it at once. The pointers last as long as the object that ``pointer`` returns. Axes, signs
+and units are those of ``models.contact``.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numba import cfunc, types
+
+from models.contact.inputs import Array
+from models.contact.kernel import contact, net
+from models.contact.stack import DOUBLES
+
+SIGNATURE = types.int32(types.int32, DOUBLES, DOUBLES, DOUBLES)
+HEADER = Path(__file__).with_name("kernel.h")
+EXAMPLE = Path(__file__).with_name("kernel_example.c")
+
+
+@dataclass(frozen=True, eq=False)
+class Pointer:
+    """Addresses of the function and of its ``net``, and ``call``, the function as ctypes knows it."""
+
+    address: int
+    net: Array
+    call: Any
+
+    @property
+    def net_address(self) -> int:
+        """Address of the table's first double."""
+        return int(self.net.ctypes.data)
+
+
+def pointer(cells: int = 21) -> Pointer:
+    """The kernel and the table for ``cells`` per strip; 0 for the linear theory. Raises InputError."""
+    compiled = _compiled()
+    return Pointer(int(compiled.address), net(cells), compiled.ctypes)
+
+
+@cache
+def _compiled() -> Any:
+    """A shell about ``contact``, whose machine code is kept on disk: compiled anew in each process, for it is short."""
+
+    @cfunc(SIGNATURE, error_model="numpy")
+    def twinrig_contact(given, table, inputs, outputs):
+        return contact(given, inputs, table, outputs)
+
+    return twinrig_contact
