@@ -10,9 +10,9 @@ from models.ride.covariance import stationary
 from models.ride.excitation import excited
 from models.ride.gaussian_laws import of_curve, of_friction
 from models.ride.in_engines import ridden
-from models.ride.nonlinear_copies import copies_in_time
+from models.ride.nonlinear_copies import _Laws, copies_in_time
 from models.ride.road_path import road_path
-from models.ride.statistical_linearisation import GRADES, promised, statistically_linear
+from models.ride.statistical_linearisation import GRADES, bent, promised, statistically_linear
 from models.ride.time_averages import standard_errors
 from models.road.two_track import CASES, excitation, half_track, input_covariance, on_track, road_of_level
 from models.vehicles.curve import Curve
@@ -43,6 +43,13 @@ def test_moments_of_a_curve_are_their_integrals(mean, deviation):
     force, gain = of_curve(curve, mean, deviation)
     assert force == pytest.approx(expected(lambda x: curve(mean + deviation * x), cuts), rel=1e-9)
     assert gain == pytest.approx(expected(lambda x: curve(mean + deviation * x) * x, cuts) / deviation, rel=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [0.05, 1.0, 300.0])
+def test_gain_of_friction_is_its_integral(ratio):
+    """Deviations of the rate from far below that of friction, where it is a damper, to far above, Coulomb's law."""
+    gain = expected(lambda x: np.tanh(ratio * x) * x, (-1.0 / ratio, 0.0, 1.0 / ratio)) / ratio
+    assert of_friction(40.0, 0.01, 0.01 * ratio) == pytest.approx(4000.0 * gain, rel=1e-9)
 
 
 def test_still_springs_have_their_slope_at_rest():
@@ -156,6 +163,24 @@ def test_engines_agree_where_springs_are_bent():
     assert one.interval == pytest.approx(20 * road.step)
     travel = one.run.positions[::20, 1] - one.run.positions[::20, 0]
     assert one.of("travel front left") == pytest.approx(travel, abs=1e-15)
+
+
+def test_a_copy_goes_where_an_engine_goes():
+    """The quarter car's motion is small at any size: the copies' laws step by step are MuJoCo's, so is the force."""
+    vehicle, excitation_ = ride(NONLINEAR, 16.0)
+    road = road_path(excitation_, SPEED, 1e-3)
+    run, table = ridden("mujoco", vehicle, road, 0.3, seed=5).run, road.table(300, 5)
+    springs = bent(vehicle)
+    plain = linearise(vehicle, SPEED, {s.name: (s.stiffness, s.damping) for s in springs})
+    laws, x = _Laws(vehicle, plain, springs, SPEED), np.zeros((4, 1))
+    for i in range(300):
+        rate, _ = laws.rate(x, table[2 * i, :, None])
+        x = laws.stepped(x, rate, table[2 * i + 1, :, None], table[2 * i + 2, :, None], road.step)
+    assert np.abs(x[:, 0] - [*run.positions[-1], *run.rates[-1]]).max() < 1e-12
+    rate, force = laws.rate(x, table[-1, :, None])
+    strut = laws.outputs(x, rate, table[-1, :, None], force)[2, 0]
+    assert strut == pytest.approx(vehicle.bodies[0].mass * rate[2, 0], rel=1e-12), "all that pulls at the body"
+    assert abs(force[0, 0]) > 100.0, "N: the bent laws are at work"
 
 
 def test_standard_errors_of_a_run():
