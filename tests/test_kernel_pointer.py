@@ -50,6 +50,7 @@ def test_numbers_are_those_of_the_package(cells):
 
 
 def test_zero_cells_are_the_linear_theory():
+    assert pointer(0).net.dtype == float
     status, out = call(pointer(0), k.BY_APPROACH, (1.1, 1.7, 5e-5, *GOOD[3:]))
     hertz = by_approach(1.1, 1.7, 5e-5, PAIR)
     assert status == k.FINE

@@ -71,7 +71,7 @@ def net(cells: int) -> Array:
         counts = range(int(strips_of(np.array(1.0), cells)), int(strips_of(np.array(1e-9), cells)) + 2, 2)
         nets = [grid(cells, count, "intermediate") for count in counts]
         parts = [nets[0].cells.ravel(), *(np.append(one.middle, one.strips) for one in nets)]
-    table = np.concatenate(([cells, counts.start, len(counts)], *parts))
+    table = np.concatenate(([cells, counts.start, len(counts)], *parts), dtype=float)
     table.setflags(write=False)
     return table
 

@@ -1,4 +1,4 @@
-"""Doubles on the stack of a compiled function, for callers that must not allocate: callbacks of engines, and C."""
+"""Pointers to doubles: on the stack of a compiled function, for callers that must not allocate, and into arrays."""
 
 from typing import Any
 
@@ -30,3 +30,16 @@ def beyond(typing_context, pointer, count):
         return builder.gep(arguments[0], [arguments[1]])
 
     return DOUBLES(DOUBLES, types.intp), generate
+
+
+@_intrinsic
+def start(typing_context, array):
+    """Pointer to the first double of a contiguous array of doubles, which must outlive it."""
+
+    if array.dtype != types.float64 or array.layout != "C":
+        return None
+
+    def generate(context, builder, signature, arguments):
+        return cgutils.create_struct_proxy(signature.args[0])(context, builder, value=arguments[0]).data
+
+    return DOUBLES(array), generate
