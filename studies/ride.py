@@ -15,6 +15,7 @@ from models.ride.measures import dynamic_load_factor, exceedances, share_beyond
 from models.ride.of_scene import (
     GRAVITY,
     Linear,
+    check_linear,
     excitation_of,
     fitted_road,
     half_track_of,
@@ -60,6 +61,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     """Refuse a varying speed, which is another study's."""
     if scene.speeds is None:
         raise InputError(scene.file, "study", scene.study, "runs at constant speeds; with a drive use ride_drive")
+    check_linear(scene, vehicle_of(scene))
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -172,16 +174,7 @@ def _table(scene: RideScene, vehicle: SpatialVehicle, found: dict[str, Sweep], s
         lines.append(f"    {name:<{width}}{_value(own, unit, str(first.status[0, -1, i])):>20}{changes}")
     lines += [f"  {name}: {reason}" for name, reason in _notes(first)]
     lines += _travels(vehicle, first, options) + _loads(vehicle, first)
-    return [*lines, *curved(vehicle), *_agreement(found)]
-
-
-def curved(vehicle: SpatialVehicle) -> list[str]:
-    """A warning where the linear vehicle is the one of small motion only."""
-    names = [s.name for s in vehicle.springs if s.travel_force or s.rate_force or s.friction]
-    if not names:
-        return []
-    return [f"  small motion only: {', '.join(names)} have curves or friction, taken by their slopes at rest; "
-            "ride_nonlinear takes them as they are"]  # fmt: skip
+    return [*lines, *_agreement(found)]
 
 
 def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) -> dict[str, float]:

@@ -11,7 +11,7 @@ from pydantic import Field
 from models.errors import InputError
 from models.ride.covariance import stationary
 from models.ride.excitation import excited
-from models.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
+from models.ride.of_scene import check_linear, excitation_of, linear_vehicle, vehicle_of
 from models.ride.scene import RideScene
 from models.ride.sweep import Sweep, sweep
 from models.strict import Strict, read
@@ -44,6 +44,8 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     if scene.speeds is None:
         raise InputError(scene.file, "study", scene.study, "runs at constant speeds; with a drive use ride_drive")
     full = {output.name for output in vehicle_of(scene).outputs}
+    for vehicle in (vehicle_of(scene), *_simpler(scene)):
+        check_linear(scene, vehicle)
     for i, vehicle in enumerate(_simpler(scene)):
         if not full & {output.name for output in vehicle.outputs}:
             place, name = f"options.simpler.{i}", _options(scene).simpler[i]

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from models.errors import InputError
-from models.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
+from models.ride.of_scene import check_linear, excitation_of, linear_vehicle, vehicle_of
 from models.ride.scene import RideScene
 from models.ride.varying_speed import VaryingSpeed, quasi_stationary, varying_speed
 from models.strict import Strict, read
@@ -33,6 +33,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     if scene.drive is None:
         raise InputError(scene.file, "study", scene.study, "runs along a drive; at constant speeds use ride")
     vehicle = vehicle_of(scene)
+    check_linear(scene, vehicle)
     if vehicle.side_forces or vehicle.drags:
         allowed = "has side forces or drag, which change with the speed: this study takes matrices that do not"
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)

@@ -137,6 +137,14 @@ def test_a_scene_that_cannot_be_is_told_why(change, said):
     assert str(caught.value).startswith("my.toml")
 
 
+@pytest.mark.parametrize("study", ["ride", "ride_detail", "ride_drive"])
+def test_curves_are_not_taken_as_lines_without_a_word(twinrig, capsys, study):
+    given = ("--set", "vehicle.file=quarter_car_nonlinear", "--set", "weighting={}", "--set", "options={}")
+    assert twinrig("run", study, *given) == 2
+    said = capsys.readouterr().err
+    assert "ride_nonlinear" in said and "small_motion" in said
+
+
 def test_weighting_of_no_output_offers_the_nearest(twinrig, capsys):
     assert twinrig("run", "ride", *SMALL[:-2], "--set", "weighting={'body center'='Wk'}") == 2
     assert "did you mean 'body centre'" in capsys.readouterr().err

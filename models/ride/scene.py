@@ -23,6 +23,7 @@ class RideVehicle(Strict):
     """[vehicle]: a vehicle file, and the point about which it is linear."""
 
     file: str = Field(description="a vehicle that comes with twinrig, or a TOML file of your own")
+    small_motion: bool = Field(default=False, description="curves and friction of springs by their slopes at rest")
     operating_point: Literal["unloaded", "loaded"] = Field(default="unloaded", description="loaded: gravity, preload")
 
 
