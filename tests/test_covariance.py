@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.errors import InputError
 from models.ride.closed_forms import QuarterCar, half_car_acceleration, split_half_car
 from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary
 from models.ride.delayed_system import DelayedSystem
@@ -243,6 +244,19 @@ def test_an_unstable_vehicle_is_refused_in_words():
     assert told.value.growth == pytest.approx(0.064, rel=0.01)
     with pytest.raises(Unstable, match="does not swing"):
         stationary(system(np.array([[0.5]]), [np.ones((1, 1))]))
+
+
+def test_a_sweep_names_the_speed_at_which_a_vehicle_is_unstable():
+    vehicle = corners([(0.0, replace(CORNER, c=-5.0))])
+    with pytest.raises(Unstable, match="must be stable at 20 m/s"):
+        sweep(lambda speed: vehicle, {"": walk(0.3)}, [20.0])
+
+
+def test_slow_motions_beside_a_wheel_of_no_mass_are_not_called_free():
+    """1e12 1/s beside 10 1/s: they fall below the accuracy of the matrix, and no load diffuses because of that."""
+    vehicle = corners([(0.0, replace(CORNER, m_u=1e-9))])
+    with pytest.raises(InputError, match=r"vehicle: has a motion so fast, [\d.]+e\+12 1/s, that its slow ones"):
+        stationary(excited(vehicle, walk(0.3), 20.0))
 
 
 def test_a_weighted_output_is_that_of_the_quadrature(truck):

@@ -31,12 +31,13 @@ ROUNDING = 10 * float(np.finfo(float).eps)
 class Unstable(InputError):
     """A system that leaves its equilibrium on its own: ``growth`` in 1/s, ``frequency`` in Hz."""
 
-    def __init__(self, growth: float, frequency: float) -> None:
+    def __init__(self, growth: float, frequency: float, speed: float | None = None) -> None:
         self.growth, self.frequency = growth, frequency
+        where = "at this speed" if speed is None else f"at {speed:g} m/s"
         how = f"that swings at {frequency:.4g} Hz" if frequency else "that does not swing"
         super().__init__(
             "", "vehicle", None, f"is unstable: a motion {how} grows at a rate of {growth:.4g} 1/s, twofold in "
-            f"{np.log(2) / growth:.3g} s, so nothing has a stationary variance; it must be stable at this speed"
+            f"{np.log(2) / growth:.3g} s, so nothing has a stationary variance; it must be stable {where}"
         )  # fmt: skip
 
 
@@ -68,12 +69,14 @@ class Parts:
 
 
 def parts(A: np.ndarray, accuracy: float = ACCURACY) -> Parts:
-    """Marginal and stable part of x' = A x + u, A (n, n); raises Unstable.
+    """Marginal and stable part of x' = A x + u, A (n, n); raises Unstable, InputError where it cannot be told.
 
     ``accuracy`` of A, relative to its norm once its states are scaled: what is smaller counts as zero.
     """
     balanced, scale, norm = _balanced(A)
     V, form, zeros, left = _zeros_first(balanced, accuracy * norm)
+    if zeros and accuracy * norm > FREE:
+        _refuse(norm)
     U, rest, undamped = _undamped_first(form[zeros:, zeros:], 10 * accuracy * norm)
     k = zeros + undamped
     V[:, zeros:] = V[:, zeros:] @ U
@@ -86,6 +89,18 @@ def parts(A: np.ndarray, accuracy: float = ACCURACY) -> Parts:
     stable = (V[:, k:] @ T, back @ W[k:]) if k else (T, back)
     return Parts(form[:k, :k], scale[:, None] * V[:, :k], W[:k] / scale, S, scale[:, None] * stable[0],
                  stable[1] / scale, zeros, scale, norm, _by_slowest(left, rest[undamped:, undamped:]))  # fmt: skip
+
+
+FREE = 1e-3
+"""A motion is not called free because of rounding where rounding comes to more than this (1/s): in a thousand seconds
+a vehicle comes to rest."""
+
+
+def _refuse(fastest: float) -> None:
+    raise InputError(
+        "", "vehicle", None, f"has a motion so fast, {fastest:.2g} 1/s, that its slow ones cannot be told from free "
+        "ones: look for a mass or an inertia that is far too small, a stiffness or damping that is far too large"
+    )  # fmt: skip
 
 
 def _balanced(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.ride.covariance import FINITE, hits, stationary, verdicts
+from models.ride.covariance import FINITE, Covariance, hits, stationary, verdicts
 from models.ride.delayed_system import DelayedSystem
 from models.ride.excitation import Excitation, excited
 from models.ride.linear_vehicle import LinearVehicle
-from models.ride.marginal import ACCURACY, Growth
+from models.ride.marginal import ACCURACY, Growth, Unstable
 from models.ride.modal import Shared, modal
 from models.ride.weighting import weighted
 
@@ -63,11 +63,19 @@ def sweep(vehicle: Callable[[float], LinearVehicle], excitations: Mapping[str, E
             point = _quick(system, states, excitation, speed, shared, accuracy) if fast else ASKED
             if isinstance(point, str):
                 direct[point] = direct.get(point, 0) + 1
-                exact = stationary(system, accuracy)
+                exact = _stationary(system, speed, accuracy)
                 point = exact.variance, exact.status, exact.reason
             found[i, j], names = point, system.names
     variance, status, reason = (np.array([[point[part] for point in row] for row in found]) for part in range(3))
     return Sweep(tuple(excitations), np.array(speeds), names, variance, status, reason, direct)
+
+
+def _stationary(system: DelayedSystem, speed: float, accuracy: float) -> Covariance:
+    """The direct answer; a vehicle that is unstable is told with its speed."""
+    try:
+        return stationary(system, accuracy)
+    except Unstable as error:
+        raise Unstable(error.growth, error.frequency, speed) from None
 
 
 ASKED = "asked for"
