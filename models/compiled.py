@@ -4,7 +4,7 @@ numba numbers the files of a function's signatures from its index. Two processes
 then write the same file, and each later loads the other's machine code. Nor does numba see a change in a function
 that another file gives to a kernel. Both are wrong answers without a word. So here every file has a name of its own
 (if an entry of the index is lost, the function is compiled again), and machine code is as old as the newest of its
-folder, of the vehicles' equations and of the marches.
+folder, of the vehicles' equations, of the marches and of the contact's kernels.
 """
 
 import zlib
@@ -16,7 +16,7 @@ from uuid import uuid4
 
 import numba
 
-COMMON = tuple(Path(__file__).parent / name for name in ("vehicles", "engines"))
+COMMON = tuple(Path(__file__).parent / name for name in ("vehicles", "engines", "contact"))
 """Folders whose functions are compiled into kernels of other folders."""
 
 

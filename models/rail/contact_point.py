@@ -1,0 +1,42 @@
+"""Where a cone touches a rail whose head is a circular cylinder along the track, exactly and in closed form.
+
+All planes that touch a cone pass through its apex. A plane that touches the rail as well has a normal square to x,
+which singles out one of them: the one whose distance from the cylinder's axis is the head's radius where wheel and rail
+just touch. How much smaller the distance is, is the penetration. The generator of the cone in this plane crosses the
+cylinder's axis, seen along the normal, at the place of contact, which is taken on the wheel's undeformed surface.
+"""
+
+import math
+
+from models.compiled import njit
+
+RIGHT, LEFT = 1.0, -1.0
+
+
+@njit(cache=True, error_model="numpy")
+def cone_on_rail(side, y, z, roll, yaw, radius, half_gauge, conicity, head):
+    """Contact of one wheel: (penetration, rolling radius, n_y, n_z, x, y, z).
+
+    side : RIGHT or LEFT; y, z : of the wheelset's centre (m); roll, yaw : rad; radius, half_gauge, head : m.
+    The normal (0, n_y, n_z) points into the rail; the place is relative to the wheelset's centre, in the track's axes
+    (m). Penetration is negative where there is a gap. Yaw and roll must be less than a right angle less the cone's.
+    """
+    cosine = 1.0 / math.sqrt(1.0 + conicity * conicity)
+    sine = conicity * cosine
+    cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
+    ahead = math.asin(side * conicity * sy * cr / math.hypot(cy, sy * sr)) - math.atan2(sy * sr, cy)
+    ca, sa = math.cos(ahead), math.sin(ahead)
+    n_y = sy * cosine * sa + cy * (side * sine * cr - cosine * ca * sr)
+    n_z = side * sine * sr + cosine * ca * cr
+    reach = half_gauge + radius / conicity  # from the wheelset's centre to the apex
+    apex_x, apex_y, apex_z = -side * reach * sy * cr, side * reach * cy * cr, side * reach * sr
+    axis_y = side * (half_gauge + head * sine) - y - apex_y  # the head's axis, seen from the apex
+    axis_z = radius + head * cosine - z - apex_z
+    penetration = head - (n_y * axis_y + n_z * axis_z)
+    # The generator per unit of the cone's radius, from the apex inwards: (sin ahead, -side / conicity, cos ahead).
+    inward = -side / conicity
+    turned = inward * cr - ca * sr
+    way_x, way_y, way_z = cy * sa - sy * turned, sy * sa + cy * turned, inward * sr + ca * cr
+    rolling = (n_z * axis_y - n_y * axis_z) / (n_z * way_y - n_y * way_z)
+    return (penetration, rolling, n_y, n_z,
+            apex_x + rolling * way_x, apex_y + rolling * way_y, apex_z + rolling * way_z)  # fmt: skip

@@ -1,0 +1,199 @@
+"""A conical wheelset on straight track, nonlinear: equations written out, rest, linearisation, fixed-step RK4.
+
+States (10): y, z, roll, yaw, angle of spin; their rates but for the last, which is the spin about the axle itself,
+the body's whole angular velocity along it. The frame of the coordinates moves with the speed of travel. Its angular
+velocity in axes that roll and yaw with the axle but do not spin is (roll', spin, yaw' cos roll) for the wheelset, with
+yaw' sin roll in place of the spin for the axes themselves, and Euler's equations in them are, with the moments M about
+the centre, I across and J along the axle,
+
+    I roll''          = M1 - I yaw'^2 sin roll cos roll + J spin yaw' cos roll
+    J spin'           = M2
+    I yaw'' cos roll  = M3 + 2 I roll' yaw' sin roll - J spin roll'
+
+Forces: both rails' (``wheel_forces``), the weight, and a spring and a damper along each axis of the track at each end
+of the suspension, free of force in the middle of the track but for the vehicle's weight.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import root
+
+from models.compiled import njit
+from models.errors import InputError, RunFailed
+from models.rail.wheel_forces import LAWS, REPORTED, net, numbers, wheel_forces
+from models.rail.wheelset import GRAVITY, Wheelset
+
+STATES = 10
+Y, Z, ROLL, YAW, ANGLE, Y_RATE, Z_RATE, ROLL_RATE, YAW_RATE, SPIN = range(STATES)
+MASS, ALONG, ACROSS, ARM, KX, KY, KZ, DX, DY, DZ, CARRIED, SUNK = range(12)
+"""Numbers of the body and its suspension (SI): inertia along and across the axle, half spacing, springs and dampers of
+one side, weight that each side carries, height at which the springs bear no more than that."""
+STIFF = 2.5
+"""Steps times the fastest motion's rate up to which RK4 is stable, with a margin: 2.78 at its very limit."""
+MOVED = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-6, 3e-5])
+"""Steps of the differences that linearise: small against penetration (7e-5 m) and creepage."""
+LIMIT = 0.3
+"""Yaw and roll (rad) and displacement (m) beyond which a path is no wheelset's on a track."""
+
+
+@njit(cache=True, error_model="numpy")
+def rates(state, speed, body, p, strips, cells, middle, law, out, report):
+    """Fill ``out`` with the rates of a state (10,), and ``report`` (2, REPORTED) with the two contacts."""
+    y, z, roll, yaw = state[Y], state[Z], state[ROLL], state[YAW]
+    roll_rate, yaw_rate, spin = state[ROLL_RATE], state[YAW_RATE], state[SPIN]
+    cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
+    force, moment = np.zeros(3), np.zeros(3)
+    velocity = np.array([speed, state[Y_RATE], state[Z_RATE]])
+    axle_x, axle_y, axle_z = -sy * cr, cy * cr, sr
+    own = spin - yaw_rate * sr  # of the wheel against the axes that do not spin
+    turning = np.array([cy * roll_rate + axle_x * own, sy * roll_rate + axle_y * own, yaw_rate + axle_z * own])
+    wheel_forces(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, law, force, moment, report)
+    for side in (1.0, -1.0):
+        arm = side * body[ARM]
+        ax, ay, az = arm * axle_x, arm * axle_y, arm * axle_z
+        turn_x, turn_y = cy * roll_rate, sy * roll_rate
+        vx, vy, vz = turn_y * az - yaw_rate * ay, yaw_rate * ax - turn_x * az, turn_x * ay - turn_y * ax
+        fx = -body[KX] * ax - body[DX] * vx
+        fy = -body[KY] * (y + ay - arm) - body[DY] * (state[Y_RATE] + vy)
+        fz = body[CARRIED] - body[KZ] * (z + az - body[SUNK]) - body[DZ] * (state[Z_RATE] + vz)
+        force[0] += fx
+        force[1] += fy
+        force[2] += fz
+        moment[0] += ay * fz - az * fy
+        moment[1] += az * fx - ax * fz
+        moment[2] += ax * fy - ay * fx
+    m1 = cy * moment[0] + sy * moment[1]
+    across = cy * moment[1] - sy * moment[0]
+    m2, m3 = cr * across + sr * moment[2], cr * moment[2] - sr * across
+    out[Y], out[Z], out[ROLL], out[YAW] = state[Y_RATE], state[Z_RATE], roll_rate, yaw_rate
+    out[ANGLE] = own
+    out[Y_RATE] = force[1] / body[MASS]
+    out[Z_RATE] = force[2] / body[MASS] + GRAVITY
+    whirl = body[ALONG] * spin
+    out[ROLL_RATE] = (m1 + whirl * yaw_rate * cr) / body[ACROSS] - yaw_rate**2 * sr * cr
+    out[SPIN] = m2 / body[ALONG]
+    out[YAW_RATE] = ((m3 - whirl * roll_rate) / body[ACROSS] + 2.0 * roll_rate * yaw_rate * sr) / cr
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def march(state, speed, step, count, every, body, p, strips, cells, middle, law, path, reports):
+    """RK4: ``count`` steps (s) from ``state``, which is moved; every so many steps one goes into path and reports."""
+    some, total, rate, here = np.empty((2, REPORTED)), np.empty(STATES), np.empty(STATES), np.empty(STATES)
+    for i in range(count + 1):
+        total[:] = 0.0
+        for stage in range(4):  # one call of the rates, or it is compiled four times
+            here[:] = state
+            if stage > 0:
+                here += (step if stage == 3 else 0.5 * step) * rate
+            rates(here, speed, body, p, strips, cells, middle, law, rate, some)
+            total += (1.0 if stage % 3 == 0 else 2.0) * rate
+            if stage == 0 and i % every == 0:
+                path[i // every], reports[i // every] = state, some
+            if stage == 0 and i == count:
+                return i
+        state += step / 6.0 * total
+        if not abs(state[Y]) + abs(state[YAW]) + abs(state[ROLL]) + abs(state[Z]) < LIMIT:
+            return i
+    return count
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """times (n,) in s; states (n, 10) as above; contacts (n, 2, REPORTED), right wheel first, as in wheel_forces."""
+
+    times: np.ndarray
+    states: np.ndarray
+    contacts: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """A wheelset that travels at a speed (m/s). law : "linear" or "fastsim"; cells : of FASTSIM, along each strip."""
+
+    wheelset: Wheelset
+    speed: float
+    law: Literal["linear", "fastsim"] = "fastsim"
+    cells: int = 21
+
+    def __post_init__(self) -> None:
+        if self.law not in LAWS:
+            raise InputError("", "law", self.law, "is not known", tuple(LAWS))
+        if not 0.0 < abs(self.speed) <= 200.0:
+            raise InputError("", "speed", self.speed, "must be a speed in m/s up to 200, and not 0")
+
+    @cached_property
+    def body(self) -> np.ndarray:
+        """Numbers of the body and its suspension (12,)."""
+        w = self.wheelset
+        carried = (w.load - w.mass * GRAVITY) / 2.0
+        sunk = float(w.ellipse.approach) / w.slant[1]
+        return np.array([w.mass, w.spin_inertia, w.yaw_inertia, w.half_spacing, w.stiffness_x, w.stiffness_y,
+                         w.stiffness_z, w.damping_x, w.damping_y, w.damping_z, carried, sunk])  # fmt: skip
+
+    @cached_property
+    def given(self) -> tuple:
+        """What the compiled functions take after the state: speed, body, contact, net and law."""
+        return (float(self.speed), self.body, numbers(self.wheelset), *net(self.wheelset, self.cells), LAWS[self.law])
+
+    def rates(self, state: np.ndarray) -> np.ndarray:
+        """Rates (10,) of a state (10,)."""
+        out = np.empty(STATES)
+        rates(np.asarray(state, float), *self.given, out, np.empty((2, REPORTED)))
+        return out
+
+    @cached_property
+    def rest(self) -> np.ndarray:
+        """The steady state (10,) in the middle of the track: height and spin such that nothing accelerates."""
+
+        def off(unknown: np.ndarray) -> list[float]:
+            found = self.rates(self._centred(unknown))
+            return [found[Z_RATE], found[SPIN]]
+
+        found = root(off, [1.0, 1.0], tol=1e-15)
+        if np.abs(found.fun).max() > 1e-7:
+            raise RunFailed("wheelset", "no steady state was found in the middle of the track")
+        return self._centred(found.x)
+
+    def _centred(self, unknown: np.ndarray) -> np.ndarray:
+        state = np.zeros(STATES)
+        state[Z], state[SPIN] = unknown[0] * self.body[SUNK], -unknown[1] * self.speed / self.wheelset.radius
+        return state
+
+    @cached_property
+    def state_matrix(self) -> np.ndarray:
+        """A (9, 9) about rest, the angle of spin left out, by central differences of fourth order."""
+        columns = []
+        for k in range(STATES):
+            some = [self.rates(self.rest + part * MOVED[k] * np.eye(STATES)[k]) for part in (-2.0, -1.0, 1.0, 2.0)]
+            columns.append((some[0] - 8.0 * some[1] + 8.0 * some[2] - some[3]) / (12.0 * MOVED[k]))
+        return np.delete(np.delete(np.array(columns).T, ANGLE, 0), ANGLE, 1)
+
+    def run(self, state: np.ndarray, duration: float, step: float, every: int = 1) -> Path:
+        """RK4 from a state (10,) over a duration (s) with a step (s); every so many steps are kept.
+
+        Raises InputError for a step too large for the fastest motion, RunFailed if the wheelset leaves the track.
+        """
+        self._check(step)
+        count = round(duration / step)
+        kept = count // every + 1
+        path, contacts = np.full((kept, STATES), np.nan), np.full((kept, 2, REPORTED), np.nan)
+        speed, *rest = self.given
+        done = march(np.array(state, float), speed, step, count, every, *rest, path, contacts)
+        if done < count:
+            raise RunFailed("wheelset", f"leaves the track after {done * step:.6g} s")
+        return Path(np.arange(kept) * step * every, path, contacts)
+
+    def _check(self, step: float) -> None:
+        fastest = float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
+        if not 0.0 < step * fastest <= STIFF:
+            raise InputError("", "step", step, f"must be above 0 and at most {STIFF / fastest:.3g} s: the fastest "
+                             f"motion has a rate of {fastest:.4g} 1/s")  # fmt: skip
+
+
+def growth(wheelset: Wheelset, speed: float) -> float:
+    """Largest real part (1/s) of the eigenvalues with linear creep, for ``linear.critical_speed``."""
+    return float(np.linalg.eigvals(Equations(wheelset, speed, "linear").state_matrix).real.max())

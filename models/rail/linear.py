@@ -1,0 +1,137 @@
+"""Lateral and yaw motion of a conical wheelset at small displacement, with Kalker's linear theory of creep forces.
+
+Coordinates are y and psi (yaw); roll and height follow from both cones touching their rails. With c the conicity,
+g = atan c, r the radius, b half the distance of the contacts and R the radius of the rails' heads, geometry gives,
+without further approximation at first order (second order for the height):
+
+    roll             = -k y,  k = c / (b - c r)
+    rolling radius   = r +- L y,  L = c (b + R sin g) / (b - c r), the equivalent conicity
+    lateral slip     = (y' b / (b - c r) - V psi) / cos g
+    height (down)    = -(k + (c b + r + R / cos g) k^2 / 2) y^2 + c (b - c r) psi^2 / 2
+
+Without slip the path is a wave, y'' = -V^2 c (b + R sin g) / (r b^2) y: Klingel's 2 pi sqrt(r b / c) for rails that
+are edges (R = 0).
+
+Left out: that the coefficients of creep follow the normal forces of the two wheels, that the constant creep forces of
+spin (opposite on the two wheels) turn with the geometry, and that the contact yields. ``equations`` has all of these.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from models.contact.linear_theory import coefficients
+from models.errors import InputError
+from models.rail.wheelset import Wheelset
+
+LOWEST_SPEED, HIGHEST_SPEED = 1.0, 1000.0
+"""Speeds (m/s) between which a critical one is looked for."""
+SPEEDS = 60
+"""Speeds that are tried on the way from the lowest to the highest."""
+PRECISION = 1e-12
+"""Relative, of a critical speed."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """M q'' + D q' + K q = 0 for q = (y, psi); each (2, 2), SI units."""
+
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+
+    @property
+    def state_matrix(self) -> np.ndarray:
+        """A (4, 4) of the state (y, psi, y', psi')."""
+        rates = -np.linalg.solve(self.mass, np.hstack([self.stiffness, self.damping]))
+        return np.vstack([np.hstack([np.zeros((2, 2)), np.eye(2)]), rates])
+
+
+def klingel(wheelset: Wheelset) -> float:
+    """Wavelength (m) of the free wheelset without slip; Klingel's formula but for the heads' radius (see above)."""
+    r, b, head = wheelset.radius, wheelset.half_gauge, wheelset.head_radius
+    return 2.0 * math.pi * math.sqrt(r * b * b / (wheelset.conicity * (b + head * wheelset.slant[0])))
+
+
+def kalker(wheelset: Wheelset) -> np.ndarray:
+    """Forces (3, 3) by creepages: (-fx, -fy, -mz) of one wheel by (xi_x, xi_y, spin); N, N m, N m^2."""
+    contact, pair = wheelset.ellipse, wheelset.pair
+    c, area = coefficients(contact.a / contact.b, pair.nu), contact.a * contact.b
+    turn = area**1.5 * c.c23
+    return pair.G * np.array([[area * c.c11, 0, 0], [0, area * c.c22, turn], [0, -turn, area**2 * c.c33]], float)
+
+
+def matrices(wheelset: Wheelset, speed: float) -> Linear:
+    """Equations of motion at a speed (m/s) above 0; raises InputError for another one."""
+    if not 0.0 < speed < math.inf:
+        raise InputError("", "speed", speed, "must be a speed above 0, in m/s")
+    w, creep = wheelset, kalker(wheelset)
+    tilt = w.conicity / (w.half_gauge - w.conicity * w.radius)
+    gyroscopic = tilt * w.spin_inertia * speed / w.radius
+    damping, stiffness = _suspension(w, tilt)
+    damping += np.array([[0.0, -gyroscopic], [gyroscopic, 0.0]])
+    stiffness += _gravity(w, tilt)
+    for motion, place in _contacts(w):
+        damping += motion.T @ creep @ motion / speed
+        stiffness += motion.T @ creep @ place
+    return Linear(np.diag([w.mass + w.yaw_inertia * tilt**2, w.yaw_inertia]), damping, stiffness)
+
+
+def _contacts(w: Wheelset) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Creepages (3) of the right and the left wheel by (y', psi') / V and by (y, psi), (3, 2) each."""
+    cosine, b = w.slant[1], w.half_gauge
+    across = b / (b - w.conicity * w.radius) / cosine
+    found = []
+    for side in (1.0, -1.0):
+        motion = np.array([[0.0, -side * b], [across, 0.0], [0.0, cosine]])
+        place = np.array([[-side * w.equivalent_conicity / w.radius, 0.0], [0.0, -1.0 / cosine], [0.0, 0.0]])
+        found.append((motion, place))
+    return found
+
+
+def _suspension(w: Wheelset, tilt: float) -> tuple[np.ndarray, np.ndarray]:
+    """Damping and stiffness of the primary suspension; roll goes with the lateral displacement."""
+    arm = w.half_spacing**2
+    return tuple(2.0 * np.diag([y + z * arm * tilt**2, x * arm])
+                 for x, y, z in ((w.damping_x, w.damping_y, w.damping_z),
+                                 (w.stiffness_x, w.stiffness_y, w.stiffness_z)))  # type: ignore[return-value]  # fmt: skip
+
+
+def _gravity(w: Wheelset, tilt: float) -> np.ndarray:
+    """Stiffness of the load, which rises with y and sinks with yaw."""
+    b, c = w.half_gauge, w.conicity
+    rise = 2.0 * tilt + (c * b + w.radius + w.head_radius / w.slant[1]) * tilt**2
+    return w.load * np.diag([rise, -c * (b - c * w.radius)])
+
+
+def kinematic_wavelength(wheelset: Wheelset) -> float:
+    """Wavelength (m) by the eigenvalues of creep forces alone: no inertia, no suspension, no weight."""
+    creep = kalker(wheelset)
+    motion = sum(m.T @ creep @ m for m, _ in _contacts(wheelset))
+    place = sum(m.T @ creep @ p for m, p in _contacts(wheelset))
+    values = np.linalg.eigvals(-np.linalg.solve(motion, place))
+    return float(2.0 * math.pi / np.abs(values.imag).max())
+
+
+def growth(wheelset: Wheelset, speed: float) -> float:
+    """Largest real part (1/s) of the eigenvalues at a speed (m/s)."""
+    return float(np.linalg.eigvals(matrices(wheelset, speed).state_matrix).real.max())
+
+
+def critical_speed(wheelset: Wheelset, growth=growth) -> float:
+    """Lowest speed (m/s) at which a motion of the wheelset no longer decays.
+
+    growth : largest real part of the eigenvalues as a function of wheelset and speed. Raises InputError if the
+    wheelset is unstable at the lowest speed, or stable up to the highest one that is looked at.
+    """
+    speeds = np.geomspace(LOWEST_SPEED, HIGHEST_SPEED, SPEEDS)
+    below = speeds[0]
+    if growth(wheelset, below) >= 0.0:
+        raise InputError("", "wheelset", None, f"is unstable at {below:g} m/s already: its suspension is too soft")
+    for speed in speeds[1:]:
+        if growth(wheelset, speed) >= 0.0:
+            return float(brentq(lambda v: growth(wheelset, v), below, speed, xtol=PRECISION * speed, rtol=PRECISION))
+        below = speed
+    raise InputError("", "wheelset", None, f"is stable up to {HIGHEST_SPEED:g} m/s: there is no critical speed")
