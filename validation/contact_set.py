@@ -1,53 +1,90 @@
-"""A set of Hertzian contacts with forces by the exact theory, against which every faster theory is measured.
+"""Hertzian contacts with forces by the exact theory, against which every faster theory is measured.
 
-Five ellipses, nine kinds of creepage and eight sizes of it. Forces are kept as shares of mu N and of mu N sqrt(ab), so
-that they hold for every load, size and friction of the same ellipse and Poisson's ratio. ``contact_set.csv`` holds
-them: ``python -m validation.contact_set`` computes it anew in ten minutes, and every report does so for a few of its
-rows.
+The set: five ellipses, thirteen kinds of creepage and eight sizes of it. Drawn contacts: ellipses, directions and sizes
+at random, in two parts, of which one goes into the bands of error that are stated and the other one judges them. Forces
+are kept as shares of mu N and of mu N sqrt(ab), so that they hold for every load, size and friction of the same ellipse
+and Poisson's ratio. ``contact_set.csv`` and ``contact_drawn.csv`` hold them: ``python -m validation.contact_set``
+computes both anew in half an hour, and every report does so for a few rows.
 """
 
 import csv
 from dataclasses import replace
+from math import cos, radians, sin
 from pathlib import Path
 
+import numpy as np
+
+from models.contact import work_precision
 from models.contact.material import Pair
 from models.contact.work_precision import Case, ellipse_cases, exact
 
 RATIOS = (0.2, 0.5, 1.0, 2.0, 5.0)
 LEVELS = (0.05, 0.2, 0.5, 0.8, 1.2, 2.0, 4.0, 10.0)
+KINDS = {**work_precision.KINDS, **{f"y{sign}spin {angle}": (0.0, cos(radians(angle)), float(f"{sign}1") *
+         sin(radians(angle))) for angle in (15, 30) for sign in "+-"}}  # fmt: skip
+"""Parts of the creepages; lateral creepage with and against spin, where theories differ most, by angles in degrees."""
 SIZE, LOAD, FRICTION, PAIR = 5e-3, 8e4, 0.3, Pair()
 """sqrt(ab) in m, N, coefficient of friction and materials with which the set is computed."""
-FILE = Path(__file__).with_suffix(".csv")
+SEED, DRAWN, RANGE = 43, 300, (0.2, 10.0)
+"""Of the drawn contacts: seed, how many in each part, and their sizes."""
+FITTED, JUDGED = 0, 1
+"""Parts of the drawn contacts: one goes into the bands, the other one has never been seen by them."""
+FILE, DRAWN_FILE = Path(__file__).with_suffix(".csv"), Path(__file__).with_name("contact_drawn.csv")
 ANSWERS = ("fx", "fy", "mz", "error")
 
 
 def cases() -> list[Case]:
     """All contacts of the set, without their forces."""
     return [case for ratio in RATIOS
-            for case in ellipse_cases(SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, FRICTION, PAIR, LEVELS)]  # fmt: skip
+            for case in ellipse_cases(*_axes(ratio), LOAD, FRICTION, PAIR, LEVELS, KINDS)]  # fmt: skip
+
+
+def drawn(part: int) -> list[Case]:
+    """A part of the drawn contacts, without their forces: every direction of the scaled creepages is as likely."""
+    rng = np.random.default_rng((SEED, part))
+    ratios, levels = (np.exp(rng.uniform(np.log(low), np.log(high), DRAWN)).tolist()
+                      for low, high in ((RATIOS[0], RATIOS[-1]), RANGE))  # fmt: skip
+    return [
+        Case(*_axes(ratio), LOAD, FRICTION, PAIR, f"drawn {part}", (x, y, spin), level)
+        for ratio, level, (x, y, spin) in zip(ratios, levels, rng.normal(size=(DRAWN, 3)).tolist(), strict=True)
+    ]
+
+
+def _axes(ratio: float) -> tuple[float, float]:
+    return SIZE * ratio**0.5, SIZE / ratio**0.5
 
 
 def read() -> list[Case]:
     """All contacts of the set with their forces."""
-    with FILE.open(newline="") as file:
+    return _read(FILE, cases())
+
+
+def read_drawn(part: int) -> list[Case]:
+    """A part of the drawn contacts with their forces."""
+    return _read(DRAWN_FILE, drawn(FITTED) + drawn(JUDGED))[part * DRAWN : (part + 1) * DRAWN]
+
+
+def _read(path: Path, asked: list[Case]) -> list[Case]:
+    with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    return [_answered(case, *(float(row[name]) for name in ANSWERS)) for case, row in zip(cases(), rows, strict=True)]
+    return [_answered(case, *(float(row[name]) for name in ANSWERS)) for case, row in zip(asked, rows, strict=True)]
 
 
 def _answered(case: Case, fx: float, fy: float, mz: float, error: float) -> Case:
     return replace(case, fx=fx, fy=fy, mz=mz, error=error)
 
 
-def write() -> None:
-    """Compute the whole set."""
-    with FILE.open("w", newline="") as file:
+def write(path: Path, asked: list[Case]) -> None:
+    """Compute the forces of all contacts asked for."""
+    with path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("ratio", "kind", "level", *ANSWERS))
-        for case in map(exact, cases()):
+        for case in map(exact, asked):
             numbers = (f"{getattr(case, name):.6f}" for name in ANSWERS)
-            writer.writerow((round(case.a / case.b, 9), case.kind, case.level, *numbers))
+            writer.writerow((round(case.a / case.b, 9), case.kind, round(case.level, 9), *numbers))
             file.flush()
 
 
 if __name__ == "__main__":
-    write()
+    write(FILE, cases())
+    write(DRAWN_FILE, drawn(FITTED) + drawn(JUDGED))

@@ -93,7 +93,7 @@ def _broken(name: str, error: BaseException) -> Row:
 def seeds() -> dict[str, int]:
     """Every seed that the rows depend on; with them and the versions all counts and states repeat exactly."""
     from studies.six_runs import Options
-    from validation import checks, fitted_roads, timing
+    from validation import checks, contact_set, fitted_roads, timing
     from validation.cases import (
         contact_price,
         drift_off,
@@ -123,8 +123,9 @@ def seeds() -> dict[str, int]:
             "loads of the score": score.SEED, "stabilisers": stabilisers.SEED, "index reduction": index_reduction.SEED,
             "growth of noise": growth.SEED, "drift-off": drift_off.SEED, "drift by solver": drift_solvers.SEED,
             "holding spring": holding_spring.SEED,
-            "random contacts": fastsim.SEED, "table of contacts": contact_price.SEED,
-            "made road": fitted_roads.SEED, "states of ride": ride_engines.SEED, "twins of ride": ride_covariance.SEED,
+            "random contacts": fastsim.SEED, "drawn contacts": contact_set.SEED,
+            "table of contacts": contact_price.SEED, "made road": fitted_roads.SEED,
+            "states of ride": ride_engines.SEED, "twins of ride": ride_covariance.SEED,
             "copies of ride": ride_varying_speed.SEED, "nonlinear ride": ride_nonlinear.SEED}  # fmt: skip
 
 

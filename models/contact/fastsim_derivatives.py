@@ -24,7 +24,6 @@ from models.contact.fastsim_many import (
     L1,
     LOAD,
     MU,
-    OF_SPIN,
     ONE,
     PART,
     SPIN,
@@ -123,21 +122,20 @@ def _scale_slopes(own, cells, middle, kind, scale, weights):
     bound = own[MU] * middle * own[LOAD] / (a * own[B])
     step, creep = 2.0 * a / (cells * bound), (own[XI_X], own[XI_Y], own[SPIN] * c)
     k, change = stiffness(own, bound, kind), np.zeros(3)
-    part, steep, reach = blend(own, bound, kind)
+    blended = blend(own, bound, kind)
     size = math.sqrt(creep[0] ** 2 + creep[1] ** 2 + creep[2] ** 2)
     mean = mean_flexibility(own, creep[2], kind)
     for j in range(3):
         unit = c if j == 2 else 1.0
-        if part > 0.0 and size > 0.0:
+        if blended[0] > 0.0 and size > 0.0:
             sign = 1.0 if creep[j] > 0.0 else -1.0 if creep[j] < 0.0 else 0.0
             if kind == ONE:
                 d_mean = (sign * own[L1 + j] - mean * creep[j] / size) / size
             else:
                 d_mean = 2.0 * creep[j] * (own[L1 + j] - mean) / (size * size)
             d_one = -d_mean / (mean * mean)
-            d_part = steep * (a * (OF_SPIN if j == 2 else 1.0) / (own[L1 + j] * bound)) ** 2 * creep[j] / reach
             for i in range(3):
-                change[i] = unit * (d_part * (1.0 / mean - 1.0 / own[L1 + i]) + part * d_one)
+                change[i] = unit * (blended[1 + j] * (1.0 / mean - 1.0 / own[L1 + i]) + blended[0] * d_one)
         for i in range(3):
             scale[i, j] = step * (change[i] * creep[i] / (c if i == 2 else 1.0) + (k[i] if i == j else 0.0))
         for i in range(2):

@@ -20,8 +20,10 @@ from models.contact.of_scene import interpenetrating
 from models.contact.theories import Contact, ExactOnEllipse, Linear, Motion, Simplified
 from models.errors import RunFailed
 
-KINDS = {"x": (1, 0, 0), "y": (0, 1, 0), "spin": (0, 0, 1), "x+y": (1, 1, 0), "x+spin": (1, 0, 1), "y+spin": (0, 1, 1),
-         "y-spin": (0, 1, -1), "x+y+spin": (1, 1, 1), "x-y+spin": (1, -1, 1)}  # fmt: skip
+Parts = tuple[float, float, float]
+KINDS: dict[str, Parts] = {"x": (1, 0, 0), "y": (0, 1, 0), "spin": (0, 0, 1), "x+y": (1, 1, 0), "x+spin": (1, 0, 1),
+                           "y+spin": (0, 1, 1), "y-spin": (0, 1, -1), "x+y+spin": (1, 1, 1),
+                           "x-y+spin": (1, -1, 1)}  # fmt: skip
 """Parts of the three creepages, each in units of its linear scale."""
 FINEST, ENOUGH = (40, 80), 0.005
 """Cells along each axis of the exact theory, halved once for the forces and twice for their error; the finer grid is
@@ -31,7 +33,10 @@ Roll = Callable[[Motion], Any]
 
 @dataclass(frozen=True)
 class Case:
-    """One contact of semi-axes a and b (m). fx, fy by mu N; mz by mu N sqrt(ab); error: of the exact grid, by mu N."""
+    """One contact of semi-axes a and b (m). fx, fy by mu N; mz by mu N sqrt(ab); error: of the exact grid, by mu N.
+
+    parts : of xi_x, xi_y and spin, each in units of its linear scale; only their ratios count. level : their size.
+    """
 
     a: float
     b: float
@@ -39,6 +44,7 @@ class Case:
     friction: float
     pair: Pair
     kind: str
+    parts: Parts
     level: float
     fx: float = np.nan
     fy: float = np.nan
@@ -54,7 +60,7 @@ class Case:
     def motion(self) -> Motion:
         """xi_x, xi_y and spin (1/m): ``level`` 1 is where a single creepage reaches mu N by the linear theory."""
         c, size = coefficients(self.a / self.b, self.pair.nu), np.sqrt(self.a * self.b)
-        parts = np.array(KINDS[self.kind], float)
+        parts = np.array(self.parts)
         unit = self.limit / (self.pair.G * size**2) * np.array([1 / c.c11, 1 / c.c22, 1 / (size * c.c23)])
         return tuple(float(v) for v in self.level * unit * parts / np.linalg.norm(parts))  # type: ignore[return-value]
 
@@ -201,10 +207,11 @@ def cheapest(points: list[Point], target: float, error: Callable[[Point], float]
     return min(meets, key=lambda one: one.seconds, default=None)
 
 
-def ellipse_cases(a: float, b: float, load: float, friction: float, pair: Pair,
-                  levels: tuple[float, ...]) -> list[Case]:  # fmt: skip
+def ellipse_cases(a: float, b: float, load: float, friction: float, pair: Pair, levels: tuple[float, ...],
+                  kinds: dict[str, Parts] = KINDS) -> list[Case]:  # fmt: skip
     """All kinds and levels on one ellipse, without their forces."""
-    return [Case(a, b, load, friction, pair, kind, level) for kind, level in product(KINDS, levels)]
+    return [Case(a, b, load, friction, pair, kind, parts, level)
+            for (kind, parts), level in product(kinds.items(), levels)]  # fmt: skip
 
 
 TARGETS = (0.05, 0.02, 0.01, 0.005)
