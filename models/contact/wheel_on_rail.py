@@ -153,7 +153,7 @@ def wheel_on_rail(wheel: Profile, rail: Profile, *, lateral_shift: float = 0.0, 
     quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
     quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
     side = Side(wheel, laid(rail, track), wheelset)
-    found = _touches(side, _placed(side, lateral_shift, yaw))
+    found = touches_of(side, placed(side, lateral_shift, yaw))
     if not found:
         raise InputError("", "lateral_shift", lateral_shift, "lets wheel and rail touch at the end of a profile only")
     return found
@@ -170,7 +170,7 @@ def laid(rail: Profile, track: Track) -> Profile:
     return Profile(y - y[inner].min() + track.gauge / 2.0, z, inclined.smoothing)
 
 
-def _placed(side: Side, shift: float, yaw: float) -> Pose:
+def placed(side: Side, shift: float, yaw: float) -> Pose:
     """The pose in which both wheels just touch."""
 
     def right_over_left(roll: float) -> float:
@@ -182,8 +182,8 @@ def _placed(side: Side, shift: float, yaw: float) -> Pose:
     return Pose(shift, yaw, roll, side.clearance(Pose(shift, yaw, roll, 0.0)))
 
 
-def _touches(side: Side, pose: Pose) -> list[Touch]:
-    """The minima of the vertical gap, each between the ridges beside it."""
+def touches_of(side: Side, pose: Pose) -> list[Touch]:
+    """Places where a wheel touches or nearly does: minima of the vertical gap, each between the ridges beside it."""
     points, gap = side.gaps(pose)
     cuts = [0, *ridges(gap, RIDGE), gap.size - 1]
     found = []

@@ -162,5 +162,3 @@ def wheel_forces(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, l
         for i in range(3):
             report[k, XI_1 + i] = slip[k, i] / max(abs(velocity[0]), REGULAR)
         report[k, POWER] = fx * slip[k, 0] + fy * slip[k, 1] + mz * slip[k, 2]
-
-
