@@ -14,7 +14,7 @@ SHARE = 0.2
 
 
 def twin(vehicle: SpatialVehicle, seed: int) -> SpatialVehicle:
-    """The vehicle with its masses, stiffnesses and dampings changed by up to SHARE each, and with a name that says so."""
+    """The vehicle with its masses, stiffnesses and dampings changed by up to SHARE each, named a twin."""
     rng = np.random.default_rng(seed)
 
     def changed(value: float) -> float:

@@ -4,7 +4,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-from validation.faults import ride
 from validation.faults.bench import CHECKS, Bench, size
 from validation.faults.planting import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, Fault, planted
 from validation.rows import Row, System, Table, finding, within
@@ -23,8 +22,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     benches = [Bench(name, QUICK_DURATION if quick else DURATION) for name in (TWIN, SYMMETRIC)]
     clean = [_record(fault, benches) for fault in CLEAN]
     found = [_record(fault, benches) for fault in FAULTS]
-    of_ride = ride.measure()
-    return _rows(clean, found) + ride.rows(of_ride), {"clean": clean, "faults": found, "ride": of_ride}
+    return _rows(clean, found), {"clean": clean, "faults": found}
 
 
 def _record(fault: Fault, benches: list[Bench]) -> dict[str, Any]:
@@ -95,7 +93,7 @@ def _listed(records: list[dict[str, Any]]) -> str:
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """The checks with their tolerances, and every fault with what sees it."""
-    return [_check_table(data), _fault_table(data), ride.table(data["ride"])]
+    return [_check_table(data), _fault_table(data)]
 
 
 def _check_table(data: dict[str, Any]) -> Table:

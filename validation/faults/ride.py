@@ -304,12 +304,12 @@ def rows(records: list[dict[str, Any]]) -> list[Row]:
     clean, *found = records
     single = [f"{record['fault']} ({seen(record)[0]})" for record in found if len(seen(record)) == 1]
     return [
-        within("planted.ride.caught", SYSTEM, "faults planted in ride that a check catches",
+        within("ride_faults.caught", SYSTEM, "faults planted in ride that a check catches",
                sum(bool(seen(record)) for record in found), "faults", len(FAULTS), 0,
                "every one of them is a wrong vehicle, road or covariance", "native"),
-        within("planted.ride.false_alarms", SYSTEM, "alarms of the checks of ride without a fault", len(seen(clean)),
+        within("ride_faults.false_alarms", SYSTEM, "alarms of the checks of ride without a fault", len(seen(clean)),
                "alarms", 0, 0, "a check that cries without a fault is no check", "native"),
-        finding("planted.ride.single", SYSTEM, "faults planted in ride that one check alone catches", len(single),
+        finding("ride_faults.single", SYSTEM, "faults planted in ride that one check alone catches", len(single),
                 "faults", "few", "what would pass if that check were dropped: " + (", ".join(single) or "none"),
                 "native"),
     ]  # fmt: skip
@@ -332,10 +332,6 @@ def table(records: list[dict[str, Any]]) -> Table:
         + "."
     )
     return Table("Faults of ride, one at a time", note, ("fault", "planted in", "caught by", "not seen by"), lines)
-
-
-def _blind(record: dict[str, Any]) -> str:
-    return ", ".join(name for name in CHECKS if name not in seen(record))
 
 
 def _sizes(record: dict[str, Any]) -> str:
