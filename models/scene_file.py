@@ -27,7 +27,7 @@ class SceneFile(Strict):
         return self.model_dump(exclude_none=True)
 
     def path(self, name: str, place: str = "") -> Path:
-        """A file that the scene names at ``place``, relative to the scene's own folder; it must be there."""
+        """A file that the scene names at ``place``: beside the scene, or else in the folder of the command."""
         return existing(name, Path(self.folder), self.file, place)
 
 
@@ -43,11 +43,16 @@ def checked(model: type[Model], table: Mapping[str, Any], file: str, folder: Pat
 
 
 def existing(name: str, folder: Path, file: str, place: str) -> Path:
-    """The file ``name`` within ``folder``; raises InputError that names the place of the scene that wanted it."""
+    """The file ``name`` within ``folder``, or else in the folder in which the command runs.
+
+    Raises InputError that names the place of the scene that wanted it.
+    """
     path = folder / name
     try:
         if path.is_file():
             return path
+        if not path.exists() and Path(name).is_file():
+            return Path(name)
         if path.is_dir():
             raise InputError(file, place, name, "is a folder: name a file")
     except OSError:  # such as a name that is too long

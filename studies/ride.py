@@ -22,8 +22,10 @@ from models.ride.of_scene import (
     linear_vehicle,
     placed_wheels,
     road_of,
+    told_by,
     vehicle_of,
 )
+from models.ride.plan import met
 from models.ride.scene import RideScene
 from models.ride.sweep import Sweep, sweep
 from models.ride.weighting import weighted
@@ -44,6 +46,8 @@ SIMPLER = {
 ISOTROPIC = "isotropic road"
 LONGEST, SHORTEST = 1e-2, 500.0
 """Band of the comparison with the isotropic road: a share of the smallest corner, and rad/m."""
+LEAST = 1e-6
+"""An output this much smaller than on another road is zero but for rounding: no change is given."""
 ALONG = 13
 """Points along the body at which its vertical acceleration is drawn."""
 OVERHANG = 0.2
@@ -73,11 +77,15 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     vehicle, speeds = vehicle_of(scene), scene.speeds.all()
     speed = options.speed or float(speeds[len(speeds) // 2])
     cases = {"as in the scene": excitation_of(scene, wheels(vehicle))}
-    cases |= {name: excitation_of(scene, wheels(vehicle), _simpler(scene, case)) for name, case in SIMPLER.items()}
+    sided = {wheel.y != 0.0 for wheel in placed_wheels(scene, wheels(vehicle))}
+    for name, case in SIMPLER.items():
+        if len(sided) == 1 or case[0] != "uncorrelated":  # a wheel in the middle is on neither of two such tracks
+            cases[name] = excitation_of(scene, wheels(vehicle), _simpler(scene, case))
     found = {}
     for i, engine in enumerate(engines):
         progress(f"linear vehicle of {engine}", 0.6 * i / len(engines))
-        found[engine] = sweep(linear_vehicle(vehicle, engine), cases, [*speeds, speed], scene.weighting)
+        with told_by(scene):
+            found[engine] = sweep(linear_vehicle(vehicle, engine), cases, [*speeds, speed], scene.weighting)
     first = found[engines[0]]
     linear = linear_vehicle(vehicle, engines[0])
     progress("figures", 0.7)
@@ -87,12 +95,14 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         at = sweep(linear_vehicle(along, "reference"), cases, [speed])
         places = [output.point[0] for output in along.outputs if isinstance(output, PointOutput)]
         along_figure(places, at, first, vehicle, speed, scene.title, folder / "body_acceleration.png")
-    outputs_figure(first, vehicle, _static(vehicle), scene.title, folder / "over_speed.png")
+    panels = kinds(vehicle, linear(speed), first)
+    outputs_figure(first, panels, _static(vehicle), scene.title, folder / "over_speed.png")
     spectra_figure(linear(speed), cases["as in the scene"], speed, scene.title, folder / "spectra.png")
     fitted = fitted_road(scene) if scene.road.file else None
     road, y = road_of(scene, wheels(vehicle)), half_track_of(scene, wheels(vehicle))
     road_figure(road, y, fitted, scene.title, folder / "road.png")
-    notes = [f"  road: {road.label(y)}", *(f"  road: {note}" for note in (fitted.notes if fitted else ()))]
+    texts = (road.label(y), *met(scene, wheels(vehicle)), *(fitted.notes if fitted else ()))
+    notes = [f"  road: {text}" for text in texts]
     return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(found),
             "table": [*_table(scene, vehicle, found, speed, options), *notes]}  # fmt: skip
 
@@ -149,6 +159,13 @@ def units(vehicle: SpatialVehicle, linear: Any, found: Sweep) -> list[str]:
     return [*own, *["m/s^2"] * (len(found.outputs) - len(own))]
 
 
+def kinds(vehicle: SpatialVehicle, linear: Any, found: Sweep) -> list[tuple[str, str]]:
+    """Kind and unit of every output, weighted ones after the vehicle's own."""
+    own = [output.kind for output in vehicle.outputs]
+    own += ["acceleration"] * (len(found.outputs) - len(own))
+    return list(zip(own, units(vehicle, linear, found), strict=True))
+
+
 def _answer(found: dict[str, Sweep]) -> dict[str, Any]:
     """Standard deviations at all speeds in the scene's own case, SI; None where an output has none."""
     one = next(iter(found.values()))
@@ -170,9 +187,9 @@ def _table(scene: RideScene, vehicle: SpatialVehicle, found: dict[str, Sweep], s
     for i, (name, unit) in enumerate(zip(first.outputs, units(vehicle, linear, first), strict=True)):
         own = first.deviation[0, -1, i]
         changes = "".join(f"{_change(first.deviation[j, -1, i], own):>20}" for j in range(1, len(first.cases)))
-        changes += f"{f'{100 * alike[name]:+.1f} %' if np.isfinite(alike.get(name, np.nan)) else '-':>20}"
+        changes += f"{_change(own * (1 + alike.get(name, np.nan)), own):>20}"
         lines.append(f"    {name:<{width}}{_value(own, unit, str(first.status[0, -1, i])):>20}{changes}")
-    lines += [f"  {name}: {reason}" for name, reason in _notes(first)]
+    lines += [f"  {name} [{unit}]: {reason}" for name, unit, reason in _notes(first, units(vehicle, linear, first))]
     lines += _travels(vehicle, first, options) + _loads(vehicle, first)
     return [*lines, *_agreement(found)]
 
@@ -203,13 +220,13 @@ def _value(value: float, unit: str, status: str) -> str:
 
 
 def _change(value: float, own: float) -> str:
-    return f"{100 * (value / own - 1):+.1f} %" if np.isfinite(value) and np.isfinite(own) and own > 0 else "-"
+    return f"{100 * (value / own - 1):+.1f} %" if np.isfinite(value) and LEAST * value < own < np.inf else "-"
 
 
-def _notes(found: Sweep) -> list[tuple[str, str]]:
-    """Why an output has no standard deviation."""
+def _notes(found: Sweep, unit: list[str]) -> list[tuple[str, str, str]]:
+    """Why an output has no standard deviation; its name and unit before."""
     at = range(len(found.outputs))
-    return [(found.outputs[i], str(found.reason[0, -1, i])) for i in at if found.status[0, -1, i] != "finite"]
+    return [(found.outputs[i], unit[i], str(found.reason[0, -1, i])) for i in at if found.status[0, -1, i] != "finite"]
 
 
 def _travels(vehicle: SpatialVehicle, found: Sweep, options: Options) -> list[str]:
@@ -236,7 +253,8 @@ def _loads(vehicle: SpatialVehicle, found: Sweep) -> list[str]:
     """Dynamic wheel load factors in a line."""
     static = _static(vehicle)
     own = {name: float(found.of(found.cases[0], name)[-1]) for name in static}
-    parts = [f"{name} {dynamic_load_factor(own[name], load):.3f}" for name, load in static.items()]
+    parts = [f"{name} {dynamic_load_factor(own[name], load):.3f}" for name, load in static.items()
+             if np.isfinite(own[name])]  # fmt: skip
     return [f"  dynamic wheel load factor: {', '.join(parts)}"] if parts else []
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from models.errors import InputError
-from models.ride.of_scene import check_linear, excitation_of, linear_vehicle, vehicle_of
+from models.ride.of_scene import check_linear, excitation_of, linear_vehicle, told_by, vehicle_of
 from models.ride.scene import RideScene
 from models.ride.varying_speed import VaryingSpeed, quasi_stationary, varying_speed
 from models.strict import Strict, read
@@ -52,17 +52,22 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     vehicle, engine = vehicle_of(scene), engines[0]
     progress(f"drive, linear vehicle of {engine}", 0.1)
     linear, road = linear_vehicle(vehicle, engine)(ANY), excitation_of(scene, wheels(vehicle))
-    first = varying_speed(linear, road, scene.drive.profile(scene.file), weightings=scene.weighting)
-    progress("each speed by itself", 0.4)
-    speeds = np.linspace(0.0, first.speed.max(), SPEEDS)
-    each = quasi_stationary(linear, road, speeds, weightings=scene.weighting)
+    with told_by(scene):
+        first = varying_speed(linear, road, scene.drive.profile(scene.file), weightings=scene.weighting)
+        progress("each speed by itself", 0.4)
+        speeds = np.linspace(0.0, first.speed.max(), SPEEDS)
+        each = quasi_stationary(linear, road, speeds, weightings=scene.weighting)
     alone = np.column_stack([np.interp(first.speed, speeds, column) for column in each.T])
-    _save(scene, first, alone, folder / "drive.nc")
-    shown = _options(scene).outputs or [o.name for o in vehicle.outputs if o.kind in ("acceleration", "tyre force")]
-    drive_figure(first, alone, shown, {o.name: (o.kind, u) for o, u in _units(scene)}, scene.title,
+    own = _units(scene)
+    units = [unit for _, unit in own] + ["m/s^2"] * len(scene.weighting)
+    _save(scene, first, alone, units, folder / "drive.nc")
+    names = [output.name for output in vehicle.outputs]
+    shown = [o.name for o in vehicle.outputs if o.kind in ("acceleration", "tyre force")]
+    shown = _options(scene).outputs or shown or names
+    drive_figure(first, alone, shown, {o.name: (o.kind, u) for o, u in own}, scene.title,
                  folder / "drive.png")  # fmt: skip
     return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(first, alone),
-            "table": [f"  linear vehicle of {engine}", *_table(first, alone)]}  # fmt: skip
+            "table": [f"  linear vehicle of {engine}", *_table(first, alone, units)]}  # fmt: skip
 
 
 def _options(scene: RideScene) -> Options:
@@ -75,7 +80,7 @@ def _units(scene: RideScene) -> list[tuple[Any, str]]:
     return [(output, own.unit) for output, own in zip(vehicle.outputs, linear.outputs, strict=True)]
 
 
-def _save(scene: RideScene, found: VaryingSpeed, alone: np.ndarray, path: Path) -> None:
+def _save(scene: RideScene, found: VaryingSpeed, alone: np.ndarray, units: list[str], path: Path) -> None:
     import xarray as xr
 
     from models.result import provenance
@@ -86,6 +91,7 @@ def _save(scene: RideScene, found: VaryingSpeed, alone: np.ndarray, path: Path) 
          "speed": ("time", found.speed, {"units": "m/s"}), "path": ("time", found.path, {"units": "m"})},
         {"time": ("time", found.time, {"units": "s"}), "output": list(found.names)},
     )  # fmt: skip
+    data["unit"] = ("output", units)
     data.attrs = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
     data.to_netcdf(path, engine="h5netcdf")
 
@@ -100,16 +106,19 @@ def _gaps(found: VaryingSpeed, alone: np.ndarray) -> np.ndarray:
 
 def _answer(found: VaryingSpeed, alone: np.ndarray) -> dict[str, Any]:
     gaps = _gaps(found, alone)
-    return {name: {"largest error of the quasi-stationary answer": float(gaps[np.abs(gaps[:, i]).argmax(), i])}
-            for i, name in enumerate(found.names)}  # fmt: skip
+    finite = np.isfinite(found.deviation).all(axis=0)
+    worst = [float(gaps[np.abs(gaps[:, i]).argmax(), i]) if finite[i] else None for i in range(len(finite))]
+    return {name: {"largest error of the quasi-stationary answer": value}
+            for name, value in zip(found.names, worst, strict=True)}  # fmt: skip
 
 
-def _table(found: VaryingSpeed, alone: np.ndarray) -> list[str]:
+def _table(found: VaryingSpeed, alone: np.ndarray, units: list[str]) -> list[str]:
     """Largest deviation of each output, and where taking each speed by itself is most wrong."""
-    width = max(map(len, found.names))
+    heads = [f"{name} [{unit}]" for name, unit in zip(found.names, units, strict=True)]
+    width = max(map(len, heads))
     lines = [f"    {'':<{width}}{'largest':>12}{'at [s]':>8}   each speed by itself is most wrong, % of the largest"]
     gaps = _gaps(found, alone)
-    for i, name in enumerate(found.names):
+    for i, name in enumerate(heads):
         own = found.deviation[:, i]
         if not np.isfinite(own).all():
             lines.append(f"    {name:<{width}}{found.status[i]:>12}")

@@ -49,28 +49,36 @@ def _middle(vehicle: SpatialVehicle) -> str:
     return min(points, key=lambda o: abs(o.point[0] - middle)).name if points else ""
 
 
-GROUPS = (("acceleration", "m/s²", 1.0), ("angular acceleration", "rad/s²", 1.0), ("travel", "mm", 1e3),
-          ("tyre force", "share of the static load", 1.0))  # fmt: skip
+NONE = "\n(no finite variance)"
+PANELS = 2
+"""Side by side."""
 
 
-def outputs_figure(found: Sweep, vehicle: SpatialVehicle, static: Mapping[str, float], title: str, path: Path) -> None:
-    """Standard deviations of the outputs over speed in the scene's own case, a panel per kind."""
-    kinds = {output.name: output.kind for output in vehicle.outputs}
-    kinds |= {name: "acceleration" for name in found.outputs if name not in kinds}
-    groups = [group for group in GROUPS if group[0] in kinds.values()]
-    rows = -(-len(groups) // 2)
-    figure, axes = plt.subplots(rows, 2, figsize=(12, 3.6 * rows), squeeze=False)
-    for axis, (kind, unit, factor) in zip(axes.ravel(), groups, strict=False):
-        curves = {name: factor * found.of(found.cases[0], name)[:-1] / static.get(name, 1.0)
-                  for name, own in kinds.items() if own == kind}  # fmt: skip
+def outputs_figure(found: Sweep, kinds: Sequence[tuple[str, str]], static: Mapping[str, float], title: str,
+                   path: Path) -> None:  # fmt: skip
+    """Standard deviations of the outputs over speed in the scene's own case, a panel per kind and unit (``kinds``)."""
+    panels = list(dict.fromkeys(kinds))
+    rows = -(-len(panels) // PANELS)
+    figure, axes = plt.subplots(rows, PANELS, figsize=(12, 3.6 * rows), squeeze=False)
+    for axis, (kind, si) in zip(axes.ravel(), panels, strict=False):
+        unit, factor = ("mm", 1e3) if si == "m" else (_written(si), 1.0)
+        unit = "share of the static load" if kind == "tyre force" else unit
+        names = [name for name, own in zip(found.outputs, kinds, strict=True) if own == (kind, si)]
+        curves = {name: factor * found.of(found.cases[0], name)[:-1] / static.get(name, 1.0) for name in names}
         for label, values in _distinct(curves).items():
-            axis.plot(found.speeds[:-1], values, label=label)
+            axis.plot(found.speeds[:-1], values, label=label if np.isfinite(values).any() else label + NONE)
+        if not np.isfinite(list(curves.values())).any():
+            axis.set(xlim=(0, found.speeds.max()), yticks=[])
         axis.set(xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=kind.capitalize())
         axis.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    for axis in axes.ravel()[len(groups) :]:
+    for axis in axes.ravel()[len(panels) :]:
         axis.remove()
     figure.suptitle(f"{title}: standard deviations over speed", fontsize=11)
     save(figure, path)
+
+
+def _written(unit: str) -> str:
+    return unit.replace("^2", "²")
 
 
 def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -78,7 +86,8 @@ def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     groups: list[tuple[list[str], np.ndarray]] = []
     for name, values in curves.items():
         for names, known in groups:
-            if np.allclose(values, known, rtol=1e-6, atol=1e-6 * np.nanmax(known), equal_nan=True):
+            largest = np.max(known, where=np.isfinite(known), initial=0.0)
+            if np.allclose(values, known, rtol=1e-6, atol=1e-6 * largest, equal_nan=True):
                 names.append(name)
                 break
         else:
@@ -88,14 +97,16 @@ def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, title: str,
                    path: Path) -> None:  # fmt: skip
-    """One-sided spectra of the accelerations and tyre forces over frequency at one speed."""
+    """One-sided spectra of the accelerations and tyre forces over frequency at one speed; no figure where all is 0."""
     from models.ride.frequency import spectra
 
     frequency = np.geomspace(0.1, 100.0, 800)
     found = 4 * np.pi * spectra(linear, excitation, speed, 2 * np.pi * frequency)  # one-sided, over Hz
-    kinds = [output.kind for output in linear.outputs]
-    shown = [kind for kind in ("acceleration", "tyre force") if kind in kinds]
-    figure, axes = plt.subplots(1, len(shown), figsize=(5.0 * len(shown), 4.2), squeeze=False)
+    moved = {output.kind for i, output in enumerate(linear.outputs) if found[:, i].any()}
+    shown = [kind for kind in ("acceleration", "tyre force") if kind in moved]
+    if not shown:
+        return
+    figure, axes = plt.subplots(1, len(shown), figsize=(6.2 * len(shown), 4.2), squeeze=False)
     units = {"acceleration": "(m/s²)²/Hz", "tyre force": "N²/Hz"}
     for axis, kind in zip(axes[0], shown, strict=True):
         curves = {output.name: found[:, i] for i, output in enumerate(linear.outputs) if output.kind == kind}
@@ -104,7 +115,7 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
         axis.set(xlabel="frequency [Hz]", ylabel=f"one-sided density [{units[kind]}]", title=kind.capitalize())
         top = max(values.max() for values in curves.values())
         axis.set_ylim(1e-6 * top, 2 * top)
-        axis.legend(fontsize=7.5)
+        axis.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
     figure.suptitle(f"{title}: spectra at {speed:g} m/s", fontsize=11)
     save(figure, path)
 
@@ -155,17 +166,21 @@ def drive_figure(found: VaryingSpeed, alone: np.ndarray, shown: Sequence[str], k
     """Standard deviations along a drive, dashed if every speed is taken by itself, above the speed."""
     groups = list(dict.fromkeys(kinds[name] for name in shown))
     heights = [3.0] * len(groups) + [1.3]
-    figure, axes = plt.subplots(len(heights), 1, figsize=(9, sum(heights) + 0.8), sharex=True, height_ratios=heights)
-    for axis, (kind, unit) in zip(axes, groups, strict=False):
+    figure, axes = plt.subplots(len(heights), 1, figsize=(9, sum(heights) + 0.8), sharex=True, height_ratios=heights,
+                                squeeze=False)  # fmt: skip
+    for axis, (kind, unit) in zip(axes[:, 0], groups, strict=False):
         own = {name: found.names.index(name) for name in shown if kinds[name] == (kind, unit)}
         pairs = {name: np.concatenate([found.deviation[:, i], alone[:, i]]) for name, i in own.items()}
         for label, both in _distinct(pairs).items():
             exact, quasi = np.split(both, 2)
+            if not np.isfinite(exact).all():  # what is left at standstill is rounding
+                axis.plot([], label=label + NONE)
+                continue
             (line,) = axis.plot(found.time, exact, label=label)
             axis.plot(found.time, quasi, "--", color=line.get_color(), linewidth=0.8)
-        axis.set(ylabel=f"standard deviation [{unit}]", title=kind.capitalize(), ylim=(0, None))
+        axis.set(ylabel=f"standard deviation [{_written(unit)}]", title=kind.capitalize(), ylim=(0, None))
         axis.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    axes[-1].plot(found.time, found.speed, color="0.3")
-    axes[-1].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
+    axes[-1, 0].plot(found.time, found.speed, color="0.3")
+    axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
     figure.suptitle(f"{title}\nsolid: exact; dashed: each speed taken by itself", fontsize=11)
     save(figure, path)

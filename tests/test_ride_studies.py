@@ -124,6 +124,10 @@ REFUSED = [
     ({"road": {"left_right": "same"}}, "left_right"),
     ({"weighting": {"body centre": "Wx"}}, "weighting"),
     ({"vehicle": {"file": "r19_rode"}}, "did you mean 'r19_ride'"),
+    ({"speeds": {"values": [5.0], "stop": 9.0}}, "speeds.stop = 9.0: is not read beside"),
+    ({"speeds": {"values": [5.0], "count": 9}}, "speeds.count = 9: is not read beside"),
+    ({"road": {"q_mean": 0.0, "q_roll": 0.0}}, "road.q_mean = 0.0: is 0, and road.q_roll, too"),
+    ({"weighting": {"travel front left": "Wk"}}, "weights accelerations, and this output is one of the kind 'travel'"),
 ]
 
 
@@ -149,3 +153,42 @@ def test_weighting_of_no_output_offers_the_nearest(twinrig, capsys):
     assert twinrig("run", "ride", *SMALL[:-2], "--set", "weighting={'body center'='Wk'}") == 2
     assert "did you mean 'body centre'" in capsys.readouterr().err
     assert not Path("results").exists()
+
+
+TRICYCLE = """
+title = "One wheel in front, two behind, on damped tyres; no output is an acceleration"
+axles = [{name = "front", x = 1.2}, {name = "rear", x = -0.9}]
+tyres = [{name = "f", axle = "front", body = "wheel", stiffness = 2e5},
+         {name = "l", axle = "rear", body = "body", y = 0.6, stiffness = 2e5, damping = 300.0},
+         {name = "r", axle = "rear", body = "body", y = -0.6, stiffness = 2e5, damping = 300.0}]
+springs = [{name = "strut", bodies = ["body", "wheel"], point = [1.2, 0, 0.3], stiffness = 2e4, damping = 1500}]
+outputs = [{name = "strut force", kind = "force", part = "strut"}, {name = "load", kind = "tyre force", tyre = "l"}]
+
+[[bodies]]
+name = "body"
+mass = 600.0
+position = [-0.9, 0.0, 0.5]
+inertia = [200.0, 900.0, 0.0]
+freedoms = ["z", "rx", "ry"]
+
+[[bodies]]
+name = "wheel"
+mass = 20.0
+position = [1.2, 0.0, 0.3]
+freedoms = ["z"]
+"""
+
+
+def test_a_wheel_in_the_middle_is_on_neither_of_two_tracks(twinrig, capsys):
+    """The study leaves out the road that it cannot run on, draws what there is, and finds the file of the command."""
+    Path("tricycle.toml").write_text(TRICYCLE)
+    given = ("--set", "vehicle.file=tricycle.toml", "--set", "speeds={values=[10.0, 20.0]}", "--set", "weighting={}",
+             "--engine", "reference")  # fmt: skip
+    assert twinrig("run", "ride", *given, "--out", "out") == 0
+    said = capsys.readouterr().out
+    assert "tracks alike" in said and "tracks independent" not in said
+    assert "load [N]: white noise" in said and "every wheel meets z_M + y theta" in said
+    assert twinrig("run", "ride", *given, "--set", "road.left_right=uncorrelated") == 2
+    assert "road.left_right = 'uncorrelated': wheel 'f' stands at y = 0" in capsys.readouterr().err
+    assert twinrig("run", "ride", *given, "--set", "road.wheels=tracks") == 2
+    assert "road.wheels = 'tracks': the first axle has no two tracks" in capsys.readouterr().err

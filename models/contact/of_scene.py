@@ -68,7 +68,7 @@ def _profile(scene: ContactScene, kind: Literal["wheel", "rail"]) -> Profile:
         return built_in(name)
     if "." not in name:
         raise InputError(scene.file, f"profiles.{kind}", name, "must be a file or built in", tuple(BUILT_IN[kind]))
-    return read_profile(scene.file_of(name, f"profiles.{kind}"), kind, smoothing=scene.profiles.smoothing)
+    return read_profile(scene.path(name, f"profiles.{kind}"), kind, smoothing=scene.profiles.smoothing)
 
 
 def hertz_of(scene: ContactScene) -> Hertz:

@@ -161,17 +161,10 @@ class ContactScene(SceneFile):
         """Name of the one table that says where the bodies touch."""
         return next(name for name in GEOMETRIES if getattr(self, name) is not None)
 
-    def file_of(self, name: str, place: str) -> Path:
-        """A file that the scene names: beside the scene, or else in the folder in which the command runs."""
-        here = Path(name)
-        if here.is_file() and not (Path(self.folder) / here).exists():
-            return here
-        return self.path(name, place)
-
     def cases_file(self) -> Path:
         """The file of cases."""
         assert self.cases is not None
-        return self.file_of(self.cases.file, "cases.file")
+        return self.path(self.cases.file, "cases.file")
 
     @property
     def pair(self) -> Pair:

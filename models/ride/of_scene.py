@@ -1,6 +1,7 @@
 """From a scene of ride to its vehicle, its road and the system that both make at a speed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from math import copysign
 from typing import TYPE_CHECKING
@@ -93,7 +94,23 @@ def excitation_of(scene: RideScene, wheels: tuple[Wheel, ...], case: tuple[str, 
     try:
         return excitation(road_of(scene, wheels), placed, left_right, front_rear)
     except InputError as error:
+        if error.file:
+            raise
         raise InputError(scene.file, f"road.{error.place}", error.value, error.allowed) from None
+
+
+@contextmanager
+def told_by(scene: RideScene) -> Iterator[None]:
+    """What a computation finds wrong names no file: it is told by the scene's key that is to blame."""
+    try:
+        yield
+    except InputError as error:
+        if error.file:
+            raise
+        if error.place.partition(" ")[0] not in ("vehicle", "output"):
+            raise InputError(scene.file, error.place, error.value, error.allowed) from None
+        what = error.allowed if error.place == "vehicle" else f"{error.place}: {error.allowed}"
+        raise InputError(scene.file, "vehicle.file", scene.vehicle.file, what) from None
 
 
 def placed_wheels(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[Wheel, ...]:
@@ -103,7 +120,11 @@ def placed_wheels(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[Wheel, .
     """
     if not any(wheel.y for wheel in wheels):
         return on_track(wheels, half_track_of(scene, wheels)) if scene.road.q_mean is None else wheels
-    return wheels if scene.road.wheels == "own" else in_tracks(wheels)
+    if scene.road.wheels == "own":
+        return wheels
+    if half_track(wheels) == 0.0:
+        raise InputError(scene.file, "road.wheels", "tracks", "the first axle has no two tracks in which to run")
+    return in_tracks(wheels)
 
 
 def in_tracks(wheels: tuple[Wheel, ...]) -> tuple[Wheel, ...]:

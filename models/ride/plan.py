@@ -1,7 +1,8 @@
 """What a scene of ride will compute: printed by ``twinrig show``, checked before any run."""
 
 from models.errors import InputError
-from models.ride.of_scene import excitation_of, road_of, vehicle_of
+from models.ride.linear_vehicle import Wheel
+from models.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
 from models.ride.scene import RideScene
 from models.road.two_track import half_track
 from models.vehicles.spatial import SpatialVehicle
@@ -12,10 +13,13 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
     vehicle = vehicle_of(scene)
     excitation_of(scene, wheels(vehicle))
-    names = tuple(output.name for output in vehicle.outputs)
+    kinds = {output.name: output.kind for output in vehicle.outputs}
     for name in scene.weighting:
-        if name not in names:
-            raise InputError(scene.file, f"weighting.{name}", None, "is no output of the vehicle", names)
+        if name not in kinds:
+            raise InputError(scene.file, f"weighting.{name}", None, "is no output of the vehicle", tuple(kinds))
+        if kinds[name] != "acceleration":
+            allowed = f"weights accelerations, and this output is one of the kind {kinds[name]!r}"
+            raise InputError(scene.file, f"weighting.{name}", scene.weighting[name], allowed)
 
 
 def describe(scene: RideScene) -> str:
@@ -25,11 +29,33 @@ def describe(scene: RideScene) -> str:
     lines += [_line("vehicle", f"{vehicle.name} ({scene.vehicle.file}), {scene.vehicle.operating_point}")]
     lines += _bodies(vehicle)
     lines += [_line("road", road_of(scene, wheels(vehicle)).label(_track(scene, vehicle)))]
-    lines += [_line("", f"left and right {scene.road.left_right}, axles {scene.road.front_rear}")]
+    lines += [_line("", text) for text in met(scene, wheels(vehicle))]
     lines += [_line("speed", _speed(scene))]
     lines += [_line("outputs", ", ".join(output.name for output in vehicle.outputs))]
     lines += [_line("weighting", ", ".join(f"{name} by {by}" for name, by in scene.weighting.items()) or "none")]
     return "\n".join([*lines, _line("absent", ", ".join(absent(scene, vehicle)) + " (not computed)")])
+
+
+LEFT_RIGHT = {
+    "modelled": "every wheel meets z_M + y theta, one mean and one roll process for all",
+    "uncorrelated": "the left wheels meet z_M + y theta, the right ones the same of a second, independent pair",
+    "equal": "every wheel meets z_M + |y| theta, so that tracks of one distance do not roll it",
+}
+FRONT_REAR = {
+    "delayed": "every axle meets what the first one met, its distance later",
+    "uncorrelated": "every axle meets a road of its own",
+    "equal": "every axle meets what the first one meets, at once",
+}
+
+
+def met(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[str, str]:
+    """What the wheels of an axle meet, and what the axles do, in words."""
+    road, placed = scene.road, placed_wheels(scene, wheels)
+    place = "its own place" if road.wheels == "own" else "that of the front wheel on its side"
+    if len({wheel.y for wheel in placed}) == 1:
+        place = f"{placed[0].y:g} m for all: one track"
+    return (f"left and right {road.left_right}: {LEFT_RIGHT[road.left_right]}; y is {place}",
+            f"axles {road.front_rear}: {FRONT_REAR[road.front_rear]}")  # fmt: skip
 
 
 def absent(scene: RideScene, vehicle: SpatialVehicle) -> list[str]:

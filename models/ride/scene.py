@@ -65,7 +65,7 @@ class Speeds(Strict):
 class Drive(Strict):
     """[drive]: a speed that varies, from point to point along straight lines."""
 
-    time: list[float] = Field(description="times in s, rising from 0")
+    time: list[float] = Field(description="times in s, rising")
     speed: list[float] = Field(description="speeds in m/s at these times, 0 for standstill")
 
     def profile(self, file: str = "") -> SpeedProfile:
@@ -102,8 +102,10 @@ def _check_speeds(file: str, speeds: Speeds) -> None:
     for i, value in enumerate(speeds.values):
         if not (np.isfinite(value) and value > 0.0):
             raise InputError(file, f"speeds.values.{i}", value, "must be above 0, in m/s: at standstill nothing moves")
-    if speeds.values and speeds.start is not None:
-        raise InputError(file, "speeds.start", speeds.start, "is not read beside a list of speeds: drop one of them")
+    for name in ("start", "stop", "count"):
+        if speeds.values and name in speeds.model_fields_set:
+            allowed = "is not read beside a list of speeds: drop one of them"
+            raise InputError(file, f"speeds.{name}", getattr(speeds, name), allowed)
     for name in ("start", "stop"):
         if not speeds.values and getattr(speeds, name) is None:
             raise InputError(file, f"speeds.{name}", None, "is missing (m/s)")
@@ -133,6 +135,8 @@ def _check_intensities(file: str, road: Road) -> None:
     if len(given) == 1:
         other = "q_roll" if given == ["q_mean"] else "q_mean"
         raise InputError(file, f"road.{other}", None, f"is missing: it belongs to road.{given[0]}")
+    if given and not road.q_mean and not road.q_roll:
+        raise InputError(file, "road.q_mean", road.q_mean, "is 0, and road.q_roll, too: this is no road")
     for name in ("level", "iso8608", "half_track") if given else ():
         if name in road.model_fields_set:
             raise InputError(file, f"road.{name}", getattr(road, name), "is not read beside q_mean and q_roll")

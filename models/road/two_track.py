@@ -174,7 +174,8 @@ def _row(wheel: Wheel, mean: np.ndarray, roll: np.ndarray, left_right: str, whee
     if left_right == "modelled":
         return own
     if wheel.y == 0.0 and any(other.y for other in wheels):
-        raise InputError("", f"wheel {wheel.name}, y", 0.0, "is neither left nor right: these are uncorrelated here")
+        allowed = f"wheel {wheel.name!r} stands at y = 0, neither left nor right"
+        raise InputError("", "left_right", left_right, allowed)
     other = np.zeros(len(own))
     return np.concatenate([own, other] if wheel.y >= 0.0 else [other, own])
 

@@ -162,6 +162,9 @@ class _Builder:
             if axle.x >= before.x:
                 allowed = f"axles are listed from the front: must lie behind {before.name!r}, below {before.x:g} m"
                 raise self._fault(_place("axles", axle.name, "x"), axle.x, allowed)
+        names = tuple(axle.name for axle in self.tables.axles)
+        for tyre in self.tables.tyres:
+            self._known(_place("tyres", tyre.name, "axle"), tyre.axle, "axle", names)
         for axle in self.tables.axles:
             if all(tyre.axle != axle.name for tyre in self.tables.tyres):
                 raise self._fault(_place("axles", axle.name), None, "no tyre names this axle")
@@ -251,7 +254,7 @@ class _Builder:
 
     def _tyre(self, tyre: TyreTable, order: tuple[str, ...]) -> Tyre:
         place = _place("tyres", tyre.name)
-        axle = self.axles[self._known(f"{place}.axle", tyre.axle, "axle", order)]
+        axle = self.axles[tyre.axle]
         x, y, z = self.bodies[self._body(f"{place}.body", tyre.body)].position
         if abs(x - axle.x) > 1e-9:
             allowed = f"its body lies at x = {x:g} m, its axle {axle.name!r} at {axle.x:g} m: they must agree"
