@@ -137,7 +137,7 @@ def _places(scene: ContactScene) -> list[str]:
     if scene.profiles is None:
         return []
     return [f"  touches at {1e3 * touch.rail_y:.2f} mm from the rail's top and {1e3 * touch.wheel_y:.2f} mm from the "
-            f"taping line, {touch.angle:.4f} rad steep, gap {1e6 * touch.gap:.1f} um"
+            f"taping line, {touch.angle:.4f} rad steep, gap {round(1e6 * touch.gap, 1) + 0.0:.1f} um"
             for touch in touches(scene)]  # fmt: skip
 
 

@@ -31,11 +31,19 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     start = time.perf_counter()
     rows = answer(path, folder / ANSWER, scene.pair, scene.method, lambda done: progress(f"{done:,} rows", 0.0))
     seconds = time.perf_counter() - start
-    wrong = f"; {rows['wrong']:,} of them wrong, see their status" if rows["wrong"] else ", all of them sound"
-    table = [f"  {rows['rows']:,} rows of {path.name}{wrong}",
-             f"  {duration(seconds)}, {duration(seconds / max(rows['rows'], 1))} a row: reading, forces twice for the "
-             "error of the cells, writing"]  # fmt: skip
+    table = told(rows["rows"], rows["wrong"], path.name, seconds)
     return {"scene": scene.title, "folder": str(folder), "failed": {}, "rows": rows, "seconds": seconds, "table": table}
+
+
+def told(rows: int, wrong: int, name: str, seconds: float) -> list[str]:
+    """What is printed of ``rows`` rows, of which some are wrong, from the file ``name``."""
+    if rows == 0:
+        return [f"  no rows in {name}"]
+    sound = ", all of them sound" if rows > 1 else ", sound"
+    state = f"; {wrong:,} of them wrong, see their status" if wrong else sound
+    each = f", {duration(seconds / rows)} a row" if rows > 1 else ""
+    return [f"  {rows:,} row{'s' * (rows > 1)} of {name}{state}",
+            f"  {duration(seconds)}{each}: reading, forces twice for the error of the cells, writing"]  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from models.contact.work_precision import Point, cheapest, exact
 from models.errors import InputError
 from models.table_stream import blocks
 from models.tables import NEWTONS, SHARES, read_table
+from studies.contact_table import told
 from validation.cases import contact_price
 from validation.contact_set import FRICTION, JUDGED, LOAD, read, read_drawn
 
@@ -199,6 +200,13 @@ def test_a_table_is_found_in_the_folder_of_the_command(twinrig, capsys):
     assert twinrig("run", "contact_table", "--set", "cases.file=mine.csv", "--out", "out") == 0
     assert twinrig("run", "contact_table", "--set", "cases.file=yours.csv") == 2
     assert "no such file" in capsys.readouterr().err
+
+
+def test_rows_are_counted_in_words_that_fit():
+    assert told(0, 0, "a.csv", 0.6) == ["  no rows in a.csv"]
+    one, many = told(1, 0, "a.csv", 0.6), told(3, 1, "a.csv", 0.6)
+    assert one[0] == "  1 row of a.csv, sound" and "a row" not in one[1]
+    assert many[0] == "  3 rows of a.csv; 1 of them wrong, see their status" and "200 ms a row" in many[1]
 
 
 def test_the_cheapest_is_the_fastest_that_meets_the_target():

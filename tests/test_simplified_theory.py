@@ -1,6 +1,7 @@
 """Kalker's theory of 1983: Hertz as its special case, continuity, symmetry, several patches, and what it refuses."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ A0, B = 6e-3, 3e-3
 """Semi-axes of an ellipse (m)."""
 HERTZ = by_load(A, 2.0 * A, 1e5, PAIR)
 ELLIPSE = quadratic(A, 2.0 * A, 0.02, 0.015)
+SADDLE = from_function(lambda x, y: A * (x**2 - y**2), (-0.01, 0.01), (-0.01, 0.01))
 CREEPAGES = [(1e-3, 0.0, 0.0), (0.0, -2e-3, 0.5), (5e-4, 1e-3, -0.4), (0.0, 0.0, 1.0)]
 
 
@@ -240,7 +242,15 @@ BAD = {
     "far too large": (lambda: press(ELLIPSE, PAIR, approach=5.0), "an approach in m"),
     "friction": (lambda: roll(press(ELLIPSE, PAIR, load=1e3), -0.1, 0.0, 0.0, 0.0), "coefficient of friction"),
     "creepage": (lambda: roll(press(ELLIPSE, PAIR, load=1e3), 0.3, math.inf, 0.0, 0.0), "creepage"),
+    "several loads": (lambda: press(ELLIPSE, PAIR, load=[1e3, 2e3]), "one number, not an array"),
+    "no patches": (lambda: press([], PAIR, load=1e3), "one patch at least"),
+    "saddle": (lambda: press(SADDLE, PAIR, load=1e3), "no bottom inside"),
+    "saddle by approach": (lambda: press(SADDLE, PAIR, approach=1e-5), "no bottom inside"),
+    "several creepages": (lambda: roll(press(ELLIPSE, PAIR, load=1e3), 0.3, [1e-3, 2e-3], 0.0, 0.0), "not an array"),
+    "cells of a half": (lambda: roll(press(ELLIPSE, PAIR, load=1e3), 0.3, 0.0, 0.0, 0.0, cells=45.0), "whole number"),
+    "no cells": (lambda: roll(press(ELLIPSE, PAIR, load=1e3), 0.3, 0.0, 0.0, 0.0, cells=0), "from 3 to"),
     "net": (lambda: Options(net=2), "3 to 100"),
+    "net of a half": (lambda: Options(net=4.5), "whole number"),  # type: ignore[arg-type]
     "shape": (lambda: Options(shape="eliptic"), "did you mean 'elliptic'"),
     "millimetres": (lambda: quadratic(A, A, 20.0, 20.0), "places in m"),
     "shape of height": (
@@ -251,6 +261,13 @@ BAD = {
     "not finite": (lambda: from_arrays(np.arange(4) / 4, np.arange(4) / 4, np.full((4, 4), np.nan)), "finite"),
     "outside": (lambda: ELLIPSE.at(np.array(1.0), np.array(0.0)), "where h is known"),
 }
+
+
+def test_the_load_that_is_too_large_is_told_as_it_was_given():
+    """Of a patch that leans, the load along its normal is larger."""
+    (patch,) = separate(quadratic(A, A, 0.003, 0.003))
+    with pytest.raises(InputError, match="load = 500000"):
+        press([replace(patch, lean=1.0)], PAIR, load=5e5)
 
 
 @pytest.mark.parametrize("case", BAD)

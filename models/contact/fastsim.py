@@ -29,7 +29,7 @@ from models.contact.fastsim_grid import POWERS, Bound, Grid, grid, strips_of
 from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER
 from models.contact.fastsim_many import BLENDED, ONE, THREE, forces, point
 from models.contact.hertz import LEAST_AXIS
-from models.contact.inputs import LARGEST_LOAD, NOTHING, Array, creepages, number, quantity, together
+from models.contact.inputs import LARGEST_LOAD, NOTHING, Array, creepages, number, quantity, together, whole_number
 from models.contact.linear_theory import flexibilities as linear_flexibilities
 from models.contact.material import Pair
 from models.errors import InputError
@@ -132,8 +132,7 @@ class Ellipse:
 
 def check_choices(cells: int, bound: str, flexibilities: str, march: str) -> None:
     """Raise InputError for an option that is not one."""
-    if isinstance(cells, bool) or not isinstance(cells, int | np.integer) or not LEAST_CELLS <= cells <= MOST_CELLS:
-        raise InputError("", "cells", cells, f"must be a whole number from {LEAST_CELLS} to {MOST_CELLS}")
+    whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
     for name, value, known in (("bound", bound, tuple(POWERS)), ("march", march, tuple(MARCHES)),
                                ("flexibilities", flexibilities, tuple(KINDS))):  # fmt: skip
         if value not in known:

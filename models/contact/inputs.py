@@ -48,6 +48,13 @@ def number(name: str, value: Any, allowed: str, least: float = -np.inf, most: fl
     return float(found)
 
 
+def whole_number(name: str, value: Any, least: int, most: int) -> int:
+    """``value`` if it is a whole number from ``least`` to ``most``, else InputError."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
+        raise InputError("", name, value, f"must be a whole number from {least} to {most}")
+    return int(value)
+
+
 def creepages(xi_x: Any, xi_y: Any, spin: Any, read: Callable[..., Any] = quantity) -> dict[str, Any]:
     """Creepages and spin (1/m) by their names, each read by ``quantity`` or by ``number``."""
     allowed, turn = f"a creepage within +-{LARGEST_CREEPAGE:g}", f"a spin in 1/m within +-{LARGEST_SPIN:g}"

@@ -17,6 +17,8 @@ from models.errors import InputError
 
 RIDGE = 1e-6
 """Height (m) of a ridge between two valleys that parts them; lower ones are roughness of one valley."""
+NO_DEPTH = 1e-12
+"""m: a valley that is no deeper within its sides is none."""
 Table = tuple[np.ndarray, np.ndarray]
 Box = tuple[float, float, float, float]
 
@@ -65,14 +67,22 @@ class Patch:
 
         Each side lies as far from the bottom as the lengths of the valley below the depth add up to on that side: that
         is the bounding box of an area in one piece, and it cannot jump to a dip that opens beyond a low ridge.
-        Raises InputError if the area reaches a side of the distance.
+        Raises InputError if the area reaches a side of the distance, or if the least distance lies there.
         """
         if depth > self.edge:
+            if self.edge - self.low <= NO_DEPTH:
+                raise no_bottom()
             raise InputError("", "distance", None, f"contact at a depth of {depth:.3g} m reaches the edge of the area "
                              "over which the undeformed distance is known: give a larger area")  # fmt: skip
         root = np.sqrt(max(depth - self.low, 0.0))
         (x, rx), (y, ry) = self._tables
         return (*sides(x, rx, self.bottom[0], root), *sides(y, ry, self.bottom[1], root))
+
+
+def no_bottom() -> InputError:
+    """The error of a distance that does not rise to all sides: it falls to one, or is flat."""
+    return InputError("", "distance", None, "has no bottom inside the area over which it is known: it must rise from "
+                      "its least value to all sides")  # fmt: skip
 
 
 def separate(distance: Distance, ridge: float = RIDGE) -> list[Patch]:

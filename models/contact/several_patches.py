@@ -35,6 +35,9 @@ from models.errors import RunFailed
 
 CLOSE = 1e-11
 """Share of approach and load to which patches settle."""
+TRIES = (("hybr", 0.3, 1.0), ("lm", 0.05, 1.0), ("hybr", 0.05, 1.15), ("hybr", 0.3, 0.9))
+"""Method, first step and start by the given one, in turn: where a patch only just touches beside a large one the fit
+has kinks, in which one way or the other is caught."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,11 +135,13 @@ def settled(patches: Sequence[Patch], start: np.ndarray, load: float | None, pai
         last = (approach - start[-1]) / unit if load is None else loads @ along / load - 1.0
         return np.append((reached - approach * along) / unit, last), found, stiffness, loads
 
-    solved = root(lambda over: state(over)[0], (start - zero) / unit, options={"xtol": 1e-14, "factor": 0.3})
-    off, found, stiffness, loads = state(solved.x)
-    if np.abs(off).max() > CLOSE:
-        raise RunFailed("simplified theory", f"patches at an approach near {found[-1]:.4g} m did not settle")
-    return found, stiffness, loads
+    for method, factor, share in TRIES:
+        solved = root(lambda over: state(over)[0], share * (start - zero) / unit, method=method,
+                      options={"xtol": 1e-14, "factor": factor})  # fmt: skip
+        off, found, stiffness, loads = state(solved.x)
+        if np.abs(off).max() <= CLOSE:
+            return found, stiffness, loads
+    raise RunFailed("simplified theory", f"patches at an approach near {found[-1]:.4g} m did not settle")
 
 
 def dragged(nets: Sequence[Net], tractions: Sequence[np.ndarray], k: int, pair: Pair) -> np.ndarray:

@@ -38,9 +38,9 @@ from scipy.optimize import brentq
 
 from models.contact.fields import Fields
 from models.contact.half_space import Convolution, influence, offsets
-from models.contact.inputs import quantity
+from models.contact.inputs import creepages, number, whole_number
 from models.contact.material import Pair
-from models.contact.patches import Box, Patch, separate, whole
+from models.contact.patches import NO_DEPTH, Box, Patch, no_bottom, separate, whole
 from models.contact.several_patches import crude, dragged, settled
 from models.contact.simplified_kernels import (
     DISPLACEMENT,
@@ -59,6 +59,7 @@ NET = 15
 """Meshes of the crude net along each axis."""
 CELLS = 45
 """Strips of the fine net, and cells along each strip."""
+LEAST_CELLS, MOST_CELLS = 3, 2000
 SHAPES = {"parabolic": PARABOLIC, "elliptic": ELLIPTIC}
 ABOUT = 0.6
 """Depth by approach of a patch, about; where several are sought, the search starts there."""
@@ -82,8 +83,7 @@ class Options:
     separate: bool = True
 
     def __post_init__(self) -> None:
-        if not 3 <= self.net <= 100:
-            raise InputError("", "net", self.net, "must be from 3 to 100 meshes")
+        whole_number("net", self.net, 3, 100)
         for name, allowed in (("shape", SHAPES), ("fit", FITS)):
             if getattr(self, name) not in allowed:
                 raise InputError("", name, getattr(self, name), "is not known", tuple(allowed))
@@ -152,21 +152,23 @@ def press(bodies: Distance | Sequence[Patch], pair: Pair, *, load: float | None 
 
     bodies : their undeformed distance, or the patches of a wheel on a rail.
 
-    Zero or negative load, or bodies apart, give an empty contact. Raises InputError for a load that is not finite, both
-    or neither of load and approach, or a contact that reaches the edge of the distance.
+    Zero or negative load, or bodies apart, give an empty contact. Raises InputError for a load that is not one finite
+    number, both or neither of load and approach, no bodies, or a contact that reaches the edge of the distance.
     """
     if (load is None) == (approach is None):
         raise InputError("", "load", load, "give either the load in N or the approach in m")
     if isinstance(bodies, Distance):
         bodies = separate(bodies) if options.separate else whole(bodies)
     patches = list(bodies)
+    if not patches:
+        raise InputError("", "bodies", bodies, "must be an undeformed distance, or one patch at least")
     lowest = min(patch.low / np.cos(patch.lean) for patch in patches)
     if load is not None:
-        wanted = float(quantity("load", load, "a load in N, up to 1e9", -1e9, 1e9))
+        wanted = number("load", load, "a load in N, up to 1e9", -1e9, 1e9)
         if wanted <= 0.0:
             return _gathered(lowest, (), pair, options)
         return _by_load(patches, lowest, wanted, pair, options)
-    reached = float(quantity("approach", approach, "an approach in m, up to 0.1", -0.1, 0.1))
+    reached = number("approach", approach, "an approach in m, up to 0.1", -0.1, 0.1)
     if reached <= lowest:
         return _gathered(reached, (), pair, options)
     return _shared(patches, reached, None, pair, options)
@@ -195,7 +197,7 @@ def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, optio
     """Find the depth of a single patch, or the depths and the common approach of several, that carry the load."""
     if len(patches) == 1:
         patch, along = patches[0], np.cos(patches[0].lean)
-        depth = _found(lambda d: load_at_depth(patch, d, pair, options).load, load / along, patch.low, patch.edge)
+        depth = _found(lambda d: along * load_at_depth(patch, d, pair, options).load, load, patch.low, patch.edge)
         alone = load_at_depth(patch, depth, pair, options)
         return _gathered(alone.approach / along, (alone,), pair, options)
 
@@ -208,6 +210,8 @@ def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, optio
 
 def _found(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
     """Depth or approach (m) above ``lowest`` at which the load is carried: doubled until it is, then Brent's method."""
+    if limit - lowest <= NO_DEPTH:
+        raise no_bottom()
     low, high = 0.0, min(1e-6, limit - lowest)
     while load_at(lowest + high) < load:
         if lowest + high >= limit:
@@ -261,14 +265,13 @@ def roll(pressed: NormalContact, friction: float, xi_x: float, xi_y: float, spin
          cells: int = CELLS) -> Rolling:  # fmt: skip
     """Forces of steady rolling: FASTSIM twice on the fine net of each patch, W_1 = W_2 refitted in between.
 
-    friction : coefficient. xi_x, xi_y : creepages. spin : 1/m. cells : strips, and cells in each. Spin and moment are
-    about x = y = 0 of the distance, where patches lean of each patch; roll these one by one if their creepages differ.
-    Raises InputError for values that are not finite or a friction below zero.
+    friction : coefficient. xi_x, xi_y : creepages. spin : 1/m. cells : strips, and cells in each, 3 or more. Spin and
+    moment are about x = y = 0 of the distance, where patches lean of each patch; roll these one by one if their
+    creepages differ. Raises InputError for what is not one finite number, a friction below zero or too few cells.
     """
-    quantity("friction", friction, "a coefficient of friction from 0 to 10", 0.0, 10.0)
-    for name, value in (("xi_x", xi_x), ("xi_y", xi_y)):
-        quantity(name, value, "a creepage from -10 to 10", -10.0, 10.0)
-    quantity("spin", spin, "a spin in rad/m from -1e4 to 1e4", -1e4, 1e4)
+    friction = number("friction", friction, "a coefficient of friction from 0 to 10", 0.0, 10.0)
+    xi_x, xi_y, spin = creepages(xi_x, xi_y, spin, number).values()
+    cells = whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
     fine = [_fine(part, pressed.options, cells) for part in pressed.patches]
     tractions = [np.zeros((*strip[-1].shape, 2)) for strip in fine]
     creepage = (friction, xi_x, xi_y, spin)
