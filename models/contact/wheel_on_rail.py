@@ -167,7 +167,9 @@ def laid(rail: Profile, track: Track) -> Profile:
     if not inner.any() or z[0] < track.gauge_depth:
         raise InputError("", "rail", float(z[0]), f"is the depth (m) to which the gauge side is known; the gauge is "
                          f"measured at {track.gauge_depth:g} m")  # fmt: skip
-    return Profile(y - y[inner].min() + track.gauge / 2.0, z, inclined.smoothing)
+    k = int(np.argmax(inner))  # the contour crosses the depth just before this point
+    face = y[k] - (y[k] - y[k - 1]) * (track.gauge_depth - z[k]) / (z[k - 1] - z[k])
+    return Profile(y - face + track.gauge / 2.0, z, inclined.smoothing)
 
 
 def placed(side: Side, shift: float, yaw: float) -> Pose:
