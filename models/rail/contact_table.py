@@ -5,8 +5,10 @@ vertical load of each wheel; both wheels carry the same. Without friction the ve
 up the load. With friction the wheelset rolls at a speed; creep forces come in, and its speed of spin is such that they
 have no moment about the axle.
 
-Normal contact is that of Kalker's simplified non-Hertzian theory (``models.contact.simplified_theory``), each patch
-with an area of its own, the patches of one wheel with the vertical approach in common.
+Roll angle and speed of spin are found with Kalker's simplified non-Hertzian theory (``simplified_theory``), each patch
+with an area of its own, the patches of one wheel with the vertical approach in common. Places, loads and pressures are
+then those of the exact normal contact (``joined_patches``). Creep forces are the simplified theory's, scaled with the
+patch's load.
 
 Benchmark: Shackleton and Iwnicki, Vehicle System Dynamics 46 (2008) 129-149; case A-1 without yaw, A-2 with 2.4 mrad
 for each mm. The load of 10 kN on each wheel and the steps of 0.5 mm are those that CONTACT's example files give.
@@ -24,8 +26,10 @@ from models.contact.material import Pair
 from models.contact.profiles import Profile
 from models.contact.simplified_theory import NormalContact, PatchPressure, press, roll
 from models.contact.standard_profiles import s1002, uic60
+from models.contact.undeformed_distance import Distance
 from models.contact.wheel_on_rail import Pose, Side, Touch, Track, Wheelset, laid, placed, touches_of
 from models.errors import RunFailed
+from models.rail.joined_patches import Share, press_exactly
 
 BENCHMARK_SHIFTS = tuple(0.5e-3 * k for k in range(21))
 """m"""
@@ -40,6 +44,8 @@ SLIDE = 0.05
 """Share of the nominal speed of spin within which the one without moment is looked for."""
 CELLS = 31
 """Strips of a patch, and cells along each."""
+PRECISION = 1e-7
+"""Relative, of the load that a wheel carries."""
 
 
 @dataclass(frozen=True)
@@ -88,12 +94,19 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """One wheel under its load: each patch pressed, and what rolling does to it (N, N, N m), in a mirror if left."""
+    """One wheel under its load: each patch pressed, and what rolling does to it (N, N, N m), in a mirror if left.
+
+    approach : vertical (m). normal : vertical part of the normal forces (N). moment : of the creep forces about the
+    axle (N m).
+    """
 
     touches: list[Touch]
     pressed: NormalContact
     creepages: list[tuple[float, float, float]]
     forces: list[tuple[float, float, float]]
+    shares: list[Share]
+    approach: float
+    normal: float
     moment: float
 
 
@@ -115,47 +128,80 @@ class Contact:
         quantity("lateral_shift", shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
         quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
         side = Side(self.wheel, laid(self.rail, self.track), self.wheelset)
-        pose = placed(side, shift, yaw)
+        pose, rolling = placed(side, shift, yaw), -self.speed / self.wheelset.radius
         for _ in range(ROLLS):
-            spin, right, left = self._balanced(side, pose)
-            sunk = (right.pressed.approach, left.pressed.approach)
-            turned = placed(side, shift, yaw).roll + (sunk[0] - sunk[1]) / self._span(side, pose, right, left)
-            pose = replace(pose, roll=turned)
-        spin, right, left = self._balanced(side, pose)
-        return Placed(shift, yaw, pose.roll, spin, _places(side, right, self.wheel), _places(side, left, self.wheel))
+            poses, touches = self._touching(side, pose)
+            right, left = self._both(side, poses, touches, rolling)
+            span = right.touches[0].wheel_y + left.touches[0].wheel_y + 2.0 * side.wheelset.arm
+            pose = replace(pose, roll=placed(side, shift, yaw).roll + (right.approach - left.approach) / span)
+            if self.friction > 0.0:
+                rolling = self._free_spin(side, poses, touches)
+        poses, touches = self._touching(side, pose)
+        near = self._both(side, poses, touches, rolling)
+        right, left = (self._exact(side, *one) for one in zip(poses, touches, near, strict=True))
+        return Placed(shift, yaw, pose.roll, rolling, _places(side, right), _places(side, left))
 
-    def _span(self, side: Side, pose: Pose, right: Carried, left: Carried) -> float:
-        """Distance (m) of the two wheels' first touches, over which a difference in approach makes roll."""
-        return sum(one.touches[0].wheel_y + side.wheelset.arm for one in (right, left))
+    def _touching(self, side: Side, pose: Pose) -> tuple[list[Pose], list[list[Touch]]]:
+        """Poses of the right wheel and of the left one in its mirror, each lowered until it touches, and the places."""
+        poses = []
+        for sign in (1.0, -1.0):
+            seen = Pose(sign * pose.shift, sign * pose.yaw, sign * pose.roll, 0.0)
+            poses.append(replace(seen, fall=side.clearance(seen)))
+        return poses, [touches_of(side, one) for one in poses]
 
-    def _balanced(self, side: Side, pose: Pose) -> tuple[float, Carried, Carried]:
-        """Speed of spin (rad/s) without moment about the axle, and both wheels at it."""
-        poses = [_lowered(side, Pose(sign * pose.shift, sign * pose.yaw, sign * pose.roll, 0.0)) for sign in (1.0, -1.0)]
-        touches = [touches_of(side, one) for one in poses]
+    def _both(self, side: Side, poses: list[Pose], touches: list[list[Touch]], spin: float) -> list[Carried]:
+        return [self._carried(side, one, found, spin) for one, found in zip(poses, touches, strict=True)]
+
+    def _free_spin(self, side: Side, poses: list[Pose], touches: list[list[Touch]]) -> float:
+        """Speed of spin (rad/s) at which the creep forces have no moment about the axle."""
         rolling = -self.speed / side.wheelset.radius
-
-        def both(spin: float) -> list[Carried]:
-            return [self._carried(side, one, found, spin) for one, found in zip(poses, touches, strict=True)]
-
-        if self.friction > 0.0:
-            bounds = (rolling * (1.0 - SLIDE), rolling * (1.0 + SLIDE))
-            rolling = float(brentq(lambda spin: sum(one.moment for one in both(spin)), *bounds, xtol=1e-9))
-        right, left = both(rolling)
-        return rolling, right, left
+        bounds = (rolling * (1.0 - SLIDE), rolling * (1.0 + SLIDE))
+        return float(brentq(lambda spin: sum(one.moment for one in self._both(side, poses, touches, spin)), *bounds,
+                            xtol=1e-6))  # fmt: skip
 
     def _carried(self, side: Side, pose: Pose, touches: list[Touch], spin: float) -> Carried:
-        """One wheel with normal forces such that they and the creep forces carry its load."""
+        """One wheel by the simplified theory, with normal forces such that they and the creep forces carry its load."""
         creepages = [self._creepage(side, pose, touch, spin) for touch in touches]
         normal = self.load
         for _ in range(ITERATIONS):
             pressed = press([touch.patch for touch in touches], self.pair, load=normal)
-            forces = [self._rolled(pressed, touch, creep) for touch, creep in zip(touches, creepages, strict=True)]
-            lifted = sum(force[1] * math.sin(touch.angle) for force, touch in zip(forces, touches, strict=True))
-            if abs(normal - lifted - self.load) < 1e-9 * self.load:
-                moment = sum(_moment(side, pose, touch, force) for touch, force in zip(touches, forces, strict=True))
-                return Carried(touches, pressed, creepages, forces, moment)
+            loads = [part.load if (part := _part(pressed, touch)) else 0.0 for touch in touches]
+            forces, lifted, moment = self._rolled(side, pose, touches, pressed, creepages, loads)
+            if abs(normal - lifted - self.load) < PRECISION * self.load:
+                return Carried(touches, pressed, creepages, forces, [], pressed.approach, normal, moment)
             normal *= self.load / (normal - lifted)
         raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
+
+    def _exact(self, side: Side, pose: Pose, touches: list[Touch], near: Carried) -> Carried:
+        """The same wheel with the exact normal contact."""
+        patches, normal = [touch.patch for touch in touches], near.normal
+        for _ in range(ITERATIONS):
+            shares, approach = press_exactly(patches, near.pressed.patches, normal, near.approach, self.pair)
+            loads = [share.load for share in shares]
+            forces, lifted, moment = self._rolled(side, pose, touches, near.pressed, near.creepages, loads)
+            if abs(normal - lifted - self.load) < PRECISION * self.load:
+                return Carried(touches, near.pressed, near.creepages, forces, shares, approach, normal, moment)
+            normal *= self.load / (normal - lifted)
+        raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
+
+    def _rolled(self, side: Side, pose: Pose, touches: list[Touch], pressed: NormalContact,
+                creepages: list[tuple[float, float, float]], loads: list[float]
+                ) -> tuple[list[tuple[float, float, float]], float, float]:  # fmt: skip
+        """Creep forces of each patch, the vertical part of their sum, upwards on the rail, and moment about the axle.
+
+        A patch that the simplified theory leaves without contact has none.
+        """
+        forces = []
+        for touch, creep, load in zip(touches, creepages, loads, strict=True):
+            part = _part(pressed, touch)
+            if part is None or load == 0.0 or self.friction == 0.0:
+                forces.append((0.0, 0.0, 0.0))
+                continue
+            one = replace(pressed, patches=(replace(part, load=load),))
+            found = roll(one, self.friction, *creep, cells=CELLS)
+            forces.append((found.fx, found.fy, found.mz))
+        lifted = sum(force[1] * math.sin(touch.angle) for force, touch in zip(forces, touches, strict=True))
+        return forces, lifted, sum(_moment(side, pose, *one) for one in zip(touches, forces, strict=True))
 
     def _creepage(self, side: Side, pose: Pose, touch: Touch, spin: float) -> tuple[float, float, float]:
         """Creepages and spin (1/m) at a place of first touch."""
@@ -166,15 +212,6 @@ class Contact:
         across, into = _axes(touch)
         return (float(velocity[0] / self.speed), float(velocity @ across / self.speed),
                 float(spin * axle @ into / self.speed))  # fmt: skip
-
-    def _rolled(self, pressed: NormalContact, touch: Touch, creep: tuple[float, float, float]
-                ) -> tuple[float, float, float]:  # fmt: skip
-        """Creep forces of one patch (N, N, N m)."""
-        part = _part(pressed, touch)
-        if part is None or self.friction == 0.0:
-            return 0.0, 0.0, 0.0
-        found = roll(replace(pressed, patches=(part,)), self.friction, *creep, cells=CELLS)
-        return found.fx, found.fy, found.mz
 
 
 def manchester(*, yaw: bool = False, rolling: bool = False, shifts: Iterable[float] = BENCHMARK_SHIFTS) -> list[Placed]:
@@ -206,11 +243,6 @@ def equivalent_conicity(shifts: np.ndarray, differences: np.ndarray, amplitude: 
     return float((values * np.sin(phase)).mean() / amplitude)
 
 
-def _lowered(side: Side, pose: Pose) -> Pose:
-    """The pose at the height at which this side's wheel just touches."""
-    return replace(pose, fall=side.clearance(pose))
-
-
 def _axes(touch: Touch) -> tuple[np.ndarray, np.ndarray]:
     """Directions along the rail's surface and into the rail, in the track."""
     cosine, sine = math.cos(touch.angle), math.sin(touch.angle)
@@ -238,29 +270,26 @@ def _part(pressed: NormalContact, touch: Touch) -> PatchPressure | None:
     return next((part for part in pressed.patches if part.patch is touch.patch), None)
 
 
-def _places(side: Side, carried: Carried, wheel: Profile) -> tuple[Place, ...]:
+def _places(side: Side, carried: Carried) -> tuple[Place, ...]:
     """What a wheel's patches report, those that carry something."""
-    found = []
-    for touch, creep, force in zip(carried.touches, carried.creepages, carried.forces, strict=True):
-        part = _part(carried.pressed, touch)
-        if part is not None:
-            found.append(_place(side, carried.pressed, part, touch, creep, force))
-    return tuple(found)
+    rows = zip(carried.touches, carried.creepages, carried.forces, carried.shares, strict=True)
+    return tuple(_place(side, touch, creep, force, share, carried.approach)
+                 for touch, creep, force, share in rows if share.load > 0.0)  # fmt: skip
 
 
-def _place(side: Side, pressed: NormalContact, part: PatchPressure, touch: Touch, creep: tuple[float, float, float],
-           force: tuple[float, float, float]) -> Place:  # fmt: skip
-    alone = replace(pressed, patches=(part,))
-    fields = roll(alone, 0.0, 0.0, 0.0, 0.0, cells=CELLS).fields[0]
-    weight = fields.pressure * fields.dx * fields.dy
-    area = float((fields.dx * fields.dy).sum())
-    across, along = (float((weight * values).sum() / weight.sum()) for values in (fields.y, fields.x))
+def _place(side: Side, touch: Touch, creep: tuple[float, float, float], force: tuple[float, float, float], share: Share,
+           approach: float) -> Place:  # fmt: skip
     touch_y = touch.rail_y + float(side.rail.y[np.argmin(side.rail.z)])
-    distance = part.patch.distance
-    step = 4.0 * distance.dx, 4.0 * distance.dy
-    curvature = [(distance.at(np.array(x), np.array(y)) + distance.at(np.array(-x), np.array(-y))
-                  - 2.0 * distance.at(np.array(0.0), np.array(0.0))) / (x + y) ** 2
-                 for x, y in ((step[0], 0.0), (0.0, step[1]))]  # fmt: skip
-    return Place(touch_y, touch_y + across * math.cos(touch.angle), touch.x + along, touch.wheel_y, touch.angle,
-                 _radius(side, touch), *map(float, curvature), part.load, *force, *creep,
-                 float(fields.pressure.max()), area, pressed.approach)  # fmt: skip
+    along, across = _curvatures(touch.patch.distance)
+    return Place(touch_y, touch_y + share.y * math.cos(touch.angle), touch.x + share.x, touch.wheel_y, touch.angle,
+                 _radius(side, touch), along, across, share.load, *force, *creep, share.peak, share.area,
+                 approach)  # fmt: skip
+
+
+def _curvatures(distance: Distance) -> tuple[float, float]:
+    """Second derivatives (1/m) of the distance at first touch, along and across."""
+    found = []
+    for x, y in ((4.0 * distance.dx, 0.0), (0.0, 4.0 * distance.dy)):
+        low, here, high = distance.at(np.array([-x, 0.0, x]), np.array([-y, 0.0, y]))
+        found.append(float((low - 2.0 * here + high) / (x + y) ** 2))
+    return found[0], found[1]

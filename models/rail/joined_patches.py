@@ -1,0 +1,104 @@
+"""Exact normal contact of one wheel: all its patches on one half-space, joined along the rail's contour.
+
+Each patch approaches along its own normal by the cosine of its lean times the vertical approach, which all have in
+common. Heights are those over each patch's own plane; lengths along the contour keep the patches apart. That bends one
+half-space around the rail's head: exact for one patch, and as good for several as their leans are alike.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.contact.material import Pair
+from models.contact.normal_problem import centres, solve_normal
+from models.contact.patches import Patch
+from models.contact.simplified_theory import PatchPressure
+from models.errors import InputError, RunFailed
+
+CELLS_X, CELLS_Y, MOST_CELLS_Y = 36, 24, 180
+"""Cells along x, and along y over the narrowest patch; along y at most."""
+MARGINS = (1.4, 2.0, 3.0)
+"""Sides of the grid by those of the areas that the simplified theory finds."""
+FAR = 1e-3
+"""Height (m) where a distance is not known."""
+PRECISION, ITERATIONS = 1e-6, 30
+"""Relative, of the vertical load and of the approach."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """What one patch carries. load : N, along its normal. x, y : centre of pressure from its place (m). area : m^2.
+    peak : Pa."""
+
+    load: float
+    x: float
+    y: float
+    area: float
+    peak: float
+
+
+def press_exactly(patches: Sequence[Patch], near: Sequence[PatchPressure], load: float, approach: float, pair: Pair
+                  ) -> tuple[list[Share], float]:  # fmt: skip
+    """The patches' shares under a vertical load (N), and the vertical approach (m).
+
+    near : the patches in contact by the simplified theory, whose areas place the grid; approach : theirs (m). Raises
+    InputError if the contact reaches the edge of the grid.
+    """
+    for margin in MARGINS[:-1]:
+        try:
+            return _pressed(patches, near, load, approach, pair, margin)
+        except InputError:  # the contact reaches the edge of the grid
+            continue
+    return _pressed(patches, near, load, approach, pair, MARGINS[-1])
+
+
+def _pressed(patches: Sequence[Patch], near: Sequence[PatchPressure], load: float, approach: float, pair: Pair,
+             margin: float) -> tuple[list[Share], float]:  # fmt: skip
+    x, y = _grid(near, margin)
+    cosines = np.cos([patch.lean for patch in patches])
+    heights = np.array([_height(patch, x, y) for patch in patches])
+    leading = float(np.cos(max(near, key=lambda part: part.load).patch.lean))
+    cell, whole = (x[1] - x[0]) * (y[1] - y[0]), load / leading
+    for _ in range(ITERATIONS):
+        lowered = heights + approach * (leading - cosines)[:, None, None]
+        owner = np.argmin(lowered, axis=0)
+        solved = solve_normal(lowered.min(axis=0), x[1] - x[0], y[1] - y[0], pair, load=whole)
+        forces = np.array([solved.pressure[owner == k].sum() * cell for k in range(len(patches))])
+        vertical, reached = float(forces @ cosines), solved.approach / leading
+        close = abs(vertical / load - 1.0) < PRECISION and abs(reached / approach - 1.0) < PRECISION
+        whole, approach = whole * load / vertical, reached
+        if close:
+            return [_share(solved.pressure * (owner == k), x, y - patch.place, cell)
+                    for k, patch in enumerate(patches)], approach  # fmt: skip
+    raise RunFailed("joined patches", "the patches' shares of the load were not found")
+
+
+def _grid(near: Sequence[PatchPressure], margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Centres (m) of the cells along x and along the contour."""
+    x0, x1 = min(part.box[0] for part in near), max(part.box[1] for part in near)
+    y0 = min(part.box[2] + part.patch.place for part in near)
+    y1 = max(part.box[3] + part.patch.place for part in near)
+    high = margin * (y1 - y0)
+    narrowest = min(part.box[3] - part.box[2] for part in near)
+    rows = min(round(CELLS_Y * high / narrowest), MOST_CELLS_Y)
+    along = (x0 + x1) / 2.0 + centres(CELLS_X, margin * (x1 - x0) / CELLS_X)
+    return along, (y0 + y1) / 2.0 + centres(rows, high / rows)
+
+
+def _height(patch: Patch, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Heights (ny, nx) of a patch along its normal, on the common contour."""
+    known, own = patch.distance, y - patch.place
+    over = (own >= known.y[0]) & (own <= known.y[-1])
+    found = np.full((y.size, x.size), FAR)
+    inside = np.clip(x, known.x[0], known.x[-1])
+    found[over] = known.at(inside[None, :], own[over][:, None])
+    return found
+
+
+def _share(pressure: np.ndarray, x: np.ndarray, y: np.ndarray, cell: float) -> Share:
+    total = float(pressure.sum())
+    if total == 0.0:
+        return Share(0.0, 0.0, 0.0, 0.0, 0.0)
+    return Share(total * cell, float((pressure.sum(axis=0) @ x) / total), float((pressure.sum(axis=1) @ y) / total),
+                 float(np.count_nonzero(pressure) * cell), float(pressure.max()))  # fmt: skip
