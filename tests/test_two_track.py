@@ -140,6 +140,7 @@ WRONG = {
     "track": (lambda: road_of_level(0.0), "half_track"),
     "waviness": (lambda: Part(1e-5, 0.1, 1.0), "above 1"),
     "short": (lambda: spectra(MeasuredTracks(np.zeros(30), np.zeros(30), 0.1, 0.7, "x")), "two windows or more"),
+    "flat": (lambda: fit(MeasuredTracks(np.zeros(3000), np.zeros(3000), 0.1, 0.7, "x")), "there is no road"),
     "class": (lambda: level_of_class("I"), "class of ISO 8608"),
     "file": (lambda: read_tracks("road.txt"), "OpenCRG"),
 }

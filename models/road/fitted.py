@@ -58,9 +58,12 @@ def fit(
 
     Raises
     ------
-    InputError : too few windows, or fewer than four bands to fit two numbers to
+    InputError : too few windows, fewer than four bands to fit two numbers to, or no mean process at all
     """
     found = spectra(tracks, window_length)
+    height = max(float(np.abs(tracks.left).max()), float(np.abs(tracks.right).max()))
+    if float(np.ptp(tracks.left + tracks.right)) <= 1e-12 * height:
+        raise InputError(tracks.name, "heights", None, "left and right have the same mean all along: there is no road")
     least = 2.0 * float(found.wavenumber[0]) if low is None else low
     most = min(HIGHEST, 0.5 * float(found.wavenumber[-1])) if high is None else high
     mean = _fit(found.wavenumber, found.mean, found.freedom, least, most, tracks.name)
