@@ -25,7 +25,7 @@ from models.ride.of_scene import (
     told_by,
     vehicle_of,
 )
-from models.ride.plan import met
+from models.ride.plan import doubts, met
 from models.ride.scene import RideScene
 from models.ride.sweep import Sweep, sweep
 from models.ride.weighting import weighted
@@ -102,7 +102,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     road, y = road_of(scene, wheels(vehicle)), half_track_of(scene, wheels(vehicle))
     road_figure(road, y, fitted, scene.title, folder / "road.png")
     texts = (road.label(y), *met(scene, wheels(vehicle)), *(fitted.notes if fitted else ()))
-    notes = [f"  road: {text}" for text in texts]
+    notes = [*(f"  question: {text}" for text in doubts(vehicle)), *(f"  road: {text}" for text in texts)]
     return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(found),
             "table": [*_table(scene, vehicle, found, speed, options), *notes]}  # fmt: skip
 

@@ -59,13 +59,13 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     check(scene, engines)
     assert scene.speeds is not None
     full = vehicle_of(scene)
-    models = {_short(vehicle): vehicle for vehicle in (*_simpler(scene), full)}
+    models = _named([*_simpler(scene), full])
     found = {}
     for i, (name, vehicle) in enumerate(models.items()):
         progress(name, i / len(models))
         found[name] = _swept(scene, vehicle, scene.speeds.all())
     names = [output.name for output in full.outputs]
-    truth = found[_short(full)].deviation[-1]
+    truth = list(found.values())[-1].deviation[-1]
     errors = {(model, road): _errors(swept, j, truth, names)
               for model, swept in found.items() for j, road in enumerate(_roads(models[model]))}  # fmt: skip
     cost = _costs(scene, models)
@@ -84,9 +84,11 @@ def _simpler(scene: RideScene) -> list[SpatialVehicle]:
     return [load_vehicle(name, scene.folder, scene.file, f"options.simpler.{i}") for i, name in given]
 
 
-def _short(vehicle: SpatialVehicle) -> str:
-    """A model by its number of freedoms."""
-    return f"{len(vehicle.coordinates())} freedoms"
+def _named(vehicles: list[SpatialVehicle]) -> dict[str, SpatialVehicle]:
+    """Models by their number of freedoms, and by their file where two have the same."""
+    counts = [len(vehicle.coordinates()) for vehicle in vehicles]
+    return {f"{n} freedoms" + (f" of {vehicle.name}" if counts.count(n) > 1 else ""): vehicle
+            for n, vehicle in zip(counts, vehicles, strict=True)}  # fmt: skip
 
 
 def _roads(vehicle: SpatialVehicle) -> list[str]:
@@ -146,15 +148,17 @@ def _table(errors: Errors, names: list[str], cost: dict[str, float], full: Spati
     """The largest error of each model and road, by kind of output."""
     kinds = {output.name: output.kind for output in full.outputs}
     shown = list(dict.fromkeys(kinds.values()))
+    width = max(len(f"{model}, {road}") for model, road in errors) + 2
     lines = ["  largest error of a standard deviation over all speeds, against the full vehicle on two tracks with "
-             "delay", f"    {'':<46}{'cost [ms]':>10}" + "".join(f"{kind:>22}" for kind in shown)]  # fmt: skip
+             "delay", f"    {'':<{width}}{'cost [ms]':>10}" + "".join(f"{kind:>22}" for kind in shown)]  # fmt: skip
     for (model, road), values in errors.items():
         worst = []
         for kind in shown:
             own = [value for name, value in zip(names, values, strict=True) if kinds[name] == kind]
             own = [value for value in own if np.isfinite(value)]
             worst.append(f"{100 * max(own, key=abs):+.1f} %" if own else "-")
-        lines.append(f"    {f'{model}, {road}':<46}{1e3 * cost[model]:>10.2f}" + "".join(f"{w:>22}" for w in worst))
+        columns = "".join(f"{w:>22}" for w in worst)
+        lines.append(f"    {f'{model}, {road}':<{width}}{1e3 * cost[model]:>10.2f}{columns}")
     return lines
 
 

@@ -192,3 +192,23 @@ def test_a_wheel_in_the_middle_is_on_neither_of_two_tracks(twinrig, capsys):
     assert "road.left_right = 'uncorrelated': wheel 'f' stands at y = 0" in capsys.readouterr().err
     assert twinrig("run", "ride", *given, "--set", "road.wheels=tracks") == 2
     assert "road.wheels = 'tracks': the first axle has no two tracks" in capsys.readouterr().err
+
+
+def test_a_mass_in_grams_is_asked_about_and_no_shipped_vehicle_is():
+    from dataclasses import replace
+
+    from models.ride.plan import doubts
+    from models.vehicles.vehicle_file import load_vehicle, shipped
+
+    assert not any(doubts(load_vehicle(name)) for name in shipped())
+    own = load_vehicle("half_car")
+    heavy = replace(own, bodies=tuple(replace(body, mass=1e3 * body.mass) for body in own.bodies))
+    assert "SI units" in doubts(heavy)[0]
+
+
+def test_models_of_the_same_size_are_told_by_their_files():
+    from models.vehicles.vehicle_file import load_vehicle
+    from studies.ride_detail import _named
+
+    names = list(_named([load_vehicle(name) for name in ("half_car", "r19_free", "r19_ride")]))
+    assert names == ["4 freedoms", "19 freedoms of r19_free.toml", "19 freedoms of r19_ride.toml"]

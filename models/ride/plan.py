@@ -1,5 +1,7 @@
 """What a scene of ride will compute: printed by ``twinrig show``, checked before any run."""
 
+from dataclasses import replace
+
 from models.errors import InputError
 from models.ride.linear_vehicle import Wheel
 from models.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
@@ -89,19 +91,41 @@ def _bodies(vehicle: SpatialVehicle) -> list[str]:
         lines.append(_line("  body", f"{body.name:<12} {body.mass:g} kg, {' '.join(body.freedoms)}{on}"))
     parts = (len(vehicle.springs), len(vehicle.bars), len(vehicle.tyres))
     lines.append(_line("  parts", "{} spring-dampers, {} anti-roll bars, {} tyres".format(*parts)))
-    return [*lines, _line("freedoms", f"{len(vehicle.coordinates())}{_frequencies(vehicle)}")]
+    lines += [_line("freedoms", f"{len(vehicle.coordinates())}{_frequencies(vehicle)}")]
+    return [*lines, *(_line("question", text) for text in doubts(vehicle))]
 
 
 def _frequencies(vehicle: SpatialVehicle) -> str:
     if vehicle.side_forces or vehicle.drags:
         return ", frequencies depend on the speed"
+    return f", undamped {', '.join(f'{f:.3g}' for f in undamped(vehicle))} Hz"
+
+
+def undamped(vehicle: SpatialVehicle) -> list[float]:
+    """Frequencies (Hz) of a vehicle without damping, side forces and drag; 0 for what nothing pulls back."""
     import numpy as np
     from scipy.linalg import eigvalsh
 
-    linear = linearise(vehicle)
+    linear = linearise(replace(vehicle, side_forces=(), drags=()))
     squares = eigvalsh((linear.stiffness + linear.stiffness.T) / 2, linear.mass)
-    found = ", ".join(f"{f:.3g}" for f in np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi))
-    return f", undamped {found} Hz"
+    return [float(f) for f in np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)]
+
+
+USUAL = (0.2, 500.0)
+"""Hz: frequencies of road vehicles, from a soft body to the stiffest mount."""
+FREE = 1e-4
+"""Hz: what is slower is nothing but a motion that is free."""
+
+
+def doubts(vehicle: SpatialVehicle) -> list[str]:
+    """A question where the vehicle has motions that no road vehicle has, as with a value in other units than SI."""
+    found = [f for f in undamped(vehicle) if f > FREE]
+    odd = [f for f in found if not USUAL[0] <= f <= USUAL[1]]
+    if not odd:
+        return []
+    listed = ", ".join(f"{f:.3g}" for f in odd[:4])
+    return [f"is every value in SI units (kg, m, N/m)? Without damping the vehicle has frequencies of {listed} Hz; "
+            f"those of road vehicles lie from {USUAL[0]:g} to {USUAL[1]:g} Hz"]  # fmt: skip
 
 
 def _speed(scene: RideScene) -> str:
