@@ -43,3 +43,13 @@ def start(typing_context, array):
         return cgutils.create_struct_proxy(signature.args[0])(context, builder, value=arguments[0]).data
 
     return DOUBLES(array), generate
+
+
+@_intrinsic
+def at(typing_context, address):
+    """Pointer to the double at an address, a whole number."""
+
+    def generate(context, builder, signature, arguments):
+        return builder.inttoptr(arguments[0], context.get_value_type(DOUBLES))
+
+    return DOUBLES(types.intp), generate

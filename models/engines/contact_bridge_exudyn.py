@@ -1,0 +1,120 @@
+"""Rolling wheels in Exudyn: the model, and the routes by which a user function gives it creep forces.
+
+Exudyn 1.13 calls Python and nothing else, and hands a user function lists. The route that costs least is one generic
+object over the nodes of all wheels: its force function is called once per stage, packs both lists into one block,
+lets the compiled kernel work on addresses, and returns a list. A load for each coordinate is called more often; a
+function before each step cannot see the stages, so that no integrator keeps its order.
+"""
+
+import struct
+from collections.abc import Callable
+from typing import Any
+
+import exudyn as exu
+import exudyn.itemInterface as items
+import numpy as np
+
+from models.contact.inputs import Array
+from models.engines.contact_bridge import FREEDOMS, Wheels, set_forces
+from models.errors import RunFailed
+
+exu.config.printToConsole = False
+Law = Callable[[Array, Array, Array, Array], Any]
+ROUTES = ("generic object", "loads", "before each step")
+
+
+class Forces:
+    """Forces of lists of positions and rates, as a list; the compiled kernel by addresses, or a Python ``law``."""
+
+    def __init__(self, wheels: Wheels, law: Law | None = None) -> None:
+        size = wheels.size
+        self._block = np.concatenate((np.zeros(3 * size), wheels.numbers))
+        f, q, v, numbers = np.split(self._block, (size, 2 * size, 3 * size))
+        pack, raw = struct.Struct(f"{2 * size}d").pack_into, self._block.data.cast("B")[8 * size :]
+        answer, address = f.data.tolist, self._block.ctypes.data
+
+        def compiled(positions: Any, rates: Any) -> Any:
+            pack(raw, 0, *positions, *rates)
+            set_forces(address, size)
+            return answer()
+
+        def by_law(positions: Any, rates: Any) -> Any:
+            pack(raw, 0, *positions, *rates)
+            f[:] = 0.0
+            law(numbers, q, v, f)  # type: ignore[misc]
+            return answer()
+
+        self.of = compiled if law is None else by_law
+
+
+class Rolling:
+    """Wheels in one Exudyn system.
+
+    of : forces of positions and rates, None for no contact; route : one of ROUTES.
+    """
+
+    def __init__(self, wheels: Wheels, of: Callable[[Any, Any], Any] | None, route: str = ROUTES[0]) -> None:
+        self._container = exu.SystemContainer()
+        self.mbs: Any = self._container.AddSystem()
+        self.wheels = wheels
+        masses, k, d = wheels.masses[:FREEDOMS], wheels.stiffness, wheels.damping
+        self._nodes = []
+        for _ in range(wheels.count):
+            node = self.mbs.AddNode(items.NodeGenericODE2(
+                numberOfODE2Coordinates=FREEDOMS, referenceCoordinates=[0.0] * FREEDOMS,
+                initialCoordinates=[0.0] * FREEDOMS, initialCoordinates_t=[0.0] * FREEDOMS))  # fmt: skip
+            self.mbs.AddObject(items.ObjectGenericODE2(
+                nodeNumbers=[node], massMatrix=np.diag(masses), stiffnessMatrix=np.diag(k), dampingMatrix=np.diag(d)))
+            self._nodes.append(node)
+        if of is not None:
+            {"generic object": self._object, "loads": self._loads, "before each step": self._before}[route](of)
+        self.mbs.Assemble()
+
+    def _object(self, of: Callable[[Any, Any], Any]) -> None:
+        self.mbs.AddObject(items.ObjectGenericODE2(
+            nodeNumbers=self._nodes, massMatrix=exu.MatrixContainer(),
+            forceUserFunction=lambda mbs, t, item, q, v: of(q, v)))  # fmt: skip
+
+    def _markers(self) -> list[Any]:
+        return [self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=i))
+                for node in self._nodes for i in range(FREEDOMS)]  # fmt: skip
+
+    def _loads(self, of: Callable[[Any, Any], Any]) -> None:
+        """The first load computes the forces of all."""
+        data, found = self.mbs.systemData, [0.0] * self.wheels.size
+
+        def first(mbs: Any, t: float, load: float) -> float:
+            found[:] = of(data.GetODE2Coordinates(), data.GetODE2Coordinates_t())
+            return found[0]
+
+        for i, marker in enumerate(self._markers()):
+            function = (lambda mbs, t, load, i=i: found[i]) if i else first
+            self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker, loadUserFunction=function))
+
+    def _before(self, of: Callable[[Any, Any], Any]) -> None:
+        """Forces of the step's start, held over it."""
+        loads = [self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker)) for marker in self._markers()]
+
+        def hold(mbs: Any, t: float) -> bool:
+            data, write = mbs.systemData, mbs.SetLoadParameter
+            for load, value in zip(loads, of(data.GetODE2Coordinates(), data.GetODE2Coordinates_t()), strict=True):
+                write(load, "load", value)
+            return True
+
+        self.mbs.SetPreStepUserFunction(hold)
+
+    def run(self, q: Array, v: Array, steps: int, step: float = 1e-4, solver: str = "ExplicitEuler") -> Array:
+        """State (2 size,) after some steps from positions and rates (size,); RunFailed unless it is finite."""
+        initial, data = exu.ConfigurationType.Initial, self.mbs.systemData
+        data.SetODE2Coordinates(q, initial)
+        data.SetODE2Coordinates_t(v, initial)
+        options = exu.SimulationSettings()
+        options.solution.file.write = options.solution.sensors.active = False
+        ti = options.timeIntegration
+        ti.numberOfSteps, ti.endTime, ti.verboseMode = steps, steps * step, 0
+        ti.adaptiveStep = ti.automaticStepSize = ti.explicit.computeEndOfStepAccelerations = False
+        done = self.mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, solver))
+        state = np.concatenate((data.GetODE2Coordinates(), data.GetODE2Coordinates_t()))
+        if not done or not np.isfinite(state).all():
+            raise RunFailed("exudyn", "the engine gave up")
+        return state

@@ -1,0 +1,83 @@
+"""Rolling wheels in MuJoCo: the model, and creep forces by a native callback or by one that goes through Python."""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+from numba import cfunc, types
+
+from models.contact.inputs import Array
+from models.engines.contact_bridge import Wheels, forces
+from models.engines.mujoco_callback import _array_at
+from models.engines.mujoco_layout import check, offset
+from models.errors import RunFailed
+
+JOINTS = (("slide", (1.0, 0.0, 0.0)), ("slide", (0.0, 1.0, 0.0)), ("slide", (0.0, 0.0, 1.0)),
+          ("hinge", (0.0, 0.0, 1.0)))  # fmt: skip
+INTEGRATORS = ("Euler", "RK4")
+
+
+def model(wheels: Wheels, step: float = 1e-4, integrator: str = "Euler") -> mujoco.MjModel:
+    """Wheels on springs; the callback's numbers lie in the model, so that it serves every model of the process."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep, spec.option.gravity = step, [0.0, 0.0, 0.0]
+    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    spec.compiler.degree = False
+    spec.add_numeric(name="wheels", data=wheels.numbers, size=wheels.numbers.size)
+    for _ in range(wheels.count):
+        body = spec.worldbody.add_body(mass=wheels.mass, inertia=[wheels.inertia] * 3, explicitinertial=True)
+        for (kind, axis), k, d in zip(JOINTS, wheels.stiffness, wheels.damping, strict=True):
+            joint = getattr(mujoco.mjtJoint, f"mjJNT_{kind.upper()}")
+            body.add_joint(type=joint, axis=axis, stiffness=k, damping=d)
+    built = spec.compile()
+    check(built, mujoco.MjData(built))
+    return built
+
+
+@cache
+def native_law() -> Any:
+    """Compiled callback: a shell about ``forces``, which is kept on disk."""
+    numbers = offset("mjModel", "numeric_data")
+    position, rate, force = (offset("mjData", field) for field in ("qpos", "qvel", "qfrc_passive"))
+
+    @cfunc(types.void(types.voidptr, types.voidptr))
+    def law(model, data):
+        forces(_array_at(model, numbers), _array_at(data, position), _array_at(data, rate), _array_at(data, force))
+
+    return law
+
+
+@cache
+def empty_law() -> Any:
+    """Compiled callback that does nothing."""
+
+    @cfunc(types.void(types.voidptr, types.voidptr))
+    def law(model, data):
+        return
+
+    return law
+
+
+def python_law(add: Callable[[Array, Array, Array, Array], Any]) -> Callable[[Any, Any], None]:
+    """Callback by a Python function of numbers, positions, rates and the forces it adds to, all arrays."""
+    return lambda model, data: add(model.numeric_data, data.qpos, data.qvel, data.qfrc_passive)
+
+
+class Marcher:
+    """Runs of one model in MuJoCo's own loop, in one thread or more."""
+
+    def __init__(self, built: mujoco.MjModel, threads: int = 1) -> None:
+        self.model, self._data = built, [mujoco.MjData(built) for _ in range(threads)]
+
+    def run(self, states: Array, steps: int) -> Array:
+        """States (n, steps, 2 m) of n runs from ``states`` (n, 2 m); RunFailed unless all of it is finite."""
+        whole = np.concatenate((np.zeros((len(states), 1)), states), axis=1)
+        path = rollout.rollout(self.model, self._data, whole, nstep=steps)[0][..., : 1 + 2 * self.model.nv]
+        late = path[:, -1, 0] < (steps - 0.5) * self.model.opt.timestep
+        if late.any() or not np.isfinite(path[:, -1]).all():  # MuJoCo starts again at time zero where it gives up
+            raise RunFailed("mujoco", "the engine gave up", float(path[..., 0].max()))
+        return path[..., 1:]
