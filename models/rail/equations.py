@@ -148,19 +148,31 @@ class Equations:
     @cached_property
     def rest(self) -> np.ndarray:
         """The steady state (10,) in the middle of the track: height and spin such that nothing accelerates."""
+        start = np.zeros(STATES)
+        start[Z], start[SPIN] = self.body[SUNK], -self.speed / self.wheelset.radius
+        return self._settled(start, (Z, SPIN), (Z_RATE, SPIN))
 
-        def off(unknown: np.ndarray) -> list[float]:
-            found = self.rates(self._centred(unknown))
-            return [found[Z_RATE], found[SPIN]]
+    def displaced(self, shift: float) -> np.ndarray:
+        """The state (10,) at a lateral displacement (m) without yaw or rates but spin: height and roll in balance."""
+        start = self.rest.copy()
+        start[Y] = shift
+        start[ROLL] = -shift * self.wheelset.tilt
+        return self._settled(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
 
-        found = root(off, [1.0, 1.0], tol=1e-15)
-        if np.abs(found.fun).max() > 1e-7:
-            raise RunFailed("wheelset", "no steady state was found in the middle of the track")
-        return self._centred(found.x)
+    def _settled(self, start: np.ndarray, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> np.ndarray:
+        """The state with two of its values such that two accelerations vanish."""
+        places, scale = list(coordinates), np.maximum(np.abs(start[list(coordinates)]), self.body[SUNK])
 
-    def _centred(self, unknown: np.ndarray) -> np.ndarray:
-        state = np.zeros(STATES)
-        state[Z], state[SPIN] = unknown[0] * self.body[SUNK], -unknown[1] * self.speed / self.wheelset.radius
+        def off(unknown: np.ndarray) -> np.ndarray:
+            state = start.copy()
+            state[places] += unknown * scale
+            return self.rates(state)[list(accelerations)]
+
+        found = root(off, np.zeros(2), tol=1e-15)
+        if np.abs(found.fun).max() > 1e-6:
+            raise RunFailed("wheelset", "no height was found at which both rails carry it")
+        state = start.copy()
+        state[places] += found.x * scale
         return state
 
     @cached_property

@@ -24,8 +24,8 @@ NOTHING = 1e-6
 class Cycle:
     """amplitude, yaw : of y (m) and of yaw (rad); frequency : Hz; steady : whether the amplitude no longer changes.
 
-    A motion that has died out has the amplitude and frequency 0. amplitude_error, frequency_error : the differences
-    from half the step by 1/15, RK4's order taken for granted, or NaN where the step was not halved.
+    A motion that has died out has the amplitude and frequency 0. amplitude_error, frequency_error : changes by halving
+    the step, NaN where it was not halved.
     """
 
     speed: float
@@ -43,9 +43,7 @@ def cycle(equations: Equations, *, start: float = 5e-3, duration: float = 8.0, s
     step : s. Raises InputError for a step that is too large, or a motion too short to show its cycles, and RunFailed
     if the wheelset leaves the track.
     """
-    state = equations.rest.copy()
-    state[Y] += start
-    path = equations.run(state, duration, step)
+    path = equations.run(equations.displaced(start), duration, step)
     y, yaw = path.states[:, Y], path.states[:, YAW]
     if np.abs(y[-y.size // 8 :]).max() < NOTHING:
         return Cycle(equations.speed, 0.0, 0.0, 0.0, True)

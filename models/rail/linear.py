@@ -17,6 +17,7 @@ spin (opposite on the two wheels) turn with the geometry, and that the contact y
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,15 +69,14 @@ def matrices(wheelset: Wheelset, speed: float) -> Linear:
     if not 0.0 < speed < math.inf:
         raise InputError("", "speed", speed, "must be a speed above 0, in m/s")
     w, creep = wheelset, kalker(wheelset)
-    tilt = w.conicity / (w.half_gauge - w.conicity * w.radius)
-    gyroscopic = tilt * w.spin_inertia * speed / w.radius
-    damping, stiffness = _suspension(w, tilt)
+    gyroscopic = w.tilt * w.spin_inertia * speed / w.radius
+    damping, stiffness = _suspension(w)
     damping += np.array([[0.0, -gyroscopic], [gyroscopic, 0.0]])
-    stiffness += _gravity(w, tilt)
+    stiffness += _gravity(w)
     for motion, place in _contacts(w):
         damping += motion.T @ creep @ motion / speed
         stiffness += motion.T @ creep @ place
-    return Linear(np.diag([w.mass + w.yaw_inertia * tilt**2, w.yaw_inertia]), damping, stiffness)
+    return Linear(np.diag([w.mass + w.yaw_inertia * w.tilt**2, w.yaw_inertia]), damping, stiffness)
 
 
 def _contacts(w: Wheelset) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -91,18 +91,18 @@ def _contacts(w: Wheelset) -> list[tuple[np.ndarray, np.ndarray]]:
     return found
 
 
-def _suspension(w: Wheelset, tilt: float) -> tuple[np.ndarray, np.ndarray]:
+def _suspension(w: Wheelset) -> tuple[np.ndarray, np.ndarray]:
     """Damping and stiffness of the primary suspension; roll goes with the lateral displacement."""
     arm = w.half_spacing**2
-    return tuple(2.0 * np.diag([y + z * arm * tilt**2, x * arm])
+    return tuple(2.0 * np.diag([y + z * arm * w.tilt**2, x * arm])
                  for x, y, z in ((w.damping_x, w.damping_y, w.damping_z),
                                  (w.stiffness_x, w.stiffness_y, w.stiffness_z)))  # type: ignore[return-value]  # fmt: skip
 
 
-def _gravity(w: Wheelset, tilt: float) -> np.ndarray:
+def _gravity(w: Wheelset) -> np.ndarray:
     """Stiffness of the load, which rises with y and sinks with yaw."""
     b, c = w.half_gauge, w.conicity
-    rise = 2.0 * tilt + (c * b + w.radius + w.head_radius / w.slant[1]) * tilt**2
+    rise = 2.0 * w.tilt + (c * b + w.radius + w.head_radius / w.slant[1]) * w.tilt**2
     return w.load * np.diag([rise, -c * (b - c * w.radius)])
 
 
@@ -120,7 +120,7 @@ def growth(wheelset: Wheelset, speed: float) -> float:
     return float(np.linalg.eigvals(matrices(wheelset, speed).state_matrix).real.max())
 
 
-def critical_speed(wheelset: Wheelset, growth=growth) -> float:
+def critical_speed(wheelset: Wheelset, growth: Callable[[Wheelset, float], float] = growth) -> float:
     """Lowest speed (m/s) at which a motion of the wheelset no longer decays.
 
     growth : largest real part of the eigenvalues as a function of wheelset and speed. Raises InputError if the

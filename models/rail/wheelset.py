@@ -69,10 +69,14 @@ class Wheelset(Strict):
         return self.conicity * cosine, cosine
 
     @property
+    def tilt(self) -> float:
+        """Roll (rad/m) to the left by lateral displacement to the right, at small displacement."""
+        return self.conicity / (self.half_gauge - self.conicity * self.radius)
+
+    @property
     def equivalent_conicity(self) -> float:
         """Change of a wheel's rolling radius by lateral displacement, roll included (exact, at small displacement)."""
-        c, b = self.conicity, self.half_gauge
-        return c * (b + self.head_radius * self.slant[0]) / (b - c * self.radius)
+        return self.tilt * (self.half_gauge + self.head_radius * self.slant[0])
 
     def coned(self, equivalent: float) -> "Wheelset":
         """The same wheelset with cones of this equivalent conicity, as profiles have one at some amplitude."""
