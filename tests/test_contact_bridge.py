@@ -6,7 +6,7 @@ import pytest
 
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_approach
-from models.engines.contact_bridge import SUNK, Wheels, add_forces
+from models.engines.contact_bridge import SUNK, Wheels, add_forces, slopes
 from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law, python_law
 from models.engines.mujoco_callback import installed
@@ -96,3 +96,30 @@ def test_what_no_kernel_can_answer_is_no_path():
 def test_wheels_that_are_none(wrong):
     with pytest.raises(InputError):
         _ = Wheels(**wrong).numbers
+
+
+def test_slopes_are_those_of_the_linear_theory_where_nothing_slips():
+    wheels, found = Wheels(2, 0), np.zeros((8, 8))
+    q, v = np.zeros(8), np.zeros(8)
+    add_forces(wheels.numbers, q, v, base := np.zeros(8))
+    for by_q, by_v in ((1.0, 0.0), (0.0, 1.0), (3.0, -2.0)):
+        slopes(wheels.numbers, q, v, by_q, by_v, found)
+        for column in range(8):
+            if column % 4 == 2:  # along z all creep forces stay zero here, and the load is Hertz's
+                continue
+            moved = np.zeros(8)
+            add_forces(wheels.numbers, q + by_q * np.eye(8)[column] * 1e-3, v + by_v * np.eye(8)[column] * 1e-3, moved)
+            # linear forces: a difference over any step is the derivative
+            np.testing.assert_allclose(found[:, column], 1e3 * (moved - base), rtol=1e-7, atol=1e-3)
+
+
+def test_implicit_steps_need_fewer_calls_with_slopes_and_end_alike():
+    wheels, ends, calls = Wheels(2, 11), [], []
+    for slope in (None, Forces(wheels).slopes):
+        forces, count = Forces(wheels), []
+        rolling = Rolling(wheels, lambda q, v, f=forces, n=count: n.append(1) or f.of(q, v), slopes=slope)
+        ends.append(rolling.run(*wheels.state(), 20, 1e-3, "GeneralizedAlpha"))
+        calls.append(len(count))
+    # Newton's method ends at its own tolerance, whatever matrix it takes
+    np.testing.assert_allclose(ends[1], ends[0], rtol=0.0, atol=1e-8)
+    assert calls[1] < calls[0]

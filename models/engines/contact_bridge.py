@@ -45,6 +45,9 @@ FREEDOMS = 4
 WHEELS, SPEED, WEIGHT, SUNK, MU, SHEAR, NU, CURVED_X, CURVED_Y, HEADER = range(10)
 """Head of the table: count; V (m/s); load (N) and approach (m) at rest; mu; G (Pa); nu; A, B (1/m). Then a net."""
 
+OF_POSITION, OF_RATE = np.array([1e-8, 1e-8, 1e-8, 1e-6]), np.array([1e-5, 1e-5, 1e-5, 1e-4])
+"""Steps (m, rad; m/s, rad/s) by which forces are differentiated: creepages of about 1e-6."""
+
 
 @dataclass(frozen=True)
 class Wheels:
@@ -141,3 +144,27 @@ def set_forces(block, size):
     f = at(block)
     carray(f, (size,))[:] = 0.0
     forces(beyond(f, 3 * size), beyond(f, size), beyond(f, 2 * size), f)
+
+
+@njit(cache=True, error_model="numpy")
+def slopes(numbers, q, v, by_q, by_v, found):
+    """Fill ``found`` (size, size) with by_q dF/dq + by_v dF/dv, central differences; for implicit integrators.
+
+    No wheel feels another, so that one coordinate of all wheels is moved at a time: 16 evaluations, however many
+    wheels there are.
+    """
+    high, low, place, rate = np.empty(q.size), np.empty(q.size), q.copy(), v.copy()
+    found[:] = 0.0
+    for i in range(FREEDOMS):
+        for moved, by, step in ((place, by_q, OF_POSITION[i]), (rate, by_v, OF_RATE[i])):
+            if by == 0.0:
+                continue
+            kept = moved[i::FREEDOMS].copy()
+            high[:], low[:] = 0.0, 0.0
+            moved[i::FREEDOMS] = kept + step
+            add_forces(numbers, place, rate, high)
+            moved[i::FREEDOMS] = kept - step
+            add_forces(numbers, place, rate, low)
+            moved[i::FREEDOMS] = kept
+            for row in range(q.size):
+                found[row, row - row % FREEDOMS + i] += by * (high[row] - low[row]) / (2.0 * step)

@@ -15,7 +15,7 @@ import exudyn.itemInterface as items
 import numpy as np
 
 from models.contact.inputs import Array
-from models.engines.contact_bridge import FREEDOMS, Wheels, set_forces
+from models.engines.contact_bridge import FREEDOMS, Wheels, set_forces, slopes
 from models.errors import RunFailed
 
 exu.config.printToConsole = False
@@ -24,7 +24,10 @@ ROUTES = ("generic object", "loads", "before each step")
 
 
 class Forces:
-    """Forces of lists of positions and rates, as a list; the compiled kernel by addresses, or a Python ``law``."""
+    """Forces of lists of positions and rates, as a list; the compiled kernel by addresses, or a Python ``law``.
+
+    ``of`` gives the forces, ``slopes`` the sum of their derivatives to positions and rates, each times a factor.
+    """
 
     def __init__(self, wheels: Wheels, law: Law | None = None) -> None:
         size = wheels.size
@@ -44,19 +47,26 @@ class Forces:
             law(numbers, q, v, f)  # type: ignore[misc]
             return answer()
 
-        self.of = compiled if law is None else by_law
+        def moved(positions: Any, rates: Any, by_q: float, by_v: float) -> Array:
+            slopes(numbers, np.array(positions), np.array(rates), by_q, by_v, found)
+            return found
+
+        found = np.zeros((size, size))
+        self.of, self.slopes = compiled if law is None else by_law, moved
 
 
 class Rolling:
     """Wheels in one Exudyn system.
 
-    of : forces of positions and rates, None for no contact; route : one of ROUTES.
+    of : forces of positions and rates, None for no contact; route : one of ROUTES; slopes : as those of ``Forces``,
+    for implicit solvers by the generic object; without them Exudyn differentiates by 2 size calls of ``of``.
     """
 
-    def __init__(self, wheels: Wheels, of: Callable[[Any, Any], Any] | None, route: str = ROUTES[0]) -> None:
+    def __init__(self, wheels: Wheels, of: Callable[[Any, Any], Any] | None, route: str = ROUTES[0],
+                 slopes: Callable[[Any, Any, float, float], Array] | None = None) -> None:  # fmt: skip
         self._container = exu.SystemContainer()
         self.mbs: Any = self._container.AddSystem()
-        self.wheels = wheels
+        self.wheels, self._slopes = wheels, slopes
         masses, k, d = wheels.masses[:FREEDOMS], wheels.stiffness, wheels.damping
         self._nodes = []
         for _ in range(wheels.count):
@@ -71,9 +81,12 @@ class Rolling:
         self.mbs.Assemble()
 
     def _object(self, of: Callable[[Any, Any], Any]) -> None:
+        slopes, more = self._slopes, dict[str, Any]()
+        if slopes is not None:  # those of the left-hand side
+            more["jacobianUserFunction"] = lambda mbs, t, item, q, v, by_q, by_v: -slopes(q, v, by_q, by_v)
         self.mbs.AddObject(items.ObjectGenericODE2(
             nodeNumbers=self._nodes, massMatrix=exu.MatrixContainer(),
-            forceUserFunction=lambda mbs, t, item, q, v: of(q, v)))  # fmt: skip
+            forceUserFunction=lambda mbs, t, item, q, v: of(q, v), **more))  # fmt: skip
 
     def _markers(self) -> list[Any]:
         return [self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=i))
@@ -113,7 +126,12 @@ class Rolling:
         ti = options.timeIntegration
         ti.numberOfSteps, ti.endTime, ti.verboseMode = steps, steps * step, 0
         ti.adaptiveStep = ti.automaticStepSize = ti.explicit.computeEndOfStepAccelerations = False
-        done = self.mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, solver))
+        try:
+            done = self.mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, solver))
+        except (exu.ExudynError, RuntimeError, ValueError) as error:
+            if "KeyboardInterrupt" in str(error):
+                raise KeyboardInterrupt from error
+            raise RunFailed("exudyn", f"the solver stopped: {str(error).strip().splitlines()[0]}") from error
         state = np.concatenate((data.GetODE2Coordinates(), data.GetODE2Coordinates_t()))
         if not done or not np.isfinite(state).all():
             raise RunFailed("exudyn", "the engine gave up")
