@@ -123,3 +123,14 @@ def test_implicit_steps_need_fewer_calls_with_slopes_and_end_alike():
     # Newton's method ends at its own tolerance, whatever matrix it takes
     np.testing.assert_allclose(ends[1], ends[0], rtol=0.0, atol=1e-8)
     assert calls[1] < calls[0]
+
+
+def test_low_speed_forces_no_tiny_steps():
+    # creepages are rates by speed: at 0.1 m/s wheels damp at 1e5 1/s, where an explicit step of 1 ms is lost
+    wheels = Wheels(1, 11, speed=0.1)
+    q, v = wheels.state()
+    forces = Forces(wheels)
+    end = Rolling(wheels, forces.of, slopes=forces.slopes).run(q, v / 200.0, 20, 1e-3, "GeneralizedAlpha")
+    assert np.abs(end[:4]).max() < np.abs(q).max()
+    with pytest.raises(RunFailed):
+        Rolling(wheels, forces.of).run(q, v / 200.0, 20, 1e-3, "GeneralizedAlpha")

@@ -8,6 +8,7 @@ function before each step cannot see the stages, so that no integrator keeps its
 
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import exudyn as exu
@@ -20,13 +21,16 @@ from models.errors import RunFailed
 
 exu.config.printToConsole = False
 Law = Callable[[Array, Array, Array, Array], Any]
+CONTRACTIVITY, ITERATIONS = 0.999, 200
 ROUTES = ("generic object", "loads", "before each step")
 
 
 class Forces:
     """Forces of lists of positions and rates, as a list; the compiled kernel by addresses, or a Python ``law``.
 
-    ``of`` gives the forces, ``slopes`` the sum of their derivatives to positions and rates, each times a factor.
+    ``of`` gives the forces, ``slopes`` the sum of their derivatives to positions and rates, each times a factor: those
+    of the linear theory, the steepest that there are. With the slopes of a wheel that slides, next to none, Newton's
+    method leaps from slip to slip at low speed and never settles; with the steepest it creeps up on the solution.
     """
 
     def __init__(self, wheels: Wheels, law: Law | None = None) -> None:
@@ -48,10 +52,10 @@ class Forces:
             return answer()
 
         def moved(positions: Any, rates: Any, by_q: float, by_v: float) -> Array:
-            slopes(numbers, np.array(positions), np.array(rates), by_q, by_v, found)
+            slopes(sticking, np.array(positions), np.array(rates), by_q, by_v, found)
             return found
 
-        found = np.zeros((size, size))
+        found, sticking = np.zeros((size, size)), replace(wheels, cells=0).numbers
         self.of, self.slopes = compiled if law is None else by_law, moved
 
 
@@ -126,6 +130,9 @@ class Rolling:
         ti = options.timeIntegration
         ti.numberOfSteps, ti.endTime, ti.verboseMode = steps, steps * step, 0
         ti.adaptiveStep = ti.automaticStepSize = ti.explicit.computeEndOfStepAccelerations = False
+        if self._slopes is not None:  # steep slopes converge slowly but surely: keep the matrix, go on for longer
+            ti.newton.useModifiedNewton, ti.newton.modifiedNewtonContractivity = True, CONTRACTIVITY
+            ti.newton.maxIterations = ITERATIONS
         try:
             done = self.mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, solver))
         except (exu.ExudynError, RuntimeError, ValueError) as error:

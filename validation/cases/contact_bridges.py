@@ -34,7 +34,7 @@ COUNTS = (1, 4, 8)
 EVALUATIONS = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
 """Calls of the callback per step."""
 ENGINES = {"mujoco": ("Euler", "RK4"), "exudyn": ("ExplicitEuler", "RK44")}
-ROUNDS = {True: 25, False: 80}
+ROUNDS = {True: 25, False: 50}
 LEAST = 0.001
 WHY = "least of interleaved rounds, as whatever else a machine does only adds to a time; start of a run taken out"
 THEORY = Options(net=9)
