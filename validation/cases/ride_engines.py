@@ -11,13 +11,13 @@ from models.engines.protocol import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
 from models.engines.spatial_reference import SpatialReference
 from models.noise import normal
-from models.parameters import spatial_twin
 from models.ride.linear_vehicle import LinearVehicle
 from models.ride.operating_point import poles, shift
 from models.vehicles.curve import Curve
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
+from validation import spatial_twin
 from validation.rows import Row, System, Table, at_most, behaves, finding
 
 TITLE = "Vehicles in space: both engines, the analytic matrices and equations written by hand"
