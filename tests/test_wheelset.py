@@ -113,12 +113,13 @@ def test_nothing_accelerates_at_rest_and_the_rails_carry_the_load():
     assert contact[0, wf.A] == pytest.approx(float(CHOSEN.ellipse.a), rel=1e-3)  # 0.2 % of the load is that of spin
 
 
-def test_energy_is_what_the_forces_do():
+@pytest.mark.parametrize("law", ["linear", "fastsim"])
+def test_energy_is_what_the_forces_do(law):
     """d(T + U)/dt by the energies' own expressions against the power of the contacts, at a lively state."""
     w = CHOSEN.changed(damping_x=0.0, damping_y=0.0, damping_z=0.0, flange_clearance=0.02)
-    equations = Equations(w, 40.0)
+    equations = Equations(w, 40.0, law)
     body = equations.body
-    state = np.array([0.006, 9e-5, -0.0004, 0.02, 0.0, 0.3, 0.02, 0.05, -0.8, -90.0])
+    state = np.array([0.006, 9e-5, -0.0004, 0.02, 0.0, 0.3, 0.02, 1.0, -20.0, -90.0])
 
     def energy(s):
         y, z, roll, yaw, _, vy, vz, roll_rate, yaw_rate, spin = s
@@ -134,14 +135,14 @@ def test_energy_is_what_the_forces_do():
     def depths(s):
         return np.array([cone_on_rail(side, *s[:4], *CONE)[0] for side in (RIGHT, LEFT)])
 
-    rates, h = equations.rates(state), 1e-6
+    rates, h = equations.rates(state), 1e-8
     gained = (energy(state + h * rates) - energy(state - h * rates)) / (2 * h)
     deeper = (depths(state + h * rates) - depths(state - h * rates)) / (2 * h)
     contact = equations.run(state, 1e-6, 1e-6).contacts[0]
-    assert (contact[:, wf.LOAD] > 1e4).all()
+    assert (contact[:, wf.LOAD] > 1e3).all()
     assert (contact[:, wf.POWER] < 0.0).all()
     done = (contact[:, wf.POWER] - contact[:, wf.LOAD] * deeper - contact[:, wf.FX] * 40.0).sum()
-    assert gained == pytest.approx(done, rel=1e-6)
+    assert gained == pytest.approx(done, abs=0.1)  # W; the energy of 4e5 J leaves 0.01 W, the least of faults 100 W
 
 
 @pytest.mark.parametrize("law", ["linear", "fastsim"])
