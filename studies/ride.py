@@ -46,6 +46,8 @@ SIMPLER = {
 ISOTROPIC = "isotropic road"
 LONGEST, SHORTEST = 1e-2, 500.0
 """Band of the comparison with the isotropic road: a share of the smallest corner, and rad/m."""
+ROUNDING = 1e-13
+"""Deviations below, in SI, are what rounding leaves of zero."""
 LEAST = 1e-6
 """An output this much smaller than on another road is zero but for rounding: no change is given."""
 ALONG = 13
@@ -185,7 +187,7 @@ def _table(scene: RideScene, vehicle: SpatialVehicle, found: dict[str, Sweep], s
     lines = [f"  at {speed:g} m/s, standard deviations; then what other roads make of them", " " * (width + 24) + heads]
     alike = isotropic_change(scene, vehicle, speed)
     for i, (name, unit) in enumerate(zip(first.outputs, units(vehicle, linear, first), strict=True)):
-        own = first.deviation[0, -1, i]
+        own = _own(first.deviation[:, -1, i])
         changes = "".join(f"{_change(first.deviation[j, -1, i], own):>20}" for j in range(1, len(first.cases)))
         changes += f"{_change(own * (1 + alike.get(name, np.nan)), own):>20}"
         lines.append(f"    {name:<{width}}{_value(own, unit, str(first.status[0, -1, i])):>20}{changes}")
@@ -210,6 +212,12 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
              for one in (road, isotropic_like(road, y))]  # fmt: skip
     names = [output.name for output in vehicle.outputs]
     return {name: float(np.sqrt(iso / own) - 1.0) for name, own, iso in zip(names, *found, strict=True) if own > 0}
+
+
+def _own(deviations: np.ndarray) -> float:
+    """The scene's own of the deviations (cases,), 0 where symmetry leaves only rounding."""
+    largest = np.max(deviations, initial=0.0, where=np.isfinite(deviations))
+    return float(deviations[0]) if deviations[0] > max(LEAST * largest, ROUNDING) else 0.0
 
 
 def _value(value: float, unit: str, status: str) -> str:

@@ -141,6 +141,21 @@ def test_a_scene_that_cannot_be_is_told_why(change, said):
     assert str(caught.value).startswith("my.toml")
 
 
+def test_an_output_that_symmetry_silences_is_zero(twinrig, capsys):
+    """Both tracks alike do not roll a car whose halves are equal."""
+    given = ("--set", "vehicle.file=seven_freedoms", "--set", "speeds={values=[15.0]}", "--set", "weighting={}",
+             "--set", "road={left_right='equal'}", "--engine", "reference")  # fmt: skip
+    assert twinrig("run", "ride", *given, "--out", "out") == 0
+    (line,) = [line for line in capsys.readouterr().out.splitlines() if line.strip().startswith("roll acceleration ")]
+    assert line.split()[2:4] == ["0", "rad/s^2"] and line.count("%") == 0
+
+
+def test_a_loaded_vehicle_that_may_yaw_is_refused(twinrig, capsys):
+    given = ("--set", "vehicle={file='r19_free', operating_point='loaded'}", "--set", "weighting={}")
+    assert twinrig("run", "ride", *given) == 2
+    assert "use unloaded" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("study", ["ride", "ride_detail", "ride_drive"])
 def test_curves_are_not_taken_as_lines_without_a_word(twinrig, capsys, study):
     given = ("--set", "vehicle.file=quarter_car_nonlinear", "--set", "weighting={}", "--set", "options={}")

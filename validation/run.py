@@ -21,11 +21,12 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
          "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
          "contact_simplified", "contact_profiles", "ride_road", "ride_covariance", "ride_engines",
-         "ride_varying_speed", "ride_nonlinear", "ride_faults", "contact_price", "fastsim")  # fmt: skip
+         "ride_varying_speed", "ride_nonlinear", "ride_faults", "contact_price", "fastsim",
+         "contact_bridges")  # fmt: skip
 """Case modules in the order of the report."""
 
 
-ALONE = ("absent", "price", "ensemble", "fastsim", "contact_price")
+ALONE = ("absent", "price", "ensemble", "fastsim", "contact_price", "contact_bridges")
 """Cases that time what they run: they begin when all others have ended, and have the machine to themselves."""
 WORKERS = 2
 """Processes that measure the other cases."""

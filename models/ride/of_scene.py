@@ -29,8 +29,15 @@ BESIDE = 1.0
 
 
 def vehicle_of(scene: RideScene) -> SpatialVehicle:
-    """The scene's vehicle, with gravity where its operating point is the loaded one."""
+    """The scene's vehicle, with gravity where its operating point is the loaded one.
+
+    InputError for a loaded vehicle that may yaw: its preloaded springs keep their directions in space, not in it, so
+    that their moments about z would pull it back or push it on.
+    """
     vehicle = load_vehicle(scene.vehicle.file, scene.folder, scene.file, "vehicle.file")
+    if scene.vehicle.operating_point == "loaded" and vehicle.side_forces:
+        allowed = "a vehicle with side forces may yaw, while preloads keep their directions in space: use unloaded"
+        raise InputError(scene.file, "vehicle.operating_point", "loaded", allowed)
     return replace(vehicle, gravity=GRAVITY if scene.vehicle.operating_point == "loaded" else 0.0)
 
 
