@@ -1,0 +1,54 @@
+"""A wheelset on rails whose equations of motion an engine writes: what is the same in every engine.
+
+The engine has the body, its joints, its weight and the primary suspension as elements of its own; both rails act by a
+callback about the compiled forces. All that follows from accelerations and paths (rest, linearisation, critical speed,
+limit cycle) is that of ``rail.equations``, of which this takes the rates and the march from the engine.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from models.errors import RunFailed
+from models.rail.equations import LIMIT, ROLL, STATES, YAW, Equations, Path, Y, Z, rates
+from models.rail.joint_forces import JOINTS, from_joints, rates_of, to_joints
+from models.rail.wheel_forces import REPORTED
+from models.rail.wheelset import Wheelset
+
+
+class EngineWheelset(Equations):
+    """A wheelset that travels at a speed in an engine; parameters and answers as those of ``Equations``."""
+
+    ENGINE: ClassVar[str]
+
+    def accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (5,) of the joints by the engine at positions and rates (5,)."""
+        raise NotImplementedError
+
+    def marched(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+        """Positions and rates (steps + 1, 10) by the engine's RK4, start included; RunFailed unless they are finite."""
+        raise NotImplementedError
+
+    def rates(self, state: np.ndarray) -> np.ndarray:
+        """Rates (10,) of a state (10,) by the engine."""
+        joints = to_joints(np.asarray(state, float))
+        return rates_of(joints, self.accelerations(joints[:JOINTS], joints[JOINTS:]))
+
+    def run(self, state: np.ndarray, duration: float, step: float, every: int = 1) -> Path:
+        """As ``Equations.run``, by the engine's RK4; the contacts are those of the states that are kept."""
+        self._check(step)
+        joints, count = to_joints(np.array(state, float)), round(duration / step)
+        states = from_joints(self.marched(joints[:JOINTS], joints[JOINTS:], count, step))
+        away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < LIMIT)
+        if away.any():
+            raise RunFailed(self.ENGINE, f"the wheelset leaves the track after {np.argmax(away) * step:.6g} s")
+        kept = states[::every]
+        contacts, out = np.empty((len(kept), 2, REPORTED)), np.empty(STATES)
+        for one, contact in zip(kept, contacts, strict=True):
+            rates(one, *self.given, out, contact)
+        return Path(np.arange(len(kept)) * step * every, kept, contacts)
+
+    @classmethod
+    def growth(cls, wheelset: Wheelset, speed: float) -> float:
+        """Largest real part (1/s) of the eigenvalues with linear creep, for ``linear.critical_speed``."""
+        return float(np.linalg.eigvals(cls(wheelset, speed, "linear").state_matrix).real.max())

@@ -1,0 +1,95 @@
+"""A wheelset on rails in MuJoCo: one body of five joints, its suspension as actuators, both rails by a native callback.
+
+The suspension's ends are sites on the axle, which spin does not move. Their reference sites stand still in the track,
+so that length and moment of each actuator are exact along the track's axes.
+"""
+
+from functools import cache, cached_property
+from typing import Any
+
+import mujoco
+import numpy as np
+from numba import cfunc, types
+
+from models.engines.contact_bridge_mujoco import Marcher
+from models.engines.mujoco_callback import _array_at, installed
+from models.engines.mujoco_layout import check, offset
+from models.engines.wheelset import EngineWheelset
+from models.rail.equations import ACROSS, ALONG, ARM, CARRIED, DX, KX, MASS, SUNK
+from models.rail.joint_forces import joint_forces, table
+from models.rail.wheelset import GRAVITY
+
+JOINTS = (("SLIDE", (0.0, 1.0, 0.0)), ("SLIDE", (0.0, 0.0, 1.0)), ("HINGE", (0.0, 0.0, 1.0)),
+          ("HINGE", (1.0, 0.0, 0.0)), ("HINGE", (0.0, 1.0, 0.0)))  # fmt: skip
+"""Kind and axis, from the track to the wheelset."""
+
+
+def model(numbers: np.ndarray, body: np.ndarray) -> mujoco.MjModel:
+    """The wheelset of ``Equations.body``; ``numbers``, the callback's table, lie in the model."""
+    spec = mujoco.MjSpec()
+    spec.option.gravity, spec.option.integrator = [0.0, 0.0, GRAVITY], mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    spec.compiler.degree = False
+    spec.add_numeric(name="rails", data=numbers, size=numbers.size)
+    own = spec.worldbody.add_body(mass=body[MASS], inertia=body[[ACROSS, ALONG, ACROSS]], explicitinertial=True)
+    for kind, axis in JOINTS:
+        own.add_joint(type=getattr(mujoco.mjtJoint, f"mjJNT_{kind}"), axis=axis)
+    for name, arm in (("right", body[ARM]), ("left", -body[ARM])):
+        own.add_site(name=name, pos=[0.0, arm, 0.0])
+        spec.worldbody.add_site(name=f"{name} frame", pos=[0.0, arm, body[SUNK]])
+        for i in range(3):
+            _strut(spec, name, i, body[KX + i], body[DX + i], body[CARRIED] if i == 2 else 0.0)
+    built = spec.compile()
+    check(built, mujoco.MjData(built))
+    return built
+
+
+def _strut(spec: Any, end: str, axis: int, stiffness: float, damping: float, held: float) -> None:
+    """Spring and damper of one end along an axis of the track, and a constant force."""
+    strut = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=end, refsite=f"{end} frame")
+    strut.gear[:], strut.gainprm[0], strut.biastype = np.eye(6)[axis], 0.0, mujoco.mjtBias.mjBIAS_AFFINE
+    strut.biasprm[:3] = held, -stiffness, -damping
+
+
+@cache
+def native_law() -> Any:
+    """Compiled callback: a shell about ``joint_forces``, which is kept on disk."""
+    numbers = offset("mjModel", "numeric_data")
+    position, rate, force = (offset("mjData", field) for field in ("qpos", "qvel", "qfrc_passive"))
+
+    @cfunc(types.void(types.voidptr, types.voidptr))
+    def law(model, data):
+        joint_forces(_array_at(model, numbers), _array_at(data, position), _array_at(data, rate),
+                     _array_at(data, force))  # fmt: skip
+
+    return law
+
+
+class MujocoWheelset(EngineWheelset):
+    """The wheelset in a MuJoCo model of its own."""
+
+    ENGINE = "mujoco"
+
+    @cached_property
+    def model(self) -> mujoco.MjModel:
+        """The model; without ``native_law`` installed, it has no rails."""
+        return model(table(self.given), self.body)
+
+    @cached_property
+    def _data(self) -> mujoco.MjData:
+        return mujoco.MjData(self.model)
+
+    def accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (5,) of the joints by ``mj_forward``."""
+        data = self._data
+        data.qpos[:], data.qvel[:] = q, v
+        with installed(native_law()):
+            mujoco.mj_forward(self.model, data)
+        return data.qacc.copy()
+
+    def marched(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+        """Positions and rates (steps + 1, 10) by MuJoCo's RK4; RunFailed where it starts again or is not finite."""
+        self.model.opt.timestep, start = step, np.concatenate((q, v))
+        with installed(native_law()):
+            path = Marcher(self.model).run(start[None], steps)[0]
+        return np.vstack((start, path))

@@ -1,0 +1,113 @@
+"""A wheelset on rails in both engines: accelerations, paths, linearisation and limit cycle of the written equations."""
+
+import math
+
+import numpy as np
+import pytest
+
+from models.engines.contact_bridge_mujoco import Marcher
+from models.engines.mujoco_callback import installed
+from models.engines.wheelset_exudyn import ExudynWheelset
+from models.engines.wheelset_mujoco import MujocoWheelset, native_law
+from models.errors import InputError, RunFailed
+from models.rail import equations as eq
+from models.rail import wheel_forces as wf
+from models.rail.equations import Equations
+from models.rail.joint_forces import from_joints, to_joints
+from models.rail.limit_cycle import cycle_with_error
+from models.rail.linear import critical_speed
+from models.rail.wheelset import CHOSEN
+
+ENGINES = (MujocoWheelset, ExudynWheelset)
+FREE = CHOSEN.changed(**{f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"})
+LIVELY = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0, 1.0, 10.0])
+"""Spread of random states: flanges touch, wheels lift off, creep forces saturate."""
+both = pytest.mark.parametrize("engine", ENGINES)
+
+
+@both
+@pytest.mark.parametrize("law", ["linear", "fastsim"])
+def test_accelerations_are_those_of_the_equations(engine, law):
+    written, built = Equations(CHOSEN, 60.0, law), engine(CHOSEN, 60.0, law)
+    draw = np.random.default_rng(1)
+    states = written.rest + LIVELY * draw.normal(size=(100, eq.STATES))
+    expected = np.array([written.rates(state) for state in states])
+    loads = [written.run(state, 1e-9, 1e-9).contacts[0, :, wf.LOAD] for state in states]
+    assert 5 < np.sum(np.array(loads) == 0.0) < 195  # wheels in the air and on the rail are among them
+    found = [built.rates(state) for state in states]
+    # Both wheels in the air leave a spin without moment: rounding of 1e-14 rad/s^2 beside zero.
+    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-13)
+
+
+def test_paths_over_a_second():
+    written = Equations(CHOSEN, 60.0)
+    start = written.displaced(5e-3)
+    paths = [one.run(start, 1.0, 5e-4) for one in (written, *(engine(CHOSEN, 60.0) for engine in ENGINES))]
+    reference, mujoco, exudyn = (path.states for path in paths)
+    assert np.ptp(reference[:, eq.Y]) > 5e-3
+    # 4e-12 seen, of spin: the engines' fifth rate is that against the axes, which RK4 rounds off elsewhere.
+    assert np.abs(mujoco - reference).max() < 1e-10
+    assert np.abs(exudyn - reference).max() < 1e-10
+    assert np.abs(exudyn - mujoco).max() < 1e-10
+    for path in paths[1:]:
+        np.testing.assert_allclose(path.contacts, paths[0].contacts, rtol=1e-6, atol=1e-6)
+        assert path.times == pytest.approx(paths[0].times)
+        assert (path.contacts[:, :, wf.POWER] <= 0.0).all()
+
+
+def wavelength(kind):
+    values = np.linalg.eigvals(kind(FREE, 0.2, "linear").state_matrix)
+    return 2 * math.pi * 0.2 / min(values[values.imag > 0], key=abs).imag
+
+
+@both
+def test_klingels_wave_and_critical_speed(engine):
+    assert wavelength(engine) == pytest.approx(wavelength(Equations), rel=1e-6)  # 4e-11 seen
+    speed = critical_speed(CHOSEN, eq.growth)
+    assert critical_speed(CHOSEN, engine.growth) == pytest.approx(speed, rel=1e-6)  # 2e-10 seen
+    assert critical_speed(CHOSEN.changed(stiffness_x=2.5e5), eq.growth) > 1.01 * speed
+
+
+@both
+def test_wheels_that_lift_off_come_back_as_in_the_equations(engine):
+    written = Equations(CHOSEN, 40.0, cells=11)
+    start = written.rest - 2e-4 * np.eye(eq.STATES)[eq.Z]
+    path, expected = (one.run(start, 0.1, 2e-4, 5) for one in (engine(CHOSEN, 40.0, cells=11), written))
+    assert (path.contacts[0, :, wf.LOAD] == 0.0).all()
+    assert (path.contacts[-1, :, wf.LOAD] > 0.0).all()
+    np.testing.assert_allclose(path.states, expected.states, rtol=0.0, atol=1e-10)
+    assert path.times == pytest.approx(expected.times)
+
+
+def test_threads_agree_to_the_last_bit():
+    built = MujocoWheelset(CHOSEN, 60.0, cells=11)
+    built.model.opt.timestep = 5e-4
+    starts = np.array([to_joints(built.displaced(shift)) for shift in (1e-3, 3e-3, 5e-3)])
+    with installed(native_law()):
+        one, two = (Marcher(built.model, threads).run(starts, 50) for threads in (1, 2))
+    assert one.tobytes() == two.tobytes()
+
+
+def test_joints_and_states():
+    states = LIVELY * np.random.default_rng(2).normal(size=(4, eq.STATES))
+    assert from_joints(to_joints(states)) == pytest.approx(states, abs=1e-15)
+
+
+@both
+def test_what_cannot_be_is_refused(engine):
+    built = engine(CHOSEN, 50.0, cells=11)
+    with pytest.raises(InputError, match="at most"):
+        built.run(built.rest, 1.0, 5e-3)
+    start = built.rest.copy()
+    start[eq.YAW_RATE] = 50.0
+    with pytest.raises(RunFailed, match=built.ENGINE):
+        built.run(start, 0.2, 5e-4)
+
+
+@pytest.mark.full
+@both
+def test_limit_cycle(engine):
+    expected, found = (cycle_with_error(kind(CHOSEN, 75.0, cells=11), duration=6.0) for kind in (Equations, engine))
+    assert found.steady
+    assert abs(found.amplitude - expected.amplitude) <= expected.amplitude_error < 1e-2 * expected.amplitude
+    assert abs(found.frequency - expected.frequency) <= expected.frequency_error < 1e-2 * expected.frequency
