@@ -35,6 +35,12 @@ def _kept_apart(compiled: Any) -> Any:
     return compiled
 
 
+def named(function: Any, *parts: Any) -> Any:
+    """A closure under a name that no other one of its factory has, made of ``parts``; compile it after that."""
+    function.__qualname__ = function.__name__ = "_".join([function.__name__, *(str(part) for part in parts)])
+    return function
+
+
 @cache
 def checksum(folder: Path) -> int:
     """Of the sources that a kernel of this folder may be made of."""

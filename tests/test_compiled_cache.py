@@ -1,8 +1,15 @@
 """Compiled kernels: each has a cache file of its own, and a change of the equations makes a new one."""
 
+import json
+import os
+import re
 import subprocess
 import sys
+from pathlib import Path
 
+import pytest
+
+import models
 from models.engines.reference import derivative_of, march_of
 
 MODES = (("road", "exact"), ("road", "linear"), ("force", "exact"), ("force-body", "exact"),
@@ -25,22 +32,54 @@ def test_two_processes_never_write_the_same_file(tmp_path):
 
 
 def test_every_kernel_is_compiled_that_way():
-    from pathlib import Path
-
-    import models
-
     sources = {path.name: path.read_text() for path in Path(models.__file__).parent.rglob("*.py")}
     own = {name for name, text in sources.items() if "numba.njit(" in text or "from numba import njit" in text}
     assert own == {"compiled.py"}
+    nested = [name for name, text in sources.items() if re.search(r"^ +@(register_jitable|njit)", text, re.MULTILINE)]
+    assert not nested, "closures take a name of their own by models.compiled.named"
+
+
+FACTORY = """
+from numba.extending import register_jitable
+from models.compiled import named, njit
+
+def inner(factor):
+    def times(x):
+        total = 0.0
+        for i in range(1000):  # long enough to stay a function of its own
+            total += factor * x / (i + 1.0) - factor * x / (i + 1.0) + factor * x / 1000
+        return total
+    return register_jitable(NAMED)
+
+def kernel(factor):
+    times = inner(factor)
+    def whole(x):
+        return times(x) + times(2 * x)
+    return njit(cache=True)(named(whole, int(factor)))
+"""
+
+
+def answers(folder, name, *factors):
+    """Of kernels that a process of its own makes with these factors, its inner functions named or not."""
+    (folder / "factory.py").write_text(FACTORY.replace("NAMED", name))
+    command = [sys.executable, "-c", f"from factory import kernel; print([kernel(f)(1.0) for f in {list(factors)}])"]
+    path = os.pathsep.join([str(folder), str(Path(models.__file__).parents[1])])
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True,
+                          env={**os.environ, "PYTHONPATH": path})  # fmt: skip
+    return json.loads(done.stdout)
+
+
+def test_closures_of_one_factory_never_stand_in_for_one_another(tmp_path):
+    """Two processes keep a kernel each, a third loads both: each must call its own inner function, 3 times 1 x."""
+    named = "named(times, int(factor))"
+    assert answers(tmp_path, named, 2.0) == pytest.approx([6.0])
+    assert answers(tmp_path, named, 3.0) == pytest.approx([9.0])
+    assert answers(tmp_path, named, 2.0, 3.0) == pytest.approx([6.0, 9.0])
 
 
 def test_a_change_of_the_equations_is_seen(tmp_path):
     """Copy the package, run, change a sign in the equations, run again: the answer must change."""
     import shutil
-    from pathlib import Path
-
-    import models
-
     copy = tmp_path / "models"
     shutil.copytree(Path(models.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
     script = (

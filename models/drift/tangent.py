@@ -13,6 +13,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from models.assembly import Assembly
+from models.compiled import named
 from models.engines.reference import compiled
 from models.signals import Sampled, Smooth
 from models.vehicles.pitch_plane import Parameters
@@ -56,7 +57,6 @@ def pushed(y, p, body, du, dx):
 
 
 def _step_of(rhs, body, flat):
-    @register_jitable
     def step_of(y, x, step, inputs, errors, at, p, other):
         """One Runge-Kutta step of the path y (8,) and the error columns x (m, 8), in place.
 
@@ -89,7 +89,7 @@ def _step_of(rhs, body, flat):
             for j in range(columns):
                 x[j, q] += step / 6 * (kx[0, j, q] + 2 * kx[1, j, q] + 2 * kx[2, j, q] + kx[3, j, q])
 
-    return step_of
+    return register_jitable(named(step_of, rhs.__name__, body, flat))
 
 
 def compile_carry(one_step, key):

@@ -12,7 +12,7 @@ from numba.extending import register_jitable
 from scipy.integrate import solve_ivp
 
 from models.assembly import Assembly
-from models.compiled import njit
+from models.compiled import named, njit
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, Trajectory, guard
 from models.errors import RunFailed
@@ -25,7 +25,7 @@ NO_INPUT = np.zeros((1, 4))
 
 def compiled(function: Any, key: tuple) -> Any:
     """Compile a closure with an index of its own: those of one factory would share numba's."""
-    function.__qualname__ = "_".join([function.__name__, *(str(part) for part in key)])
+    function = named(function, *key)
     return njit(cache=True, nogil=True, error_model="numpy")(function)  # no check for masses of zero: there are none
 
 
@@ -67,12 +67,11 @@ def _compile_single(rhs, key):
 
 
 def _sum(rhs, added):
-    @register_jitable
     def total(y, u, p, dy):
         rhs(y, u, p, dy)
         added(y, u, p, dy)
 
-    return total
+    return register_jitable(named(total, rhs.__name__, added.__name__))
 
 
 @dataclass
