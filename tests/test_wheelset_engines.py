@@ -8,7 +8,7 @@ import pytest
 from models.engines.contact_bridge_mujoco import Marcher
 from models.engines.mujoco_callback import installed
 from models.engines.wheelset_exudyn import ExudynWheelset
-from models.engines.wheelset_mujoco import MujocoWheelset, native_law
+from models.engines.wheelset_mujoco import MujocoWheelset, rail_law
 from models.errors import InputError, RunFailed
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
@@ -83,7 +83,7 @@ def test_threads_agree_to_the_last_bit():
     built = MujocoWheelset(CHOSEN, 60.0, cells=11)
     built.model.opt.timestep = 5e-4
     starts = np.array([to_joints(built.displaced(shift)) for shift in (1e-3, 3e-3, 5e-3)])
-    with installed(native_law()):
+    with installed(rail_law()):
         one, two = (Marcher(built.model, threads).run(starts, 50) for threads in (1, 2))
     assert one.tobytes() == two.tobytes()
 

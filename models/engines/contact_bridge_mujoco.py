@@ -39,14 +39,14 @@ def model(wheels: Wheels, step: float = 1e-4, integrator: str = "Euler") -> mujo
 
 
 @cache
-def native_law() -> Any:
-    """Compiled callback: a shell about ``forces``, which is kept on disk."""
+def native_law(kernel: Any = forces) -> Any:
+    """Compiled callback: a shell about a compiled kernel of (numbers, positions, rates, forces), kept on disk."""
     numbers = offset("mjModel", "numeric_data")
     position, rate, force = (offset("mjData", field) for field in ("qpos", "qvel", "qfrc_passive"))
 
     @cfunc(types.void(types.voidptr, types.voidptr))
     def law(model, data):
-        forces(_array_at(model, numbers), _array_at(data, position), _array_at(data, rate), _array_at(data, force))
+        kernel(_array_at(model, numbers), _array_at(data, position), _array_at(data, rate), _array_at(data, force))
 
     return law
 

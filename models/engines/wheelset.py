@@ -5,6 +5,7 @@ callback about the compiled forces. All that follows from accelerations and path
 limit cycle) is that of ``rail.equations``, of which this takes the rates and the march from the engine.
 """
 
+from abc import ABC, abstractmethod
 from typing import ClassVar
 
 import numpy as np
@@ -16,18 +17,18 @@ from models.rail.wheel_forces import REPORTED
 from models.rail.wheelset import Wheelset
 
 
-class EngineWheelset(Equations):
+class EngineWheelset(Equations, ABC):
     """A wheelset that travels at a speed in an engine; parameters and answers as those of ``Equations``."""
 
     ENGINE: ClassVar[str]
 
+    @abstractmethod
     def accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (5,) of the joints by the engine at positions and rates (5,)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def marched(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
         """Positions and rates (steps + 1, 10) by the engine's RK4, start included; RunFailed unless they are finite."""
-        raise NotImplementedError
 
     def rates(self, state: np.ndarray) -> np.ndarray:
         """Rates (10,) of a state (10,) by the engine."""

@@ -4,16 +4,15 @@ The suspension's ends are sites on the axle, which spin does not move. Their ref
 so that length and moment of each actuator are exact along the track's axes.
 """
 
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import mujoco
 import numpy as np
-from numba import cfunc, types
 
-from models.engines.contact_bridge_mujoco import Marcher
-from models.engines.mujoco_callback import _array_at, installed
-from models.engines.mujoco_layout import check, offset
+from models.engines.contact_bridge_mujoco import Marcher, native_law
+from models.engines.mujoco_callback import installed
+from models.engines.mujoco_layout import check
 from models.engines.wheelset import EngineWheelset
 from models.rail.equations import ACROSS, ALONG, ARM, CARRIED, DX, KX, MASS, SUNK
 from models.rail.joint_forces import joint_forces, table
@@ -51,18 +50,9 @@ def _strut(spec: Any, end: str, axis: int, stiffness: float, damping: float, hel
     strut.biasprm[:3] = held, -stiffness, -damping
 
 
-@cache
-def native_law() -> Any:
-    """Compiled callback: a shell about ``joint_forces``, which is kept on disk."""
-    numbers = offset("mjModel", "numeric_data")
-    position, rate, force = (offset("mjData", field) for field in ("qpos", "qvel", "qfrc_passive"))
-
-    @cfunc(types.void(types.voidptr, types.voidptr))
-    def law(model, data):
-        joint_forces(_array_at(model, numbers), _array_at(data, position), _array_at(data, rate),
-                     _array_at(data, force))  # fmt: skip
-
-    return law
+def rail_law() -> Any:
+    """Compiled callback of both rails."""
+    return native_law(joint_forces)
 
 
 class MujocoWheelset(EngineWheelset):
@@ -72,7 +62,7 @@ class MujocoWheelset(EngineWheelset):
 
     @cached_property
     def model(self) -> mujoco.MjModel:
-        """The model; without ``native_law`` installed, it has no rails."""
+        """The model; without ``rail_law`` installed, it has no rails."""
         return model(table(self.given), self.body)
 
     @cached_property
@@ -83,13 +73,13 @@ class MujocoWheelset(EngineWheelset):
         """Accelerations (5,) of the joints by ``mj_forward``."""
         data = self._data
         data.qpos[:], data.qvel[:] = q, v
-        with installed(native_law()):
+        with installed(rail_law()):
             mujoco.mj_forward(self.model, data)
         return data.qacc.copy()
 
     def marched(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
         """Positions and rates (steps + 1, 10) by MuJoCo's RK4; RunFailed where it starts again or is not finite."""
         self.model.opt.timestep, start = step, np.concatenate((q, v))
-        with installed(native_law()):
+        with installed(rail_law()):
             path = Marcher(self.model).run(start[None], steps)[0]
         return np.vstack((start, path))
