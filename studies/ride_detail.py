@@ -1,5 +1,6 @@
 """How much vehicle and how much road does a question need: error of every output by model and road, beside its cost."""
 
+import csv
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +16,6 @@ from models.ride.of_scene import check_linear, excitation_of, linear_vehicle, ve
 from models.ride.scene import RideScene
 from models.ride.sweep import Sweep, sweep
 from models.strict import Strict, read
-from models.tables import write_table
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
@@ -134,8 +134,12 @@ Errors = dict[tuple[str, str], np.ndarray]
 
 
 def _save(errors: Errors, names: list[str], path: Path) -> None:
-    columns = {f"{model}, {road}": ("-", values) for (model, road), values in errors.items()}
-    write_table(path, {"output": ("-", np.arange(len(names))), **columns})
+    """A row per output, a column per model and road, relative; empty where a model has no such output."""
+    with path.open("x", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["output", *(f"{model}, {road} [-]" for model, road in errors)])
+        for name, *row in zip(names, *errors.values(), strict=True):
+            writer.writerow([name, *("" if np.isnan(value) else repr(float(value)) for value in row)])
 
 
 def _answer(errors: Errors, names: list[str]) -> dict[str, Any]:

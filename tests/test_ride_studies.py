@@ -1,5 +1,6 @@
 """Scenes and studies of ride: what they save, what they say, what they refuse."""
 
+import csv
 import json
 from pathlib import Path
 
@@ -50,6 +51,10 @@ def test_detail_compares_outputs_of_the_same_name(twinrig, capsys):
     found = json.loads(capsys.readouterr().out)["answer"]
     assert found["4 freedoms, one track"]["body centre"] == 0.0  # the scene's vehicle against itself
     assert found["2 freedoms, one track"]["pitch acceleration"] is None
+    with open("out/errors.csv", newline="") as file:
+        rows = {row["output"]: row for row in csv.DictReader(file)}
+    assert rows["pitch acceleration"]["2 freedoms, one track [-]"] == ""
+    assert float(rows["body centre"]["4 freedoms, one track [-]"]) == 0.0
     assert abs(found["2 freedoms, one track"]["tyre force front left"]) < 0.05
 
 
