@@ -1,0 +1,69 @@
+"""Where the spectator stands, and what a surface looks like from there."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from studies.pictures.raster import halved, paint
+from studies.pictures.shapes import Surface
+
+NEAREST = 0.05
+"""m: what is nearer to the eye, or behind it, is not drawn."""
+LIGHT = np.array([0.35, 0.5, 0.8])
+"""Towards the lamp: to the spectator's right, back to him, up."""
+DIM = 0.48
+"""Brightness of a surface that no lamp reaches."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """An eye that looks at a target (m), with the direction ``up``; opening : the picture's height in rad."""
+
+    eye: tuple[float, float, float]
+    target: tuple[float, float, float]
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    opening: float = 0.5
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Rows: to the right, up, back to the spectator."""
+        back = np.subtract(self.eye, self.target)
+        back /= np.linalg.norm(back)
+        right = np.cross(self.up, back)
+        right /= np.linalg.norm(right)
+        return np.array([right, np.cross(back, right), back])
+
+    def pixels(self, height: int) -> float:
+        """Pixels per metre at the target, in a picture of this height."""
+        return height / (2.0 * np.tan(self.opening / 2.0) * float(np.linalg.norm(np.subtract(self.eye, self.target))))
+
+    def seen(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+        """Pixels (..., 2) and inverse distances (...) of points (..., 3); not positive behind the eye."""
+        own = (points - self.eye) @ self.axes.T
+        near = -1.0 / own[..., 2]
+        scale = height / (2.0 * np.tan(self.opening / 2.0)) * near
+        return np.stack([width / 2.0 + scale * own[..., 0], height / 2.0 - scale * own[..., 1]], -1), near
+
+
+def picture(camera: Camera, layers: list[list[Surface]], width: int, height: int,
+            background: np.ndarray) -> np.ndarray:  # fmt: skip
+    """Image (h, w, 3) of surfaces; a later layer lies over all earlier ones, as arrows over bodies do."""
+    image = np.repeat(np.repeat(background, 2, 0), 2, 1) if background.ndim == 3 else (
+        np.broadcast_to(background, (2 * height, 2 * width, 3)).copy())
+    for layer in layers:
+        nearest = np.zeros(image.shape[:2])
+        for surface in (surface for surface in layer if surface.alpha == 1.0):
+            paint(*_shaded(camera, surface, width, height), image, nearest)
+        for surface in (surface for surface in layer if surface.alpha < 1.0):
+            veil, front = image.copy(), nearest.copy()
+            paint(*_shaded(camera, surface, width, height), veil, front)
+            image += surface.alpha * (veil - image)
+    return halved(image)
+
+
+def _shaded(camera: Camera, surface: Surface, width: int, height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    corners, near = camera.seen(surface.corners, 2 * width, 2 * height)
+    kept = ((near > 0.0) & (near < 1.0 / NEAREST)).all(axis=1)
+    towards = LIGHT @ camera.axes / np.linalg.norm(LIGHT)
+    light = DIM + (1.0 - DIM) * np.clip(surface.normals[kept] @ towards, 0.0, 1.0)
+    return corners[kept], near[kept], light[..., None] * np.array(surface.colour)

@@ -1,0 +1,116 @@
+"""Surfaces of simple bodies as triangles, in the body's own axes (m)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+Colour = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles (m, 3, 3) and the outward normals at their corners (m, 3, 3); colour from 0 to 1.
+
+    alpha : below 1, what lies behind shines through.
+    """
+
+    corners: np.ndarray
+    normals: np.ndarray
+    colour: Colour
+    alpha: float = 1.0
+
+    def moved(self, place: np.ndarray, turn: np.ndarray) -> "Surface":
+        """The surface after turning by ``turn`` (3, 3) and shifting by ``place`` (3,)."""
+        return replace(self, corners=self.corners @ turn.T + place, normals=self.normals @ turn.T)
+
+    def at(self, *place: float) -> "Surface":
+        """The surface shifted."""
+        return replace(self, corners=self.corners + np.array(place))
+
+
+def faceted(corners: np.ndarray, colour: Colour, alpha: float = 1.0) -> Surface:
+    """Triangles (m, 3, 3) with flat faces; counter-clockwise seen from outside."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals /= np.where(length > 0, length, 1.0)
+    return Surface(corners, np.repeat(normals[:, None], 3, axis=1), colour, alpha)
+
+
+def _patches(points: np.ndarray) -> np.ndarray:
+    """Triangles of a net of points (a, b, 3)."""
+    one, two, three, four = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
+    return np.concatenate([np.stack([one, two, three], 2).reshape(-1, 3, 3),
+                           np.stack([one, three, four], 2).reshape(-1, 3, 3)])  # fmt: skip
+
+
+def sheet(points: np.ndarray, colour: Colour, alpha: float = 1.0) -> Surface:
+    """A net of points (a, b, 3) with flat faces."""
+    return faceted(_patches(points), colour, alpha)
+
+
+def revolved(axial: Sequence[float], radii: Sequence[float], colour: Colour, alpha: float = 1.0,
+             pieces: int = 48) -> Surface:  # fmt: skip
+    """A line (axial, radii) turned about y, from left to right; round along, sharp at the line's corners."""
+    angles = np.linspace(0.0, 2.0 * np.pi, pieces + 1)
+    y, r = np.array(axial, float), np.array(radii, float)
+    ring = np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], 1)
+    net = r[:, None, None] * ring + np.stack([0 * y, y, 0 * y], 1)[:, None]
+    slopes = np.stack([np.diff(y), -np.diff(r)], 1)
+    slopes /= np.linalg.norm(slopes, axis=1, keepdims=True)
+    surfaces = [_band(net[i : i + 2], slope[0] * ring + [0.0, slope[1], 0.0]) for i, slope in enumerate(slopes)]
+    return Surface(*(np.concatenate(part) for part in zip(*surfaces, strict=True)), colour, alpha)
+
+
+def _band(net: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return _patches(net), _patches(np.stack([normals, normals]))
+
+
+def box(x: float, y: float, z: float, colour: Colour, alpha: float = 1.0) -> Surface:
+    """A box about the origin with these edges."""
+    half = np.array([x, y, z]) / 2.0
+    return extruded(np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half[[0, 2]], 2.0 * half[1], colour, alpha)
+
+
+def extruded(outline: np.ndarray, width: float, colour: Colour, alpha: float = 1.0) -> Surface:
+    """A convex outline (n, 2) in x and z, counter-clockwise from x to z, drawn out along y about the origin."""
+    front = np.insert(outline, 1, -width / 2.0, axis=1)
+    back = np.insert(outline, 1, width / 2.0, axis=1)
+    fan = [np.stack([np.repeat(side[:1], len(side) - 2, 0), side[first:][: len(side) - 2], side[second:][: len(side) - 2]], 1)
+           for side, first, second in ((front, 1, 2), (back, 2, 1))]  # fmt: skip
+    closed = np.stack([np.vstack([back, back[:1]]), np.vstack([front, front[:1]])])
+    return faceted(np.concatenate([*fan, _patches(closed)]), colour, alpha)
+
+
+def ball(radius: float, colour: Colour, alpha: float = 1.0) -> Surface:
+    """A sphere about the origin."""
+    angle = np.linspace(0.0, np.pi, 17)
+    found = revolved(-radius * np.cos(angle), radius * np.sin(angle), colour, alpha, 32)
+    return replace(found, normals=found.corners / radius)
+
+
+def between(tail: np.ndarray, head: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour,
+            alpha: float = 1.0) -> Surface:  # fmt: skip
+    """A revolved line whose axis runs from one point to another; ``axial`` counts from the tail (m)."""
+    along = (head - tail) / np.linalg.norm(head - tail)
+    aside = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+    aside /= np.linalg.norm(aside)
+    turn = np.column_stack([aside, along, np.cross(aside, along)])
+    return revolved(axial, radii, colour, alpha, 16).moved(tail, turn)
+
+
+def rod(tail: np.ndarray, head: np.ndarray, radius: float, colour: Colour) -> Surface:
+    """A round rod from one point to another."""
+    length = float(np.linalg.norm(head - tail))
+    return between(tail, head, np.array([0.0, 0.0, length, length]), radius * np.array([0.0, 1.0, 1.0, 0.0]), colour)
+
+
+def arrow(tail: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour) -> Surface | None:
+    """An arrow of exactly the vector's length (m); None where it is shorter than a tenth of its thickness."""
+    length = float(np.linalg.norm(vector))
+    if length < 0.1 * thickness:
+        return None
+    head = min(2.6 * thickness, length)
+    axial = np.array([0.0, 0.0, length - head, length - head, length])
+    radii = thickness * min(1.0, length / (2.6 * thickness)) * np.array([0.0, 0.35, 0.35, 1.0, 0.0])
+    return between(tail, tail + vector, axial, radii, colour)

@@ -1,0 +1,126 @@
+"""A wheelset that hunts on its rails: shapes, camera and the forces at its contacts."""
+
+import numpy as np
+
+from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
+from models.rail.equations import ROLL, YAW, Path, Y, Z
+from models.rail.joint_forces import JOINTS, to_joints
+from models.rail.wheel_forces import ANGLE, FX, FY, LOAD
+from models.rail.wheelset import CHOSEN, Wheelset
+from studies.pictures.camera import Camera
+from studies.pictures.film import Arrow, Kind, Motion, Stage
+from studies.pictures.poses import of_exudyn, of_mujoco
+from studies.pictures.shapes import Colour, Surface, box, extruded, revolved
+
+SPEED, SHIFT, CELLS, STEP = 45.0, 4e-3, 11, 5e-4
+"""Speed of travel (m/s), first lateral displacement (m), cells of FASTSIM, step (s)."""
+MAGNIFIED = 5.0
+SLEEPERS = 0.6
+"""m from one sleeper to the next."""
+STEEL: Colour = (0.62, 0.66, 0.71)
+DARK: Colour = (0.42, 0.45, 0.5)
+RAIL: Colour = (0.66, 0.56, 0.5)
+CONCRETE: Colour = (0.72, 0.71, 0.68)
+BALLAST: Colour = (0.56, 0.54, 0.51)
+KINDS = {"normal force": Kind((0.0, 0.62, 0.45), 9e-6, 5e4), "creep force": Kind((0.84, 0.2, 0.0), 5e-5, 1e4)}
+SIDES = {"right": RIGHT, "left": LEFT}
+
+
+def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[Motion]]:
+    """The stage, and the motion of each engine at the steps that are nearest to ``times`` (s)."""
+    return stage(CHOSEN), [_motion(engine, duration, times) for engine in engines]
+
+
+def _motion(engine: str, duration: float, times: np.ndarray) -> Motion:
+    from models.engines.wheelset_exudyn import ExudynWheelset
+    from models.engines.wheelset_mujoco import MujocoWheelset
+
+    own = {"exudyn": ExudynWheelset, "mujoco": MujocoWheelset}[engine](CHOSEN, SPEED, "fastsim", CELLS)
+    path = own.run(own.displaced(SHIFT), duration, STEP)
+    rows = np.rint(times / STEP).astype(int)
+    kept = Path(path.times[rows], path.states[rows], path.contacts[rows])
+    joints = to_joints(kept.states)[:, :JOINTS]
+    poses = _exudyn(own, joints) if engine == "exudyn" else of_mujoco(own.model, {"wheelset": 1}, joints)  # type: ignore[attr-defined]
+    return Motion(engine, kept.times, *poses, arrows(CHOSEN, kept))
+
+
+def _exudyn(own, joints):
+    """Poses by a marker in the middle of the axle: the last link of the first object."""
+    from models.engines.spatial_exudyn_build import items
+
+    mbs = own._system[0]
+    middle = mbs.AddMarker(items.MarkerKinematicTreeRigid(
+        objectNumber=0, linkNumber=JOINTS - 1, localPosition=[0.0, 0.0, 0.0]))  # fmt: skip
+    mbs.Assemble()
+    return of_exudyn(mbs, {"wheelset": middle}, joints)
+
+
+def arrows(wheelset: Wheelset, path: Path) -> tuple[Arrow, ...]:
+    """Normal force and creep force on the wheels where they touch, of the contacts of a path."""
+    found = []
+    for k, (name, side) in enumerate(SIDES.items()):
+        points = np.array([_place(wheelset, side, state) for state in path.states])
+        contact = path.contacts[:, k]
+        sine, cosine, none = np.sin(contact[:, ANGLE]), np.cos(contact[:, ANGLE]), 0.0 * contact[:, ANGLE]
+        normal = contact[:, LOAD, None] * np.stack([none, sine, -cosine], 1)
+        creep = np.stack([contact[:, FX], contact[:, FY] * cosine, contact[:, FY] * sine], 1)
+        found += [Arrow(f"normal force, {name}", "normal force", "wheelset", points, normal),
+                  Arrow(f"creep force, {name}", "creep force", "wheelset", points, creep)]  # fmt: skip
+    return tuple(found)
+
+
+def _place(w: Wheelset, side: float, state: np.ndarray) -> np.ndarray:
+    """Place of contact in the track's axes (m)."""
+    found = cone_on_rail(side, *state[[Y, Z, ROLL, YAW]], w.radius, w.half_gauge, w.conicity, w.head_radius)
+    return np.array(found[-3:]) + [0.0, state[Y], state[Z]]
+
+
+def stage(wheelset: Wheelset) -> Stage:
+    """Wheelset, rails and sleepers, seen from ahead and to the right; z down."""
+    camera = Camera((3.0, 1.75, -1.25), (0.0, 0.0, 0.06), (0.0, 0.0, -1.0), 0.56)
+    caption = f"displacements drawn {MAGNIFIED:g} times as large; forces on the wheels"
+    return Stage(f"Wheelset at {SPEED:g} m/s on straight rails", caption, {"wheelset": shapes(wheelset)},
+                 {"wheelset": (0.0, 0.0, 0.0)}, camera, KINDS, lambda time: track(wheelset, SPEED * time), MAGNIFIED,
+                 ("wheelset",))  # fmt: skip
+
+
+def shapes(w: Wheelset) -> list[Surface]:
+    """An axle and two wheels, whose treads are the cones of the model; flanges stand off as far as they are drawn to."""
+    found = [revolved([-w.half_spacing - 0.12, -w.half_spacing - 0.12, w.half_spacing + 0.12, w.half_spacing + 0.12],
+                      [0.0, 0.085, 0.085, 0.0], DARK)]  # fmt: skip
+    inner, outer = 0.036 + MAGNIFIED * w.flange_clearance + 0.004, 0.075
+    for side in (1.0, -1.0):
+        across = np.array([-inner - 0.03, -inner - 0.025, -inner, outer, outer, 0.02, 0.02, 0.05, 0.05])
+        radii = np.array([0.0, w.radius + 0.028, w.radius + w.conicity * inner, w.radius - w.conicity * outer, 0.39,
+                          0.37, 0.19, 0.16, 0.0])  # fmt: skip
+        across = w.half_gauge + across
+        if side < 0:
+            across, radii = -across[::-1], radii[::-1]
+        found.append(revolved(across, radii, STEEL, pieces=72))
+        spots = [box(0.05, 0.02, 0.05, DARK).at(0.28 * np.cos(a), side * (w.half_gauge + 0.012), 0.28 * np.sin(a))
+                 for a in np.arange(5) * 2.0 * np.pi / 5.0]  # fmt: skip
+        found += spots
+    return found
+
+
+def track(w: Wheelset, way: float) -> list[Surface]:
+    """Rails, sleepers and ballast after a way (m)."""
+    found = []
+    first, last, top = -2.6, 1.9, w.radius
+    for side in (1.0, -1.0):
+        y = side * w.half_gauge
+        head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])
+        for outline, colour in ((head, STEEL), (np.array([[-0.01, 0.05], [0.01, 0.05], [0.01, 0.15], [-0.01, 0.15]]), RAIL),
+                                (np.array([[-0.07, 0.15], [0.07, 0.15], [0.07, 0.17], [-0.07, 0.17]]), RAIL)):
+            found.append(_along(outline, last - first, colour).at((first + last) / 2.0, y, top))
+    phase = way % SLEEPERS
+    for i in range(int(np.ceil(first / SLEEPERS)), int(np.floor(last / SLEEPERS)) + 1):
+        found.append(box(0.24, 2.5, 0.1, CONCRETE).at(i * SLEEPERS - phase + 0.3, 0.0, top + 0.22))
+    found.append(box(9.0, 9.0, 0.02, BALLAST).at(-1.0, 0.0, top + 0.25))
+    return found
+
+
+def _along(outline: np.ndarray, length: float, colour: Colour) -> Surface:
+    """An outline (n, 2) in y and z drawn out along x."""
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    return extruded(outline, length, colour).moved(np.zeros(3), turn)
