@@ -29,7 +29,9 @@ class System:
 SYSTEMS = {
     DEFAULT: System("models.scene", "models.plan", ("reference", "exudyn", "mujoco")),
     "ride": System("models.ride.scene", "models.ride.plan", ("reference", "exudyn", "mujoco")),
+    "wheelset": System("models.rail.scene", "models.rail.plan", ("reference", "exudyn", "mujoco")),
     "contact": System("models.contact.scene", "models.contact.plan"),
+    "wheel-rail": System("models.rail.benchmark_scene", "models.rail.benchmark_plan"),
 }
 
 

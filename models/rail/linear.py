@@ -27,12 +27,21 @@ from models.contact.linear_theory import coefficients
 from models.errors import InputError
 from models.rail.wheelset import Wheelset
 
-LOWEST_SPEED, HIGHEST_SPEED = 1.0, 1000.0
+LOWEST_SPEED, HIGHEST_SPEED = 1.0, 200.0
 """Speeds (m/s) between which a critical one is looked for."""
 SPEEDS = 60
 """Speeds that are tried on the way from the lowest to the highest."""
 PRECISION = 1e-12
 """Relative, of a critical speed."""
+
+
+class NoCriticalSpeed(InputError):
+    """A wheelset without a speed at which it turns from stable to unstable; ``unstable`` says which it is."""
+
+    def __init__(self, unstable: bool) -> None:
+        self.unstable = unstable
+        super().__init__("", "wheelset", None, f"is unstable at {LOWEST_SPEED:g} m/s already: its suspension is too "
+                         "soft" if unstable else f"is stable up to {HIGHEST_SPEED:g} m/s: there is no critical speed")
 
 
 @dataclass(frozen=True)
@@ -123,15 +132,15 @@ def growth(wheelset: Wheelset, speed: float) -> float:
 def critical_speed(wheelset: Wheelset, growth: Callable[[Wheelset, float], float] = growth) -> float:
     """Lowest speed (m/s) at which a motion of the wheelset no longer decays.
 
-    growth : largest real part of the eigenvalues as a function of wheelset and speed. Raises InputError if the
+    growth : largest real part of the eigenvalues as a function of wheelset and speed. Raises NoCriticalSpeed if the
     wheelset is unstable at the lowest speed, or stable up to the highest one that is looked at.
     """
     speeds = np.geomspace(LOWEST_SPEED, HIGHEST_SPEED, SPEEDS)
     below = speeds[0]
     if growth(wheelset, below) >= 0.0:
-        raise InputError("", "wheelset", None, f"is unstable at {below:g} m/s already: its suspension is too soft")
+        raise NoCriticalSpeed(unstable=True)
     for speed in speeds[1:]:
         if growth(wheelset, speed) >= 0.0:
             return float(brentq(lambda v: growth(wheelset, v), below, speed, xtol=PRECISION * speed, rtol=PRECISION))
         below = speed
-    raise InputError("", "wheelset", None, f"is stable up to {HIGHEST_SPEED:g} m/s: there is no critical speed")
+    raise NoCriticalSpeed(unstable=False)

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
 from pydantic import Field
 
 from models.errors import InputError
@@ -12,6 +11,7 @@ from models.ride.speed_profile import SpeedProfile
 from models.road import TRACK_WIDTH
 from models.road.two_track import LEVEL, MEAN_CORNER, ROLL_CORNER
 from models.scene_file import SceneFile, checked
+from models.speeds import Speeds, check_speeds
 from models.strict import Strict, quantity
 
 LeftRight = Literal["modelled", "uncorrelated", "equal"]
@@ -49,19 +49,6 @@ class Road(Strict):
     wheels: Places = Field(default="own", description="each at its own y, or in the front wheels' tracks")
 
 
-class Speeds(Strict):
-    """[speeds]: constant ones, from start to stop, or the values of a list."""
-
-    start: float | None = quantity("m/s", "first speed", default=None)
-    stop: float | None = quantity("m/s", "last speed", default=None)
-    count: int = Field(default=25, ge=2, le=10_000, description="number of speeds")
-    values: list[float] = Field(default_factory=list, description="speeds in m/s instead")
-
-    def all(self) -> np.ndarray:
-        """All speeds, m/s."""
-        return np.array(self.values) if self.values else np.linspace(self.start, self.stop, self.count)  # type: ignore[arg-type]
-
-
 class Drive(Strict):
     """[drive]: a speed that varies, from point to point along straight lines."""
 
@@ -91,24 +78,11 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ri
     if (scene.speeds is None) == (scene.drive is None):
         raise InputError(file, "speeds", None, "give either the table speeds or the table drive, and not both")
     if scene.speeds is not None:
-        _check_speeds(file, scene.speeds)
+        check_speeds(file, scene.speeds)
     if scene.drive is not None:
         scene.drive.profile(file)
     _check_road(file, scene.road)
     return scene
-
-
-def _check_speeds(file: str, speeds: Speeds) -> None:
-    for i, value in enumerate(speeds.values):
-        if not (np.isfinite(value) and value > 0.0):
-            raise InputError(file, f"speeds.values.{i}", value, "must be above 0, in m/s: at standstill nothing moves")
-    for name in ("start", "stop", "count"):
-        if speeds.values and name in speeds.model_fields_set:
-            allowed = "is not read beside a list of speeds: drop one of them"
-            raise InputError(file, f"speeds.{name}", getattr(speeds, name), allowed)
-    for name in ("start", "stop"):
-        if not speeds.values and getattr(speeds, name) is None:
-            raise InputError(file, f"speeds.{name}", None, "is missing (m/s)")
 
 
 OF_FILE = ("track_width", "first", "last")

@@ -1,0 +1,66 @@
+"""From a scene to its wheelset, and to the equations of motion of each implementation."""
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from models.errors import InputError
+from models.rail.equations import Equations
+from models.rail.linear import NoCriticalSpeed, critical_speed
+from models.rail.scene import WheelsetScene
+from models.rail.wheelset import CHOSEN, Wheelset
+from models.scene_file import existing, parse
+
+SETS = {"chosen": CHOSEN}
+IMPLEMENTATIONS = {
+    "reference": "models.rail.equations.Equations",
+    "exudyn": "models.engines.wheelset_exudyn.ExudynWheelset",
+    "mujoco": "models.engines.wheelset_mujoco.MujocoWheelset",
+}
+BESIDE = (0.9, 1.1)
+"""Speeds of the paths by the critical one, where the scene names none."""
+
+
+def wheelset_of(scene: WheelsetScene) -> Wheelset:
+    """The wheelset with the scene's overrides; each value is judged under its own file's name."""
+    name, override = scene.wheelset.parameters, scene.wheelset.override
+    base = SETS.get(name)
+    if base is None and not name.endswith(".toml"):
+        allowed = "must be a TOML file with all parameters, or a parameter set"
+        raise InputError(scene.file, "wheelset.parameters", name, allowed, tuple(SETS))
+    if base is None:
+        path = existing(name, Path(scene.folder), scene.file, "wheelset.parameters")
+        base = _judged(parse(path), path.name, "")
+    values = {key: getattr(base, key) for key in Wheelset.model_fields}
+    return _judged(values | override, scene.file, "wheelset.override") if override else base
+
+
+def _judged(values: dict[str, Any], file: str, table: str) -> Wheelset:
+    """The wheelset of these values; a fault is told by file and table."""
+    try:
+        return Wheelset(**values)
+    except InputError as error:
+        place = ".".join(part for part in (table, error.place.partition(".")[2]) if part)
+        raise InputError(file, place, error.value, error.allowed) from None
+
+
+def implementation(engine: str) -> type[Equations]:
+    """The equations of motion of an implementation; its engine is imported here and not before."""
+    module, _, name = IMPLEMENTATIONS[engine].rpartition(".")
+    return getattr(import_module(module), name)
+
+
+def equations_of(scene: WheelsetScene, engine: str, speed: float) -> Equations:
+    """The scene's wheelset with its law of creep at a speed (m/s)."""
+    return implementation(engine)(wheelset_of(scene), speed, scene.contact.law, scene.contact.cells)
+
+
+def path_speeds(scene: WheelsetScene) -> list[float]:
+    """Speeds (m/s) of the paths: the scene's, or around the critical one, or the last speed where there is none."""
+    if scene.run.speeds:
+        return list(scene.run.speeds)
+    try:
+        critical = critical_speed(wheelset_of(scene))
+    except NoCriticalSpeed:
+        return [float(scene.speeds.all()[-1])]
+    return [round(share * critical, 2) for share in BESIDE]

@@ -1,0 +1,208 @@
+"""Periodic motion of a wheelset by shooting: limit cycles that attract, and those that only part two behaviours.
+
+An orbit begins where the lateral displacement is at its maximum, the amplitude. It is marched with a whole number of
+steps to the period, so that halving the step asks the same question again. Newton's method makes the state come back;
+besides state and period, either the amplitude or the speed is unknown. With a given amplitude, branches can be
+followed that stand upright over the speed or turn back.
+
+Floquet multipliers are those of the return map of the section without lateral rate: beyond 1 the orbit repels.
+"""
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from models.errors import RunFailed
+from models.rail.equations import ANGLE, STATES, Y_RATE, Equations, Path, Y
+from models.rail.linear import critical_speed
+
+Unknown = Literal["amplitude", "speed"]
+SIZES = np.array([1e-3, 1e-4, 1e-4, 1e-3, 1.0, 1e-2, 1e-2, 1e-2, 1e-2, 1.0])
+"""Of the states (m, rad, m/s, rad/s): what a difference of each is measured by."""
+CLOSED = 1e-9
+"""Largest difference of start and end, by SIZES, of a state that has come back."""
+SHIFT = 1e-3
+"""Of the sizes, of 1 m/s: steps of the central differences that linearise the return."""
+NEWTON, LEAST_GAIN = 15, 0.3
+"""Corrections at most; share of the difference that one may leave before the return is linearised anew."""
+HALVINGS = 5
+"""Of the way to the next amplitude, where Newton's method does not reach it at once."""
+RETURNS = [k for k in range(STATES) if k != ANGLE]
+"""States that must come back; the angle of spin does not."""
+SPEED, PERIOD = len(RETURNS), len(RETURNS) + 1
+"""Columns of the slopes after those of the states."""
+AMPLITUDE, RATE = RETURNS.index(Y), RETURNS.index(Y_RATE)
+STILL = [k for k in range(len(RETURNS)) if k != RATE]
+"""The section's coordinates."""
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """One periodic motion. state (10,) : at its maximum of y; period : s, of so many steps.
+
+    slopes (9, 11) : of the state after a period, the angle of spin left out, by the state before, the speed and the
+    period, by SIZES, 1 m/s and the period. error : change of the unknown by halving the step, frequency_error : Hz;
+    both NaN where it was not halved.
+    """
+
+    equations: Equations
+    state: np.ndarray
+    period: float
+    steps: int
+    slopes: np.ndarray
+    error: float = math.nan
+    frequency_error: float = math.nan
+
+    @property
+    def speed(self) -> float:
+        """m/s."""
+        return self.equations.speed
+
+    @property
+    def amplitude(self) -> float:
+        """Of the lateral displacement (m)."""
+        return float(self.state[Y])
+
+    @property
+    def frequency(self) -> float:
+        """Hz."""
+        return 1.0 / self.period
+
+    @property
+    def multiplier(self) -> float:
+        """Largest magnitude of the Floquet multipliers."""
+        by_states, back = self.slopes[:, : len(RETURNS)], self.slopes[:, PERIOD]
+        returned = by_states - np.outer(back, by_states[RATE]) / back[RATE]
+        return float(np.abs(np.linalg.eigvals(returned[np.ix_(STILL, STILL)])).max())
+
+    @property
+    def stable(self) -> bool:
+        """Whether neighbouring motions come nearer."""
+        return self.multiplier < 1.0
+
+    def path(self) -> Path:
+        """One period, start and end included."""
+        return self.equations.run(self.state, self.period, self.period / self.steps)
+
+
+def beginning(equations: Equations, amplitude: float, step: float) -> Orbit:
+    """The orbit of a small amplitude (m), from the motion that neither grows nor decays by the equations' own law.
+
+    step : s, about. Raises NoCriticalSpeed if there is no such motion, RunFailed if it leads to no orbit, as where the
+    amplitude is so small that cells of FASTSIM begin to slide one by one.
+    """
+    at = replace(equations, speed=critical_speed(equations.wheelset, lambda _, speed: growth_at(equations, speed)))
+    values, vectors = np.linalg.eig(at.state_matrix)
+    k = np.where(values.imag > 0.0, values.real, -math.inf).argmax()
+    state = at.rest.copy()
+    state[RETURNS] += amplitude * (vectors[:, k] / vectors[AMPLITUDE, k]).real
+    period = 2.0 * math.pi / values[k].imag
+    guess = Orbit(at, state, period, math.ceil(period / step), np.empty(0))
+    return solved(_linearised(guess), "speed")
+
+
+def growth_at(equations: Equations, speed: float) -> float:
+    """Largest real part (1/s) of the eigenvalues by these equations at another speed (m/s)."""
+    return float(np.linalg.eigvals(replace(equations, speed=speed).state_matrix).real.max())
+
+
+def branch(first: Orbit, amplitudes: Iterable[float]) -> Iterator[Orbit]:
+    """Orbits of one amplitude (m) after the other, each from the ones before; the speed of each is found.
+
+    Raises RunFailed where the branch cannot be followed.
+    """
+    before, last = first, first
+    for amplitude in amplitudes:
+        before, last = last, _onwards(before, last, amplitude, HALVINGS)
+        yield last
+
+
+def _onwards(before: Orbit, last: Orbit, amplitude: float, halvings: int) -> Orbit:
+    """The orbit of an amplitude along the straight line through two orbits, in smaller steps if need be."""
+    way = last.amplitude - before.amplitude
+    share = (amplitude - last.amplitude) / way if way else 0.0
+    state = last.state + share * (last.state - before.state)
+    state[Y] = amplitude
+    ahead = replace(last.equations, speed=last.speed + share * (last.speed - before.speed))
+    guess = replace(last, equations=ahead, state=state, period=last.period + share * (last.period - before.period))
+    try:
+        return solved(guess, "speed")
+    except RunFailed:
+        if halvings == 0:
+            raise
+    middle = _onwards(before, last, (last.amplitude + amplitude) / 2.0, halvings - 1)
+    return _onwards(last, middle, amplitude, halvings - 1)
+
+
+def solved(guess: Orbit, unknown: Unknown, *, precise: bool = True) -> Orbit:
+    """The orbit near a guess, with the speed or the amplitude of the guess, and its slopes if it is to be precise.
+
+    The slopes of the guess lead there as long as they do; what is asked of the orbit is that it comes back.
+    Raises RunFailed if none is found.
+    """
+    orbit, own, left = guess, False, math.inf
+    for _ in range(NEWTON):
+        missed = _missed(orbit)
+        size = float(np.abs(missed).max())
+        if size < CLOSED:
+            return orbit if own or not precise else _linearised(orbit)
+        if not own and size > LEAST_GAIN * left:
+            orbit, own = _linearised(orbit), True
+        orbit, left, own = _corrected(orbit, missed, unknown), size, False
+    raise RunFailed("wheelset", f"no periodic motion was found near {orbit.speed:.6g} m/s and {orbit.amplitude:.3g} m")
+
+
+def refined(orbit: Orbit, unknown: Unknown) -> Orbit:
+    """The orbit at half the step, with the changes that halving made."""
+    half = solved(replace(orbit, steps=2 * orbit.steps), unknown, precise=False)
+    return replace(half, error=abs(getattr(half, unknown) - getattr(orbit, unknown)),
+                   frequency_error=abs(half.frequency - orbit.frequency))  # fmt: skip
+
+
+def _end(equations: Equations, state: np.ndarray, period: float, steps: int) -> np.ndarray:
+    return equations.run(state, period, period / steps, steps).states[-1]
+
+
+def _missed(orbit: Orbit) -> np.ndarray:
+    """Difference (9,) of end and start by SIZES."""
+    end = _end(orbit.equations, orbit.state, orbit.period, orbit.steps)
+    return ((end - orbit.state) / SIZES)[RETURNS]
+
+
+def _linearised(orbit: Orbit) -> Orbit:
+    """The orbit with its own slopes."""
+    eq, T, n = orbit.equations, orbit.period, orbit.steps
+
+    def difference(ends: list[np.ndarray], shift: float) -> np.ndarray:
+        return ((ends[1] - ends[0]) / (2.0 * shift * SIZES))[RETURNS]
+
+    columns = []
+    for k in RETURNS:
+        moved = SHIFT * SIZES[k] * np.eye(STATES)[k]
+        columns.append(difference([_end(eq, orbit.state + sign * moved, T, n) for sign in (-1.0, 1.0)], SHIFT))
+    speeds = [replace(eq, speed=eq.speed + sign * SHIFT) for sign in (-1.0, 1.0)]
+    columns.append(difference([_end(one, orbit.state, T, n) for one in speeds], SHIFT))
+    columns.append(difference([_end(eq, orbit.state, T * (1.0 + sign * SHIFT), n) for sign in (-1.0, 1.0)], SHIFT))
+    return replace(orbit, slopes=np.array(columns).T)
+
+
+def _corrected(orbit: Orbit, missed: np.ndarray, unknown: Unknown) -> Orbit:
+    """One correction by the slopes; the lateral rate stays zero."""
+    returned = orbit.slopes.copy()
+    returned[:, : len(RETURNS)] -= np.eye(len(RETURNS))
+    free = [k for k in STILL if k != AMPLITUDE]
+    columns = [*free, AMPLITUDE if unknown == "amplitude" else SPEED, PERIOD]
+    found = -np.linalg.solve(returned[:, columns], missed)
+    state = orbit.state.copy()
+    places = [RETURNS[k] for k in free]
+    state[places] += found[:-2] * SIZES[places]
+    speed = orbit.speed
+    if unknown == "amplitude":
+        state[Y] += found[-2] * SIZES[Y]
+    else:
+        speed += found[-2]
+    period = orbit.period * (1.0 + found[-1])
+    return replace(orbit, equations=replace(orbit.equations, speed=speed), state=state, period=period)

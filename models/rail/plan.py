@@ -1,0 +1,86 @@
+"""What a scene of a wheelset will compute: printed by ``twinrig show``, checked before any run."""
+
+from models.errors import InputError
+from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
+from models.rail.of_scene import equations_of, path_speeds, wheelset_of
+from models.rail.scene import WheelsetScene
+from models.rail.wheelset import Wheelset
+
+LAWS = {"linear": "Kalker's linear theory, without bound", "fastsim": "FASTSIM, {} cells along each strip"}
+
+
+def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
+    """Refuse, before any file is written, what reading alone does not find: a wheelset or a step that cannot be."""
+    wheelset_of(scene)
+    for speed in path_speeds(scene):
+        equations = equations_of(scene, "reference", speed)
+        try:
+            equations.run(equations.rest, scene.run.step, scene.run.step)
+        except InputError as error:
+            raise InputError(scene.file, "run.step", scene.run.step, f"{error.allowed} at {speed:g} m/s") from None
+
+
+def describe(scene: WheelsetScene) -> str:
+    """The scene's plan as text: wheelset, contact, suspension, speeds, and what is built in which engine."""
+    wheelset, own = wheelset_of(scene), scene.wheelset
+    changed = ", ".join(f"{name} = {value:g}" for name, value in own.override.items())
+    ellipse, run, speeds = wheelset.ellipse, scene.run, scene.speeds.all()
+    lines = [
+        scene.title, _line("scene", f"{scene.file}, study {scene.study}"),
+        _line("wheelset", own.parameters + (f", but {changed}" if changed else "")),
+        _line("", f"{wheelset.mass:g} kg, {wheelset.load:g} N on both rails, 5 freedoms: lateral, vertical, roll, yaw, "
+                  "spin"),
+        _line("wheels", f"cones of conicity {wheelset.conicity:g}, radius {wheelset.radius:g} m, on heads of radius "
+                        f"{wheelset.head_radius:g} m"),
+        _line("contact", f"{LAWS[scene.contact.law].format(scene.contact.cells)}; at rest a = {1e3 * ellipse.a:.3g} "
+                         f"mm, b = {1e3 * ellipse.b:.3g} mm; friction {wheelset.friction:g}"),
+        _line("flange", f"after {1e3 * wheelset.flange_clearance:g} mm, {wheelset.flange_stiffness:g} N/m"),
+        _line("held by", _suspension(wheelset)),
+        _line("Klingel", f"wavelength {klingel(wheelset):.5g} m"), _line("critical", _critical(wheelset)),
+        _line("speeds", f"{len(speeds)} from {speeds.min():g} to {speeds.max():g} m/s"),
+        _line("paths", f"at {' and '.join(f'{speed:g}' for speed in path_speeds(scene))} m/s, {run.duration:g} s in "
+                       f"steps of {run.step:g} s, from {1e3 * run.displacement:g} mm and {run.yaw:g} rad"),
+    ]  # fmt: skip
+    return "\n".join([*lines, _line("absent", ", ".join(absent(scene, wheelset)) + " (not computed)"), "",
+                      *ENGINES])  # fmt: skip
+
+
+def absent(scene: WheelsetScene, wheelset: Wheelset) -> list[str]:
+    """What the scene or its wheelset does not name."""
+    present = {
+        "FASTSIM": scene.contact.law == "fastsim",
+        "springs": bool(wheelset.stiffness_x or wheelset.stiffness_y or wheelset.stiffness_z),
+        "dampers": bool(wheelset.damping_x or wheelset.damping_y or wheelset.damping_z),
+        "friction": wheelset.friction > 0.0, "flange": wheelset.flange_stiffness > 0.0,
+        "damping of the contact": wheelset.contact_damping > 0.0, "irregularities of the track": False,
+    }  # fmt: skip
+    return [name for name, there in present.items() if not there]
+
+
+def _line(head: str, text: str) -> str:
+    return f"  {head:<10} {text}"
+
+
+def _suspension(wheelset: Wheelset) -> str:
+    """Springs and dampers of one side along each axis, in words."""
+    w = wheelset
+    parts = [f"{axis} {spring:g} N/m and {damper:g} N s/m"
+             for axis, spring, damper in zip("xyz", (w.stiffness_x, w.stiffness_y, w.stiffness_z),
+                                             (w.damping_x, w.damping_y, w.damping_z), strict=True)
+             if spring or damper]  # fmt: skip
+    return f"on each side, {w.half_spacing:g} m from the middle: {', '.join(parts)}" if parts else "nothing: it is free"
+
+
+def _critical(wheelset: Wheelset) -> str:
+    try:
+        return f"{critical_speed(wheelset):.5g} m/s by the linear theory of two motions"
+    except NoCriticalSpeed as error:
+        return f"none: the wheelset {error.allowed}"
+
+
+ENGINES = (
+    "  reference  the equations written out, compiled, RK4",
+    "  exudyn     a kinematic tree of 5 links, native springs and dampers, both rails by one user function, RK44",
+    "  mujoco     one body of 5 joints, springs and dampers as actuators, both rails by one native callback, RK4",
+)
+"""What each implementation builds."""
