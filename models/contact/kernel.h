@@ -40,6 +40,8 @@ typedef struct {
   double stick;    /* share of the area that sticks */
 } twinrig_out;
 
-/* net: the table of cells that comes with the function; it must not be changed. */
+/* net: the table of cells that comes with the function, or that of the undeformed distance of bodies whose contact is no
+   ellipse (by approach only; shape_x and shape_y are not read, a and b are half the lengths of the patch). It must not
+   be changed. */
 typedef int32_t (*twinrig_contact)(int32_t given, const double *net, const twinrig_in *in, twinrig_out *out);
 #endif

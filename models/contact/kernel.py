@@ -5,7 +5,9 @@ blended flexibilities and the intermediate bound (``fastsim``), to the last digi
 they refuse by an exception is refused here by a status, and every result is then not a number.
 
 The net of cells is a table of doubles that ``net`` makes for a number of cells, good for ellipses of every shape. That
-of zero cells stands for the linear theory: forces of small creepages, which no friction limits.
+of zero cells stands for the linear theory: forces of small creepages, which no friction limits. In the place of a net
+stands the ``table`` of an undeformed distance (``kernel_simplified``) where the contact is no ellipse: Kalker's theory
+of 1983, by the approach alone; A and B are not read, a and b come out as half the lengths of the patch.
 """
 
 import math
@@ -37,6 +39,12 @@ from models.contact.fastsim_many import (
 )
 from models.contact.hertz import FLATTEST, LARGEST_AXIS, LEAST_AXIS, aspect, integrals
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN, NOTHING, Array
+from models.contact.kernel_simplified import FOUND, HALF_X, HALF_Y, roll_on
+from models.contact.kernel_simplified import FX as ROLLED_X
+from models.contact.kernel_simplified import FY as ROLLED_Y
+from models.contact.kernel_simplified import LOAD as CARRIED
+from models.contact.kernel_simplified import MZ as TURNED
+from models.contact.kernel_simplified import STICK as STUCK
 from models.contact.linear_theory import LARGEST_PATCH, coefficient_at, flexibilities_at
 from models.contact.stack import beyond, doubles
 from models.errors import InputError
@@ -80,14 +88,17 @@ def net(cells: int) -> Array:
 def contact(given, inputs, table, outputs):
     """Status of one contact, FINE or another; fills ``outputs``.
 
-    given : BY_LOAD or another; inputs : pointer to INPUTS doubles; table : pointer to a ``net``; outputs : pointer to
-    OUTPUTS doubles. A load or an approach of zero or less has zeros all over.
+    given : BY_LOAD or another; inputs : pointer to INPUTS doubles; table : pointer to a ``net`` or to the table of
+    a distance; outputs : pointer to OUTPUTS doubles. A load or an approach of zero or less has zeros all over.
     """
     own, out = carray(inputs, (INPUTS,)), carray(outputs, (OUTPUTS,))
-    status = _status(given, own)
+    any_shape = carray(table, (1,))[_CELLS] < 0.0
+    status = _status(given, own, any_shape)
     out[:] = 0.0 if status == FINE else math.nan
-    if status != FINE or own[PRESSING] <= 0.0:
+    if status != FINE or (own[PRESSING] <= 0.0 and not any_shape):
         return status
+    if any_shape:
+        return _simplified(own, table, out)
     if not _press(given, own, out):
         out[:] = math.nan
         return NOT_PLAUSIBLE
@@ -99,16 +110,18 @@ def contact(given, inputs, table, outputs):
 
 
 @njit(cache=True, error_model="numpy")
-def _status(given, own):
+def _status(given, own, any_shape):
     """Whether the inputs are numbers, and numbers in SI."""
-    if not BY_LOAD <= given <= AXES_BY_APPROACH:
+    if not BY_LOAD <= given <= AXES_BY_APPROACH or (any_shape and given != BY_APPROACH):
         return NOT_KNOWN
     for value in own:
         if not math.isfinite(value):
             return NOT_FINITE
     most = LARGEST_LOAD if given in (BY_LOAD, AXES_BY_LOAD) else LARGEST_APPROACH
     small, large = min(own[SHAPE_X], own[SHAPE_Y]), max(own[SHAPE_X], own[SHAPE_Y])
-    if given in (BY_LOAD, BY_APPROACH):
+    if any_shape:
+        shaped = True
+    elif given in (BY_LOAD, BY_APPROACH):
         shaped = small > 0.0 and FLATTEST <= large <= LARGEST_CURVATURE
     else:  # without a load the axes may be none
         shaped = (small >= LEAST_AXIS or own[PRESSING] <= 0.0) and small >= 0.0 and large <= LARGEST_AXIS
@@ -148,6 +161,20 @@ def _press(given, own, out):
     out[APPROACH] = 1.5 * load / (math.pi * short * long) * short * whole / elastic
     rolls = short >= LEAST_AXIS and long <= SLENDEREST * short and short * long <= LARGEST_PATCH**2
     return rolls and load <= LARGEST_LOAD
+
+
+@njit(cache=True, error_model="numpy")
+def _simplified(own, table, out):
+    """Status of a contact of any shape, and its forces."""
+    found = carray(doubles(FOUND), (FOUND,))
+    if not roll_on(table, own[PRESSING], own[FRICTION], own[CREEP_X], own[CREEP_Y], own[TURNING], own[MODULUS],
+                   own[POISSON], found):  # fmt: skip
+        out[:] = math.nan
+        return NOT_PLAUSIBLE
+    out[FX], out[FY], out[MZ], out[STICK] = found[ROLLED_X], found[ROLLED_Y], found[TURNED], found[STUCK]
+    out[AXIS_A], out[AXIS_B], out[NORMAL] = found[HALF_X], found[HALF_Y], found[CARRIED]
+    out[APPROACH] = own[PRESSING] if found[CARRIED] > 0.0 else 0.0
+    return FINE
 
 
 @njit(cache=True, error_model="numpy")

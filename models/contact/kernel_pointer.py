@@ -5,9 +5,9 @@ structures and the status are in ``kernel.h`` beside this file, a program that u
 
     int32_t twinrig_contact(int32_t given, const double *net, const twinrig_in *in, twinrig_out *out);
 
-The function allocates nothing, takes no lock, holds nothing between two calls and enters Python nowhere, so that any
-number of threads may call it at once. The pointers last as long as the object that ``pointer`` returns. Axes, signs
-and units are those of ``models.contact``.
+The function takes no lock, holds nothing between two calls and enters Python nowhere, so that any number of threads may
+call it at once; on an ellipse it allocates nothing either. The pointers last as long as the object that ``pointer``
+returns. Axes, signs and units are those of ``models.contact``.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,9 @@ from numba import cfunc, types
 
 from models.contact.inputs import Array
 from models.contact.kernel import contact, net
+from models.contact.kernel_simplified import table
 from models.contact.stack import DOUBLES
+from models.contact.undeformed_distance import Distance
 
 SIGNATURE = types.int32(types.int32, DOUBLES, DOUBLES, DOUBLES)
 HEADER = Path(__file__).with_name("kernel.h")
@@ -40,10 +42,14 @@ class Pointer:
         return int(self.net.ctypes.data)
 
 
-def pointer(cells: int = 21) -> Pointer:
-    """The kernel and the table for ``cells`` per strip; 0 for the linear theory. Raises InputError."""
+def pointer(cells: int = 21, distance: Distance | None = None) -> Pointer:
+    """The kernel and the table for ``cells`` per strip; 0 for the linear theory. Raises InputError.
+
+    distance : of bodies whose contact is no ellipse; then the table is theirs, for Kalker's theory of 1983.
+    """
     compiled = _compiled()
-    return Pointer(int(compiled.address), net(cells), compiled.ctypes)
+    found = net(cells) if distance is None else table(distance, cells)
+    return Pointer(int(compiled.address), found, compiled.ctypes)
 
 
 @cache

@@ -57,7 +57,7 @@ class Patch:
         return float(min((side for side, cut in zip(sides, self.cut, strict=True) if not cut), default=np.inf))
 
     @cached_property
-    def _tables(self) -> tuple[Table, Table]:
+    def lines(self) -> tuple[Table, Table]:
         """Lines along x and along y with the root of the least height above the bottom, linear for a parabola."""
         return tuple(_rooted(valley[0], valley[1], at, self.low) for valley, at in
                      ((self.distance.valley_x, self.bottom[0]), (self.distance.valley_y, self.bottom[1])))  # type: ignore[return-value]  # fmt: skip
@@ -75,7 +75,7 @@ class Patch:
             raise InputError("", "distance", None, f"contact at a depth of {depth:.3g} m reaches the edge of the area "
                              "over which the undeformed distance is known: give a larger area")  # fmt: skip
         root = np.sqrt(max(depth - self.low, 0.0))
-        (x, rx), (y, ry) = self._tables
+        (x, rx), (y, ry) = self.lines
         return (*sides(x, rx, self.bottom[0], root), *sides(y, ry, self.bottom[1], root))
 
 

@@ -18,7 +18,7 @@ LEAST = 0.2
 bottom leaves the fit undefined, and this bound keeps it positive."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def overlap_pressure(depth, height, low, shape):
     """W times the pressure at a height: depth - height, or the root that has the same value at the bottom."""
     over = depth - height
@@ -27,7 +27,7 @@ def overlap_pressure(depth, height, low, shape):
     return over if shape == PARABOLIC else math.sqrt(over * (depth - low))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def crude_net(padded, origin, step, box, depth, low, cells, shape):
     """Height, W p and covered share of every mesh (cells, cells), rows along y.
 
@@ -47,7 +47,7 @@ def crude_net(padded, origin, step, box, depth, low, cells, shape):
     return height, pressure, cover
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def resultant(padded, origin, step, box, depth, low, points, shape):
     """Sum of W p dA over the box from points x points midpoints."""
     total = 0.0
@@ -60,7 +60,7 @@ def resultant(padded, origin, step, box, depth, low, points, shape):
     return total * dx * dy
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def corner(x, y):
     """Integral of 1/r over the rectangle from the origin to (x, y), signed (Boussinesq; Johnson, section 3.3)."""
     along = x * math.asinh(y / abs(x)) if x != 0.0 else 0.0
@@ -68,7 +68,7 @@ def corner(x, y):
     return along + across
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def displacement(pressure, dx, dy, modulus):
     """Normal displacement (m) at the meshes' centres by a pressure (Pa) on each mesh, both bodies together."""
     cells = pressure.shape[0]
@@ -93,7 +93,7 @@ def displacement(pressure, dx, dy, modulus):
     return found / (math.pi * modulus)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def covariances(u, h, cover):
     """Mean of u, covariance of u and h and variance of u, weighted by the covered shares (the last two not divided)."""
     mean_u, mean_h = weighted_mean(u, cover), weighted_mean(h, cover)
@@ -105,7 +105,7 @@ def covariances(u, h, cover):
     return mean_u, both, square
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def weighted_mean(values, weights):
     """Mean of values with weights of the same shape; loops compile in a tenth of an array expression's time."""
     total = weight = 0.0
@@ -115,7 +115,7 @@ def weighted_mean(values, weights):
     return total / weight
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def slope_products(u, h, cover, dx, dy, along_y):
     """Weighted sums of the products of the slopes of u and h and of the squares of those of u, between meshes."""
     product = square = 0.0
@@ -134,7 +134,7 @@ def slope_products(u, h, cover, dx, dy, along_y):
     return product, square
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def crude_fit(padded, origin, step, box, depth, low, cells, shape, kind, modulus):
     """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA of one patch at a depth.
 
@@ -153,7 +153,56 @@ def crude_fit(padded, origin, step, box, depth, low, cells, shape, kind, modulus
     return stiffness, approach, total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def tangential(traction, dx, dy, nu):
+    """Displacement (2, cells, cells) at the meshes' centres by a traction (2, cells, cells), times pi G (Cerruti)."""
+    cells = traction.shape[1]
+    corners = np.empty((3, cells + 1, cells + 1))  # integrals of y^2/r^3, x^2/r^3 and xy/r^3 from the origin
+    for j in range(cells + 1):
+        y = (j - 0.5) * dy
+        for i in range(cells + 1):
+            x = (i - 0.5) * dx
+            corners[0, j, i], corners[1, j, i] = x * math.asinh(y / abs(x)), y * math.asinh(x / abs(y))
+            corners[2, j, i] = -math.hypot(x, y)
+    influence = np.empty((3, cells, 2 * cells - 1))  # along x, along y, across; by rows apart and columns as above
+    for j in range(cells):
+        for i in range(2 * cells - 1):
+            k = abs(i - cells + 1)
+            whole = corners[:, j + 1, k + 1] - corners[:, j + 1, k] - corners[:, j, k + 1] + corners[:, j, k]
+            influence[0, j, i] = (1.0 - nu) * whole[0] + whole[1]
+            influence[1, j, i] = whole[0] + (1.0 - nu) * whole[1]
+            influence[2, j, i] = nu * whole[2] if i >= cells - 1 else -nu * whole[2]
+    found = np.zeros((2, cells, cells))
+    for row in range(cells):
+        for column in range(cells):
+            px, py = traction[0, row, column], traction[1, row, column]
+            for j in range(cells):
+                k, first, side = abs(j - row), cells - 1 - column, 1.0 if j >= row else -1.0
+                for i in range(cells):
+                    across = side * influence[2, k, first + i]
+                    found[0, j, i] += influence[0, k, first + i] * px + across * py
+                    found[1, j, i] += across * px + influence[1, k, first + i] * py
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def tangential_fit(u, traction, cover, dx, dy, kind):
+    """W_1 = W_2 (m/Pa) by least squares of u = W p + a, both (2, cells, cells); 0 where none can be fitted.
+
+    Of both directions together, weighted by the covered shares; by DISPLACEMENT or by GRADIENT along x.
+    """
+    both = square = 0.0
+    for k in range(2):
+        if kind == GRADIENT:
+            one, two = slope_products(traction[k], u[k], cover, dx, dy, False)
+        else:
+            _, one, two = covariances(traction[k], u[k], cover)
+        both += one
+        square += two
+    return both / square if square > 0.0 and both > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
 def push(x, y, force, at_x, at_y):
     """Sum of force / r at points: times 1 / (pi E*) the normal displacement by loads (N) of another patch.
 
@@ -167,7 +216,7 @@ def push(x, y, force, at_x, at_y):
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def drag(x, y, force, at_x, at_y, nu):
     """The same of tangential loads (2, n), times 1 / (pi G), (2, points) (Cerruti; Johnson, section 3.6)."""
     found = np.zeros((2, at_x.size))
@@ -181,7 +230,7 @@ def drag(x, y, force, at_x, at_y, nu):
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def strips(padded, origin, step, box, depth, low, rows, cells, shape):
     """Strips of the fine net: y, low and high end in x (s,), and W p in the cells from the leading edge back (s, n).
 
@@ -219,7 +268,7 @@ def strips(padded, origin, step, box, depth, low, rows, cells, shape):
     return y[:count].copy(), low_x[:count].copy(), high_x[:count].copy(), pressure
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def crossing(row, depth, inner, outer):
     """Where the row passes the depth between a point below and a point not below it: false position, Illinois' rule."""
     at_inner, at_outer = along(row, inner) - depth, along(row, outer) - depth
@@ -240,7 +289,7 @@ def crossing(row, depth, inner, outer):
     return middle
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def march(y, low_x, high_x, width, pressure, mu, flexibility, xi_x, xi_y, spin, traction):
     """FASTSIM along strips with the pressure p of every cell; fills the tractions (s, n, 2).
 
@@ -270,7 +319,7 @@ def march(y, low_x, high_x, width, pressure, mu, flexibility, xi_x, xi_y, spin, 
     return fx, fy, mz, stuck, area
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def step_on(px, py, u, v, bound, middle, slips):
     """Traction after a step in which the rigid slip would take (u, v) from it, and whether it slips.
 
@@ -293,7 +342,7 @@ def step_on(px, py, u, v, bound, middle, slips):
     return bound * x / size, bound * y / size, True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def gather(y, low_x, high_x, width, traction, box, cells):
     """Mean tractions (2, cells, cells) of the crude meshes: every cell's share by its overlap with the mesh."""
     found = np.zeros((2, cells, cells))

@@ -37,7 +37,6 @@ import numpy as np
 from scipy.optimize import brentq
 
 from models.contact.fields import Fields
-from models.contact.half_space import Convolution, influence, offsets
 from models.contact.inputs import creepages, number, whole_number
 from models.contact.material import Pair
 from models.contact.patches import NO_DEPTH, Box, Patch, no_bottom, separate, whole
@@ -51,6 +50,8 @@ from models.contact.simplified_kernels import (
     gather,
     march,
     strips,
+    tangential,
+    tangential_fit,
 )
 from models.contact.undeformed_distance import Distance
 from models.errors import InputError
@@ -311,28 +312,12 @@ def _refitted(pressed: NormalContact, tractions: list[np.ndarray]) -> list[float
     """
     options, pair = pressed.options, pressed.pair
     nets = [crude(part.patch, part.depth, options.net, PARABOLIC) for part in pressed.patches]
-    measured, found = _slopes if options.fit == "gradient" else _spread, []
+    found = []
     for k, (part, net, traction) in enumerate(zip(pressed.patches, nets, tractions, strict=True)):
-        dx, dy = net.step
-        kernel = influence(offsets(options.net, dx), offsets(options.net, dy)[:, None], dx, dy, pair)[..., :2, :2]
-        u = np.moveaxis(Convolution(kernel)(np.moveaxis(traction, 0, -1)), -1, 0) + dragged(nets, tractions, k, pair)
-        both, square = measured(u, traction, net.cover)
-        found.append(both / square if square > 0.0 and both > 0.0 else 1.0 / part.stiffness)
+        u = tangential(traction, *net.step, pair.nu) / (np.pi * pair.G) + dragged(nets, tractions, k, pair)
+        fitted = float(tangential_fit(u, traction, net.cover, *net.step, FITS[options.fit]))
+        found.append(fitted if fitted > 0.0 else 1.0 / part.stiffness)
     return found
-
-
-def _spread(u: np.ndarray, p: np.ndarray, cover: np.ndarray) -> tuple[float, float]:
-    """Covariance of u and p and variance of p, both directions together, weighted by the covered shares."""
-    share = cover / cover.sum()
-    du, dp = (f - (share * f).sum(axis=(1, 2), keepdims=True) for f in (u, p))
-    return float((share * du * dp).sum()), float((share * dp * dp).sum())
-
-
-def _slopes(u: np.ndarray, p: np.ndarray, cover: np.ndarray) -> tuple[float, float]:
-    """The same of the changes along x, from mesh to mesh."""
-    share = cover[:, 1:] * cover[:, :-1]
-    du, dp = np.diff(u, axis=2), np.diff(p, axis=2)
-    return float((share * du * dp).sum()), float((share * dp * dp).sum())
 
 
 def _fields(fine: tuple[Any, ...], traction: np.ndarray, friction: float) -> Fields:

@@ -1,0 +1,173 @@
+"""Kalker's theory of 1983 (``simplified_theory``) for compiled callers: one patch of any shape, at its approach.
+
+The undeformed distance and the way the theory is used are a table of doubles that ``table`` makes. The kernel finds
+the depth that has the approach, marches, fits W_1 = W_2 and marches again, by the compiled parts of the package: its
+numbers are those of ``press`` and ``roll``. Nothing is raised. The work arrays, some ten kilobytes, are taken from the
+heap and given back within the call, which is a hundredth of its time; no lock, nothing kept, any number of threads.
+"""
+
+import math
+
+import numpy as np
+from numba import carray
+
+from models.compiled import njit
+from models.contact.distance_kernels import sides
+from models.contact.inputs import Array, whole_number
+from models.contact.patches import Patch, separate
+from models.contact.simplified_kernels import (
+    PARABOLIC,
+    crude_fit,
+    crude_net,
+    gather,
+    march,
+    strips,
+    tangential,
+    tangential_fit,
+)
+from models.contact.simplified_theory import ABOUT, FITS, LEAST_CELLS, PLAIN, SHAPES, Options
+from models.contact.stack import beyond
+from models.contact.undeformed_distance import Distance
+from models.errors import InputError
+
+_CELLS, _NET, _SHAPE, _FIT, _LOW, _EDGE, _X, _Y, _DX, _DY, _BOTTOM_X, _BOTTOM_Y = range(12)
+_LINES_X, _LINES_Y, _ROWS, _COLUMNS, _HEAD = range(12, 17)
+"""Places in the table: minus the cells; net, shape and fit; least distance and depth at which a side is reached (m);
+first node, spacing and bottom along x and y (m); lengths. Then lines and roots along x and y, and padded heights."""
+MOST_CELLS = 200
+SETTLED = 1e-12
+"""Share of the approach, from first touch on, to which the depth settles."""
+TRIES = 100
+LOAD, FX, FY, MZ, STICK, HALF_X, HALF_Y = range(7)
+"""What ``roll_on`` finds: N, N, N, N m, share of the area, half the lengths of the patch's box (m)."""
+FOUND = 7
+
+
+def table(distance: Distance, cells: int = 21, options: Options = PLAIN) -> Array:
+    """Table for an undeformed distance of one valley; its first number is below zero. Not to be changed.
+
+    cells : strips of the fine net, and cells in each, 3 to 200. Raises InputError, also for several valleys.
+    """
+    cells = whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
+    patches = separate(distance) if options.separate else [Patch(distance)]
+    if len(patches) > 1:
+        raise InputError("", "distance", None, f"has {len(patches)} valleys: the compiled theory takes one patch")
+    (patch,) = patches
+    (x, root_x), (y, root_y) = patch.lines
+    head = [-cells, options.net, SHAPES[options.shape], FITS[options.fit], patch.low, patch.edge, distance.x[0],
+            distance.y[0], distance.dx, distance.dy, *patch.bottom[:2],
+            x.size, y.size, *distance.padded.shape]  # fmt: skip
+    made = np.concatenate((head, x, root_x, y, root_y, distance.padded.ravel()), dtype=float)
+    made.setflags(write=False)
+    return made
+
+
+@njit(cache=True, error_model="numpy")
+def box_at(numbers, head, depth):
+    """Rectangle x0, x1, y0, y1 (m) about {h < depth}, as ``Patch.box`` has it."""
+    m, n = int(head[_LINES_X]), int(head[_LINES_Y])
+    x = carray(beyond(numbers, _HEAD), (2, m))
+    y = carray(beyond(numbers, _HEAD + 2 * m), (2, n))
+    root = math.sqrt(max(depth - head[_LOW], 0.0))
+    x0, x1 = sides(x[0], x[1], head[_BOTTOM_X], root)
+    y0, y1 = sides(y[0], y[1], head[_BOTTOM_Y], root)
+    return x0, x1, y0, y1
+
+
+@njit(cache=True, error_model="numpy")
+def fit_at(numbers, depth, modulus):
+    """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA at a depth (m)."""
+    head = carray(numbers, (_HEAD,))
+    after = _HEAD + 2 * int(head[_LINES_X] + head[_LINES_Y])
+    padded = carray(beyond(numbers, after), (int(head[_ROWS]), int(head[_COLUMNS])))
+    return crude_fit(padded, (head[_X], head[_Y]), (head[_DX], head[_DY]), box_at(numbers, head, depth), depth,
+                     head[_LOW], int(head[_NET]), int(head[_SHAPE]), int(head[_FIT]), modulus)  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def settle(numbers, approach, modulus):
+    """Depth (m), stiffness and sum of W p dA that belong to an approach (m); not a number beyond the table's edge.
+
+    False position by Illinois' rule: the approach grows with the depth, for one valley in proportion.
+    """
+    head = carray(numbers, (_HEAD,))
+    low, most = head[_LOW], head[_EDGE] - head[_LOW]
+    over = approach - low
+    left, off_left, right, off_right = 0.0, -over, 0.0, -over
+    depth = min(ABOUT * over, most)
+    kept = 0
+    for _ in range(TRIES):
+        stiffness, reached, volume = fit_at(numbers, low + depth, modulus)
+        off = reached - approach
+        if abs(off) <= SETTLED * over:
+            return low + depth, stiffness, volume
+        if not math.isfinite(off) or (off < 0.0 and depth >= most):
+            break
+        if off < 0.0:
+            left, off_left = depth, off
+            off_right *= 0.5 if kept < 0 else 1.0
+            kept = -1
+        else:
+            right, off_right = depth, off
+            off_left *= 0.5 if kept > 0 else 1.0
+            kept = 1
+        if right <= 0.0:  # not yet enclosed
+            depth, kept = min(1.5 * depth, most), 0
+            continue
+        depth = (left * off_right - right * off_left) / (off_right - off_left)
+        if not left < depth < right:
+            return low + depth, stiffness, volume  # rounding leaves nothing between
+    return math.nan, math.nan, math.nan
+
+
+@njit(cache=True, error_model="numpy")
+def roll_on(numbers, approach, friction, xi_x, xi_y, spin, shear, nu, found):
+    """Fill ``found`` (FOUND,) of the patch at an approach (m); whether there is an answer.
+
+    Zeros where the bodies do not touch. No answer where the contact reaches the edge of the distance.
+    """
+    head = carray(numbers, (_HEAD,))
+    found[:] = 0.0
+    if approach <= head[_LOW]:
+        return True
+    depth, stiffness, volume = settle(numbers, approach, shear / (1.0 - nu))
+    if not (math.isfinite(stiffness) and volume >= 0.0):
+        return False
+    load = volume * stiffness
+    if not load > 0.0:
+        return True
+    after = _HEAD + 2 * int(head[_LINES_X] + head[_LINES_Y])
+    padded = carray(beyond(numbers, after), (int(head[_ROWS]), int(head[_COLUMNS])))
+    origin, step, box = (head[_X], head[_Y]), (head[_DX], head[_DY]), box_at(numbers, head, depth)
+    cells, net = -int(head[_CELLS]), int(head[_NET])
+    y, low_x, high_x, pressure = strips(padded, origin, step, box, depth, head[_LOW], cells, cells, int(head[_SHAPE]))
+    width = (box[3] - box[2]) / cells
+    normalise(pressure, low_x, high_x, width, load)
+    traction = np.empty((y.size, cells, 2))
+    march(y, low_x, high_x, width, pressure, friction, 1.0 / stiffness, xi_x, xi_y, spin, traction)
+    crude = gather(y, low_x, high_x, width, traction, box, net)
+    dx, dy = (box[1] - box[0]) / net, (box[3] - box[2]) / net
+    cover = crude_net(padded, origin, step, box, depth, head[_LOW], net, PARABOLIC)[2]
+    u = tangential(crude, dx, dy, nu) / (math.pi * shear)
+    flexibility = tangential_fit(u, crude, cover, dx, dy, int(head[_FIT]))
+    if flexibility <= 0.0:
+        flexibility = 1.0 / stiffness
+    fx, fy, mz, stuck, area = march(y, low_x, high_x, width, pressure, friction, flexibility, xi_x, xi_y, spin,
+                                    traction)  # fmt: skip
+    found[LOAD], found[FX], found[FY], found[MZ] = load, fx, fy, mz
+    found[STICK] = stuck / area
+    found[HALF_X], found[HALF_Y] = 0.5 * (box[1] - box[0]), 0.5 * (box[3] - box[2])
+    return math.isfinite(fx + fy + mz + load)
+
+
+@njit(cache=True, error_model="numpy")
+def normalise(pressure, low_x, high_x, width, load):
+    """Scale the pressure of strips (s, n) to carry the load (N), so that full sliding gives mu N exactly."""
+    carried = 0.0
+    strips_, cells = pressure.shape
+    for s in range(strips_):
+        for i in range(cells):
+            carried += pressure[s, i] * (high_x[s] - low_x[s]) * width / cells
+    for s in range(strips_):
+        for i in range(cells):
+            pressure[s, i] *= load / carried
