@@ -13,7 +13,6 @@ import numpy as np
 from models.errors import RunFailed
 from models.rail.equations import LIMIT, ROLL, STATES, YAW, Equations, Path, Y, Z, rates
 from models.rail.joint_forces import JOINTS, from_joints, rates_of, to_joints
-from models.rail.wheel_forces import REPORTED
 from models.rail.wheelset import Wheelset
 
 
@@ -44,7 +43,7 @@ class EngineWheelset(Equations, ABC):
         if away.any():
             raise RunFailed(self.ENGINE, f"the wheelset leaves the track after {np.argmax(away) * step:.6g} s")
         kept = states[::every]
-        contacts, out = np.empty((len(kept), 2, REPORTED)), np.empty(STATES)
+        contacts, out = self.blank(len(kept)), np.empty(STATES)
         for one, contact in zip(kept, contacts, strict=True):
             rates(one, *self.given, out, contact)
         return Path(np.arange(len(kept)) * step * every, kept, contacts)

@@ -1,4 +1,4 @@
-"""A conical wheelset on straight track, nonlinear: equations written out, rest, linearisation, fixed-step RK4.
+"""A wheelset on straight track, nonlinear: equations written out, rest, linearisation, fixed-step RK4.
 
 States (10): y, z, roll, yaw, angle of spin; their rates but for the last, which is the spin about the axle itself,
 the body's whole angular velocity along it. The frame of the coordinates moves with the speed of travel. Its angular
@@ -20,11 +20,11 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import root
+from scipy.optimize import brentq, root
 
 from models.compiled import njit
 from models.errors import InputError, RunFailed
-from models.rail.wheel_forces import LAWS, REPORTED, net, numbers, wheel_forces
+from models.rail.wheel_forces import LAWS, REPORTED, carried, net, numbers, patches, wheel_forces
 from models.rail.wheelset import GRAVITY, Wheelset
 
 STATES = 10
@@ -39,10 +39,13 @@ MOVED = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-6, 3e-5])
 LIMIT = 0.3
 """Yaw and roll (rad) and displacement (m) beyond which a path is no wheelset's on a track."""
 
+DEEPEST = 5e-3
+"""Height (m) above which the rails carry every load that is allowed."""
+
 
 @njit(cache=True, error_model="numpy")
 def rates(state, speed, body, p, strips, cells, middle, law, out, report):
-    """Fill ``out`` with the rates of a state (10,), and ``report`` (2, REPORTED) with the two contacts."""
+    """Fill ``out`` with the rates of a state (10,), and ``report`` (patches, REPORTED) with the contacts."""
     y, z, roll, yaw = state[Y], state[Z], state[ROLL], state[YAW]
     roll_rate, yaw_rate, spin = state[ROLL_RATE], state[YAW_RATE], state[SPIN]
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
@@ -82,7 +85,7 @@ def rates(state, speed, body, p, strips, cells, middle, law, out, report):
 @njit(cache=True, nogil=True, error_model="numpy")
 def march(state, speed, step, count, every, body, p, strips, cells, middle, law, path, reports):
     """RK4: ``count`` steps (s) from ``state``, which is moved; every so many steps one goes into path and reports."""
-    some, total, rate, here = np.empty((2, REPORTED)), np.empty(STATES), np.empty(STATES), np.empty(STATES)
+    some, total, rate, here = np.empty((patches(p), REPORTED)), np.empty(STATES), np.empty(STATES), np.empty(STATES)
     for i in range(count + 1):
         total[:] = 0.0
         for stage in range(4):  # one call of the rates, or it is compiled four times
@@ -103,7 +106,7 @@ def march(state, speed, step, count, every, body, p, strips, cells, middle, law,
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """times (n,) in s; states (n, 10) as above; contacts (n, 2, REPORTED), right wheel first, as in wheel_forces."""
+    """times (n,) in s; states (n, 10) as above; contacts (n, patches, REPORTED) of ``wheel_forces``, right side first."""
 
     times: np.ndarray
     states: np.ndarray
@@ -130,7 +133,7 @@ class Equations:
         """Numbers of the body and its suspension (12,)."""
         w = self.wheelset
         carried = (w.load - w.mass * GRAVITY) / 2.0
-        sunk = float(w.ellipse.approach) / w.slant[1]
+        sunk = self._static_height() if w.profiles else float(w.ellipse.approach) / w.slant[1]
         return np.array([w.mass, w.spin_inertia, w.yaw_inertia, w.half_spacing, w.stiffness_x, w.stiffness_y,
                          w.stiffness_z, w.damping_x, w.damping_y, w.damping_z, carried, sunk])  # fmt: skip
 
@@ -139,10 +142,19 @@ class Equations:
         """What the compiled functions take after the state: speed, body, contact, net and law."""
         return (float(self.speed), self.body, numbers(self.wheelset), *net(self.wheelset, self.cells), LAWS[self.law])
 
+    def _static_height(self) -> float:
+        """Height z (m) in the middle of the track at which smooth rails carry the load."""
+        given = numbers(self.wheelset)
+        return float(brentq(lambda z: carried(z, given) - self.wheelset.load, 0.0, DEEPEST, xtol=1e-15))
+
+    def blank(self, *shape: int) -> np.ndarray:
+        """Contacts (*shape, patches, REPORTED) that are not known yet."""
+        return np.full((*shape, patches(self.given[2]), REPORTED), np.nan)
+
     def rates(self, state: np.ndarray) -> np.ndarray:
         """Rates (10,) of a state (10,)."""
         out = np.empty(STATES)
-        rates(np.asarray(state, float), *self.given, out, np.empty((2, REPORTED)))
+        rates(np.asarray(state, float), *self.given, out, self.blank())
         return out
 
     @cached_property
@@ -154,9 +166,12 @@ class Equations:
 
     def displaced(self, shift: float) -> np.ndarray:
         """The state (10,) at a lateral displacement (m) without yaw or rates but spin: height and roll in balance."""
-        start = self.rest.copy()
+        start, w = self.rest.copy(), self.wheelset
         start[Y] = shift
-        start[ROLL] = -shift * self.wheelset.tilt
+        start[ROLL] = -shift * w.tilt
+        if w.profiles:
+            rise, start[ROLL] = w.profiles.touching(w.radius, shift)
+            start[Z] += rise
         return self._settled(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
 
     def _settled(self, start: np.ndarray, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> np.ndarray:
@@ -192,7 +207,7 @@ class Equations:
         self._check(step)
         count = round(duration / step)
         kept = count // every + 1
-        path, contacts = np.full((kept, STATES), np.nan), np.full((kept, 2, REPORTED), np.nan)
+        path, contacts = np.full((kept, STATES), np.nan), self.blank(kept)
         speed, *rest = self.given
         done = march(np.array(state, float), speed, step, count, every, *rest, path, contacts)
         if done < count:

@@ -4,7 +4,8 @@ Normal force
     Hertz' theory at the penetration, times 1 + ``contact_damping`` times the speed of approach, and never below zero:
     it begins and ends without a jump and never pulls. The semi-axes are those of the elastic force. The curvature of
     the cone is that in the plane square to its generator; that the generator is a little askew to the rail under yaw
-    is left out of the curvatures, and of nothing else.
+    is left out of the curvatures, and of nothing else. Profiles have several patches on a wheel, each pressed by its
+    own penetration as if it were alone (``profile_contact``).
 Creepage
     Velocity of the wheel relative to the rail by the speed of travel V, or by REGULAR where |V| is less; there the
     forces of rolling forwards and backwards are mixed as V goes from REGULAR to -REGULAR, so that nothing jumps.
@@ -12,7 +13,8 @@ Creepage
 Creep law
     LINEAR (Kalker, without bound) or FASTSIM.
 Flange
-    Beyond its clearance a spring pushes the wheelset back at the wheel's place of contact, without friction.
+    Of cones only: beyond its clearance a spring pushes the wheelset back at the wheel's place of contact, without
+    friction.
 """
 
 import math
@@ -27,26 +29,33 @@ from models.contact.hertz import aspect
 from models.contact.linear_theory import coefficient_at, flexibilities_at
 from models.errors import InputError
 from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
+from models.rail.laid_profiles import profile_numbers
+from models.rail.profile_contact import ACROSS, ALONG, N_Y, N_Z, TOUCH, X_, Y_, Z_, ZONES, profile_on_rail
+from models.rail.profile_contact import DEPTH as DEEP
 from models.rail.wheelset import Wheelset
 
 REGULAR = 0.1
 """Speed (m/s) below which creepage is no longer relative to the speed of travel."""
 LINEAR, FASTSIM = 0, 1
 LAWS = {"linear": LINEAR, "fastsim": FASTSIM}
-RADIUS, HALF_GAUGE, CONICITY, HEAD, MODULUS, SHEAR, POISSON, FRICTION, DAMPING, CLEARANCE, FLANGE = range(11)
-"""Numbers of the contact, as ``numbers`` gives them (SI): modulus is E*, flange its spring's stiffness."""
-LOAD, FX, FY, MZ, XI_1, XI_2, XI_3, A, B, DEPTH, POWER, ANGLE = range(12)
-"""Columns of what a wheel's contact reports: normal force, creep forces and moment on the wheel in its own axes,
-creepages and spin, semi-axes, penetration, power of the creep forces (W), angle of the rail's surface (rad)."""
-REPORTED = 12
+RADIUS, HALF_GAUGE, CONICITY, HEAD, MODULUS, SHEAR, POISSON, FRICTION, DAMPING, CLEARANCE, FLANGE, NUMBERS = range(12)
+"""Numbers of the contact, as ``numbers`` gives them (SI): modulus is E*, flange its spring's stiffness; then those of
+the profiles, if the wheelset has some."""
+(LOAD, FX, FY, MZ, XI_1, XI_2, XI_3, A, B, DEPTH, POWER, ANGLE, PLACE_X, PLACE_Y, PLACE_Z, FLANGE_FORCE, ELASTIC_POWER,
+ DAMPING_POWER, REPORTED) = range(19)  # fmt: skip
+"""Columns of what a patch reports: normal force, creep forces and moment on the wheel in its own axes, creepages and
+spin, semi-axes, penetration, power of the creep forces (W), angle of the rail's surface (rad), place from the
+wheelset's centre in the track's axes (m), lateral force of a cone's flange (N), powers of the elastic normal force and
+flange and of the contact's damping (W)."""
 BLEND, ORDER = KINDS["blended"], MARCHES["second-order"]
 
 
 def numbers(wheelset: Wheelset) -> np.ndarray:
-    """The contact's numbers (11,), in the order above."""
+    """The contact's numbers, in the order above: (11,), or more for profiles."""
     w, pair = wheelset, wheelset.pair
-    return np.array([w.radius, w.half_gauge, w.conicity, w.head_radius, pair.modulus, pair.G, pair.nu, w.friction,
-                     w.contact_damping, w.flange_clearance, w.flange_stiffness])  # fmt: skip
+    found = [w.radius, w.half_gauge, w.conicity, w.head_radius, pair.modulus, pair.G, pair.nu, w.friction,
+             w.contact_damping, w.flange_clearance, w.flange_stiffness]  # fmt: skip
+    return np.concatenate((found, profile_numbers(w.profiles, w.radius))) if w.profiles else np.array(found)
 
 
 def net(wheelset: Wheelset, cells: int = 21) -> tuple[np.ndarray, np.ndarray, float]:
@@ -59,19 +68,49 @@ def net(wheelset: Wheelset, cells: int = 21) -> tuple[np.ndarray, np.ndarray, fl
 
 
 @njit(cache=True, error_model="numpy")
-def normal_contact(penetration, rate, rolling, p):
-    """Normal force (N) and semi-axes (m) at a penetration (m) that grows at a rate (m/s); zeros where there is none."""
+def patches(p):
+    """How many contacts both wheels together can have: one each of cones, one for each zone of profiles."""
+    return 2 if p.size == NUMBERS else 2 * int(p[NUMBERS + ZONES])
+
+
+@njit(cache=True, error_model="numpy")
+def contact_points(y, z, roll, yaw, p, touches):
+    """Fill ``touches`` (patches, TOUCH), the right wheel's first; without a normal where nothing is near."""
+    each = len(touches) // 2
+    for k in range(2):
+        side, own = RIGHT if k == 0 else LEFT, touches[k * each : (k + 1) * each]
+        if p.size > NUMBERS:
+            profile_on_rail(side, y, z, roll, yaw, p[NUMBERS:], own)
+            continue
+        depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, y, z, roll, yaw, p[RADIUS], p[HALF_GAUGE],
+                                                            p[CONICITY], p[HEAD])  # fmt: skip
+        touch = own[0]
+        touch[DEEP], touch[N_Y], touch[N_Z], touch[X_], touch[Y_], touch[Z_] = depth, n_y, n_z, cx, cy, cz
+        touch[ALONG] = 0.5 / (rolling * math.sqrt(1.0 + p[CONICITY] * p[CONICITY]))
+        touch[ACROSS] = 0.5 / p[HEAD]
+
+
+@njit(cache=True, error_model="numpy")
+def normal_contact(penetration, along, across, p):
+    """Elastic normal force (N) and semi-axes (m) at a penetration (m), curvatures 1/m; zeros where there is none."""
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
-    along = 0.5 / (rolling * math.sqrt(1.0 + p[CONICITY] * p[CONICITY]))
-    across = 0.5 / p[HEAD]
     g, cosine, sine = aspect(min(along, across) / max(along, across))
     short = math.sqrt(penetration * cosine / (max(along, across) * (cosine + sine)))
     load = 2.0 / 3.0 * math.pi * p[MODULUS] * penetration * short / (g * (cosine + sine))
-    load *= max(0.0, 1.0 + p[DAMPING] * rate)
     if along <= across:
         return load, short / g, short
     return load, short, short / g
+
+
+@njit(cache=True, error_model="numpy")
+def carried(z, p):
+    """Vertical part (N) of the elastic normal forces with the wheelset's centre at a height z (m) over the middle."""
+    touches, whole = np.zeros((patches(p), TOUCH)), 0.0
+    contact_points(0.0, z, 0.0, 0.0, p, touches)
+    for touch in touches:
+        whole += touch[N_Z] * normal_contact(touch[DEEP], touch[ALONG], touch[ACROSS], p)[0]
+    return whole
 
 
 @njit(cache=True, error_model="numpy")
@@ -124,41 +163,61 @@ def wheel_forces(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, l
 
     y, z : of the wheelset's centre (m), roll, yaw : rad; velocity (3,) : of the centre in the track, the speed of
     travel first (m/s); turning (3,) : angular velocity, spin about the axle included, in the track's axes (rad/s);
-    p : ``numbers``; strips, cells, middle : ``net``; law : LINEAR or FASTSIM; report (2, REPORTED) is filled.
+    p : ``numbers``; strips, cells, middle : ``net``; law : LINEAR or FASTSIM; report (patches, REPORTED) is filled.
     """
-    contacts, slip, found = np.zeros((2, 10)), np.empty((2, 3)), np.empty((2, 4))
-    place = np.empty((2, 5))
-    for k in range(2):
-        side = RIGHT if k == 0 else LEFT
-        depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, y, z, roll, yaw, p[RADIUS], p[HALF_GAUGE],
-                                                            p[CONICITY], p[HEAD])  # fmt: skip
-        place[k, 0], place[k, 1], place[k, 2], place[k, 3], place[k, 4] = n_y, n_z, cx, cy, cz
-        vx = velocity[0] + turning[1] * cz - turning[2] * cy
-        vy = velocity[1] + turning[2] * cx - turning[0] * cz
-        vz = velocity[2] + turning[0] * cy - turning[1] * cx
-        slip[k, 0], slip[k, 1] = vx, n_z * vy - n_y * vz
-        slip[k, 2] = turning[1] * n_y + turning[2] * n_z
-        load, a, b = normal_contact(depth, n_y * vy + n_z * vz, rolling, p)
-        contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3] = a, b, load, p[FRICTION]
-        l1, l2, l3 = flexibilities_at(a, b, p[SHEAR], p[POISSON])
-        contacts[k, 7], contacts[k, 8], contacts[k, 9] = l1, l2, l3
-        report[k, LOAD], report[k, A], report[k, B], report[k, DEPTH] = load, a, b, depth
-        report[k, ANGLE] = math.atan2(-n_y, n_z)
-    creep(contacts, slip, velocity[0], p, strips, cells, middle, law, found)
-    for k in range(2):
-        fx, fy, mz = found[k, 0], found[k, 1], found[k, 2]
-        n_y, n_z, cx, cy, cz = place[k]
-        side = RIGHT if k == 0 else LEFT
-        flange = -side * p[FLANGE] * max(0.0, side * y - p[CLEARANCE])
-        across = n_z * fy - n_y * report[k, LOAD] + flange
-        down = -n_y * fy - n_z * report[k, LOAD]
-        force[0] += fx
-        force[1] += across
-        force[2] += down
-        moment[0] += cy * down - cz * across
-        moment[1] += cz * fx - cx * down + n_y * mz
-        moment[2] += cx * across - cy * fx + n_z * mz
-        report[k, FX], report[k, FY], report[k, MZ] = fx, fy, mz
-        for i in range(3):
-            report[k, XI_1 + i] = slip[k, i] / max(abs(velocity[0]), REGULAR)
-        report[k, POWER] = fx * slip[k, 0] + fy * slip[k, 1] + mz * slip[k, 2]
+    n = patches(p)
+    touches, contacts, slip, found = np.zeros((n, TOUCH)), np.zeros((n, 10)), np.empty((n, 3)), np.empty((n, 4))
+    contact_points(y, z, roll, yaw, p, touches)
+    row, some = np.empty(n, np.int64), 0
+    for k in range(n):
+        report[k] = 0.0
+        if touches[k, N_Z] == 0.0 and touches[k, N_Y] == 0.0:
+            continue
+        side = RIGHT if 2 * k < n else LEFT
+        if p.size == NUMBERS:
+            report[k, FLANGE_FORCE] = -side * p[FLANGE] * max(0.0, side * y - p[CLEARANCE])
+        _press(touches[k], velocity, turning, p, contacts[some], slip[some], report[k])
+        row[some], some = k, some + 1
+    creep(contacts[:some], slip[:some], velocity[0], p, strips, cells, middle, law, found[:some])
+    for i in range(some):
+        _act(touches[row[i]], slip[i], found[i], velocity[0], force, moment, report[row[i]])
+
+
+@njit(cache=True, error_model="numpy")
+def _press(touch, velocity, turning, p, contact, slip, report):
+    """Kinematics and normal force of one patch: its contact (10,) for the creep law, its slip (3,), its report."""
+    n_y, n_z, cx, cy, cz = touch[N_Y], touch[N_Z], touch[X_], touch[Y_], touch[Z_]
+    vx = velocity[0] + turning[1] * cz - turning[2] * cy
+    vy = velocity[1] + turning[2] * cx - turning[0] * cz
+    vz = velocity[2] + turning[0] * cy - turning[1] * cx
+    slip[0], slip[1] = vx, n_z * vy - n_y * vz
+    slip[2] = turning[1] * n_y + turning[2] * n_z
+    rate = n_y * vy + n_z * vz
+    elastic, a, b = normal_contact(touch[DEEP], touch[ALONG], touch[ACROSS], p)
+    load = elastic * max(0.0, 1.0 + p[DAMPING] * rate)
+    contact[0], contact[1], contact[2], contact[3] = a, b, load, p[FRICTION]
+    contact[7], contact[8], contact[9] = flexibilities_at(a, b, p[SHEAR], p[POISSON])
+    report[LOAD], report[A], report[B], report[DEPTH] = load, a, b, touch[DEEP]
+    report[ANGLE] = math.atan2(-n_y, n_z)
+    report[PLACE_X], report[PLACE_Y], report[PLACE_Z] = cx, cy, cz
+    report[ELASTIC_POWER] = report[FLANGE_FORCE] * vy - elastic * rate
+    report[DAMPING_POWER] = (elastic - load) * rate
+
+
+@njit(cache=True, error_model="numpy")
+def _act(touch, slip, found, speed, force, moment, report):
+    """Add one patch's forces to force and moment; the rest of its report."""
+    n_y, n_z, cx, cy, cz = touch[N_Y], touch[N_Z], touch[X_], touch[Y_], touch[Z_]
+    fx, fy, mz = found[0], found[1], found[2]
+    across = n_z * fy - n_y * report[LOAD] + report[FLANGE_FORCE]
+    down = -n_y * fy - n_z * report[LOAD]
+    force[0] += fx
+    force[1] += across
+    force[2] += down
+    moment[0] += cy * down - cz * across
+    moment[1] += cz * fx - cx * down + n_y * mz
+    moment[2] += cx * across - cy * fx + n_z * mz
+    report[FX], report[FY], report[MZ] = fx, fy, mz
+    for i in range(3):
+        report[XI_1 + i] = slip[i] / max(abs(speed), REGULAR)
+    report[POWER] = fx * slip[0] + fy * slip[1] + mz * slip[2]

@@ -1,4 +1,4 @@
-"""A wheelset with conical wheels in its primary suspension, on two straight rails with round heads."""
+"""A wheelset in its primary suspension on two straight rails: cones on round heads, or profiles."""
 
 from typing import Any
 
@@ -7,6 +7,7 @@ from scipy.optimize import brentq
 
 from models.contact.hertz import Hertz, by_load
 from models.contact.material import STEEL, Material, Pair
+from models.rail.laid_profiles import Profiles
 from models.strict import Strict, message, quantity
 
 GRAVITY = 9.81
@@ -19,7 +20,8 @@ class Wheelset(Strict):
 
     The wheelset turns about its axle, so its inertia about all axes across that is one number. On each side, at
     ``half_spacing`` from the middle, a spring and a damper along each axis of the track hold the axle to a frame that
-    moves with the speed. What the frame weighs on the axle is ``load`` less the wheelset's own weight.
+    moves with the speed. What the frame weighs on the axle is ``load`` less the wheelset's own weight. With profiles,
+    half_gauge, conicity, head_radius and the flange's values serve the linear theory alone (``coned``).
     """
 
     mass: float = quantity("kg", "of the wheelset")
@@ -42,6 +44,7 @@ class Wheelset(Strict):
     flange_stiffness: float = quantity("N/m", "lateral, of a flange on its rail", zero=True)
     contact_damping: float = quantity("s/m", "share of the elastic normal force by the speed of approach", zero=True)
     material: Material = STEEL
+    profiles: Profiles | None = Field(default=None, description="cross-sections in place of cones and round heads")
 
     def __init__(self, **values: Any) -> None:
         try:

@@ -1,0 +1,134 @@
+"""Profiles of wheels and rails as a wheelset has them, prepared for ``profile_contact``."""
+
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from pydantic import Field
+from scipy.interpolate import CubicSpline
+
+from models.contact.profile_files import Kind, read_profile
+from models.contact.profiles import Profile
+from models.contact.standard_profiles import RAILS, WHEELS
+from models.contact.wheel_on_rail import Pose, Side, Track, Wheelset, laid, placed
+from models.errors import InputError
+from models.strict import Strict, quantity
+
+SPACING = 2.5e-4
+"""Distance (m) of nodes along the wheel's contour and of knots along the rail's."""
+SHIFTS = np.arange(-0.012, 0.0120001, 1e-3)
+"""Lateral displacements (m) at which first contact is looked for."""
+APART, CLOSE = 3e-3, 1e-6
+"""Way (m) on the wheel that first contact must jump between displacements that are so close (m)."""
+RIDGE = 1e-5
+"""Height (m) of the gap between both places of a jump from which on the patches are two."""
+BLEND = 1e-3
+"""Half the length (m) over which one zone passes into the next."""
+
+
+class Profiles(Strict):
+    """Cross-sections in place of cones and round heads; the wheel's ``radius`` is that at the taping line.
+
+    wheel, rail : the name of a built-in profile, or a file that ``models.contact.profile_files`` reads.
+    """
+
+    wheel: str = Field(default="S1002", description="built-in wheel, or the file of one")
+    rail: str = Field(default="UIC60", description="built-in rail, or the file of one")
+    smoothing: float = quantity("m", "wavelength of which half is left, for profiles from files", default=0.0,
+                                zero=True)  # fmt: skip
+    gauge: float = quantity("m", "between the rails, gauge_depth below their tops", default=1.435)
+    gauge_depth: float = quantity("m", "below the tops, at which the gauge is measured", default=0.014)
+    inclination: float = quantity("rad", "of the rails, towards each other", default=0.025, signed=True)
+    back_to_back: float = quantity("m", "between the backs of the flanges", default=1.360)
+    taping: float = quantity("m", "from a flange's back to the taping line", default=0.070)
+
+    def side(self, radius: float) -> Side:
+        """The right wheel of a radius (m) on its rail; raises InputError for files that are no profiles."""
+        rail = _profile(self.rail, "rail", self.smoothing)
+        return Side(_profile(self.wheel, "wheel", self.smoothing),
+                    laid(rail, Track(self.gauge, self.gauge_depth, self.inclination)),
+                    Wheelset(radius, self.back_to_back, self.taping))  # fmt: skip
+
+    def touching(self, radius: float, shift: float) -> tuple[float, float]:
+        """Height z (m) over that in the middle, and roll (rad), at which both wheels just touch; InputError if none."""
+        side = self.side(radius)
+        pose = placed(side, shift, 0.0)
+        return pose.fall - side.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
+
+
+def _profile(name: str, kind: Kind, smoothing: float) -> Profile:
+    known = WHEELS if kind == "wheel" else RAILS
+    if name in known:
+        return known[name]()
+    if not Path(name).suffix:
+        raise InputError("", kind, name, "is neither built in nor a file", tuple(known))
+    return read_profile(name, kind, smoothing=smoothing)
+
+
+@cache
+def profile_numbers(profiles: Profiles, radius: float) -> np.ndarray:
+    """What ``profile_on_rail`` reads, for wheels of a radius (m) at the taping line."""
+    side = profiles.side(radius)
+    tip = int(np.argmax(side.wheel.z))
+    y = _even(side.wheel.y[tip:], side.wheel.z[tip:])
+    curve = side.wheel.curve
+    nodes = np.column_stack([y, radius + curve(y), curve(y, 1), _zones(y, _cuts(side))])
+    knots = _even(side.rail.y, side.rail.z)
+    cubic = CubicSpline(knots, side.rail.curve(knots)).c
+    rail = np.column_stack([knots, np.vstack([cubic[::-1].T, np.zeros(4)])])
+    level = side.clearance(Pose(0.0, 0.0, 0.0, 0.0)) - radius
+    head = [int(nodes[:, 3].max()) + 1, len(nodes), len(rail), SPACING, side.wheelset.arm, level]
+    found = np.concatenate((head, nodes.ravel(), rail.ravel()))
+    found.flags.writeable = False
+    return found
+
+
+def _even(y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Places y at even distances along a contour."""
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
+    return np.interp(np.arange(0.0, length[-1], SPACING), length, y)
+
+
+def _cuts(side: Side) -> list[float]:
+    """Places (m from the taping line) on the wheel that first contact jumps across, over a ridge of the gap."""
+    touched = [(float(shift), found[0]) for shift in SHIFTS if (found := _first(side, float(shift))) is not None]
+    cuts = [_ridge(side, before, after) for before, after in pairwise(touched)]
+    return [cut for cut in cuts if cut is not None]
+
+
+def _first(side: Side, shift: float) -> tuple[float, np.ndarray, np.ndarray] | None:
+    """Place of first contact from the taping line, places and gaps (m) there; None where wheels and rails do not meet.
+    """
+    try:
+        pose = placed(side, shift, 0.0)
+    except InputError:
+        return None
+    points, gap = side.gaps(pose)
+    own = points[:, 1] - shift - side.wheelset.arm
+    return float(own[np.argmin(gap)]), own, gap
+
+
+def _ridge(side: Side, before: tuple[float, float], after: tuple[float, float]) -> float | None:
+    """Highest place between both ends of a jump of first contact between two (shift, place); None without a jump."""
+    while abs(after[1] - before[1]) > APART:
+        middle = (before[0] + after[0]) / 2.0
+        found = _first(side, middle)
+        if found is None:
+            return None
+        here, own, gap = found
+        if after[0] - before[0] < CLOSE:
+            between = (own > min(before[1], after[1])) & (own < max(before[1], after[1]))
+            return float(own[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE else None
+        before, after = ((before, (middle, here)) if abs(here - before[1]) > abs(here - after[1]) else
+                         ((middle, here), after))  # fmt: skip
+    return None
+
+
+def _zones(y: np.ndarray, cuts: list[float]) -> np.ndarray:
+    """Zone (n,) of places on the wheel: a whole number, but where one passes smoothly into the next."""
+    zones = np.zeros(y.size)
+    for cut in cuts:
+        t = np.clip((y - cut) / (2.0 * BLEND) + 0.5, 0.0, 1.0)
+        zones += t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+    return zones

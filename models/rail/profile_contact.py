@@ -1,0 +1,114 @@
+"""Compiled contact of a wheel and a rail of any cross-section: its patches, each with depth, normal and curvatures.
+
+The wheel is a body of revolution. Of each of its circles one point is nearest to a straight rail, with roll and yaw in
+it (the outline of ``models.contact.wheel_on_rail``); how deep it lies in the rail along the rail's normal is its depth
+w. The contour is divided into zones, once and for all, at the places that first contact jumps across; shares of
+neighbouring zones add up to one. In every zone moments over the contour describe one patch:
+
+    place, normal, radius   means, weighted by w^3
+    penetration             (9/8) int w^4 / int w^3
+    semi-width of overlap   the root of 9 times the variance of the place
+
+Where the depth is a parabola these are its depth and its width to the last digit, hence Hertz' contact. Elsewhere they
+are means over nearly the length that Hertz' pressure covers: w^3 has the variance of the load of a patch that spans
+5/9 of the overlap's depth (Piotrowski and Kik take 0.55). All of them move smoothly with the wheelset, and a load
+goes over from one zone to the next without a jump.
+"""
+
+import math
+
+import numpy as np
+
+from models.compiled import njit
+
+ZONES, NODES, KNOTS, SPACING, ARM, LEVEL, HEADER = range(7)
+"""Head of a profile's numbers: counts of zones, of the wheel's nodes and of the rail's knots; distance of the nodes
+along the contour (m), distance of the taping line from the middle of the axle, height of the axle over the rail's top
+where both wheels just touch in the middle of the track. Then, by node, place from the taping line, radius, slope and
+zone; then, by knot, place from the middle of the track and the four coefficients of the cubic beyond it."""
+OF_NODE, OF_KNOT = 4, 5
+DEPTH, N_Y, N_Z, X_, Y_, Z_, ALONG, ACROSS, TOUCH = range(9)
+"""Columns of a touch: penetration (m), normal into the rail, place from the wheelset's centre in the track's axes (m),
+curvatures A and B of the undeformed distance along and across (1/m)."""
+SHARPEST = 500.0
+"""Curvature (1/m) of a patch that only one node lies in."""
+W3, W4, S1, S2, NY, NZ, RX, RY, RZ, RADIUS, SUMS = range(11)
+_LEAST = 1e-60
+"""m^3: sums of cubes of depths below a nanometre's are none."""
+
+
+@njit(cache=True, error_model="numpy")
+def profile_on_rail(side, y, z, roll, yaw, p, touches):
+    """Fill ``touches`` (zones, TOUCH) of the right (side 1) or left (-1) wheel; a depth of 0 is no contact.
+
+    y, z : of the wheelset's centre (m), roll, yaw : rad, as in ``models.rail``; p : numbers of the profiles.
+    """
+    zones, nodes, knots = int(p[ZONES]), int(p[NODES]), int(p[KNOTS])
+    sums = np.zeros((zones, SUMS))
+    y, roll, yaw = side * y, side * roll, side * yaw  # the left wheel is the right one in a mirror
+    z += p[LEVEL]
+    cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
+    lead = sr * sy / cy
+    level = 1.0 / math.sqrt(1.0 + lead * lead)
+    steer = cr * sy / cy * level
+    rail = HEADER + OF_NODE * nodes
+    k = rail
+    last = rail + OF_KNOT * (knots - 1)
+    for j in range(nodes):
+        at = HEADER + OF_NODE * j
+        sine = min(1.0, max(-1.0, -p[at + 2] * steer))
+        cosine = math.sqrt(1.0 - sine * sine)
+        ahead = p[at + 1] * (sine - cosine * lead) * level
+        down = p[at + 1] * (cosine + sine * lead) * level
+        own = p[ARM] + p[at]
+        across = cr * own - sr * down
+        place_y, place_z = sy * ahead + cy * across, sr * own + cr * down
+        here = y + place_y
+        if not p[rail] <= here < p[last]:
+            continue
+        while here < p[k]:
+            k -= OF_KNOT
+        while here >= p[k + OF_KNOT]:
+            k += OF_KNOT
+        t = here - p[k]
+        over = z + place_z - (p[k + 1] + t * (p[k + 2] + t * (p[k + 3] + t * p[k + 4])))
+        if over <= 0.0:
+            continue
+        slope = p[k + 2] + t * (2.0 * p[k + 3] + 3.0 * t * p[k + 4])
+        upright = 1.0 / math.sqrt(1.0 + slope * slope)
+        depth = over * upright
+        zone = int(p[at + 3])
+        share = p[at + 3] - zone
+        for part in range(2):
+            weight = (share if part == 1 else 1.0 - share) * depth**3
+            if weight > 0.0:
+                length = j * p[SPACING]
+                to = sums[zone + part]
+                to[W3] += weight
+                to[W4] += weight * depth
+                to[S1] += weight * length
+                to[S2] += weight * length * length
+                to[NY] -= weight * slope * upright
+                to[NZ] += weight * upright
+                to[RX] += weight * (cy * ahead - sy * across)
+                to[RY] += weight * place_y
+                to[RZ] += weight * place_z
+                to[RADIUS] += weight * p[at + 1]
+    for zone in range(zones):
+        _patch(side, sums[zone], cy * sr, cr, touches[zone])
+
+
+@njit(cache=True, error_model="numpy")
+def _patch(side, sums, tilt, upright, touch):
+    """One touch from its zone's sums; (-tilt, upright) are y and z of the radius that points down."""
+    touch[:] = 0.0
+    whole = sums[W3]
+    if whole <= _LEAST:
+        return
+    middle, size = sums[S1] / whole, math.hypot(sums[NY], sums[NZ])
+    depth, n_y, n_z = 1.125 * sums[W4] / whole, sums[NY] / size, sums[NZ] / size
+    spread = max(0.0, 9.0 * (sums[S2] / whole - middle * middle))
+    touch[DEPTH], touch[N_Y], touch[N_Z] = depth, side * n_y, n_z
+    touch[X_], touch[Y_], touch[Z_] = sums[RX] / whole, side * sums[RY] / whole, sums[RZ] / whole
+    touch[ALONG] = 0.5 * (n_z * upright - n_y * tilt) * whole / sums[RADIUS]
+    touch[ACROSS] = depth / (spread + depth / SHARPEST)
