@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from models.contact.standard_profiles import s1002, uic60
-from models.contact.wheel_on_rail import Track, Wheelset
 from models.errors import InputError, RunFailed
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
-from models.rail.contact_table import Contact, equivalent_conicity, manchester, rolling_radius_difference
+from models.rail.contact_table import (
+    Contact,
+    benchmark_side,
+    equivalent_conicity,
+    manchester,
+    rolling_radius_difference,
+)
 from models.rail.equations import Equations
 from models.rail.limit_cycle import bifurcation, cycle_with_error
 from models.rail.linear import _gravity, critical_speed, growth, kinematic_wavelength, klingel, matrices
@@ -253,7 +257,7 @@ def test_two_patches_at_five_millimetres():
 
 
 def test_table_mirrors():
-    contact = Contact(s1002(), uic60(), Track(), Wheelset(), 1e4)
+    contact = Contact(benchmark_side(), 1e4)
     one, two = contact.at(2e-3, 0.004), contact.at(-2e-3, -0.004)
     assert one.roll == pytest.approx(-two.roll, abs=1e-12)
     assert one.right[0].normal == pytest.approx(two.left[0].normal, rel=1e-9)

@@ -29,12 +29,14 @@ PRECISION, ITERATIONS = 1e-6, 30
 @dataclass(frozen=True)
 class Share:
     """What one patch carries. load : N, along its normal. x, y : centre of pressure from its place (m). area : m^2.
-    peak : Pa."""
+    length, width : of the rectangle about the area, along the rail and across (m). peak : Pa."""
 
     load: float
     x: float
     y: float
     area: float
+    length: float
+    width: float
     peak: float
 
 
@@ -99,6 +101,12 @@ def _height(patch: Patch, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def _share(pressure: np.ndarray, x: np.ndarray, y: np.ndarray, cell: float) -> Share:
     total = float(pressure.sum())
     if total == 0.0:
-        return Share(0.0, 0.0, 0.0, 0.0, 0.0)
+        return Share(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    length, width = (_extent(at, (pressure > 0.0).any(axis=axis)) for axis, at in enumerate((x, y)))
     return Share(total * cell, float((pressure.sum(axis=0) @ x) / total), float((pressure.sum(axis=1) @ y) / total),
-                 float(np.count_nonzero(pressure) * cell), float(pressure.max()))  # fmt: skip
+                 float(np.count_nonzero(pressure) * cell), length, width, float(pressure.max()))  # fmt: skip
+
+
+def _extent(at: np.ndarray, inside: np.ndarray) -> float:
+    """Way (m) from the first to the last cell inside, both included."""
+    return float(np.ptp(at[inside]) + at[1] - at[0])
