@@ -1,0 +1,45 @@
+"""Eigenvalues of a wheelset about rest with linear creep, by any implementation of its equations of motion."""
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from models.rail.equations import Equations
+from models.rail.wheelset import Wheelset
+
+SLOW = 0.2
+"""Speed (m/s) at which a free wheelset moves without any effect of its inertia on the wavelength."""
+
+
+def free(wheelset: Wheelset) -> Wheelset:
+    """The same wheelset without suspension."""
+    return wheelset.changed(**{f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"})
+
+
+def wavelength(kind: type[Equations], wheelset: Wheelset) -> float:
+    """Wavelength (m) of the free wheelset by the slowest oscillation of all its motions."""
+    found = values(kind, free(wheelset), SLOW)
+    return 2.0 * math.pi * SLOW / min(found[found.imag > 0.0], key=abs).imag
+
+
+def values(kind: type[Equations], wheelset: Wheelset, speed: float) -> np.ndarray:
+    """Eigenvalues (9,) in 1/s at a speed (m/s)."""
+    return np.linalg.eigvals(kind(wheelset, speed, "linear").state_matrix)
+
+
+def growth(kind: type[Equations], wheelset: Wheelset, speed: float) -> float:
+    """Largest real part (1/s) at a speed (m/s), for ``linear.critical_speed``."""
+    return float(values(kind, wheelset, speed).real.max())
+
+
+def locus(kind: type[Equations], wheelset: Wheelset, speeds: Iterable[float]) -> np.ndarray:
+    """Eigenvalues (speeds, 9) in 1/s."""
+    return np.array([values(kind, wheelset, float(speed)) for speed in speeds])
+
+
+def hunting(values: np.ndarray) -> np.ndarray:
+    """Of eigenvalues (..., 9), the least damped one with an imaginary part above 0; NaN if there is none."""
+    oscillates = np.where(values.imag > 0.0, values.real, -math.inf)
+    found = np.take_along_axis(values, oscillates.argmax(axis=-1)[..., None], -1)[..., 0]
+    return np.where(np.isfinite(oscillates.max(axis=-1)), found, math.nan)
