@@ -11,8 +11,10 @@ NEAREST = 0.05
 """m: what is nearer to the eye, or behind it, is not drawn."""
 LIGHT = np.array([0.35, 0.5, 0.8])
 """Towards the lamp: to the spectator's right, back to him, up."""
-DIM = 0.48
-"""Brightness of a surface that no lamp reaches."""
+HAZE = 70.0
+"""m: how far one sees until the sky's lower colour hides two thirds."""
+DIM = 0.4
+"""Brightness of a surface that looks away from the lamp."""
 
 
 @dataclass(frozen=True)
@@ -46,24 +48,27 @@ class Camera:
 
 
 def picture(camera: Camera, layers: list[list[Surface]], width: int, height: int,
-            background: np.ndarray) -> np.ndarray:  # fmt: skip
-    """Image (h, w, 3) of surfaces; a later layer lies over all earlier ones, as arrows over bodies do."""
-    image = np.repeat(np.repeat(background, 2, 0), 2, 1) if background.ndim == 3 else (
-        np.broadcast_to(background, (2 * height, 2 * width, 3)).copy())
+            sky: np.ndarray) -> np.ndarray:  # fmt: skip
+    """Image (h, w, 3) of surfaces before a sky, from its top (3,) to its bottom; a later layer lies over all earlier ones, as arrows over bodies do."""
+    shade = np.linspace(*sky, 2 * height, dtype=np.float32)
+    image = np.broadcast_to(shade[:, None], (2 * height, 2 * width, 3)).copy()
     for layer in layers:
-        nearest = np.zeros(image.shape[:2])
+        nearest = np.zeros(image.shape[:2], np.float32)
         for surface in (surface for surface in layer if surface.alpha == 1.0):
-            paint(*_shaded(camera, surface, width, height), image, nearest)
+            paint(*_shaded(camera, surface, width, height, sky[1]), image, nearest)
         for surface in (surface for surface in layer if surface.alpha < 1.0):
             veil, front = image.copy(), nearest.copy()
-            paint(*_shaded(camera, surface, width, height), veil, front)
+            paint(*_shaded(camera, surface, width, height, sky[1]), veil, front)
             image += surface.alpha * (veil - image)
     return halved(image)
 
 
-def _shaded(camera: Camera, surface: Surface, width: int, height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _shaded(camera: Camera, surface: Surface, width: int, height: int,
+            haze: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """What ``paint`` takes, of the triangles that lie before the eye."""
     corners, near = camera.seen(surface.corners, 2 * width, 2 * height)
     kept = ((near > 0.0) & (near < 1.0 / NEAREST)).all(axis=1)
     towards = LIGHT @ camera.axes / np.linalg.norm(LIGHT)
-    light = DIM + (1.0 - DIM) * np.clip(surface.normals[kept] @ towards, 0.0, 1.0)
-    return corners[kept], near[kept], light[..., None] * np.array(surface.colour)
+    light = DIM + (1.0 - DIM) * (0.5 + 0.5 * surface.normals[kept] @ towards)
+    clear = np.exp(-1.0 / (HAZE * near[kept]))[..., None]
+    return corners[kept], near[kept], clear * light[..., None] * surface.colour + (1.0 - clear) * haze

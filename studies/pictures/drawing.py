@@ -9,7 +9,7 @@ from studies.pictures.shapes import Surface, arrow, rod
 
 SKY = np.array([[0.80, 0.87, 0.94], [0.985, 0.99, 1.0]])
 """Colour at the top and at the bottom of a picture."""
-THICKNESS = 0.035
+THICKNESS = 0.024
 """Half width of an arrow's head, by the height that the picture shows at its target."""
 GREY = (0.35, 0.37, 0.4)
 
@@ -24,8 +24,7 @@ def drawn(motion: Motion, stage: Stage, k: int, width: int, height: int) -> np.n
     thick = THICKNESS * height / stage.camera.pixels(height)
     arrows = [arrow(*line, thick, stage.kinds[own.kind].colour)
               for own, line in zip(motion.arrows, lines(motion, stage, k), strict=True)]  # fmt: skip
-    shade = np.linspace(*SKY, height)[:, None].repeat(width, axis=1)
-    return picture(stage.camera, [around + struts + bodies, [own for own in arrows if own]], width, height, shade)
+    return picture(stage.camera, [around + struts + bodies, [own for own in arrows if own]], width, height, SKY)
 
 
 def lines(motion: Motion, stage: Stage, k: int) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -4,7 +4,7 @@ Axes are those of the run, whatever they are; the camera's ``up`` says where up 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -44,6 +44,15 @@ class Kind:
 
 
 @dataclass(frozen=True)
+class Curve:
+    """What is plotted below the pictures: forces of one kind along a direction, and how that is called."""
+
+    kind: str
+    direction: tuple[float, float, float]
+    meaning: str
+
+
+@dataclass(frozen=True)
 class Strut:
     """A rod between points fixed to two bodies, in the bodies' axes."""
 
@@ -59,8 +68,7 @@ class Stage:
 
     shapes : surfaces of each body in its own axes; rest : its place when nothing moves; magnified : how many times as
     large displacements and turns from there are drawn (turning about the y of ``wheels`` apart, which is drawn as it
-    is); kinds : of the arrows; scenery : surfaces around at a time (s), in space; curves : label, unit and, of each
-    motion, values (f, curves) to plot below the pictures, with their names.
+    is); kinds : of the arrows; curve : plotted below; scenery : surfaces around at a time (s), in space.
     """
 
     title: str
@@ -69,11 +77,11 @@ class Stage:
     rest: dict[str, tuple[float, float, float]]
     camera: Camera
     kinds: dict[str, Kind]
+    curve: Curve
     scenery: Callable[[float], list[Surface]] = lambda time: []
     magnified: float = 1.0
     wheels: tuple[str, ...] = ()
     struts: tuple[Strut, ...] = ()
-    curves: tuple[str, ...] = field(default=())
 
 
 def gaps(one: Motion, two: Motion) -> tuple[float, float, float]:

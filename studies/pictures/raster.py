@@ -8,6 +8,16 @@ from models.compiled import njit
 
 
 @njit(cache=True, error_model="numpy")
+def within(start, growth, left, right):
+    """The part of columns from ``left`` to ``right`` in which start + column * growth is not negative."""
+    if growth > 0.0:
+        return max(left, -start / growth), right
+    if growth < 0.0:
+        return left, min(right, -start / growth)
+    return left, right if start >= 0.0 else left - 1.0
+
+
+@njit(cache=True, error_model="numpy")
 def paint(corners, near, colours, image, nearest):
     """Paint triangles into ``image`` (h, w, 3) where they lie before what is in ``nearest`` (h, w) already.
 
@@ -22,25 +32,24 @@ def paint(corners, near, colours, image, nearest):
         area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
         if area == 0.0:
             continue
-        left, right = max(0, math.ceil(min(x0, x1, x2))), min(width - 1, math.floor(max(x0, x1, x2)))
         top, bottom = max(0, math.ceil(min(y0, y1, y2))), min(height - 1, math.floor(max(y0, y1, y2)))
         for row in range(top, bottom + 1):
-            for column in range(left, right + 1):
-                one = ((column - x0) * (y2 - y0) - (x2 - x0) * (row - y0)) / area
-                two = ((x1 - x0) * (row - y0) - (column - x0) * (y1 - y0)) / area
-                zero = 1.0 - one - two
-                if zero < 0.0 or one < 0.0 or two < 0.0:
-                    continue
-                here = zero * near[k, 0] + one * near[k, 1] + two * near[k, 2]
+            # Shares of corners 1 and 2 at column 0, and their growth from column to column.
+            one, one_on = (-x0 * (y2 - y0) - (x2 - x0) * (row - y0)) / area, (y2 - y0) / area
+            two, two_on = ((x1 - x0) * (row - y0) + x0 * (y1 - y0)) / area, -(y1 - y0) / area
+            left, right = within(one, one_on, max(0.0, min(x0, x1, x2)), min(width - 1.0, max(x0, x1, x2)))
+            left, right = within(two, two_on, left, right)
+            left, right = within(1.0 - one - two, -one_on - two_on, left, right)
+            for column in range(math.ceil(left), math.floor(right) + 1):
+                b, c = one + column * one_on, two + column * two_on
+                a = 1.0 - b - c
+                here = a * near[k, 0] + b * near[k, 1] + c * near[k, 2]
                 if here > nearest[row, column]:
                     nearest[row, column] = here
                     for i in range(3):
-                        image[row, column, i] = (
-                            zero * colours[k, 0, i] + one * colours[k, 1, i] + two * colours[k, 2, i]
-                        )
+                        image[row, column, i] = a * colours[k, 0, i] + b * colours[k, 1, i] + c * colours[k, 2, i]
 
 
 def halved(image: np.ndarray) -> np.ndarray:
     """Image (h, w, 3) from one of twice the size: smooth edges."""
-    height, width = image.shape[0] // 2, image.shape[1] // 2
-    return image.reshape(height, 2, width, 2, 3).mean(axis=(1, 3))
+    return (image[::2, ::2] + image[1::2, ::2] + image[::2, 1::2] + image[1::2, 1::2]) / 4.0

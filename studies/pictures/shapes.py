@@ -57,7 +57,8 @@ def revolved(axial: Sequence[float], radii: Sequence[float], colour: Colour, alp
     ring = np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], 1)
     net = r[:, None, None] * ring + np.stack([0 * y, y, 0 * y], 1)[:, None]
     slopes = np.stack([np.diff(y), -np.diff(r)], 1)
-    slopes /= np.linalg.norm(slopes, axis=1, keepdims=True)
+    length = np.linalg.norm(slopes, axis=1, keepdims=True)
+    slopes /= np.where(length > 0, length, 1.0)
     surfaces = [_band(net[i : i + 2], slope[0] * ring + [0.0, slope[1], 0.0]) for i, slope in enumerate(slopes)]
     return Surface(*(np.concatenate(part) for part in zip(*surfaces, strict=True)), colour, alpha)
 
@@ -78,8 +79,15 @@ def extruded(outline: np.ndarray, width: float, colour: Colour, alpha: float = 1
     back = np.insert(outline, 1, width / 2.0, axis=1)
     fan = [np.stack([np.repeat(side[:1], len(side) - 2, 0), side[first:][: len(side) - 2], side[second:][: len(side) - 2]], 1)
            for side, first, second in ((front, 1, 2), (back, 2, 1))]  # fmt: skip
-    closed = np.stack([np.vstack([back, back[:1]]), np.vstack([front, front[:1]])])
+    closed = np.stack([np.vstack([front, front[:1]]), np.vstack([back, back[:1]])])
     return faceted(np.concatenate([*fan, _patches(closed)]), colour, alpha)
+
+
+def floor(z: float, colour: Colour, half: float = 150.0) -> Surface:
+    """A level square about the origin, of tiles: what is behind the eye is lost, near the origin little at a time."""
+    lines = half * np.sinh(np.linspace(-6.0, 6.0, 57)) / np.sinh(6.0)
+    x, y = np.meshgrid(lines, lines)
+    return sheet(np.stack([x, y, np.full_like(x, z)], -1), colour)
 
 
 def ball(radius: float, colour: Colour, alpha: float = 1.0) -> Surface:

@@ -8,21 +8,23 @@ from models.rail.joint_forces import JOINTS, to_joints
 from models.rail.wheel_forces import ANGLE, FX, FY, LOAD
 from models.rail.wheelset import CHOSEN, Wheelset
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, Kind, Motion, Stage
+from studies.pictures.film import Arrow, Curve, Kind, Motion, Stage
 from studies.pictures.poses import of_exudyn, of_mujoco
-from studies.pictures.shapes import Colour, Surface, box, extruded, revolved
+from studies.pictures.shapes import Colour, Surface, box, extruded, floor, revolved
 
-SPEED, SHIFT, CELLS, STEP = 45.0, 4e-3, 11, 5e-4
+SPEED, SHIFT, CELLS, STEP = 75.0, 5e-3, 11, 5e-4
 """Speed of travel (m/s), first lateral displacement (m), cells of FASTSIM, step (s)."""
 MAGNIFIED = 5.0
 SLEEPERS = 0.6
 """m from one sleeper to the next."""
 STEEL: Colour = (0.62, 0.66, 0.71)
 DARK: Colour = (0.42, 0.45, 0.5)
+BROWN: Colour = (0.45, 0.27, 0.16)
 RAIL: Colour = (0.66, 0.56, 0.5)
 CONCRETE: Colour = (0.72, 0.71, 0.68)
 BALLAST: Colour = (0.56, 0.54, 0.51)
-KINDS = {"normal force": Kind((0.0, 0.62, 0.45), 9e-6, 5e4), "creep force": Kind((0.84, 0.2, 0.0), 5e-5, 1e4)}
+KINDS = {"normal force": Kind((0.0, 0.62, 0.45), 8e-6, 5e4), "creep force": Kind((0.84, 0.2, 0.0), 1.2e-4, 2e3)}
+CURVE = Curve("creep force", (0.0, 1.0, 0.0), "across the track, to the right")
 SIDES = {"right": RIGHT, "left": LEFT}
 
 
@@ -77,10 +79,10 @@ def _place(w: Wheelset, side: float, state: np.ndarray) -> np.ndarray:
 
 def stage(wheelset: Wheelset) -> Stage:
     """Wheelset, rails and sleepers, seen from ahead and to the right; z down."""
-    camera = Camera((3.0, 1.75, -1.25), (0.0, 0.0, 0.06), (0.0, 0.0, -1.0), 0.56)
+    camera = Camera((2.75, 1.75, -0.95), (0.0, 0.06, 0.04), (0.0, 0.0, -1.0), 0.5)
     caption = f"displacements drawn {MAGNIFIED:g} times as large; forces on the wheels"
     return Stage(f"Wheelset at {SPEED:g} m/s on straight rails", caption, {"wheelset": shapes(wheelset)},
-                 {"wheelset": (0.0, 0.0, 0.0)}, camera, KINDS, lambda time: track(wheelset, SPEED * time), MAGNIFIED,
+                 {"wheelset": (0.0, 0.0, 0.0)}, camera, KINDS, CURVE, lambda time: track(wheelset, SPEED * time), MAGNIFIED,
                  ("wheelset",))  # fmt: skip
 
 
@@ -97,16 +99,15 @@ def shapes(w: Wheelset) -> list[Surface]:
         if side < 0:
             across, radii = -across[::-1], radii[::-1]
         found.append(revolved(across, radii, STEEL, pieces=72))
-        spots = [box(0.05, 0.02, 0.05, DARK).at(0.28 * np.cos(a), side * (w.half_gauge + 0.012), 0.28 * np.sin(a))
-                 for a in np.arange(5) * 2.0 * np.pi / 5.0]  # fmt: skip
-        found += spots
+        found += [box(0.09, 0.03, 0.09, BROWN).at(0.28 * np.cos(a), side * (w.half_gauge + y), 0.28 * np.sin(a))
+                  for a in np.arange(6) * np.pi / 3.0 for y in (0.016, -inner - 0.02)]  # fmt: skip
     return found
 
 
 def track(w: Wheelset, way: float) -> list[Surface]:
     """Rails, sleepers and ballast after a way (m)."""
     found = []
-    first, last, top = -2.6, 1.9, w.radius
+    first, last, top = -24.0, 2.4, w.radius
     for side in (1.0, -1.0):
         y = side * w.half_gauge
         head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])
@@ -116,7 +117,7 @@ def track(w: Wheelset, way: float) -> list[Surface]:
     phase = way % SLEEPERS
     for i in range(int(np.ceil(first / SLEEPERS)), int(np.floor(last / SLEEPERS)) + 1):
         found.append(box(0.24, 2.5, 0.1, CONCRETE).at(i * SLEEPERS - phase + 0.3, 0.0, top + 0.22))
-    found.append(box(9.0, 9.0, 0.02, BALLAST).at(-1.0, 0.0, top + 0.25))
+    found.append(floor(top + 0.24, BALLAST))
     return found
 
 

@@ -1,0 +1,54 @@
+"""Pictures of a vehicle that moves, as each engine reports it, with the forces on it: stills and a film."""
+
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from studies.figures import LABELS
+from studies.pictures.page import Page, difference, eight_bits
+from studies.pictures.scene import PictureScene
+from studies.pictures.video import missing, still, write
+
+SYSTEM = "pictures"
+Progress = Callable[[str, float], None]
+SIZE = 1280, 800
+"""Pixels of an engine's own still."""
+RUN = 0.2
+"""Share of the time that the runs take, for the progress bar."""
+
+
+def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Run the vehicle in each engine and draw it; saves ``page.png``, a still of each engine and ``film.mp4``."""
+    from studies.pictures.drawing import drawn
+
+    progress(f"{scene.vehicle} in {', '.join(LABELS[engine] for engine in engines)}", 0.0)
+    film, vehicle = scene.film, import_module(f"studies.pictures.{scene.vehicle}")
+    stage, motions = vehicle.filmed(film.duration, film.times(), engines)
+    page = Page(stage, motions)
+    best = page.tallest()
+    written = [still(folder / "page.png", page.frame(best))]
+    for motion in motions:
+        image = eight_bits(drawn(motion, stage, best, *SIZE))
+        written.append(still(folder / f"{motion.engine}.png", image))
+    said = missing(film.format)
+    if film.format != "png" and not said:
+        frames = _told(page.frames(), film.frames, progress)
+        written.append(write(folder / f"film.{film.format}", frames, film.frames_per_second))
+    table = [f"  {difference(motions)}", f"  {', '.join(path.name for path in written)}", *([f"  {said}"] if said else [])]
+    return {"scene": scene.title, "folder": str(folder), "failed": {}, "frames": film.frames, "table": table}
+
+
+def _told(frames: Iterator[np.ndarray], count: int, progress: Progress) -> Iterator[np.ndarray]:
+    """The frames, each of which moves the progress bar."""
+    for k, frame in enumerate(frames):
+        progress(f"frame {k + 1} of {count}", RUN + (1.0 - RUN) * k / count)
+        yield frame
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("animation")

@@ -1,0 +1,127 @@
+"""The page of a film: each engine's picture, the forces' scale, their course, and how far the engines differ."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrow
+
+from studies.figures import COLOURS, LABELS
+from studies.pictures.drawing import drawn
+from studies.pictures.film import Motion, Stage, gaps
+
+WIDTH, HEIGHT = 1280, 720
+EDGE, TOP, TALL = 12, 66, 400
+"""Pixels: margin, height of the title, height of the pictures."""
+
+
+class Page:
+    """A page of 1280 x 720 pixels on which one frame after the other is drawn."""
+
+    def __init__(self, stage: Stage, motions: list[Motion]) -> None:
+        self.stage, self.motions = stage, motions
+        self._wide = (WIDTH - EDGE * (len(motions) + 1)) // len(motions)
+        self._figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100, layout="none")
+        self._canvas = FigureCanvasAgg(self._figure)
+        self._head()
+        self._legend()
+        axes = self._curves()
+        self._clock = self._figure.text(1 - EDGE / WIDTH, 0.96, "", ha="right", fontsize=13, family="monospace")
+        self._cursor = axes.axvline(0.0, color="#222222", lw=1.2)
+        for artist in (self._clock, self._cursor):
+            artist.set_animated(True)
+        self._canvas.draw()
+        self._still = self._canvas.copy_from_bbox(self._figure.bbox)
+
+    def frames(self) -> Iterator[np.ndarray]:
+        """All pages (720, 1280, 3), 8 bits a colour."""
+        return (self.frame(k) for k in range(len(self.motions[0].times)))
+
+    def frame(self, k: int) -> np.ndarray:
+        """One page."""
+        time, canvas = float(self.motions[0].times[k]), self._canvas
+        canvas.restore_region(self._still)
+        self._clock.set_text(f"t = {time:.3f} s")
+        self._cursor.set_xdata([time, time])
+        for artist in (self._clock, self._cursor):
+            self._figure.draw_artist(artist)
+        page = np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        for i, motion in enumerate(self.motions):
+            left = EDGE + i * (self._wide + EDGE)
+            page[TOP : TOP + TALL, left : left + self._wide] = eight_bits(
+                drawn(motion, self.stage, k, self._wide, TALL))
+        return page
+
+    def tallest(self) -> int:
+        """The frame in which the plotted forces are largest."""
+        return int(np.abs(self._values(self.motions[0])[0]).sum(axis=1).argmax())
+
+    def _values(self, motion: Motion) -> tuple[np.ndarray, list[str]]:
+        """Plotted forces (f, arrows) in kN, and their names."""
+        own = [arrow for arrow in motion.arrows if arrow.kind == self.stage.curve.kind]
+        names = [arrow.name.rpartition(", ")[2] for arrow in own]
+        return np.column_stack([arrow.vectors @ self.stage.curve.direction for arrow in own]) / 1e3, names
+
+    def _head(self) -> None:
+        self._figure.text(EDGE / WIDTH, 0.96, self.stage.title, fontsize=15, weight="bold")
+        for i, motion in enumerate(self.motions):
+            left = EDGE + i * (self._wide + EDGE)
+            self._figure.text(left / WIDTH, 1 - (TOP - 5) / HEIGHT, LABELS[motion.engine], fontsize=12, weight="bold",
+                              color=COLOURS[motion.engine], va="bottom")  # fmt: skip
+
+    def _legend(self) -> None:
+        """An arrow of each kind as long as its round force is at the camera's target, and what is drawn."""
+        row, left = 1 - (TOP + TALL + 20) / HEIGHT, EDGE
+        for name, kind in self.stage.kinds.items():
+            length = kind.scale * kind.legend * self.stage.camera.pixels(TALL)
+            self._figure.add_artist(FancyArrow(
+                left, row * HEIGHT, length, 0.0, width=3.5, head_width=12, head_length=min(15, length), transform=None,
+                length_includes_head=True, color=kind.colour, lw=0))  # fmt: skip
+            text = self._figure.text((left + length + 8) / WIDTH, row, f"{name}, {kind.legend / 1e3:g} kN", va="center")
+            left += length + 8 + text.get_window_extent().width + 34
+        self._figure.text(1 - EDGE / WIDTH, row, self.stage.caption, ha="right", va="center")
+
+    def _curves(self):
+        """Axes with the plotted forces: a line of the first engine, dots of the second one."""
+        axes = self._figure.add_axes((70 / WIDTH, 62 / HEIGHT, 1 - 82 / WIDTH, 140 / HEIGHT))
+        values, names = self._values(self.motions[0])
+        times, every = self.motions[0].times, max(1, len(self.motions[0].times) // 60)
+        for i, name in enumerate(names):
+            axes.plot(times, values[:, i], color=TONES[i % len(TONES)], label=name)
+        for motion in self.motions[1:]:
+            for i in range(len(names)):
+                axes.plot(times[::every], self._values(motion)[0][::every, i], "o", ms=3, color=TONES[i % len(TONES)])
+        axes.set_xlim(times[0], times[-1] if times[-1] > times[0] else times[0] + 1.0)
+        axes.set_ylabel(f"{self.stage.curve.kind} [kN]")
+        axes.set_title(f"{self.stage.curve.kind.capitalize()} {self.stage.curve.meaning}{self._marks()}")
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(names))
+        self._figure.text(1 - EDGE / WIDTH, 12 / HEIGHT, self._difference(), ha="right", fontsize=9.5)
+        self._figure.text(70 / WIDTH, 12 / HEIGHT, "time [s]", fontsize=9.5)
+        return axes
+
+    def _marks(self) -> str:
+        if len(self.motions) == 1:
+            return ""
+        one, two = (LABELS[motion.engine] for motion in self.motions)
+        return f": lines {one}, dots {two}"
+
+    def _difference(self) -> str:
+        return difference(self.motions)
+
+
+TONES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+
+
+def difference(motions: list[Motion]) -> str:
+    """How far two engines differ over the whole film, in words; who drew it, for one."""
+    if len(motions) == 1:
+        return f"poses as {LABELS[motions[0].engine]} reports them"
+    places, turns, forces = gaps(*motions)
+    return ("poses as each engine reports them; largest difference over the film: "
+            f"places {places:.1e} m, rotations {turns:.1e} rad, forces {forces:.1e} N")  # fmt: skip
+
+
+def eight_bits(image: np.ndarray) -> np.ndarray:
+    """Colours from 0 to 1 as bytes."""
+    return (255.0 * image.clip(0.0, 1.0) + 0.5).astype(np.uint8)

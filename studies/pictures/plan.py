@@ -1,0 +1,18 @@
+"""What a scene of pictures will draw: printed by ``twinrig show``, checked before any run."""
+
+from studies.pictures.scene import PictureScene
+from studies.pictures.video import missing
+
+
+def check(scene: PictureScene, engines: tuple[str, ...]) -> None:
+    """Nothing is left to refuse: the scene's tables say it all."""
+
+
+def describe(scene: PictureScene) -> str:
+    """The scene's plan as text."""
+    film = scene.film
+    shown = f"{film.duration:g} s of the run in {film.frames} frames, {film.frames / film.frames_per_second:g} s of film"
+    lines = [scene.title, f"  scene      {scene.file}, study {scene.study}", f"  vehicle    {scene.vehicle}",
+             f"  film       {shown}, {film.format}"]  # fmt: skip
+    said = missing(film.format)
+    return "\n".join([*lines, f"  note       {said}"] if said else lines)

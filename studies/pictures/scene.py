@@ -1,0 +1,51 @@
+"""Scenes of pictures: which vehicle is drawn, of which run, and how the film runs."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from models.errors import InputError
+from models.scene_file import SceneFile, checked
+from models.strict import Strict, quantity
+
+MOST_FRAMES = 3000
+"""Two minutes of film; each frame takes a fifth of a second to draw."""
+
+
+class Film(Strict):
+    """[film]: how long a run is shown, and how."""
+
+    duration: float = quantity("s", "of the run that is shown")
+    slow_motion: float = Field(default=1.0, gt=0, le=1000, description="seconds of film per second of the run")
+    frames_per_second: int = Field(default=25, ge=1, le=60, description="of the film")
+    format: Literal["mp4", "gif", "png"] = Field(default="mp4", description="png: stills only")
+
+    def times(self) -> np.ndarray:
+        """Times (s) of the frames within the run, the first one at 0."""
+        return np.arange(self.frames) / (self.slow_motion * self.frames_per_second)
+
+    @property
+    def frames(self) -> int:
+        """Number of frames: one per interval of the film."""
+        return max(1, round(self.duration * self.slow_motion * self.frames_per_second))
+
+
+class PictureScene(SceneFile):
+    """One scene of pictures."""
+
+    system: Literal["pictures"] = "pictures"
+    study: str = Field(default="animation", description="the study that runs the scene")
+    vehicle: Literal["wheelset", "pitch_plane", "r19_free"] = Field(description="what is drawn")
+    film: Film
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> PictureScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(PictureScene, table, file, folder)
+    if scene.film.frames > MOST_FRAMES:
+        raise InputError(file, "film.duration", scene.film.duration, f"makes {scene.film.frames} frames (duration x slow "
+                         f"motion x frames per second) of at most {MOST_FRAMES}: show less of the run")  # fmt: skip
+    return scene

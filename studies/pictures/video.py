@@ -1,0 +1,37 @@
+"""Frames to a file: MP4 or GIF by the extra ``video``; stills always."""
+
+from collections.abc import Iterable
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+from matplotlib.image import imsave
+
+PACKAGES = ("imageio", "imageio_ffmpeg")
+
+
+def missing(form: str) -> str:
+    """A sentence that names the extra where a film of this format needs it and it is not there; else empty."""
+    if form == "png" or all(find_spec(name) for name in PACKAGES):
+        return ""
+    return f"no {form} is written without the extra 'video': pip install 'twinrig[video]'; the stills need nothing"
+
+
+def write(path: Path, frames: Iterable[np.ndarray], per_second: int) -> Path:
+    """Write frames (h, w, 3) of 8 bits a colour to ``path``, .mp4 or .gif, one at a time."""
+    import imageio.v2 as imageio
+
+    if path.suffix == ".gif":
+        options = {"duration": 1000.0 / per_second, "loop": 0}
+    else:
+        options = {"fps": per_second, "codec": "libx264", "quality": 7}
+    with imageio.get_writer(path, **options) as writer:
+        for frame in frames:
+            writer.append_data(frame)
+    return path
+
+
+def still(path: Path, image: np.ndarray) -> Path:
+    """Write one image (h, w, 3) to a PNG file, the same bytes from the same image."""
+    imsave(path, np.ascontiguousarray(image), metadata={"Software": None})
+    return path
