@@ -25,7 +25,8 @@ COLUMNS: dict[str, tuple[str, Callable[[Place], float]]] = {
     "angle": ("deg", lambda p: float(np.degrees(-p.centre_angle))), "normal": ("kN", lambda p: 1e-3 * p.normal),
     "peak": ("MPa", lambda p: 1e-6 * p.peak), "area": ("mm^2", lambda p: 1e6 * p.area),
     "half_length": ("mm", lambda p: 5e2 * p.length), "half_width": ("mm", lambda p: 5e2 * p.width),
-    "rolling_radius": ("mm", lambda p: 1e3 * p.rolling_radius), "touch_on_rail": ("mm", lambda p: 1e3 * (p.touch_y - p.top)),
+    "rolling_radius": ("mm", lambda p: 1e3 * p.rolling_radius),
+    "touch_on_rail": ("mm", lambda p: 1e3 * (p.touch_y - p.top)),
     "touch_on_wheel": ("mm", lambda p: 1e3 * p.wheel_y), "touch_angle": ("deg", lambda p: float(np.degrees(-p.angle))),
     "fx": ("kN", lambda p: 1e-3 * p.fx), "fy": ("kN", lambda p: 1e-3 * p.fy), "mz": ("N m", lambda p: p.mz),
     "xi_x": ("-", lambda p: p.xi_x), "xi_y": ("-", lambda p: p.xi_y), "spin": ("1/m", lambda p: p.spin),
@@ -94,7 +95,8 @@ def _save(name: str, found: list[Placed], folder: Path) -> None:
     write_table(folder / f"{name}.csv", {key: (unit, np.array([one[key] for one in answers]))
                                          for key, unit in POSITION.items()})  # fmt: skip
     for wheel in WHEELS:
-        lines = [{"shift": one["shift"], "patch": k, **patch} for one in answers for k, patch in enumerate(one[wheel], 1)]
+        lines = [{"shift": one["shift"], "patch": k, **patch}
+                 for one in answers for k, patch in enumerate(one[wheel], 1)]  # fmt: skip
         units = {"shift": "mm", "patch": "-", **{key: unit for key, (unit, _) in COLUMNS.items()}}
         write_table(folder / f"{name}_{wheel}.csv", {key: (unit, np.array([line[key] for line in lines]))
                                                      for key, unit in units.items()})  # fmt: skip
@@ -104,9 +106,9 @@ HEADS = {"on_rail": "8.2f", "on_wheel": "8.2f", "angle": "7.2f", "normal": "8.3f
          "half_length": "6.2f", "half_width": "6.2f", "fx": "7.3f", "fy": "7.3f"}  # fmt: skip
 """Columns that are printed, and how."""
 NOTES = [
-    "  of the centre of pressure: on the rail from its highest point, on the wheel from the taping line (mm, outwards),",
-    "  angle of the surface (deg, down towards the middle); N normal, Fx Fy on the wheel, Fy outwards (kN); peak (MPa);",
-    "  area (mm^2); a, b: half its length and width (mm); dr: rolling radius of the right wheel less the left one's (mm)",
+    "  centre of pressure: on the rail from its highest point, on the wheel from the taping line, outwards (mm);",
+    "  angle of the rail there (deg, down towards the middle); N: normal; Fx, Fy: on the wheel, out (kN); peak (MPa);",
+    "  area (mm^2); a, b: half its length and width (mm); dr: rolling radius, right less left (mm)",
 ]
 
 

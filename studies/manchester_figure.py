@@ -1,4 +1,4 @@
-"""Picture of a wheelset's contact over its lateral displacement: places, angles, forces and pressures of both wheels."""
+"""Picture of a held wheelset's contact over its displacement: places, angles, forces, pressures of both wheels."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -47,5 +47,5 @@ def _points(axis: plt.Axes, placed: list[Placed], wheel: str, value: Callable[[P
         return
     shift, values, half = np.array(points).T
     colour = COLOURS[k % len(COLOURS)]
-    axis.errorbar(shift, values, yerr=half if wide else None, fmt="os"[k % 2], markersize=4, color=colour, linewidth=1.6,
-                  markerfacecolor=colour if k == 0 else "white", label=label)  # fmt: skip
+    axis.errorbar(shift, values, yerr=half if wide else None, fmt="os"[k % 2], markersize=4, color=colour,
+                  linewidth=1.6, markerfacecolor=colour if k == 0 else "white", label=label)  # fmt: skip

@@ -89,8 +89,8 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Wh
 def _check_case(scene: WheelRailScene, name: str, case: Case) -> None:
     largest = float(np.abs(case.yaw * scene.positions.values()).max())
     if largest > LARGEST_YAW:
-        raise InputError(scene.file, f"cases.{name}.yaw", case.yaw, f"turns the wheelset by {largest:.3g} rad, more than "
-                         f"{LARGEST_YAW:g}: the yaw is in rad for each metre of displacement")  # fmt: skip
+        raise InputError(scene.file, f"cases.{name}.yaw", case.yaw, f"turns the wheelset by {largest:.3g} rad, more "
+                         f"than {LARGEST_YAW:g}: the yaw is in rad for each metre of displacement")  # fmt: skip
     if case.friction > LARGEST_FRICTION:
         raise InputError(scene.file, f"cases.{name}.friction", case.friction, f"must be at most {LARGEST_FRICTION:g}")
 

@@ -37,6 +37,7 @@ BENCHMARK_YAW = 2.4
 """rad of yaw for each m of lateral displacement in case A-2."""
 BENCHMARK_LOAD, BENCHMARK_SPEED, BENCHMARK_FRICTION = 1.0e4, 2.0, 0.3
 """N on each wheel; m/s; coefficient of friction."""
+Triple = tuple[float, float, float]
 ROLLS = 3
 """Times that the roll angle is found anew with the approaches of both wheels."""
 ITERATIONS = 60
@@ -52,11 +53,13 @@ CLIMBED = 2e-3
 
 @dataclass(frozen=True)
 class Place:
-    """One patch of one wheel; the left wheel as in a mirror, so that y and fy point away from the track's middle.
+    """One piece of a wheel's contact area: a patch, or several that have grown together.
+
+    The left wheel as in a mirror, so that y and fy point away from the track's middle.
 
     touch_y, y : first touch and centre of pressure, on the rail from the middle of the track (m). top : the rail's
-    highest point, likewise (m). x : of the centre of pressure, ahead of the axle's middle (m). wheel_y : of first touch,
-    on the wheel from the taping line (m). angle, centre_angle : of the rail's surface at first touch and at the centre
+    highest point, likewise (m). x : of the centre of pressure, ahead of the axle (m). wheel_y : of first touch, on the
+    wheel from the taping line (m). angle, centre_angle : of the rail's surface at first touch and at the centre
     of pressure (rad), negative where it falls towards the middle. rolling_radius : at first touch (m). below_tip : of
     first touch below the tip of the flange (m). curvature_x, curvature_y : second derivatives of the undeformed
     distance there, along and across (1/m). normal : N. fx, fy : creep forces on the wheel (N), mz : N m. xi_x, xi_y,
@@ -110,18 +113,16 @@ class Placed:
 class Carried:
     """One wheel under its load: each patch pressed, and what rolling does to it (N, N, N m), in a mirror if left.
 
-    approach : vertical (m). normal : vertical part of the normal forces (N). moment : of the creep forces about the
-    axle (N m).
+    approach : vertical (m). normal : vertical part of the normal forces (N).
     """
 
     touches: list[Touch]
     pressed: NormalContact
-    creepages: list[tuple[float, float, float]]
-    forces: list[tuple[float, float, float]]
+    creepages: list[Triple]
+    forces: list[Triple]
     shares: list[Share]
     approach: float
     normal: float
-    moment: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +152,7 @@ class Contact:
             span = right.touches[0].wheel_y + left.touches[0].wheel_y + 2.0 * side.wheelset.arm
             pose = replace(pose, roll=placed(side, shift, yaw).roll + (right.approach - left.approach) / span)
             if self.friction > 0.0:
-                rolling = self._free_spin(side, poses, touches)
+                rolling = self._free_spin(side, poses, (right, left))
         poses, touches = self._touching(side, pose)
         near = self._both(side, poses, touches, rolling)
         right, left = (self._exact(side, *one) for one in zip(poses, touches, near, strict=True))
@@ -168,12 +169,19 @@ class Contact:
     def _both(self, side: Side, poses: list[Pose], touches: list[list[Touch]], spin: float) -> list[Carried]:
         return [self._carried(side, one, found, spin) for one, found in zip(poses, touches, strict=True)]
 
-    def _free_spin(self, side: Side, poses: list[Pose], touches: list[list[Touch]]) -> float:
-        """Speed of spin (rad/s) at which the creep forces have no moment about the axle."""
+    def _free_spin(self, side: Side, poses: list[Pose], wheels: tuple[Carried, Carried]) -> float:
+        """Speed of spin (rad/s) at which the creep forces have no moment about the axle, pressed as the wheels are."""
+
+        def of(pose: Pose, one: Carried, spin: float) -> float:
+            creepages = [self._creepage(side, pose, touch, spin) for touch in one.touches]
+            loads = [_load(one.pressed, touch) for touch in one.touches]
+            return self._rolled(side, pose, one.touches, one.pressed, creepages, loads)[2]
+
+        def moment(spin: float) -> float:
+            return sum(of(pose, one, spin) for pose, one in zip(poses, wheels, strict=True))
+
         rolling = -self.speed / side.wheelset.radius
-        bounds = (rolling * (1.0 - SLIDE), rolling * (1.0 + SLIDE))
-        return float(brentq(lambda spin: sum(one.moment for one in self._both(side, poses, touches, spin)), *bounds,
-                            xtol=1e-6))  # fmt: skip
+        return float(brentq(moment, rolling * (1.0 - SLIDE), rolling * (1.0 + SLIDE), xtol=1e-6))
 
     def _carried(self, side: Side, pose: Pose, touches: list[Touch], spin: float) -> Carried:
         """One wheel by the simplified theory, with normal forces such that they and the creep forces carry its load."""
@@ -181,10 +189,10 @@ class Contact:
         normal = self.load
         for _ in range(ITERATIONS):
             pressed = press([touch.patch for touch in touches], self.pair, load=normal)
-            loads = [part.load if (part := _part(pressed, touch)) else 0.0 for touch in touches]
-            forces, lifted, moment = self._rolled(side, pose, touches, pressed, creepages, loads)
+            loads = [_load(pressed, touch) for touch in touches]
+            forces, lifted, _ = self._rolled(side, pose, touches, pressed, creepages, loads)
             if abs(normal - lifted - self.load) < PRECISION * self.load:
-                return Carried(touches, pressed, creepages, forces, [], pressed.approach, normal, moment)
+                return Carried(touches, pressed, creepages, forces, [], pressed.approach, normal)
             normal *= self.load / (normal - lifted)
         raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
 
@@ -194,15 +202,15 @@ class Contact:
         for _ in range(ITERATIONS):
             shares, approach = press_exactly(patches, near.pressed.patches, normal, near.approach, self.pair)
             loads = [share.load for share in shares]
-            forces, lifted, moment = self._rolled(side, pose, touches, near.pressed, near.creepages, loads)
+            forces, lifted, _ = self._rolled(side, pose, touches, near.pressed, near.creepages, loads)
             if abs(normal - lifted - self.load) < PRECISION * self.load:
-                return Carried(touches, near.pressed, near.creepages, forces, shares, approach, normal, moment)
+                return Carried(touches, near.pressed, near.creepages, forces, shares, approach, normal)
             normal *= self.load / (normal - lifted)
         raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
 
     def _rolled(self, side: Side, pose: Pose, touches: list[Touch], pressed: NormalContact,
-                creepages: list[tuple[float, float, float]], loads: list[float]
-                ) -> tuple[list[tuple[float, float, float]], float, float]:  # fmt: skip
+                creepages: list[Triple], loads: list[float]
+                ) -> tuple[list[Triple], float, float]:  # fmt: skip
         """Creep forces of each patch, the vertical part of their sum, upwards on the rail, and moment about the axle.
 
         A patch that the simplified theory leaves without contact has none.
@@ -219,7 +227,7 @@ class Contact:
         lifted = sum(force[1] * math.sin(touch.angle) for force, touch in zip(forces, touches, strict=True))
         return forces, lifted, sum(_moment(side, pose, *one) for one in zip(touches, forces, strict=True))
 
-    def _creepage(self, side: Side, pose: Pose, touch: Touch, spin: float) -> tuple[float, float, float]:
+    def _creepage(self, side: Side, pose: Pose, touch: Touch, spin: float) -> Triple:
         """Creepages and spin (1/m) at a place of first touch."""
         if self.friction == 0.0:
             return 0.0, 0.0, 0.0
@@ -290,11 +298,16 @@ def _arm(side: Side, pose: Pose, touch: Touch) -> np.ndarray:
     return pose.turn @ np.array([touch.x, side.wheelset.arm + touch.wheel_y, down])
 
 
-def _moment(side: Side, pose: Pose, touch: Touch, force: tuple[float, float, float]) -> float:
+def _moment(side: Side, pose: Pose, touch: Touch, force: Triple) -> float:
     """Moment (N m) of a patch's creep forces about the axle."""
     across, into = _axes(touch)
     whole = force[0] * np.array([1.0, 0.0, 0.0]) + force[1] * across
     return float(pose.turn[:, 1] @ (np.cross(_arm(side, pose, touch), whole) + force[2] * into))
+
+
+def _load(pressed: NormalContact, touch: Touch) -> float:
+    part = _part(pressed, touch)
+    return 0.0 if part is None else part.load
 
 
 def _part(pressed: NormalContact, touch: Touch) -> PatchPressure | None:
@@ -302,21 +315,29 @@ def _part(pressed: NormalContact, touch: Touch) -> PatchPressure | None:
 
 
 def _places(side: Side, carried: Carried) -> tuple[Place, ...]:
-    """What a wheel's patches report, those that carry something."""
-    rows = zip(carried.touches, carried.creepages, carried.forces, carried.shares, strict=True)
-    return tuple(_place(side, touch, creep, force, share, carried.approach)
-                 for touch, creep, force, share in rows if share.load > 0.0)  # fmt: skip
+    """What a wheel's patches report, those that carry something; patches that have grown together as one."""
+    rows = list(zip(carried.touches, carried.creepages, carried.forces, carried.shares, strict=True))
+    pieces = dict.fromkeys(share.piece for *_, share in rows if share.load > 0.0)
+    return tuple(_place(side, [row for row in rows if row[-1].piece == piece and row[-1].load > 0.0], carried.approach)
+                 for piece in pieces)  # fmt: skip
 
 
-def _place(side: Side, touch: Touch, creep: tuple[float, float, float], force: tuple[float, float, float], share: Share,
-           approach: float) -> Place:  # fmt: skip
+def _place(side: Side, rows: list[tuple[Touch, Triple, Triple, Share]], approach: float) -> Place:
+    """One piece of the contact area: first touch and creepages are those of the patch that carries most."""
+    touch, creep, _, _ = max(rows, key=lambda row: row[-1].load)
     top = float(side.rail.y[np.argmin(side.rail.z)])
-    touch_y = touch.rail_y + top
-    y = touch_y + share.y * math.cos(touch.angle)
+    loads = np.array([share.load for *_, share in rows])
+    y, x = (float(np.average(values, weights=loads)) for values in zip(
+        *((one.rail_y + top + share.y * math.cos(one.angle), one.x + share.x) for one, _, _, share in rows),
+        strict=True))  # fmt: skip
+    forces = np.sum([force for _, _, force, _ in rows], axis=0)
+    boxes = np.array([share.box for *_, share in rows])
+    length, width = (float(boxes[:, k + 1].max() - boxes[:, k].min()) for k in (0, 2))
     tip = float(side.wheel.z.max() - side.wheel.curve(touch.wheel_y))
-    return Place(touch_y, y, top, touch.x + share.x, touch.wheel_y, touch.angle, math.atan(float(side.rail.curve(y, 1))),
-                 _radius(side, touch), tip, *_curvatures(touch.patch.distance), share.load, *force, *creep, share.peak,
-                 share.area, share.length, share.width, approach)  # fmt: skip
+    return Place(touch.rail_y + top, y, top, x, touch.wheel_y, touch.angle, math.atan(float(side.rail.curve(y, 1))),
+                 _radius(side, touch), tip, *_curvatures(touch.patch.distance), float(loads.sum()),
+                 *(float(force) for force in forces), *creep, max(share.peak for *_, share in rows),
+                 sum(share.area for *_, share in rows), length, width, approach)  # fmt: skip
 
 
 def _curvatures(distance: Distance) -> tuple[float, float]:

@@ -9,10 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import label
 
 from models.contact.material import Pair
 from models.contact.normal_problem import centres, solve_normal
-from models.contact.patches import Patch
+from models.contact.patches import Box, Patch
 from models.contact.simplified_theory import PatchPressure
 from models.errors import InputError, RunFailed
 
@@ -28,16 +29,20 @@ PRECISION, ITERATIONS = 1e-6, 30
 
 @dataclass(frozen=True)
 class Share:
-    """What one patch carries. load : N, along its normal. x, y : centre of pressure from its place (m). area : m^2.
-    length, width : of the rectangle about the area, along the rail and across (m). peak : Pa."""
+    """What one patch carries.
+
+    load : N, along its normal. x, y : centre of pressure from its place (m). area : m^2. box : sides x0, x1, y0, y1 of
+    the rectangle about the area, along the rail and along its contour (m). peak : Pa. piece : number of the piece of
+    the contact area in which the patch has its peak; patches that have grown together are of one piece.
+    """
 
     load: float
     x: float
     y: float
     area: float
-    length: float
-    width: float
+    box: Box
     peak: float
+    piece: int
 
 
 def press_exactly(patches: Sequence[Patch], near: Sequence[PatchPressure], load: float, approach: float, pair: Pair
@@ -71,7 +76,8 @@ def _pressed(patches: Sequence[Patch], near: Sequence[PatchPressure], load: floa
         close = abs(vertical / load - 1.0) < PRECISION and abs(reached / approach - 1.0) < PRECISION
         whole, approach = whole * load / vertical, reached
         if close:
-            return [_share(solved.pressure * (owner == k), x, y - patch.place, cell)
+            pieces, _ = label(solved.contact, np.ones((3, 3)))
+            return [_share(solved.pressure * (owner == k), x, y, patch.place, cell, pieces)
                     for k, patch in enumerate(patches)], approach  # fmt: skip
     raise RunFailed("joined patches", "the patches' shares of the load were not found")
 
@@ -98,15 +104,18 @@ def _height(patch: Patch, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return found
 
 
-def _share(pressure: np.ndarray, x: np.ndarray, y: np.ndarray, cell: float) -> Share:
+def _share(pressure: np.ndarray, x: np.ndarray, y: np.ndarray, place: float, cell: float, pieces: np.ndarray) -> Share:
+    """Share of a patch at a place on the contour (m), of which ``pressure`` is zero elsewhere."""
     total = float(pressure.sum())
     if total == 0.0:
-        return Share(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    length, width = (_extent(at, (pressure > 0.0).any(axis=axis)) for axis, at in enumerate((x, y)))
-    return Share(total * cell, float((pressure.sum(axis=0) @ x) / total), float((pressure.sum(axis=1) @ y) / total),
-                 float(np.count_nonzero(pressure) * cell), length, width, float(pressure.max()))  # fmt: skip
+        return Share(0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0), 0.0, 0)
+    box = (*_ends(x, (pressure > 0.0).any(axis=0)), *_ends(y, (pressure > 0.0).any(axis=1)))
+    return Share(total * cell, float((pressure.sum(axis=0) @ x) / total),
+                 float((pressure.sum(axis=1) @ y) / total) - place, float(np.count_nonzero(pressure) * cell), box,
+                 float(pressure.max()), int(pieces.flat[np.argmax(pressure)]))  # fmt: skip
 
 
-def _extent(at: np.ndarray, inside: np.ndarray) -> float:
-    """Way (m) from the first to the last cell inside, both included."""
-    return float(np.ptp(at[inside]) + at[1] - at[0])
+def _ends(at: np.ndarray, inside: np.ndarray) -> tuple[float, float]:
+    """Outer sides (m) of the first and the last cell inside."""
+    half = (at[1] - at[0]) / 2.0
+    return float(at[inside][0] - half), float(at[inside][-1] + half)
