@@ -27,7 +27,7 @@ def prescribe(assembly: Assembly, effect: str, p: Any, mode: Mode,
     _check_scene(scene, columns)
     values, period = read_time_series(scene.path(p.file, f"effects.{effect}.file"), columns)
     if p.bandwidth is not None:
-        values = _smoothed(values, period, p.bandwidth, scene.file, f"effects.{effect}.bandwidth")
+        values = smoothed(values, period, p.bandwidth, scene.file, f"effects.{effect}.bandwidth")
     motion = Smooth(values, period, derivatives=2, degree=5)
     if motion.end < scene.run.duration * (1 - 1e-9):
         raise InputError(scene.file, f"effects.{effect}.file", p.file,
@@ -47,7 +47,7 @@ def _check_scene(scene: Any, columns: Mapping[str, Any]) -> None:
                          "prescribed, and its file says where it starts: drop this key")
 
 
-def _smoothed(values: np.ndarray, period: float, bandwidth: float, file: str, place: str) -> np.ndarray:
+def smoothed(values: np.ndarray, period: float, bandwidth: float, file: str, place: str) -> np.ndarray:
     """Samples (n, columns) through a Butterworth low-pass forward and backward: no delay, half the amplitude at
     ``bandwidth`` (Hz), an eighth order in all.
 

@@ -1,0 +1,134 @@
+"""A vehicle cut at its wheels in an engine: what is the same in every one.
+
+The engine has bodies, joints and weights, and integrates; springs, hub forces and stabilisers act by the compiled
+forces of ``hub_forces.kernel`` as its callback. The reference solves the written-out equations instead.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from importlib import import_module
+from typing import ClassVar
+
+import numpy as np
+
+from models.engines.protocol import guard
+from models.errors import Refused, RunFailed
+from models.hub_forces.cut_vehicle import PITCH, CutVehicle
+from models.hub_forces.kernel import GRAVITY, WRENCH, forces, parts
+from models.hub_forces.mechanics import PER_MOTION, inertia
+from models.hub_forces.table import Drive, table
+from models.steps import divides, fitting
+
+ENGINES = ("reference", "exudyn", "mujoco")
+UPRIGHT = 1.4
+"""rad: a vehicle that pitches farther has tumbled, and its heading and roll become one angle at pi / 2."""
+
+
+@dataclass(frozen=True)
+class HubRun:
+    """A run: times (m,) in s; coordinates and rates (m, 2 n), the chassis' six first.
+
+    elements (m, e): forces of springs, mounts and bars in the chassis' axes, compression positive, N or N m
+    wrenches (m, hubs, 6): force (N) and moment (N m) at every hub in the drive's frame
+    moments (m, 2): of the stabiliser on roll and pitch, N m
+    """
+
+    times: np.ndarray
+    states: np.ndarray
+    elements: np.ndarray
+    wrenches: np.ndarray
+    moments: np.ndarray
+
+
+class HubModel(ABC):
+    """A driven cut vehicle in one engine, to be marched over ``steps`` steps of ``step`` (s) by Runge-Kutta 4."""
+
+    ENGINE: ClassVar[str]
+
+    def __init__(self, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> None:
+        """Refused where the step does not divide the duration or the inputs are not one row per half step."""
+        if not divides(step, duration):
+            raise Refused(self.ENGINE, f"the step {step:g} s does not divide the duration {duration:g} s; use for "
+                                       f"example {fitting(step, duration)} s")
+        self.vehicle, self.step, self.steps = vehicle, step, round(duration / step)
+        _check(self.ENGINE, vehicle, drive, 2 * self.steps + 1)
+        self.numbers, self.size = table(vehicle, drive, step), vehicle.size
+
+    @abstractmethod
+    def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
+
+    @abstractmethod
+    def marched(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Coordinates and rates (steps + 1, 2 n) from those at the start, (n,) each."""
+
+    def run(self, start: np.ndarray | None = None) -> HubRun:
+        """March from coordinates and rates (2 n,), or from rest; RunFailed unless the vehicle stays upright."""
+        first = np.zeros(2 * self.size) if start is None else start
+        states = self.marched(*np.split(first, 2))
+        times = self.step * np.arange(len(states))
+        guard(self.ENGINE, times, states, self.steps * self.step)
+        tumbled = np.abs(states[:, PITCH]) > UPRIGHT
+        if tumbled.any():
+            at = int(np.argmax(tumbled))
+            raise RunFailed(self.ENGINE, f"the vehicle pitches by more than {UPRIGHT} rad", times[at], states[at])
+        return self.reported(times, states)
+
+    def reported(self, times: np.ndarray, states: np.ndarray) -> HubRun:
+        """A run with the forces of its states."""
+        work, vehicle, n = self.work(), self.vehicle, self.size
+        inside, moments = np.empty((len(times), len(vehicle.elements))), np.empty((len(times), 2))
+        wrenches = np.empty((len(times), len(vehicle.hubs), WRENCH))
+        for i, (time, state) in enumerate(zip(times, np.ascontiguousarray(states), strict=True)):
+            forces(self.numbers, time, state[:n], state[n:], *work[:2], inside[i], wrenches[i], moments[i])
+        return HubRun(times, states, inside, wrenches, moments)
+
+    def work(self) -> tuple[np.ndarray, ...]:
+        """Room for the compiled forces: motion of the joints, their forces, those of elements, hubs, stabiliser."""
+        own = self.vehicle
+        return (np.empty((self.size + 1, PER_MOTION)), np.zeros(self.size), np.empty(len(own.elements)),
+                np.empty((len(own.hubs), WRENCH)), np.empty(2))  # fmt: skip
+
+
+def _check(engine: str, vehicle: CutVehicle, drive: Drive, rows: int) -> None:
+    width = (2 if drive.road else WRENCH) * len(vehicle.hubs)
+    if drive.hubs.shape != (rows, width) or not np.isfinite(drive.hubs).all():
+        raise Refused(engine, f"inputs must be {rows} rows (half steps) of {width} finite numbers")
+    if drive.guide is not None and (drive.guide.shape != (rows, 6) or not np.isfinite(drive.guide).all()):
+        raise Refused(engine, f"a guide must be {rows} rows (half steps) of 6 finite numbers")
+
+
+class ReferenceHubs(HubModel):
+    """The written-out equations."""
+
+    ENGINE = "reference"
+
+    def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (n,) from the mass matrix of ``mechanics``."""
+        head, joints, bodies, *_ = parts(self.numbers)
+        work, mass = self.work(), np.empty((self.size, self.size))
+        forces(self.numbers, time, q, v, *work)
+        inertia(joints, bodies, work[0], head[GRAVITY], mass, work[1])
+        return np.linalg.solve(mass, work[1])
+
+    def marched(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Coordinates and rates (steps + 1, 2 n) by the classical Runge-Kutta method."""
+        states, n, h = np.empty((self.steps + 1, 2 * self.size)), self.size, self.step
+        states[0] = np.concatenate((q, v))
+
+        def rates(t: float, x: np.ndarray) -> np.ndarray:
+            return np.concatenate((x[n:], self.accelerations(t, x[:n], x[n:])))
+
+        for i, x in enumerate(states[:-1]):
+            a = rates(t := i * h, x)
+            b = rates(t + h / 2, x + h / 2 * a)
+            c = rates(t + h / 2, x + h / 2 * b)
+            states[i + 1] = x + h / 6 * (a + 2 * b + 2 * c + rates(t + h, x + h * c))
+        return states
+
+
+def build(engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> HubModel:
+    """A driven cut vehicle in "reference", "exudyn" or "mujoco"; step and duration in s. Raises Refused."""
+    if engine == "reference":
+        return ReferenceHubs(vehicle, drive, step, duration)
+    return import_module(f"models.engines.hub_forces_{engine}").MODEL(vehicle, drive, step, duration)
