@@ -1,6 +1,7 @@
 """Where the spectator stands, and what a surface looks like from there."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,7 +27,7 @@ class Camera:
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
     opening: float = 0.5
 
-    @property
+    @cached_property
     def axes(self) -> np.ndarray:
         """Rows: to the right, up, back to the spectator."""
         back = np.subtract(self.eye, self.target)
@@ -54,21 +55,24 @@ def picture(camera: Camera, layers: list[list[Surface]], width: int, height: int
     image = np.broadcast_to(shade[:, None], (2 * height, 2 * width, 3)).copy()
     for layer in layers:
         nearest = np.zeros(image.shape[:2], np.float32)
-        for surface in (surface for surface in layer if surface.alpha == 1.0):
-            paint(*_shaded(camera, surface, width, height, sky[1]), image, nearest)
+        solid = [surface for surface in layer if surface.alpha == 1.0]
+        if solid:
+            paint(*_shaded(camera, solid, width, height, sky[1]), image, nearest)
         for surface in (surface for surface in layer if surface.alpha < 1.0):
             veil, front = image.copy(), nearest.copy()
-            paint(*_shaded(camera, surface, width, height, sky[1]), veil, front)
-            image += surface.alpha * (veil - image)
+            paint(*_shaded(camera, [surface], width, height, sky[1]), veil, front)
+            image += np.float32(surface.alpha) * (veil - image)
     return halved(image)
 
 
-def _shaded(camera: Camera, surface: Surface, width: int, height: int,
+def _shaded(camera: Camera, surfaces: list[Surface], width: int, height: int,
             haze: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
     """What ``paint`` takes, of the triangles that lie before the eye."""
-    corners, near = camera.seen(surface.corners, 2 * width, 2 * height)
+    corners, near = camera.seen(np.concatenate([one.corners for one in surfaces]), 2 * width, 2 * height)
+    normals = np.concatenate([one.normals for one in surfaces])
+    colours = np.repeat([one.colour for one in surfaces], [len(one.corners) for one in surfaces], axis=0)
     kept = ((near > 0.0) & (near < 1.0 / NEAREST)).all(axis=1)
     towards = LIGHT @ camera.axes / np.linalg.norm(LIGHT)
-    light = DIM + (1.0 - DIM) * (0.5 + 0.5 * surface.normals[kept] @ towards)
+    light = DIM + (1.0 - DIM) * (0.5 + 0.5 * normals[kept] @ towards)
     clear = np.exp(-1.0 / (HAZE * near[kept]))[..., None]
-    return corners[kept], near[kept], clear * light[..., None] * surface.colour + (1.0 - clear) * haze
+    return corners[kept], near[kept], clear * light[..., None] * colours[kept, None] + (1.0 - clear) * haze

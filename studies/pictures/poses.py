@@ -1,6 +1,6 @@
 """Poses of bodies as an engine itself computes them from the coordinates of its own run."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,17 +22,13 @@ def of_mujoco(model: Any, bodies: Mapping[str, int], coordinates: np.ndarray) ->
     return ({name: places[:, i] for name, i in bodies.items()}, {name: turns[:, i] for name, i in bodies.items()})
 
 
-def of_exudyn(mbs: Any, markers: Mapping[str, Any], coordinates: np.ndarray) -> Poses:
-    """Poses by Exudyn's markers on the bodies at its coordinates (f, n), in its own order."""
+def of_exudyn(mbs: Any, bodies: Mapping[str, Callable[[Any], Any]], coordinates: np.ndarray) -> Poses:
+    """Poses at Exudyn's coordinates (f, n), in its own order; ``bodies`` answer for an output variable of Exudyn."""
     import exudyn as exu
 
-    kinds = exu.OutputVariableType
-    places: dict[str, list] = {name: [] for name in markers}
-    turns: dict[str, list] = {name: [] for name in markers}
+    kinds, found = exu.OutputVariableType, []
     for row in coordinates:
         mbs.systemData.SetODE2Coordinates(row)
-        for name, marker in markers.items():
-            places[name].append(mbs.GetMarkerOutput(marker, kinds.Position))
-            turns[name].append(np.reshape(mbs.GetMarkerOutput(marker, kinds.RotationMatrix), (3, 3)))
-    return ({name: np.array(rows) for name, rows in places.items()},
-            {name: np.array(rows) for name, rows in turns.items()})  # fmt: skip
+        found.append([(ask(kinds.Position), np.reshape(ask(kinds.RotationMatrix), (3, 3))) for ask in bodies.values()])
+    places, turns = (np.array([[pose[part] for pose in frame] for frame in found]) for part in (0, 1))
+    return ({name: places[:, i] for i, name in enumerate(bodies)}, {name: turns[:, i] for i, name in enumerate(bodies)})

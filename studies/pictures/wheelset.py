@@ -1,5 +1,8 @@
 """A wheelset that hunts on its rails: shapes, camera and the forces at its contacts."""
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 
 from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
@@ -9,10 +12,10 @@ from models.rail.wheel_forces import ANGLE, FX, FY, LOAD
 from models.rail.wheelset import CHOSEN, Wheelset
 from studies.pictures.camera import Camera
 from studies.pictures.film import Arrow, Curve, Kind, Motion, Stage
-from studies.pictures.poses import of_exudyn, of_mujoco
+from studies.pictures.poses import Poses, of_exudyn, of_mujoco
 from studies.pictures.shapes import Colour, Surface, box, extruded, floor, revolved
 
-SPEED, SHIFT, CELLS, STEP = 75.0, 5e-3, 11, 5e-4
+SPEED, SHIFT, CELLS, STEP = 75.0, 6e-3, 11, 5e-4
 """Speed of travel (m/s), first lateral displacement (m), cells of FASTSIM, step (s)."""
 MAGNIFIED = 5.0
 SLEEPERS = 0.6
@@ -23,7 +26,7 @@ BROWN: Colour = (0.45, 0.27, 0.16)
 RAIL: Colour = (0.66, 0.56, 0.5)
 CONCRETE: Colour = (0.72, 0.71, 0.68)
 BALLAST: Colour = (0.56, 0.54, 0.51)
-KINDS = {"normal force": Kind((0.0, 0.62, 0.45), 8e-6, 5e4), "creep force": Kind((0.84, 0.2, 0.0), 1.2e-4, 2e3)}
+KINDS = {"normal force": Kind((0.0, 0.62, 0.45), 8e-6, 5e4), "creep force": Kind((0.84, 0.2, 0.0), 1e-4, 2e3)}
 CURVE = Curve("creep force", (0.0, 1.0, 0.0), "across the track, to the right")
 SIDES = {"right": RIGHT, "left": LEFT}
 
@@ -46,7 +49,7 @@ def _motion(engine: str, duration: float, times: np.ndarray) -> Motion:
     return Motion(engine, kept.times, *poses, arrows(CHOSEN, kept))
 
 
-def _exudyn(own, joints):
+def _exudyn(own: Any, joints: np.ndarray) -> Poses:
     """Poses by a marker in the middle of the axle: the last link of the first object."""
     from models.engines.spatial_exudyn_build import items
 
@@ -54,7 +57,7 @@ def _exudyn(own, joints):
     middle = mbs.AddMarker(items.MarkerKinematicTreeRigid(
         objectNumber=0, linkNumber=JOINTS - 1, localPosition=[0.0, 0.0, 0.0]))  # fmt: skip
     mbs.Assemble()
-    return of_exudyn(mbs, {"wheelset": middle}, joints)
+    return of_exudyn(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)
 
 
 def arrows(wheelset: Wheelset, path: Path) -> tuple[Arrow, ...]:
@@ -79,7 +82,7 @@ def _place(w: Wheelset, side: float, state: np.ndarray) -> np.ndarray:
 
 def stage(wheelset: Wheelset) -> Stage:
     """Wheelset, rails and sleepers, seen from ahead and to the right; z down."""
-    camera = Camera((2.75, 1.75, -0.95), (0.0, 0.06, 0.04), (0.0, 0.0, -1.0), 0.5)
+    camera = Camera((2.75, 1.75, -0.95), (0.0, 0.12, 0.06), (0.0, 0.0, -1.0), 0.54)
     caption = f"displacements drawn {MAGNIFIED:g} times as large; forces on the wheels"
     return Stage(f"Wheelset at {SPEED:g} m/s on straight rails", caption, {"wheelset": shapes(wheelset)},
                  {"wheelset": (0.0, 0.0, 0.0)}, camera, KINDS, CURVE, lambda time: track(wheelset, SPEED * time), MAGNIFIED,

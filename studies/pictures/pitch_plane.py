@@ -1,0 +1,113 @@
+"""The pitch-plane vehicle on a random road: shapes, camera, wheel and suspension forces."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from models.assembly import Assembly, assemble
+from models.engines.protocol import build, settings_of
+from models.scene import build as scene_of
+from models.simulate import Channels, outputs
+from models.vehicles.pitch_plane import equilibrium
+from studies.pictures.camera import Camera
+from studies.pictures.film import Arrow, Curve, Kind, Motion, Stage, Strut
+from studies.pictures.poses import Poses, of_exudyn, of_mujoco
+from studies.pictures.road import AHEAD, PassingRoad
+from studies.pictures.shapes import Colour, Surface, box, revolved
+
+SPEED, SEED = 15.0, 1
+MAGNIFIED = 3.0
+RADIUS, HEIGHT = 0.33, 0.75
+"""m: of the wheels and of the chassis' centre above the road; the model has neither."""
+KINDS = {"wheel force": Kind((0.0, 0.62, 0.45), 1.2e-4, 4e3), "suspension force": Kind((0.84, 0.2, 0.0), 1.2e-4, 4e3)}
+CURVE = Curve("wheel force", (0.0, 0.0, -1.0), "upwards")
+PLANE = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+"""Exudyn's axes as columns: backward, down, to the right."""
+PAINT: Colour = (0.16, 0.42, 0.72)
+RUBBER: Colour = (0.16, 0.16, 0.17)
+RIM: Colour = (0.78, 0.79, 0.8)
+
+
+def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[Motion]]:
+    """The stage, and the motion of each engine at the steps that are nearest to ``times`` (s)."""
+    scene = scene_of({"title": "pitch plane", "run": {"duration": float(np.ceil(duration + AHEAD / SPEED))},
+                      "effects": {"road": {"source": "iso8608", "road_class": "C", "seed": SEED, "speed": SPEED}}})
+    assembly = assemble(scene)
+    runs = [_motion(engine, assembly, times) for engine in engines]
+    return stage(assembly, runs[0][1]), [motion for motion, _ in runs]
+
+
+def _motion(engine: str, assembly: Assembly, times: np.ndarray) -> tuple[Motion, Channels]:
+    model: Any = build(engine, assembly, settings_of(assembly.scene, engine))
+    run = model.run()
+    channels = outputs(assembly, run)
+    rows = np.rint(times / (run.times[1] - run.times[0])).astype(int)
+    places, turns = (_exudyn if engine == "exudyn" else _mujoco)(model, run.states[rows, :4])
+    poses = {name: place + _offset(assembly, name) for name, place in places.items()}, turns
+    return Motion(engine, run.times[rows], *poses, arrows(assembly, channels, rows, poses)), channels
+
+
+def _mujoco(model: Any, states: np.ndarray) -> Poses:
+    names = [body.name for body in model.assembly.vehicle.bodies]
+    places, turns = of_mujoco(model.model, {name: model.model.body(name).id for name in names}, states)
+    return {name: place * [0.0, 1.0, 1.0] for name, place in places.items()}, turns
+
+
+def _exudyn(model: Any, states: np.ndarray) -> Poses:
+    """Poses by Exudyn's nodes in its plane; wheels are points, which do not turn."""
+    import exudyn as exu
+
+    mbs, nodes = model.built.mbs, model.built.nodes
+
+    def ask(node: Any, kind: Any) -> Any:
+        turns = mbs.GetNode(node)["nodeType"] == "RigidBody2D"
+        return np.eye(3) if kind == exu.OutputVariableType.RotationMatrix and not turns else mbs.GetNodeOutput(node, kind)
+
+    coordinates = np.zeros((len(states), 7))
+    coordinates[:, [1, 3, 5, 6]] = states
+    places, turns = of_exudyn(mbs, {name: partial(ask, node) for name, node in nodes.items()}, coordinates)
+    return ({name: place @ PLANE.T for name, place in places.items()},
+            {name: PLANE @ turn @ PLANE.T for name, turn in turns.items()})  # fmt: skip
+
+
+def _offset(assembly: Assembly, body: str) -> np.ndarray:
+    """Where a body is drawn when its coordinates are zero: the model counts heights from there and knows no x."""
+    x = {axle.wheel: axle.x for axle in assembly.vehicle.axles}.get(body)
+    return np.array([0.0, 0.0, -HEIGHT]) if x is None else np.array([x, 0.0, -RADIUS])
+
+
+def arrows(assembly: Assembly, channels: Channels, rows: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
+    """The road's forces on the wheels and the suspension's on the chassis."""
+    up, found = np.array([0.0, 0.0, -1.0]), []
+    for axle, wheel, strut in zip(assembly.vehicle.axles, ("f1", "f2"), ("f3", "f4"), strict=True):
+        road, mount = np.array([0.0, 0.0, RADIUS]), np.array([axle.x, 0.0, 0.0])
+        found += [Arrow(f"wheel force, {axle.name}", "wheel force", axle.wheel, poses[0][axle.wheel] + road,
+                        channels[wheel][2][rows, None] * up),
+                  Arrow(f"suspension force, {axle.name}", "suspension force", "chassis",
+                        poses[0]["chassis"] + poses[1]["chassis"] @ mount, channels[strut][2][rows, None] * up)]  # fmt: skip
+    return tuple(found)
+
+
+def stage(assembly: Assembly, channels: Channels) -> Stage:
+    """The vehicle, seen from its right, on a road that passes by; z down."""
+    height = channels["zeta1"][2]
+    way = assembly.vehicle.axles[0].x + SPEED * np.linspace(0.0, assembly.scene.run.duration, len(height))
+    road = PassingRoad(way, np.column_stack([height, height]), (-1.0, 1.0), SPEED, -1.0, MAGNIFIED, 1.0)
+    level = equilibrium(assembly.parameters, assembly.vehicle.geometry)
+    names = [body.name for body in assembly.vehicle.bodies]
+    rest = {name: tuple(_offset(assembly, name) + [0.0, 0.0, level[i]]) for i, name in enumerate(names)}
+    struts = tuple(Strut("chassis", (axle.x, 0.0, 0.0), axle.wheel, (0.0, 0.0, 0.0)) for axle in assembly.vehicle.axles)
+    caption = f"displacements and road drawn {MAGNIFIED:g} times as large; forces on wheels and chassis"
+    camera = Camera((1.5, 4.6, -1.5), (0.0, 0.0, -0.62), (0.0, 0.0, -1.0), 0.46)
+    return Stage(f"Pitch-plane vehicle at {SPEED:g} m/s on a road of class C", caption, shapes(assembly), rest, camera,
+                 KINDS, CURVE, road.at, MAGNIFIED, struts=struts)  # fmt: skip
+
+
+def shapes(assembly: Assembly) -> dict[str, list[Surface]]:
+    """A beam for the chassis and two wheels."""
+    p = assembly.parameters
+    beam = box(p.a + p.b + 0.5, 0.5, 0.14, PAINT).at((p.b - p.a) / 2.0, 0.0, -0.07)
+    tyre = revolved([-0.1, -0.1, -0.07, 0.07, 0.1, 0.1], np.array([0.62, 0.92, 1.0, 1.0, 0.92, 0.62]) * RADIUS, RUBBER)
+    rim = revolved([-0.09, -0.09, 0.09, 0.09], np.array([0.0, 0.64, 0.64, 0.0]) * RADIUS, RIM)
+    return {axle.wheel: [tyre, rim] for axle in assembly.vehicle.axles} | {"chassis": [beam]}

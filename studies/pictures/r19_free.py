@@ -1,0 +1,140 @@
+"""The car of 19 freedoms on a random road: shapes, camera and the forces of the road on its tyres."""
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from models.engines.protocol import Settings
+from models.engines.spatial_protocol import INTEGRATORS, SpatialRun, build
+from models.ride.of_scene import GRAVITY, excitation_of, vehicle_of
+from models.ride.road_path import RoadPath, road_path
+from models.ride.scene import build as ride_scene
+from models.vehicles.spatial import PointOutput, SpatialVehicle, TyreOutput
+from models.vehicles.spatial_linear import linearise, preloads, wheels
+from studies.pictures.camera import Camera
+from studies.pictures.film import Arrow, Curve, Kind, Motion, Stage
+from studies.pictures.poses import Poses, of_exudyn, of_mujoco
+from studies.pictures.road import AHEAD, PassingRoad
+from studies.pictures.shapes import Colour, Surface, ball, box, extruded, revolved
+
+SPEED, STEP, SEED = 20.0, 1e-3, 3
+"""m/s, largest step (s), seed of the road."""
+MAGNIFIED = 4.0
+SCENE = {"title": "", "system": "ride", "vehicle": {"file": "r19_free"}, "road": {"iso8608": "C"},
+         "speeds": {"values": [SPEED]}}  # fmt: skip
+KINDS = {"wheel load": Kind((0.0, 0.62, 0.45), 1.6e-4, 4e3), "side force": Kind((0.84, 0.2, 0.0), 2e-3, 2e2)}
+CURVE = Curve("wheel load", (0.0, 0.0, 1.0), "of the road on the tyres, static part included")
+PAINT: Colour = (0.16, 0.42, 0.72)
+RUBBER: Colour = (0.16, 0.16, 0.17)
+RIM: Colour = (0.78, 0.79, 0.8)
+ENGINE: Colour = (0.75, 0.45, 0.15)
+PERSON: Colour = (0.93, 0.76, 0.55)
+
+
+def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[Motion]]:
+    """The stage, and the motion of each engine at the steps that are nearest to ``times`` (s)."""
+    scene = ride_scene(SCENE)
+    vehicle = reporting(vehicle_of(scene))
+    road = road_path(excitation_of(scene, wheels(vehicle)), SPEED, STEP)
+    steps = int(np.ceil(duration / road.step))
+    table = road.table(steps + int(AHEAD / SPEED / road.step), SEED)
+    rows = np.rint(times / road.step).astype(int)
+    motions = [_motion(engine, vehicle, road, table[: 2 * steps + 1], rows) for engine in engines]
+    return stage(vehicle, road, table), motions
+
+
+def reporting(vehicle: SpatialVehicle) -> SpatialVehicle:
+    """The vehicle with the outputs from which its road forces follow: tyre forces, then speeds of side forces' points."""
+    tyres = tuple(TyreOutput(tyre.name, "tyre force", tyre.name) for tyre in vehicle.tyres)
+    across = tuple(PointOutput(f.name, "velocity", f.body, f.point, (0.0, 1.0, 0.0)) for f in vehicle.side_forces)
+    return replace(vehicle, outputs=(*tyres, *across))
+
+
+def _motion(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, rows: np.ndarray) -> Motion:
+    settings = Settings(INTEGRATORS[engine], road.step, (len(table) - 1) // 2 * road.step)
+    model = build(engine, vehicle, settings, SPEED, table)
+    zero = np.zeros(len(vehicle.coordinates()))
+    run = model.run(zero, zero)
+    kept = SpatialRun(run.times[rows], run.positions[rows], run.rates[rows])
+    poses = (_exudyn if engine == "exudyn" else _mujoco)(model, kept.positions)
+    return Motion(engine, kept.times, *poses, arrows(vehicle, kept, table[2 * rows], poses))
+
+
+def _mujoco(model: Any, positions: np.ndarray) -> Poses:
+    joints = np.empty_like(positions)
+    joints[:, model.numbers.columns] = positions
+    return of_mujoco(model.model, model.numbers.bodies, joints)
+
+
+def _exudyn(model: Any, positions: np.ndarray) -> Poses:
+    markers = {body.name: model.built.marker(body.name, body.position) for body in model.vehicle.bodies}
+    model.mbs.Assemble()
+    asked = {name: partial(model.mbs.GetMarkerOutput, marker) for name, marker in markers.items()}
+    return of_exudyn(model.mbs, asked, np.array([model._all(row) for row in positions]))
+
+
+def arrows(vehicle: SpatialVehicle, run: SpatialRun, road: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
+    """Wheel loads, static ones included, and side forces, both at the road, from the states of a run (small motion)."""
+    own = linearise(vehicle, SPEED).outputs
+    found = [run.rates @ one.rate + run.positions @ one.displacement + road @ np.concatenate([one.road, one.road_rate])
+             for one in own]  # fmt: skip
+    held = preloads(replace(vehicle, gravity=GRAVITY)).tyres
+    loads = [_arrow("wheel load", vehicle, tyre.name, tyre.body, tyre.point, held[tyre.name] + force, 2, poses)
+             for tyre, force in zip(vehicle.tyres, found, strict=False)]  # fmt: skip
+    names = vehicle.coordinates()
+    sides = []
+    for side, speed in zip(vehicle.side_forces, found[len(vehicle.tyres) :], strict=True):
+        roll, yaw = (run.positions[:, names.index((side.chassis, freedom))] for freedom in ("rx", "rz"))
+        force = side.stiffness * (side.roll_steer * roll + yaw - speed / SPEED)
+        sides.append(_arrow("side force", vehicle, side.name, side.body, side.point, force, 1, poses))
+    return (*loads, *sides)
+
+
+def _arrow(kind: str, vehicle: SpatialVehicle, name: str, body: str, point: Any, force: np.ndarray, axis: int,
+           poses: Poses) -> Arrow:  # fmt: skip
+    """A force along an axis of the space, at the road under a point of a body."""
+    arm = np.subtract((point[0], point[1], 0.0), vehicle.body(body).position)
+    points = poses[0][body] + poses[1][body] @ arm
+    return Arrow(f"{kind}, {name}", kind, body, points, force[:, None] * np.eye(3)[axis])
+
+
+def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
+    """The car, seen from ahead and to its left, on a road that passes by."""
+    front = [tyre for tyre in vehicle.tyres if tyre.axle == 0]
+    columns = [vehicle.tyres.index(tyre) for tyre in front]
+    way = front[0].point[0] + SPEED * road.half * np.arange(len(table))
+    tracks = front[0].point[1], front[1].point[1]
+    passing = PassingRoad(way, table[:, columns], tracks, SPEED, magnified=MAGNIFIED)
+    rest = {body.name: body.position for body in vehicle.bodies}
+    camera = Camera((5.6, 4.6, 2.3), (-0.1, 0.1, 0.5), opening=0.5)
+    caption = f"displacements and road drawn {MAGNIFIED:g} times as large; forces of the road on the tyres"
+    return Stage(f"Car of {len(vehicle.coordinates())} freedoms at {SPEED:g} m/s on a road of class C", caption,
+                 shapes(vehicle), rest, camera, KINDS, CURVE, passing.at, MAGNIFIED)  # fmt: skip
+
+
+def shapes(vehicle: SpatialVehicle) -> dict[str, list[Surface]]:
+    """Wheels where there are tyres, a car about the chassis, an engine and occupants within it."""
+    found = {tyre.body: _wheel(vehicle.body(tyre.body).position[2]) for tyre in vehicle.tyres}
+    found["engine"] = [box(0.5, 0.7, 0.45, ENGINE)]
+    found |= {f"{side} seat": [ball(0.13, PERSON).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON).at(0.0, 0.0, 0.02)]
+              for side in ("left", "right")}  # fmt: skip
+    found["body"] = _car(vehicle)
+    return found
+
+
+def _wheel(radius: float) -> list[Surface]:
+    tyre = revolved([-0.1, -0.1, -0.07, 0.07, 0.1, 0.1],
+                    np.array([0.62, 0.92, 1.0, 1.0, 0.92, 0.62]) * radius, RUBBER)  # fmt: skip
+    return [tyre, revolved([-0.09, -0.09, 0.09, 0.09], np.array([0.0, 0.64, 0.64, 0.0]) * radius, RIM)]
+
+
+def _car(vehicle: SpatialVehicle) -> list[Surface]:
+    """Two convex outlines, through which one sees what is inside, about the chassis' own centre."""
+    x, _, z = vehicle.body("body").position
+    front, rear = max(t.point[0] for t in vehicle.tyres), min(t.point[0] for t in vehicle.tyres)
+    lower = [(rear - 0.7, 0.4), (rear - 0.55, 0.27), (front + 0.6, 0.27), (front + 0.72, 0.45), (front + 0.6, 0.68),
+             (front - 0.35, 0.88), (rear - 0.6, 0.92)]  # fmt: skip
+    upper = [(rear - 0.45, 0.92), (front - 0.38, 0.88), (front - 1.05, 1.38), (rear + 0.15, 1.4)]
+    return [extruded(np.array(lower) - [x, z], 1.66, PAINT, 0.42), extruded(np.array(upper) - [x, z], 1.4, PAINT, 0.3)]

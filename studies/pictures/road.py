@@ -1,0 +1,61 @@
+"""A road that passes by: chequered tiles with the heights of both tracks."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from studies.pictures.shapes import Colour, Surface, box, faceted, floor
+
+LIGHT: Colour = (0.60, 0.61, 0.63)
+DARK: Colour = (0.54, 0.55, 0.57)
+GRASS: Colour = (0.55, 0.64, 0.46)
+LINE: Colour = (0.97, 0.97, 0.95)
+AHEAD = 45.0
+"""m of road that are drawn to both sides of the vehicle."""
+TILE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class PassingRoad:
+    """Heights (m) over a way (m) at the lateral places ``tracks`` (m), passed with a speed (m/s).
+
+    up : the vertical component of the direction up, 1 or -1; magnified : of the heights; half : width (m).
+    """
+
+    way: np.ndarray
+    heights: np.ndarray
+    tracks: tuple[float, float]
+    speed: float
+    up: float = 1.0
+    magnified: float = 1.0
+    half: float = 2.6
+
+    def at(self, time: float) -> list[Surface]:
+        """Road, its middle line and the grass at a time (s)."""
+        first = np.floor((self.speed * time - AHEAD) / TILE)
+        stations = np.arange(first, first + 2.0 * AHEAD / TILE)
+        own = TILE * stations - self.speed * time
+        across = np.linspace(-self.half, self.half, 2 * round(self.half / TILE) + 1)
+        x, y = np.meshgrid(own, across, indexing="ij")
+        net = np.stack([x, y, self._height(x + self.speed * time, y)], -1)
+        dark = (stations[:-1, None] + np.arange(len(across) - 1)) % 2 == 1
+        return [_tiles(net, dark, DARK), _tiles(net, ~dark, LIGHT), floor(-0.35 * self.up, GRASS), *self._marks(time)]
+
+    def _marks(self, time: float) -> list[Surface]:
+        """Lines along both edges."""
+        side = self.half - 0.15
+        starts = 4.0 * np.arange(-10, 11) - self.speed * time % 4.0
+        return [box(1.6, 0.1, 0.02, LINE).at(x, y, float(self._height(np.array(x + self.speed * time), y)) + 0.01 * self.up)
+                for x in starts for y in (-side, side)]  # fmt: skip
+
+    def _height(self, way: np.ndarray, y: np.ndarray | float) -> np.ndarray:
+        one, two = (np.interp(way, self.way, column) for column in self.heights.T)
+        share = (np.asarray(y) - self.tracks[0]) / (self.tracks[1] - self.tracks[0])
+        return self.magnified * (one + share * (two - one))
+
+
+def _tiles(net: np.ndarray, chosen: np.ndarray, colour: Colour) -> Surface:
+    """Chosen tiles (a - 1, b - 1) of a net (a, b, 3)."""
+    one, two, three, four = (part[chosen] for part in (net[:-1, :-1], net[1:, :-1], net[1:, 1:], net[:-1, 1:]))
+    corners = np.concatenate([np.stack([one, two, three], 1), np.stack([one, three, four], 1)])
+    return faceted(corners, colour)
