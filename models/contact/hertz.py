@@ -169,7 +169,7 @@ def integrals(g: float) -> tuple[float, float]:
         a_b, b_b = a_b + b_b / mean, 2.0 * (b_b + a_b * other)
         a_d, b_d = a_d + b_d / mean, 2.0 * (b_d + a_d * other)
         before, mean = mean, mean + other
-        if abs(before - other) <= 1e-8 * before:  # the error is the square of this
+        if not abs(before - other) > 1e-8 * before:  # the error is the square of this; what is no number ends here too
             scale = math.pi / (4.0 * mean)
             return scale * (a_b + b_b / mean), scale * (a_d + b_d / mean)
         other = 2.0 * math.sqrt(before * other)

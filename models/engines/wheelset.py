@@ -11,9 +11,14 @@ from typing import ClassVar
 import numpy as np
 
 from models.errors import RunFailed
-from models.rail.equations import LIMIT, ROLL, STATES, YAW, Equations, Path, Y, Z, rates
+from models.rail.equations import LEAN, LIMIT, ROLL, STATES, YAW, Equations, Path, Y, Z, rates
 from models.rail.joint_forces import JOINTS, from_joints, rates_of, to_joints
 from models.rail.wheelset import Wheelset
+
+
+def leaning(weight: float, body: np.ndarray) -> np.ndarray:
+    """A weight's parts (3,) along the track's axes by its part square to the track, on the track of these numbers."""
+    return weight * np.array([0.0, body[LEAN], 1.0])
 
 
 class EngineWheelset(Equations, ABC):
@@ -36,12 +41,11 @@ class EngineWheelset(Equations, ABC):
 
     def run(self, state: np.ndarray, duration: float, step: float, every: int = 1) -> Path:
         """As ``Equations.run``, by the engine's RK4; the contacts are those of the states that are kept."""
-        self._check(step)
-        joints, count = to_joints(np.array(state, float)), round(duration / step)
+        count, joints = self._steps(state, duration, step, every), to_joints(np.array(state, float))
         states = from_joints(self.marched(joints[:JOINTS], joints[JOINTS:], count, step))
         away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < LIMIT)
         if away.any():
-            raise RunFailed(self.ENGINE, f"the wheelset leaves the track after {np.argmax(away) * step:.6g} s")
+            raise RunFailed(self.ENGINE, "the wheelset leaves the track", (int(np.argmax(away)) - 1) * step)
         kept = states[::every]
         contacts, out = self.blank(len(kept)), np.empty(STATES)
         for one, contact in zip(kept, contacts, strict=True):

@@ -14,7 +14,7 @@ import exudyn as exu
 import numpy as np
 
 from models.engines.spatial_exudyn_build import KINDS, items, lists
-from models.engines.wheelset import EngineWheelset
+from models.engines.wheelset import EngineWheelset, leaning
 from models.errors import RunFailed
 from models.rail.equations import ACROSS, ALONG, ARM, CARRIED, DX, DZ, KX, KZ, MASS, SUNK
 from models.rail.joint_forces import JOINTS, set_joint_forces, table
@@ -44,7 +44,7 @@ def tree(mbs: Any, node: Any, numbers: np.ndarray, body: np.ndarray) -> Any:
     zero = [[0.0, 0.0, 0.0]] * JOINTS
     inertias = [np.zeros((3, 3))] * (JOINTS - 1) + [np.diag(body[[ACROSS, ALONG, ACROSS]])]
     return mbs.AddObject(items.ObjectKinematicTree(
-        nodeNumber=node, gravity=[0.0, 0.0, GRAVITY], jointTypes=CHAIN, linkParents=list(range(-1, JOINTS - 1)),
+        nodeNumber=node, gravity=leaning(GRAVITY, body), jointTypes=CHAIN, linkParents=list(range(-1, JOINTS - 1)),
         jointTransformations=lists.Matrix3DList([np.eye(3)] * JOINTS), jointOffsets=lists.Vector3DList(zero),
         linkInertiasCOM=lists.Matrix3DList(inertias), linkCOMs=lists.Vector3DList(zero),
         linkMasses=[0.0] * (JOINTS - 1) + [body[MASS]], forceUserFunction=rails(numbers)))  # fmt: skip
@@ -59,7 +59,7 @@ def suspension(mbs: Any, wheelset: Any, body: np.ndarray) -> None:
             objectNumber=wheelset, linkNumber=JOINTS - 1, localPosition=[0.0, arm, 0.0]))  # fmt: skip
         mbs.AddObject(items.CartesianSpringDamper(
             markerNumbers=[frame, end], stiffness=body[KX : KZ + 1], damping=body[DX : DZ + 1]))  # fmt: skip
-        mbs.AddLoad(items.LoadForceVector(markerNumber=end, loadVector=[0.0, 0.0, body[CARRIED]]))
+        mbs.AddLoad(items.LoadForceVector(markerNumber=end, loadVector=leaning(body[CARRIED], body)))
 
 
 class ExudynWheelset(EngineWheelset):
@@ -114,6 +114,7 @@ class ExudynWheelset(EngineWheelset):
                 raise KeyboardInterrupt from error
             raise RunFailed("exudyn", f"the solver stopped: {str(error).strip().splitlines()[0]}") from error
         path = np.hstack([mbs.GetSensorStoredData(sensor)[:, 1:] for sensor in self._system[1]])
-        if len(path) != steps + 1 or not np.isfinite(path).all():
-            raise RunFailed("exudyn", "the engine gave up")
+        good = np.isfinite(path).all(axis=1).cumprod().sum()
+        if good != steps + 1:
+            raise RunFailed("exudyn", "the engine gave up", max(good - 1, 0) * step)
         return path

@@ -13,7 +13,7 @@ import numpy as np
 from models.engines.contact_bridge_mujoco import Marcher, native_law
 from models.engines.mujoco_callback import installed
 from models.engines.mujoco_layout import check
-from models.engines.wheelset import EngineWheelset
+from models.engines.wheelset import EngineWheelset, leaning
 from models.rail.equations import ACROSS, ALONG, ARM, CARRIED, DX, KX, MASS, SUNK
 from models.rail.joint_forces import joint_forces, table
 from models.rail.wheelset import GRAVITY
@@ -26,7 +26,7 @@ JOINTS = (("SLIDE", (0.0, 1.0, 0.0)), ("SLIDE", (0.0, 0.0, 1.0)), ("HINGE", (0.0
 def model(numbers: np.ndarray, body: np.ndarray) -> mujoco.MjModel:
     """The wheelset of ``Equations.body``; ``numbers``, the callback's table, lie in the model."""
     spec = mujoco.MjSpec()
-    spec.option.gravity, spec.option.integrator = [0.0, 0.0, GRAVITY], mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.gravity, spec.option.integrator = leaning(GRAVITY, body), mujoco.mjtIntegrator.mjINT_RK4
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     spec.compiler.degree = False
     spec.add_numeric(name="rails", data=numbers, size=numbers.size)
@@ -36,8 +36,8 @@ def model(numbers: np.ndarray, body: np.ndarray) -> mujoco.MjModel:
     for name, arm in (("right", body[ARM]), ("left", -body[ARM])):
         own.add_site(name=name, pos=[0.0, arm, 0.0])
         spec.worldbody.add_site(name=f"{name} frame", pos=[0.0, arm, body[SUNK]])
-        for i in range(3):
-            _strut(spec, name, i, body[KX + i], body[DX + i], body[CARRIED] if i == 2 else 0.0)
+        for i, held in enumerate(leaning(body[CARRIED], body)):
+            _strut(spec, name, i, body[KX + i], body[DX + i], held)
     built = spec.compile()
     check(built, mujoco.MjData(built))
     return built

@@ -11,7 +11,8 @@ the centre, I across and J along the axle,
     I yaw'' cos roll  = M3 + 2 I roll' yaw' sin roll - J spin roll'
 
 Forces: both rails' (``wheel_forces``), the weight, and a spring and a damper along each axis of the track at each end
-of the suspension, free of force in the middle of the track but for the vehicle's weight.
+of the suspension, free of force in the middle of the track but for the vehicle's weight. On a track that leans both
+wheelset and vehicle weigh to the right as well.
 """
 
 import math
@@ -23,22 +24,25 @@ import numpy as np
 from scipy.optimize import brentq, root
 
 from models.compiled import njit
+from models.contact.inputs import number, quantity
 from models.errors import InputError, RunFailed
 from models.rail.wheel_forces import LAWS, REPORTED, carried, net, numbers, patches, wheel_forces
 from models.rail.wheelset import GRAVITY, Wheelset
+from models.steps import divides
 
 STATES = 10
 Y, Z, ROLL, YAW, ANGLE, Y_RATE, Z_RATE, ROLL_RATE, YAW_RATE, SPIN = range(STATES)
-MASS, ALONG, ACROSS, ARM, KX, KY, KZ, DX, DY, DZ, CARRIED, SUNK = range(12)
+MASS, ALONG, ACROSS, ARM, KX, KY, KZ, DX, DY, DZ, CARRIED, SUNK, LEAN = range(13)
 """Numbers of the body and its suspension (SI): inertia along and across the axle, half spacing, springs and dampers of
-one side, weight that each side carries, height at which the springs bear no more than that."""
+one side, weight that each side carries, height at which the springs bear no more than that, lean of the track."""
 STIFF = 2.5
 """Steps times the fastest motion's rate up to which RK4 is stable, with a margin: 2.78 at its very limit."""
 MOVED = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-6, 3e-5])
 """Steps of the differences that linearise: small against penetration (7e-5 m) and creepage."""
+FASTEST = 200.0
+"""m/s"""
 LIMIT = 0.3
 """Yaw and roll (rad) and displacement (m) beyond which a path is no wheelset's on a track."""
-
 DEEPEST = 5e-3
 """Height (m) above which the rails carry every load that is allowed."""
 
@@ -61,7 +65,7 @@ def rates(state, speed, body, p, strips, cells, middle, law, out, report):
         turn_x, turn_y = cy * roll_rate, sy * roll_rate
         vx, vy, vz = turn_y * az - yaw_rate * ay, yaw_rate * ax - turn_x * az, turn_x * ay - turn_y * ax
         fx = -body[KX] * ax - body[DX] * vx
-        fy = -body[KY] * (y + ay - arm) - body[DY] * (state[Y_RATE] + vy)
+        fy = body[CARRIED] * body[LEAN] - body[KY] * (y + ay - arm) - body[DY] * (state[Y_RATE] + vy)
         fz = body[CARRIED] - body[KZ] * (z + az - body[SUNK]) - body[DZ] * (state[Z_RATE] + vz)
         force[0] += fx
         force[1] += fy
@@ -74,7 +78,7 @@ def rates(state, speed, body, p, strips, cells, middle, law, out, report):
     m2, m3 = cr * across + sr * moment[2], cr * moment[2] - sr * across
     out[Y], out[Z], out[ROLL], out[YAW] = state[Y_RATE], state[Z_RATE], roll_rate, yaw_rate
     out[ANGLE] = own
-    out[Y_RATE] = force[1] / body[MASS]
+    out[Y_RATE] = force[1] / body[MASS] + GRAVITY * body[LEAN]
     out[Z_RATE] = force[2] / body[MASS] + GRAVITY
     whirl = body[ALONG] * spin
     out[ROLL_RATE] = (m1 + whirl * yaw_rate * cr) / body[ACROSS] - yaw_rate**2 * sr * cr
@@ -106,7 +110,7 @@ def march(state, speed, step, count, every, body, p, strips, cells, middle, law,
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """times (n,) in s; states (n, 10) as above; contacts (n, patches, REPORTED) of ``wheel_forces``, right side first."""
+    """times (n,) in s; states (n, 10) as above; contacts (n, patches, REPORTED) of ``wheel_forces``, right first."""
 
     times: np.ndarray
     states: np.ndarray
@@ -115,27 +119,31 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """A wheelset that travels at a speed (m/s). law : "linear" or "fastsim"; cells : of FASTSIM, along each strip."""
+    """A wheelset that travels at a speed (m/s), or stands. law : "linear" or "fastsim"; cells : of FASTSIM's strips.
+
+    lean : of the track to the right, the weight across the track as a share of that square to it.
+    """
 
     wheelset: Wheelset
     speed: float
     law: Literal["linear", "fastsim"] = "fastsim"
     cells: int = 21
+    lean: float = 0.0
 
     def __post_init__(self) -> None:
         if self.law not in LAWS:
             raise InputError("", "law", self.law, "is not known", tuple(LAWS))
-        if not 0.0 < abs(self.speed) <= 200.0:
-            raise InputError("", "speed", self.speed, "must be a speed in m/s up to 200, and not 0")
+        number("speed", self.speed, "a speed in m/s from -200 to 200", -FASTEST, FASTEST)
+        number("lean", self.lean, "a slope across the track from -1 to 1", -1.0, 1.0)
 
     @cached_property
     def body(self) -> np.ndarray:
-        """Numbers of the body and its suspension (12,)."""
+        """Numbers of the body and its suspension (13,)."""
         w = self.wheelset
         carried = (w.load - w.mass * GRAVITY) / 2.0
         sunk = self._static_height() if w.profiles else float(w.ellipse.approach) / w.slant[1]
         return np.array([w.mass, w.spin_inertia, w.yaw_inertia, w.half_spacing, w.stiffness_x, w.stiffness_y,
-                         w.stiffness_z, w.damping_x, w.damping_y, w.damping_z, carried, sunk])  # fmt: skip
+                         w.stiffness_z, w.damping_x, w.damping_y, w.damping_z, carried, sunk, self.lean])  # fmt: skip
 
     @cached_property
     def given(self) -> tuple:
@@ -202,23 +210,32 @@ class Equations:
     def run(self, state: np.ndarray, duration: float, step: float, every: int = 1) -> Path:
         """RK4 from a state (10,) over a duration (s) with a step (s); every so many steps are kept.
 
-        Raises InputError for a step too large for the fastest motion, RunFailed if the wheelset leaves the track.
+        Raises InputError for a state that is no wheelset's, a step too large for the fastest motion, or a duration that
+        is no whole number of steps; RunFailed if the wheelset leaves the track.
         """
-        self._check(step)
-        count = round(duration / step)
+        count = self._steps(state, duration, step, every)
         kept = count // every + 1
         path, contacts = np.full((kept, STATES), np.nan), self.blank(kept)
         speed, *rest = self.given
         done = march(np.array(state, float), speed, step, count, every, *rest, path, contacts)
         if done < count:
-            raise RunFailed("wheelset", f"leaves the track after {done * step:.6g} s")
+            raise RunFailed("wheelset", "leaves the track", done * step)
         return Path(np.arange(kept) * step * every, path, contacts)
 
-    def _check(self, step: float) -> None:
+    def _steps(self, state: np.ndarray, duration: float, step: float, every: int) -> int:
+        """Number of steps of a run that is possible."""
+        if quantity("state", state, "ten finite numbers").shape != (STATES,):
+            raise InputError("", "state", None, f"must be {STATES} finite numbers")
         fastest = float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
-        if not 0.0 < step * fastest <= STIFF:
+        if not 0.0 < number("step", step, "a step in s") * fastest <= STIFF:
             raise InputError("", "step", step, f"must be above 0 and at most {STIFF / fastest:.3g} s: the fastest "
                              f"motion has a rate of {fastest:.4g} 1/s")  # fmt: skip
+        if not divides(step, number("duration", duration, "a time in s")):
+            raise InputError("", "duration", duration, f"must be a whole number of steps of {step:g} s, 1 or more")
+        count = round(duration / step)
+        if isinstance(every, bool) or not isinstance(every, int) or not 1 <= every <= count or count % every:
+            raise InputError("", "every", every, f"must be a whole number that divides the {count} steps")
+        return count
 
 
 def growth(wheelset: Wheelset, speed: float) -> float:
