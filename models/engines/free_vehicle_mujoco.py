@@ -1,0 +1,62 @@
+"""A free vehicle in MuJoCo: native bodies and joints, all forces by a native callback."""
+
+from functools import cache
+from typing import Any
+
+import mujoco
+import numpy as np
+from numba import carray, cfunc, types
+
+from models.engines.contact_bridge_mujoco import Marcher
+from models.engines.free_vehicle import Driven
+from models.engines.mujoco_callback import _array_at, _double_at, installed
+from models.engines.mujoco_layout import check, offset
+from models.engines.spatial_mujoco import Numbers, _spec, _weigh
+from models.engines.spatial_protocol import SpatialRun
+
+
+@cache
+def timed_law(kernel: Any) -> Any:
+    """Compiled callback: a shell about a compiled kernel of (numbers, time, positions, rates, forces)."""
+    numbers, time = offset("mjModel", "numeric_data"), offset("mjData", "time")
+    position, rate, force = (offset("mjData", field) for field in ("qpos", "qvel", "qfrc_passive"))
+
+    @cfunc(types.void(types.voidptr, types.voidptr))
+    def law(model, data):
+        kernel(_array_at(model, numbers), carray(_double_at(data, time), (1,))[0], _array_at(data, position),
+               _array_at(data, rate), _array_at(data, force))  # fmt: skip
+
+    return law
+
+
+class FreeMujoco:
+    """One free vehicle in one MuJoCo model; the callback's numbers lie in the model."""
+
+    def __init__(self, driven: Driven) -> None:
+        self.driven, numbers = driven, driven.numbers
+        spec = _spec(driven.vehicle, 1e-3)
+        spec.option.gravity = driven.gravity
+        spec.add_numeric(name="vehicle", size=numbers.size, data=numbers)
+        self.model = spec.compile()
+        own = Numbers(driven.vehicle, self.model)
+        if not np.array_equal(own.columns, np.arange(driven.size)):
+            raise ValueError("the bodies are not in the order of a walk through their tree")
+        _weigh(self.model, own, driven.vehicle.bodies)
+        self.data = mujoco.MjData(self.model)
+        self.law = timed_law(driven.kernel)
+        check(self.model, self.data)
+
+    def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (n,) by ``mj_forward``."""
+        self.data.time, self.data.qpos[:], self.data.qvel[:] = t, q, v
+        with installed(self.law):
+            mujoco.mj_forward(self.model, self.data)
+        return self.data.qacc.copy()
+
+    def run(self, q: np.ndarray, v: np.ndarray, duration: float, step: float) -> SpatialRun:
+        """March by MuJoCo's RK4; RunFailed where it starts again or is not finite."""
+        self.model.opt.timestep, start, steps = step, np.concatenate((q, v)), round(duration / step)
+        with installed(self.law):
+            states = np.vstack((start, Marcher(self.model).run(start[None], steps)[0]))
+        positions, rates = np.split(states, 2, axis=1)
+        return SpatialRun(step * np.arange(steps + 1), positions, rates, {"steps": steps, "force calls": 4 * steps})

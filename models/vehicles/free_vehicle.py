@@ -1,0 +1,102 @@
+"""A vehicle of the ride that may turn through any angle: the same bodies, masses and springs on a carrier that yaws.
+
+The laws of ``spatial`` hold along directions fixed in space, for small motion about straight travel. Here a massless
+**carrier** on the ground has the chassis' motion in the plane, x, y and yaw, all finite (ISO 8855: x forward, y left, z
+up). On it a massless **sway** has the rest, z, roll and pitch, about axes on the ground below the chassis' centre, and
+the chassis is fixed to it. All that had no parent rides on the carrier. Directions that were fixed in space are fixed
+in the carrier now, points of the chassis on the ground move sideways with it as they did, and to first order in all
+other coordinates nothing else changes but this: what had no coordinate along y, as wheels and occupants, rides along,
+so that its mass takes part sideways and in yaw. Each tyre that turns gets a **rotor**, a body of its own with the spin.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.errors import InputError
+from models.vehicles.spatial import FREEDOMS, AntiRollBar, Body, SpatialVehicle, Vector
+
+CARRIER, SWAY, ROTOR = "carrier", "sway", "rotor"
+SPECK = 1e-9
+"""Mass (kg) of a rotor: Exudyn divides by the mass of whatever has inertia."""
+PLANE, REST = ("x", "y", "rz"), ("z", "rx", "ry")
+
+
+def free_vehicle(vehicle: SpatialVehicle, gravity: float = 9.81, spin_inertia: float = 0.0,
+                 fixed: tuple[str, ...] = ()) -> SpatialVehicle:  # fmt: skip
+    """The vehicle on a carrier, bodies in the order of a walk through their tree, without side forces, drag, outputs.
+
+    gravity : m/s^2; spin_inertia : kg m^2 of each wheel about its axle, 0 for wheels that do not spin; fixed : tyres
+    whose wheels do not spin. Raises InputError unless the vehicle's chassis has all six freedoms and no parent.
+    """
+    chassis = chassis_of(vehicle)
+    x, y, _ = chassis.position
+    bodies = [Body(CARRIER, 0.0, (0.0, 0.0, 0.0), PLANE), Body(SWAY, 0.0, (x, y, 0.0), REST, parent=CARRIER)]
+    for body in vehicle.bodies:
+        if body.name == chassis.name:
+            bodies.append(replace(body, freedoms=(), parent=SWAY))
+        else:
+            bodies.append(replace(body, parent=body.parent or CARRIER))
+    turning = ((0.0, 0.0, 0.0), (0.0, spin_inertia, 0.0), (0.0, 0.0, 0.0))
+    bodies += [Body(rotor(tyre.name), SPECK, tyre.point, ("ry",), turning, tyre.body)
+               for tyre in vehicle.tyres if spin_inertia and tyre.name not in fixed]  # fmt: skip
+    bars = tuple(_swaying(bar) if bar.body == chassis.name else bar for bar in vehicle.bars)
+    return replace(vehicle, bodies=_walked(bodies), bars=bars, side_forces=(), drags=(), outputs=(), gravity=gravity)
+
+
+def chassis_of(vehicle: SpatialVehicle) -> Body:
+    """The body on which the tyres' side forces act; InputError unless it is free."""
+    names = {force.chassis for force in vehicle.side_forces}
+    missing = [tyre.name for tyre in vehicle.tyres if tyre.name not in {force.name for force in vehicle.side_forces}]
+    if missing or len(names) != 1:
+        raise InputError(vehicle.name, f"tyres[{missing[0]}].cornering" if missing else "chassis", None,
+                         "a vehicle that is steered needs a chassis, and the cornering stiffness of every tyre")
+    chassis = vehicle.body(names.pop())
+    if chassis.parent is not None or set(chassis.freedoms) != set(FREEDOMS):
+        allowed = "a vehicle that is steered needs a chassis with the freedoms x, y, z, rx, ry, rz and without a parent"
+        raise InputError(vehicle.name, f"bodies[{chassis.name}].freedoms", list(chassis.freedoms), allowed)
+    return chassis
+
+
+def rotor(tyre: str) -> str:
+    """Name of the body that spins with a tyre."""
+    return f"{tyre} {ROTOR}"
+
+
+def anchor(vehicle: SpatialVehicle, body: str) -> tuple[int, Vector]:
+    """Last coordinate that moves a body, -1 if none does, and where (m) its joint lies in the design position."""
+    own = vehicle.body(body)
+    last = [i for i, (name, _) in enumerate(vehicle.coordinates()) if name == body]
+    if last:
+        return last[-1], own.position
+    return (-1, (0.0, 0.0, 0.0)) if own.parent is None else anchor(vehicle, own.parent)
+
+
+def joints(vehicle: SpatialVehicle) -> np.ndarray:
+    """(n, 5) of every coordinate: its kind (place in FREEDOMS), the coordinate below it (-1: none), the arm (m) from
+    the joint of that one to its own in the design position."""
+    rows = []
+    for body in vehicle.bodies:
+        below, origin = (-1, (0.0, 0.0, 0.0)) if body.parent is None else anchor(vehicle, body.parent)
+        for freedom in (freedom for freedom in FREEDOMS if freedom in body.freedoms):
+            rows.append([FREEDOMS.index(freedom), below, *np.subtract(body.position, origin)])
+            below, origin = len(rows) - 1, body.position
+    return np.array(rows)
+
+
+def _swaying(bar: AntiRollBar) -> AntiRollBar:
+    return replace(bar, body=SWAY)
+
+
+def _walked(bodies: list[Body]) -> tuple[Body, ...]:
+    """Every body right before all that ride on it: the order in which engines number them."""
+    found: list[Body] = []
+
+    def walk(parent: str | None) -> None:
+        for body in bodies:
+            if body.parent == parent:
+                found.append(body)
+                walk(body.name)
+
+    walk(None)
+    return tuple(found)
