@@ -15,7 +15,7 @@ from models.contact.wheel_on_rail import Pose, Side, Track, Wheelset, laid, plac
 from models.errors import InputError
 from models.strict import Strict, quantity
 
-SPACING = 2.5e-4
+SPACING, OF_KNOTS = 5e-5, 2.5e-4
 """Distance (m) of nodes along the wheel's contour and of knots along the rail's."""
 SHIFTS = np.arange(-0.012, 0.0120001, 1e-3)
 """Lateral displacements (m) at which first contact is looked for."""
@@ -71,10 +71,10 @@ def profile_numbers(profiles: Profiles, radius: float) -> np.ndarray:
     """What ``profile_on_rail`` reads, for wheels of a radius (m) at the taping line."""
     side = profiles.side(radius)
     tip = int(np.argmax(side.wheel.z))
-    y = _even(side.wheel.y[tip:], side.wheel.z[tip:])
+    y = _even(side.wheel.y[tip:], side.wheel.z[tip:], SPACING)
     curve = side.wheel.curve
     nodes = np.column_stack([y, radius + curve(y), curve(y, 1), _zones(y, _cuts(side))])
-    knots = _even(side.rail.y, side.rail.z)
+    knots = _even(side.rail.y, side.rail.z, OF_KNOTS)
     cubic = CubicSpline(knots, side.rail.curve(knots)).c
     rail = np.column_stack([knots, np.vstack([cubic[::-1].T, np.zeros(4)])])
     level = side.clearance(Pose(0.0, 0.0, 0.0, 0.0)) - radius
@@ -84,10 +84,10 @@ def profile_numbers(profiles: Profiles, radius: float) -> np.ndarray:
     return found
 
 
-def _even(y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Places y at even distances along a contour."""
+def _even(y: np.ndarray, z: np.ndarray, spacing: float) -> np.ndarray:
+    """Places y at even distances (m) along a contour."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
-    return np.interp(np.arange(0.0, length[-1], SPACING), length, y)
+    return np.interp(np.arange(0.0, length[-1], spacing), length, y)
 
 
 def _cuts(side: Side) -> list[float]:
