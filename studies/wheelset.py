@@ -89,7 +89,7 @@ def _save(scene: WheelsetScene, linear: dict[str, Linear], paths: dict[str, dict
 
     origin = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
     if linear:
-        axes: dict[str, Any] = {"engine": list(linear), "speed": next(iter(linear.values())).speeds}
+        axes = {"engine": list(linear), "speed": next(iter(linear.values())).speeds}
         values = np.array([one.values for one in linear.values()])
         data = xr.Dataset({name: (("engine", "speed", "eigenvalue"), part, {"units": "1/s"})
                            for name, part in (("real", values.real), ("imag", values.imag))}, axes, origin)  # fmt: skip
@@ -97,17 +97,23 @@ def _save(scene: WheelsetScene, linear: dict[str, Linear], paths: dict[str, dict
         data.to_netcdf(folder / "eigenvalues.nc", engine="h5netcdf")
         _save_table(linear, folder)
     if paths:
-        one = next(iter(paths.values()))
-        axes = {"engine": list(paths), "speed": list(one), "time": next(iter(one.values())).times}
-        every = [[paths[engine][speed] for speed in one] for engine in paths]
-        data = xr.Dataset({
-            **{name: (tuple(axes), np.array([[p.states[:, k] for p in row] for row in every]), {"units": unit})
-               for name, (k, unit) in STATES.items()},
-            **{name: ((*axes, "patch"), np.array([[p.contacts[:, :, k] for p in row] for row in every]),
-                      {"units": unit}) for name, (k, unit) in CONTACTS.items()},
-        }, axes, origin)  # fmt: skip
-        data["speed"].attrs["units"], data["time"].attrs["units"] = "m/s", "s"
-        data.to_netcdf(folder / "paths.nc", engine="h5netcdf")
+        dataset(paths).assign_attrs(origin).to_netcdf(folder / "paths.nc", engine="h5netcdf")
+
+
+def dataset(paths: dict[str, dict[float, Motion]]) -> Any:
+    """States and contacts over engine, speed and time, with units, as an xarray Dataset."""
+    import xarray as xr
+
+    one = next(iter(paths.values()))
+    axes = {"engine": list(paths), "speed": list(one), "time": next(iter(one.values())).times}
+    every = [[own[speed] for speed in one] for own in paths.values()]
+    states = {name: (tuple(axes), np.array([[p.states[:, k] for p in row] for row in every]), {"units": unit})
+              for name, (k, unit) in STATES.items()}  # fmt: skip
+    contacts = {name: ((*axes, "patch"), np.array([[p.contacts[:, :, k] for p in row] for row in every]),
+                       {"units": unit}) for name, (k, unit) in CONTACTS.items()}  # fmt: skip
+    data = xr.Dataset({**states, **contacts}, axes)
+    data["speed"].attrs["units"], data["time"].attrs["units"] = "m/s", "s"
+    return data
 
 
 def _save_table(linear: dict[str, Linear], folder: Path) -> None:
@@ -181,7 +187,8 @@ def _motions(paths: dict[str, dict[float, Motion]]) -> list[str]:
 
 def _ending(motion: Motion) -> str:
     """Last amplitude of a path, and what a cycle makes of it."""
-    tops = maxima(motion.states[:, Y])
+    y = motion.states[:, Y]
+    tops = y[maxima(y)]
     if tops.size < 2:
         return f"ends at {1e3 * motion.states[-1, Y]:.3g} mm without a second maximum"
     return f"last amplitude {1e3 * tops[-1]:.4g} mm, {100 * (tops[-1] / tops[-2] - 1):+.3g} % in the last cycle"

@@ -1,15 +1,16 @@
 """Figures of a wheelset on straight track: eigenvalues over speed, paths, creep forces and their power."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from models.rail import wheel_forces as wf
+from models.rail.equations import YAW, Y
 from models.rail.equations import Path as Motion
-from models.rail.equations import Y
 from models.rail.linear import klingel
+from models.rail.orbit import Orbit
 from models.rail.wheelset import Wheelset
 from studies.figures import COLOURS, LABELS, plt, save
 
@@ -96,4 +97,51 @@ def creep_figure(paths: Mapping[float, Motion], title: str, path: Path) -> None:
     largest = max(float(own.contacts[:, :, wf.POWER].max()) for own in paths.values())
     figure.suptitle(f"{title}\ncreep forces on the wheels and their power, at any time {largest:.3g} W or less",
                     fontsize=11)  # fmt: skip
+    save(figure, path)
+
+
+def branch_figure(orbits: Sequence[Orbit], wheelset: Wheelset, title: str, path: Path) -> None:
+    """Amplitude and frequency of the cycles over the speed: those that attract filled, those that repel open."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4))
+    speeds = np.array([orbit.speed for orbit in orbits])
+    for axis, values in ((left, [1e3 * orbit.amplitude for orbit in orbits]),
+                         (right, [orbit.frequency for orbit in orbits])):  # fmt: skip
+        axis.plot(speeds, values, color="0.7", zorder=1)
+        for stable, face, label in ((True, "#0072b2", "attracts"), (False, "white", "repels")):
+            chosen = [i for i, orbit in enumerate(orbits) if orbit.stable == stable]
+            axis.scatter(speeds[chosen], np.array(values)[chosen], s=22, facecolor=face, edgecolor="#0072b2", zorder=2,
+                         label=f"cycle that {label}" if chosen else None)  # fmt: skip
+    left.axhline(1e3 * wheelset.flange_clearance, color="0.6", linestyle=":")
+    left.annotate("flanges touch", (speeds.max(), 1e3 * wheelset.flange_clearance), (0, 4), textcoords="offset points",
+                  ha="right", fontsize=8)  # fmt: skip
+    ends = np.array([speeds.min(), speeds.max()])
+    right.plot(ends, ends / klingel(wheelset), color="0.6", linestyle=":", label="speed by Klingel's wavelength")
+    left.set(xlabel="speed [m/s]", ylabel="amplitude of the lateral displacement [mm]", ylim=(0, None),
+             title="Amplitude")  # fmt: skip
+    right.set(xlabel="speed [m/s]", ylabel="frequency [Hz]", title="Frequency")
+    left.legend()
+    right.legend()
+    figure.suptitle(title, fontsize=11)
+    save(figure, path)
+
+
+def cycle_figure(cycles: Mapping[str, Orbit], title: str, path: Path) -> None:
+    """The cycle in the plane of lateral displacement and yaw in every implementation, and its creep forces."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4))
+    for engine, orbit in cycles.items():
+        states = orbit.path().states[:: 1 if engine == "reference" else 16]
+        left.plot(1e3 * states[:, Y], 1e3 * states[:, YAW], MARKS[engine], color=COLOURS[engine], label=LABELS[engine])
+    first = next(iter(cycles.values()))
+    own = first.path()
+    each = own.contacts.shape[1] // 2
+    for column, name, style in ((wf.FX, "along", "-"), (wf.FY, "across", "--")):
+        for wheel, side, colour in ((0, "right", "#0072b2"), (1, "left", "#d55e00")):
+            values = own.contacts[:, wheel * each : (wheel + 1) * each, column].sum(axis=1)
+            right.plot(own.times, 1e-3 * values, style, color=colour, label=f"{side} wheel, {name}")
+    left.set(xlabel="lateral displacement [mm]", ylabel="yaw [mrad]", title=f"Cycle at {first.speed:g} m/s, "
+             f"{first.frequency:.4g} Hz")  # fmt: skip
+    right.set(xlabel="time [s]", ylabel="creep force [kN]", title="Creep forces in one period")
+    left.legend()
+    right.legend(fontsize=8)
+    figure.suptitle(title, fontsize=11)
     save(figure, path)

@@ -1,92 +1,80 @@
-"""Limit cycle of a wheelset: lateral amplitude and frequency in the steady oscillation, with their own errors.
+"""The limit cycle that a wheelset reaches from a large disturbance, and the branch of cycles over the speed.
 
 Above the critical speed the motion grows until creep forces saturate and flanges touch. Below it, down to a speed of
-its own, a large disturbance may end in the same cycle: where two answers exist, the one of the given start is found.
+its own, a large disturbance may end in the same cycle: the branch then begins with cycles that repel.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterator
+from itertools import count
 
 import numpy as np
 
-from models.errors import InputError
-from models.rail.equations import YAW, Equations, Y
+from models.errors import RunFailed
+from models.rail.equations import Equations, Y
+from models.rail.orbit import Orbit, beginning, branch, near, refined, solved
 
-CYCLES = 4
-"""Last cycles over which amplitude and frequency are means."""
-STEADY = 1e-3
-"""Relative change of the amplitude over the last cycles up to which a motion counts as a limit cycle."""
-NOTHING = 1e-6
-"""Amplitude (m) below which a motion has died out."""
+NOTHING = 1e-5
+"""Displacement (m) below which a motion has died out."""
+MARCH, MARCHES = 2.0, 20
+"""Seconds of one march towards the cycle, and how many there are at most."""
+STEADY = 2e-3
+"""Relative change of the amplitude from cycle to cycle from which Newton's method takes over."""
+FIRST = (0.1, 0.2, 0.4)
+"""Amplitudes at which a branch may begin, by the clearance of the flanges: of the smallest that leads to an orbit."""
+INNER, OUTER = 10, 0.02
+"""Amplitudes of a branch up to the clearance; step of those beyond, by the clearance."""
+LARGEST = 2.0
+"""Amplitude at which a branch ends, by the clearance."""
 
 
-@dataclass(frozen=True)
-class Cycle:
-    """amplitude, yaw : of y (m) and of yaw (rad); frequency : Hz; steady : whether the amplitude no longer changes.
+def attained(equations: Equations, *, start: float = 5e-3, step: float = 5e-4) -> Orbit | None:
+    """The limit cycle that a wheelset reaches from a lateral displacement ``start`` (m); None where it dies out.
 
-    A motion that has died out has the amplitude and frequency 0. amplitude_error, frequency_error : changes by halving
-    the step, NaN where it was not halved.
+    The motion is marched in steps (s) of this size until it repeats itself about, and then closed by Newton's method.
+    Raises InputError for a step that is too large, RunFailed if the wheelset leaves the track or does not settle.
     """
-
-    speed: float
-    amplitude: float
-    yaw: float
-    frequency: float
-    steady: bool
-    amplitude_error: float = float("nan")
-    frequency_error: float = float("nan")
-
-
-def cycle(equations: Equations, *, start: float = 5e-3, duration: float = 8.0, step: float = 5e-4) -> Cycle:
-    """The cycle that a wheelset reaches from a lateral displacement ``start`` (m) after ``duration`` (s).
-
-    step : s. Raises InputError for a step that is too large, or a motion too short to show its cycles, and RunFailed
-    if the wheelset leaves the track.
-    """
-    path = equations.run(equations.displaced(start), duration, step)
-    y, yaw = path.states[:, Y], path.states[:, YAW]
-    if np.abs(y[-y.size // 8 :]).max() < NOTHING:
-        return Cycle(equations.speed, 0.0, 0.0, 0.0, True)
-    tops, crossings = maxima(y), upward(path.times, y)
-    if min(tops.size, crossings.size) < CYCLES + 2:
-        raise InputError("", "duration", duration, f"s must hold {CYCLES + 2} cycles or more")
-    last = tops[-CYCLES:]
-    period = (crossings[-1] - crossings[-1 - CYCLES]) / CYCLES
-    return Cycle(equations.speed, float(last.mean()), float(maxima(yaw)[-CYCLES:].mean()), float(1.0 / period),
-                 bool(np.ptp(last) < STEADY * last.mean()))  # fmt: skip
+    state = equations.displaced(start)
+    for _ in range(MARCHES):
+        path = equations.run(state, MARCH, step)
+        y, state = path.states[:, Y], path.states[-1]
+        if np.abs(y[-y.size // 4 :]).max() < NOTHING:
+            return None
+        tops = maxima(y)
+        if tops.size > 2 and np.ptp(y[tops[-2:]]) < STEADY * y[tops[-1]]:
+            period = float(path.times[tops[-1]] - path.times[tops[-2]])
+            return solved(near(equations, path.states[tops[-1]], period, step), "amplitude")
+    raise RunFailed("wheelset", f"no steady motion within {MARCHES * MARCH:g} s at {equations.speed:.6g} m/s")
 
 
 def maxima(values: np.ndarray) -> np.ndarray:
-    """The positive maxima of evenly spaced values, each by the parabola through its three highest points."""
+    """Places of the positive maxima."""
     before, here, after = values[:-2], values[1:-1], values[2:]
-    k = np.flatnonzero((here > before) & (here >= after) & (here > 0.0))
-    rise, bend = (after[k] - before[k]) / 2.0, before[k] - 2.0 * here[k] + after[k]
-    return here[k] - 0.5 * rise**2 / bend
+    return 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0.0))
 
 
-def upward(times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Times at which values go from negative to positive, by the cubic through four points around."""
-    k = np.flatnonzero((values[1:-2] < 0.0) & (values[2:-1] >= 0.0)) + 1
-    step = times[1] - times[0]
-    found = []
-    for i in k:
-        cubic = np.polyfit(np.arange(-1.0, 3.0), values[i - 1 : i + 3], 3)
-        roots = np.roots(cubic)
-        real = roots[np.abs(roots.imag) < 1e-9].real
-        found.append(times[i] + step * real[np.argmin(np.abs(real - 0.5))])
-    return np.array(found)
+def bifurcation(equations: Equations, slowest: float, fastest: float, step: float = 5e-4) -> Iterator[Orbit]:
+    """Cycles by rising amplitude, from the critical speed on until one leaves a range of speeds (m/s).
+
+    Each at half the step (s), with the changes that halving made: of the speed, and of the frequency. Raises
+    NoCriticalSpeed if no branch begins, RunFailed where it cannot be followed.
+    """
+    clearance = equations.wheelset.flange_clearance
+    first = _first(equations, clearance, step)
+    inner = np.linspace(first.amplitude, clearance, INNER)[1:]
+    outer = (clearance * (1.0 + OUTER * k) for k in count(1))
+    yield refined(first, "speed")
+    for amplitudes in (inner, outer):
+        for orbit in branch(first, amplitudes):
+            if not slowest <= orbit.speed <= fastest or orbit.amplitude > LARGEST * clearance:
+                return
+            first = orbit
+            yield refined(orbit, "speed")
 
 
-def cycle_with_error(equations: Equations, *, start: float = 5e-3, duration: float = 8.0, step: float = 5e-4) -> Cycle:
-    """``cycle`` at half the step, with the differences that halving made."""
-    whole = cycle(equations, start=start, duration=duration, step=step)
-    half = cycle(equations, start=start, duration=duration, step=step / 2.0)
-    return Cycle(half.speed, half.amplitude, half.yaw, half.frequency, half.steady,
-                 abs(half.amplitude - whole.amplitude), abs(half.frequency - whole.frequency))  # fmt: skip
-
-
-def bifurcation(equations: Equations, speeds: Iterable[float], *, start: float = 5e-3, duration: float = 8.0,
-                step: float = 5e-4) -> list[Cycle]:  # fmt: skip
-    """Cycles over speed (m/s), each from the same start."""
-    return [cycle(Equations(equations.wheelset, speed, equations.law, equations.cells), start=start, duration=duration,
-                  step=step) for speed in speeds]  # fmt: skip
+def _first(equations: Equations, clearance: float, step: float) -> Orbit:
+    for share in FIRST:
+        try:
+            return beginning(equations, share * clearance, step)
+        except RunFailed as error:
+            failed = error
+    raise failed

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from models.errors import RunFailed
+from models.errors import InputError, RunFailed
 from models.rail.equations import ANGLE, STATES, Y_RATE, Equations, Path, Y
 from models.rail.linear import critical_speed
 
@@ -24,8 +24,9 @@ SIZES = np.array([1e-3, 1e-4, 1e-4, 1e-3, 1.0, 1e-2, 1e-2, 1e-2, 1e-2, 1.0])
 """Of the states (m, rad, m/s, rad/s): what a difference of each is measured by."""
 CLOSED = 1e-9
 """Largest difference of start and end, by SIZES, of a state that has come back."""
-SHIFT = 1e-3
-"""Of the sizes, of 1 m/s: steps of the central differences that linearise the return."""
+SHIFT = 1e-2
+"""Of the sizes, of 1 m/s and the period: steps of the central differences that linearise the return, wide enough to
+reach over the kinks that cells of FASTSIM make where they begin to slide."""
 NEWTON, LEAST_GAIN = 15, 0.3
 """Corrections at most; share of the difference that one may leave before the return is linearised anew."""
 HALVINGS = 5
@@ -88,6 +89,13 @@ class Orbit:
         return self.equations.run(self.state, self.period, self.period / self.steps)
 
 
+def near(equations: Equations, state: np.ndarray, period: float, step: float) -> Orbit:
+    """A guess for ``solved``: a state (10,) near a maximum of y and a period (s), in steps (s) of this size at most."""
+    start = state.copy()
+    start[Y_RATE] = 0.0
+    return _linearised(Orbit(equations, start, period, math.ceil(period / step), np.empty(0)))
+
+
 def beginning(equations: Equations, amplitude: float, step: float) -> Orbit:
     """The orbit of a small amplitude (m), from the motion that neither grows nor decays by the equations' own law.
 
@@ -99,9 +107,7 @@ def beginning(equations: Equations, amplitude: float, step: float) -> Orbit:
     k = np.where(values.imag > 0.0, values.real, -math.inf).argmax()
     state = at.rest.copy()
     state[RETURNS] += amplitude * (vectors[:, k] / vectors[AMPLITUDE, k]).real
-    period = 2.0 * math.pi / values[k].imag
-    guess = Orbit(at, state, period, math.ceil(period / step), np.empty(0))
-    return solved(_linearised(guess), "speed")
+    return solved(near(at, state, 2.0 * math.pi / values[k].imag, step), "speed")
 
 
 def growth_at(equations: Equations, speed: float) -> float:
@@ -114,7 +120,7 @@ def branch(first: Orbit, amplitudes: Iterable[float]) -> Iterator[Orbit]:
 
     Raises RunFailed where the branch cannot be followed.
     """
-    before, last = first, first
+    before, last = replace(first, state=first.equations.rest), first
     for amplitude in amplitudes:
         before, last = last, _onwards(before, last, amplitude, HALVINGS)
         yield last
@@ -123,7 +129,7 @@ def branch(first: Orbit, amplitudes: Iterable[float]) -> Iterator[Orbit]:
 def _onwards(before: Orbit, last: Orbit, amplitude: float, halvings: int) -> Orbit:
     """The orbit of an amplitude along the straight line through two orbits, in smaller steps if need be."""
     way = last.amplitude - before.amplitude
-    share = (amplitude - last.amplitude) / way if way else 0.0
+    share = (amplitude - last.amplitude) / way
     state = last.state + share * (last.state - before.state)
     state[Y] = amplitude
     ahead = replace(last.equations, speed=last.speed + share * (last.speed - before.speed))
@@ -145,14 +151,17 @@ def solved(guess: Orbit, unknown: Unknown, *, precise: bool = True) -> Orbit:
     """
     orbit, own, left = guess, False, math.inf
     for _ in range(NEWTON):
-        missed = _missed(orbit)
+        try:
+            missed = _missed(orbit)
+        except (InputError, RunFailed):  # a correction that led away: off the track, to a speed or period that is none
+            break
         size = float(np.abs(missed).max())
         if size < CLOSED:
             return orbit if own or not precise else _linearised(orbit)
         if not own and size > LEAST_GAIN * left:
             orbit, own = _linearised(orbit), True
         orbit, left, own = _corrected(orbit, missed, unknown), size, False
-    raise RunFailed("wheelset", f"no periodic motion was found near {orbit.speed:.6g} m/s and {orbit.amplitude:.3g} m")
+    raise RunFailed("wheelset", f"no periodic motion was found near {guess.speed:.6g} m/s and {guess.amplitude:.3g} m")
 
 
 def refined(orbit: Orbit, unknown: Unknown) -> Orbit:
