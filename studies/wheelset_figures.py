@@ -102,24 +102,29 @@ def creep_figure(paths: Mapping[float, Motion], title: str, path: Path) -> None:
 
 def branch_figure(orbits: Sequence[Orbit], wheelset: Wheelset, title: str, path: Path) -> None:
     """Amplitude and frequency of the cycles over the speed: those that attract filled, those that repel open."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4))
-    speeds = np.array([orbit.speed for orbit in orbits])
-    for axis, values in ((left, [1e3 * orbit.amplitude for orbit in orbits]),
-                         (right, [orbit.frequency for orbit in orbits])):  # fmt: skip
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 4.4))
+    speeds, amplitudes = (np.array([getattr(orbit, name) for orbit in orbits]) for name in ("speed", "amplitude"))
+    frequencies, clearance = np.array([orbit.frequency for orbit in orbits]), 1e3 * wheelset.flange_clearance
+    for axis, values in ((left, 1e3 * amplitudes), (middle, 1e3 * amplitudes), (right, frequencies)):
         axis.plot(speeds, values, color="0.7", zorder=1)
         for stable, face, label in ((True, "#0072b2", "attracts"), (False, "white", "repels")):
             chosen = [i for i, orbit in enumerate(orbits) if orbit.stable == stable]
-            axis.scatter(speeds[chosen], np.array(values)[chosen], s=22, facecolor=face, edgecolor="#0072b2", zorder=2,
+            axis.scatter(speeds[chosen], values[chosen], s=22, facecolor=face, edgecolor="#0072b2", zorder=2,
                          label=f"cycle that {label}" if chosen else None)  # fmt: skip
-    left.axhline(1e3 * wheelset.flange_clearance, color="0.6", linestyle=":")
-    left.annotate("flanges touch", (speeds.max(), 1e3 * wheelset.flange_clearance), (0, 4), textcoords="offset points",
-                  ha="right", fontsize=8)  # fmt: skip
+        axis.set_xlabel("speed [m/s]")
+    for axis in (left, middle):
+        axis.axhline(clearance, color="0.6", linestyle=":")
+        axis.set(ylabel="amplitude of the lateral displacement [mm]", ylim=(0, None))
+    begins = speeds[amplitudes <= 1.02e-3 * clearance] if (amplitudes <= 1e-3 * clearance).any() else speeds[:1]
+    margin = 0.2 * np.ptp(begins) + 0.05
+    middle.set(xlim=(begins.min() - margin, begins.max() + margin), ylim=(0, 1.1 * clearance), title="where it begins")
+    left.annotate("flanges touch", (speeds.max(), clearance), (0, -11), textcoords="offset points", ha="right",
+                  fontsize=8)  # fmt: skip
     ends = np.array([speeds.min(), speeds.max()])
     right.plot(ends, ends / klingel(wheelset), color="0.6", linestyle=":", label="speed by Klingel's wavelength")
-    left.set(xlabel="speed [m/s]", ylabel="amplitude of the lateral displacement [mm]", ylim=(0, None),
-             title="Amplitude")  # fmt: skip
-    right.set(xlabel="speed [m/s]", ylabel="frequency [Hz]", title="Frequency")
-    left.legend()
+    left.set_title("Amplitude")
+    right.set(ylabel="frequency [Hz]", title="Frequency")
+    left.legend(loc="lower right")
     right.legend()
     figure.suptitle(title, fontsize=11)
     save(figure, path)
@@ -142,6 +147,6 @@ def cycle_figure(cycles: Mapping[str, Orbit], title: str, path: Path) -> None:
              f"{first.frequency:.4g} Hz")  # fmt: skip
     right.set(xlabel="time [s]", ylabel="creep force [kN]", title="Creep forces in one period")
     left.legend()
-    right.legend(fontsize=8)
+    right.legend(fontsize=8, loc="center", bbox_to_anchor=(0.5, -0.24), ncols=2)
     figure.suptitle(title, fontsize=11)
     save(figure, path)

@@ -21,7 +21,7 @@ STEADY = 2e-3
 """Relative change of the amplitude from cycle to cycle from which Newton's method takes over."""
 FIRST = (0.1, 0.2, 0.4)
 """Amplitudes at which a branch may begin, by the clearance of the flanges: of the smallest that leads to an orbit."""
-INNER, OUTER = 10, 0.02
+INNER, OUTER = 12, 0.03
 """Amplitudes of a branch up to the clearance; step of those beyond, by the clearance."""
 LARGEST = 2.0
 """Amplitude at which a branch ends, by the clearance."""

@@ -4,13 +4,16 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from models.contact.standard_profiles import RAILS, WHEELS
 from models.errors import InputError
 from models.rail.equations import Equations
+from models.rail.laid_profiles import Profiles
 from models.rail.linear import NoCriticalSpeed, critical_speed
 from models.rail.scene import WheelsetScene
 from models.rail.wheelset import CHOSEN, Wheelset
 from models.scene_file import existing, parse
 
+BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
 SETS = {"chosen": CHOSEN}
 IMPLEMENTATIONS = {
     "reference": "models.rail.equations.Equations",
@@ -31,8 +34,23 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
     if base is None:
         path = existing(name, Path(scene.folder), scene.file, "wheelset.parameters")
         base = _judged(parse(path), path.name, "")
-    values = {key: getattr(base, key) for key in Wheelset.model_fields}
-    return _judged(values | override, scene.file, "wheelset.override") if override else base
+    values = {key: getattr(base, key) for key in Wheelset.model_fields} | {"profiles": _profiles(scene, base)}
+    return _judged(values | override, scene.file, "wheelset.override")
+
+
+def _profiles(scene: WheelsetScene, base: Wheelset) -> Profiles | None:
+    """Profiles of the scene, with the paths of their files, or else the parameter set's own."""
+    if scene.profiles is None:
+        return base.profiles
+    found = scene.profiles
+    for kind in ("wheel", "rail"):
+        name = getattr(found, kind)
+        if Path(name).suffix:
+            found = found.model_copy(update={kind: str(scene.path(name, f"profiles.{kind}"))})
+        elif name not in BUILT_IN[kind]:
+            allowed = "must be a file or built in"
+            raise InputError(scene.file, f"profiles.{kind}", name, allowed, tuple(BUILT_IN[kind]))
+    return found
 
 
 def _judged(values: dict[str, Any], file: str, table: str) -> Wheelset:

@@ -30,11 +30,11 @@ def describe(scene: WheelsetScene) -> str:
         _line("wheelset", own.parameters + (f", but {changed}" if changed else "")),
         _line("", f"{wheelset.mass:g} kg, {wheelset.load:g} N on both rails, 5 freedoms: lateral, vertical, roll, yaw, "
                   "spin"),
-        _line("wheels", f"cones of conicity {wheelset.conicity:g}, radius {wheelset.radius:g} m, on heads of radius "
-                        f"{wheelset.head_radius:g} m"),
+        _line("wheels", _wheels(wheelset)),
         _line("contact", f"{LAWS[scene.contact.law].format(scene.contact.cells)}; at rest a = {1e3 * ellipse.a:.3g} "
                          f"mm, b = {1e3 * ellipse.b:.3g} mm; friction {wheelset.friction:g}"),
-        _line("flange", f"after {1e3 * wheelset.flange_clearance:g} mm, {wheelset.flange_stiffness:g} N/m"),
+        _line("flange", "that of the profile" if wheelset.profiles else
+              f"after {1e3 * wheelset.flange_clearance:g} mm, {wheelset.flange_stiffness:g} N/m"),
         _line("held by", _suspension(wheelset)),
         _line("Klingel", f"wavelength {klingel(wheelset):.5g} m"), _line("critical", _critical(wheelset)),
         _line("speeds", f"{len(speeds)} from {speeds.min():g} to {speeds.max():g} m/s"),
@@ -51,7 +51,8 @@ def absent(scene: WheelsetScene, wheelset: Wheelset) -> list[str]:
         "FASTSIM": scene.contact.law == "fastsim",
         "springs": bool(wheelset.stiffness_x or wheelset.stiffness_y or wheelset.stiffness_z),
         "dampers": bool(wheelset.damping_x or wheelset.damping_y or wheelset.damping_z),
-        "friction": wheelset.friction > 0.0, "flange": wheelset.flange_stiffness > 0.0,
+        "friction": wheelset.friction > 0.0,
+        "flange": wheelset.profiles is not None or wheelset.flange_stiffness > 0.0,
         "damping of the contact": wheelset.contact_damping > 0.0, "irregularities of the track": False,
     }  # fmt: skip
     return [name for name, there in present.items() if not there]
@@ -59,6 +60,15 @@ def absent(scene: WheelsetScene, wheelset: Wheelset) -> list[str]:
 
 def _line(head: str, text: str) -> str:
     return f"  {head:<10} {text}"
+
+
+def _wheels(wheelset: Wheelset) -> str:
+    w, p = wheelset, wheelset.profiles
+    cones = f"cones of conicity {w.conicity:g}, radius {w.radius:g} m, on heads of radius {w.head_radius:g} m"
+    if p is None:
+        return cones
+    rails = f"{p.rail} inclined by {p.inclination:g} rad, gauge {p.gauge:g} m"
+    return f"{p.wheel} of radius {w.radius:g} m on {rails}; closed forms for {cones}"
 
 
 def _suspension(wheelset: Wheelset) -> str:

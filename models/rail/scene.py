@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from models.errors import InputError
+from models.rail.laid_profiles import Profiles
 from models.scene_file import SceneFile, checked
 from models.speeds import Speeds, check_speeds
 from models.steps import MOST_STEPS, divides, fitting
@@ -49,6 +50,7 @@ class WheelsetScene(SceneFile):
     system: Literal["wheelset"] = "wheelset"
     study: str = Field(default="wheelset", description="the study that runs the scene")
     wheelset: WheelsetTable = WheelsetTable()
+    profiles: Profiles | None = Field(default=None, description="cross-sections in place of cones and round heads")
     contact: Creep = Creep()
     speeds: Speeds = Field(description="table with a range of speeds, or a list of them")
     run: RunTable = RunTable()
