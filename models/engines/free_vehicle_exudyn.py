@@ -34,7 +34,8 @@ class FreeExudyn:
 
     def __init__(self, driven: Driven) -> None:
         self.driven, self._container = driven, exu.SystemContainer()
-        mbs = self.mbs = self._container.AddSystem()
+        self.mbs: Any = self._container.AddSystem()
+        mbs = self.mbs
         built = Build(driven.vehicle, mbs, Preloads({}, {}), mbs.AddObject(items.ObjectGround()))
         _tree(built, list(driven.vehicle.bodies))
         tree, node = built.links[driven.vehicle.bodies[0].name][0], next(iter(built.places.values()))[0]
@@ -47,9 +48,9 @@ class FreeExudyn:
 
     def _started(self, q: np.ndarray, v: np.ndarray) -> Any:
         """Settings that write no file; the system is at positions and rates."""
-        options, initial = exu.SimulationSettings(), exu.ConfigurationType.Initial
-        self.mbs.systemData.SetODE2Coordinates(q, initial)
-        self.mbs.systemData.SetODE2Coordinates_t(v, initial)
+        options, initial, data = exu.SimulationSettings(), exu.ConfigurationType.Initial, self.mbs.systemData
+        data.SetODE2Coordinates(q, initial)
+        data.SetODE2Coordinates_t(v, initial)
         options.solution.file.write = options.solution.sensors.active = False
         return options
 

@@ -51,8 +51,9 @@ brakes and drive on wheels; of the steering on the wheels."""
 
 
 @njit(cache=True, error_model="numpy")
-def control(knots, count, t):
+def control(numbers, first, which, count, t):
     """Value and rate of a control at a time (s): at rest at every knot, by the smoothest step of degree 5 between."""
+    knots = numbers[first + 2 * which * count :]
     if t <= knots[0]:
         return knots[count], 0.0
     for i in range(1, count):
@@ -68,14 +69,13 @@ def control(knots, count, t):
 def height(waves, count, x, y):
     """Height (m) of the road at a place (m) and its slopes along x and y: a sum of plane waves."""
     z = along = across = 0.0
-    for i in range(count):
-        w = waves[4 * i : 4 * i + 4]
-        phase = w[0] * x + w[1] * y
+    for i in range(0, 4 * count, 4):
+        phase = waves[i] * x + waves[i + 1] * y
         cosine, sine = math.cos(phase), math.sin(phase)
-        z += w[2] * cosine + w[3] * sine
-        slope = w[3] * cosine - w[2] * sine
-        along += w[0] * slope
-        across += w[1] * slope
+        z += waves[i + 2] * cosine + waves[i + 3] * sine
+        slope = waves[i + 3] * cosine - waves[i + 2] * sine
+        along += waves[i] * slope
+        across += waves[i + 1] * slope
     return z, along, across
 
 
@@ -83,13 +83,15 @@ def height(waves, count, x, y):
 def _outwards(rows, n, q, v, turned, place, axes, speed, turning):
     """Places and rotations of all joints, their axes, and velocities, in the carrier's axes and beside it.
 
-    ``speed`` (n, 3) is the velocity of the body behind a joint where it would pass the carrier's origin.
+    ``speed`` (n, 3) is the velocity of the body behind a joint where it would pass the carrier's origin. All that is
+    filled in must be zeros before.
     """
     for j in range(n):
         row = rows[PER_JOINT * j : PER_JOINT * (j + 1)]
         kind, below = int(row[KIND]), int(row[BELOW])
-        if j < 3:  # the carrier's own
-            turned[j], place[j], speed[j], turning[j], axes[j] = np.eye(3), 0.0, 0.0, 0.0, 0.0
+        if j < 3:  # the carrier's own: zeros but for
+            for k in range(3):
+                turned[j, k, k] = 1.0
             axes[j, kind % 3] = 1.0
             continue
         for k in range(3):
@@ -192,17 +194,18 @@ def _parts(numbers, q, v, f, tree, pushed, twisted, ledger):
 
 
 @njit(cache=True, error_model="numpy")
-def _touch(tyre, steer, steering, v, chassis, carried, frame, tree, road, contact, slide, way, ledger, report):
+def _touch(numbers, tyre, steer, steering, v, chassis, frame, tree, contact, slide, way, ledger, report):
     """Load of one tyre, and where and how it slides; fills contact, slide and ``way``: wheel's centre, arm to the
     contact, axes along, across and normal, axle, push along the normal (3 each)."""
     turned, place, _, speed, turning = tree
-    cosine, sine, x, y, yawing = frame
+    cosine, sine, x, y, ahead, aside, yawing = frame
     p, u, c, m, e = way[0], np.empty(3), way[1], way[4], way[5]
     joint = int(tyre[KNUCKLE])
     _point(joint, tyre[AT:], turned, place, speed, turning, p, u)
-    u[0] += carried[0] - yawing * p[1]
-    u[1] += carried[1] + yawing * p[0]
-    zeta, dx, dy = height(road, len(road) // 4, x + cosine * p[0] - sine * p[1], y + sine * p[0] + cosine * p[1])
+    u[0] += ahead - yawing * p[1]
+    u[1] += aside + yawing * p[0]
+    road = numbers[int(numbers[OF_WAVES]) :]
+    zeta, dx, dy = height(road, int(numbers[WAVES]), x + cosine * p[0] - sine * p[1], y + sine * p[0] + cosine * p[1])
     m[0], m[1], m[2] = -(cosine * dx + sine * dy), sine * dx - cosine * dy, 1.0
     elastic = max(tyre[STATIC] + tyre[VERTICAL] * (zeta - (p[2] - tyre[HEIGHT])), 0.0)
     rising = u[0] * m[0] + u[1] * m[1] + u[2]
@@ -242,6 +245,14 @@ def _touch(tyre, steer, steering, v, chassis, carried, frame, tree, road, contac
         contact[FIRST + i] = 1.0 / tyre[BRISTLES]
     report[PRESS], report[ANGLE] = pressing, steer
     report[SLIP_X], report[SLIP_Y], report[TURN], report[TREAD] = slide[0], slide[1], slide[2], slide[3]
+
+
+@njit(cache=True, error_model="numpy")
+def _copied(numbers, first, table):
+    """A table out of the numbers."""
+    for i in range(table.shape[0]):
+        for j in range(table.shape[1]):
+            table[i, j] = numbers[first + i * table.shape[1] + j]
 
 
 @njit(cache=True, error_model="numpy")
@@ -303,43 +314,38 @@ def all_forces(numbers, t, q, v, f, report, ledger):
     t : s; q, v : positions and rates of the coordinates (m, rad; m/s, rad/s) in the vehicle's order.
     """
     n, w, chassis = int(numbers[JOINTS]), int(numbers[TYRES]), int(numbers[CHASSIS])
-    turned, vectors = np.empty((n, 3, 3)), np.zeros((6, n, 3))
-    place, axes, speed, turning, pushed, twisted = vectors
+    turned, place, axes, speed = np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
+    turning, pushed, twisted = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
     tree = (turned, place, axes, speed, turning)
     rows = numbers[HEADER : HEADER + PER_JOINT * n]
     _outwards(rows, n, q, v, turned, place, axes, speed, turning)
-    ledger[:] = 0.0
+    for i in range(LEDGER):
+        ledger[i] = 0.0
     _parts(numbers, q, v, f, tree, pushed, twisted, ledger)
-    pushed[2], twisted[2] = 0.0, 0.0  # what acts between the vehicle's parts does not push the carrier
     _inwards(rows, n, place, axes, pushed, twisted, f)
-    pushed[:], twisted[:] = 0.0, 0.0
+    for k in range(3):  # what acts between the vehicle's parts does not push the carrier
+        pushed[2, k] = twisted[2, k] = 0.0
     cosine, sine, knots = math.cos(q[2]), math.sin(q[2]), int(numbers[KNOTS])
-    carried = np.array([cosine * v[0] + sine * v[1], cosine * v[1] - sine * v[0], 0.0])
-    frame = (cosine, sine, q[0], q[1], v[2])
-    first = int(numbers[OF_KNOTS])
-    steer, steering = control(numbers[first + 2 * STEER * knots :], knots, t)
-    braking = control(numbers[first + 2 * BRAKE * knots :], knots, t)[0]
-    driving = control(numbers[first + 2 * DRIVE * knots :], knots, t)[0]
-    first = int(numbers[OF_WAVES])
-    road = numbers[first : first + 4 * int(numbers[WAVES])]
+    frame = (cosine, sine, q[0], q[1], cosine * v[0] + sine * v[1], cosine * v[1] - sine * v[0], v[2])
+    steer, steering = control(numbers, int(numbers[OF_KNOTS]), STEER, knots, t)
+    braking = control(numbers, int(numbers[OF_KNOTS]), BRAKE, knots, t)[0]
+    driving = control(numbers, int(numbers[OF_KNOTS]), DRIVE, knots, t)[0]
     contacts, slides, found, ways = np.empty((w, 10)), np.empty((w, 4)), np.empty((w, 4)), np.empty((w, 7, 3))
     tyres = numbers[int(numbers[OF_TYRES]) :]
     for i in range(w):
-        tyre = tyres[PER_TYRE * i : PER_TYRE * (i + 1)]
-        _touch(tyre, tyre[STEERED] * steer, tyre[STEERED] * steering, v, chassis, carried, frame, tree, road,
+        tyre = tyres[PER_TYRE * i :]
+        _touch(numbers, tyre, tyre[STEERED] * steer, tyre[STEERED] * steering, v, chassis, frame, tree,
                contacts[i], slides[i], ways[i], ledger, report[i])  # fmt: skip
-    cells, strips = int(numbers[CELLS]), int(numbers[STRIPS])
-    first = int(numbers[OF_CELLS])
-    net_cells = numbers[first : first + 5 * cells].reshape((5, cells))
-    first = int(numbers[OF_STRIPS])
-    net_strips = numbers[first : first + 4 * strips].reshape((4, strips))
-    tyre_forces(contacts, slides, net_strips, net_cells, numbers[MIDDLE], found)
+    cells, strips = np.empty((5, int(numbers[CELLS]))), np.empty((4, int(numbers[STRIPS])))
+    _copied(numbers, int(numbers[OF_CELLS]), cells)
+    _copied(numbers, int(numbers[OF_STRIPS]), strips)
+    tyre_forces(contacts, slides, strips, cells, numbers[MIDDLE], found)
     for i in range(w):
-        tyre = tyres[PER_TYRE * i : PER_TYRE * (i + 1)]
+        tyre = tyres[PER_TYRE * i :]
         _creep(tyre, found[i], ways[i], chassis, f, tree, pushed, twisted, report[i])
         _torque(tyre, braking, driving, v, ways[i, 5], chassis, f, turning, twisted, ledger, report[i])
         ledger[STEER_POWER] -= tyre[STEERED] * steering * report[i, STEER_MOMENT]
-    _drag(numbers, chassis, carried, v[2], tree, pushed, twisted, ledger)
+    _drag(numbers, chassis, frame, tree, pushed, twisted, ledger)
     _inwards(rows, n, place, axes, pushed, twisted, f)
     f[0] += cosine * pushed[2, 0] - sine * pushed[2, 1]
     f[1] += sine * pushed[2, 0] + cosine * pushed[2, 1]
@@ -348,7 +354,10 @@ def all_forces(numbers, t, q, v, f, report, ledger):
 
 @njit(cache=True, error_model="numpy")
 def _inwards(rows, n, place, axes, pushed, twisted, f):
-    """What was gathered on the bodies, from the leaves to the carrier: each coordinate takes its share."""
+    """What was gathered on the bodies, from the leaves to the carrier: each coordinate takes its share.
+
+    Nothing is left on the bodies but on the carrier.
+    """
     moment = np.empty(3)
     for j in range(n - 1, 2, -1):
         below = int(rows[PER_JOINT * j + BELOW])
@@ -360,15 +369,16 @@ def _inwards(rows, n, place, axes, pushed, twisted, f):
         for k in range(3):
             pushed[below, k] += pushed[j, k]
             twisted[below, k] += twisted[j, k]
+            pushed[j, k] = twisted[j, k] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def _drag(numbers, chassis, carried, yawing, tree, pushed, twisted, ledger):
+def _drag(numbers, chassis, frame, tree, pushed, twisted, ledger):
     """Drag at the chassis' centre, against its motion along the vehicle."""
     turned, place, _, speed, turning = tree
     p, u, force = np.empty(3), np.empty(3), np.zeros(3)
     _point(chassis, numbers[DRAG_X:], turned, place, speed, turning, p, u)
-    ahead = u[0] + carried[0] - yawing * p[1]
+    ahead = u[0] + frame[4] - frame[6] * p[1]
     force[0] = -numbers[DRAG] * abs(ahead) * ahead
     ledger[DISSIPATED] += force[0] * ahead
     _push(chassis, force, p, pushed, twisted)

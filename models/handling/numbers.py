@@ -8,7 +8,7 @@ from models.errors import InputError
 from models.handling import forces as at
 from models.handling.tyre import net, shape_factor
 from models.vehicles.curve import Curve
-from models.vehicles.free_vehicle import SWAY, anchor, chassis_of, free_vehicle, joints, rotor
+from models.vehicles.free_vehicle import anchor, chassis_of, free_vehicle, joints, rotor
 from models.vehicles.spatial import SpatialVehicle, Vector
 from models.vehicles.spatial_linear import Preloads, preloads
 
