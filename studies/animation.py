@@ -37,8 +37,9 @@ def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: P
     if film.format != "png" and not said:
         frames = _told(page.frames(), film.frames, progress)
         written.append(write(folder / f"film.{film.format}", frames, film.frames_per_second))
-    table = [f"  {difference(motions)}", f"  {', '.join(path.name for path in written)}", *([f"  {said}"] if said else [])]
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "frames": film.frames, "table": table}
+    table = [difference(motions), ", ".join(path.name for path in written), said]
+    return {"scene": scene.title, "folder": str(folder), "failed": {}, "frames": film.frames,
+            "table": [f"  {line}" for line in table if line]}  # fmt: skip
 
 
 def _told(frames: Iterator[np.ndarray], count: int, progress: Progress) -> Iterator[np.ndarray]:

@@ -40,6 +40,12 @@ class Camera:
         """Pixels per metre at the target, in a picture of this height."""
         return height / (2.0 * np.tan(self.opening / 2.0) * float(np.linalg.norm(np.subtract(self.eye, self.target))))
 
+    def horizon(self, height: int) -> float:
+        """Row (pixels from the top) of what is far away and level with the eye; negative above the picture."""
+        _, upright, back = self.axes
+        level = float(np.dot(back, self.up) / np.dot(upright, self.up))
+        return height / 2.0 * (1.0 - level / np.tan(self.opening / 2.0))
+
     def seen(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
         """Pixels (..., 2) and inverse distances (...) of points (..., 3); not positive behind the eye."""
         own = (points - self.eye) @ self.axes.T
@@ -50,8 +56,12 @@ class Camera:
 
 def picture(camera: Camera, layers: list[list[Surface]], width: int, height: int,
             sky: np.ndarray) -> np.ndarray:  # fmt: skip
-    """Image (h, w, 3) of surfaces before a sky, from its top (3,) to its bottom; a later layer lies over all earlier ones, as arrows over bodies do."""
-    shade = np.linspace(*sky, 2 * height, dtype=np.float32)
+    """Image (h, w, 3) of surfaces before a sky, whose two colours are those of the picture's top and of the horizon.
+
+    A later layer lies over all earlier ones, as arrows over bodies do.
+    """
+    down = np.clip(np.arange(2 * height) / max(1.0, 2.0 * camera.horizon(height)), 0.0, 1.0)[:, None]
+    shade = (sky[0] + down * (sky[1] - sky[0])).astype(np.float32)
     image = np.broadcast_to(shade[:, None], (2 * height, 2 * width, 3)).copy()
     for layer in layers:
         nearest = np.zeros(image.shape[:2], np.float32)

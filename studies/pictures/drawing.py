@@ -5,10 +5,10 @@ from scipy.spatial.transform import Rotation
 
 from studies.pictures.camera import picture
 from studies.pictures.film import Arrow, Motion, Stage
-from studies.pictures.shapes import Surface, arrow, rod
+from studies.pictures.shapes import arrow, rod
 
 SKY = np.array([[0.80, 0.87, 0.94], [0.985, 0.99, 1.0]])
-"""Colour at the top and at the bottom of a picture."""
+"""Colour at the top of a picture and at the horizon."""
 THICKNESS = 0.024
 """Half width of an arrow's head, by the height that the picture shows at its target."""
 GREY = (0.35, 0.37, 0.4)

@@ -3,10 +3,11 @@
 Axes are those of the run, whatever they are; the camera's ``up`` says where up is. Lengths in m, forces in N.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from studies.pictures.camera import Camera
 from studies.pictures.shapes import Colour, Surface
@@ -14,7 +15,7 @@ from studies.pictures.shapes import Colour, Surface
 
 @dataclass(frozen=True, eq=False)
 class Arrow:
-    """A force over time: points (f, 3) in space, on ``body``, and vectors (f, 3); ``kind`` says its scale and colour."""
+    """A force over time: points (f, 3) in space, on ``body``, vectors (f, 3); ``kind``: its scale and colour."""
 
     name: str
     kind: str
@@ -74,7 +75,7 @@ class Stage:
     title: str
     caption: str
     shapes: dict[str, list[Surface]]
-    rest: dict[str, tuple[float, float, float]]
+    rest: Mapping[str, ArrayLike]
     camera: Camera
     kinds: dict[str, Kind]
     curve: Curve

@@ -1,8 +1,10 @@
 """The page of a film: each engine's picture, the forces' scale, their course, and how far the engines differ."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrow
@@ -22,7 +24,8 @@ class Page:
     def __init__(self, stage: Stage, motions: list[Motion]) -> None:
         self.stage, self.motions = stage, motions
         self._wide = (WIDTH - EDGE * (len(motions) + 1)) // len(motions)
-        self._figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100, layout="none")
+        no_layout: Any = "none"  # overrides the style of figures; the type hints do not know it
+        self._figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100, layout=no_layout)
         self._canvas = FigureCanvasAgg(self._figure)
         self._head()
         self._legend()
@@ -72,19 +75,20 @@ class Page:
 
     def _legend(self) -> None:
         """An arrow of each kind as long as its round force is at the camera's target, and what is drawn."""
-        row, left = 1 - (TOP + TALL + 20) / HEIGHT, EDGE
+        row, left = 1 - (TOP + TALL + 20) / HEIGHT, float(EDGE)
         for name, kind in self.stage.kinds.items():
             length = kind.scale * kind.legend * self.stage.camera.pixels(TALL)
-            self._figure.add_artist(FancyArrow(
-                left, row * HEIGHT, length, 0.0, width=3.5, head_width=12, head_length=min(15, length), transform=None,
-                length_includes_head=True, color=kind.colour, lw=0))  # fmt: skip
+            arrow = FancyArrow(
+                left, row * HEIGHT, length, 0.0, width=3.5, head_width=12, head_length=min(15, length),
+                length_includes_head=True, color=kind.colour, lw=0)  # fmt: skip
+            self._figure.add_artist(arrow)
             text = self._figure.text((left + length + 8) / WIDTH, row, f"{name}, {kind.legend / 1e3:g} kN", va="center")
             left += length + 8 + text.get_window_extent().width + 34
         self._figure.text(1 - EDGE / WIDTH, row, self.stage.caption, ha="right", va="center")
 
-    def _curves(self):
+    def _curves(self) -> Axes:
         """Axes with the plotted forces: a line of the first engine, dots of the second one."""
-        axes = self._figure.add_axes((70 / WIDTH, 62 / HEIGHT, 1 - 82 / WIDTH, 140 / HEIGHT))
+        axes = self._figure.add_axes((70 / WIDTH, 62 / HEIGHT, 1 - 82 / WIDTH, 128 / HEIGHT))
         values, names = self._values(self.motions[0])
         times, every = self.motions[0].times, max(1, len(self.motions[0].times) // 60)
         for i, name in enumerate(names):
@@ -96,7 +100,7 @@ class Page:
         axes.set_ylabel(f"{self.stage.curve.kind} [kN]")
         axes.set_title(f"{self.stage.curve.kind.capitalize()} {self.stage.curve.meaning}{self._marks()}")
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(names))
-        self._figure.text(1 - EDGE / WIDTH, 12 / HEIGHT, self._difference(), ha="right", fontsize=9.5)
+        self._figure.text(1 - EDGE / WIDTH, 12 / HEIGHT, difference(self.motions), ha="right", fontsize=9.5)
         self._figure.text(70 / WIDTH, 12 / HEIGHT, "time [s]", fontsize=9.5)
         return axes
 
@@ -105,9 +109,6 @@ class Page:
             return ""
         one, two = (LABELS[motion.engine] for motion in self.motions)
         return f": lines {one}, dots {two}"
-
-    def _difference(self) -> str:
-        return difference(self.motions)
 
 
 TONES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")

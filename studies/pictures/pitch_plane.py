@@ -18,7 +18,7 @@ from studies.pictures.shapes import Colour, Surface, box, revolved
 
 SPEED, SEED = 15.0, 1
 MAGNIFIED = 3.0
-RADIUS, HEIGHT = 0.33, 0.75
+RADIUS, HEIGHT = 0.33, 0.95
 """m: of the wheels and of the chassis' centre above the road; the model has neither."""
 KINDS = {"wheel force": Kind((0.0, 0.62, 0.45), 1.2e-4, 4e3), "suspension force": Kind((0.84, 0.2, 0.0), 1.2e-4, 4e3)}
 CURVE = Curve("wheel force", (0.0, 0.0, -1.0), "upwards")
@@ -31,8 +31,9 @@ RIM: Colour = (0.78, 0.79, 0.8)
 
 def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[Motion]]:
     """The stage, and the motion of each engine at the steps that are nearest to ``times`` (s)."""
-    scene = scene_of({"title": "pitch plane", "run": {"duration": float(np.ceil(duration + AHEAD / SPEED))},
-                      "effects": {"road": {"source": "iso8608", "road_class": "C", "seed": SEED, "speed": SPEED}}})
+    run = {"duration": float(np.ceil(duration + AHEAD / SPEED)), "step": 1e-3}
+    scene = scene_of({"title": "pitch plane", "run": run,
+                      "effects": {"road": {"source": "iso8608", "road_class": "D", "seed": SEED, "speed": SPEED}}})
     assembly = assemble(scene)
     runs = [_motion(engine, assembly, times) for engine in engines]
     return stage(assembly, runs[0][1]), [motion for motion, _ in runs]
@@ -61,8 +62,9 @@ def _exudyn(model: Any, states: np.ndarray) -> Poses:
     mbs, nodes = model.built.mbs, model.built.nodes
 
     def ask(node: Any, kind: Any) -> Any:
-        turns = mbs.GetNode(node)["nodeType"] == "RigidBody2D"
-        return np.eye(3) if kind == exu.OutputVariableType.RotationMatrix and not turns else mbs.GetNodeOutput(node, kind)
+        point = mbs.GetNode(node)["nodeType"] == "Point2D"
+        turned = kind == exu.OutputVariableType.RotationMatrix
+        return np.eye(3) if point and turned else mbs.GetNodeOutput(node, kind)
 
     coordinates = np.zeros((len(states), 7))
     coordinates[:, [1, 3, 5, 6]] = states
@@ -79,13 +81,13 @@ def _offset(assembly: Assembly, body: str) -> np.ndarray:
 
 def arrows(assembly: Assembly, channels: Channels, rows: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
     """The road's forces on the wheels and the suspension's on the chassis."""
-    up, found = np.array([0.0, 0.0, -1.0]), []
+    up, (places, turns), found = np.array([0.0, 0.0, -1.0]), poses, []
     for axle, wheel, strut in zip(assembly.vehicle.axles, ("f1", "f2"), ("f3", "f4"), strict=True):
         road, mount = np.array([0.0, 0.0, RADIUS]), np.array([axle.x, 0.0, 0.0])
-        found += [Arrow(f"wheel force, {axle.name}", "wheel force", axle.wheel, poses[0][axle.wheel] + road,
-                        channels[wheel][2][rows, None] * up),
-                  Arrow(f"suspension force, {axle.name}", "suspension force", "chassis",
-                        poses[0]["chassis"] + poses[1]["chassis"] @ mount, channels[strut][2][rows, None] * up)]  # fmt: skip
+        on_wheel, on_chassis = (channels[name][2][rows, None] * up for name in (wheel, strut))
+        mounts = places["chassis"] + turns["chassis"] @ mount
+        found.append(Arrow(f"wheel force, {axle.name}", "wheel force", axle.wheel, places[axle.wheel] + road, on_wheel))
+        found.append(Arrow(f"suspension force, {axle.name}", "suspension force", "chassis", mounts, on_chassis))
     return tuple(found)
 
 
@@ -96,11 +98,11 @@ def stage(assembly: Assembly, channels: Channels) -> Stage:
     road = PassingRoad(way, np.column_stack([height, height]), (-1.0, 1.0), SPEED, -1.0, MAGNIFIED, 1.0)
     level = equilibrium(assembly.parameters, assembly.vehicle.geometry)
     names = [body.name for body in assembly.vehicle.bodies]
-    rest = {name: tuple(_offset(assembly, name) + [0.0, 0.0, level[i]]) for i, name in enumerate(names)}
+    rest = {name: _offset(assembly, name) + np.array([0.0, 0.0, level[i]]) for i, name in enumerate(names)}
     struts = tuple(Strut("chassis", (axle.x, 0.0, 0.0), axle.wheel, (0.0, 0.0, 0.0)) for axle in assembly.vehicle.axles)
     caption = f"displacements and road drawn {MAGNIFIED:g} times as large; forces on wheels and chassis"
-    camera = Camera((1.5, 4.6, -1.5), (0.0, 0.0, -0.62), (0.0, 0.0, -1.0), 0.46)
-    return Stage(f"Pitch-plane vehicle at {SPEED:g} m/s on a road of class C", caption, shapes(assembly), rest, camera,
+    camera = Camera((1.5, 4.6, -1.5), (0.0, 0.0, -0.66), (0.0, 0.0, -1.0), 0.46)
+    return Stage(f"Pitch-plane vehicle at {SPEED:g} m/s on a road of class D", caption, shapes(assembly), rest, camera,
                  KINDS, CURVE, road.at, MAGNIFIED, struts=struts)  # fmt: skip
 
 

@@ -11,7 +11,8 @@ def check(scene: PictureScene, engines: tuple[str, ...]) -> None:
 def describe(scene: PictureScene) -> str:
     """The scene's plan as text."""
     film = scene.film
-    shown = f"{film.duration:g} s of the run in {film.frames} frames, {film.frames / film.frames_per_second:g} s of film"
+    long = film.frames / film.frames_per_second
+    shown = f"{film.duration:g} s of the run in {film.frames} frames, {long:g} s of film"
     lines = [scene.title, f"  scene      {scene.file}, study {scene.study}", f"  vehicle    {scene.vehicle}",
              f"  film       {shown}, {film.format}"]  # fmt: skip
     said = missing(film.format)

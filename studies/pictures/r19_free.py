@@ -19,12 +19,12 @@ from studies.pictures.poses import Poses, of_exudyn, of_mujoco
 from studies.pictures.road import AHEAD, PassingRoad
 from studies.pictures.shapes import Colour, Surface, ball, box, extruded, revolved
 
-SPEED, STEP, SEED = 20.0, 1e-3, 3
-"""m/s, largest step (s), seed of the road."""
+SPEED, STEP, SEED, GUST = 20.0, 1e-3, 3, 0.5
+"""m/s, largest step (s), seed of the road, lateral speed of the body at the start (m/s)."""
 MAGNIFIED = 4.0
 SCENE = {"title": "", "system": "ride", "vehicle": {"file": "r19_free"}, "road": {"iso8608": "C"},
          "speeds": {"values": [SPEED]}}  # fmt: skip
-KINDS = {"wheel load": Kind((0.0, 0.62, 0.45), 1.6e-4, 4e3), "side force": Kind((0.84, 0.2, 0.0), 2e-3, 2e2)}
+KINDS = {"wheel load": Kind((0.0, 0.62, 0.45), 1.6e-4, 4e3), "side force": Kind((0.84, 0.2, 0.0), 6e-4, 1e3)}
 CURVE = Curve("wheel load", (0.0, 0.0, 1.0), "of the road on the tyres, static part included")
 PAINT: Colour = (0.16, 0.42, 0.72)
 RUBBER: Colour = (0.16, 0.16, 0.17)
@@ -46,7 +46,7 @@ def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tupl
 
 
 def reporting(vehicle: SpatialVehicle) -> SpatialVehicle:
-    """The vehicle with the outputs from which its road forces follow: tyre forces, then speeds of side forces' points."""
+    """The vehicle with the outputs of its road forces: tyre forces, then lateral speeds where side forces act."""
     tyres = tuple(TyreOutput(tyre.name, "tyre force", tyre.name) for tyre in vehicle.tyres)
     across = tuple(PointOutput(f.name, "velocity", f.body, f.point, (0.0, 1.0, 0.0)) for f in vehicle.side_forces)
     return replace(vehicle, outputs=(*tyres, *across))
@@ -56,7 +56,8 @@ def _motion(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndar
     settings = Settings(INTEGRATORS[engine], road.step, (len(table) - 1) // 2 * road.step)
     model = build(engine, vehicle, settings, SPEED, table)
     zero = np.zeros(len(vehicle.coordinates()))
-    run = model.run(zero, zero)
+    gust = np.array([GUST if place == ("body", "y") else 0.0 for place in vehicle.coordinates()])
+    run = model.run(zero, gust)
     kept = SpatialRun(run.times[rows], run.positions[rows], run.rates[rows])
     poses = (_exudyn if engine == "exudyn" else _mujoco)(model, kept.positions)
     return Motion(engine, kept.times, *poses, arrows(vehicle, kept, table[2 * rows], poses))
@@ -110,8 +111,8 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
     rest = {body.name: body.position for body in vehicle.bodies}
     camera = Camera((5.6, 4.6, 2.3), (-0.1, 0.1, 0.5), opening=0.5)
     caption = f"displacements and road drawn {MAGNIFIED:g} times as large; forces of the road on the tyres"
-    return Stage(f"Car of {len(vehicle.coordinates())} freedoms at {SPEED:g} m/s on a road of class C", caption,
-                 shapes(vehicle), rest, camera, KINDS, CURVE, passing.at, MAGNIFIED)  # fmt: skip
+    title = f"Car of {len(vehicle.coordinates())} freedoms at {SPEED:g} m/s on a road of class C, after a gust"
+    return Stage(title, caption, shapes(vehicle), rest, camera, KINDS, CURVE, passing.at, MAGNIFIED)
 
 
 def shapes(vehicle: SpatialVehicle) -> dict[str, list[Surface]]:

@@ -39,16 +39,20 @@ class PassingRoad:
         x, y = np.meshgrid(own, across, indexing="ij")
         net = np.stack([x, y, self._height(x + self.speed * time, y)], -1)
         dark = (stations[:-1, None] + np.arange(len(across) - 1)) % 2 == 1
-        return [_tiles(net, dark, DARK), _tiles(net, ~dark, LIGHT), floor(-0.35 * self.up, GRASS), *self._marks(time)]
+        if self.up < 0:
+            net, dark = net[:, ::-1], dark[:, ::-1]
+        grass = floor(-0.35 * self.up, GRASS, self.up)
+        return [_tiles(net, dark, DARK), _tiles(net, ~dark, LIGHT), grass, *self._marks(time)]
 
     def _marks(self, time: float) -> list[Surface]:
         """Lines along both edges."""
         side = self.half - 0.15
         starts = 4.0 * np.arange(-10, 11) - self.speed * time % 4.0
-        return [box(1.6, 0.1, 0.02, LINE).at(x, y, float(self._height(np.array(x + self.speed * time), y)) + 0.01 * self.up)
+        return [box(1.6, 0.1, 0.02, LINE).at(x, y, float(self._height(x + self.speed * time, y)) + 0.01 * self.up)
                 for x in starts for y in (-side, side)]  # fmt: skip
 
     def _height(self, way: np.ndarray, y: np.ndarray | float) -> np.ndarray:
+        """Drawn height (m) at a place on the way and across it."""
         one, two = (np.interp(way, self.way, column) for column in self.heights.T)
         share = (np.asarray(y) - self.tracks[0]) / (self.tracks[1] - self.tracks[0])
         return self.magnified * (one + share * (two - one))

@@ -1,9 +1,9 @@
 """Surfaces of simple bodies as triangles, in the body's own axes (m)."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 Colour = tuple[float, float, float]
 
@@ -49,7 +49,7 @@ def sheet(points: np.ndarray, colour: Colour, alpha: float = 1.0) -> Surface:
     return faceted(_patches(points), colour, alpha)
 
 
-def revolved(axial: Sequence[float], radii: Sequence[float], colour: Colour, alpha: float = 1.0,
+def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, alpha: float = 1.0,
              pieces: int = 48) -> Surface:  # fmt: skip
     """A line (axial, radii) turned about y, from left to right; round along, sharp at the line's corners."""
     angles = np.linspace(0.0, 2.0 * np.pi, pieces + 1)
@@ -59,12 +59,9 @@ def revolved(axial: Sequence[float], radii: Sequence[float], colour: Colour, alp
     slopes = np.stack([np.diff(y), -np.diff(r)], 1)
     length = np.linalg.norm(slopes, axis=1, keepdims=True)
     slopes /= np.where(length > 0, length, 1.0)
-    surfaces = [_band(net[i : i + 2], slope[0] * ring + [0.0, slope[1], 0.0]) for i, slope in enumerate(slopes)]
-    return Surface(*(np.concatenate(part) for part in zip(*surfaces, strict=True)), colour, alpha)
-
-
-def _band(net: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return _patches(net), _patches(np.stack([normals, normals]))
+    corners = [_patches(net[i : i + 2]) for i in range(len(slopes))]
+    normals = [_patches(np.stack([slope[0] * ring + [0.0, slope[1], 0.0]] * 2)) for slope in slopes]
+    return Surface(np.concatenate(corners), np.concatenate(normals), colour, alpha)
 
 
 def box(x: float, y: float, z: float, colour: Colour, alpha: float = 1.0) -> Surface:
@@ -77,16 +74,19 @@ def extruded(outline: np.ndarray, width: float, colour: Colour, alpha: float = 1
     """A convex outline (n, 2) in x and z, counter-clockwise from x to z, drawn out along y about the origin."""
     front = np.insert(outline, 1, -width / 2.0, axis=1)
     back = np.insert(outline, 1, width / 2.0, axis=1)
-    fan = [np.stack([np.repeat(side[:1], len(side) - 2, 0), side[first:][: len(side) - 2], side[second:][: len(side) - 2]], 1)
-           for side, first, second in ((front, 1, 2), (back, 2, 1))]  # fmt: skip
+    fan = [np.stack([np.broadcast_to(side[:1], side[2:].shape), side[1:-1], side[2:]], 1)
+           for side in (front, back[::-1])]  # fmt: skip
     closed = np.stack([np.vstack([front, front[:1]]), np.vstack([back, back[:1]])])
     return faceted(np.concatenate([*fan, _patches(closed)]), colour, alpha)
 
 
-def floor(z: float, colour: Colour, half: float = 150.0) -> Surface:
-    """A level square about the origin, of tiles: what is behind the eye is lost, near the origin little at a time."""
+def floor(z: float, colour: Colour, up: float, half: float = 150.0) -> Surface:
+    """A level square about the origin, of tiles: what is behind the eye is lost, near the origin little at a time.
+
+    up : 1 where z is up, -1 where it is down.
+    """
     lines = half * np.sinh(np.linspace(-6.0, 6.0, 57)) / np.sinh(6.0)
-    x, y = np.meshgrid(lines, lines)
+    x, y = np.meshgrid(up * lines, lines, indexing="ij")
     return sheet(np.stack([x, y, np.full_like(x, z)], -1), colour)
 
 

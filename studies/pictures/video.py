@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.image import imsave
@@ -21,11 +22,10 @@ def write(path: Path, frames: Iterable[np.ndarray], per_second: int) -> Path:
     """Write frames (h, w, 3) of 8 bits a colour to ``path``, .mp4 or .gif, one at a time."""
     import imageio.v2 as imageio
 
-    if path.suffix == ".gif":
-        options = {"duration": 1000.0 / per_second, "loop": 0}
-    else:
-        options = {"fps": per_second, "codec": "libx264", "quality": 7}
-    with imageio.get_writer(path, **options) as writer:
+    gif: dict[str, Any] = {"duration": 1000.0 / per_second, "loop": 0}
+    mp4: dict[str, Any] = {"fps": per_second, "codec": "libx264", "quality": 7}
+    writer: Any
+    with imageio.get_writer(path, **(gif if path.suffix == ".gif" else mp4)) as writer:
         for frame in frames:
             writer.append_data(frame)
     return path
@@ -33,5 +33,6 @@ def write(path: Path, frames: Iterable[np.ndarray], per_second: int) -> Path:
 
 def still(path: Path, image: np.ndarray) -> Path:
     """Write one image (h, w, 3) to a PNG file, the same bytes from the same image."""
-    imsave(path, np.ascontiguousarray(image), metadata={"Software": None})
+    metadata: Any = {"Software": None}
+    imsave(path, np.ascontiguousarray(image), metadata=metadata)
     return path

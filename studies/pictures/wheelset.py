@@ -77,7 +77,7 @@ def arrows(wheelset: Wheelset, path: Path) -> tuple[Arrow, ...]:
 def _place(w: Wheelset, side: float, state: np.ndarray) -> np.ndarray:
     """Place of contact in the track's axes (m)."""
     found = cone_on_rail(side, *state[[Y, Z, ROLL, YAW]], w.radius, w.half_gauge, w.conicity, w.head_radius)
-    return np.array(found[-3:]) + [0.0, state[Y], state[Z]]
+    return np.array(found[-3:]) + np.array([0.0, state[Y], state[Z]])
 
 
 def stage(wheelset: Wheelset) -> Stage:
@@ -85,12 +85,12 @@ def stage(wheelset: Wheelset) -> Stage:
     camera = Camera((2.75, 1.75, -0.95), (0.0, 0.12, 0.06), (0.0, 0.0, -1.0), 0.54)
     caption = f"displacements drawn {MAGNIFIED:g} times as large; forces on the wheels"
     return Stage(f"Wheelset at {SPEED:g} m/s on straight rails", caption, {"wheelset": shapes(wheelset)},
-                 {"wheelset": (0.0, 0.0, 0.0)}, camera, KINDS, CURVE, lambda time: track(wheelset, SPEED * time), MAGNIFIED,
-                 ("wheelset",))  # fmt: skip
+                 {"wheelset": (0.0, 0.0, 0.0)}, camera, KINDS, CURVE, lambda time: track(wheelset, SPEED * time),
+                 MAGNIFIED, ("wheelset",))  # fmt: skip
 
 
 def shapes(w: Wheelset) -> list[Surface]:
-    """An axle and two wheels, whose treads are the cones of the model; flanges stand off as far as they are drawn to."""
+    """An axle and two wheels, whose treads are the model's cones; flanges stand off by the magnified clearance."""
     found = [revolved([-w.half_spacing - 0.12, -w.half_spacing - 0.12, w.half_spacing + 0.12, w.half_spacing + 0.12],
                       [0.0, 0.085, 0.085, 0.0], DARK)]  # fmt: skip
     inner, outer = 0.036 + MAGNIFIED * w.flange_clearance + 0.004, 0.075
@@ -114,14 +114,13 @@ def track(w: Wheelset, way: float) -> list[Surface]:
     for side in (1.0, -1.0):
         y = side * w.half_gauge
         head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])
-        for outline, colour in ((head, STEEL), (np.array([[-0.01, 0.05], [0.01, 0.05], [0.01, 0.15], [-0.01, 0.15]]), RAIL),
-                                (np.array([[-0.07, 0.15], [0.07, 0.15], [0.07, 0.17], [-0.07, 0.17]]), RAIL)):
-            found.append(_along(outline, last - first, colour).at((first + last) / 2.0, y, top))
+        parts = [_along(head, last - first, STEEL), box(last - first, 0.02, 0.1, RAIL).at(0.0, 0.0, 0.1),
+                 box(last - first, 0.14, 0.02, RAIL).at(0.0, 0.0, 0.16)]  # fmt: skip
+        found += [part.at((first + last) / 2.0, y, top) for part in parts]
     phase = way % SLEEPERS
     for i in range(int(np.ceil(first / SLEEPERS)), int(np.floor(last / SLEEPERS)) + 1):
         found.append(box(0.24, 2.5, 0.1, CONCRETE).at(i * SLEEPERS - phase + 0.3, 0.0, top + 0.22))
-    found.append(floor(top + 0.24, BALLAST))
-    return found
+    return [*found, floor(top + 0.24, BALLAST, -1.0)]
 
 
 def _along(outline: np.ndarray, length: float, colour: Colour) -> Surface:
