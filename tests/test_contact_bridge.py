@@ -1,16 +1,20 @@
 """Creep forces as a callback of both engines: the same numbers by every bridge, nothing silent, threads that agree."""
 
+import re
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_approach
+from models.contact.undeformed_distance import from_function
 from models.engines.contact_bridge import SUNK, Wheels, add_forces, slopes
 from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law, python_law
 from models.engines.mujoco_callback import installed
-from models.errors import InputError, RunFailed
+from models.errors import InputError, Refused, RunFailed
 from validation.cases.contact_bridges import plain
 
 STEP, STEPS = 1e-4, 60
@@ -26,7 +30,7 @@ def native(wheels: Wheels, states: np.ndarray, integrator="RK4", threads=1) -> n
 
 
 def test_forces_are_those_of_the_package():
-    wheels = Wheels(2, 11)
+    wheels = Wheels(2, cells=11)
     (q, v), f = wheels.state(), np.zeros(8)
     add_forces(wheels.numbers, q, v, f)
     for k in (0, 4):
@@ -37,16 +41,17 @@ def test_forces_are_those_of_the_package():
         np.testing.assert_allclose(f[k : k + 4], expected, rtol=1e-11, atol=1e-7)
 
 
-@pytest.mark.parametrize(("count", "cells"), [(1, 7), (4, 21), (8, 0)])
-def test_both_engines_give_one_path(count, cells):
-    wheels = Wheels(count, cells)
+@pytest.mark.parametrize(("count", "theory", "cells"), [(1, "fastsim", 7), (4, "fastsim", 21), (8, "linear", 21),
+                                                        (1, "simplified", 7)])  # fmt: skip
+def test_both_engines_give_one_path(count, theory, cells):
+    wheels = Wheels(count, theory, cells)
     path = native(wheels, np.concatenate(wheels.state())[None])[0, -1]
     # one kernel and one method; rates are of 0.1 m/s and rad/s
     np.testing.assert_allclose(path, exudyn(wheels, Forces(wheels).of), rtol=0.0, atol=1e-14)
 
 
 def test_every_bridge_gives_one_path():
-    wheels = Wheels(2, 11)
+    wheels = Wheels(2, cells=11)
     start, built = np.concatenate(wheels.state())[None], model(wheels, STEP, "RK4")
     expected = native(wheels, start)[0, -1]
     for law, close in ((add_forces, 0.0), (plain(wheels), 1e-12)):
@@ -70,7 +75,7 @@ def test_threads_agree_to_the_last_bit():
 
 
 def test_an_empty_callback_changes_nothing():
-    wheels = Wheels(1, None)
+    wheels = Wheels(1, "none")
     start, built = np.concatenate(wheels.state())[None], model(wheels, STEP)
     alone = Marcher(built).run(start, STEPS)
     with installed(empty_law()):
@@ -92,14 +97,15 @@ def test_what_no_kernel_can_answer_is_no_path():
         Rolling(wheels, Forces(wheels).of).run(q, v, 5)
 
 
-@pytest.mark.parametrize("wrong", [{"count": 0}, {"count": 1.5}, {"speed": 0.0}, {"load": float("nan")}, {"cells": 2}])
+@pytest.mark.parametrize("wrong", [{"count": 0}, {"count": 1.5}, {"speed": float("inf")}, {"load": float("nan")},
+                                   {"cells": 2}, {"theory": "hertz"}, {"theory": "simplified", "cells": 2}])
 def test_wheels_that_are_none(wrong):
     with pytest.raises(InputError):
         _ = Wheels(**wrong).numbers
 
 
 def test_slopes_are_those_of_the_linear_theory_where_nothing_slips():
-    wheels, found = Wheels(2, 0), np.zeros((8, 8))
+    wheels, found = Wheels(2, "linear"), np.zeros((8, 8))
     q, v = np.zeros(8), np.zeros(8)
     add_forces(wheels.numbers, q, v, base := np.zeros(8))
     for by_q, by_v in ((1.0, 0.0), (0.0, 1.0), (3.0, -2.0)):
@@ -114,7 +120,7 @@ def test_slopes_are_those_of_the_linear_theory_where_nothing_slips():
 
 
 def test_implicit_steps_need_fewer_calls_with_slopes_and_end_alike():
-    wheels, ends, calls = Wheels(2, 11), [], []
+    wheels, ends, calls = Wheels(2, cells=11), [], []
     for slope in (None, Forces(wheels).slopes):
         forces, count = Forces(wheels), []
         rolling = Rolling(wheels, lambda q, v, f=forces, n=count: n.append(1) or f.of(q, v), slopes=slope)
@@ -126,11 +132,72 @@ def test_implicit_steps_need_fewer_calls_with_slopes_and_end_alike():
 
 
 def test_low_speed_forces_no_tiny_steps():
-    # creepages are rates by speed: at 0.1 m/s wheels damp at 1e5 1/s, where an explicit step of 1 ms is lost
-    wheels = Wheels(1, 11, speed=0.1)
+    # creepages are rates by speed: at 1 m/s wheels damp at 1e4 1/s, of which an explicit step is less than 2.8
+    wheels, start = Wheels(1, cells=7, speed=1.0), (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
+    forces, refused = Forces(wheels), pytest.raises(Refused, match="stability limit of RK44")
+    with refused as told:
+        Rolling(wheels, forces.of).run(*start, 50, 4e-3, "RK44")
+    stable = float(re.search(r"RK44, (\S+) s,", str(told.value))[1])
+    true = Rolling(wheels, forces.of).run(*start, 2000, 1e-4, "RK44")
+    assert 1e-4 < stable < 4e-3 / 20.0
+    for solver in ("GeneralizedAlpha", "TrapezoidalIndex2"):
+        end = Rolling(wheels, forces.of, slopes=forces.slopes).run(*start, 50, 4e-3, solver)
+        # second order in a step that is 1/17 of the suspension's shortest period: below 0.1 % of what is left
+        assert np.abs(end - true)[:4].max() < 1e-3 * np.abs(true[:4]).max()
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.05, -0.05])
+def test_crawling_and_standing_wheels(speed):
+    wheels = Wheels(1, cells=7, speed=speed)
     q, v = wheels.state()
     forces = Forces(wheels)
     end = Rolling(wheels, forces.of, slopes=forces.slopes).run(q, v / 200.0, 20, 1e-3, "GeneralizedAlpha")
     assert np.abs(end[:4]).max() < np.abs(q).max()
-    with pytest.raises(RunFailed):
+    with pytest.raises(RunFailed, match="exudyn"):  # Newton's method by differences leaps from slip to slip
         Rolling(wheels, forces.of).run(q, v / 200.0, 20, 1e-3, "GeneralizedAlpha")
+
+
+def force(speed: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    add_forces(Wheels(1, cells=7, speed=speed).numbers, q, v, found := np.zeros(4))
+    return found
+
+
+def test_forces_through_zero_speed():
+    q, v = np.array([0.0, 0.0, 1e-5, 2e-3]), np.array([2e-4, -1e-4, 0.0, 1e-2])
+    speeds = np.linspace(-0.2, 0.2, 401)
+    found = np.array([force(speed, q, v) for speed in speeds])
+    # continuous: no change over 1 mm/s is more than ten times the even share of the whole change
+    assert (np.abs(np.diff(found, axis=0)).max(axis=0) <= 10.0 / 400.0 * np.ptp(found, axis=0) + 1e-6).all()
+    mirror = np.array([-1.0, 1.0, 1.0, -1.0])
+    for k in (0, 60, 150, 200):  # rolling backwards is the mirror image of rolling forwards, slip and all
+        np.testing.assert_allclose(force(-speeds[k], mirror * q, mirror * v), mirror * found[k], rtol=1e-10, atol=1e-6)
+    slips = np.column_stack((np.full(401, v[0]), v[1] - speeds * q[3], np.zeros(401), np.full(401, v[3])))
+    assert (np.sum(found * slips, axis=1) < 0.0).all()
+
+
+def test_simplified_theory_is_near_to_fastsim():
+    # the same ellipse by two theories: about a tenth of mu N between them
+    wheels, found = Wheels(4), []
+    for theory in ("fastsim", "simplified"):
+        add_forces(replace(wheels, theory=theory).numbers, *wheels.state(), f := np.zeros(16))
+        found.append(f.reshape(4, 4))
+    off = np.abs(found[1] - found[0])[:, :2].max() / (0.3 * wheels.load)
+    assert 1e-4 < off < 0.1
+
+
+def test_a_distance_that_rolls_one_way_only():
+    leaning = from_function(lambda x, y: (x**2 + y**2) * (1.3 + 10.0 * x), (-0.03, 0.03), (-0.03, 0.03), 61)
+    assert np.isfinite(force_of(Wheels(1, "simplified", 7, distance=leaning)))
+    with pytest.raises(InputError, match="mirror image"):
+        Wheels(1, "simplified", 7, distance=leaning, speed=0.0)
+
+
+def force_of(wheels: Wheels) -> float:
+    add_forces(wheels.numbers, np.zeros(4), np.full(4, 1e-3), f := np.zeros(4))
+    return float(f.sum())
+
+
+def test_a_step_too_long_is_refused_by_both_engines():
+    with pytest.raises(Refused, match=r"mujoco.*stability limit of RK4,"):
+        model(Wheels(1), 2e-3, "RK4")
+    assert model(Wheels(1), 2e-4, "RK4").opt.timestep == 2e-4

@@ -10,55 +10,66 @@ from studies.figures import plt
 LAWS = ("no contact", "empty callback", "linear theory", "FASTSIM, 7 cells", "FASTSIM, 11 cells", "FASTSIM, 21 cells",
         "FASTSIM, 41 cells", "non-Hertzian")  # fmt: skip
 NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
-BRIDGES = {"native": "native", "jitted": "jitted, from Python", "plain": "plain Python", "none": "", "empty": ""}
+BRIDGES = {"native": "native", "jitted": "jitted, from Python", "plain": "plain Python"}
 PARTS = (("own", "engine", "0.75"), ("kernel", "kernel", "C0"), ("over", "bridge", "C3"))
 METHODS = {"mujoco": "Euler", "exudyn": "ExplicitEuler"}
+COLOURS = {"mujoco": "C0", "exudyn": "C1"}
 WHEELS = 4
+LINES = {1: ":", WHEELS: "-", 8: "--"}
 
 
 def figure(points: list[dict[str, Any]]) -> Figure:
-    """Cost per step over the law at four wheels, and shares of engine, kernel and bridge over the wheels."""
-    drawing, (left, right) = plt.subplots(1, 2, figsize=(11.5, 4.8), width_ratios=(1.15, 1.0))
+    """Cost per step over the law; shares of engine, kernel and bridge over the law and over the number of wheels."""
+    drawing, (left, middle, right) = plt.subplots(1, 3, figsize=(15.5, 5.6), width_ratios=(1.25, 1.0, 0.8))
     some = [p for p in points if METHODS[p["engine"]] == p["method"]]
-    _laws(left, [p for p in some if p["wheels"] == WHEELS])
-    _shares(right, [p for p in some if p["cells"] == 21 and p["bridge"] in ("native", "generic object")])
-    drawing.suptitle("A contact kernel inside an engine costs little more than itself, if no Python stands between",
+    best = [p for p in some if p["bridge"] in ("empty", _main(p["engine"]))]
+    _laws(left, some)
+    _shares(middle, [(f"{NAMES[p['engine']]}, {p['law']}", p) for p in best if p["wheels"] == WHEELS])
+    _shares(right, [(f"{NAMES[p['engine']]}, {p['wheels']} wheel{'s' * (p['wheels'] > 1)}", p)
+                    for p in best if p["main"]])  # fmt: skip
+    middle.set_title(f"shares by law, {WHEELS} wheels")
+    right.set_title("shares by wheels, FASTSIM, 21 cells")
+    right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, fontsize="small")
+    drawing.suptitle("A contact kernel inside an engine: what a step costs and what it is made of",
                      x=0.01, ha="left", fontweight="bold")  # fmt: skip
     return drawing
-
-
-def _laws(axis: Any, points: list[dict[str, Any]]) -> None:
-    lines: dict[tuple[str, str], list[tuple[int, float]]] = {}
-    for p in points:
-        bridges = [p["bridge"]] if p["bridge"] not in ("none", "empty") else [_main(p["engine"])]
-        for bridge in bridges:
-            lines.setdefault((p["engine"], bridge), []).append((LAWS.index(p["law"]), 1e6 * p["step"]))
-    for i, ((engine, bridge), values) in enumerate(sorted(lines.items(), key=lambda one: one[0], reverse=True)):
-        main = bridge == _main(engine)
-        x, y = np.array(sorted(values)).T
-        mark, colour = "o-" if main else "osD^v"[i % 5], "C0" if engine == "mujoco" else "C1"
-        axis.semilogy(x, y, mark, color=colour, mfc=None if main else "white",
-                      label=f"{NAMES[engine]}, {BRIDGES.get(bridge, bridge)}")  # fmt: skip
-    axis.set_xticks(range(len(LAWS)), LAWS, rotation=35, ha="right")
-    axis.set(ylabel="time per step [us]", title=f"{WHEELS} wheels, one call per step")
-    axis.grid(True, axis="y", alpha=0.3)
-    axis.legend(fontsize="small")
 
 
 def _main(engine: str) -> str:
     return "native" if engine == "mujoco" else "generic object"
 
 
-def _shares(axis: Any, points: list[dict[str, Any]]) -> None:
-    labels = [f"{NAMES[p['engine']]}, {p['wheels']} wheel{'s' if p['wheels'] > 1 else ''}" for p in points]
-    before = np.zeros(len(points))
+def _laws(axis: Any, points: list[dict[str, Any]]) -> None:
+    """Lines of the best bridge at every number of wheels, marks of the others."""
+    for engine in METHODS:
+        own = [p for p in points if p["engine"] == engine]
+        for count, style in LINES.items():
+            line = [p for p in own if p["wheels"] == count and p["bridge"] in ("none", "empty", _main(engine))]
+            x, y = np.array(sorted((LAWS.index(p["law"]), 1e6 * p["step"]) for p in line)).T
+            label = f"{NAMES[engine]}, {_main(engine)}, {count} wheel{'s' * (count > 1)}"
+            axis.semilogy(x, y, style, marker=".", color=COLOURS[engine], label=label)
+        others = [p for p in own if p["bridge"] not in ("none", "empty", _main(engine))]
+        for mark, bridge in zip("sD^", dict.fromkeys(p["bridge"] for p in others), strict=False):
+            x, y = np.array([(LAWS.index(p["law"]), 1e6 * p["step"]) for p in others if p["bridge"] == bridge]).T
+            axis.semilogy(x, y, mark, color=COLOURS[engine], mfc="white",
+                          label=f"{NAMES[engine]}, {BRIDGES.get(bridge, bridge)}, {WHEELS} wheels")  # fmt: skip
+    axis.set_xticks(range(len(LAWS)), LAWS, rotation=35, ha="right")
+    axis.set(ylabel="time per step [us]", title="one call per step")
+    axis.grid(True, axis="y", alpha=0.3)
+    axis.legend(fontsize="x-small")
+
+
+def _shares(axis: Any, points: list[tuple[str, dict[str, Any]]]) -> None:
+    """A bar of 100 % for each; the parts of a bar are of its whole, none below zero."""
+    labels, before = [label for label, _ in points], np.zeros(len(points))
+    whole = np.array([sum(max(p[part], 0.0) for part, _, _ in PARTS) for _, p in points])
     for part, name, colour in PARTS:
-        share = np.array([100.0 * max(p[part], 0.0) / p["step"] for p in points])
+        share = np.array([100.0 * max(p[part], 0.0) for _, p in points]) / whole
         axis.barh(labels, share, left=before, color=colour, label=name)
         for i, (at, value) in enumerate(zip(before, share, strict=True)):
             if value >= 6.0:
                 axis.text(at + value / 2.0, i, f"{value:.0f}", ha="center", va="center", fontsize="small")
         before += share
     axis.invert_yaxis()
-    axis.set(xlabel="share of the step [%]", title="FASTSIM, 21 cells")
-    axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize="small")
+    axis.tick_params(axis="y", labelsize="small")
+    axis.set_xlabel("share of the step [%]")

@@ -7,7 +7,8 @@ they refuse by an exception is refused here by a status, and every result is the
 The net of cells is a table of doubles that ``net`` makes for a number of cells, good for ellipses of every shape. That
 of zero cells stands for the linear theory: forces of small creepages, which no friction limits. In the place of a net
 stands the ``table`` of an undeformed distance (``kernel_simplified``) where the contact is no ellipse: Kalker's theory
-of 1983, by the approach alone; A and B are not read, a and b come out as half the lengths of the patch.
+of 1983, by the approach alone; A and B are not read, a and b come out as half the lengths of the patch. That table
+holds the address of its law, so that who has none pays nothing for it.
 """
 
 import math
@@ -39,14 +40,8 @@ from models.contact.fastsim_many import (
 )
 from models.contact.hertz import FLATTEST, LARGEST_AXIS, LEAST_AXIS, aspect, integrals
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN, NOTHING, Array
-from models.contact.kernel_simplified import FOUND, HALF_X, HALF_Y, roll_on
-from models.contact.kernel_simplified import FX as ROLLED_X
-from models.contact.kernel_simplified import FY as ROLLED_Y
-from models.contact.kernel_simplified import LOAD as CARRIED
-from models.contact.kernel_simplified import MZ as TURNED
-from models.contact.kernel_simplified import STICK as STUCK
 from models.contact.linear_theory import LARGEST_PATCH, coefficient_at, flexibilities_at
-from models.contact.stack import beyond, doubles
+from models.contact.stack import ask, beyond, doubles
 from models.errors import InputError
 
 (SHAPE_X, SHAPE_Y, PRESSING, FRICTION, CREEP_X, CREEP_Y, TURNING, MODULUS, POISSON) = range(9)
@@ -62,6 +57,8 @@ FINE, NOT_FINITE, NOT_PLAUSIBLE, NOT_KNOWN = range(4)
 LARGEST_CURVATURE, SLENDEREST, LARGEST_FRICTION = 1e12, 1e9, 10.0
 _CELLS, _FIRST, _COUNT, _ALONG = range(4)
 """Places in the net: cells per strip, strips of the first net, how many nets, where the rows of the cells begin."""
+_LAW = 1
+"""Place of the law's address where the first number is below zero."""
 _LANES, _CONTACT, _SLIPS, _FOUND = ROWS * LANES, 10, 5, 4
 
 
@@ -98,7 +95,7 @@ def contact(given, inputs, table, outputs):
     if status != FINE or (own[PRESSING] <= 0.0 and not any_shape):
         return status
     if any_shape:
-        return _simplified(own, table, out)
+        return ask(int(carray(table, (2,))[_LAW]), inputs, table, outputs)
     if not _press(given, own, out):
         out[:] = math.nan
         return NOT_PLAUSIBLE
@@ -161,20 +158,6 @@ def _press(given, own, out):
     out[APPROACH] = 1.5 * load / (math.pi * short * long) * short * whole / elastic
     rolls = short >= LEAST_AXIS and long <= SLENDEREST * short and short * long <= LARGEST_PATCH**2
     return rolls and load <= LARGEST_LOAD
-
-
-@njit(cache=True, error_model="numpy")
-def _simplified(own, table, out):
-    """Status of a contact of any shape, and its forces."""
-    found = carray(doubles(FOUND), (FOUND,))
-    if not roll_on(table, own[PRESSING], own[FRICTION], own[CREEP_X], own[CREEP_Y], own[TURNING], own[MODULUS],
-                   own[POISSON], found):  # fmt: skip
-        out[:] = math.nan
-        return NOT_PLAUSIBLE
-    out[FX], out[FY], out[MZ], out[STICK] = found[ROLLED_X], found[ROLLED_Y], found[TURNED], found[STUCK]
-    out[AXIS_A], out[AXIS_B], out[NORMAL] = found[HALF_X], found[HALF_Y], found[CARRIED]
-    out[APPROACH] = own[PRESSING] if found[CARRIED] > 0.0 else 0.0
-    return FINE
 
 
 @njit(cache=True, error_model="numpy")

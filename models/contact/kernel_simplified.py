@@ -7,13 +7,35 @@ heap and given back within the call, which is a hundredth of its time; no lock, 
 """
 
 import math
+from functools import cache
 
 import numpy as np
-from numba import carray
+from numba import carray, cfunc, types
 
 from models.compiled import njit
 from models.contact.distance_kernels import sides
 from models.contact.inputs import Array, whole_number
+from models.contact.kernel import (
+    APPROACH,
+    AXIS_A,
+    AXIS_B,
+    CREEP_X,
+    CREEP_Y,
+    FINE,
+    FRICTION,
+    FX,
+    FY,
+    INPUTS,
+    MODULUS,
+    MZ,
+    NORMAL,
+    NOT_PLAUSIBLE,
+    OUTPUTS,
+    POISSON,
+    PRESSING,
+    STICK,
+    TURNING,
+)
 from models.contact.patches import Patch, separate
 from models.contact.simplified_kernels import (
     PARABOLIC,
@@ -26,21 +48,19 @@ from models.contact.simplified_kernels import (
     tangential_fit,
 )
 from models.contact.simplified_theory import ABOUT, FITS, LEAST_CELLS, PLAIN, SHAPES, Options
-from models.contact.stack import beyond
+from models.contact.stack import DOUBLES, beyond
 from models.contact.undeformed_distance import Distance
 from models.errors import InputError
 
-_CELLS, _NET, _SHAPE, _FIT, _LOW, _EDGE, _X, _Y, _DX, _DY, _BOTTOM_X, _BOTTOM_Y = range(12)
-_LINES_X, _LINES_Y, _ROWS, _COLUMNS, _HEAD = range(12, 17)
-"""Places in the table: minus the cells; net, shape and fit; least distance and depth at which a side is reached (m);
-first node, spacing and bottom along x and y (m); lengths. Then lines and roots along x and y, and padded heights."""
+_CELLS, _LAW, _NET, _SHAPE, _FIT, _LOW, _EDGE, _X, _Y, _DX, _DY, _BOTTOM_X, _BOTTOM_Y = range(13)
+_LINES_X, _LINES_Y, _ROWS, _COLUMNS, _HEAD = range(13, 18)
+"""Places in the table: minus the cells; address of the law; net, shape and fit; least distance and depth at which a
+side is reached (m); first node, spacing and bottom along x and y (m); lengths. Then lines and roots along x and y, and
+padded heights."""
 MOST_CELLS = 200
 SETTLED = 1e-12
 """Share of the approach, from first touch on, to which the depth settles."""
 TRIES = 100
-LOAD, FX, FY, MZ, STICK, HALF_X, HALF_Y = range(7)
-"""What ``roll_on`` finds: N, N, N, N m, share of the area, half the lengths of the patch's box (m)."""
-FOUND = 7
 
 
 def table(distance: Distance, cells: int = 21, options: Options = PLAIN) -> Array:
@@ -54,8 +74,8 @@ def table(distance: Distance, cells: int = 21, options: Options = PLAIN) -> Arra
         raise InputError("", "distance", None, f"has {len(patches)} valleys: the compiled theory takes one patch")
     (patch,) = patches
     (x, root_x), (y, root_y) = patch.lines
-    head = [-cells, options.net, SHAPES[options.shape], FITS[options.fit], patch.low, patch.edge, distance.x[0],
-            distance.y[0], distance.dx, distance.dy, *patch.bottom[:2],
+    head = [-cells, _law().address, options.net, SHAPES[options.shape], FITS[options.fit], patch.low, patch.edge,
+            distance.x[0], distance.y[0], distance.dx, distance.dy, *patch.bottom[:2],
             x.size, y.size, *distance.padded.shape]  # fmt: skip
     made = np.concatenate((head, x, root_x, y, root_y, distance.padded.ravel()), dtype=float)
     made.setflags(write=False)
@@ -121,43 +141,50 @@ def settle(numbers, approach, modulus):
 
 
 @njit(cache=True, error_model="numpy")
-def roll_on(numbers, approach, friction, xi_x, xi_y, spin, shear, nu, found):
-    """Fill ``found`` (FOUND,) of the patch at an approach (m); whether there is an answer.
+def simplified(inputs, numbers, outputs):
+    """Status of the patch, FINE or NOT_PLAUSIBLE; fills ``outputs``, of ``inputs`` that ``kernel`` has found fine.
 
-    Zeros where the bodies do not touch. No answer where the contact reaches the edge of the distance.
+    All pointers to doubles. Zeros where the bodies do not touch; no answer where the contact reaches the edge of the
+    distance.
     """
-    head = carray(numbers, (_HEAD,))
-    found[:] = 0.0
-    if approach <= head[_LOW]:
-        return True
-    depth, stiffness, volume = settle(numbers, approach, shear / (1.0 - nu))
-    if not (math.isfinite(stiffness) and volume >= 0.0):
-        return False
-    load = volume * stiffness
-    if not load > 0.0:
-        return True
+    own, out, head = carray(inputs, (INPUTS,)), carray(outputs, (OUTPUTS,)), carray(numbers, (_HEAD,))
+    out[:] = 0.0
+    if own[PRESSING] <= head[_LOW]:
+        return FINE
+    depth, stiffness, volume = settle(numbers, own[PRESSING], own[MODULUS] / (1.0 - own[POISSON]))
+    if stiffness * volume > 0.0:
+        _roll(own, numbers, head, depth, stiffness, stiffness * volume, out)
+    if math.isfinite(stiffness * volume + out[FX] + out[FY] + out[MZ]):
+        return FINE
+    out[:] = math.nan
+    return NOT_PLAUSIBLE
+
+
+@njit(cache=True, error_model="numpy")
+def _roll(own, numbers, head, depth, stiffness, load, out):
+    """Fill ``out`` of the patch at a depth: as ``simplified_theory.roll``."""
     after = _HEAD + 2 * int(head[_LINES_X] + head[_LINES_Y])
     padded = carray(beyond(numbers, after), (int(head[_ROWS]), int(head[_COLUMNS])))
     origin, step, box = (head[_X], head[_Y]), (head[_DX], head[_DY]), box_at(numbers, head, depth)
-    cells, net = -int(head[_CELLS]), int(head[_NET])
+    cells, net, shear = -int(head[_CELLS]), int(head[_NET]), own[MODULUS]
     y, low_x, high_x, pressure = strips(padded, origin, step, box, depth, head[_LOW], cells, cells, int(head[_SHAPE]))
     width = (box[3] - box[2]) / cells
     normalise(pressure, low_x, high_x, width, load)
-    traction = np.empty((y.size, cells, 2))
-    march(y, low_x, high_x, width, pressure, friction, 1.0 / stiffness, xi_x, xi_y, spin, traction)
-    crude = gather(y, low_x, high_x, width, traction, box, net)
-    dx, dy = (box[1] - box[0]) / net, (box[3] - box[2]) / net
-    cover = crude_net(padded, origin, step, box, depth, head[_LOW], net, PARABOLIC)[2]
-    u = tangential(crude, dx, dy, nu) / (math.pi * shear)
-    flexibility = tangential_fit(u, crude, cover, dx, dy, int(head[_FIT]))
-    if flexibility <= 0.0:
-        flexibility = 1.0 / stiffness
-    fx, fy, mz, stuck, area = march(y, low_x, high_x, width, pressure, friction, flexibility, xi_x, xi_y, spin,
-                                    traction)  # fmt: skip
-    found[LOAD], found[FX], found[FY], found[MZ] = load, fx, fy, mz
-    found[STICK] = stuck / area
-    found[HALF_X], found[HALF_Y] = 0.5 * (box[1] - box[0]), 0.5 * (box[3] - box[2])
-    return math.isfinite(fx + fy + mz + load)
+    traction, flexibility = np.empty((y.size, cells, 2)), 1.0 / stiffness
+    fx = fy = mz = stuck = area = 0.0
+    for again in (False, True):
+        if again:
+            crude = gather(y, low_x, high_x, width, traction, box, net)
+            dx, dy = (box[1] - box[0]) / net, (box[3] - box[2]) / net
+            cover = crude_net(padded, origin, step, box, depth, head[_LOW], net, PARABOLIC)[2]
+            u = tangential(crude, dx, dy, own[POISSON]) / (math.pi * shear)
+            fitted = tangential_fit(u, crude, cover, dx, dy, int(head[_FIT]))
+            flexibility = fitted if fitted > 0.0 else flexibility
+        fx, fy, mz, stuck, area = march(y, low_x, high_x, width, pressure, own[FRICTION], flexibility, own[CREEP_X],
+                                        own[CREEP_Y], own[TURNING], traction)  # fmt: skip
+    out[FX], out[FY], out[MZ], out[STICK] = fx, fy, mz, stuck / area
+    out[AXIS_A], out[AXIS_B] = 0.5 * (box[1] - box[0]), 0.5 * (box[3] - box[2])
+    out[NORMAL], out[APPROACH] = load, own[PRESSING]
 
 
 @njit(cache=True, error_model="numpy")
@@ -171,3 +198,14 @@ def normalise(pressure, low_x, high_x, width, load):
     for s in range(strips_):
         for i in range(cells):
             pressure[s, i] *= load / carried
+
+
+@cache
+def _law():
+    """A shell about ``simplified``, whose address the tables hold."""
+
+    @cfunc(types.int32(DOUBLES, DOUBLES, DOUBLES), error_model="numpy")
+    def law(inputs, numbers, outputs):
+        return simplified(inputs, numbers, outputs)
+
+    return law

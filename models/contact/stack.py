@@ -1,4 +1,4 @@
-"""Pointers to doubles: on the stack of a compiled function, for callers that must not allocate, and into arrays."""
+"""Pointers to doubles, on the stack of a compiled function or into arrays, for callers that must not allocate."""
 
 from typing import Any
 
@@ -53,3 +53,15 @@ def at(typing_context, address):
         return builder.inttoptr(arguments[0], context.get_value_type(DOUBLES))
 
     return DOUBLES(types.intp), generate
+
+
+@_intrinsic
+def ask(typing_context, address, inputs, table, outputs):
+    """Result of the compiled function int32(DOUBLES, DOUBLES, DOUBLES) at an address, a whole number."""
+
+    def generate(context, builder, signature, arguments):
+        pointer = context.get_value_type(DOUBLES)
+        kind = ir.FunctionType(ir.IntType(32), [pointer] * 3)
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
+
+    return types.int32(types.intp, DOUBLES, DOUBLES, DOUBLES), generate

@@ -1,14 +1,26 @@
 """Creep forces on the wheels of a vehicle as one callback: what is the same in every engine.
 
 Each wheel has four coordinates of its own: forward x beside the steady rolling at speed V, lateral y, vertical z
-downwards and yaw. From them follow the approach to the rail, the creepages x'/V and y'/V - yaw and the spin yaw'/V,
-and from these, by the contact kernel, the load and the creep forces. Springs to the frame and masses belong to the
-engine. It is the least vehicle on which a callback can be measured, and a pattern for those of more bodies: positions
-and rates in, forces added, one compiled function that finds all numbers in one table and enters Python nowhere.
+downwards and yaw. From them follow the approach to the rail and the velocity x', y' - V yaw, yaw' at which the wheel
+slips, and from these, by the contact kernel, the load and the creep forces. Springs to the frame and masses belong to
+the engine. It is the least vehicle on which a callback can be measured, and a pattern for those of more bodies:
+positions and rates in, forces added, one compiled function that finds all numbers in one table and enters Python
+nowhere.
+
+Speed
+    Creepages are the velocity of slip by |V|, or by REGULAR = 0.1 m/s where |V| is less, zero included: a wheel at
+    rest is held by friction as by a damper. A wheel that rolls backwards is the mirror image of one that rolls
+    forwards; from REGULAR to -REGULAR the two are mixed, so that the forces are continuous through V = 0 and have no
+    power of their own.
+Steps
+    Creep forces damp like G a b C / V by mass: 10^4 1/s at 1 m/s, 10^5 1/s at 0.1 m/s and below. Explicit methods need
+    steps shorter than about 2 by that, and a longer one is refused before the run, as friction keeps its nonsense
+    small. Implicit ones take steps of the suspension's own motions, with ``slopes`` for their Newton's method.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal, get_args
 
 import numpy as np
 from numba import carray
@@ -36,15 +48,24 @@ from models.contact.kernel import (
     contact,
     net,
 )
+from models.contact.kernel_simplified import table
 from models.contact.material import Pair
+from models.contact.simplified_theory import press
 from models.contact.stack import at, beyond, doubles, start
-from models.errors import InputError
+from models.contact.undeformed_distance import Distance, quadratic
+from models.engines.stability import GROWTH, LONG_RUN, Linear, growth, limit
+from models.errors import InputError, Refused
+from models.rail.wheel_forces import REGULAR
 
 X, Y, Z, YAW = range(4)
 FREEDOMS = 4
+Theory = Literal["none", "linear", "fastsim", "simplified"]
 WHEELS, SPEED, WEIGHT, SUNK, MU, SHEAR, NU, CURVED_X, CURVED_Y, HEADER = range(10)
 """Head of the table: count; V (m/s); load (N) and approach (m) at rest; mu; G (Pa); nu; A, B (1/m). Then a net."""
 
+THEORIES = get_args(Theory)
+WIDE = 0.03
+"""Half the sides (m) of the distance that is made of curvatures."""
 OF_POSITION, OF_RATE = np.array([1e-8, 1e-8, 1e-8, 1e-6]), np.array([1e-5, 1e-5, 1e-5, 1e-4])
 """Steps (m, rad; m/s, rad/s) by which forces are differentiated: creepages of about 1e-6."""
 
@@ -53,17 +74,21 @@ OF_POSITION, OF_RATE = np.array([1e-8, 1e-8, 1e-8, 1e-6]), np.array([1e-5, 1e-5,
 class Wheels:
     """Wheels that roll side by side, each on springs and dampers to a frame that moves on at ``speed``.
 
-    count : of wheels; cells : per strip of FASTSIM, 0 for the linear theory, None for no contact at all; speed : m/s;
-    load : N, on each wheel at rest; mu : coefficient of friction; curvatures : A, B (1/m); mass, inertia : of a wheel
-    (kg, kg m^2); stiffness, damping : to the frame along x, y, z (N/m, N s/m) and in yaw (N m, N m s).
+    count : of wheels; theory : of the contact, as scenes name it, or "none"; cells : per strip, where strips are;
+    speed : V (m/s), negative backwards, also zero; load : N, on each wheel at rest; mu : coefficient of friction;
+    curvatures : A, B (1/m); distance : undeformed distance of wheel and rail for "simplified", that of the curvatures
+    if none is given; mass, inertia : of a wheel (kg, kg m^2); stiffness, damping : to the frame along x, y, z (N/m,
+    N s/m) and in yaw (N m, N m s). Raises InputError.
     """
 
     count: int = 4
-    cells: int | None = 21
+    theory: Theory = "fastsim"
+    cells: int = 21
     speed: float = 20.0
     load: float = 8e4
     mu: float = 0.3
     curvatures: tuple[float, float] = (1.1, 1.7)
+    distance: Distance | None = None
     mass: float = 600.0
     inertia: float = 100.0
     stiffness: tuple[float, float, float, float] = (5e6, 5e6, 1e6, 2e6)
@@ -73,9 +98,17 @@ class Wheels:
     def __post_init__(self) -> None:
         if isinstance(self.count, bool) or not isinstance(self.count, int) or not 1 <= self.count <= 1000:
             raise InputError("", "count", self.count, "must be a whole number of wheels from 1 to 1000")
-        for name in ("speed", "load", "mass", "inertia"):
+        if self.theory not in THEORIES:
+            raise InputError("", "theory", self.theory, "is not known", THEORIES)
+        for name in ("load", "mass", "inertia"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise InputError("", name, getattr(self, name), "must be above 0")
+        if not np.isfinite(self.speed):
+            raise InputError("", "speed", self.speed, "must be a finite speed in m/s")
+        if self.distance is not None and self.speed < REGULAR:
+            skew = np.abs(self.distance.height - self.distance.height[:, ::-1]).max()
+            if max(skew, abs(self.distance.x[0] + self.distance.x[-1])) > 1e-9:
+                raise InputError("", "distance", None, f"must be its own mirror image in x below {REGULAR} m/s")
 
     @property
     def size(self) -> int:
@@ -90,10 +123,23 @@ class Wheels:
     @cached_property
     def numbers(self) -> Array:
         """The table that ``forces`` reads: head and net."""
-        rest = by_load(*self.curvatures, self.load, self.pair)
-        head = [self.count, self.speed, self.load, float(rest.approach), self.mu, self.pair.G, self.pair.nu,
-                *self.curvatures]  # fmt: skip
-        return np.concatenate((head, net(self.cells or 0)))
+        if self.theory == "simplified":
+            sunk, law = press(self.bodies, self.pair, load=self.load).approach, table(self.bodies, self.cells)
+        else:
+            sunk = float(by_load(*self.curvatures, self.load, self.pair).approach)
+            law = net(self.cells if self.theory == "fastsim" else 0)
+        head = [self.count, self.speed, self.load, sunk, self.mu, self.pair.G, self.pair.nu, *self.curvatures]
+        return np.concatenate((head, law))
+
+    @cached_property
+    def bodies(self) -> Distance:
+        """Undeformed distance of a wheel on its rail."""
+        return self.distance if self.distance is not None else quadratic(*self.curvatures, WIDE, WIDE)
+
+    @property
+    def sticking(self) -> Array:
+        """The table of the linear theory, the steepest of all."""
+        return replace(self, theory="linear").numbers
 
     def state(self, seed: int = 8) -> tuple[Array, Array]:
         """Positions and rates (size,) with creepages about those at which the wheels begin to slide."""
@@ -117,16 +163,22 @@ def forces(numbers, q, v, f):
     own, out = carray(given, (INPUTS,)), carray(answer, (OUTPUTS,))
     own[SHAPE_X], own[SHAPE_Y], own[FRICTION] = head[CURVED_X], head[CURVED_Y], head[MU]
     own[MODULUS], own[POISSON] = head[SHEAR], head[NU]
-    for k in range(0, FREEDOMS * wheels, FREEDOMS):
-        own[PRESSING] = head[SUNK] + position[k + Z]
-        own[CREEP_X] = rate[k + X] / head[SPEED]
-        own[CREEP_Y] = rate[k + Y] / head[SPEED] - position[k + YAW]
-        own[TURNING] = rate[k + YAW] / head[SPEED]
-        contact(BY_APPROACH, given, beyond(numbers, HEADER), answer)
-        force[k + X] += out[FX]
-        force[k + Y] += out[FY]
-        force[k + Z] += head[WEIGHT] - out[NORMAL]
-        force[k + YAW] += out[MZ]
+    speed = max(abs(head[SPEED]), REGULAR)
+    forwards = min(1.0, max(0.0, 0.5 + 0.5 * head[SPEED] / REGULAR))
+    for way in (1.0, -1.0):
+        share = forwards if way > 0.0 else 1.0 - forwards
+        if share == 0.0:
+            continue
+        for k in range(0, FREEDOMS * wheels, FREEDOMS):
+            own[PRESSING] = head[SUNK] + position[k + Z]
+            own[CREEP_X] = way * rate[k + X] / speed
+            own[CREEP_Y] = (rate[k + Y] - head[SPEED] * position[k + YAW]) / speed
+            own[TURNING] = way * rate[k + YAW] / speed
+            contact(BY_APPROACH, given, beyond(numbers, HEADER), answer)
+            force[k + X] += share * way * out[FX]
+            force[k + Y] += share * out[FY]
+            force[k + Z] += share * (head[WEIGHT] - out[NORMAL])
+            force[k + YAW] += share * way * out[MZ]
 
 
 @njit(cache=True, error_model="numpy")
@@ -168,3 +220,24 @@ def slopes(numbers, q, v, by_q, by_v, found):
             moved[i::FREEDOMS] = kept
             for row in range(q.size):
                 found[row, row - row % FREEDOMS + i] += by * (high[row] - low[row]) / (2.0 * step)
+
+
+def linear(wheels: Wheels) -> Linear:
+    """The wheels about rest with the forces of the linear theory, the steepest of all; see ``stability``."""
+    n, zeros = wheels.size, np.zeros(wheels.size)
+    by_place, by_rate = np.zeros((n, n)), np.zeros((n, n))
+    if wheels.theory != "none":
+        numbers = wheels.sticking
+        slopes(numbers, zeros, zeros, 1.0, 0.0, by_place)
+        slopes(numbers, zeros, zeros, 0.0, 1.0, by_rate)
+    stiffness, damping = (np.diag(np.tile(values, wheels.count)) for values in (wheels.stiffness, wheels.damping))
+    return np.diag(wheels.masses), damping - by_rate, stiffness - by_place, damping, damping
+
+
+def check_step(engine: str, wheels: Wheels, method: str, step: float, steps: int = LONG_RUN) -> None:
+    """Refuse a step (s) at which a motion of the wheels would grow over the run, naming the limit."""
+    about = linear(replace(wheels, count=1))
+    if growth(method, step, steps * step, about) > np.log(GROWTH):
+        longest = limit(method, step, LONG_RUN * step, about)
+        raise Refused(engine, f"step {step:g} s exceeds the stability limit of {method}, {0.999 * longest:.3g} s, for "
+                              f"wheels at {wheels.speed:g} m/s: shorten it, or take an implicit method")  # fmt: skip

@@ -8,7 +8,6 @@ function before each step cannot see the stages, so that no integrator keeps its
 
 import struct
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import exudyn as exu
@@ -16,12 +15,12 @@ import exudyn.itemInterface as items
 import numpy as np
 
 from models.contact.inputs import Array
-from models.engines.contact_bridge import FREEDOMS, Wheels, set_forces, slopes
+from models.engines.contact_bridge import FREEDOMS, Wheels, check_step, set_forces, slopes
 from models.errors import RunFailed
 
 exu.config.printToConsole = False
 Law = Callable[[Array, Array, Array, Array], Any]
-CONTRACTIVITY, ITERATIONS = 0.999, 200
+CONTRACTIVITY, ITERATIONS = 0.99999, 1000
 ROUTES = ("generic object", "loads", "before each step")
 
 
@@ -55,7 +54,7 @@ class Forces:
             slopes(sticking, np.array(positions), np.array(rates), by_q, by_v, found)
             return found
 
-        found, sticking = np.zeros((size, size)), replace(wheels, cells=0).numbers
+        found, sticking = np.zeros((size, size)), wheels.sticking
         self.of, self.slopes = compiled if law is None else by_law, moved
 
 
@@ -121,7 +120,11 @@ class Rolling:
         self.mbs.SetPreStepUserFunction(hold)
 
     def run(self, q: Array, v: Array, steps: int, step: float = 1e-4, solver: str = "ExplicitEuler") -> Array:
-        """State (2 size,) after some steps from positions and rates (size,); RunFailed unless it is finite."""
+        """State (2 size,) after some steps from positions and rates (size,); RunFailed unless it is finite.
+
+        Refused is raised for a step that an explicit solver cannot take; RunFailed where Newton's method gives up.
+        """
+        check_step("exudyn", self.wheels, solver, step, steps)
         initial, data = exu.ConfigurationType.Initial, self.mbs.systemData
         data.SetODE2Coordinates(q, initial)
         data.SetODE2Coordinates_t(v, initial)

@@ -10,7 +10,7 @@ from mujoco import rollout
 from numba import cfunc, types
 
 from models.contact.inputs import Array
-from models.engines.contact_bridge import Wheels, forces
+from models.engines.contact_bridge import Wheels, check_step, forces
 from models.engines.mujoco_callback import _array_at
 from models.engines.mujoco_layout import check, offset
 from models.errors import RunFailed
@@ -21,7 +21,11 @@ INTEGRATORS = ("Euler", "RK4")
 
 
 def model(wheels: Wheels, step: float = 1e-4, integrator: str = "Euler") -> mujoco.MjModel:
-    """Wheels on springs; the callback's numbers lie in the model, so that it serves every model of the process."""
+    """Wheels on springs; the callback's numbers lie in the model, so that it serves every model of the process.
+
+    Refused is raised for a step that the integrator cannot take.
+    """
+    check_step("mujoco", wheels, integrator, step)
     spec = mujoco.MjSpec()
     spec.option.timestep, spec.option.gravity = step, [0.0, 0.0, 0.0]
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")

@@ -1,10 +1,10 @@
 """What a contact kernel costs inside an engine: the kernel itself, the bridge to it, and the engine around both."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import mujoco
 import numpy as np
@@ -14,62 +14,74 @@ from models.contact.fastsim import fastsim
 from models.contact.hertz import by_approach
 from models.contact.inputs import Array
 from models.contact.patches import separate
-from models.contact.simplified_theory import Options, press, roll
+from models.contact.simplified_theory import press, roll
 from models.contact.stack import start
-from models.contact.undeformed_distance import Distance
-from models.engines.contact_bridge import FREEDOMS, SUNK, YAW, Wheels, X, Y, Z, add_forces, forces
+from models.engines.contact_bridge import FREEDOMS, SUNK, YAW, Theory, Wheels, X, Y, Z, add_forces, forces
 from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law, python_law
 from models.engines.mujoco_callback import installed
+from validation import slow_wheels
 from validation.rows import Row, System, Table, at_most, behaves
-from validation.timing import interleave
+from validation.timing import interleave, interval, resamples
 
 TITLE = "What a contact kernel costs inside an engine"
 SYSTEM: System = "rolling-vehicle"
 STEP = 2e-5
-STEPS = {"none": 1000, "empty": 600, "native": 160, "jitted": 160, "plain": 6, "non-Hertzian": 2}
+STEPS = {"none": 1000, "empty": 600, "native": 160, "jitted": 160, "plain": 6, "simplified": 4, "plain simplified": 2}
 """Steps of a run with one call each: runs of a few milliseconds, which now and then nothing else disturbs."""
-CELLS = (0, 7, 11, 21, 41)
+LAWS = (("linear", 0), ("fastsim", 7), ("fastsim", 11), ("fastsim", 21), ("fastsim", 41), ("simplified", 21))
+"""Theories and cells per strip."""
+MAIN = LAWS[3]
 COUNTS = (1, 4, 8)
 EVALUATIONS = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
 """Calls of the callback per step."""
 ENGINES = {"mujoco": ("Euler", "RK4"), "exudyn": ("ExplicitEuler", "RK44")}
-ROUNDS = 60
+ROUNDS = 24
 LEAST = 0.001
-WHY = "least of interleaved rounds, as whatever else a machine does only adds to a time; start of a run taken out"
-THEORY = Options(net=9)
+WHY = "median of the ratios within interleaved rounds; start of a run taken out"
 
 
 @dataclass(frozen=True)
 class Setup:
-    """One way of marching. bridge : none, empty, native, jitted, plain, or a route of Exudyn's; law : cells of FASTSIM,
-    0 the linear theory, -1 the non-Hertzian one, None where nothing is computed.
+    """One way of marching. bridge : none, empty, native, jitted, plain, or a route of Exudyn's; law : theory and cells,
+    None where nothing is computed.
     """
 
     engine: str
     method: str
     bridge: str
-    law: int | None
+    law: tuple[str, int] | None
     count: int
 
     def what(self) -> str:
         """The law by its name."""
-        return {None: "no contact" if self.bridge == "none" else "empty callback", 0: "linear theory",
-                -1: "non-Hertzian"}.get(self.law, f"FASTSIM, {self.law} cells")  # fmt: skip
+        if self.law is None:
+            return "no contact" if self.bridge == "none" else "empty callback"
+        theory, cells = self.law
+        return f"FASTSIM, {cells} cells" if theory == "fastsim" else NAMES[theory]
+
+    def wheels(self) -> Wheels:
+        """What is marched."""
+        theory, cells = self.law or ("none", 21)
+        return Wheels(self.count, cast(Theory, theory), cells or 21)
+
+
+ENGINE_NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
+NAMES = {"linear": "linear theory", "simplified": "non-Hertzian"}
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Whether threads and engines agree; in the full run also the price of every law, bridge and count of wheels.
+    """Whether threads and engines agree, and low speed; in the full run also the price of every law and bridge.
 
     Prices are only judged in the full run: the least of a few rounds is not the least.
     """
-    rows = [_threads_row(), _agreement_row()]
+    rows, done = slow_wheels.rows(quick)
+    rows += [_threads_row(), _agreement_row()]
+    data: dict[str, Any] = {"slow": [asdict(run) for run in done]}
     if quick:
-        return rows, {}
-    setups = every()
-    took, kernels = prices(setups, ROUNDS)
-    found = [_split(one, took, kernels) for one in setups]
-    return rows + _price_rows(found), {"points": found}
+        return rows, data
+    prices = Prices(every(), ROUNDS)
+    return rows + _price_rows(prices), {**data, "points": [prices.point(one) for one in prices.setups]}
 
 
 def every() -> list[Setup]:
@@ -79,36 +91,61 @@ def every() -> list[Setup]:
         best, *others = ("native", "jitted", "plain") if engine == "mujoco" else (*ROUTES, "plain")
         for method, count in [(methods[0], count) for count in COUNTS] + [(methods[1], 4)]:
             found += [Setup(engine, method, "none", None, count), Setup(engine, method, "empty", None, count)]
-            found += [Setup(engine, method, best, cells, count) for cells in CELLS]
-        found += [Setup(engine, method, other, 21, 4) for method in methods for other in others]
-        found.append(Setup(engine, methods[0], "plain", -1, 4))
-    return found
+            found += [Setup(engine, method, best, law, count) for law in (LAWS if method == methods[0] else (MAIN,))]
+        found += [Setup(engine, method, other, MAIN, 4) for method in methods for other in others]
+    return [*found, Setup("mujoco", "Euler", "plain", LAWS[-1], 4)]
 
 
-Kernel = tuple[int, int]
-"""Law and count of wheels."""
+class Prices:
+    """Seconds per step of setups and seconds per evaluation of the forces on all wheels, in every round."""
+
+    def __init__(self, setups: list[Setup], rounds: int) -> None:
+        self.setups = setups
+        kernels = sorted({(one.law, one.count) for one in setups if one.law is not None})
+        runs, loops = [_job(one) for one in setups], [_kernel_job(law, count) for law, count in kernels]
+        jobs = [part for march, steps in runs for part in (partial(march, steps), partial(march, 1))]
+        seconds = interleave([*jobs, *(job for job, _ in loops)], rounds, LEAST)
+        whole, first, alone = seconds[: len(jobs) : 2], seconds[1 : len(jobs) : 2], seconds[len(jobs) :]
+        self._steps = {one: (a, b, steps - 1) for one, a, b, (_, steps) in zip(setups, whole, first, runs, strict=True)}
+        self._calls = {kernel: one / calls for kernel, one, (_, calls) in zip(kernels, alone, loops, strict=True)}
+
+    def step(self, one: Setup, rounds: bool = False) -> Any:
+        """Seconds per step: of each round, or by the least of all, as whatever else a machine does only adds."""
+        whole, first, steps = self._steps[one]
+        return (whole - first) / steps if rounds else float(whole.min() - first.min()) / steps
+
+    def own(self, one: Setup, rounds: bool = False) -> Any:
+        """The same without contact: the engine's own."""
+        return self.step(replace(one, bridge="none", law=None), rounds)
+
+    def kernel(self, one: Setup, rounds: bool = False) -> Any:
+        """Seconds of the kernel in a step, likewise."""
+        if one.law is None:
+            return 0.0
+        calls = 1 if one.bridge == "before each step" else EVALUATIONS[one.method]
+        found = calls * self._calls[one.law, one.count]
+        return found if rounds else float(found.min())
+
+    def interval(self, ratios: Array) -> tuple[float, float, float]:
+        """Median of the ratios of the rounds with its 95 % interval, bootstrapped."""
+        _, low, high = interval(np.median(ratios[resamples(len(ratios))], axis=1))
+        return float(np.median(ratios)), low, high
+
+    def point(self, one: Setup) -> dict[str, Any]:
+        """A step and what it is made of, in seconds: engine, kernel, bridge; the share of the bridge."""
+        step, own, kernel = self.step(one), self.own(one), self.kernel(one)
+        a, b, c = (part(one, True) for part in (self.step, self.own, self.kernel))
+        share = self.interval((a - b - c) / a)
+        return {"engine": one.engine, "method": one.method, "bridge": one.bridge, "law": one.what(),
+                "wheels": one.count, "main": one.law == MAIN, "step": step, "own": own, "kernel": kernel,
+                "over": step - own - kernel, "share": share}  # fmt: skip
 
 
-def prices(setups: Sequence[Setup], rounds: int) -> tuple[dict[Setup, float], dict[Kernel, float]]:
-    """Seconds per step of each, and seconds of one evaluation of the forces on all wheels in a compiled loop."""
-    kernels = sorted({(one.law, one.count) for one in setups if one.law is not None})
-    runs, loops = [_job(one) for one in setups], [_kernel_job(*one) for one in kernels]
-    jobs = [part for march, steps in runs for part in (partial(march, steps), partial(march, 1))]
-    least = interleave([*jobs, *(job for job, _ in loops)], rounds, LEAST).min(axis=1)
-    whole, first, alone = least[: len(jobs) : 2], least[1 : len(jobs) : 2], least[len(jobs) :]
-    per_step = [float(a - b) / (steps - 1) for a, b, (_, steps) in zip(whole, first, runs, strict=True)]
-    per_call = [float(seconds) / calls for seconds, (_, calls) in zip(alone, loops, strict=True)]
-    return dict(zip(setups, per_step, strict=True)), dict(zip(kernels, per_call, strict=True))
-
-
-def _kernel_job(law: int, count: int) -> tuple[Callable[[], Any], int]:
-    wheels = Wheels(count, max(law, 0))
+def _kernel_job(law: tuple[str, int], count: int) -> tuple[Callable[[], Any], int]:
+    wheels = Setup("", "", "native", law, count).wheels()
     q, v = wheels.state()
-    f, numbers = np.zeros(wheels.size), wheels.numbers
-    if law < 0:
-        other = non_hertzian(wheels)
-        return lambda: other(numbers, q, v, f), 1
-    return lambda: _repeat(numbers, q, v, f, 200), 200
+    f, numbers, calls = np.zeros(wheels.size), wheels.numbers, 4 if law[0] == "simplified" else 200
+    return lambda: _repeat(numbers, q, v, f, calls), calls
 
 
 @njit(cache=True, error_model="numpy")
@@ -119,11 +156,13 @@ def _repeat(numbers, q, v, f, times):
 
 def _job(one: Setup) -> tuple[Callable[[int], Any], int]:
     """Function that marches some steps, and how many are to be timed."""
-    wheels = Wheels(one.count, None if one.law is None else max(one.law, 0))
-    kind = "non-Hertzian" if one.law == -1 else one.bridge if one.bridge in STEPS else "native"
+    wheels = one.wheels()
+    kind = one.bridge if one.bridge in STEPS else "native"
+    if wheels.theory == "simplified":
+        kind = "plain simplified" if one.bridge == "plain" else "simplified"
     law = None
     if one.bridge == "plain":
-        law = non_hertzian(wheels) if one.law == -1 else plain(wheels)
+        law = non_hertzian(wheels) if wheels.theory == "simplified" else plain(wheels)
     march = (_mujoco_job if one.engine == "mujoco" else _exudyn_job)(one, wheels, law)
     return march, max(2, STEPS[kind] // EVALUATIONS[one.method])
 
@@ -160,21 +199,20 @@ def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
         for k in range(0, wheels.size, FREEDOMS):
             hertz = by_approach(*wheels.curvatures, numbers[SUNK] + q[k + Z], wheels.pair)
             creep = fastsim(hertz.a, hertz.b, hertz.load, wheels.mu, *_motion(wheels, q, v, k), wheels.pair,
-                            cells=wheels.cells or 21)  # fmt: skip
+                            cells=wheels.cells)  # fmt: skip
             f[k : k + FREEDOMS] += creep.fx, creep.fy, wheels.load - hertz.load, creep.mz
 
     return add
 
 
 def non_hertzian(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
-    """The theory of 1983 on the same bodies, given by their distance; 21 cells on a net of 9."""
-    x = np.linspace(-0.03, 0.03, 61)
-    bodies = separate(Distance(x, x, wheels.curvatures[0] * x**2 + wheels.curvatures[1] * x[:, None] ** 2))
+    """The theory of 1983 likewise."""
+    bodies = separate(wheels.bodies)
 
     def add(numbers: Array, q: Array, v: Array, f: Array) -> None:
         for k in range(0, wheels.size, FREEDOMS):
-            pressed = press(bodies, wheels.pair, approach=numbers[SUNK] + q[k + Z], options=THEORY)
-            creep = roll(pressed, wheels.mu, *_motion(wheels, q, v, k), cells=21)
+            pressed = press(bodies, wheels.pair, approach=numbers[SUNK] + q[k + Z])
+            creep = roll(pressed, wheels.mu, *_motion(wheels, q, v, k), cells=wheels.cells)
             f[k : k + FREEDOMS] += creep.fx, creep.fy, wheels.load - pressed.load, creep.mz
 
     return add
@@ -185,30 +223,22 @@ def _motion(wheels: Wheels, q: Array, v: Array, k: int) -> tuple[float, float, f
     return v[k + X] / wheels.speed, v[k + Y] / wheels.speed - q[k + YAW], v[k + YAW] / wheels.speed
 
 
-def _split(one: Setup, took: dict[Setup, float], kernels: dict[Kernel, float]) -> dict[str, Any]:
-    """Seconds per step and what they are made of: engine, kernel, bridge."""
-    engine = took[replace(one, bridge="none", law=None)]
-    calls = 1 if one.bridge == "before each step" else EVALUATIONS[one.method]
-    kernel = calls * kernels[one.law, one.count] if one.law is not None else 0.0
-    return {"engine": one.engine, "method": one.method, "bridge": one.bridge, "law": one.what(), "wheels": one.count,
-            "cells": one.law, "step": took[one], "own": engine, "kernel": kernel,
-            "over": took[one] - engine - kernel}  # fmt: skip
-
-
-def _price_rows(found: list[dict[str, Any]]) -> list[Row]:
+def _price_rows(prices: Prices) -> list[Row]:
     rows = []
-    for p in found:
-        if (p["cells"], p["wheels"]) != (21, 4) or p["bridge"] not in ("native", ROUTES[0]):
+    for one in prices.setups:
+        if (one.law, one.count) != (MAIN, 4) or one.bridge not in ("native", ROUTES[0]):
             continue
-        name, calls = f"contact_bridges.{p['engine']}.{p['method']}", EVALUATIONS[p["method"]]
-        if p["engine"] == "mujoco":
-            what = (f"MuJoCo, {p['method']}: step with FASTSIM at four wheels (21 x 21, native, {1e6 * p['step']:.1f} "
-                    f"us) by the step without contact and {4 * calls} kernel times")  # fmt: skip
-            rows.append(at_most(name, SYSTEM, what, p["step"] / (p["own"] + p["kernel"]), "", 1.3, WHY, "none"))
+        step, own, kernel = (part(one, True) for part in (prices.step, prices.own, prices.kernel))
+        name, calls = f"contact_bridges.{one.engine}.{one.method}", EVALUATIONS[one.method]
+        if one.engine == "mujoco":
+            value, low, high = prices.interval(step / (own + kernel))
+            what, bound = f"by the step without contact and {4 * calls} kernel times", 1.3
         else:
-            what = (f"Exudyn, {p['method']}: share of the bridge in a step with FASTSIM at four wheels (21 x 21, "
-                    f"{1e6 * p['step']:.1f} us)")  # fmt: skip
-            rows.append(at_most(name, SYSTEM, what, max(p["over"] / p["step"], 0.0), "", 0.25, WHY, "none"))
+            value, low, high = prices.interval((step - own - kernel) / step)
+            what, bound = "share of the bridge", 0.25
+        what = (f"{ENGINE_NAMES[one.engine]}, {one.method}: step with FASTSIM at four wheels (21 x 21, native, "
+                f"{1e6 * prices.step(one):.1f} us), {what}; 95 % interval {low:.3f} to {high:.3f}")  # fmt: skip
+        rows.append(at_most(name, SYSTEM, what, max(value, 0.0), "", bound, WHY, "none"))
     return rows
 
 
@@ -238,22 +268,26 @@ def _agreement_row() -> Row:
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """Every cost per step."""
-    if not data:
-        return []
-    note = (f"Microseconds per step, {WHY}. Kernel: the forces of all wheels in a compiled loop, times the calls per "
-            "step. Bridge: what the step takes beyond the engine's own and the kernel.")  # fmt: skip
-    heads = ("engine", "method", "wheels", "bridge", "law", "step", "engine's own", "kernel", "bridge's", "share")
+    """Every cost per step, and runs at low speed."""
+    slow = slow_wheels.table(data["slow"])
+    if "points" not in data:
+        return [slow]
+    note = ("Microseconds per step, least of interleaved rounds, as whatever else a machine does only adds to a time; "
+            "start of a run taken out. Kernel: the forces of all wheels in a compiled loop, times the calls per step. "
+            "Bridge: what the step takes beyond the engine's own and the kernel, for plain Python its slower kernel "
+            "too. Share: of the bridge in the step, median of the rounds with its 95 % interval.")  # fmt: skip
+    heads = ("engine", "method", "wheels", "bridge", "law", "step", "engine's own", "kernel", "bridge's", "share [%]")
     rows = tuple((p["engine"], p["method"], str(p["wheels"]), p["bridge"], p["law"],
                   *(f"{1e6 * p[part]:.2f}" for part in ("step", "own", "kernel", "over")),
-                  f"{p['over'] / p['step']:.0%}") for p in data["points"])  # fmt: skip
-    return [Table("Cost per step of a contact kernel inside an engine", note, heads, rows)]
+                  "{:.0f} ({:.0f} to {:.0f})".format(*(100.0 * share for share in p["share"])))
+                 for p in data["points"])  # fmt: skip
+    return [Table("Cost per step of a contact kernel inside an engine", note, heads, rows), slow]
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Cost per step over the law, and shares of engine, kernel and bridge."""
-    if not data:
+    if "points" not in data:
         return []
     from validation.contact_bridges_figure import figure
 
-    return [("Contact kernels inside the engines", figure(data["points"]))]
+    return [("Contact kernels inside the engines: cost per step by law, and its shares", figure(data["points"]))]

@@ -1,0 +1,111 @@
+"""Wheels at low speed in Exudyn: what an explicit and an implicit integrator need for the same decaying motion."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from models.contact.inputs import Array
+from models.engines.contact_bridge import Wheels, linear
+from models.engines.contact_bridge_exudyn import Forces, Rolling
+from models.engines.stability import LONG_RUN, limit
+from models.errors import Refused, RunFailed
+from validation.rows import Row, System, Table, at_most, behaves
+
+SYSTEM: System = "rolling-vehicle"
+DURATION = 0.2
+"""s, two periods and more of the suspension."""
+SPEEDS = (1.0, 0.1, 0.05, 0.0)
+METHODS = ("GeneralizedAlpha", "TrapezoidalIndex2")
+MORE = 20
+"""Times the explicit limit that an implicit step is to be, at 1 m/s."""
+STEPS = {1.0: (1e-3, 2e-3, 4e-3), 0.1: (1e-3, 4e-3), 0.05: (1e-3, 4e-3), 0.0: (1e-3, 4e-3)}
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run: its method, step (s), steps, force calls, and its error by what is left of the displacements."""
+
+    speed: float
+    method: str
+    step: float
+    steps: int
+    calls: int
+    error: float
+
+
+def wheel(speed: float) -> tuple[Wheels, tuple[Array, Array]]:
+    """One wheel with FASTSIM, pulled aside and let go."""
+    return Wheels(1, speed=speed), (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
+
+
+def march(speed: float, method: str, steps: int, with_slopes: bool = True) -> tuple[Array, int]:
+    """Positions at the end and the number of force calls; RunFailed or Refused where there are none."""
+    (wheels, start), calls = wheel(speed), [0]
+    forces = Forces(wheels)
+
+    def of(q: Any, v: Any) -> Any:
+        calls[0] += 1
+        return forces.of(q, v)
+
+    rolling = Rolling(wheels, of, slopes=forces.slopes if with_slopes and method in METHODS else None)
+    return rolling.run(*start, steps, DURATION / steps, method)[: wheels.size], calls[0]
+
+
+def longest(speed: float) -> float:
+    """Longest step (s) of RK44."""
+    return limit("RK44", 1e-3, LONG_RUN * 1e-3, linear(wheel(speed)[0]))
+
+
+def runs(speed: float, steps: tuple[float, ...]) -> list[Run]:
+    """The explicit run at nearly its longest step, against one of half of it, and implicit ones of some steps (s)."""
+    coarse = int(np.ceil(1.05 * DURATION / longest(speed)))
+    true, _ = march(speed, "RK44", 2 * coarse)
+    found = []
+    for method, count in [("RK44", coarse)] + [(name, round(DURATION / step)) for name in METHODS for step in steps]:
+        end, calls = march(speed, method, count)
+        error = float(np.abs(end - true).max() / np.abs(true).max())
+        found.append(Run(speed, method, DURATION / count, count, calls, error))
+    return found
+
+
+def rows(quick: bool) -> tuple[list[Row], list[Run]]:
+    """Implicit steps at 1 m/s beside explicit ones, and what is said where none can be taken."""
+    done = runs(1.0, (MORE * longest(1.0), *(() if quick else STEPS[1.0])))
+    if not quick:
+        done += [run for speed in SPEEDS[1:] for run in runs(speed, STEPS[speed])]
+    explicit = done[0]
+    implicit = [next(run for run in done if run.method == method) for method in METHODS]
+    found = [at_most(f"contact_bridges.low-speed.{run.method}", SYSTEM, f"Exudyn at 1 m/s, {run.method} with slopes: "
+                     f"error after {DURATION:g} s in steps of {1e3 * run.step:.2g} ms ({run.calls} force calls; RK44 "
+                     f"needs {explicit.calls})", run.error, "of what is left", 1e-3, f"{MORE} times the explicit limit "
+                     "and of second order: a twentieth of the suspension's shortest period", "closed form")
+             for run in implicit]  # fmt: skip
+    tried = {"slopes by differences": (0.1, "GeneralizedAlpha", 200, False), "explicit": (0.1, "RK44", 200, True)}
+    expected = {"slopes by differences": "raised", "explicit": "refused"}
+    why = "the slopes of sliding let Newton's method leap from slip to slip; an explicit step is beyond its limit"
+    for name, how in tried.items():
+        what = f"Exudyn at 0.1 m/s in steps of 1 ms, {how[1]}, {name}"
+        found.append(behaves(f"contact_bridges.low-speed.{name.replace(' ', '-')}", SYSTEM, what, _said(*how),
+                             expected[name], why, "none"))  # fmt: skip
+    return found, done
+
+
+def _said(speed: float, method: str, steps: int, with_slopes: bool) -> str:
+    try:
+        march(speed, method, steps, with_slopes)
+    except Refused:
+        return "refused"
+    except RunFailed:
+        return "raised"
+    return "an answer"
+
+
+def table(saved: list[dict[str, Any]]) -> Table:
+    """Every run."""
+    lines = tuple((f"{run['speed']:g}", run["method"], f"{1e3 * run['step']:.3g}", str(run["steps"]), str(run["calls"]),
+                   f"{run['error']:.1e}") for run in saved)  # fmt: skip
+    note = (f"One wheel pulled aside by 0.1 mm and let go, {DURATION:g} s; error of its place by the largest "
+            "displacement left, against RK44 at half its step. Implicit methods with the linear theory's slopes.")
+    return Table("Steps and force calls at low speed in Exudyn", note,
+                 ("speed [m/s]", "method", "step [ms]", "steps", "force calls", "error"), lines)  # fmt: skip
