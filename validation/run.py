@@ -20,7 +20,7 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "drift_off", "drift_solvers", "holding_spring", "point_mass",
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
          "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
-         "contact_simplified", "contact_profiles", "ride_road", "ride_covariance", "ride_engines",
+         "contact_simplified", "contact_profiles", "manchester", "ride_road", "ride_covariance", "ride_engines",
          "ride_varying_speed", "ride_nonlinear", "ride_faults", "contact_price", "fastsim",
          "contact_bridges")  # fmt: skip
 """Case modules in the order of the report."""

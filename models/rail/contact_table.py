@@ -62,9 +62,9 @@ class Place:
     wheel from the taping line (m). angle, centre_angle : of the rail's surface at first touch and at the centre
     of pressure (rad), negative where it falls towards the middle. rolling_radius : at first touch (m). below_tip : of
     first touch below the tip of the flange (m). curvature_x, curvature_y : second derivatives of the undeformed
-    distance there, along and across (1/m). normal : N. fx, fy : creep forces on the wheel (N), mz : N m. xi_x, xi_y,
-    spin : creepages at first touch, spin in 1/m. peak : largest pressure (Pa). area : m^2. length, width : of the
-    rectangle about it, along the rail and across (m). approach : vertical, of the wheel (m).
+    distance there, along and across (1/m). normal : N. vertical : part of it (N). fx, fy : creep forces on the wheel
+    (N), mz : N m. xi_x, xi_y, spin : creepages at first touch, spin in 1/m. peak : largest pressure (Pa). area : m^2.
+    length, width : of the rectangle about it, along the rail and across (m). approach : vertical, of the wheel (m).
     """
 
     touch_y: float
@@ -79,6 +79,7 @@ class Place:
     curvature_x: float
     curvature_y: float
     normal: float
+    vertical: float
     fx: float
     fy: float
     mz: float
@@ -330,13 +331,15 @@ def _place(side: Side, rows: list[tuple[Touch, Triple, Triple, Share]], approach
     y, x = (float(np.average(values, weights=loads)) for values in zip(
         *((one.rail_y + top + share.y * math.cos(one.angle), one.x + share.x) for one, _, _, share in rows),
         strict=True))  # fmt: skip
-    forces = np.sum([force for _, _, force, _ in rows], axis=0)
+    fx, fy, mz = (float(force) for force in np.sum([force for _, _, force, _ in rows], axis=0))
+    vertical = sum(share.load * math.cos(one.angle) for one, _, _, share in rows)
     boxes = np.array([share.box for *_, share in rows])
     length, width = (float(boxes[:, k + 1].max() - boxes[:, k].min()) for k in (0, 2))
     tip = float(side.wheel.z.max() - side.wheel.curve(touch.wheel_y))
+    along, across = _curvatures(touch.patch.distance)
     return Place(touch.rail_y + top, y, top, x, touch.wheel_y, touch.angle, math.atan(float(side.rail.curve(y, 1))),
-                 _radius(side, touch), tip, *_curvatures(touch.patch.distance), float(loads.sum()),
-                 *(float(force) for force in forces), *creep, max(share.peak for *_, share in rows),
+                 _radius(side, touch), tip, along, across, float(loads.sum()), vertical, fx, fy, mz, *creep,
+                 max(share.peak for *_, share in rows),
                  sum(share.area for *_, share in rows), length, width, approach)  # fmt: skip
 
 

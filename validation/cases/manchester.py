@@ -1,0 +1,186 @@
+"""The Manchester contact benchmark: places, angles and forces of both wheels, against CONTACT and second ways."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.contact.profile_files import read_profile
+from models.contact.wheel_on_rail import Side, Track, Wheelset, laid
+from models.rail.contact_table import BENCHMARK_FRICTION, BENCHMARK_LOAD, BENCHMARK_YAW, Contact, Placed, benchmark_side
+from validation.cases.contact_profiles import RAIL_FILE, WHEEL_FILE
+from validation.manchester_references import CONTACT, apart, on_one_plane, searched, sums
+from validation.rows import Row, System, Table, at_most, finding, not_run, within
+from validation.scenes import data_folder
+
+TITLE = "The Manchester contact benchmark, cases A"
+SYSTEM: System = "contact"
+PLACE, FORCE = 0.3, 2.0
+"""Bounds asked for: mm and %."""
+QUICK = (1.0, 6.5)
+"""Shifts (mm) of case A-2 in the quick share."""
+FILES = (0.0, 2.0, 5.0, 6.0, 6.5, 10.0)
+"""Shifts (mm) at which the built-in profiles are compared with the benchmark's files."""
+PUBLISHED = "CONTACT's reference output of case A-2.2, exact theory on one plane, cells of 0.2 mm; the bound asked for"
+WHEELS = {"right": 2, "left": 5}
+"""First column of each wheel in the published table."""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows on case A-2 against what is published; in the full run also on case A-1, searches, files and the price."""
+    rolling, still = (Contact(benchmark_side(), BENCHMARK_LOAD, friction=mu) for mu in (BENCHMARK_FRICTION, 0.0))
+    published = CONTACT[np.isin(CONTACT[:, 0], QUICK)] if quick else CONTACT
+    placed, each = _timed(rolling, BENCHMARK_YAW, published[:, 0])
+    rows = [row for wheel in WHEELS for row in _published_rows(wheel, placed, published)]
+    two = still.at(5e-3)
+    rows.append(within("manchester.two_patches", SYSTEM, "patches on the right wheel at 5 mm, case A-1",
+                       float(len(two.right)), "", 2.0, 0.0, "the gauge corner takes over from the head",
+                       "published"))  # fmt: skip
+    data: dict[str, Any] = {"A-2": [_told(one) for one in placed], "published": published.tolist()}
+    if not quick:
+        static, each_still = _timed(still, 0.0, CONTACT[:, 0])
+        data["A-1"] = [_told(one) for one in static]
+        rows += [*_static_rows(still, static), *_split_rows(rolling, placed[10]), *_file_rows(rolling, placed),
+                 _load_row(static), *_price_rows({"A-1": each_still, "A-2": each})]  # fmt: skip
+    return rows, data
+
+
+def _timed(contact: Contact, yaw: float, shifts: np.ndarray) -> tuple[list[Placed], float]:
+    """Every position (mm), and the seconds that each took."""
+    start = time.perf_counter()
+    found = [contact.at(1e-3 * float(shift), 1e-3 * float(shift) * yaw) for shift in shifts]
+    return found, (time.perf_counter() - start) / len(found)
+
+
+def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> list[Row]:
+    own = np.array([sums(one, wheel) for one in placed])
+    theirs = published[:, WHEELS[wheel] : WHEELS[wheel] + 3]
+    off = np.abs(own - theirs)
+    force = 100.0 * off / theirs
+    rows = [
+        at_most(f"manchester.places.{wheel}", SYSTEM, f"mean place of contact of the {wheel} wheel, largest difference",
+                float(off[:, 0].max()), "mm", PLACE, PUBLISHED, "published"),
+        at_most(f"manchester.forces.{wheel}", SYSTEM, f"normal force of the {wheel} wheel, largest difference",
+                float(force[:, 1].max()), "%", FORCE, PUBLISHED, "published"),
+        finding(f"manchester.peaks.{wheel}", SYSTEM, f"largest pressure of the {wheel} wheel, largest difference",
+                float(force[:, 2].max()), "%", 0.0, "CONTACT's cells of 0.2 mm; a flange's patch has four of them"),
+    ]  # fmt: skip
+    roll = np.abs(np.array([1e3 * one.roll for one in placed]) - published[:, 1])
+    return rows if wheel == "left" else [*rows, finding(
+        "manchester.roll", SYSTEM, "roll, largest difference", float(roll.max()), "mrad", 0.0,
+        "CONTACT's input, which another code found; on the flange its wheels do not stand equally low")]  # fmt: skip
+
+
+def _static_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
+    """Touching places by search, and the mirror image."""
+    off = np.array([gap for one in placed[::2] for gap in _searched_off(contact, one)])
+    one, two = contact.at(4e-3, 3e-3), contact.at(-4e-3, -3e-3)
+    mirror = max(abs(a / b - 1.0) for wheels in ((one.right, two.left), (one.left, two.right))
+                 for x, y in zip(*wheels, strict=True) for a, b in ((x.y, y.y), (x.normal, y.normal)))  # fmt: skip
+    why = "search over points of the wheel's surface, straight between points of both profiles"
+    return [
+        at_most("manchester.search.rail", SYSTEM, "first touch on the rail, case A-1, largest difference",
+                float(off[:, 0].max()), "mm", PLACE, f"{why}; the bound asked for", "closed form"),
+        at_most("manchester.search.wheel", SYSTEM, "first touch on the wheel, case A-1, largest difference",
+                float(off[:, 1].max()), "mm", PLACE, f"{why}; the bound asked for", "closed form"),
+        at_most("manchester.search.angle", SYSTEM, "angle there, largest difference", float(off[:, 2].max()), "rad",
+                0.02, f"{why}, as far as an angle changes in 0.3 mm of the gauge corner", "closed form"),
+        at_most("manchester.mirror", SYSTEM, "shifted and turned the other way, wheels exchanged",
+                mirror, "", 1e-9, "the track is symmetric", "none"),
+    ]  # fmt: skip
+
+
+def _searched_off(contact: Contact, placed: Placed) -> list[tuple[float, float, float]]:
+    found = []
+    for sign, places in ((1.0, placed.right), (-1.0, placed.left)):
+        for place in places:
+            y, u, angle = searched(contact.side, placed, sign, place.wheel_y)
+            found.append((1e3 * abs(y - place.touch_y), 1e3 * abs(u - place.wheel_y), abs(angle - place.angle)))
+    return found
+
+
+def _split_rows(contact: Contact, placed: Placed) -> list[Row]:
+    """How two patches share the load at 5 mm, in case A-2."""
+    own = [place.normal for place in placed.right]
+    total = sum(own)
+    alone, (mean, _, plane) = apart(contact, placed), on_one_plane(contact, placed)
+    far = {name: 100.0 * max(abs(a - b) for a, b in zip(own, other, strict=True)) / total
+           for name, other in (("apart", alone), ("one plane", plane))}  # fmt: skip
+    return [
+        at_most("manchester.split.apart", SYSTEM, "shares of two patches at 5 mm, by the wheel's force", far["apart"],
+                "%", FORCE, "each on a half-space of its own that the other's resultant sinks", "closed form"),
+        at_most("manchester.split.plane", SYSTEM, "shares of two patches at 5 mm on one plane", far["one plane"], "%",
+                FORCE, "exact theory on CONTACT's plane, lowered as the wheel is", "native"),
+        finding("manchester.split.mean", SYSTEM, "mean place at 5 mm on CONTACT's own plane", mean, "mm",
+                float(CONTACT[10, 2]), "CONTACT lays more on the smaller patch; 4 um of shift do the same"),
+    ]  # fmt: skip
+
+
+def _load_row(static: list[Placed]) -> Row:
+    off = max(abs(sum(place.vertical for place in wheel) / BENCHMARK_LOAD - 1.0)
+              for one in static for wheel in (one.right, one.left))  # fmt: skip
+    return at_most("manchester.load", SYSTEM, "vertical sum of a wheel's normal forces less its load, case A-1", off,
+                   "", 1e-5, "patches share the load to the precision of the shares", "none")  # fmt: skip
+
+
+def _file_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
+    """Built-in profiles against the benchmark's own files, whose rail lies inclined."""
+    names = {"places": ("mm", PLACE, 0), "forces": ("%", FORCE, 1)}
+    words = "built-in profiles against the benchmark's files, case A-2"
+    folder = data_folder()
+    if folder is None or not (folder / WHEEL_FILE).is_file():
+        reason = "TWINRIG_DATA names no folder with the benchmark's profiles"
+        return [not_run(f"manchester.files.{name}", SYSTEM, f"{name}: {words}", reason) for name in names]
+    rail = laid(read_profile(folder / RAIL_FILE, "rail"), Track(inclination=0.0))
+    side = Side(read_profile(folder / WHEEL_FILE, "wheel"), rail, Wheelset())
+    other = Contact(side, contact.load, contact.speed, contact.friction)
+    chosen = [one for one in placed if round(1e3 * one.shift, 6) in FILES]
+    pairs = [(sums(one, wheel), sums(other.at(one.shift, one.yaw), wheel)) for one in chosen for wheel in WHEELS]
+    off = [(abs(a[0] - b[0]), 100.0 * abs(a[1] / b[1] - 1.0)) for a, b in pairs]
+    return [at_most(f"manchester.files.{name}", SYSTEM, f"{name}: {words}, largest difference",
+                    max(one[k] for one in off), unit, bound, "the bound asked for", "published")
+            for name, (unit, bound, k) in names.items()]  # fmt: skip
+
+
+def _price_rows(each: dict[str, float]) -> list[Row]:
+    return [finding(f"manchester.price.{name}", SYSTEM, f"time of one position, both wheels, case {name}", seconds, "s",
+                    "-", "geometry, roll, exact normal contact; rolling also the speed of spin") for name, seconds in
+            each.items()]  # fmt: skip
+
+
+def _told(placed: Placed) -> dict[str, Any]:
+    """Shift (mm), and of each patch place, place on the wheel (mm), angle (deg), force (kN) and peak (MPa)."""
+    return {"shift": 1e3 * placed.shift} | {
+        wheel: [[1e3 * p.y, 1e3 * p.wheel_centre, float(np.degrees(-p.centre_angle)), p.normal / 1e3, p.peak / 1e6]
+                for p in getattr(placed, wheel)] for wheel in WHEELS
+    }  # fmt: skip
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Every patch of every position."""
+    heads = ("shift [mm]", "wheel", "in the track [mm]", "on the wheel [mm]", "angle [deg]", "normal force [kN]",
+             "largest pressure [MPa]")  # fmt: skip
+    note = "A row for each patch, at its centre of pressure; 10 kN on each wheel, S1002 on UIC 60 at 1:40."
+    return [Table(f"Manchester benchmark, case {name}", note, heads, tuple(
+        (f"{one['shift']:g}", wheel, *(f"{value:.3f}" for value in patch[:4]), f"{patch[4]:.0f}")
+        for one in data[name] for wheel in WHEELS for patch in one[wheel]))
+        for name in ("A-1", "A-2") if name in data]  # fmt: skip
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Mean place and force of the right wheel beside CONTACT's."""
+    from studies.figures import plt
+
+    published = np.array(data["published"])
+    figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.4))
+    for axis, value, column, scale in ((axes[0], 0, 2, 1.0), (axes[1], 3, 3, 1e-3)):
+        axis.plot(published[:, 0], scale * published[:, column], "s", markersize=8, markerfacecolor="none",
+                  color="0.4", label="CONTACT, all patches together")  # fmt: skip
+        points = [(one["shift"], patch[value]) for one in data["A-2"] for patch in one["right"]]
+        axis.plot(*np.array(points).T, "o", markersize=4, color="#0072b2", label="every patch here")
+        axis.set_xlabel("displacement of the wheelset [mm]")
+    axes[0].set_ylabel("place of contact in the track [mm]")
+    axes[1].set_ylabel("normal force [kN]")
+    axes[0].legend()
+    return [("Right wheel in case A-2, rolling with yaw: patches here and the reference output of CONTACT.", figure)]
