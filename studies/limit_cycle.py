@@ -1,7 +1,6 @@
 """Limit cycles of a wheelset on straight track: amplitude and frequency over speed, those that repel as well."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +12,12 @@ from models.rail.equations import YAW
 from models.rail.limit_cycle import attained, bifurcation
 from models.rail.linear import NoCriticalSpeed
 from models.rail.of_scene import BESIDE, equations_of
-from models.rail.orbit import Orbit, refined, solved
+from models.rail.orbit import Orbit, beside, refined, solved
 from models.rail.scene import WheelsetScene
 from models.strict import Strict, quantity, read
 
 SYSTEM = "wheelset"
 Progress = Callable[[str, float], None]
-AWAY = 0.99
-"""Speed, by the wanted one, of the orbit from which every engine finds its own."""
 
 
 class Options(Strict):
@@ -89,14 +86,13 @@ def _usual(scene: WheelsetScene, orbits: list[Orbit]) -> float:
 
 
 def _cycles(scene: WheelsetScene, engines: tuple[str, ...], speed: float) -> tuple[dict[str, Orbit], dict[str, str]]:
-    """The refined cycle of every engine at a speed (m/s); each finds it from that of the equations at another speed."""
+    """The refined cycle of every engine at a speed (m/s); each finds it from a guess that is off."""
     found, failed = dict[str, Orbit](), dict[str, str]()
     first = attained(equations_of(scene, "reference", speed), start=scene.run.displacement, step=scene.run.step)
     if first is None:
         return found, failed
-    away = solved(replace(first, equations=equations_of(scene, "reference", AWAY * speed)), "amplitude")
     for engine in engines:
-        guess = replace(away, equations=equations_of(scene, engine, speed))
+        guess = beside(first, equations_of(scene, engine, speed))
         try:
             found[engine] = refined(solved(guess, "amplitude", precise=False), "amplitude")
         except RunFailed as error:

@@ -21,7 +21,7 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
          "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
          "contact_simplified", "contact_profiles", "manchester", "ride_road", "ride_covariance", "ride_engines",
-         "ride_varying_speed", "ride_nonlinear", "ride_faults", "contact_price", "fastsim",
+         "ride_varying_speed", "ride_nonlinear", "ride_faults", "contact_price", "fastsim", "wheelset",
          "contact_bridges")  # fmt: skip
 """Case modules in the order of the report."""
 
@@ -115,6 +115,7 @@ def seeds() -> dict[str, int]:
         roads,
         score,
         stabilisers,
+        wheelset,
     )
 
     return {"random states": checks.SEED, "class C road": roads.SEED, "six runs": Options.model_fields["seed"].default,
@@ -127,7 +128,8 @@ def seeds() -> dict[str, int]:
             "random contacts": fastsim.SEED, "drawn contacts": contact_set.SEED,
             "table of contacts": contact_price.SEED, "made road": fitted_roads.SEED,
             "states of ride": ride_engines.SEED, "twins of ride": ride_covariance.SEED,
-            "copies of ride": ride_varying_speed.SEED, "nonlinear ride": ride_nonlinear.SEED}  # fmt: skip
+            "copies of ride": ride_varying_speed.SEED, "nonlinear ride": ride_nonlinear.SEED,
+            "drawn wheelsets": wheelset.SEED}  # fmt: skip
 
 
 def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:

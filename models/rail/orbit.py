@@ -29,6 +29,8 @@ SHIFT = 1e-2
 reach over the kinks that cells of FASTSIM make where they begin to slide."""
 NEWTON, LEAST_GAIN = 15, 0.3
 """Corrections at most; share of the difference that one may leave before the return is linearised anew."""
+ASIDE = 0.01
+"""Share by which a guess for other equations is displaced, so that they find the orbit by themselves."""
 HALVINGS = 5
 """Of the way to the next amplitude, where Newton's method does not reach it at once."""
 RETURNS = [k for k in range(STATES) if k != ANGLE]
@@ -108,6 +110,12 @@ def beginning(equations: Equations, amplitude: float, step: float) -> Orbit:
     state = at.rest.copy()
     state[RETURNS] += amplitude * (vectors[:, k] / vectors[AMPLITUDE, k]).real
     return solved(near(at, state, 2.0 * math.pi / values[k].imag, step), "speed")
+
+
+def beside(orbit: Orbit, equations: Equations) -> Orbit:
+    """A guess for the same orbit by other equations: everything ASIDE farther from rest."""
+    rest = orbit.equations.rest
+    return replace(orbit, equations=equations, state=rest + (1.0 + ASIDE) * (orbit.state - rest))
 
 
 def growth_at(equations: Equations, speed: float) -> float:

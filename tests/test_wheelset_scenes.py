@@ -1,0 +1,152 @@
+"""Scenes of a wheelset, their studies, and orbits."""
+
+import json
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.errors import InputError, RunFailed
+from models.rail import equations as eq
+from models.rail import plan
+from models.rail.eigenvalues import free, growth
+from models.rail.equations import Equations
+from models.rail.limit_cycle import attained, bifurcation
+from models.rail.linear import NoCriticalSpeed, critical_speed
+from models.rail.of_scene import path_speeds, wheelset_of
+from models.rail.orbit import solved
+from models.rail.scene import build
+from models.rail.wheelset import CHOSEN
+from studies import limit_cycle, wheelset
+
+SCENE = {"title": "t", "system": "wheelset", "contact": {"cells": 11},
+         "speeds": {"start": 50.0, "stop": 80.0, "count": 4}, "run": {"duration": 0.2, "speeds": [60.0]}}  # fmt: skip
+OWN = "".join(f"{key} = {value}\n" for key, value in CHOSEN.model_dump(exclude={"material", "profiles"}).items())
+
+
+def scene(**tables):
+    return build(SCENE | tables, "s.toml")
+
+
+@pytest.mark.parametrize(("tables", "place", "words"), [
+    ({"speeds": {"values": [0.0]}}, "speeds.values.0", "above 0"),
+    ({"speeds": {"start": 0.0, "stop": 9.0}}, "speeds.start", "above 0"),
+    ({"speeds": {"start": 60.0, "stop": 60.0}}, "speeds.stop", "for one speed write speeds.values = [60]"),
+    ({"speeds": {"start": 60.0, "stop": 300.0}}, "speeds.stop", "at most 200"),
+    ({"run": {"speeds": [-1.0]}}, "run.speeds.0", "above 0"),
+    ({"run": {"duration": 1.0, "step": 3e-4}}, "run.step", "divide"),
+    ({"run": {"displacement": 0.5}}, "run.displacement", "at most 0.02 m"),
+    ({"contact": {"law": "lineer"}}, "contact.law", "did you mean 'linear'"),
+    ({"contact": {"law": "linear", "cells": 9}}, "contact.cells", "no meaning"),
+    ({"wheelset": {"overide": {}}}, "wheelset.overide", "did you mean 'override'"),
+])  # fmt: skip
+def test_scenes_that_cannot_be(tables, place, words):
+    with pytest.raises(InputError, match=r"s\.toml") as told:
+        scene(**tables)
+    assert told.value.place == place and words in str(told.value)
+
+
+@pytest.mark.parametrize(("table", "place", "words"), [
+    ({"override": {"mass": -1.0}}, "wheelset.override.mass", "above 0"),
+    ({"override": {"stifness_x": 1e5}}, "wheelset.override.stifness_x", "did you mean 'stiffness_x'"),
+    ({"override": {"load": 100.0}}, "wheelset.override", "own weight"),
+    ({"parameters": "chosn"}, "wheelset.parameters", "did you mean 'chosen'"),
+    ({"parameters": "mine.toml"}, "wheelset.parameters", "no such file"),
+])  # fmt: skip
+def test_wheelsets_that_cannot_be(table, place, words):
+    with pytest.raises(InputError, match=r"s\.toml") as told:
+        wheelset_of(scene(wheelset=table))
+    assert told.value.place == place and words in str(told.value)
+
+
+def test_a_wheelset_of_ones_own(tmp_path):
+    (tmp_path / "mine.toml").write_text(OWN.replace("mass = 1200.0", "mass = 1300.0"))
+    own = wheelset_of(build(SCENE | {"wheelset": {"parameters": "mine.toml", "override": {"load": 9e4}}}, "", tmp_path))
+    assert own == CHOSEN.changed(mass=1300.0, load=9e4)
+    (tmp_path / "mine.toml").write_text(OWN.replace("mass", "maas"))
+    with pytest.raises(InputError, match=r"mine\.toml: maas.*did you mean 'mass'"):
+        wheelset_of(build(SCENE | {"wheelset": {"parameters": "mine.toml"}}, "", tmp_path))
+
+
+def test_a_step_that_is_too_large_is_refused_before_the_run():
+    with pytest.raises(InputError, match=r"s.toml: run.step = 0.005: must be above 0 and at most .* at 60 m/s"):
+        plan.check(scene(run={"duration": 0.2, "step": 5e-3, "speeds": [60.0]}), ("reference",))
+
+
+def test_the_plan_says_what_is_absent_and_whether_there_is_a_critical_speed():
+    told = plan.describe(scene(contact={"law": "linear"}))
+    assert "absent     FASTSIM" in told and "critical   67.672 m/s" in told
+    springs = {f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"}
+    told = plan.describe(scene(wheelset={"override": springs}))
+    assert "nothing: it is free" in told and "springs, dampers" in told and "unstable at 1 m/s already" in told
+
+
+def test_without_a_critical_speed_the_study_says_so(tmp_path):
+    stiff = {"stiffness_x": 1e8, "stiffness_y": 1e8, "damping_x": 1e5, "damping_y": 1e5}
+    one = scene(wheelset={"override": stiff}, run={"duration": 0.02, "step": 1e-4})
+    assert path_speeds(one) == [80.0]
+    found = wheelset.run(one, ("reference",), tmp_path, lambda *_: None)
+    assert found["answer"]["critical_speed"] == {"reference": None}
+    assert sum("none: the wheelset is stable up to 200 m/s" in line for line in found["table"]) == 2
+    found = limit_cycle.run(scene(wheelset={"override": stiff}, run={}), ("reference",), tmp_path, lambda *_: None)
+    assert found["answer"] == {"branch": [], "cycles": {}}
+    assert any("no branch begins" in line for line in found["table"])
+
+
+def test_the_study_saves_what_it_says(tmp_path):
+    import xarray as xr
+
+    found = wheelset.run(scene(), ("reference", "mujoco"), tmp_path, lambda *_: None)
+    json.dumps(found)
+    assert found["answer"]["critical_speed"]["mujoco"] == pytest.approx(67.42, rel=1e-4)
+    assert found["answer"]["largest_power"]["reference"] <= 0.0
+    with xr.open_dataset(tmp_path / "paths.nc") as data:
+        assert data["y"].dims == ("engine", "speed", "time") and data["y"].units == "m"
+        assert float(data["y"][0, 0, 0]) == 5e-3
+    with xr.open_dataset(tmp_path / "eigenvalues.nc") as data:
+        assert data["real"].shape == (2, 4, 9)
+    assert (tmp_path / "over_speed.csv").read_text().startswith("speed [m/s],reference growth [1/s]")
+
+
+def test_no_critical_speed_is_told_apart():
+    with pytest.raises(NoCriticalSpeed) as told:
+        critical_speed(free(CHOSEN), lambda one, speed: growth(Equations, one, speed))
+    assert told.value.unstable
+
+
+def test_a_branch_stands_upright_until_flanges_touch():
+    orbits = []
+    for orbit in bifurcation(Equations(CHOSEN, 60.0, cells=7), 50.0, 67.8):
+        orbits.append(orbit)
+    assert orbits[0].amplitude < 1e-3 and orbits[-1].amplitude > CHOSEN.flange_clearance
+    assert np.ptp([o.speed for o in orbits if o.amplitude < 6.5e-3]) < 0.01
+    assert all(o.error < 1e-4 * o.speed for o in orbits)
+    one = orbits[-1]
+    # The orbit comes back, and so does what begins beside it, by the multiplier.
+    path = one.path()
+    assert path.states[-1, eq.YAW] == pytest.approx(path.states[0, eq.YAW], abs=1e-11)
+
+
+def test_orbits_that_are_none():
+    assert attained(Equations(CHOSEN, 40.0, cells=7), start=1e-3) is None
+    orbit = attained(Equations(CHOSEN, 75.0, cells=7))
+    with pytest.raises(RunFailed, match="no periodic motion"):
+        solved(replace(orbit, equations=Equations(CHOSEN, 20.0, cells=7)), "amplitude")
+
+
+def test_limit_cycles_need_a_bound_and_a_range():
+    with pytest.raises(InputError, match="without bound"):
+        limit_cycle.check(scene(contact={"law": "linear"}), ())
+    with pytest.raises(InputError, match="range of speeds"):
+        limit_cycle.check(scene(speeds={"values": [60.0]}), ())
+
+
+def test_the_scene_of_the_readme_is_a_valid_scene():
+    import re
+    from pathlib import Path
+
+    text = (Path(__file__).parents[1] / "README.md").read_text()
+    (block,) = (found for found in re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
+                if 'system = "wheelset"' in found)  # fmt: skip
+    plan.check(build(tomllib.loads(block), "README.md"), ("reference",))

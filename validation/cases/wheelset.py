@@ -1,0 +1,316 @@
+"""A wheelset on straight track in three implementations: wave, critical speed, paths, limit cycles, power, faults."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import numpy as np
+from scipy.optimize import brentq
+
+from models.rail import equations as eq
+from models.rail import wheel_forces as wf
+from models.rail.eigenvalues import free, growth, wavelength
+from models.rail.equations import Equations
+from models.rail.limit_cycle import attained
+from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
+from models.rail.of_scene import IMPLEMENTATIONS, implementation
+from models.rail.orbit import Orbit, beside, refined, solved
+from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
+from validation.rows import Row, System, Table, at_most, behaves, within
+
+TITLE = "A wheelset on straight track"
+SYSTEM: System = "rolling-vehicle"
+SEED = 2026
+DRAWN = 6
+"""Wheelsets with parameters at random, beside the chosen one, a free one and one that no speed makes unstable."""
+RANGES = {"mass": (800.0, 2000.0), "spin_inertia": (50.0, 200.0), "yaw_inertia": (500.0, 1500.0),
+          "radius": (0.35, 0.55), "half_gauge": (0.7, 0.8), "conicity": (0.02, 0.3), "head_radius": (0.15, 0.4),
+          "load": (6e4, 2e5), "half_spacing": (0.8, 1.2), "stiffness_x": (1e5, 3e6), "stiffness_y": (1e5, 3e6),
+          "stiffness_z": (3e5, 2e6), "damping_x": (5e2, 1e4), "damping_y": (5e2, 1e4), "damping_z": (1e3, 2e4),
+          "friction": (0.1, 0.5)}  # fmt: skip
+STIFF = CHOSEN.changed(stiffness_x=1e8, stiffness_y=1e8, damping_x=1e5, damping_y=1e5)
+EDGE = 2e-3
+"""Radius (m) of rails that are edges: Klingel's own wheelset."""
+STEP, DURATION = 5e-4, 1.0
+LIVELY = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0, 1.0, 10.0])
+"""Spread of random states about rest: flanges touch, wheels lift off, creep forces saturate."""
+ABOVE = 1.1
+"""Speed of paths and cycles by the critical one."""
+ENGINES = tuple(name for name in IMPLEMENTATIONS if name != "reference")
+AROUND = 0.02
+"""Half the bracket of a critical speed that is only looked up again, by the speed."""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """All rows; quick: the chosen wheelset alone, without the faults."""
+    wheelsets = {"chosen": CHOSEN} | ({} if quick else drawn())
+    rows = _wave_rows(wheelsets)
+    speeds = {name: criticals(one, quick) for name, one in wheelsets.items()}
+    rows += _critical_rows(speeds)
+    rows += _acceleration_rows(wheelsets)
+    rows += _path_rows(wheelsets, speeds, 11 if quick else 21)
+    cycles = _cycles({"chosen": CHOSEN} if quick else {"chosen": CHOSEN, **_that_hunt(wheelsets, speeds)}, speeds)
+    rows += _cycle_rows(cycles)
+    rows.append(_order_row())
+    if not quick:
+        rows += [_none_row("free", free(CHOSEN), "unstable"), _none_row("stiff", STIFF, "stable"), *_fault_rows()]
+    return rows, {"critical": speeds, "cycles": {name: {engine: _numbers(one) for engine, one in own.items()}
+                                                 for name, own in cycles.items()}}  # fmt: skip
+
+
+def drawn() -> dict[str, Wheelset]:
+    """Wheelsets with parameters drawn evenly over the logarithms of RANGES."""
+    draw, found = np.random.default_rng(SEED), dict[str, Wheelset]()
+    while len(found) < DRAWN:
+        values = {key: float(np.exp(draw.uniform(*np.log(ends)))) for key, ends in RANGES.items()}
+        if values["load"] > 1.5 * GRAVITY * values["mass"]:
+            found[f"drawn {len(found) + 1}"] = CHOSEN.changed(**values)
+    return found
+
+
+def criticals(wheelset: Wheelset, quick: bool) -> dict[str, float | None]:
+    """Critical speed (m/s) of each implementation; None where there is none. Quick: engines look near the first."""
+    found: dict[str, float | None] = {}
+    for engine in IMPLEMENTATIONS:
+        of, first = partial(growth, implementation(engine), wheelset), found.get("reference")
+        try:
+            found[engine] = _near(of, first) if quick and first else critical_speed(wheelset, lambda _, v, of=of: of(v))
+        except NoCriticalSpeed:
+            found[engine] = None
+    return found
+
+
+def _near(growth: Callable[[float], float], speed: float) -> float:
+    """The critical speed (m/s) within AROUND of another."""
+    return float(brentq(growth, (1.0 - AROUND) * speed, (1.0 + AROUND) * speed, xtol=1e-12 * speed, rtol=1e-12))
+
+
+def _spread(values: dict[str, float]) -> float:
+    """Largest relative difference of any two."""
+    every = np.array(list(values.values()))
+    return float(np.ptp(every) / np.abs(every).max())
+
+
+def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
+    """Wavelength of each free wheelset: closed form, rails that are edges, implementations among each other."""
+    closed, edges, among = [], [], []
+    for one in wheelsets.values():
+        waves = {engine: wavelength(implementation(engine), one) for engine in IMPLEMENTATIONS}
+        closed.append(max(abs(wave / klingel(one) - 1.0) for wave in waves.values()))
+        among.append(_spread(waves))
+        edge = one.changed(head_radius=EDGE)
+        plain = 2.0 * np.pi * np.sqrt(edge.radius * edge.half_gauge / edge.conicity)
+        edges.append(abs(wavelength(Equations, edge) / plain - 1.0))
+    count = f"of {len(wheelsets)} wheelsets without suspension at 0.2 m/s"
+    return [
+        at_most("wheelset.wave.closed", SYSTEM, f"wavelength {count}: eigenvalues of all motions by the closed form",
+                max(closed), "", 1e-3, "cones on round heads without slip; inertia and spin creepage are what is left",
+                "closed form"),
+        at_most("wheelset.wave.klingel", SYSTEM, f"wavelength {count} on rails that are edges: by Klingel's formula",
+                max(edges), "", 1e-3, "2 pi sqrt(r b / c), for which rails have no radius", "closed form"),
+        at_most("wheelset.wave.engines", SYSTEM, f"wavelength {count}: three implementations", max(among), "", 1e-6,
+                "each linearises its own equations of motion around the same contact forces", "shared kernel"),
+    ]  # fmt: skip
+
+
+def _critical_rows(speeds: dict[str, dict[str, float | None]]) -> list[Row]:
+    """Critical speeds among each other: of those that have one, and whether all agree which those are."""
+    there = {name: {engine: v for engine, v in own.items() if v is not None} for name, own in speeds.items()}
+    agreed = all(len(own) in (0, len(IMPLEMENTATIONS)) for own in there.values())
+    having = [own for own in there.values() if len(own) == len(IMPLEMENTATIONS)]
+    why = "each linearises its own equations of motion around the same contact forces, and looks for itself"
+    return [
+        at_most("wheelset.critical.engines", SYSTEM, f"critical speed of {len(having)} wheelsets: three "
+                "implementations", max(map(_spread, having)), "", 1e-6, why, "shared kernel"),
+        behaves("wheelset.critical.agreed", SYSTEM, f"which of {len(there)} wheelsets have a critical speed",
+                "agreed" if agreed else "different", "agreed", why, "shared kernel"),
+    ]  # fmt: skip
+
+
+def _none_row(name: str, wheelset: Wheelset, expected: str) -> Row:
+    """What all implementations say of a wheelset without a critical speed."""
+    said = set()
+    for engine in IMPLEMENTATIONS:
+        try:
+            said.add(f"{critical_speed(wheelset, partial(growth, implementation(engine))):.3g} m/s")
+        except NoCriticalSpeed as error:
+            said.add("unstable" if error.unstable else "stable")
+    return behaves(f"wheelset.critical.{name}", SYSTEM, f"a {name} wheelset at all speeds, in three implementations",
+                   " or ".join(sorted(said)), expected, "nothing holds it, or more than creep forces can drive")
+
+
+def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
+    """Accelerations at lively states by each engine against the equations."""
+    draw = np.random.default_rng(SEED)
+    rows = []
+    for engine in ENGINES:
+        worst = 0.0
+        for one in wheelsets.values():
+            written, built = (implementation(name)(one, 60.0, cells=11) for name in ("reference", engine))
+            states = written.rest + LIVELY * draw.normal(size=(20, eq.STATES))
+            worst = max(worst, *(_apart(built.rates(state), written.rates(state)) for state in states))
+        rows.append(at_most(f"wheelset.accelerations.{engine}", SYSTEM, "rates of 20 random states of "
+                            f"{len(wheelsets)} wheelsets with FASTSIM, by the largest", worst, "", 1e-10,
+                            "the engine's own equations of motion around the same contact forces",
+                            "shared kernel"))  # fmt: skip
+    return rows
+
+
+def _apart(found: np.ndarray, expected: np.ndarray) -> float:
+    return float(np.abs(found - expected).max() / np.abs(expected).max())
+
+
+Speeds = dict[str, dict[str, float | None]]
+
+
+def _usual(speeds: Speeds, name: str) -> float:
+    """Speed (m/s) of a path: above the critical one, 60 where there is none."""
+    critical = speeds[name]["reference"]
+    return min(ABOVE * critical, 180.0) if critical is not None else 60.0
+
+
+def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> list[Row]:
+    """One second by RK4 with FASTSIM: states of the engines by the equations', and the power of creep forces."""
+    gaps, positive, steps = dict.fromkeys(ENGINES, 0.0), 0, 0
+    between = 0.0
+    for name, one in wheelsets.items():
+        paths, step = {}, _step(Equations(one, _usual(speeds, name), "fastsim", cells))
+        for engine in IMPLEMENTATIONS:
+            equations = implementation(engine)(one, _usual(speeds, name), "fastsim", cells)
+            paths[engine] = equations.run(equations.displaced(4e-3), DURATION, step)
+            power = paths[engine].contacts[:, :, wf.POWER]
+            positive, steps = positive + int((power > 0.0).sum()), steps + power.size
+        for engine in ENGINES:
+            gaps[engine] = max(gaps[engine], float(np.abs(paths[engine].states - paths["reference"].states).max()))
+        between = max(between, float(np.abs(paths["exudyn"].states - paths["mujoco"].states).max()))
+    of = f"states of {len(wheelsets)} wheelsets over 1 s with FASTSIM ({cells} cells), RK4 at the same step"
+    why = "the same method and contact forces; what differs is rounding"
+    return [
+        *(at_most(f"wheelset.path.{engine}", SYSTEM, f"{of}: {engine} by the equations (m, rad, s)", gaps[engine], "",
+                  1e-10, why, "shared kernel") for engine in ENGINES),
+        at_most("wheelset.path.between", SYSTEM, f"{of}: both engines", between, "", 1e-10, why, "shared kernel"),
+        at_most("wheelset.power", SYSTEM, f"times that a creep force has a power above zero, of {steps:,} at every "
+                "step of these paths", positive, "", 0, "friction takes energy and never gives any", "none"),
+    ]  # fmt: skip
+
+
+def _step(equations: Equations) -> float:
+    """STEP, or a smaller one that divides DURATION, for the fastest motion."""
+    fastest = float(np.abs(np.linalg.eigvals(equations.state_matrix)).max())
+    return DURATION / np.ceil(DURATION / min(STEP, 1.0 / fastest))
+
+
+def _that_hunt(wheelsets: dict[str, Wheelset], speeds: Speeds) -> dict[str, Wheelset]:
+    """The drawn wheelsets whose critical speed leaves room above."""
+    return {name: one for name, one in wheelsets.items() if 20.0 < (speeds[name]["reference"] or 0.0) < 160.0}
+
+
+def _cycles(wheelsets: dict[str, Wheelset], speeds: Speeds) -> dict[str, dict[str, Orbit]]:
+    """Limit cycle of every wheelset in every implementation at half the step, each found from 1 % beside."""
+    found = {}
+    for name, one in wheelsets.items():
+        speed = _usual(speeds, name)
+        equations = Equations(one, speed, "fastsim", 11)
+        first = attained(equations, step=_step(equations))
+        if first is None:
+            continue
+        found[name] = {engine: _own(first, implementation(engine)(one, speed, "fastsim", 11))
+                       for engine in IMPLEMENTATIONS}  # fmt: skip
+    return found
+
+
+def _own(orbit: Orbit, equations: Equations) -> Orbit:
+    return refined(solved(beside(orbit, equations), "amplitude", precise=False), "amplitude")
+
+
+def _numbers(orbit: Orbit) -> dict[str, float]:
+    names = ("speed", "amplitude", "frequency", "error", "frequency_error")
+    return {name: float(getattr(orbit, name)) for name in names}
+
+
+def _cycle_rows(cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
+    """Amplitude and frequency: step-halving errors, and how far the engines are apart by these."""
+    rows = []
+    for value, error in (("amplitude", "error"), ("frequency", "frequency_error")):
+        every = [[(getattr(o, value), getattr(o, error)) for o in own.values()] for own in cycles.values()]
+        errors = max(e / v for own in every for v, e in own)
+        apart = max((max(v for v, _ in own) - min(v for v, _ in own)) / max(e for _, e in own) for own in every)
+        of = f"{value} of the limit cycle of {len(cycles)} wheelsets above the critical speed"
+        rows += [
+            at_most(f"wheelset.cycle.{value}.error", SYSTEM, f"{of}: change by halving the step, relative", errors, "",
+                    1e-2, "Newton's method closes the orbit at either step", "none"),
+            at_most(f"wheelset.cycle.{value}", SYSTEM, f"{of}: three implementations, by the error of the step", apart,
+                    "", 1.0, "each closes its own orbit, from a guess that is 1 % off", "shared kernel"),
+        ]  # fmt: skip
+    return rows
+
+
+def _order_row() -> Row:
+    """Observed order of RK4 with linear creep, from three steps."""
+    equations = Equations(CHOSEN, 60.0, "linear")
+    start = equations.displaced(5e-3)
+    ends = [equations.run(start, 0.1, step).states[-1] for step in (1.25e-4, 6.25e-5, 3.125e-5)]
+    first, second = np.abs(ends[0] - ends[1])[eq.YAW], np.abs(ends[1] - ends[2])[eq.YAW]
+    return within("wheelset.order", SYSTEM, "observed order of RK4 in the yaw after 0.1 s, linear creep",
+                  float(np.log2(first / second)), "", 4.0, 0.2, "the order of the method", "closed form")  # fmt: skip
+
+
+@contextmanager
+def spin_reversed() -> Iterator[None]:
+    """The written equations with the sign of the spin creepage turned, run as plain Python."""
+
+    def faulty(contacts: np.ndarray, slip: np.ndarray, *others: Any) -> None:
+        slip[:, 2] *= -1.0
+        wf.creep(contacts, slip, *others)
+
+    source = wf.wheel_forces.py_func
+    with mock.patch.object(eq, "wheel_forces", _with(source, creep=faulty)), mock.patch.object(
+        eq, "rates", eq.rates.py_func
+    ):
+        yield
+
+
+def _with(function: Callable[..., Any], **others: Any) -> Callable[..., Any]:
+    """The same function with other globals."""
+    from types import FunctionType
+
+    return FunctionType(function.__code__, function.__globals__ | others, function.__name__)
+
+
+def _fault_rows() -> list[Row]:
+    """What a small fault in one implementation does to the figures above."""
+    state = Equations(CHOSEN, 60.0).displaced(3e-3)
+    engine = implementation("mujoco")(CHOSEN, 60.0)
+    right = _apart(engine.rates(state), Equations(CHOSEN, 60.0).rates(state))
+    with spin_reversed():
+        spin = _apart(engine.rates(state), Equations(CHOSEN, 60.0).rates(state))
+    softer = CHOSEN.changed(stiffness_x=0.99 * CHOSEN.stiffness_x)
+    speeds = [critical_speed(one, partial(growth, Equations)) for one in (CHOSEN, softer)]
+    seen = {"sign of the spin": right < 1e-10 < spin, "1 % of a stiffness": abs(speeds[1] / speeds[0] - 1.0) > 1e-6}
+    return [behaves(f"wheelset.fault.{name.split()[-1]}", SYSTEM, f"planted in one implementation: {name}",
+                    "seen" if found else "unseen", "seen", "beyond the bounds of the rows above")
+            for name, found in seen.items()]  # fmt: skip
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Critical speeds and limit cycles."""
+    heads = ("wheelset", *IMPLEMENTATIONS)
+    speeds = tuple((name, *("none" if v is None else f"{v:.9g}" for v in own.values()))
+                   for name, own in data["critical"].items())  # fmt: skip
+    cycles = tuple((name, engine, f"{o['speed']:.4g}", f"{1e3 * o['amplitude']:.7f}", f"{1e3 * o['error']:.0e}",
+                    f"{o['frequency']:.8f}", f"{o['frequency_error']:.0e}")
+                   for name, own in data["cycles"].items() for engine, o in own.items())  # fmt: skip
+    return [Table("Critical speed of wheelsets", "In m/s, with linear creep; parameters drawn at random but for the "
+                  "chosen ones.", heads, speeds),
+            Table("Limit cycles of wheelsets", "With FASTSIM, 11 cells; errors are what halving the step changes.",
+                  ("wheelset", "implementation", "speed [m/s]", "amplitude [mm]", "error", "frequency [Hz]", "error"),
+                  cycles)]  # fmt: skip
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """No figure: the studies draw."""
+    return []
