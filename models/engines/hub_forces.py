@@ -5,19 +5,21 @@ forces of ``hub_forces.kernel`` as its callback. The reference solves the writte
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import ClassVar
 
 import numpy as np
 
-from models.engines.protocol import guard
+from models.engines.protocol import Settings, guard
+from models.engines.spatial_protocol import _check_step
 from models.errors import Refused, RunFailed
 from models.hub_forces.cut_vehicle import PITCH, CutVehicle
 from models.hub_forces.kernel import GRAVITY, WRENCH, forces, parts
 from models.hub_forces.mechanics import PER_MOTION, inertia
 from models.hub_forces.table import Drive, table
 from models.steps import divides, fitting
+from models.vehicles.spatial_linear import linearise
 
 ENGINES = ("reference", "exudyn", "mujoco")
 UPRIGHT = 1.4
@@ -52,6 +54,7 @@ class HubModel(ABC):
                                        f"example {fitting(step, duration)} s")
         self.vehicle, self.step, self.steps = vehicle, step, round(duration / step)
         _check(self.ENGINE, vehicle, drive, 2 * self.steps + 1)
+        check_step(self.ENGINE, vehicle, step, duration)
         self.numbers, self.size = table(vehicle, drive, step), vehicle.size
 
     @abstractmethod
@@ -88,6 +91,12 @@ class HubModel(ABC):
         own = self.vehicle
         return (np.empty((self.size + 1, PER_MOTION)), np.zeros(self.size), np.empty(len(own.elements)),
                 np.empty((len(own.hubs), WRENCH)), np.empty(2))  # fmt: skip
+
+
+def check_step(engine: str, vehicle: CutVehicle, step: float, duration: float) -> None:
+    """Refused where a mode of the vehicle on its tyres, which are stiffer than none, would grow at a step (s)."""
+    linear = linearise(replace(vehicle.whole, side_forces=()))
+    _check_step(engine, linear, Settings("RK4", step, duration))
 
 
 def _check(engine: str, vehicle: CutVehicle, drive: Drive, rows: int) -> None:

@@ -42,7 +42,7 @@ class ExudynHubs(HubModel):
 
     def __init__(self, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> None:
         super().__init__(vehicle, drive, step, duration)
-        mbs = exu.SystemContainer().AddSystem()
+        mbs: Any = exu.SystemContainer().AddSystem()
         built = Build(vehicle.tree, mbs, Preloads({}, {}), mbs.AddObject(items.ObjectGround()))
         _tree(built, list(vehicle.tree.bodies))
         tree = built.links[vehicle.chassis][0]

@@ -31,7 +31,7 @@ class HubForces:
 
     def noisy(self, deviation: np.ndarray, seed: int, path: int = 0) -> "HubForces":
         """With white noise of standard deviations (6 h,), N and N m, on every sample."""
-        noise = normal(seed, path, *self.samples.shape, source=FORCES)
+        noise = normal(seed, path, len(self.samples), self.samples.shape[1], source=FORCES)
         return replace(self, samples=self.samples + noise * deviation)
 
 

@@ -3,7 +3,9 @@
 Forces and moments of white noise at the hubs turn the vehicle as a double integral, var = q t^3 / 3, with
 q = period I^-1 C I^-1 of the covariance C of the moment samples about the common centre of mass. What turns by phi
 carries body-fixed forces with it, but not gravity: the vehicle slides off by g times the tilt, a double integral of a
-double integral, var = g^2 q t^7 / 252. Forces that are given in the space do not turn, and there is no such error.
+double integral, var = g^2 q t^7 / 252. Forces that are given in the space do not turn, and there is no such error;
+but what carries the vehicle from below its centre of mass then topples it, as an upright pendulum, with the rates
+sqrt(m g h / I) of roll and pitch, h the height of the centre above the hubs.
 """
 
 from dataclasses import dataclass
@@ -33,6 +35,11 @@ class Rigid:
         inverse = np.linalg.inv(self.inertia)
         return inverse @ (rows.T * deviation**2) @ rows @ inverse
 
+    def toppling(self) -> np.ndarray:
+        """Growth rates (2,) of roll and pitch, 1/s, under forces that keep their directions in the space."""
+        loads = -self.arms[:, 2].mean() * self.mass * GRAVITY
+        return np.sqrt(np.maximum(loads, 0.0) / np.diag(self.inertia)[:2])
+
     def angle_variance(self, deviation: np.ndarray, period: float, times: np.ndarray) -> np.ndarray:
         """Variances (m, 3) of roll, pitch, heading (rad^2) at times (m,) from rest."""
         return np.outer(times**3 / 3, period * np.diag(self.turning(deviation)))
@@ -52,7 +59,7 @@ def rigid(vehicle: CutVehicle) -> Rigid:
     """All bodies in the design position as one."""
     bodies = vehicle.whole.bodies
     mass = sum(body.mass for body in bodies)
-    centre = sum(body.mass * np.array(body.position) for body in bodies) / mass
+    centre = np.array([body.mass * np.array(body.position) for body in bodies]).sum(axis=0) / mass
     inertia = np.zeros((3, 3))
     for body in bodies:
         arm = np.subtract(body.position, centre)

@@ -1,0 +1,190 @@
+"""How far noisy hub forces let a vehicle drift, what that does to its springs and mounts, and what holding it takes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.damage import damage_ratio
+from models.engines.hub_forces import HubRun, build
+from models.errors import RunFailed
+from models.hub_forces.cut_vehicle import ANGLES, PITCH, ROLL, CutVehicle, X, Y, Z
+from models.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
+from models.hub_forces.scene import COMPONENTS, HubScene
+from models.hub_forces.table import Drive
+from models.hub_forces.tilt_filter import Tilt, estimate, held, pulled
+from models.prescribed import smoothed
+from models.road.iso8608 import iso8608_road
+from models.strict import Strict, read
+from models.time_series import write_time_series
+
+SYSTEM = "hub-forces"
+Progress = Callable[[str, float], None]
+FREE, FILTER, PRESCRIBED = "free", "filter", "prescribed"
+DRIFTED = 0.05
+"""rad: a roll or pitch that is off by more is drift-off, as in the study of the pitch plane."""
+
+
+class Options(Strict):
+    """[options] of this study: none."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What was measured, what the filter made of it, the true run if it was a virtual measurement, and the runs."""
+
+    vehicle: CutVehicle
+    forces: HubForces
+    angles: Angles
+    tilt: Tilt
+    truth: HubRun | None
+    runs: dict[str, HubRun]
+    failed: dict[str, str]
+
+
+def check(scene: HubScene, engines: tuple[str, ...]) -> None:
+    """Refuse options: there are none."""
+    read(Options, scene.options, scene.file, "options")
+
+
+def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Measure, run free and with both stabilisers; saves the measurement, ``runs.csv`` and two figures."""
+    from studies.hub_forces_figures import damage_figure, drift_figure
+
+    found = compute(scene, engines, progress)
+    _save(found, folder)
+    drift_figure(found, scene.title, folder / "drift.png")
+    damage_figure(found, scene.title, folder / "damage.png")
+    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": answer(found),
+            "table": _table(scene, found)}  # fmt: skip
+
+
+def compute(scene: HubScene, engines: tuple[str, ...], progress: Progress = lambda text, part: None) -> Found:
+    """All runs: free in every engine, with stabilisers in the last one, which is the fastest."""
+    vehicle, own, last = scene.cut_vehicle(), scene.run, engines[-1]
+    progress("virtual measurement", 0.05)
+    true, forces, angles = _measured(scene, vehicle, last)
+    deviations = (scene.angles.angle_deviation, scene.angles.rate_deviation)
+    progress("Kalman filter", 0.2)
+    tilt = estimate(vehicle, forces, angles, scene.deviations(vehicle), deviations, scene.stabilise.model, scene.file)
+    drive = forces.drive(own.step, round(own.duration / own.step), scene.forces.interpolation)
+    quiet = smoothed(angles.samples[:, :2], angles.period, scene.stabilise.smoothing, scene.file, "stabilise.smoothing")
+    drives = {f"{FREE}, {engine}": (engine, drive) for engine in engines}
+    drives[FILTER] = last, pulled(drive, vehicle, tilt, own.step, scene.stabilise.bandwidth)
+    drives[PRESCRIBED] = last, held(drive, quiet, angles.period, own.step)
+    runs, failed = dict[str, HubRun](), dict[str, str]()
+    for i, (name, (engine, driven)) in enumerate(drives.items()):
+        progress(name, 0.3 + 0.6 * i / len(drives))
+        try:
+            runs[name] = build(engine, vehicle, driven, own.step, own.duration).run(_start(vehicle, driven, angles))
+        except RunFailed as error:
+            failed[name] = str(error)
+    return Found(vehicle, forces, angles, tilt, true, runs, failed)
+
+
+def _measured(scene: HubScene, vehicle: CutVehicle, engine: str) -> tuple[HubRun | None, HubForces, Angles]:
+    """What transducers say: of the files, or of a run on the road with noise."""
+    if scene.road is None:
+        return None, *scene.measured(vehicle)
+    own, road, steps = scene.run, scene.road, round(scene.run.duration / scene.run.step)
+    left, right = (iso8608_road(road.iso8608, road.seed + i) for i in range(2))
+    drive = two_tracks(vehicle, left, right, road.speed, own.step, steps)
+    true = truth(engine, vehicle, drive, scene.forces.frame, own.step, own.duration)
+    forces, angles = recorded(true, scene.forces.frame, round(1.0 / (scene.forces.sampling_rate * own.step)))
+    deviations = (scene.angles.angle_deviation, scene.angles.rate_deviation)
+    return true, forces.noisy(scene.deviations(vehicle), scene.seed), angles.noisy(deviations, scene.seed)
+
+
+def _start(vehicle: CutVehicle, drive: Drive, angles: Angles) -> np.ndarray:
+    """At rest in the design position; an enforced tilt begins where its file does."""
+    start = np.zeros(2 * vehicle.size)
+    if drive.guide is not None and drive.pull is None:
+        start[[ROLL, PITCH, vehicle.size + ROLL, vehicle.size + PITCH]] = drive.guide[0, :4]
+    return start
+
+
+def errors(found: Found, run: HubRun) -> np.ndarray:
+    """Errors (m, 6) of roll, pitch, heading (rad), x, y, z (m) against the true run; of a file only of both angles."""
+    order = [*ANGLES.values(), X, Y, Z]
+    if found.truth is not None:
+        return run.states[:, order] - found.truth.states[:, order]
+    off = np.full((len(run.times), len(order)), np.nan)
+    for i in range(2):
+        times = found.angles.period * np.arange(len(found.tilt.states))
+        off[:, i] = run.states[:, order[i]] - np.interp(run.times, times, found.tilt.states[:, i])
+    return off
+
+
+def damages(found: Found, run: HubRun) -> dict[str, float]:
+    """Pseudo-damage of every element's section force by the true one, or by that of the run with the filter."""
+    true = found.truth or found.runs[FILTER]
+    return {element.name: damage_ratio(run.elements[:, i], true.elements[:, i])
+            for i, element in enumerate(found.vehicle.elements)}  # fmt: skip
+
+
+def drift_off(found: Found, run: HubRun) -> float:
+    """First time (s) at which roll or pitch is off by DRIFTED; infinite if never."""
+    off = np.abs(errors(found, run)[:, :2]).max(axis=1) > DRIFTED
+    return float(run.times[np.argmax(off)]) if off.any() else float("inf")
+
+
+def answer(found: Found) -> dict[str, Any]:
+    """Per run: largest errors, rms of the stabiliser's moments, damage of every element."""
+    out: dict[str, Any] = {name: {"failed": text} for name, text in found.failed.items()}
+    for name, run in found.runs.items():
+        off = np.abs(errors(found, run)).max(axis=0)
+        out[name] = {
+            **dict(zip((*ANGLES, "x", "y", "z"), map(float, off), strict=True)),
+            "moments": np.sqrt(np.mean(run.moments**2, axis=0)).tolist(), "damage": damages(found, run),
+        }  # fmt: skip
+    return out
+
+
+def engines_apart(found: Found) -> float:
+    """Largest difference of any coordinate or rate between the free runs of the engines before drift-off."""
+    free = [run for name, run in found.runs.items() if name.startswith(FREE)]
+    before = int(min(min(drift_off(found, run) for run in free), free[0].times[-1]) / free[0].times[1]) + 1
+    return max(float(np.abs(run.states[:before] - free[0].states[:before]).max()) for run in free)
+
+
+def _table(scene: HubScene, found: Found) -> list[str]:
+    lines = [f"  forces in the frame {scene.forces.frame!r}; innovations squared {found.tilt.surprise:.2f} times",
+             f"  {'':<18}{'roll':>9}{'pitch':>9}{'heading':>9}{'x':>8}{'y':>8}{'z':>8}{'drift-off':>11}"
+             f"{'moments rms':>16}   damage / true",
+             f"  {'largest error':<18}{'[mrad]':>9}{'[mrad]':>9}{'[mrad]':>9}{'[m]':>8}{'[m]':>8}{'[m]':>8}{'[s]':>11}"
+             f"{'[N m]':>16}   least, most"]  # fmt: skip
+    for name, run in found.runs.items():
+        off, (roll, pitch) = np.abs(errors(found, run)).max(axis=0), np.sqrt(np.mean(run.moments**2, axis=0))
+        ratios = damages(found, run).values()
+        lines.append(f"  {name:<18}" + "".join(f"{1e3 * v:>9.3g}" for v in off[:3])
+                     + "".join(f"{v:>8.2g}" for v in off[3:])
+                     + f"{drift_off(found, run):>11.4g}{roll:>8.3g}{pitch:>8.3g}   "
+                     + f"{min(ratios):.3g}, {max(ratios):.3g}")  # fmt: skip
+    lines += [f"  {name}: {text}" for name, text in found.failed.items()]
+    if sum(name.startswith(FREE) for name in found.runs) > 1:
+        lines.append(f"  engines before drift-off: {engines_apart(found):.1e}")
+    return lines
+
+
+def _save(found: Found, folder: Path) -> None:
+    """The measurement as a user would give it, and the chassis of every run."""
+    names = [(f"{hub}_{name}", next(iter(units))) for hub in found.vehicle.hubs for name, units in COMPONENTS.items()]
+    columns = {name: (unit, found.forces.samples[:, i]) for i, (name, unit) in enumerate(names)}
+    write_time_series(folder / "hub_forces.csv", columns, found.forces.period)
+    angles = zip(("roll", "pitch", "roll_rate", "pitch_rate"), ("rad", "rad", "rad/s", "rad/s"),
+                 found.angles.samples.T, strict=True)  # fmt: skip
+    write_time_series(folder / "angles.csv", {name: (unit, values) for name, unit, values in angles},
+                      found.angles.period)  # fmt: skip
+    runs = {**({"true": found.truth} if found.truth else {}), **found.runs}
+    every = {f"{name}: {what}": ("rad", run.states[:, i]) for name, run in runs.items() for what, i in ANGLES.items()}
+    every |= {f"{name}: {what}": ("m", run.states[:, i]) for name, run in runs.items()
+              for what, i in (("x", X), ("y", Y), ("z", Z))}  # fmt: skip
+    write_time_series(folder / "runs.csv", every, float(next(iter(found.runs.values())).times[1]))
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("hub_forces")
