@@ -4,8 +4,8 @@ Normal force
     Hertz' theory at the penetration, times 1 + ``contact_damping`` times the speed of approach, and never below zero:
     it begins and ends without a jump and never pulls. The semi-axes are those of the elastic force. The curvature of
     the cone is that in the plane square to its generator; that the generator is a little askew to the rail under yaw
-    is left out of the curvatures, and of nothing else. Profiles have several patches on a wheel, each pressed by its
-    own penetration as if it were alone (``profile_contact``).
+    is left out of the curvatures, and of nothing else. Profiles have several patches on a wheel, each with a
+    penetration of its own (``profile_contact``).
 Creepage
     Velocity of the wheel relative to the rail by the speed of travel V, or by REGULAR where |V| is less; there the
     forces of rolling forwards and backwards are mixed as V goes from REGULAR to -REGULAR, so that nothing jumps.
@@ -25,12 +25,11 @@ from models.compiled import njit
 from models.contact.fastsim import KINDS, MARCHES
 from models.contact.fastsim_grid import grid, strips_of
 from models.contact.fastsim_many import SPIN, XI_X, forces
-from models.contact.hertz import aspect
 from models.contact.linear_theory import coefficient_at, flexibilities_at
 from models.errors import InputError
 from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
 from models.rail.laid_profiles import profile_numbers
-from models.rail.profile_contact import ACROSS, ALONG, N_Y, N_Z, TOUCH, X_, Y_, Z_, ZONES, profile_on_rail
+from models.rail.profile_contact import ACROSS, ALONG, N_Y, N_Z, TOUCH, X_, Y_, Z_, ZONES, pressed, profile_on_rail
 from models.rail.profile_contact import DEPTH as DEEP
 from models.rail.wheelset import Wheelset
 
@@ -80,7 +79,7 @@ def contact_points(y, z, roll, yaw, p, touches):
     for k in range(2):
         side, own = RIGHT if k == 0 else LEFT, touches[k * each : (k + 1) * each]
         if p.size > NUMBERS:
-            profile_on_rail(side, y, z, roll, yaw, p[NUMBERS:], own)
+            profile_on_rail(side, y, z, roll, yaw, p[NUMBERS:], p[MODULUS], own)
             continue
         depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, y, z, roll, yaw, p[RADIUS], p[HALF_GAUGE],
                                                             p[CONICITY], p[HEAD])  # fmt: skip
@@ -91,25 +90,12 @@ def contact_points(y, z, roll, yaw, p, touches):
 
 
 @njit(cache=True, error_model="numpy")
-def normal_contact(penetration, along, across, p):
-    """Elastic normal force (N) and semi-axes (m) at a penetration (m), curvatures 1/m; zeros where there is none."""
-    if penetration <= 0.0:
-        return 0.0, 0.0, 0.0
-    g, cosine, sine = aspect(min(along, across) / max(along, across))
-    short = math.sqrt(penetration * cosine / (max(along, across) * (cosine + sine)))
-    load = 2.0 / 3.0 * math.pi * p[MODULUS] * penetration * short / (g * (cosine + sine))
-    if along <= across:
-        return load, short / g, short
-    return load, short, short / g
-
-
-@njit(cache=True, error_model="numpy")
 def carried(z, p):
     """Vertical part (N) of the elastic normal forces with the wheelset's centre at a height z (m) over the middle."""
     touches, whole = np.zeros((patches(p), TOUCH)), 0.0
     contact_points(0.0, z, 0.0, 0.0, p, touches)
     for touch in touches:
-        whole += touch[N_Z] * normal_contact(touch[DEEP], touch[ALONG], touch[ACROSS], p)[0]
+        whole += touch[N_Z] * pressed(touch[DEEP], touch[ALONG], touch[ACROSS], p[MODULUS])[0]
     return whole
 
 
@@ -193,7 +179,7 @@ def _press(touch, velocity, turning, p, contact, slip, report):
     slip[0], slip[1] = vx, n_z * vy - n_y * vz
     slip[2] = turning[1] * n_y + turning[2] * n_z
     rate = n_y * vy + n_z * vz
-    elastic, a, b = normal_contact(touch[DEEP], touch[ALONG], touch[ACROSS], p)
+    elastic, a, b = pressed(touch[DEEP], touch[ALONG], touch[ACROSS], p[MODULUS])
     load = elastic * max(0.0, 1.0 + p[DAMPING] * rate)
     contact[0], contact[1], contact[2], contact[3] = a, b, load, p[FRICTION]
     contact[7], contact[8], contact[9] = flexibilities_at(a, b, p[SHEAR], p[POISSON])
