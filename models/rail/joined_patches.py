@@ -109,7 +109,7 @@ def _share(pressure: np.ndarray, x: np.ndarray, y: np.ndarray, place: float, cel
     total = float(pressure.sum())
     if total == 0.0:
         return Share(0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0), 0.0, 0)
-    box = (*_ends(x, (pressure > 0.0).any(axis=0)), *_ends(y, (pressure > 0.0).any(axis=1)))
+    box = (*_ends(x, pressure.sum(axis=0) > 0.0), *_ends(y, pressure.sum(axis=1) > 0.0))
     return Share(total * cell, float((pressure.sum(axis=0) @ x) / total),
                  float((pressure.sum(axis=1) @ y) / total) - place, float(np.count_nonzero(pressure) * cell), box,
                  float(pressure.max()), int(pieces.flat[np.argmax(pressure)]))  # fmt: skip
