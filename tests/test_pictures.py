@@ -96,6 +96,10 @@ def test_a_film_has_as_many_frames_as_its_duration_and_rate_say(hunting, tmp_pat
 
     frames = list(Page(*hunting).frames())
     assert frames[0].shape == (720, 1280, 3) and (frames[0] != frames[2]).any()
+    for kind in hunting[0].kinds.values():  # the legend's arrow below the pictures, as long as its force is drawn
+        shaft = np.isclose(frames[0][480:492], 255.0 * np.array(kind.colour), atol=1.0).all(axis=2).any(axis=0)
+        long = kind.scale * kind.legend * hunting[0].camera.pixels(400)
+        assert np.ptp(np.flatnonzero(shaft)) == pytest.approx(long, abs=5.0)  # its tip is blurred
     path = video.write(tmp_path / "film.mp4", frames * 2, 30)
     assert imageio_ffmpeg.count_frames_and_secs(str(path))[0] == 6
     assert video.write(tmp_path / "film.gif", [frame[::8, ::8] for frame in frames], 25).stat().st_size > 1000

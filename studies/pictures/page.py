@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrow
+from matplotlib.transforms import IdentityTransform
 
 from studies.figures import COLOURS, LABELS
 from studies.pictures.drawing import drawn
@@ -80,7 +81,7 @@ class Page:
             length = kind.scale * kind.legend * self.stage.camera.pixels(TALL)
             arrow = FancyArrow(
                 left, row * HEIGHT, length, 0.0, width=3.5, head_width=12, head_length=min(15, length),
-                length_includes_head=True, color=kind.colour, lw=0)  # fmt: skip
+                length_includes_head=True, color=kind.colour, lw=0, transform=IdentityTransform())  # fmt: skip
             self._figure.add_artist(arrow)
             text = self._figure.text((left + length + 8) / WIDTH, row, f"{name}, {kind.legend / 1e3:g} kN", va="center")
             left += length + 8 + text.get_window_extent().width + 34

@@ -84,9 +84,9 @@ def stage(wheelset: Wheelset) -> Stage:
     """Wheelset, rails and sleepers, seen from ahead and to the right; z down."""
     camera = Camera((2.75, 1.75, -0.95), (0.0, 0.12, 0.06), (0.0, 0.0, -1.0), 0.54)
     caption = f"displacements drawn {MAGNIFIED:g} times as large; forces on the wheels"
-    return Stage(f"Wheelset at {SPEED:g} m/s on straight rails", caption, {"wheelset": shapes(wheelset)},
-                 {"wheelset": (0.0, 0.0, 0.0)}, camera, KINDS, CURVE, lambda time: track(wheelset, SPEED * time),
-                 MAGNIFIED, ("wheelset",))  # fmt: skip
+    title = f"Wheelset that hunts at {SPEED:g} m/s, creep forces by FASTSIM"
+    return Stage(title, caption, {"wheelset": shapes(wheelset)}, {"wheelset": (0.0, 0.0, 0.0)}, camera, KINDS, CURVE,
+                 lambda time: track(wheelset, SPEED * time), MAGNIFIED, ("wheelset",))  # fmt: skip
 
 
 def shapes(w: Wheelset) -> list[Surface]:
