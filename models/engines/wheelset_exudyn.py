@@ -51,14 +51,15 @@ def tree(mbs: Any, node: Any, numbers: np.ndarray, body: np.ndarray) -> Any:
 
 
 def suspension(mbs: Any, wheelset: Any, body: np.ndarray) -> None:
-    """Springs and dampers of both ends along the track's axes, and what the vehicle weighs on them."""
+    """Springs and dampers of both ends along the track's axes, if any, and what the vehicle weighs on them."""
     ground = mbs.AddObject(items.ObjectGround())
     for arm in (body[ARM], -body[ARM]):
         frame = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=ground, localPosition=[0.0, arm, body[SUNK]]))
         end = mbs.AddMarker(items.MarkerKinematicTreeRigid(
             objectNumber=wheelset, linkNumber=JOINTS - 1, localPosition=[0.0, arm, 0.0]))  # fmt: skip
-        mbs.AddObject(items.CartesianSpringDamper(
-            markerNumbers=[frame, end], stiffness=body[KX : KZ + 1], damping=body[DX : DZ + 1]))  # fmt: skip
+        if body[KX : DZ + 1].any():
+            mbs.AddObject(items.CartesianSpringDamper(
+                markerNumbers=[frame, end], stiffness=body[KX : KZ + 1], damping=body[DX : DZ + 1]))  # fmt: skip
         mbs.AddLoad(items.LoadForceVector(markerNumber=end, loadVector=leaning(body[CARRIED], body)))
 
 

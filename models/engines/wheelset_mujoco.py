@@ -37,7 +37,8 @@ def model(numbers: np.ndarray, body: np.ndarray) -> mujoco.MjModel:
         own.add_site(name=name, pos=[0.0, arm, 0.0])
         spec.worldbody.add_site(name=f"{name} frame", pos=[0.0, arm, body[SUNK]])
         for i, held in enumerate(leaning(body[CARRIED], body)):
-            _strut(spec, name, i, body[KX + i], body[DX + i], held)
+            if body[KX + i] or body[DX + i] or held:
+                _strut(spec, name, i, body[KX + i], body[DX + i], held)
     built = spec.compile()
     check(built, mujoco.MjData(built))
     return built
