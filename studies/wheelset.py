@@ -10,6 +10,7 @@ import numpy as np
 from models.errors import RunFailed
 from models.rail import wheel_forces as wf
 from models.rail.eigenvalues import growth, hunting, locus, wavelength
+from models.rail.energy import ledger
 from models.rail.equations import ROLL, SPIN, YAW, Y, Z
 from models.rail.equations import Path as Motion
 from models.rail.limit_cycle import maxima
@@ -47,7 +48,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
         paths_figure(paths, scene.title, folder / "paths.png")
         creep_figure(next(iter(paths.values())), scene.title, folder / "creep.png")
     return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": _answer(wheelset, linear, paths),
-            "table": [*_waves(wheelset, linear), *_stability(wheelset, linear), *_motions(paths)]}  # fmt: skip
+            "table": [*_waves(wheelset, linear), *_stability(wheelset, linear), *_motions(scene, paths)]}  # fmt: skip
 
 
 class Linear:
@@ -168,20 +169,22 @@ def _speed(critical: float | None, why: str, first: float | None = None) -> str:
     return f"{critical:>14.9g} m/s" + (f" {critical / first - 1:+.0e} from the first" if first else "")
 
 
-def _motions(paths: dict[str, dict[float, Motion]]) -> list[str]:
+def _motions(scene: WheelsetScene, paths: dict[str, dict[float, Motion]]) -> list[str]:
     """How each path ends, how far the implementations are apart, and the power of the creep forces."""
     if not paths:
         return []
     name, first = next(iter(paths.items()))
-    lines = [f"  paths, by {name}"]
+    lines = [f"  paths, by {name}, with {scene.contact.law}"]
     for speed, own in first.items():
         lines.append(f"    {speed:g} m/s: {_ending(own)}")
         lines += [f"      {engine}: within {np.abs(other[speed].states - own.states).max():.1e} of {name} (m, rad, s)"
                   for engine, other in paths.items() if engine != name]  # fmt: skip
         power = own.contacts[:, :, wf.POWER]
-        work = np.trapezoid(power.sum(axis=1), own.times)
+        book = ledger(equations_of(scene, "reference", speed), own)
         lines.append(f"      power of the creep forces: from {power.min():,.3g} to {power.max():.3g} W at a patch; "
-                     f"together they take {-work:,.4g} J")  # fmt: skip
+                     f"together they take {book.creep[-1]:,.4g} J")  # fmt: skip
+        lines.append(f"      energy: the drive gives {book.drive[-1]:,.4g} J, dampers take {book.dampers[-1]:,.4g} J; "
+                     f"{np.abs(book.residual).max():.1e} J are not accounted for")  # fmt: skip
     return lines
 
 

@@ -3,6 +3,7 @@
 import json
 import tomllib
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from models.rail.orbit import solved
 from models.rail.scene import build
 from models.rail.wheelset import CHOSEN
 from studies import limit_cycle, wheelset
+from validation.absence import wheelset as absence
 
 SCENE = {"title": "t", "system": "wheelset", "contact": {"cells": 11},
          "speeds": {"start": 50.0, "stop": 80.0, "count": 4}, "run": {"duration": 0.2, "speeds": [60.0]}}  # fmt: skip
@@ -112,7 +114,7 @@ def test_the_study_saves_what_it_says(tmp_path):
 
 def test_no_critical_speed_is_told_apart():
     with pytest.raises(NoCriticalSpeed) as told:
-        critical_speed(free(CHOSEN).changed(mass=1e4, yaw_inertia=3e4), lambda one, speed: growth(Equations, one, speed))
+        critical_speed(free(CHOSEN).changed(mass=1e4, yaw_inertia=3e4), partial(growth, Equations))
     assert told.value.unstable
 
 
@@ -134,6 +136,10 @@ def test_orbits_that_are_none():
     orbit = attained(Equations(CHOSEN, 75.0, cells=7))
     with pytest.raises(RunFailed, match="no periodic motion"):
         solved(replace(orbit, equations=Equations(CHOSEN, 20.0, cells=7)), "amplitude")
+
+
+def test_what_the_scene_does_not_name_is_absent():
+    assert [(row.id, row.reason) for row in absence.rows() if row.status != "passed"] == []
 
 
 def test_limit_cycles_need_a_bound_and_a_range():

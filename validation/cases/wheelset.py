@@ -13,19 +13,20 @@ from scipy.optimize import brentq
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.eigenvalues import free, growth, wavelength
+from models.rail.energy import ledger
 from models.rail.equations import Equations
 from models.rail.limit_cycle import attained
 from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
 from models.rail.of_scene import IMPLEMENTATIONS, implementation
 from models.rail.orbit import Orbit, beside, refined, solved
 from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
-from validation.rows import Row, System, Table, at_most, behaves, within
+from validation.rows import Row, System, Table, at_most, behaves, finding, within
 
 TITLE = "A wheelset on straight track"
 SYSTEM: System = "rolling-vehicle"
 SEED = 2026
 DRAWN = 6
-"""Wheelsets with parameters at random, beside the chosen one, one that every speed makes unstable and one that none does."""
+"""Wheelsets with parameters at random, beside the chosen one, one unstable at every speed and one at none."""
 RANGES = {"mass": (800.0, 2000.0), "spin_inertia": (50.0, 200.0), "yaw_inertia": (500.0, 1500.0),
           "radius": (0.35, 0.55), "half_gauge": (0.7, 0.8), "conicity": (0.02, 0.3), "head_radius": (0.15, 0.4),
           "load": (6e4, 2e5), "half_spacing": (0.8, 1.2), "stiffness_x": (1e5, 3e6), "stiffness_y": (1e5, 3e6),
@@ -56,7 +57,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows += _path_rows(wheelsets, speeds, 11 if quick else 21)
     cycles = _cycles({"chosen": CHOSEN} if quick else {"chosen": CHOSEN, **_that_hunt(wheelsets, speeds)}, speeds)
     rows += _cycle_rows(cycles)
-    rows.append(_order_row())
+    rows += [_order_row(), *_energy_rows()]
     if not quick:
         rows += [_none_row("heavy", HEAVY, "unstable"), _none_row("stiff", STIFF, "stable"), *_fault_rows()]
     return rows, {"critical": speeds, "cycles": {name: {engine: _numbers(one) for engine, one in own.items()}
@@ -258,6 +259,26 @@ def _order_row() -> Row:
     first, second = np.abs(ends[0] - ends[1])[eq.YAW], np.abs(ends[1] - ends[2])[eq.YAW]
     return within("wheelset.order", SYSTEM, "observed order of RK4 in the yaw after 0.1 s, linear creep",
                   float(np.log2(first / second)), "", 4.0, 0.2, "the order of the method", "closed form")  # fmt: skip
+
+
+def _energy_rows() -> list[Row]:
+    """What the ledger of a path below the flanges leaves open, and how it falls with the step."""
+    equations = Equations(CHOSEN, 60.0, "linear")
+    left = [_open(equations, step) for step in (1.25e-4, 6.25e-5, 3.125e-5)]
+    return [
+        at_most("wheelset.energy", SYSTEM, "energy that the ledger of a path of 0.1 s leaves open, by what creep takes",
+                left[-1], "", 1e-8, "steps of 31 us; powers added up to the fourth order", "none"),
+        within("wheelset.energy.order", SYSTEM, "order at which that falls with the step", float(
+            np.log2(left[1] / left[2])), "", 4.0, 0.2, "that of the integrator, and of the sum of powers", "none"),
+        finding("wheelset.energy.fastsim", SYSTEM, "the same with FASTSIM (11 cells) in steps of 0.5 ms",
+                _open(Equations(CHOSEN, 60.0, "fastsim", 11), STEP), "", 0.0,
+                "forces have kinks where cells begin to slide, and no order beyond them", "none"),
+    ]  # fmt: skip
+
+
+def _open(equations: Equations, step: float) -> float:
+    book = ledger(equations, equations.run(equations.displaced(5e-3), 0.1, step))
+    return float(np.abs(book.residual).max() / book.creep[-1])
 
 
 @contextmanager
