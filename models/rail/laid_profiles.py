@@ -15,7 +15,7 @@ from models.contact.wheel_on_rail import Pose, Side, Track, Wheelset, laid, plac
 from models.errors import InputError
 from models.strict import Strict, quantity
 
-SPACING, OF_KNOTS = 5e-5, 2.5e-4
+SPACING, OF_KNOTS = 1e-4, 2.5e-4
 """Distance (m) of nodes along the wheel's contour and of knots along the rail's."""
 SHIFTS = np.arange(-0.012, 0.0120001, 1e-3)
 """Lateral displacements (m) at which first contact is looked for."""
