@@ -50,7 +50,9 @@ class EngineWheelset(Equations, ABC):
         contacts, out = self.blank(len(kept)), np.empty(STATES)
         for one, contact in zip(kept, contacts, strict=True):
             rates(one, *self.given, out, contact)
-        return Path(np.arange(len(kept)) * step * every, kept, contacts)
+        found = Path(np.arange(len(kept)) * step * every, kept, contacts)
+        self._check_loads(found, step, self.ENGINE)
+        return found
 
     @classmethod
     def growth(cls, wheelset: Wheelset, speed: float) -> float:

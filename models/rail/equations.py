@@ -16,8 +16,9 @@ wheelset and vehicle weigh to the right as well.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
@@ -26,7 +27,7 @@ from scipy.optimize import brentq, root
 from models.compiled import njit
 from models.contact.inputs import number, quantity
 from models.errors import InputError, RunFailed
-from models.rail.wheel_forces import LAWS, REPORTED, carried, net, numbers, patches, wheel_forces
+from models.rail.wheel_forces import LAWS, LOAD, REPORTED, carried, net, numbers, patches, wheel_forces
 from models.rail.wheelset import GRAVITY, Wheelset
 from models.steps import divides
 
@@ -35,8 +36,8 @@ Y, Z, ROLL, YAW, ANGLE, Y_RATE, Z_RATE, ROLL_RATE, YAW_RATE, SPIN = range(STATES
 MASS, ALONG, ACROSS, ARM, KX, KY, KZ, DX, DY, DZ, CARRIED, SUNK, LEAN = range(13)
 """Numbers of the body and its suspension (SI): inertia along and across the axle, half spacing, springs and dampers of
 one side, weight that each side carries, height at which the springs bear no more than that, lean of the track."""
-STIFF = 2.5
-"""Steps times the fastest motion's rate up to which RK4 is stable, with a margin: 2.78 at its very limit."""
+STIFF, LIMIT_OF_RK4 = 2.5, 2.785
+"""Steps times the fastest motion's rate up to which a step is allowed, with a margin, and up to which RK4 is stable."""
 MOVED = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-6, 3e-5])
 """Steps of the differences that linearise: small against penetration (7e-5 m) and creepage."""
 FASTEST = 200.0
@@ -200,18 +201,15 @@ class Equations:
 
     @cached_property
     def state_matrix(self) -> np.ndarray:
-        """A (9, 9) about rest, the angle of spin left out, by central differences of fourth order."""
-        columns = []
-        for k in range(STATES):
-            some = [self.rates(self.rest + part * MOVED[k] * np.eye(STATES)[k]) for part in (-2.0, -1.0, 1.0, 2.0)]
-            columns.append((some[0] - 8.0 * some[1] + 8.0 * some[2] - some[3]) / (12.0 * MOVED[k]))
-        return np.delete(np.delete(np.array(columns).T, ANGLE, 0), ANGLE, 1)
+        """A (9, 9) about rest, the angle of spin left out."""
+        return slopes(self.rates, self.rest)
 
     def run(self, state: np.ndarray, duration: float, step: float, every: int = 1) -> Path:
         """RK4 from a state (10,) over a duration (s) with a step (s); every so many steps are kept.
 
         Raises InputError for a state that is no wheelset's, a step too large for the fastest motion, or a duration that
-        is no whole number of steps; RunFailed if the wheelset leaves the track.
+        is no whole number of steps; RunFailed if the wheelset leaves the track, or if the step was too large for the
+        contacts' largest loads among the states that are kept.
         """
         count = self._steps(state, duration, step, every)
         kept = count // every + 1
@@ -220,7 +218,18 @@ class Equations:
         done = march(np.array(state, float), speed, step, count, every, *rest, path, contacts)
         if done < count:
             raise RunFailed("wheelset", "leaves the track", done * step)
-        return Path(np.arange(kept) * step * every, path, contacts)
+        found = Path(np.arange(kept) * step * every, path, contacts)
+        self._check_loads(found, step, "wheelset")
+        return found
+
+    def _check_loads(self, path: Path, step: float, engine: str) -> None:
+        """Raise RunFailed if the step was too large for a patch that carried more than at rest: all is wrong then."""
+        for k in sorted(set(path.contacts[:, :, LOAD].argmax(axis=0))):
+            rate = float(np.abs(np.linalg.eigvals(slopes(partial(Equations.rates, self), path.states[k]))).max())
+            if not step * rate <= LIMIT_OF_RK4:
+                raise RunFailed(engine, f"the step of {step:g} s is too large for contacts that carry "
+                                f"{path.contacts[k, :, LOAD].max():.3g} N, whose motion has a rate of {rate:.4g} 1/s",
+                                path.times[k])  # fmt: skip
 
     def _steps(self, state: np.ndarray, duration: float, step: float, every: int) -> int:
         """Number of steps of a run that is possible."""
@@ -236,6 +245,15 @@ class Equations:
         if isinstance(every, bool) or not isinstance(every, int) or not 1 <= every <= count or count % every:
             raise InputError("", "every", every, f"must be a whole number that divides the {count} steps")
         return count
+
+
+def slopes(rates: Callable[[np.ndarray], np.ndarray], state: np.ndarray) -> np.ndarray:
+    """Slopes (9, 9) of the rates about a state, the angle of spin left out, by central differences of fourth order."""
+    columns = []
+    for k in range(STATES):
+        some = [rates(state + part * MOVED[k] * np.eye(STATES)[k]) for part in (-2.0, -1.0, 1.0, 2.0)]
+        columns.append((some[0] - 8.0 * some[1] + 8.0 * some[2] - some[3]) / (12.0 * MOVED[k]))
+    return np.delete(np.delete(np.array(columns).T, ANGLE, 0), ANGLE, 1)
 
 
 def growth(wheelset: Wheelset, speed: float) -> float:
