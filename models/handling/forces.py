@@ -196,10 +196,10 @@ def _parts(numbers, q, v, f, tree, pushed, twisted, ledger):
 @njit(cache=True, error_model="numpy")
 def _touch(numbers, tyre, steer, steering, v, chassis, frame, tree, contact, slide, way, ledger, report):
     """Load of one tyre, and where and how it slides; fills contact, slide and ``way``: wheel's centre, arm to the
-    contact, axes along, across and normal, axle, push along the normal (3 each)."""
+    contact, axes along, across and normal, axle, push along the normal, and room for three more (3 each)."""
     turned, place, _, speed, turning = tree
     cosine, sine, x, y, ahead, aside, yawing = frame
-    p, u, c, m, e = way[0], np.empty(3), way[1], way[4], way[5]
+    p, c, m, e, u, whole, rim = way[0], way[1], way[4], way[5], way[7], way[8], way[9]
     joint = int(tyre[KNUCKLE])
     _point(joint, tyre[AT:], turned, place, speed, turning, p, u)
     u[0] += ahead - yawing * p[1]
@@ -228,7 +228,6 @@ def _touch(numbers, tyre, steer, steering, v, chassis, frame, tree, contact, sli
     cross(m, way[2], way[3])
     rotor = int(tyre[ROTOR])
     spin = v[rotor] if rotor >= 0 else sum_of(turning[chassis], e) - sum_of(turning[joint], e)
-    whole, rim = np.empty(3), np.empty(3)
     for k in range(3):
         whole[k] = turning[joint, k] + spin * e[k]
     whole[2] += yawing + steering
@@ -264,8 +263,8 @@ def sum_of(a, b):
 @njit(cache=True, error_model="numpy")
 def _creep(tyre, found, way, chassis, f, tree, pushed, twisted, report):
     """Forces of one tyre's contact, and its load, onto its wheel; the moment about the axle onto its spin."""
-    joint, rotor, force, arm, moment = int(tyre[KNUCKLE]), int(tyre[ROTOR]), np.empty(3), np.empty(3), np.empty(3)
-    p, c, m, e = way[0], way[1], way[4], way[5]
+    joint, rotor = int(tyre[KNUCKLE]), int(tyre[ROTOR])
+    p, c, m, e, force, arm, moment = way[0], way[1], way[4], way[5], way[7], way[8], way[9]
     for k in range(3):
         force[k] = found[0] * way[2, k] + found[1] * way[3, k]
         arm[k] = p[k] + c[k]
@@ -293,7 +292,9 @@ def _torque(tyre, braking, driving, v, e, chassis, f, turning, twisted, ledger, 
         return
     joint = int(tyre[KNUCKLE])
     spin = v[rotor] + sum_of(turning[joint], e) - sum_of(turning[chassis], e)
-    report[SPIN_TORQUE] = tyre[DRIVEN] * driving - tyre[BRAKED] * braking * math.tanh(spin / tyre[BRAKE_RATE])
+    report[SPIN_TORQUE] = tyre[DRIVEN] * driving
+    if braking != 0.0:
+        report[SPIN_TORQUE] -= tyre[BRAKED] * braking * math.tanh(spin / tyre[BRAKE_RATE])
     f[rotor] += report[SPIN_TORQUE]
     ledger[TORQUE_POWER] += report[SPIN_TORQUE] * spin
     _hold(-report[SPIN_TORQUE], e, joint, chassis, twisted)
@@ -330,7 +331,7 @@ def all_forces(numbers, t, q, v, f, report, ledger):
     steer, steering = control(numbers, int(numbers[OF_KNOTS]), STEER, knots, t)
     braking = control(numbers, int(numbers[OF_KNOTS]), BRAKE, knots, t)[0]
     driving = control(numbers, int(numbers[OF_KNOTS]), DRIVE, knots, t)[0]
-    contacts, slides, found, ways = np.empty((w, 10)), np.empty((w, 4)), np.empty((w, 4)), np.empty((w, 7, 3))
+    contacts, slides, found, ways = np.empty((w, 10)), np.empty((w, 4)), np.empty((w, 4)), np.empty((w, 10, 3))
     tyres = numbers[int(numbers[OF_TYRES]) :]
     for i in range(w):
         tyre = tyres[PER_TYRE * i :]

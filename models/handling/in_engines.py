@@ -1,0 +1,128 @@
+"""A manoeuvre in an engine, and what is read of it: tyres, energies, motion in the vehicle's own axes."""
+
+from dataclasses import dataclass
+from importlib import import_module
+
+import numpy as np
+
+from models.engines.free_vehicle import Driven, FreeModel
+from models.engines.spatial_protocol import SpatialRun
+from models.errors import InputError, RunFailed
+from models.handling import forces as at
+from models.handling.numbers import GRAVITY, Handling
+from models.vehicles.free_vehicle import chassis_of
+
+MODELS = {"exudyn": "FreeExudyn", "mujoco": "FreeMujoco"}
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """A run (times, positions, rates) and its reports: tyres (m, w, REPORTED) and ledgers (m, LEDGER) of ``forces``."""
+
+    handling: Handling
+    run: SpatialRun
+    tyres: np.ndarray
+    ledger: np.ndarray
+
+    @property
+    def path(self) -> np.ndarray:
+        """(m, 3): x, y (m) of the chassis' place on the road, and yaw (rad)."""
+        return self.run.positions[:, :3]
+
+    def velocity(self) -> np.ndarray:
+        """(m, 3): velocities ahead and to the left (m/s) below the chassis' centre, yaw rate (rad/s)."""
+        yaw, rates = self.run.positions[:, 2], self.run.rates
+        place = chassis_of(self.handling.given).position
+        ahead = np.cos(yaw) * rates[:, 0] + np.sin(yaw) * rates[:, 1] - rates[:, 2] * place[1]
+        aside = np.cos(yaw) * rates[:, 1] - np.sin(yaw) * rates[:, 0] + rates[:, 2] * place[0]
+        return np.column_stack([ahead, aside, rates[:, 2]])
+
+    def lateral_acceleration(self) -> np.ndarray:
+        """(m,) m/s^2 along the vehicle's left, of the place below the chassis' centre."""
+        ahead, aside, turning = self.velocity().T
+        return np.gradient(aside, self.run.times) + ahead * turning
+
+
+def build(engine: str, handling: Handling) -> FreeModel:
+    """The vehicle in "exudyn" or "mujoco"."""
+    if engine not in MODELS:
+        raise InputError("", "engine", engine, "no such engine", tuple(MODELS))
+    driven = Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces)
+    found: FreeModel = getattr(import_module(f"models.engines.free_vehicle_{engine}"), MODELS[engine])(driven)
+    return found
+
+
+def driven(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
+    """Drive from straight rolling at a speed (m/s) for a duration (s); RunFailed where it does not end well."""
+    return read(handling, build(engine, handling).run(*handling.straight(speed), duration, step), engine)
+
+
+def read(handling: Handling, run: SpatialRun, engine: str = "") -> Drive:
+    """Reports of a run; RunFailed where a tyre's force is not finite."""
+    count, tyres = len(run.times), len(handling.vehicle.tyres)
+    report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
+    at.reports(handling.numbers, run.times, np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates),
+               report, ledger)  # fmt: skip
+    if not np.isfinite(report).all():
+        raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
+    return Drive(handling, run, report, ledger)
+
+
+def energy(drive: Drive) -> np.ndarray:
+    """(m,) J: kinetic energy, weights, springs and tyres, by the rigid bodies' own velocities."""
+    h, run = drive.handling, drive.run
+    motion = np.array([_bodies(h, q, v) for q, v in zip(run.positions, run.rates, strict=True)])
+    return motion + drive.ledger[:, at.POTENTIAL]
+
+
+def unaccounted(drive: Drive) -> np.ndarray:
+    """(m,) J: energy less what it was at the start and less what was put in and taken out since, by Simpson's rule.
+
+    Rows lie at every second step: the middle one of three belongs to the rule.
+    """
+    ledger, times = drive.ledger, drive.run.times
+    power = ledger[:, at.DISSIPATED] + ledger[:, at.TORQUE_POWER] + ledger[:, at.STEER_POWER]
+    power = power + drive.tyres[:, :, at.POWER].sum(axis=1)
+    step = times[1] - times[0]
+    work = np.cumsum(step / 3.0 * (power[:-2:2] + 4.0 * power[1:-1:2] + power[2::2]))
+    held = energy(drive)[::2]
+    return held[1:] - held[0] - work
+
+
+def _bodies(h: Handling, q: np.ndarray, v: np.ndarray) -> float:
+    """Kinetic energy and that of weights (J), body by body from the outermost parent: written without any engine."""
+    from models.vehicles.spatial import FREEDOMS
+
+    total, frames, i = 0.0, {None: (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3))}, 0
+    for body in h.vehicle.bodies:
+        p, R, u, w, origin = frames[body.parent]
+        arm = R @ np.subtract(body.position, origin)
+        p, u = p + arm, u + np.cross(w, arm)
+        for freedom in (freedom for freedom in FREEDOMS if freedom in body.freedoms):
+            axis = R[:, FREEDOMS.index(freedom) % 3]
+            if freedom in "xyz":
+                p, u = p + axis * q[i], u + axis * v[i] + np.cross(w, axis * q[i])
+            else:
+                w = w + axis * v[i]
+                R = _turned(axis, q[i]) @ R
+            i += 1
+        frames[body.name] = (p, R, u, w, np.array(body.position))
+        spin = R.T @ w
+        total += 0.5 * body.mass * u @ u + 0.5 * spin @ np.array(body.inertia) @ spin - body.mass * h.gravity @ p
+    return float(total)
+
+
+def _turned(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Rotation about an axis (Rodrigues)."""
+    across = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
+
+
+def total_mass(handling: Handling) -> float:
+    """kg."""
+    return sum(body.mass for body in handling.vehicle.bodies)
+
+
+def friction_distance(speed: float, mu: float) -> float:
+    """Distance (m) in which sliding friction alone stops: v^2 / (2 mu g)."""
+    return speed**2 / (2.0 * mu * GRAVITY)

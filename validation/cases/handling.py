@@ -1,0 +1,262 @@
+"""R19-free on four brush tyres: both engines, the linear limit, friction, energy, standstill, and what it costs."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.compiled import njit
+from models.contact.fastsim_many import LOAD, MU, A, B
+from models.handling import forces as at
+from models.handling.in_engines import Drive, build, driven, energy, friction_distance, unaccounted
+from models.handling.numbers import Controls, Handling, Tyres
+from models.handling.road import plane_waves
+from models.handling.single_track import steady_turn
+from models.handling.tyre import FIRST, brush, net, tyre_forces
+from models.vehicles.vehicle_file import load_vehicle
+from validation.rows import Row, System, Table, at_most, behaves, finding
+from validation.timing import interleave
+
+TITLE = "A car on four rolling tyres"
+SYSTEM: System = "rolling-vehicle"
+R19 = load_vehicle("r19_free")
+NO_DRAG = replace(R19, drags=())
+ALL = ("fl", "fr", "rl", "rr")
+LANE = Controls(steer=((0.0, 0.0), (0.3, 0.05), (0.7, -0.05), (1.0, 0.0)))
+LEVEL, SEED, SPEED = 4e-6, 3, 25.0
+SLOPE = 0.1
+ROUNDS = 15
+
+
+def lane_change(**changes: Any) -> Handling:
+    """A lane change on a rough road."""
+    return Handling(R19, controls=LANE, waves=plane_waves(LEVEL, seed=SEED)).changed(**changes)
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Tyre, engines and mirror image; in the full run also turns, stops, slopes, energy, planted faults, price."""
+    duration = 0.3 if quick else 1.0
+    drives = {engine: driven(engine, lane_change(), SPEED, duration) for engine in ("mujoco", "exudyn")}
+    rows = [_engines_row(drives), *_tyre_rows(), _power_row(drives["mujoco"]), _mirror_row(duration)]
+    if not quick:
+        rows += [*_turn_rows(), *_stop_rows(), _slope_row(), *_energy_rows(), *_fault_rows(), _price_row()]
+    return rows, {}
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """None: the rows say all."""
+    return []
+
+
+def draw(data: dict[str, Any]) -> dict[str, Any]:
+    """None."""
+    return {}
+
+
+def _gap(one: Drive, other: Drive) -> float:
+    return float(max(np.abs(one.run.positions - other.run.positions).max(), np.abs(one.run.rates - other.run.rates).max()))
+
+
+def _engines_row(drives: dict[str, Drive]) -> Row:
+    return at_most("handling.engines", SYSTEM, "lane change on a rough road: positions and rates of the two engines",
+                   _gap(drives["mujoco"], drives["exudyn"]), "m, rad, m/s, rad/s", 1e-10,
+                   "the same tableau, step and forces around two engines' own trees: rounding alone",
+                   "shared kernel")  # fmt: skip
+
+
+def cornering(handling: Handling, i: int, slip: float = 1e-7) -> float:
+    """Cornering stiffness (N/rad) of one tyre at its static load, out of its table and the brush."""
+    n = handling.numbers[int(handling.numbers[at.OF_TYRES]) + at.PER_TYRE * i :]
+    half = np.sqrt(n[at.RADIUS] * n[at.STATIC] / n[at.VERTICAL])
+    found = brush(n[at.STATIC], n[at.GRIP], half, n[at.HALF_WIDTH], n[at.BRISTLES], np.array([[0, slip, 0, 1.0]]))
+    return float(-found[0, 1] / slip)
+
+
+def _cornering_error(handling: Handling) -> float:
+    given = {force.name: force.stiffness for force in R19.side_forces}
+    return max(abs(cornering(handling, i) / given[name] - 1.0) for i, name in enumerate(ALL))
+
+
+def locked_error() -> float:
+    """Largest error, by mu N, of the force on wheels that do not turn, from one that opposes sliding with mu N."""
+    angles, speeds = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), [0.1, 1.0, 40.0])
+    slides = np.zeros((angles.size, 4))
+    slides[:, 0], slides[:, 1] = (speeds * np.cos(angles)).ravel(), (speeds * np.sin(angles)).ravel()
+    found = brush(3000.0, 0.8, 0.08, 0.09, 5e7, slides)[:, :2]
+    return float(np.abs(found / (0.8 * 3000.0) + slides[:, :2] / np.hypot(*slides[:, :2].T)[:, None]).max())
+
+
+def _tyre_rows() -> list[Row]:
+    return [
+        at_most("handling.cornering", SYSTEM, "cornering stiffness at small slip, by the ride vehicle's, less 1",
+                _cornering_error(Handling(R19)), "", 1e-3, "the bristles are those of the ride vehicle's tyres",
+                "closed form"),
+        at_most("handling.locked", SYSTEM, "force on a wheel that does not turn, beside mu N against its sliding, by "
+                "mu N", locked_error(), "", 1e-9, "all bristles slide one way", "closed form"),
+    ]  # fmt: skip
+
+
+def _power_row(drive: Drive) -> Row:
+    return behaves("handling.power", SYSTEM, "power of each tyre's contact at every step of the lane change",
+                   "never positive" if drive.tyres[:, :, at.POWER].max() <= 0.0 else "positive", "never positive",
+                   "friction takes energy out")  # fmt: skip
+
+
+def mirror_gap(handling: Handling, duration: float) -> float:
+    """Largest difference between a step of steering to the left and the mirror image of one to the right."""
+    left, right = (driven("mujoco", handling.changed(controls=Controls(steer=((0.0, 0.0), (0.2, side * 0.06)))), SPEED,
+                          duration) for side in (1.0, -1.0))  # fmt: skip
+    places = handling.vehicle.coordinates()
+    swap = [places.index((_other(name), freedom)) for name, freedom in places]
+    sign = np.array([-1.0 if freedom in ("y", "rx", "rz") else 1.0 for _, freedom in places])
+    return float(np.abs(left.run.positions - sign * right.run.positions[:, swap]).max())
+
+
+def _other(name: str) -> str:
+    for one, two in (("fl", "fr"), ("rl", "rr"), ("left", "right")):
+        for a, b in ((one, two), (two, one)):
+            if name.startswith(a):
+                return b + name[len(a) :]
+    return name
+
+
+def _mirror_row(duration: float) -> Row:
+    inclined = Handling(R19, Tyres(inclination=-0.02))
+    return at_most("handling.mirror", SYSTEM, "step steer to the left beside the mirror image of one to the right, with "
+                   "inclined wheels", mirror_gap(inclined, duration), "m, rad", 1e-10, "a symmetric vehicle",
+                   "none")  # fmt: skip
+
+
+def turn_error(change: Callable[[np.ndarray], None] | None = None, speed: float = 20.0) -> float:
+    """Yaw gain of a steady turn of small slip, by the closed form, less 1; ``change`` plants a fault in the table."""
+    steer = 2e-5
+    handling = Handling(NO_DRAG, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
+    gain = steady_turn(handling, speed).yaw_gain
+    if change is not None:
+        change(handling.numbers)
+    return float(driven("mujoco", handling, speed, 5.0).velocity()[-1, 2] / steer / gain - 1.0)
+
+
+def _turn_rows() -> list[Row]:
+    found = steady_turn(Handling(NO_DRAG), 20.0)
+    return [
+        at_most("handling.turn", SYSTEM, "yaw gain of a steady turn of small slip at 20 m/s, by the single-track "
+                "vehicle's, less 1", turn_error(), "", 1e-3, "linear tyres, with trail and turning slip",
+                "closed form"),
+        finding("handling.understeer", SYSTEM, "its understeer gradient", found.understeer, "s^2/m",
+                "positive: understeering", "closed form at the static loads"),
+    ]  # fmt: skip
+
+
+def _stop_rows() -> list[Row]:
+    mu, speed = 0.7, 15.0
+    handling = Handling(NO_DRAG, Tyres(friction=mu, fixed=ALL))
+    drive = driven("mujoco", handling, speed, 2.0)
+    ahead = drive.velocity()[:, 0]
+    left = drive.tyres[:, :, at.FX] + mu * drive.tyres[:, :, at.PRESS]
+    stopped = friction_distance(speed, mu) - friction_distance(ahead[-1], mu)
+    return [
+        at_most("handling.slide", SYSTEM, "braking force of four locked wheels beside mu N, by mu N",
+                float(np.abs(left / (mu * drive.tyres[:, :, at.PRESS])).max()), "", 1e-9, "at every step of a stop",
+                "closed form"),
+        at_most("handling.stop", SYSTEM, "way of a stop with locked wheels from 15 m/s, by (v0^2 - v^2) / (2 mu g), "
+                "less 1", float(drive.path[-1, 0] / stopped - 1.0), "", 1e-2,
+                "wheel loads swing about the weight when the body dives", "closed form"),
+    ]  # fmt: skip
+
+
+def _slope_row() -> Row:
+    handling = Handling(R19, Tyres(fixed=ALL), slope=SLOPE)
+    drive = driven("mujoco", handling, 0.0, 2.0, 1e-4)
+    last = slice(-2000, None)
+    drift = float(np.abs(drive.tyres[last, :, at.SLIP_X].mean(axis=0)).max())
+    return at_most("handling.slope", SYSTEM, f"drift of locked wheels at rest on a slope of {SLOPE:g} rad",
+                   1e3 * drift, "mm/s", 1.0, "bristles that do not roll are dampers, relative to 0.1 m/s",
+                   "none")  # fmt: skip
+
+
+def _energy_rows() -> list[Row]:
+    gaps = {}
+    for name, friction in (("held", 20.0), ("sliding", 0.9)):
+        for step in (1e-3, 5e-4):
+            drive = driven("mujoco", lane_change(tyres=Tyres(friction=friction)), SPEED, 1.0, step)
+            gaps[name, step] = float(np.abs(unaccounted(drive)).max())
+    whole = energy(drive)[0]
+    order = np.log2(gaps["held", 1e-3] / gaps["held", 5e-4])
+    return [
+        at_most("handling.ledger", SYSTEM, "energy of the lane change that nothing accounts for, by all of it",
+                gaps["sliding", 1e-3] / whole, "", 1e-7, "springs, dampers, tyres, drag and steering are summed up by "
+                "Simpson's rule; bristles that begin to slide limit its order", "closed form"),
+        behaves("handling.ledger_order", SYSTEM, "its order in the step where friction holds the bristles",
+                "at least 3.5" if order >= 3.5 else f"{order:.2f}", "at least 3.5", "that of Runge and Kutta is 4",
+                "closed form"),
+    ]  # fmt: skip
+
+
+def _tyre(numbers: np.ndarray, i: int) -> np.ndarray:
+    return numbers[int(numbers[at.OF_TYRES]) + at.PER_TYRE * i :]
+
+
+def _swap_axles(numbers: np.ndarray) -> None:
+    """Bristles of the rear in front, and the other way round."""
+    for front, rear in ((0, 2), (1, 3)):
+        one, two = _tyre(numbers, front), _tyre(numbers, rear)
+        one[at.BRISTLES], two[at.BRISTLES] = float(two[at.BRISTLES]), float(one[at.BRISTLES])
+
+
+def _turn_wrong(numbers: np.ndarray) -> None:
+    """One front wheel is steered the other way."""
+    _tyre(numbers, 1)[at.STEERED] *= -1.0
+
+
+def _fault_rows() -> list[Row]:
+    soft = Handling(R19)
+    _tyre(soft.numbers, 0)[at.BRISTLES] *= 1.01
+    leaning = Handling(R19, Tyres(inclination=-0.02))
+    _tyre(leaning.numbers, 1)[at.INCLINED] *= -1.0
+    rough = lane_change()
+    _tyre(rough.numbers, 2)[at.GRIP] *= 1.0 + 1e-6
+    found = {
+        "bristles of one tyre 1 % too stiff, by the cornering stiffness": _cornering_error(soft) > 1e-3,
+        "bristles of front and rear swapped, by the steady turn": abs(turn_error(_swap_axles)) > 1e-3,
+        "one wheel steered the other way, by the steady turn": abs(turn_error(_turn_wrong)) > 1e-3,
+        "friction of one tyre 1e-6 off in one engine, by the engines": _gap(
+            driven("mujoco", rough, SPEED, 1.0), driven("exudyn", lane_change(), SPEED, 1.0)) > 1e-10,
+    }  # fmt: skip
+    return [behaves(f"handling.fault{i}", SYSTEM, f"planted: {name}", "caught" if caught else "missed", "caught",
+                    "a check that cannot fail shows nothing") for i, (name, caught) in enumerate(found.items())]  # fmt: skip
+
+
+def _price_row() -> Row:
+    steps, handling = 100, lane_change(waves=np.empty((0, 4)))
+    bare = lane_change(waves=np.empty((0, 4)))
+    bare.numbers[at.TYRES] = 0.0
+    models = [build("mujoco", one) for one in (handling, bare)]
+    start = handling.straight(SPEED)
+    jobs = [lambda model=model: model.run(*start, steps * 1e-4, 1e-4) for model in models]
+    ratio = _ratio(interleave([*jobs, lambda: _repeat_tyres(4 * steps)], ROUNDS, 0.005))
+    return at_most("handling.price", SYSTEM, "step of MuJoCo with four tyres (22 x 21 cells), by a step without them and "
+                   "what the kernel takes alone, less 1", ratio, "", 0.3, "least seconds of interleaved rounds",
+                   "none")  # fmt: skip
+
+
+def _ratio(seconds: np.ndarray) -> float:
+    full, none, kernel = seconds.min(axis=1)
+    return max(float(full / (none + kernel) - 1.0), 0.0)
+
+
+def _repeat_tyres(times: int) -> None:
+    """Four tyres that roll with a little slip."""
+    of = net(21)
+    contacts, found = np.zeros((4, 10)), np.empty((4, 4))
+    contacts[:, [A, B, LOAD, MU]] = 0.08, 0.09, 3000.0, 0.9
+    contacts[:, FIRST:] = 2e-8
+    _many(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, found, times)
+
+
+@njit(cache=True, error_model="numpy")
+def _many(contacts, slides, strips, cells, middle, found, times):
+    for _ in range(times):
+        tyre_forces(contacts, slides, strips, cells, middle, found)
