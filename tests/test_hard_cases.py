@@ -11,6 +11,7 @@ from models import signals
 from models.effects import contact_points as contact_effect
 from models.engines import exudyn as exudyn_engine
 from models.engines import protocol, stability
+from models.rail.equations import Equations
 from models.ride import covariance, marginal
 from models.vehicles import pitch_plane
 from validation.cases import hard_cases
@@ -22,6 +23,7 @@ from validation.hard_cases import (
     invariants,
     prescribed_pitch,
     ride,
+    rolling,
     sampled_input,
     stepping,
 )
@@ -123,6 +125,12 @@ def test_without_sizes_of_their_own_road_states_hide_an_undamped_motion(monkeypa
     monkeypatch.setattr(marginal, "_balanced", balanced)
     monkeypatch.setattr(marginal, "_of_undamped", lambda *own: undamped(*own[:-1], np.inf))
     assert found(ride, "no damping, road that next to walks", "reference", tmp_path) == "SILENT"
+
+
+@pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
+def test_without_the_check_of_loads_a_hard_landing_is_silent(implementation, monkeypatch, tmp_path):
+    monkeypatch.setattr(Equations, "_check_loads", lambda *_: None)
+    assert found(rolling, "step too large for a landing", implementation, tmp_path) == "SILENT"
 
 
 def broken(engine, folder):

@@ -10,7 +10,7 @@ from importlib import import_module
 from validation.hard_cases.case import Case
 
 FAMILIES = ("stepping", "sampled_input", "contact_points", "prescribed_pitch", "stabilisers", "invariants", "extremes",
-            "accelerometers", "drift", "kalman", "covariance", "contact", "ride")  # fmt: skip
+            "accelerometers", "drift", "kalman", "covariance", "contact", "ride", "rolling")  # fmt: skip
 
 
 def all_cases() -> tuple[Case, ...]:

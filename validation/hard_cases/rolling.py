@@ -1,0 +1,310 @@
+"""Wheels on rails: standstill, reversal, lift-off, hardly any load or friction, speeds and steps at their ends.
+
+Every implementation marches the equations of motion that it writes itself; creep forces are the same compiled ones.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.engines.wheelset_exudyn import ExudynWheelset
+from models.engines.wheelset_mujoco import MujocoWheelset
+from models.errors import InputError, RunFailed
+from models.rail import equations as eq
+from models.rail import wheel_forces as wf
+from models.rail.equations import Equations
+from models.rail.equations import Path as Motion
+from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
+from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+
+KINDS: dict[str, type[Equations]] = {"reference": Equations, "exudyn": ExudynWheelset, "mujoco": MujocoWheelset}
+STEP = 5e-4
+FREE = {f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"}
+HEAVY = CHOSEN.changed(**FREE, mass=8000.0, spin_inertia=2500.0, yaw_inertia=8000.0)
+"""Without suspension; so heavy and hard to turn that it stands still in steps of 0.08 ms."""
+MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
+"""What left and right exchanged make of a state; its spin is about the same axle."""
+
+
+def built(implementation: str, wheelset: Wheelset = CHOSEN, speed: float = 40.0, **own: Any) -> Equations:
+    """A wheelset in an implementation, with coarse cells."""
+    return KINDS[implementation](wheelset, speed, **({"cells": 7} | own))
+
+
+def off(equations: Equations, **values: float) -> np.ndarray:
+    """Rest, moved by values named as the state's numbers in ``equations``."""
+    state = equations.rest.copy()
+    for name, value in values.items():
+        state[getattr(eq, name)] += value
+    return state
+
+
+def beyond_friction(motion: Motion, mu: float) -> float:
+    """Largest tangential force by mu N less 1, or infinity for one that has power or is there without a bound."""
+    force = np.hypot(motion.contacts[..., wf.FX], motion.contacts[..., wf.FY])
+    bound = mu * motion.contacts[..., wf.LOAD]
+    if motion.contacts[..., wf.POWER].max() > 0.0 or (force[bound == 0.0] > 0.0).any():
+        return np.inf
+    loaded = bound > 0.0
+    return float(np.max(force[loaded] / bound[loaded] - 1.0, initial=0.0))
+
+
+def standing(implementation: str, folder: Path) -> float:
+    """Speed at which a standing wheelset creeps sideways under a third of what friction could hold."""
+    own = built(implementation, HEAVY, 0.0, lean=0.1)
+    motion = own.run(own.rest, 0.04, 8e-5, 250)
+    return float(abs(motion.states[-1, eq.Y] - motion.states[-2, eq.Y]) / 0.02)
+
+
+def standing_naive(folder: Path) -> str:
+    """Creepage by a speed that is not regularised."""
+    with np.errstate(divide="ignore"):
+        return f"creepage by the speed of travel: {np.float64(1e-4) / np.float64(0.0)}"
+
+
+def reversal(implementation: str, folder: Path) -> float:
+    """Largest jump of an acceleration by mu N / m, as the speed passes 0 and where regularisation begins and ends."""
+    found = []
+    for middle in (-wf.REGULAR, 0.0, wf.REGULAR):
+        below, above = (built(implementation, CHOSEN, middle + part) for part in (-1e-9, 1e-9))
+        state = np.array([2e-3, 5e-5, 1e-4, 1e-3, 0.0, 1e-3, 0.0, 1e-3, 1e-3, 0.1])
+        found.append(np.abs(above.rates(state) - below.rates(state)).max())
+    return float(max(found) * CHOSEN.mass / (CHOSEN.friction * CHOSEN.load))
+
+
+def through_zero(implementation: str, folder: Path) -> float:
+    """Kinetic energy of lateral motion and yaw beyond that of the start, by it, in runs of falling speed through 0."""
+    state, found = None, []
+    for speed in np.linspace(0.06, -0.06, 7):
+        own = built(implementation, HEAVY, float(speed))
+        state = off(own, Y_RATE=2e-3, YAW_RATE=2e-3) if state is None else state
+        state[eq.SPIN] = -speed / HEAVY.radius
+        motion = own.run(state, 0.002, 8e-5)
+        if beyond_friction(motion, HEAVY.friction) > 1e-12:
+            return np.inf
+        moving = motion.states[:, [eq.Y_RATE, eq.YAW_RATE]] ** 2 @ [HEAVY.mass, HEAVY.yaw_inertia]
+        found.append(moving)
+        state = motion.states[-1].copy()
+    return float(np.max(found) / found[0][0] - 1.0)
+
+
+def energies(motion: Motion, w: Wheelset) -> np.ndarray:
+    """Energy (J) of a wheelset without suspension whose contacts are elastic: of motion, of weight, of the contacts."""
+    _, z, roll, _, _, vy, vz, roll_rate, yaw_rate, spin = motion.states.T
+    turning = w.yaw_inertia * (roll_rate**2 + (yaw_rate * np.cos(roll)) ** 2) + w.spin_inertia * spin**2
+    pressed = 0.4 * (motion.contacts[..., wf.LOAD] * motion.contacts[..., wf.DEPTH]).sum(axis=1)
+    return 0.5 * (w.mass * (vy**2 + vz**2) + turning) - w.load * z + pressed
+
+
+def falling(**moved: float) -> Callable[[str, Path], float]:
+    """A case of an elastic wheelset without friction that is let go above its rails: energy gained by that of 1 mm."""
+    own = CHOSEN.changed(**FREE, friction=0.0, contact_damping=0.0, flange_clearance=0.1)
+
+    def error(implementation: str, folder: Path) -> float:
+        wheelset = built(implementation, own)
+        motion = wheelset.run(off(wheelset, **moved), 0.06, 5e-5)
+        loads = motion.contacts[..., wf.LOAD]
+        if not ((loads == 0.0).any(axis=0) & (loads > 0.0).any(axis=0)).all():
+            return np.inf  # nothing has lifted off, or nothing has landed
+        found = energies(motion, own)
+        return float((found - found[0]).max() / (own.load * 1e-3))
+
+    return error
+
+
+def bouncing(implementation: str, folder: Path) -> float:
+    """Height above that of release, by it, of a wheelset that rolls, with friction and damping."""
+    own = CHOSEN.changed(**FREE)
+    wheelset = built(implementation, own)
+    start = off(wheelset, Z=-1e-3)
+    motion = wheelset.run(start, 0.2, 1e-4)
+    if beyond_friction(motion, own.friction) > 1e-12:
+        return np.inf
+    return float(max(0.0, (start[eq.Z] - motion.states[:, eq.Z].min()) / 1e-3))
+
+
+def light(mass: float) -> Callable[[str, Path], float]:
+    """A case of a toy: load of both wheels against its weight, relative, creep forces bounded."""
+    own = CHOSEN.changed(**FREE, mass=mass, load=mass * GRAVITY, spin_inertia=0.1 * mass, yaw_inertia=mass)
+
+    def error(implementation: str, folder: Path) -> float:
+        wheelset = built(implementation, own)
+        motion = wheelset.run(wheelset.rest, 2e-3, 2e-4)
+        if beyond_friction(motion, own.friction) > 1e-12:
+            return np.inf
+        contact = motion.contacts[-1]
+        up = contact[:, wf.LOAD] * np.cos(contact[:, wf.ANGLE]) - contact[:, wf.FY] * np.sin(contact[:, wf.ANGLE])
+        return float(abs(up.sum() / own.load - 1.0))
+
+    return error
+
+
+def frictions(implementation: str, folder: Path) -> float:
+    """Force beyond mu N for mu from nothing to 1."""
+    found = []
+    for mu in (0.0, 1e-6, 1e-3, 1.0):
+        wheelset = built(implementation, CHOSEN.changed(friction=mu), 60.0)
+        found.append(beyond_friction(wheelset.run(off(wheelset, Y=3e-3, YAW=3e-3), 0.05, STEP), mu))
+    return max(found)
+
+
+def pure_spin(implementation: str, folder: Path) -> float:
+    """Steep cones at rest: lateral forces of both wheels together, and moments about the axle of each, by mu N (r)."""
+    own = CHOSEN.changed(conicity=0.5)
+    wheelset = built(implementation, own, 20.0)
+    contact = wheelset.run(wheelset.rest, 1e-4, 1e-4).contacts[0]
+    bound = own.friction * contact[:, wf.LOAD]
+    if np.abs(contact[:, wf.FY] / bound).min() < 0.1:
+        return np.inf
+    moment = contact[:, wf.FX] * contact[:, wf.PLACE_Z] - contact[:, wf.MZ] * np.sin(contact[:, wf.ANGLE])
+    return float(max(np.abs(moment / (bound * own.radius)).max(), abs(contact[:, wf.FY].sum()) / bound[0]))
+
+
+def halved(wheelset: Wheelset, speed: float, step: float) -> Callable[[str, Path], float]:
+    """A case whose run is near the one with half the step (m)."""
+
+    def error(implementation: str, folder: Path) -> float:
+        own = built(implementation, wheelset, speed)
+        start = own.displaced(1e-3)
+        ends = [own.run(start, 100 * step, h).states[-1] for h in (step, step / 2.0)]
+        return float(np.abs(ends[1] - ends[0])[: eq.ANGLE].max())
+
+    return error
+
+
+def crawling(implementation: str, folder: Path) -> float:
+    """Displacement at 1e-6 m/s against that of a wheelset that stands, by it."""
+    ends = []
+    for speed in (0.0, 1e-6):
+        own = built(implementation, HEAVY, speed, lean=0.1)
+        ends.append(own.run(built(implementation, HEAVY, 0.0).rest, 0.01, 8e-5).states[-1, eq.Y])
+    return float(abs(ends[1] / ends[0] - 1.0))
+
+
+def symmetric(implementation: str, folder: Path) -> float:
+    """Displacement, roll and yaw of a wheelset in the middle of the track, above its critical speed."""
+    own = built(implementation, CHOSEN, 80.0)
+    return float(np.abs(own.run(own.rest, 0.3, STEP).states[:, [eq.Y, eq.ROLL, eq.YAW]]).max())
+
+
+def mirrored(implementation: str, folder: Path) -> float:
+    """A start and its mirror image, one wheel in the air: difference of the images."""
+    own = built(implementation)
+    start = off(own, Y=2e-3, Z=-7e-4, ROLL=1e-3, YAW=2e-3, ROLL_RATE=0.05, YAW_RATE=0.1)
+    one, other = (own.run(state, 0.05, 1e-4).states for state in (start, MIRROR * start))
+    return float(np.abs(one - MIRROR * other).max())
+
+
+def refused(place: str, run: Callable[[str], Any]) -> Callable[[str, Path], float]:
+    """A case that is refused by a name."""
+
+    def error(implementation: str, folder: Path) -> float:
+        try:
+            run(implementation)
+        except InputError as refusal:
+            if place not in refusal.place:
+                return np.inf
+            raise
+        return np.inf
+
+    return error
+
+
+def ran(*, duration: float = 0.01, step: float = STEP, every: int = 1, speed: float = 40.0,
+        **moved: float) -> Callable[[str], Any]:  # fmt: skip
+    """A run from a state that is off rest."""
+
+    def run(implementation: str) -> Motion:
+        own = built(implementation, speed=speed)
+        return own.run(off(own, **moved), duration, step, every)
+
+    return run
+
+
+def fails(**own: float) -> Callable[[str, Path], float]:
+    """A case that fails, and says when: in its first half."""
+
+    def error(implementation: str, folder: Path) -> float:
+        try:
+            ran(**{"duration": 0.1} | own)(implementation)
+        except RunFailed as failure:
+            if failure.time is None or not 0.0 <= failure.time < 0.05:
+                return np.inf
+            raise
+        return np.inf
+
+    return error
+
+
+LANDING = {"Z": -5e-3, "Y_RATE": 0.01, "YAW": 1e-3}
+
+
+def too_large_naive(folder: Path) -> str:
+    """The path without the check of loads, against that of an eighth of the step."""
+    own, ends = built("reference"), []
+    for step in (STEP, STEP / 8.0):
+        states, contacts = np.empty((1, eq.STATES)), own.blank(1)
+        state, (speed, *rest) = off(own, **LANDING), own.given
+        eq.march(state, speed, step, round(0.1 / step), 1_000_000, *rest, states, contacts)
+        ends.append(state)
+    return f"displaced by {1e3 * abs(ends[1][eq.Y] - ends[0][eq.Y]):.2g} mm more or less after 0.1 s"
+
+
+REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
+RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
+NAN = float("nan")
+CASES = (
+    Case("wheelset that stands on a slope", "creepage is velocity by no speed; friction that sticks would not move",
+         "creeps sideways by less than 1 mm/s", "m/s", 1e-3, "asked for; creepage is regularised below 0.1 m/s",
+         standing, naive=standing_naive),
+    Case("speed that changes its sign", "the leading edge becomes the trailing one", "accelerations do not jump",
+         "mu N / m", 1e-5, "slope times 2e-9 m/s", reversal),
+    Case("reversal", "forces of rolling forwards and backwards are mixed", "lateral motion gains no energy", "of it",
+         0.0, "creep forces have no power", through_zero),
+    Case("wheelset dropped on its rails", "contact begins and ends within steps", "gains no energy", "of 1 mm", 1e-3,
+         "error of the step, 3e-4 at twice the step", falling(Z=-1e-3)),
+    Case("one wheel lifted", "the wheelset lands on one wheel, then on the other", "gains no energy", "of 1 mm", 1e-3,
+         "Hertz' energy changes with the place of contact", falling(Z=-1e-3, ROLL=2e-3)),
+    Case("wheelset that bounces and rolls", "creep forces come and go with the load", "height of release", "of it",
+         0.0, "damped", bouncing),
+    Case("wheelset of a kilogram", "patches of a quarter of a millimetre", "its weight", "", 1e-6, "asked for",
+         light(1.0)),
+    Case("wheelset of a milligram", "sinks in by less than rounding of its height", "says that it finds no rest", "",
+         0.0, "exact", light(1e-6), RAISED),
+    Case("friction from 0 to 1", "creep forces are bounded by next to nothing", "|F| <= mu N, no power gained", "mu N",
+         1e-12, "rounding", frictions),
+    Case("steep cones at rest", "nothing but spin, and much of it", "no lateral force, no moment about the axle",
+         "mu N", 1e-9, "rounding of the height of rest", pure_spin),
+    Case("wheelset at 200 m/s", "far above its critical speed", "half the step", "m", 1e-8, "error of the step",
+         halved(CHOSEN, 200.0, 2e-4)),
+    Case("conicity of 0.5", "geometry far from linear", "half the step", "m", 1e-8, "error of the step",
+         halved(CHOSEN.changed(conicity=0.5), 20.0, 1e-4)),
+    Case("wheelset at 1 micrometre per second", "next to singular", "the one that stands", "", 1e-4,
+         "1e-5 of the mixture", crawling),
+    Case("wheelset in the middle of the track", "unstable: rounding grows", "stays there", "m, rad", 1e-12, "rounding",
+         symmetric),
+    Case("wheelset in a mirror", "one wheel in the air, the other rolls", "mirror image", "SI", 1e-11, "rounding",
+         mirrored),
+    Case("wheelset that derails", "geometry has no sense any more", "fails, and says when", "", 0.0, "exact",
+         fails(YAW_RATE=50.0), RAISED),
+    Case("step too large for a landing", "stable at rest, not under a load 12 times as large", "fails, and says when",
+         "", 0.0, "exact", fails(**LANDING), RAISED, naive=too_large_naive),
+    Case("spin of 1e300 rad/s", "finite, squares are not", "fails, and says when", "", 0.0, "exact", fails(SPIN=1e300),
+         RAISED),
+    *(Case(name, "a number from senseless input", f"refused at {place}", "", 0.0, "exact", refused(place, run), REFUSED)
+      for name, place, run in (
+          ("step of 4 ms on rails", "step", ran(step=4e-3, duration=0.04)),
+          ("step of 0.5 ms at standstill", "step", ran(speed=0.0)),
+          ("wheelset somewhere unknown", "state[0]", ran(Y=NAN)),
+          ("spin that is infinite", "state[9]", ran(SPIN=np.inf)),
+          ("duration between two steps on rails", "duration", ran(duration=0.0013)),
+          ("wheelset that runs for no time", "duration", ran(duration=0.0)),
+          ("every third of twenty steps", "every", ran(every=3)),
+          ("wheelset at 300 m/s", "speed", ran(speed=300.0)),
+          ("wheelset without a mass", "mass", lambda _: CHOSEN.changed(mass=NAN)),
+          ("strips of two cells", "cells", lambda name: built(name, cells=2).rest),
+          ("strips of 2000 cells in an engine", "cells", lambda name: built(name, cells=2000).rest),
+      )),
+)  # fmt: skip
