@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from models.contact.wheel_on_rail import DEEP
 from models.contact.work_precision import duration
 from models.errors import InputError, RunFailed
 from models.rail.benchmark_plan import case_text
@@ -19,6 +20,8 @@ Progress = Callable[[str, float], None]
 WHEELS = ("right", "left")
 FLANGE = 0.8
 """Contact angle (rad) from which on a patch is called one of the flange."""
+TOO_DEEP = ("distance", "load")
+"""What the theories complain of where the contact grows out of its surroundings."""
 COLUMNS: dict[str, tuple[str, Callable[[Place], float]]] = {
     "on_rail": ("mm", lambda p: 1e3 * (p.y - p.top)), "in_track": ("mm", lambda p: 1e3 * p.y),
     "on_wheel": ("mm", lambda p: 1e3 * p.wheel_centre), "ahead": ("mm", lambda p: 1e3 * p.x),
@@ -64,7 +67,11 @@ def _try(contact: Contact, shift: float, yaw: float, name: str, found: list[Plac
     try:
         found.append(contact.at(shift, yaw * shift))
     except (InputError, RunFailed) as error:
-        failed[f"{name}, {1e3 * shift:g} mm"] = str(error)
+        deep = isinstance(error, InputError) and error.place in TOO_DEEP
+        failed[f"{name}, {1e3 * shift:g} mm"] = (
+            f"a load of {contact.load:g} N presses wheel and rail more than {1e3 * DEEP:g} mm into each other" if deep
+            else str(error)
+        )  # fmt: skip
 
 
 def patches(placed: Placed, wheel: str) -> tuple[Place, ...]:

@@ -44,6 +44,13 @@ def test_what_cannot_be_is_told_in_one_sentence(twinrig, capsys):
     assert "rad for each metre" in refused(twinrig, capsys, "cases={A={yaw=24.0}}")
 
 
+def test_position_that_fails_is_named(twinrig, capsys):
+    changes = ("wheelset.load=4e5", "positions.start=6.5e-3", "positions.count=1", "cases={A={}}")
+    args = [part for change in changes for part in ("--set", change)]
+    assert twinrig("run", "manchester", *args) == 1
+    assert "A, 6.5 mm  FAILED: a load of 400000 N presses" in capsys.readouterr().out
+
+
 def test_wheel_that_has_climbed_its_flange_is_told():
     with pytest.raises(RunFailed, match="right wheel has climbed its flange"):
         Contact(benchmark_side(), 1e4).at(18e-3)

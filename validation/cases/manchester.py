@@ -144,9 +144,9 @@ def _file_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
 
 
 def _price_rows(each: dict[str, float]) -> list[Row]:
-    return [finding(f"manchester.price.{name}", SYSTEM, f"processor time of one position, both wheels, case {name}", seconds, "s",
-                    "-", "geometry, roll, exact normal contact; rolling also the speed of spin") for name, seconds in
-            each.items()]  # fmt: skip
+    why = "geometry, roll, exact normal contact; rolling also the speed of spin"
+    return [finding(f"manchester.price.{name}", SYSTEM, f"processor time of one position, both wheels, case {name}",
+                    seconds, "s", "-", why) for name, seconds in each.items()]  # fmt: skip
 
 
 def _told(placed: Placed) -> dict[str, Any]:
