@@ -37,12 +37,12 @@ def _reference(problem: Problem) -> Row:
 
 
 def _orders(problem: Problem, points: list[Point]) -> list[Row]:
-    """Observed order of every fixed-step method, for every quantity."""
+    """Observed order of every fixed-step method that declares one, for every quantity."""
     rows = []
     for quantity in problem.units:
         for curve, found in cost.orders(points, quantity, problem.uncertainty[quantity]).items():
             setting = cost.by_curve(points)[curve][0].setting
-            if setting.adaptive:
+            if setting.adaptive or not setting.order:
                 continue
             name = f"price.{problem.key}.order.{quantity}.{curve}".replace(" ", "-")
             what = f"observed order of the largest {quantity} error, {named(curve)}"
