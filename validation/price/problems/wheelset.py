@@ -1,4 +1,4 @@
-"""Problem C: two wheels that roll with FASTSIM, released from where they slide, along the rail and across.
+"""Problem C: a wheel that rolls with FASTSIM, released from where it slides, along the rail and across.
 
 The creep forces are those of the engines' callback in every solver, so that what differs is the integrator. They have
 kinks wherever a cell begins to slip or to stick, so that no method keeps an order above two: the order of the others is
@@ -27,8 +27,8 @@ from validation.price.problems.road_excited import STAGES, setting
 DURATION = 0.1
 """s"""
 CELLS = 11
-LEVEL = np.tile([1.0, 1.0, 0.0, 1.0], 2)
-"""The wheels begin at rest on their rails."""
+LEVEL = np.array([1.0, 1.0, 0.0, 1.0])
+"""The wheel begins at rest on its rail."""
 PLACES = 16
 """Evaluations behind one set of slopes."""
 MS = 1e-3
@@ -56,7 +56,7 @@ QUICK: dict[tuple[str, str], tuple[float, ...]] = {
 
 @dataclass(frozen=True)
 class Result:
-    """Places and rates at the end (16,), and what they took."""
+    """Places and rates at the end (8,), and what they took."""
 
     state: Array
     counts: dict[str, int]
@@ -104,11 +104,11 @@ class RollingWheels:
     note = f"Every set of slopes that an implicit method asks for counts as {PLACES} force calls."
 
     def __init__(self, quick: bool) -> None:
-        self.title = f"Two wheels with FASTSIM at {SPEED:g} m/s, released from sliding, {DURATION:g} s"
-        self.wheels, self.units = Wheels(2, cells=CELLS, speed=SPEED), {"place": "m, rad"}
+        self.title = f"A wheel with FASTSIM at {SPEED:g} m/s, released from sliding, {DURATION:g} s"
+        self.wheels, self.units = Wheels(1, cells=CELLS, speed=SPEED), {"place": "m, rad"}
         self.tolerances: tuple[float, ...] = (1e-6, 1e-7, 1e-8)
         self._start = np.concatenate([part * LEVEL for part in self.wheels.state()])
-        springs = [np.tile(values, 2) for values in (self.wheels.stiffness, self.wheels.damping)]
+        springs = [np.array(values) for values in (self.wheels.stiffness, self.wheels.damping)]
         self._table = np.array([self.wheels.masses, *springs])
         solvers = (("DOP853", 1e-12), ("DOP853", 1e-11) if quick else ("Radau", 1e-9))
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
@@ -127,7 +127,7 @@ class RollingWheels:
         return made if made.order <= 2 else replace(made, order=0)
 
     def build(self, setting: Setting) -> Solver:
-        """The wheels in one engine; Refused for a step that the method cannot take."""
+        """The wheel in one engine; Refused for a step that the method cannot take."""
         method = setting.method.split()[0]
         if setting.engine == "reference":
             if not setting.adaptive:
