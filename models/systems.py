@@ -31,6 +31,7 @@ SYSTEMS = {
     "ride": System("models.ride.scene", "models.ride.plan", ("reference", "exudyn", "mujoco")),
     "wheelset": System("models.rail.scene", "models.rail.plan", ("reference", "exudyn", "mujoco")),
     "contact": System("models.contact.scene", "models.contact.plan"),
+    "handling": System("models.handling.scene", "models.handling.plan", ("exudyn", "mujoco")),
     "hub-forces": System("models.hub_forces.scene", "models.hub_forces.plan", ("reference", "exudyn", "mujoco")),
     "pictures": System("studies.pictures.scene", "studies.pictures.plan", ("exudyn", "mujoco")),
     "wheel-rail": System("models.rail.benchmark_scene", "models.rail.benchmark_plan"),

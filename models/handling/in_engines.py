@@ -10,8 +10,12 @@ from models.engines.spatial_protocol import SpatialRun
 from models.errors import InputError, RunFailed
 from models.handling import forces as at
 from models.handling.numbers import GRAVITY, Handling
+from models.handling.tyre import SLOW
 from models.vehicles.free_vehicle import chassis_of
+from models.vehicles.spatial import FREEDOMS
 
+LIMIT = 2.78
+"""Step times rate up to which the classical Runge-Kutta method damps what is damped."""
 MODELS = {"exudyn": "FreeExudyn", "mujoco": "FreeMujoco"}
 
 
@@ -58,14 +62,33 @@ def driven(engine: str, handling: Handling, speed: float, duration: float, step:
 
 
 def read(handling: Handling, run: SpatialRun, engine: str = "") -> Drive:
-    """Reports of a run; RunFailed where a tyre's force is not finite."""
+    """Reports of a run; RunFailed where a tyre's force is not finite, or stiffer than the step can follow."""
     count, tyres = len(run.times), len(handling.vehicle.tyres)
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
     at.reports(handling.numbers, run.times, np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates),
                report, ledger)  # fmt: skip
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
+    _check_step(handling, run, report, engine)
     return Drive(handling, run, report, ledger)
+
+
+def _check_step(h: Handling, run: SpatialRun, report: np.ndarray, engine: str) -> None:
+    """Bristles that hold damp a wheel at C / u, u the speed of the tread: refuse a step that lets it swing up."""
+    step = float(run.times[1] - run.times[0])
+    for i, tyre in enumerate(h.vehicle.tyres):
+        n, own = h.numbers[int(h.numbers[at.OF_TYRES]) + at.PER_TYRE * i :], report[:, i]
+        stiffness = 8.0 / 3.0 * n[at.RADIUS] * own[:, at.PRESS] / n[at.VERTICAL] * n[at.HALF_WIDTH] * n[at.BRISTLES]
+        lightness = 1.0 / h.vehicle.body(tyre.body).mass
+        if n[at.ROTOR] >= 0.0:
+            lightness += tyre.point[2] ** 2 / h.tyres.spin_inertia
+        holds = np.hypot(own[:, at.FX], own[:, at.FY]) < 0.95 * n[at.GRIP] * own[:, at.PRESS]
+        damped = holds * stiffness * lightness / np.maximum(np.abs(own[:, at.TREAD]), SLOW)
+        if step * damped.max() > LIMIT:
+            row = int(np.argmax(step * damped > LIMIT))
+            raise RunFailed(engine, f"tyre {tyre.name!r} rolls so slowly that a step of {step:g} s is too long; use at "
+                                    f"most {0.9 * LIMIT / damped.max():.2g} s or end the run before",
+                            float(run.times[row]))  # fmt: skip
 
 
 def energy(drive: Drive) -> np.ndarray:
@@ -91,9 +114,8 @@ def unaccounted(drive: Drive) -> np.ndarray:
 
 def _bodies(h: Handling, q: np.ndarray, v: np.ndarray) -> float:
     """Kinetic energy and that of weights (J), body by body from the outermost parent: written without any engine."""
-    from models.vehicles.spatial import FREEDOMS
-
-    total, frames, i = 0.0, {None: (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3))}, 0
+    frames: dict[str | None, tuple] = {None: (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3))}
+    total, i = 0.0, 0
     for body in h.vehicle.bodies:
         p, R, u, w, origin = frames[body.parent]
         arm = R @ np.subtract(body.position, origin)

@@ -40,8 +40,8 @@ def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
         c = 8.0 / 3.0 * a**2 * n[HALF_WIDTH] * n[BRISTLES]
         trail, turning, x = 3.0 * np.pi / 32.0 * a, n[HALF_WIDTH] ** 2 / 5.0, tyre.point[0] - centre
         slip = np.array([1.0, x]) / speed
-        force = -c * (slip + [0.0, trail / speed])
-        moment = c * (trail * slip - [0.0, turning / speed])
+        force = -c * (slip + np.array([0.0, trail / speed]))
+        moment = c * (trail * slip - np.array([0.0, turning / speed]))
         matrix += np.array([force, x * force + moment])
         steered += n[STEERED] * c * np.array([-1.0, -x + trail])
     side, yaw = np.linalg.solve(matrix, steered)

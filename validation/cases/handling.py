@@ -56,7 +56,8 @@ def draw(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _gap(one: Drive, other: Drive) -> float:
-    return float(max(np.abs(one.run.positions - other.run.positions).max(), np.abs(one.run.rates - other.run.rates).max()))
+    pairs = ((one.run.positions, other.run.positions), (one.run.rates, other.run.rates))
+    return float(max(np.abs(a - b).max() for a, b in pairs))
 
 
 def _engines_row(drives: dict[str, Drive]) -> Row:
@@ -124,8 +125,8 @@ def _other(name: str) -> str:
 
 def _mirror_row(duration: float) -> Row:
     inclined = Handling(R19, Tyres(inclination=-0.02))
-    return at_most("handling.mirror", SYSTEM, "step steer to the left beside the mirror image of one to the right, with "
-                   "inclined wheels", mirror_gap(inclined, duration), "m, rad", 1e-10, "a symmetric vehicle",
+    return at_most("handling.mirror", SYSTEM, "step steer to the left beside the mirror image of one to the right, "
+                   "with inclined wheels", mirror_gap(inclined, duration), "m, rad", 1e-10, "a symmetric vehicle",
                    "none")  # fmt: skip
 
 
@@ -226,7 +227,8 @@ def _fault_rows() -> list[Row]:
             driven("mujoco", rough, SPEED, 1.0), driven("exudyn", lane_change(), SPEED, 1.0)) > 1e-10,
     }  # fmt: skip
     return [behaves(f"handling.fault{i}", SYSTEM, f"planted: {name}", "caught" if caught else "missed", "caught",
-                    "a check that cannot fail shows nothing") for i, (name, caught) in enumerate(found.items())]  # fmt: skip
+                    "a check that cannot fail shows nothing")
+            for i, (name, caught) in enumerate(found.items())]  # fmt: skip
 
 
 def _price_row() -> Row:
@@ -237,8 +239,8 @@ def _price_row() -> Row:
     start = handling.straight(SPEED)
     jobs = [lambda model=model: model.run(*start, steps * 1e-4, 1e-4) for model in models]
     ratio = _ratio(interleave([*jobs, lambda: _repeat_tyres(4 * steps)], ROUNDS, 0.005))
-    return at_most("handling.price", SYSTEM, "step of MuJoCo with four tyres (22 x 21 cells), by a step without them and "
-                   "what the kernel takes alone, less 1", ratio, "", 0.3, "least seconds of interleaved rounds",
+    return at_most("handling.price", SYSTEM, "step of MuJoCo with four tyres (22 x 21 cells), by a step without them "
+                   "and what the kernel takes alone, less 1", ratio, "", 0.3, "least seconds of interleaved rounds",
                    "none")  # fmt: skip
 
 
