@@ -223,7 +223,7 @@ def ran(*, duration: float = 0.01, step: float = STEP, every: int = 1, speed: fl
     return run
 
 
-def fails(**own: float) -> Callable[[str, Path], float]:
+def fails(**own: Any) -> Callable[[str, Path], float]:
     """A case that fails, and says when: in its first half."""
 
     def error(implementation: str, folder: Path) -> float:
