@@ -5,7 +5,6 @@ import tomllib
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
 import pytest
 
 from models.errors import InputError, RunFailed
@@ -13,10 +12,10 @@ from models.rail import equations as eq
 from models.rail import plan
 from models.rail.eigenvalues import free, growth
 from models.rail.equations import Equations
-from models.rail.limit_cycle import attained, bifurcation
+from models.rail.limit_cycle import attained
 from models.rail.linear import NoCriticalSpeed, critical_speed
 from models.rail.of_scene import path_speeds, wheelset_of
-from models.rail.orbit import solved
+from models.rail.orbit import beginning, branch, refined, solved
 from models.rail.scene import build
 from models.rail.wheelset import CHOSEN
 from studies import limit_cycle, wheelset
@@ -119,15 +118,13 @@ def test_no_critical_speed_is_told_apart():
 
 
 def test_a_branch_stands_upright_until_flanges_touch():
-    orbits = []
-    for orbit in bifurcation(Equations(CHOSEN, 60.0, cells=7), 50.0, 67.8):
-        orbits.append(orbit)
-    assert orbits[0].amplitude < 1e-3 and orbits[-1].amplitude > CHOSEN.flange_clearance
-    assert np.ptp([o.speed for o in orbits if o.amplitude < 6.5e-3]) < 0.01
-    assert all(o.error < 1e-4 * o.speed for o in orbits)
-    one = orbits[-1]
-    # The orbit comes back, and so does what begins beside it, by the multiplier.
-    path = one.path()
+    first = beginning(Equations(CHOSEN, 60.0, cells=7), 1e-3, 5e-4)
+    low, high = branch(first, [5e-3, 7.3e-3])
+    assert abs(low.speed - first.speed) < 0.01 < 1.0 < high.speed - low.speed
+    assert low.multiplier > 0.99 and high.multiplier < 0.2
+    half = refined(high, "speed")
+    assert 0.0 < half.error < 1e-4 * half.speed and half.amplitude == high.amplitude
+    path = high.path()
     assert path.states[-1, eq.YAW] == pytest.approx(path.states[0, eq.YAW], abs=1e-11)
 
 
