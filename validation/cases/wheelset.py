@@ -246,8 +246,8 @@ def _cycle_rows(cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
         rows += [
             at_most(f"wheelset.cycle.{value}.error", SYSTEM, f"{of}: change by halving the step, relative", errors, "",
                     1e-2, "Newton's method closes the orbit at either step", "none"),
-            at_most(f"wheelset.cycle.{value}", SYSTEM, f"{of}: {count} implementations, by the error of the step", apart,
-                    "", 1.0, "each closes its own orbit, from a guess that is 1 % off", "shared kernel"),
+            at_most(f"wheelset.cycle.{value}", SYSTEM, f"{of}: {count} implementations, by the error of the step",
+                    apart, "", 1.0, "each closes its own orbit, from a guess that is 1 % off", "shared kernel"),
         ]  # fmt: skip
     return rows
 
