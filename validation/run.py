@@ -21,12 +21,12 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
          "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
          "contact_simplified", "contact_profiles", "manchester", "ride_road", "ride_covariance", "ride_engines",
-         "ride_varying_speed", "ride_nonlinear", "ride_faults", "contact_price", "fastsim", "wheelset",
-         "contact_bridges")  # fmt: skip
+         "ride_varying_speed", "ride_nonlinear", "ride_faults", "hub_forces", "contact_price", "fastsim", "wheelset",
+         "contact_bridges", "handling")  # fmt: skip
 """Case modules in the order of the report."""
 
 
-ALONE = ("absent", "price", "ensemble", "fastsim", "contact_price", "contact_bridges")
+ALONE = ("absent", "price", "ensemble", "fastsim", "contact_price", "contact_bridges", "handling")
 """Cases that time what they run: they begin when all others have ended, and have the machine to themselves."""
 WORKERS = 2
 """Processes that measure the other cases."""
@@ -102,6 +102,7 @@ def seeds() -> dict[str, int]:
         ensemble,
         fastsim,
         growth,
+        handling,
         holding_spring,
         index_reduction,
         inertial_unit,
@@ -129,7 +130,7 @@ def seeds() -> dict[str, int]:
             "table of contacts": contact_price.SEED, "made road": fitted_roads.SEED,
             "states of ride": ride_engines.SEED, "twins of ride": ride_covariance.SEED,
             "copies of ride": ride_varying_speed.SEED, "nonlinear ride": ride_nonlinear.SEED,
-            "drawn wheelsets": wheelset.SEED}  # fmt: skip
+            "drawn wheelsets": wheelset.SEED, "rough road of handling": handling.SEED}  # fmt: skip
 
 
 def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:

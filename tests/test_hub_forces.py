@@ -1,0 +1,144 @@
+"""A vehicle cut at its wheels: engines, closed forms of its drift, the filter, scenes and their faults."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.engines.hub_forces import build
+from models.errors import InputError, Refused, RunFailed
+from models.hub_forces.cut_vehicle import PITCH, ROLL, cut
+from models.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
+from models.hub_forces.rigid import rigid
+from models.hub_forces.scene import build as scene_of
+from models.hub_forces.table import Drive
+from models.hub_forces.tilt_filter import estimate, held, pulled
+from models.road.iso8608 import iso8608_road
+from models.vehicles.spatial_linear import linearise
+from validation.cases import hub_forces as case
+
+ALL = {"title": "t", "system": "hub-forces", "study": "hub_forces", "vehicle": {"file": "r19_free"}, "road": {}}
+
+
+def test_the_quick_share_passes(tmp_path):
+    rows, _ = case.measure(True, tmp_path)
+    assert [row.id for row in rows if row.status != "passed"] == []
+
+
+def test_without_symmetry_the_engines_agree_too():
+    # 1e-10: a wrong product of inertia or arm would show at 1e-2
+    assert all(row.status == "passed" for row in case._accelerations("twin", cut(case.twin(), "body")))
+
+
+def test_small_motion_on_tyres_is_that_of_the_linear_vehicle():
+    car = case.r19()
+    linear, n = linearise(replace(car.whole, gravity=0.0), 20.0), car.size
+    places = {place: i for i, place in enumerate(car.whole.coordinates())}
+    order = [places["body", f] for f in ("x", "y", "z", "rz", "ry", "rx")]
+    order += [places[place] for place in car.tree.coordinates()[6:]]
+    bare = replace(car, tree=replace(car.tree, gravity=0.0), loads=0 * car.loads,
+                   elements=tuple(replace(element, held=0.0) for element in car.elements))  # fmt: skip
+    model = build("reference", bare, Drive(np.zeros((3, 8)), speed=20.0), 1e-3, 1e-3)
+    small = 1e-6 * np.random.default_rng(1).uniform(-1, 1, (2, n))
+    found = model.accelerations(0.0, *small)
+    q, v = np.zeros((2, n))
+    q[order], v[order] = small
+    expected = np.linalg.solve(linear.mass, -linear.damping @ v - linear.stiffness @ q)[order]
+    assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()  # second order in 1e-6
+
+
+@pytest.fixture(scope="module")
+def measured():
+    car, step = case.r19(), 2e-3
+    drive = two_tracks(car, *(iso8608_road("C", seed) for seed in (1, 2)), 20.0, step, 500)
+    true = truth("mujoco", car, drive, "hub", step, 1.0)
+    return car, true, *recorded(true, "hub", 1)
+
+
+def test_enforced_angles_are_met_and_the_moment_is_what_was_left_out(measured):
+    car, true, forces, angles = measured
+    less = replace(forces, samples=forces.samples - np.eye(24)[3] * 200.0)  # 200 N m about x at one hub
+    drives = [held(own.drive(2e-3, 500), angles.samples[:, :2], 2e-3, 2e-3) for own in (forces, less)]
+    whole, run = (build("mujoco", car, drive, 2e-3, 1.0).run() for drive in drives)
+    assert np.abs(run.states[:, [ROLL, PITCH]] - true.states[:, [ROLL, PITCH]]).max() < 1e-6
+    # 0.5 %: the heading, which is free, takes a little through the product of inertia
+    assert (run.moments - whole.moments)[:, 0] == pytest.approx(np.full(501, 200.0), rel=5e-3)
+    assert np.abs(run.moments - whole.moments)[:, 1].max() < 2.0
+
+
+def test_the_filter_holds_both_angles_and_refuses_what_contradicts(measured):
+    car, true, forces, angles = measured
+    deviation = np.tile([8.0] * 3 + [1.0] * 3, 4)
+    tilt = estimate(car, forces, angles.noisy((1.75e-3, 5e-3), 3), deviation, (1.75e-3, 5e-3), 1.0)
+    assert np.abs(tilt.states[50:, :2] - angles.samples[50:, :2]).max() < 3e-3
+    shifted = replace(forces, samples=forces.samples + np.eye(24)[3] * 400.0)  # 1.4 rad/s^2 of roll that was not
+    free, drawn = (build("mujoco", car, d, 2e-3, 1.0).run() for d in (
+        shifted.drive(2e-3, 500), pulled(shifted.drive(2e-3, 500), car, tilt, 2e-3, 2.0)))  # fmt: skip
+    off = [np.abs(run.states[-1, ROLL] - true.states[-1, ROLL]) for run in (free, drawn)]
+    assert off[0] > 0.3 and off[1] < 0.02
+    with pytest.raises(InputError, match="contradicts the hub forces"):
+        estimate(car, replace(forces, samples=-forces.samples), angles, deviation, (1.75e-3, 5e-3), 1.0)
+
+
+def test_the_laws_of_the_rigid_vehicle():
+    car = rigid(case.r19())
+    # two equal forces up, left and right, do not roll; one alone does by its arm
+    both = np.zeros((2, 24))
+    both[0, [2, 8]], both[1, 2] = 100.0, 100.0
+    assert car.moments(both)[:, 0] == pytest.approx([0.0, 100.0 * 0.69342])
+    times = np.array([1.0, 2.0])
+    variance = car.angle_variance(np.ones(24), 1e-3, times)
+    assert variance[1] / variance[0] == pytest.approx([8.0] * 3)  # t^3
+
+
+def test_noise_is_the_same_in_any_frame_and_differs_from_path_to_path():
+    still = HubForces(np.zeros((5000, 24)), 1e-3, "hub")
+    one, two = (still.noisy(np.full(24, 3.0), 7, path).samples for path in (0, 1))
+    assert one.std() == pytest.approx(3.0, rel=0.01)  # 120,000 samples: 0.2 %
+    assert abs(np.mean(one * two)) < 0.1
+    assert Angles(np.zeros((5000, 4)), 1e-3).noisy((1.0, 10.0), 7).samples.std(axis=0) == pytest.approx(
+        [1, 1, 10, 10], rel=0.05)  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "told"), [
+    ({"vehicle": {"file": "r19_free", "chassis": "fl"}}, "fl"),
+    ({"vehicle": {"file": "r19_free", "chassis": "bodi"}}, "no such body"),
+    ({"vehicle": {"file": "quarter_car", "chassis": "body"}}, "what is left of a vehicle without tyres"),
+    ({"forces": {"file": "f.csv"}}, "give either the table road"),
+    ({"forces": {"frame": "wheel"}}, "frame"),
+    ({"forces": {"sampling_rate": 300.0}}, "multiple of run.step"),
+    ({"run": {"step": 7e-3}}, "must divide run.duration"),
+    ({"run": {"step": 0.05, "duration": 1.0}, "forces": {"sampling_rate": 20.0}}, "step of 0.05 s"),
+    ({"forces": {"frame": "inertial"}, "stabilise": {"bandwidth": 0.3}}, "topple the vehicle"),
+])  # fmt: skip
+def test_one_clear_message(change, told):
+    from models.hub_forces.plan import check
+
+    with pytest.raises(InputError, match=told):
+        check(scene_of({**ALL, **change}, "s.toml"), ("mujoco",))
+
+
+def test_inputs_of_a_wrong_length_are_refused_and_a_vehicle_that_tumbles_is_told():
+    car = case.r19()
+    with pytest.raises(Refused, match="rows"):
+        build("mujoco", car, case.static(car, 7), 1e-3, 1.0)
+    start = np.zeros(38)
+    start[19 + PITCH] = 3.0
+    with pytest.raises(RunFailed, match="pitches by more than"):
+        build("mujoco", car, case.static(car, 1201), 1e-3, 0.6).run(start)
+
+
+def test_a_file_of_ones_own(tmp_path, measured):
+    from studies.hub_forces import _save, compute
+
+    scene = scene_of({**ALL, "run": {"duration": 0.5}}, "s.toml")
+    found = compute(scene, ("mujoco",))
+    _save(found, tmp_path)
+    own = {**ALL, "run": {"duration": 0.5}, "forces": {"file": "hub_forces.csv"}, "angles": {"file": "angles.csv"}}
+    del own["road"]
+    again = compute(scene_of(own, "s.toml", tmp_path), ("mujoco",))
+    assert np.array_equal(again.runs["filter"].states, found.runs["filter"].states)
+    header, *rows = (tmp_path / "hub_forces.csv").read_text().splitlines()
+    (tmp_path / "hub_forces.csv").write_text("\n".join([header.replace("fl_fx [N]", "fl_fx [lbf]"), *rows]) + "\n")
+    with pytest.raises(InputError, match="lbf"):
+        scene_of(own, "s.toml", tmp_path).measured(case.r19())

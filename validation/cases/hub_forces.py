@@ -1,0 +1,311 @@
+"""R19-free cut at its wheels and driven by hub forces: engines, gravity error, toppling, growth, filter, faults."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from scipy.stats import chi2
+
+from models.engines.hub_forces import ENGINES, HubRun, build
+from models.engines.hub_forces_mujoco import MujocoHubs
+from models.engines.spatial_reference import SpatialReference
+from models.errors import InputError
+from models.hub_forces.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut
+from models.hub_forces.kernel import WRENCH, forces
+from models.hub_forces.measurement import HubForces, model, recorded, truth, two_tracks
+from models.hub_forces.rigid import rigid
+from models.hub_forces.scene import HubScene
+from models.hub_forces.scene import build as scene_of
+from models.hub_forces.table import Drive
+from models.hub_forces.tilt_filter import estimate, held
+from models.road.iso8608 import iso8608_road
+from models.signals import Interpolation
+from models.vehicles.spatial import SpatialVehicle, SpringDamper
+from models.vehicles.vehicle_file import load_vehicle
+from studies.hub_forces import FILTER, Found, answer, compute, damages, drift_off, engines_apart, errors
+from validation.rows import Row, System, Table, at_most, behaves, finding, within
+
+TITLE = "A car of 19 freedoms on noisy hub forces"
+SYSTEM: System = "drift"
+SEED, COPIES, LASTING = 31, 48, 4.0
+"""Of the ensemble: seed, paths and their length (s)."""
+TILT = 0.1
+"""rad, of the gravity error."""
+STEP = 1e-3
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Engines and closed forms; in full also measurement, growth, stabilisers, the twin and planted faults."""
+    car = r19()
+    rows = [*_accelerations("r19_free", car), _wrenches(car), *_gravity(car), _toppling(car),
+            _together(car, 0.2 if quick else 2.0)]  # fmt: skip
+    if quick:
+        return rows, {}
+    rows += [*_accelerations("twin", cut(twin(), "body")), *_reproduced(car), *_growth(car)]
+    scenes = {frame: _scene(frame) for frame in ("hub", "inertial")}
+    found = {frame: compute(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
+    for frame, own in found.items():
+        rows += [*_stabilised(frame, own), _exact(frame, own)]
+    return rows + _faults(scenes["hub"]), {frame: answer(own) for frame, own in found.items()}
+
+
+@cache
+def r19() -> CutVehicle:
+    """The shipped car, cut."""
+    return cut(load_vehicle("r19_free"), "body")
+
+
+def twin() -> SpatialVehicle:
+    """R19-free without any symmetry: every spring, mount and wheel differs from every other, left from right."""
+    whole = load_vehicle("r19_free")
+    springs = tuple(replace(s, stiffness=s.stiffness * (1 + 0.02 * i), damping=s.damping * (1.3 - 0.02 * i))
+                    for i, s in enumerate(whole.springs))  # fmt: skip
+    bodies = tuple(replace(b, mass=b.mass * (1 + 0.03 * i)) for i, b in enumerate(whole.bodies))
+    chassis = replace(bodies[0], inertia=((200.0, 15.0, -10.0), (15.0, 1390.0, 8.0), (-10.0, 8.0, 1617.0)))
+    return replace(whole, springs=springs, bodies=(chassis, *bodies[1:]))
+
+
+def static(vehicle: CutVehicle, rows: int, frame: str = "hub") -> Drive:
+    """Hub forces that carry the vehicle at rest."""
+    forces = np.zeros((rows, WRENCH * len(vehicle.hubs)))
+    forces[:, 2::WRENCH] = vehicle.loads
+    return Drive(forces, frame)
+
+
+def _anywhere(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates and rates at random, the chassis turned by any heading and by up to a radian."""
+    rng = np.random.default_rng(seed)
+    q, v = rng.uniform(-0.03, 0.03, vehicle.size), rng.uniform(-0.5, 0.5, vehicle.size)
+    q[:6] = *rng.uniform(-5, 5, 3), rng.uniform(-3, 3), *rng.uniform(-1, 1, 2)
+    return q, v
+
+
+def _shaken(vehicle: CutVehicle, frame: str, guide: bool) -> Drive:
+    """A row of six random components per hub, with a stabiliser or without."""
+    rng = np.random.default_rng(SEED)
+    drive = static(vehicle, 3, frame)
+    shaken = drive.hubs + rng.normal(0, 500.0, drive.hubs.shape[1])
+    return replace(drive, hubs=shaken, guide=rng.normal(0, 0.1, (1, 6)).repeat(3, axis=0) if guide else None)
+
+
+def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
+    """Engines and written-out equations at random states, and those equations against others without any force."""
+    worst = 0.0
+    for i, (frame, guide) in enumerate((("hub", False), ("inertial", True), ("body", True))):
+        q, v = _anywhere(vehicle, i)
+        found = [build(engine, vehicle, _shaken(vehicle, frame, guide), STEP, STEP).accelerations(0.0, q, v)
+                 for engine in ENGINES]  # fmt: skip
+        worst = max(worst, max(float(np.abs(a - found[0]).max() / np.abs(found[0]).max()) for a in found[1:]))
+    q, v = _anywhere(vehicle, 7)
+    bare = replace(vehicle, elements=(), loads=0 * vehicle.loads)
+    own = build("reference", bare, static(bare, 3), STEP, STEP).accelerations(0.0, q, v)
+    slack = SpringDamper("none", vehicle.chassis, vehicle.whole.tyres[0].body, (0, 0, 0), (0, 0, 0), (0, 0, 1), 0, 0)
+    other = SpatialReference(replace(vehicle.tree, gravity=0.0, springs=(slack,))).acceleration(q, v)
+    other -= GRAVITY * np.eye(len(q))[Z]
+    return [
+        at_most(f"hub_forces.accelerations_{name}", SYSTEM, "accelerations of Exudyn and MuJoCo beside the written-out "
+                "equations at random states, relative", worst, "1", 1e-10, "one callback, three mass matrices",
+                "shared kernel"),
+        at_most(f"hub_forces.free_fall_{name}", SYSTEM, "accelerations of the freely falling, turning tree beside a "
+                "second set of equations", float(np.abs(own - other).max()), "m/s^2, rad/s^2", 1e-9,
+                "written separately; gravity moves all alike", "native"),
+    ]  # fmt: skip
+
+
+def _wrenches(vehicle: CutVehicle) -> Row:
+    """Joint forces of the hubs' wrenches by the kernel and by MuJoCo's own Jacobians."""
+    (q, _), worst = _anywhere(vehicle, 3), 0.0
+    for frame in ("hub", "inertial"):
+        drive = _shaken(vehicle, frame, guide=False)
+        built, bare = (MujocoHubs(vehicle, replace(drive, hubs=f * drive.hubs), STEP, STEP) for f in (1.0, 0.0))
+        own = _forces(built, q) - _forces(bare, q)
+        data, other = mujoco.MjData(built.model), np.zeros(vehicle.size)
+        data.qpos[:] = q
+        mujoco.mj_kinematics(built.model, data)
+        mujoco.mj_comPos(built.model, data)
+        for tyre, wrench in zip(vehicle.whole.tyres, drive.hubs[0].reshape(-1, 2, 3), strict=True):
+            number = [body.name for body in vehicle.tree.bodies].index(tyre.body)
+            body = int(built.model.body(str(number)).id)
+            force, moment = wrench if frame == "inertial" else wrench @ data.xmat[body].reshape(3, 3).T
+            mujoco.mj_applyFT(built.model, data, force, moment, data.xpos[body], body, other)
+        worst = max(worst, float(np.abs(own - other).max() / np.abs(other).max()))
+    return at_most("hub_forces.wrenches", SYSTEM, "joint forces of six components per hub in two frames beside "
+                   "MuJoCo's own Jacobians, relative", worst, "1", 1e-12, "places, axes, frames", "native")  # fmt: skip
+
+
+def _forces(built: MujocoHubs, q: np.ndarray) -> np.ndarray:
+    """Joint forces (n,) of the kernel at rest."""
+    work = built.work()
+    forces(built.numbers, 0.0, q, np.zeros(len(q)), *work)
+    return work[1]
+
+
+def _tilted(vehicle: CutVehicle, frame: str, tilt: float, duration: float) -> HubRun:
+    steps, start = round(duration / STEP), np.zeros(2 * vehicle.size)
+    start[ROLL] = tilt
+    return build("mujoco", vehicle, static(vehicle, 2 * steps + 1, frame), STEP, duration).run(start)
+
+
+def _gravity(vehicle: CutVehicle) -> list[Row]:
+    """Body-fixed static forces on a tilted vehicle: it slides off, and nothing inside it feels that."""
+    run = _tilted(vehicle, "hub", TILT, 1.0)
+    fall = -0.5 * GRAVITY * np.column_stack([np.full(len(run.times), np.sin(TILT)), np.full(len(run.times),
+                                             1 - np.cos(TILT))]) * run.times[:, None] ** 2  # fmt: skip
+    held_by = np.array([element.held for element in vehicle.elements])
+    return [
+        at_most("hub_forces.gravity_error", SYSTEM, "position of the chassis on body-fixed forces at a roll of 0.1 rad "
+                "beside -g sin(roll) t^2/2 and -g (1 - cos(roll)) t^2/2 over 1 s",
+                float(np.abs(run.states[:, [Y, Z]] - fall).max()), "m", 1e-9, "forces turn with it, gravity does not",
+                "closed form"),
+        at_most("hub_forces.equivalence", SYSTEM, "change of any section force by that tilt, of the weight",
+                float(np.abs(run.elements - held_by).max() / vehicle.loads.sum()), "1", 1e-10,
+                "uniform gravity cannot be told from an acceleration: body-fixed forces leave the inside alone",
+                "closed form"),
+    ]  # fmt: skip
+
+
+def _toppling(vehicle: CutVehicle) -> Row:
+    """Forces that keep their directions carry the vehicle from below: it topples like a pendulum."""
+    run, expected = _tilted(vehicle, "inertial", 1e-6, 2.0), float(rigid(vehicle).toppling()[0])
+    late = np.abs(run.states[[1000, 2000], ROLL])
+    return within("hub_forces.toppling", SYSTEM, "growth rate of a roll error on forces of the inertial frame beside "
+                  "sqrt(m g h / I) of the rigid car", float(np.log(late[1] / late[0])), "1/s", expected,
+                  0.02 * expected, "springs that give change it by less than one per cent", "closed form")  # fmt: skip
+
+
+def _together(vehicle: CutVehicle, duration: float) -> Row:
+    """Free on noise in every engine."""
+    steps = round(duration / STEP)
+    drive = static(vehicle, steps + 1)
+    noisy = HubForces(drive.hubs, STEP, "hub").noisy(np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs)), SEED)
+    paths = [model(engine, vehicle, noisy, STEP, duration).run().states for engine in ENGINES]
+    return at_most("hub_forces.engines_on_noise", SYSTEM, f"coordinates and rates of three implementations on noise "
+                   f"of 50 N and 5 N m, {duration:g} s", max(float(np.abs(p - paths[0]).max()) for p in paths[1:]),
+                   "m, rad, 1/s", 1e-9, "same tableau, same step", "shared kernel")  # fmt: skip
+
+
+def _rough(vehicle: CutVehicle, duration: float) -> Drive:
+    """A class C road at 20 m/s."""
+    left, right = (iso8608_road("C", seed) for seed in (1, 2))
+    return two_tracks(vehicle, left, right, 20.0, STEP, round(duration / STEP))
+
+
+def _reproduced(vehicle: CutVehicle) -> list[Row]:
+    """Hub forces of a road without noise bring the same motion back, but for what lies between samples."""
+    duration = 2.0
+    true = truth("mujoco", vehicle, _rough(vehicle, duration), "hub", STEP, duration)
+    off = {}
+    readings: tuple[Interpolation, ...] = ("linear", "smooth")
+    for interpolation in readings:
+        for every in (4, 2):
+            measured, _ = recorded(true, "hub", every)
+            run = model("mujoco", vehicle, measured, STEP, duration, interpolation).run()
+            off[interpolation, every] = float(np.abs((run.states - true.states)[:, [ROLL, PITCH]]).max())
+    order = np.log2(off["linear", 4] / off["linear", 2])
+    return [
+        within("hub_forces.hold", SYSTEM, "order in the sampling period of roll and pitch on linear samples of hub "
+               "forces, 250 and 500 Hz", float(order), "1", 2.0, 0.5, "linear interpolation errs by the square",
+               "closed form"),
+        at_most("hub_forces.reproduced", SYSTEM, "error of roll and pitch on a cubic spline through samples at 500 Hz, "
+                "2 s of a class C road", off["smooth", 2], "rad", 1e-5, "the cut vehicle is the one on the road",
+                "shared kernel"),
+    ]  # fmt: skip
+
+
+def _growth(vehicle: CutVehicle) -> list[Row]:
+    """Mean squares of an ensemble by their laws, chi-square with as many degrees of freedom as paths."""
+    steps, step = round(LASTING / 2e-3), 2e-3
+    rest, deviation = static(vehicle, steps + 1), np.tile([20.0] * 3 + [4.0] * 3, len(vehicle.hubs))
+    still = HubForces(rest.hubs, step, "hub")
+    ends = np.array([model("mujoco", vehicle, still.noisy(deviation, SEED, path), step, LASTING).run().states[-1]
+                     for path in range(COPIES)])  # fmt: skip
+    own, at = rigid(vehicle), np.array([LASTING])
+    law = own.angle_variance(deviation, step, at)[0]
+    sliding = own.position_variance(deviation, step, at, "hub")[0, 1]
+    low, high = chi2.ppf([5e-4, 1 - 5e-4], COPIES) / COPIES
+    named = [("roll", ROLL, law[0]), ("pitch", PITCH, law[1]), ("heading", HEADING, law[2]), ("y", Y, sliding)]
+    return [within(f"hub_forces.growth_{name}", SYSTEM, f"mean square of {name} after {LASTING:g} s on white noise by "
+                   f"its law, {COPIES} paths", float(np.mean(ends[:, i] ** 2) / variance), "1", (low + high) / 2,
+                   (high - low) / 2, "99.9 % of chi-square; q t^3/3, and g^2 q t^7/252 beside it for y",
+                   "closed form") for name, i, variance in named]  # fmt: skip
+
+
+def _scene(frame: str) -> HubScene:
+    """That of the study, 8 s long."""
+    return scene_of({
+        "title": TITLE, "system": "hub-forces", "study": "hub_forces", "vehicle": {"file": "r19_free"},
+        "run": {"duration": 8.0}, "road": {}, "forces": {"frame": frame},
+    })  # fmt: skip
+
+
+def _stabilised(frame: str, found: Found) -> list[Row]:
+    """Engines before drift-off, both angles with the filter, and the damage that each run leaves."""
+    off = np.abs(errors(found, found.runs[FILTER])).max(axis=0)
+    rows = [
+        at_most(f"hub_forces.engines_{frame}", SYSTEM, f"engines apart before drift-off, noisy road run of 8 s, frame "
+                f"{frame!r}", engines_apart(found), "m, rad, 1/s", 1e-9, "same tableau, same step", "shared kernel"),
+        *(at_most(f"hub_forces.filter_{name}_{frame}", SYSTEM, f"largest error of {name} with the filter, frame "
+                  f"{frame!r}", float(off[i]), "rad", 0.01, "demanded", "none")
+          for i, name in enumerate(("roll", "pitch"))),
+        finding(f"hub_forces.drift_off_{frame}", SYSTEM, "free run leaves the true roll or pitch by 0.05 rad; 8 s: "
+                f"never, frame {frame!r}", min(drift_off(found, found.runs["free, mujoco"]), 8.0), "s", "", "stated"),
+    ]  # fmt: skip
+    for name in (name for name in found.runs if "exudyn" not in name):
+        ratios = damages(found, found.runs[name]).values()
+        for end, value in (("least", min(ratios)), ("most", max(ratios))):
+            what = f"{end} damage of {len(ratios)} springs, mounts and bars by the true one; {name}, frame {frame!r}"
+            rows.append(finding(f"hub_forces.damage_{end}_{name.split(',')[0]}_{frame}", SYSTEM, what, value, "1", 1.0,
+                                "body-frame section forces, slope 5"))  # fmt: skip
+    return rows
+
+
+def _exact(frame: str, found: Found) -> Row:
+    """Roll and pitch prescribed as they truly were: what remains is the noise of the forces."""
+    assert found.truth is not None
+    steps = len(found.truth.times) - 1
+    drive = held(found.forces.drive(STEP, steps), found.truth.states[:, [ROLL, PITCH]], STEP, STEP)
+    run = build("mujoco", found.vehicle, drive, STEP, steps * STEP).run()
+    ratios = np.array(list(damages(found, run).values()))
+    return at_most(f"hub_forces.prescribed_{frame}", SYSTEM, "largest deviation from 1 of a damage ratio, true roll "
+                   f"and pitch prescribed, frame {frame!r}", float(np.abs(ratios - 1).max()), "1", 0.1,
+                   "force noise of 0.2 % alone changes lightly loaded bushes by some per cent", "none")  # fmt: skip
+
+
+def _faults(scene: HubScene) -> list[Row]:
+    """A measurement in a wrong frame, or with hubs exchanged, contradicts the measured angles."""
+    vehicle, duration = r19(), 2.0
+    drive = _rough(vehicle, duration)
+    clean, angles = recorded(truth("mujoco", vehicle, drive, "hub", STEP, duration), "hub", 2)
+    other, _ = recorded(truth("mujoco", vehicle, drive, "inertial", STEP, duration), "inertial", 2)
+    parts, of_space = (own.samples.reshape(len(own.samples), -1, WRENCH) for own in (clean, other))
+    turned = parts * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
+    planted = {"left and right exchanged": parts[:, [1, 0, 3, 2]], "front and rear exchanged": parts[:, [2, 3, 0, 1]],
+               "y of the frame turned round": turned, "another frame": of_space, "nothing": parts}  # fmt: skip
+    rows = []
+    for i, (name, samples) in enumerate(planted.items()):
+        faulty = replace(clean, samples=samples.reshape(len(samples), -1))
+        said = "accepted"
+        try:
+            estimate(vehicle, faulty, angles, scene.deviations(vehicle), (1.75e-3, 5e-3), 1.0)
+        except InputError:
+            said = "refused"
+        expected = "accepted" if name == "nothing" else "refused"
+        rows.append(behaves(f"hub_forces.fault_{i}", SYSTEM, f"measurement with {name} planted", said, expected,
+                            "the innovations of the filter tell"))  # fmt: skip
+    return rows
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Damage of every section force, run by run."""
+    found = []
+    for frame, of_runs in data.items():
+        runs = {name: run["damage"] for name, run in of_runs.items() if "exudyn" not in name and "damage" in run}
+        elements = next(iter(runs.values()))
+        rows = tuple((element, *(f"{own[element]:.3g}" for own in runs.values())) for element in elements)
+        found.append(Table(f"Damage by the true one, hub forces in the frame '{frame}'",
+                           "Section forces in the chassis' axes, slope 5; roll and pitch are prescribed as measured.",
+                           ("element", *runs), rows))  # fmt: skip
+    return found
