@@ -17,8 +17,8 @@ goes over from one zone to the next without a jump. Patches of one wheel press t
 
 The place lies ahead of the axle or behind it under yaw, and the depth grows, as the outline has it. Left out: that
 the axes of a patch turn about its normal under yaw, a conforming patch's curvature in its own plane, and that normal
-force and curvature follow from different means, so that the elastic energy is a function of the way to some thousandth
-parts (the energy's ledger adds up the way's work).
+force and curvature follow from different means, so that the work on the way to a place depends on the way by one or two
+hundredth parts (``energy`` adds up what was done on the way).
 """
 
 import math

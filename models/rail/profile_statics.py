@@ -1,0 +1,71 @@
+"""A wheelset on profiles at rest on smooth rails, held sideways: heights, loads, and the cones that steer alike."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import root
+
+from models.errors import InputError, RunFailed
+from models.rail.contact_table import equivalent_conicity
+from models.rail.profile_contact import ACROSS, ALONG, DEPTH, N_Z, TOUCH, X_, Z_, pressed
+from models.rail.wheel_forces import MODULUS, contact_points, numbers, patches
+from models.rail.wheelset import Wheelset
+
+SCALE = 1e-5
+"""Size (m, rad) of the changes that contact yields."""
+PRECISION = 1e-9
+"""Share of the load to which each wheel's is found."""
+SHIFTS = 16
+"""Lateral displacements up to the amplitude at which the rolling radii are found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """z (m) and roll (rad) of the wheelset; touches (patches, TOUCH), loads (patches,) in N, right wheel first."""
+
+    z: float
+    roll: float
+    touches: np.ndarray
+    loads: np.ndarray
+
+    def radii(self) -> np.ndarray:
+        """Rolling radius (2,) of the right and the left wheel, the mean of its patches by their loads (m)."""
+        axle = np.array([0.0, np.cos(self.roll), np.sin(self.roll)])
+        places = self.touches[:, X_ : Z_ + 1]
+        radius = np.linalg.norm(places - np.outer(places @ axle, axle), axis=1)
+        weighed, loads = (radius * self.loads).reshape(2, -1).sum(axis=1), self.loads.reshape(2, -1).sum(axis=1)
+        return weighed / loads
+
+
+def held(wheelset: Wheelset, shift: float) -> Held:
+    """The wheelset at a lateral displacement (m), without yaw, half its load on each wheel.
+
+    Raises InputError for a wheelset without profiles or a displacement at which not both wheels touch.
+    """
+    if wheelset.profiles is None:
+        raise InputError("", "wheelset", None, "has cones: this needs profiles")
+    given, half = numbers(wheelset), 0.5 * wheelset.load
+    z, roll = wheelset.profiles.touching(wheelset.radius, shift)
+
+    def found(unknown: np.ndarray) -> Held:
+        touches = np.zeros((patches(given), TOUCH))
+        here = (z + unknown[0] * SCALE, roll + unknown[1] * SCALE)
+        contact_points(shift, *here, 0.0, given, touches)
+        loads = np.array([pressed(*touch[[DEPTH, ALONG, ACROSS]], given[MODULUS])[0] for touch in touches])
+        return Held(*here, touches, loads)
+
+    def off(unknown: np.ndarray) -> np.ndarray:
+        one = found(unknown)
+        return (one.loads * one.touches[:, N_Z]).reshape(2, -1).sum(axis=1) / half - 1.0
+
+    solved = root(off, [5.0, 0.0], tol=1e-14)
+    if np.abs(solved.fun).max() > PRECISION:
+        raise RunFailed("wheelset", f"no height was found at which both wheels carry their load at y = {shift:g} m")
+    return found(solved.x)
+
+
+def steering_cones(wheelset: Wheelset, amplitude: float) -> Wheelset:
+    """The wheelset with the cones that steer as its profiles do at an amplitude (m): for ``models.rail.linear``."""
+    shifts = np.linspace(0.0, amplitude, SHIFTS + 1)
+    differences = np.array([0.0, *(-np.diff(held(wheelset, float(shift)).radii())[0] for shift in shifts[1:])])
+    return wheelset.coned(equivalent_conicity(shifts, differences, amplitude)).changed(profiles=None)
