@@ -1,0 +1,44 @@
+"""What a scene of hub forces will compute: printed by ``twinrig show``, checked before any run."""
+
+import numpy as np
+
+from models.engines.hub_forces import check_step
+from models.errors import InputError
+from models.hub_forces.rigid import rigid
+from models.hub_forces.scene import HubScene
+
+
+def check(scene: HubScene, engines: tuple[str, ...]) -> None:
+    """Everything that can be refused before a run is refused here, before any file is written."""
+    vehicle = scene.cut_vehicle()
+    check_step(engines[-1], vehicle, scene.run.step, scene.run.duration)
+    if scene.forces.frame == "inertial":
+        growth = float(rigid(vehicle).toppling().max()) / (2 * np.pi)
+        if scene.stabilise.bandwidth <= growth:
+            raise InputError(scene.file, "stabilise.bandwidth", scene.stabilise.bandwidth,
+                             f"must be above {growth:.3g} Hz: forces that keep their directions topple the vehicle so "
+                             "fast")
+    if scene.forces.file is not None:
+        scene.measured(vehicle)
+
+
+def describe(scene: HubScene) -> str:
+    """The scene's plan as text."""
+    vehicle, forces = scene.cut_vehicle(), scene.forces
+    own = rigid(vehicle)
+    source = f"file {forces.file}" if forces.file else f"virtual measurement at {forces.sampling_rate:g} Hz"
+    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"),
+             _line("vehicle", f"{vehicle.tree.name}: {vehicle.size} freedoms, {own.mass:.6g} kg, cut at "
+                              f"{', '.join(vehicle.hubs)}"),
+             _line("inside", f"{len(vehicle.elements)} springs, mounts and bars, in the chassis' axes"),
+             _line("forces", f"{source}, six per hub in the frame {forces.frame!r}, {forces.interpolation}"),
+             _line("noise", f"{forces.force_deviation:g} N and {forces.moment_deviation:g} N m on every sample")]
+    if scene.road is not None:
+        lines.append(_line("road", f"ISO 8608 class {scene.road.iso8608}, two independent tracks, seeds "
+                                   f"{scene.road.seed} and {scene.road.seed + 1}, {scene.road.speed:g} m/s"))
+    lines.append(_line("run", f"{scene.run.duration:g} s, Runge-Kutta 4, {scene.run.step:g} s"))
+    return "\n".join([*lines, _line("absent", "drag, tyres that roll, curves and friction of springs (not computed)")])
+
+
+def _line(head: str, text: str) -> str:
+    return f"  {head:<10} {text}"
