@@ -11,8 +11,9 @@ from validation.hard_cases.rolling import KINDS
 SPREAD = np.array([2e-3, 1e-4, 2e-4, 5e-3, 1.0, 0.05, 0.01, 0.05, 0.05, 1.0])
 SPREADABLE = ("mass", "spin_inertia", "yaw_inertia", "radius", "conicity", "head_radius", "stiffness_x", "stiffness_y",
               "stiffness_z", "damping_x", "damping_y", "damping_z", "friction", "flange_clearance")  # fmt: skip
-SAME = 1e-8
-"""Largest difference between the engines, SI. The written equations count the spin about the axle itself, engines that
+SAME, NUDGE, SENSITIVE = 1e-8, 1e-13, 100.0
+"""Largest difference between the engines, SI, but where wheels that bounce make more of rounding: the written equations
+do so too with a start moved by NUDGE of itself, and engines may differ by so many times that. The written equations count the spin about the axle itself, engines that
 against axes that do not spin: RK4 makes another error of each, so that these may differ by what halving the step does.
 """
 
@@ -26,11 +27,11 @@ def drawn(draw):
     return CHOSEN.changed(**values), speed, str(draw.choice(("linear", "fastsim"))), step, draw.normal(size=eq.STATES)
 
 
-def ended(kind, wheelset, speed, law, step, moved, parts=1):
-    """State after 0.1 s, None where that is refused or fails; ``parts`` : of each step."""
+def ended(kind, wheelset, speed, law, step, moved, parts=1, nudge=0.0):
+    """State after 0.1 s, None where that is refused or fails; parts : of each step; nudge : of the start."""
     try:
         own = kind(wheelset, speed, law, 7)
-        return own.run(own.rest + SPREAD * moved, 0.1, step / parts).states[-1]
+        return own.run((own.rest + SPREAD * moved) * (1.0 + nudge), 0.1, step / parts).states[-1]
     except (InputError, RunFailed):
         return None
 
@@ -46,7 +47,9 @@ def test_random_wheelsets_agree_or_fail_aloud(count):
         if not ends:
             continue
         done, (written, *engines) = done + 1, ends
-        assert np.ptp(engines, axis=0).max() < SAME, (i, given)
+        if (apart := np.ptp(engines, axis=0).max()) > SAME:
+            nudged = [ended(KINDS["reference"], *given, nudge=nudge) for nudge in (-NUDGE, NUDGE)]
+            assert apart < SENSITIVE * max(np.abs(end - written).max() for end in nudged), (i, given)
         if (apart := np.abs(written - engines[0]).max()) > SAME:
             half = ended(KINDS["reference"], *given, parts=2)
             assert apart < np.abs(written - half).max(), (i, given)
