@@ -138,8 +138,9 @@ def _answer(wheelset: Wheelset, linear: dict[str, Linear], paths: dict[str, dict
 
 def _waves(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
     """Klingel's wavelength by its closed form, and how far each implementation's lies from it."""
+    closed_form = "closed form of the cones, no slip" if wheelset.profiles else "closed form, no slip"
     closed, first = klingel(wheelset), next((one.wavelength for one in linear.values()), 0.0)
-    lines = ["  wavelength of the free wheelset", f"    {'closed form, no slip':<34}{closed:>14.9g} m",
+    lines = ["  wavelength of the free wheelset", f"    {closed_form:<34}{closed:>14.9g} m",
              f"    {'creep forces alone':<34}{kinematic_wavelength(wheelset):>14.9g} m"]  # fmt: skip
     for engine, one in linear.items():
         lines.append(f"    {f'eigenvalues of {engine}':<34}{one.wavelength:>14.9g} m   "
@@ -153,8 +154,8 @@ def _stability(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
     two, why = critical(wheelset, _two_motions)
     lines = ["  critical speed with linear creep", f"    {'lateral and yaw motion alone':<34}" + _speed(two, why)]
     first = next((one.critical for one in linear.values()), None)
-    return lines + [f"    {f'eigenvalues of {engine}':<34}" + _speed(one.critical, one.why, first)
-                    for engine, one in linear.items()]  # fmt: skip
+    return lines + [f"    {f'eigenvalues of {engine}':<34}" + _speed(one.critical, one.why, first if k else None)
+                    for k, (engine, one) in enumerate(linear.items())]  # fmt: skip
 
 
 def _two_motions(wheelset: Wheelset, speed: float) -> float:
