@@ -79,9 +79,9 @@ def criticals(wheelset: Wheelset, quick: bool) -> dict[str, float | None]:
     """Critical speed (m/s) of each implementation; None where there is none. Quick: engines look near the first."""
     found: dict[str, float | None] = {}
     for engine in IMPLEMENTATIONS:
-        of, first = partial(growth, implementation(engine), wheelset), found.get("reference")
+        of, first = partial(growth, implementation(engine)), found.get("reference")
         try:
-            found[engine] = _near(of, first) if quick and first else critical_speed(wheelset, lambda _, v, of=of: of(v))
+            found[engine] = _near(partial(of, wheelset), first) if quick and first else critical_speed(wheelset, of)
         except NoCriticalSpeed:
             found[engine] = None
     return found
