@@ -51,9 +51,14 @@ def build(engine: str, handling: Handling) -> FreeModel:
     """The vehicle in "exudyn" or "mujoco"."""
     if engine not in MODELS:
         raise InputError("", "engine", engine, "no such engine", tuple(MODELS))
-    driven = Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces)
-    found: FreeModel = getattr(import_module(f"models.engines.free_vehicle_{engine}"), MODELS[engine])(driven)
+    module = import_module(f"models.engines.free_vehicle_{engine}")
+    found: FreeModel = getattr(module, MODELS[engine])(driven_by(handling))
     return found
+
+
+def driven_by(handling: Handling) -> Driven:
+    """What an engine builds: the bodies, and the compiled forces with their table."""
+    return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces)
 
 
 def driven(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
@@ -86,9 +91,9 @@ def _check_step(h: Handling, run: SpatialRun, report: np.ndarray, engine: str) -
         damped = holds * stiffness * lightness / np.maximum(np.abs(own[:, at.TREAD]), SLOW)
         if step * damped.max() > LIMIT:
             row = int(np.argmax(step * damped > LIMIT))
-            raise RunFailed(engine, f"tyre {tyre.name!r} rolls so slowly that a step of {step:g} s is too long; use at "
-                                    f"most {0.9 * LIMIT / damped.max():.2g} s or end the run before",
-                            float(run.times[row]))  # fmt: skip
+            raise RunFailed(engine, f"tyre {tyre.name!r}, at {own[row, at.TREAD]:.3g} m/s, damps its wheel faster than "
+                                    f"steps of {step:g} s can follow; use at most {0.9 * LIMIT / damped.max():.2g} s, "
+                                    "or end the run before", float(run.times[row]))  # fmt: skip
 
 
 def energy(drive: Drive) -> np.ndarray:
