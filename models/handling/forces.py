@@ -22,6 +22,7 @@ from numba import carray
 from models.compiled import njit
 from models.contact.fastsim_many import LOAD, MU, A, B
 from models.contact.stack import at, beyond
+from models.handling.inputs import control, height
 from models.handling.tyre import FIRST, tyre_forces
 
 (COUNT, JOINTS, PARTS, TYRES, KNOTS, WAVES, CHASSIS, DRAG, DRAG_X, DRAG_Y, DRAG_Z, CELLS, STRIPS, MIDDLE, OF_PARTS,
@@ -48,35 +49,6 @@ angle (rad), torque on the wheel by brake and drive (N m)."""
 POTENTIAL, DISSIPATED, TORQUE_POWER, STEER_POWER, LEDGER = range(5)
 """Columns of the ledger: energy of springs and tyres (J); power (W) of dampers, friction, tyres' dampers and drag; of
 brakes and drive on wheels; of the steering on the wheels."""
-
-
-@njit(cache=True, error_model="numpy")
-def control(numbers, first, which, count, t):
-    """Value and rate of a control at a time (s): at rest at every knot, by the smoothest step of degree 5 between."""
-    knots = numbers[first + 2 * which * count :]
-    if t <= knots[0]:
-        return knots[count], 0.0
-    for i in range(1, count):
-        if t < knots[i]:
-            span, rise = knots[i] - knots[i - 1], knots[count + i] - knots[count + i - 1]
-            u = (t - knots[i - 1]) / span
-            grown = u * u * u * (10.0 - u * (15.0 - 6.0 * u))
-            return knots[count + i - 1] + rise * grown, rise * 30.0 * (u * (1.0 - u)) ** 2 / span
-    return knots[2 * count - 1], 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def height(waves, count, x, y):
-    """Height (m) of the road at a place (m) and its slopes along x and y: a sum of plane waves."""
-    z = along = across = 0.0
-    for i in range(0, 4 * count, 4):
-        phase = waves[i] * x + waves[i + 1] * y
-        cosine, sine = math.cos(phase), math.sin(phase)
-        z += waves[i + 2] * cosine + waves[i + 3] * sine
-        slope = waves[i + 3] * cosine - waves[i + 2] * sine
-        along += waves[i] * slope
-        across += waves[i + 1] * slope
-    return z, along, across
 
 
 @njit(cache=True, error_model="numpy")
