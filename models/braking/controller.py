@@ -1,0 +1,72 @@
+"""What stands at the port: a controller is asked once per sample, and answers with what its valves do."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+SAMPLE = 0.0055
+"""Time between two samples (s): the paper's, 182 a second."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What goes to the controller.
+
+    number : of the sample, from 0; time : ns since the start; wheels (W,) : wheel-speed signals times the wheel's
+    radius (m/s); brake : whether the switch at the pedal is closed; supply : pressure (bar); speed : of the vehicle
+    (m/s) if the scene gives it away, else not a number.
+    """
+
+    number: int
+    time: int
+    wheels: np.ndarray
+    brake: bool
+    supply: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class Command:
+    """What comes back: states (W,) of the valves, or pressures (W,) in bar instead."""
+
+    valves: np.ndarray | None = None
+    pressures: np.ndarray | None = None
+
+
+class Controller(Protocol):
+    """A controller, whatever it runs in."""
+
+    def sample(self, given: Sample) -> Command:
+        """Answer to one sample."""
+        ...
+
+
+@dataclass(frozen=True)
+class AllApplied:
+    """No anti-lock system: every valve stays open."""
+
+    wheels: int
+
+    def sample(self, given: Sample) -> Command:
+        """Apply."""
+        return Command(valves=np.full(self.wheels, 1 if given.brake else -1))
+
+
+@dataclass
+class SlipBangBang:
+    """Releases above a slip, applies below a lower one, and does between them what it did before."""
+
+    wheels: int
+    release: float = 0.15
+    apply: float = 0.08
+
+    def __post_init__(self) -> None:
+        self._valves = np.ones(self.wheels, dtype=np.int64)
+
+    def sample(self, given: Sample) -> Command:
+        """By the given speed of the vehicle."""
+        slip = 1.0 - given.wheels / max(given.speed, 0.1)
+        self._valves[slip > self.release] = -1
+        self._valves[slip < self.apply] = 1
+        return Command(valves=self._valves.copy())
