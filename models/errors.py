@@ -69,7 +69,11 @@ class RunFailed(RuntimeError):
     reason : what was found, as a phrase
     time : last time (s) with a good state, None if there is none
     state : the last good state, shape (8,) or None
+
+    ``partial`` is what the run had recorded until then, where its system keeps that.
     """
+
+    partial: Any = None
 
     def __init__(self, engine: str, reason: str, time: float | None = None, state: "np.ndarray | None" = None) -> None:
         self.engine, self.reason, self.time, self.state = engine, reason, time, state

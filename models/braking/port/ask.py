@@ -1,0 +1,58 @@
+"""One exchange with a controller: whatever it does wrong ends the run in one named error."""
+
+import math
+
+import numpy as np
+
+from models.braking.controller import Command, Controller, Sample
+from models.errors import RunFailed
+
+NAMES = ("crash", "silence", "wrong length", "wrong frame", "wrong number", "not a number", "no state of a valve",
+         "below zero")  # fmt: skip
+"""What a controller can do wrong: it raised, died or closed; did not answer in time; answered with too little or too
+much; what is no answer frame; to another sample; with what is no finite number; with a valve in none of
+-1, 0, 1; with a pressure below none."""
+
+
+class ControllerFailed(RunFailed):
+    """A controller did not answer, or not with what can be done. name : one of ``NAMES``; number : of the sample."""
+
+    def __init__(self, given: Sample, name: str, reason: str) -> None:
+        self.name, self.number = name, given.number
+        super().__init__("controller", f"sample {given.number}: {name}: {reason}", 1e-9 * given.time)
+
+
+def ask(controller: Controller, given: Sample) -> Command:
+    """A controller's answer, checked. Raises ControllerFailed, whatever the controller raises."""
+    try:
+        command = controller.sample(given)
+    except RunFailed:
+        raise
+    except Exception as error:
+        raise ControllerFailed(given, "crash", f"{type(error).__name__}: {error}") from error
+    return checked(command, given)
+
+
+def checked(command: Command, given: Sample) -> Command:
+    """The same answer if each wheel has one state of its valve or one pressure; raises ControllerFailed."""
+    if not isinstance(command, Command) or (command.valves is None) == (command.pressures is None):
+        raise ControllerFailed(given, "wrong frame", "needs either valves or pressures")
+    values = _array(command.pressures if command.valves is None else command.valves, given)
+    for value in values.tolist():
+        if not math.isfinite(value):
+            raise ControllerFailed(given, "not a number", f"{value:g} for a wheel")
+        if command.pressures is not None and value < 0.0:
+            raise ControllerFailed(given, "below zero", f"a pressure of {value:g} bar")
+        if command.valves is not None and value not in (-1, 0, 1):
+            raise ControllerFailed(given, "no state of a valve", f"{value:g} is none of -1, 0, 1")
+    return Command(pressures=values) if command.valves is None else Command(valves=values.astype(np.int64))
+
+
+def _array(values: object, given: Sample) -> np.ndarray:
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ControllerFailed(given, "wrong frame", str(error)) from None
+    if array.shape != given.wheels.shape:
+        raise ControllerFailed(given, "wrong length", f"{array.size} values for {given.wheels.size} wheels")
+    return array
