@@ -1,0 +1,106 @@
+"""Pressures in the brake chambers over one sample, and the torques that follow them in order.
+
+Mode V: the controller sets valves. A chamber then fills from the supply or empties to the air, each by a first-order
+law, exact over a step; a change of a valve takes effect after the valves' delay, also between two samples. The supply
+is a reservoir: what a chamber takes in, p V, it gives. Mode P: the controller sets the pressures themselves, as the
+paper measured them, and each is held over the sample.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from models.braking.brake import torque
+from models.compiled import njit
+from models.errors import InputError
+
+RELEASE, HOLD, APPLY = -1, 0, 1
+"""States of a valve."""
+NONE = np.zeros(0)
+
+
+class Chambers(NamedTuple):
+    """How chambers (W,) fill and empty: time constants (s) of their first-order pressure; supply pressure (bar).
+
+    volumes (W,) : of the chambers with their pistons out, and reservoir : of the supply, in litres; an infinite one
+    keeps its pressure and asks for no volumes. delay : of the valves (s).
+    """
+
+    fill: np.ndarray
+    empty: np.ndarray
+    supply: float
+    volumes: np.ndarray = NONE
+    reservoir: float = math.inf
+    delay: float = 0.0
+
+
+class Air(NamedTuple):
+    """What pressures go on from, all of it moved in place.
+
+    pressure, torque (W,) : bar, N m, with which the hysteresis remembers; supply (1,) : bar; commands (d + 2, W) :
+    states of the valves as they were commanded, the latest last, d the whole samples of the valves' delay.
+    """
+
+    pressure: np.ndarray
+    torque: np.ndarray
+    supply: np.ndarray
+    commands: np.ndarray
+
+
+def still(chambers: Chambers, sample: float) -> Air:
+    """No pressure anywhere but in the supply, all valves released; sample (s)."""
+    wheels = chambers.fill.size
+    if math.isfinite(chambers.reservoir) and chambers.volumes.size != wheels:
+        raise InputError("", "volumes", chambers.volumes.tolist(), f"a reservoir asks for those of {wheels} chambers")
+    rows = int(chambers.delay / sample) + 2
+    return Air(np.zeros(wheels), np.zeros(wheels), np.array([float(chambers.supply)]),
+               np.full((rows, wheels), RELEASE, dtype=np.int64))  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def chamber(pressure, valve, time, fill, empty, supply):
+    """Pressure (bar) of a chamber after a time (s) with its valve in a state."""
+    if valve == APPLY:
+        return supply + (pressure - supply) * math.exp(-time / fill)
+    return pressure * math.exp(-time / empty) if valve == RELEASE else pressure
+
+
+@njit(cache=True, error_model="numpy")
+def press(valves, time, air, chambers, brakes):
+    """Go on for a time (s) with valves (W,) as they are: no pressure turns back, so the torque law holds."""
+    taken = 0.0
+    for i in range(valves.size):
+        before = air.pressure[i]
+        after = chamber(before, valves[i], time, chambers.fill[i], chambers.empty[i], air.supply[0])
+        air.pressure[i], air.torque[i] = after, torque(i, after, air.torque[i], brakes)
+        if valves[i] == APPLY and chambers.reservoir < math.inf:
+            taken += chambers.volumes[i] * (after - before)
+    if taken > 0.0:
+        air.supply[0] -= taken / chambers.reservoir
+
+
+@njit(cache=True, error_model="numpy")
+def by_valves(valves, sample, air, chambers, brakes, torques):
+    """Mode V: fill ``torques`` (n + 1, W), those at the ends of the n steps of a sample (s)."""
+    steps = torques.shape[0] - 1
+    air.commands[:-1] = air.commands[1:]
+    air.commands[-1] = valves
+    late = chambers.delay - (air.commands.shape[0] - 2) * sample
+    step = sample / steps
+    torques[0] = air.torque
+    for n in range(steps):
+        wait = min(max(late - n * step, 0.0), step)
+        if wait > 0.0:
+            press(air.commands[0], wait, air, chambers, brakes)
+        if wait < step:
+            press(air.commands[1], step - wait, air, chambers, brakes)
+        torques[n + 1] = air.torque
+
+
+@njit(cache=True, error_model="numpy")
+def by_pressures(pressures, air, brakes, torques):
+    """Mode P: pressures (W,) in bar are there at once and stay for the sample; ``torques`` (n + 1, W) as above."""
+    for i in range(pressures.size):
+        air.pressure[i], air.torque[i] = pressures[i], torque(i, pressures[i], air.torque[i], brakes)
+    torques[:] = air.torque
