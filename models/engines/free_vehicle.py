@@ -1,22 +1,29 @@
 """A free vehicle in an engine: what is the same in every engine.
 
 The engine has the bodies, their joints and weights; all forces come from one compiled kernel of (numbers, time,
-positions, rates, forces), the last three pointers to doubles in the order of the vehicle's coordinates, as
-``models.handling.forces.forces`` is one. Both engines march by the classical Runge-Kutta method.
+positions, rates, forces), the last three pointers to doubles in the order of the vehicle's coordinates, as those
+of ``models.handling.forces`` and ``models.hub_forces.kernel`` are. Both engines march by the classical Runge-Kutta
+method.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, Protocol
+from importlib import import_module
+from typing import Any, ClassVar
 
 import numpy as np
 
+from models.engines.protocol import guard
 from models.engines.spatial_protocol import SpatialRun
+from models.errors import InputError
 from models.vehicles.spatial import SpatialVehicle
+
+MODELS = {"exudyn": "FreeExudyn", "mujoco": "FreeMujoco"}
 
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """vehicle : its bodies right before those that ride on them (``vehicles.free_vehicle``); gravity (3,) in m/s^2.
+    """vehicle : its bodies right before those that ride on them ; gravity (3,) in m/s^2.
 
     numbers : table of doubles that the kernel reads; kernel : compiled function that adds to the forces; block :
     compiled function of (address, time, n) that clears and fills the forces of a block f, q, v (n,) and numbers.
@@ -34,13 +41,31 @@ class Driven:
         return len(self.vehicle.coordinates())
 
 
-class FreeModel(Protocol):
+class FreeModel(ABC):
     """A free vehicle built in one engine."""
 
+    ENGINE: ClassVar[str]
+
+    @abstractmethod
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), positions and rates (n,)."""
-        ...
+
+    @abstractmethod
+    def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+        """Positions and rates (steps + 1, 2 n) from those at the start, (n,) each; RunFailed where the engine stops."""
 
     def run(self, q: np.ndarray, v: np.ndarray, duration: float, step: float) -> SpatialRun:
-        """March from positions and rates (n,); states at every step. RunFailed unless all of it is finite."""
-        ...
+        """March from positions and rates (n,); states at every step. RunFailed unless all of it is finite and sane."""
+        steps = round(duration / step)
+        states, times = self.march(q, v, steps, step), step * np.arange(steps + 1)
+        guard(self.ENGINE, times, states, steps * step)
+        positions, rates = np.split(states, 2, axis=1)
+        return SpatialRun(times, positions, rates, {"steps": steps, "force calls": 4 * steps})
+
+
+def free_model(engine: str, driven: Driven) -> FreeModel:
+    """The vehicle in "exudyn" or "mujoco"."""
+    if engine not in MODELS:
+        raise InputError("", "engine", engine, "no such engine", tuple(MODELS))
+    found: FreeModel = getattr(import_module(f"models.engines.free_vehicle_{engine}"), MODELS[engine])(driven)
+    return found

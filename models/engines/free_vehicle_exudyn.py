@@ -7,9 +7,8 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
-from models.engines.free_vehicle import Driven
+from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.spatial_exudyn_build import KINDS, Build, _tree, items
-from models.engines.spatial_protocol import SpatialRun
 from models.errors import RunFailed
 from models.vehicles.spatial_linear import Preloads
 
@@ -29,8 +28,10 @@ def user_function(driven: Driven) -> Callable[..., Any]:
     return forces
 
 
-class FreeExudyn:
+class FreeExudyn(FreeModel):
     """One free vehicle in one Exudyn system."""
+
+    ENGINE = "exudyn"
 
     def __init__(self, driven: Driven) -> None:
         self.driven, self._container = driven, exu.SystemContainer()
@@ -66,9 +67,9 @@ class FreeExudyn:
         solver.FinalizeSolver(self.mbs, options)
         return np.linalg.solve(mass, force)
 
-    def run(self, q: np.ndarray, v: np.ndarray, duration: float, step: float) -> SpatialRun:
-        """March by Exudyn's RK44; RunFailed where it stops or is not finite."""
-        options, steps = self._started(q, v), round(duration / step)
+    def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+        """Positions and rates (steps + 1, 2 n) by Exudyn's RK44; RunFailed where it stops."""
+        options = self._started(q, v)
         options.solution.sensors.active, options.solution.sensors.writePeriod = True, step
         ti = options.timeIntegration
         ti.numberOfSteps, ti.endTime, ti.verboseMode = steps, steps * step, 0
@@ -79,7 +80,4 @@ class FreeExudyn:
             if "KeyboardInterrupt" in str(error):
                 raise KeyboardInterrupt from error
             raise RunFailed("exudyn", f"the solver stopped: {str(error).strip().splitlines()[0]}") from error
-        positions, rates = (self.mbs.GetSensorStoredData(sensor)[:, 1:] for sensor in self._sensors)
-        if len(positions) != steps + 1 or not np.isfinite(positions).all() or not np.isfinite(rates).all():
-            raise RunFailed("exudyn", "the engine gave up")
-        return SpatialRun(step * np.arange(steps + 1), positions, rates, {"steps": steps, "force calls": 4 * steps})
+        return np.hstack([self.mbs.GetSensorStoredData(sensor)[:, 1:] for sensor in self._sensors])

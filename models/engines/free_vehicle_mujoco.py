@@ -8,11 +8,10 @@ import numpy as np
 from numba import carray, cfunc, types
 
 from models.engines.contact_bridge_mujoco import Marcher
-from models.engines.free_vehicle import Driven
+from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.mujoco_callback import _array_at, _double_at, installed
 from models.engines.mujoco_layout import check, offset
 from models.engines.spatial_mujoco import Numbers, _spec, _weigh
-from models.engines.spatial_protocol import SpatialRun
 
 
 @cache
@@ -29,15 +28,18 @@ def timed_law(kernel: Any) -> Any:
     return law
 
 
-class FreeMujoco:
+class FreeMujoco(FreeModel):
     """One free vehicle in one MuJoCo model; the callback's numbers lie in the model."""
+
+    ENGINE = "mujoco"
 
     def __init__(self, driven: Driven) -> None:
         self.driven, numbers = driven, driven.numbers
         spec = _spec(driven.vehicle, 1e-3)
         spec.option.gravity = driven.gravity
-        spec.add_numeric(name="vehicle", size=numbers.size, data=numbers)
+        spec.add_numeric(name="vehicle", size=numbers.size, data=[0.0])
         self.model = spec.compile()
+        self.model.numeric_data[:] = numbers
         own = Numbers(driven.vehicle, self.model)
         if not np.array_equal(own.columns, np.arange(driven.size)):
             raise ValueError("the bodies are not in the order of a walk through their tree")
@@ -53,10 +55,8 @@ class FreeMujoco:
             mujoco.mj_forward(self.model, self.data)
         return self.data.qacc.copy()
 
-    def run(self, q: np.ndarray, v: np.ndarray, duration: float, step: float) -> SpatialRun:
-        """March by MuJoCo's RK4; RunFailed where it starts again or is not finite."""
-        self.model.opt.timestep, start, steps = step, np.concatenate((q, v)), round(duration / step)
+    def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+        """Positions and rates (steps + 1, 2 n) by MuJoCo's RK4; RunFailed where it gives up."""
+        self.model.opt.timestep, start = step, np.concatenate((q, v))
         with installed(self.law):
-            states = np.vstack((start, Marcher(self.model).run(start[None], steps)[0]))
-        positions, rates = np.split(states, 2, axis=1)
-        return SpatialRun(step * np.arange(steps + 1), positions, rates, {"steps": steps, "force calls": 4 * steps})
+            return np.vstack((start, Marcher(self.model).run(start[None], steps)[0]))

@@ -1,21 +1,20 @@
 """A vehicle cut at its wheels in an engine: what is the same in every one.
 
-The engine has bodies, joints and weights, and integrates; springs, hub forces and stabilisers act by the compiled
-forces of ``hub_forces.kernel`` as its callback. The reference solves the written-out equations instead.
+In an engine it is a free vehicle (``free_vehicle``), of which springs, hub forces and stabilisers are the compiled
+forces of ``hub_forces.kernel``. The reference solves the written-out equations instead.
 """
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from importlib import import_module
-from typing import ClassVar
 
 import numpy as np
 
+from models.engines.free_vehicle import Driven, free_model
 from models.engines.protocol import Settings, guard
 from models.engines.spatial_protocol import _check_step
 from models.errors import Refused, RunFailed
 from models.hub_forces.cut_vehicle import PITCH, CutVehicle
-from models.hub_forces.kernel import GRAVITY, WRENCH, forces, parts
+from models.hub_forces.kernel import GRAVITY, WRENCH, forces, joint_forces, parts, set_joint_forces
 from models.hub_forces.mechanics import PER_MOTION, inertia
 from models.hub_forces.table import Drive, table
 from models.steps import divides, fitting
@@ -45,16 +44,14 @@ class HubRun:
 class HubModel(ABC):
     """A driven cut vehicle in one engine, to be marched over ``steps`` steps of ``step`` (s) by Runge-Kutta 4."""
 
-    ENGINE: ClassVar[str]
-
-    def __init__(self, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> None:
+    def __init__(self, engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> None:
         """Refused where the step does not divide the duration or the inputs are not one row per half step."""
         if not divides(step, duration):
-            raise Refused(self.ENGINE, f"the step {step:g} s does not divide the duration {duration:g} s; use for "
+            raise Refused(engine, f"the step {step:g} s does not divide the duration {duration:g} s; use for "
                                        f"example {fitting(step, duration)} s")
-        self.vehicle, self.step, self.steps = vehicle, step, round(duration / step)
-        _check(self.ENGINE, vehicle, drive, 2 * self.steps + 1)
-        check_step(self.ENGINE, vehicle, step, duration)
+        self.engine, self.vehicle, self.step, self.steps = engine, vehicle, step, round(duration / step)
+        _check(engine, vehicle, drive, 2 * self.steps + 1)
+        check_step(engine, vehicle, step, duration)
         self.numbers, self.size = table(vehicle, drive, step), vehicle.size
 
     @abstractmethod
@@ -70,11 +67,11 @@ class HubModel(ABC):
         first = np.zeros(2 * self.size) if start is None else start
         states = self.marched(*np.split(first, 2))
         times = self.step * np.arange(len(states))
-        guard(self.ENGINE, times, states, self.steps * self.step)
+        guard(self.engine, times, states, self.steps * self.step)
         tumbled = np.abs(states[:, PITCH]) > UPRIGHT
         if tumbled.any():
             at = int(np.argmax(tumbled))
-            raise RunFailed(self.ENGINE, f"the vehicle pitches by more than {UPRIGHT} rad", times[at], states[at])
+            raise RunFailed(self.engine, f"the vehicle pitches by more than {UPRIGHT} rad", times[at], states[at])
         return self.reported(times, states)
 
     def reported(self, times: np.ndarray, states: np.ndarray) -> HubRun:
@@ -110,8 +107,6 @@ def _check(engine: str, vehicle: CutVehicle, drive: Drive, rows: int) -> None:
 class ReferenceHubs(HubModel):
     """The written-out equations."""
 
-    ENGINE = "reference"
-
     def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) from the mass matrix of ``mechanics``."""
         head, joints, bodies, *_ = parts(self.numbers)
@@ -136,8 +131,24 @@ class ReferenceHubs(HubModel):
         return states
 
 
+class EngineHubs(HubModel):
+    """The cut vehicle in Exudyn or MuJoCo: ``model`` is the free vehicle there."""
+
+    def __init__(self, engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> None:
+        super().__init__(engine, vehicle, drive, step, duration)
+        weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
+        self.model = free_model(engine, Driven(vehicle.tree, weight, self.numbers, joint_forces, set_joint_forces))
+
+    def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (n,) by the engine."""
+        return self.model.acceleration(time, q, v)
+
+    def marched(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Coordinates and rates (steps + 1, 2 n) by the engine's Runge-Kutta 4; RunFailed where it stops."""
+        return self.model.march(q, v, self.steps, self.step)
+
+
 def build(engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> HubModel:
     """A driven cut vehicle in "reference", "exudyn" or "mujoco"; step and duration in s. Raises Refused."""
-    if engine == "reference":
-        return ReferenceHubs(vehicle, drive, step, duration)
-    return import_module(f"models.engines.hub_forces_{engine}").MODEL(vehicle, drive, step, duration)
+    kind = ReferenceHubs if engine == "reference" else EngineHubs
+    return kind(engine, vehicle, drive, step, duration)

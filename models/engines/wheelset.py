@@ -13,7 +13,6 @@ import numpy as np
 from models.errors import RunFailed
 from models.rail.equations import LEAN, LIMIT, ROLL, STATES, YAW, Equations, Path, Y, Z, rates
 from models.rail.joint_forces import JOINTS, from_joints, rates_of, to_joints
-from models.rail.wheelset import Wheelset
 
 
 def leaning(weight: float, body: np.ndarray) -> np.ndarray:
@@ -53,8 +52,3 @@ class EngineWheelset(Equations, ABC):
         found = Path(np.arange(len(kept)) * step * every, kept, contacts)
         self._check_loads(found, step, self.ENGINE)
         return found
-
-    @classmethod
-    def growth(cls, wheelset: Wheelset, speed: float) -> float:
-        """Largest real part (1/s) of the eigenvalues with linear creep, for ``linear.critical_speed``."""
-        return float(np.linalg.eigvals(cls(wheelset, speed, "linear").state_matrix).real.max())

@@ -1,13 +1,12 @@
 """A manoeuvre in an engine, and what is read of it: tyres, energies, motion in the vehicle's own axes."""
 
 from dataclasses import dataclass
-from importlib import import_module
 
 import numpy as np
 
-from models.engines.free_vehicle import Driven, FreeModel
+from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.spatial_protocol import SpatialRun
-from models.errors import InputError, RunFailed
+from models.errors import RunFailed
 from models.handling import forces as at
 from models.handling.numbers import GRAVITY, Handling
 from models.handling.tyre import SLOW
@@ -16,7 +15,6 @@ from models.vehicles.spatial import FREEDOMS
 
 LIMIT = 2.78
 """Step times rate up to which the classical Runge-Kutta method damps what is damped."""
-MODELS = {"exudyn": "FreeExudyn", "mujoco": "FreeMujoco"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +47,7 @@ class Drive:
 
 def build(engine: str, handling: Handling) -> FreeModel:
     """The vehicle in "exudyn" or "mujoco"."""
-    if engine not in MODELS:
-        raise InputError("", "engine", engine, "no such engine", tuple(MODELS))
-    module = import_module(f"models.engines.free_vehicle_{engine}")
-    found: FreeModel = getattr(module, MODELS[engine])(driven_by(handling))
-    return found
+    return free_model(engine, driven_by(handling))
 
 
 def driven_by(handling: Handling) -> Driven:

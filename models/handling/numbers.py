@@ -23,8 +23,8 @@ class Tyres:
 
     friction : mu; half_width : of the patch (m); inclination : of the wheels of the left side about their forward
     axis (rad), the right side's mirrored; cells : of the patch's net per strip; spin_inertia : of a wheel about its
-    axle (kg m^2); fixed : tyres whose wheels do not spin; brake_rate : spin beside the chassis (rad/s) at which a
-    brake's torque is whole (within 24 %, by tanh).
+    axle (kg m^2), chosen; fixed : tyres whose wheels do not spin; brake_rate : spin beside the chassis (rad/s) at which
+    a brake's torque is whole (within 24 %, by tanh).
     """
 
     friction: float = 0.9

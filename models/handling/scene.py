@@ -35,7 +35,7 @@ class TyreTable(Strict):
     inclination: float = quantity("rad", "of the left wheels about their forward axis; the right ones mirrored",
                                   default=0.0, signed=True)  # fmt: skip
     cells: int = Field(default=21, ge=3, le=200, description="of the patch's net, per strip")
-    spin_inertia: float = quantity("kg m^2", "of a wheel about its axle", default=1.7)
+    spin_inertia: float = quantity("kg m^2", "of a wheel about its axle, chosen", default=1.7)
     brake_rate: float = quantity("rad/s", "spin from which a brake's torque is whole", default=1.0)
 
 

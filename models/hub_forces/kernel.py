@@ -9,6 +9,7 @@ import numpy as np
 from numba import carray
 
 from models.compiled import njit
+from models.contact.stack import at, beyond
 from models.hub_forces.cut_vehicle import HEADING, PITCH, ROLL
 from models.hub_forces.mechanics import (
     PARENT,
@@ -169,9 +170,17 @@ def forces(numbers, t, q, v, m, out, inside, wrenches, moments):
 
 
 @njit(cache=True, error_model="numpy")
-def joint_forces(numbers, time, q, v, f):
-    """Add the joints' forces to ``f``; all five are pointers to doubles: the table, the time (s), and n of each."""
+def joint_forces(numbers, t, q, v, f):
+    """Add the joints' forces to ``f``, for callbacks: all but the time (s) are pointers to doubles."""
     head = carray(numbers, (HEADER,))
     n, e, h = int(head[JOINTS]), int(head[ELEMENTS]), int(head[HUBS])
-    forces(carray(numbers, (int(head[ALL]),)), time[0], carray(q, (n,)), carray(v, (n,)),
+    forces(carray(numbers, (int(head[ALL]),)), t, carray(q, (n,)), carray(v, (n,)),
            np.empty((n + 1, PER_MOTION)), carray(f, (n,)), np.empty(e), np.empty((h, WRENCH)), np.empty(2))
+
+
+@njit(cache=True, error_model="numpy")
+def set_joint_forces(block, t, n):
+    """``joint_forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    f = at(block)
+    carray(f, (n,))[:] = 0.0
+    joint_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

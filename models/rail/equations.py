@@ -254,8 +254,3 @@ def slopes(rates: Callable[[np.ndarray], np.ndarray], state: np.ndarray) -> np.n
         some = [rates(state + part * MOVED[k] * np.eye(STATES)[k]) for part in (-2.0, -1.0, 1.0, 2.0)]
         columns.append((some[0] - 8.0 * some[1] + 8.0 * some[2] - some[3]) / (12.0 * MOVED[k]))
     return np.delete(np.delete(np.array(columns).T, ANGLE, 0), ANGLE, 1)
-
-
-def growth(wheelset: Wheelset, speed: float) -> float:
-    """Largest real part (1/s) of the eigenvalues with linear creep, for ``linear.critical_speed``."""
-    return float(np.linalg.eigvals(Equations(wheelset, speed, "linear").state_matrix).real.max())

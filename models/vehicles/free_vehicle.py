@@ -14,12 +14,13 @@ from dataclasses import replace
 import numpy as np
 
 from models.errors import InputError
-from models.vehicles.spatial import FREEDOMS, AntiRollBar, Body, SpatialVehicle, Vector
+from models.vehicles.spatial import FREEDOMS, AntiRollBar, Body, Freedom, SpatialVehicle, Vector
 
 CARRIER, SWAY, ROTOR = "carrier", "sway", "rotor"
 SPECK = 1e-9
 """Mass (kg) of a rotor: Exudyn divides by the mass of whatever has inertia."""
-PLANE, REST = ("x", "y", "rz"), ("z", "rx", "ry")
+PLANE: tuple[Freedom, ...] = ("x", "y", "rz")
+REST: tuple[Freedom, ...] = ("z", "rx", "ry")
 
 
 def free_vehicle(vehicle: SpatialVehicle, gravity: float = 9.81, spin_inertia: float = 0.0,

@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 from scipy.stats import chi2
 
-from models.engines.hub_forces import ENGINES, HubRun, build
-from models.engines.hub_forces_mujoco import MujocoHubs
+from models.engines.free_vehicle_mujoco import FreeMujoco
+from models.engines.hub_forces import ENGINES, EngineHubs, HubModel, HubRun, build
 from models.engines.spatial_reference import SpatialReference
 from models.errors import InputError
 from models.hub_forces.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut
@@ -120,23 +120,26 @@ def _wrenches(vehicle: CutVehicle) -> Row:
     (q, _), worst = _anywhere(vehicle, 3), 0.0
     for frame in ("hub", "inertial"):
         drive = _shaken(vehicle, frame, guide=False)
-        built, bare = (MujocoHubs(vehicle, replace(drive, hubs=f * drive.hubs), STEP, STEP) for f in (1.0, 0.0))
+        built, bare = (EngineHubs("mujoco", vehicle, replace(drive, hubs=part * drive.hubs), STEP, STEP)
+                       for part in (1.0, 0.0))  # fmt: skip
         own = _forces(built, q) - _forces(bare, q)
-        data, other = mujoco.MjData(built.model), np.zeros(vehicle.size)
+        assert isinstance(built.model, FreeMujoco)
+        model = built.model.model
+        data, other = mujoco.MjData(model), np.zeros(vehicle.size)
         data.qpos[:] = q
-        mujoco.mj_kinematics(built.model, data)
-        mujoco.mj_comPos(built.model, data)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
         for tyre, wrench in zip(vehicle.whole.tyres, drive.hubs[0].reshape(-1, 2, 3), strict=True):
             number = [body.name for body in vehicle.tree.bodies].index(tyre.body)
-            body = int(built.model.body(str(number)).id)
+            body = int(model.body(str(number)).id)
             force, moment = wrench if frame == "inertial" else wrench @ data.xmat[body].reshape(3, 3).T
-            mujoco.mj_applyFT(built.model, data, force, moment, data.xpos[body], body, other)
+            mujoco.mj_applyFT(model, data, force, moment, data.xpos[body], body, other)
         worst = max(worst, float(np.abs(own - other).max() / np.abs(other).max()))
     return at_most("hub_forces.wrenches", SYSTEM, "joint forces of six components per hub in two frames beside "
                    "MuJoCo's own Jacobians, relative", worst, "1", 1e-12, "places, axes, frames", "native")  # fmt: skip
 
 
-def _forces(built: MujocoHubs, q: np.ndarray) -> np.ndarray:
+def _forces(built: HubModel, q: np.ndarray) -> np.ndarray:
     """Joint forces (n,) of the kernel at rest."""
     work = built.work()
     forces(built.numbers, 0.0, q, np.zeros(len(q)), *work)
