@@ -212,9 +212,9 @@ def _study(scene: Any) -> Any:
     return module
 
 
-NOT_STUDIES = ("__init__", "command_line", "contact_figures", "figures", "folders", "handling_figures",
-               "hub_forces_figures", "manchester_figure", "ride_figures", "ride_nonlinear_figures",
-               "stabiliser_figures", "virtual_measurement", "wheelset_figures")  # fmt: skip
+NOT_STUDIES = ("__init__", "braking_figures", "command_line", "contact_figures", "figures", "folders",
+               "handling_figures", "hub_forces_figures", "manchester_figure", "ride_figures",
+               "ride_nonlinear_figures", "stabiliser_figures", "virtual_measurement", "wheelset_figures")  # fmt: skip
 
 
 @contextmanager

@@ -1,0 +1,124 @@
+"""From a scene of braking to a vehicle on its road, ready to run."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from models.braking.brake import Brake, of_wheels
+from models.braking.controller import AllApplied, Controller, SlipBangBang
+from models.braking.magic_formula import SURFACES, surface
+from models.braking.plane_vehicle import PAPER, Truck, truck
+from models.braking.pressure import Chambers
+from models.braking.run import Braked
+from models.braking.scene import BrakeTable, BrakingScene, Procedure, Stretch
+from models.braking.surfaces import Road, road
+from models.braking.surfaces import Stretch as Numbered
+from models.braking.tyre_table import TyreTable, stacked
+from models.errors import InputError
+from models.scene_file import parse
+from models.strict import read
+
+CONTROLLERS = {"none": AllApplied, "slip_bang_bang": SlipBangBang}
+"""What ``controller.kind`` names."""
+
+
+def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
+    """The scene's vehicle with its brakes on the road of a procedure; InputError for what does not fit together."""
+    plane = truck(vehicle_of(scene), transfer=scene.load_transfer is not None)
+    names = surfaces_of(scene, procedure)
+    tyres = [table_of(scene, name) for name in names]
+    front, rear = (brake_of(scene, axle) for axle in ("front", "rear"))
+    return Braked(
+        plane=plane, kind=np.zeros(plane.wheels, dtype=np.int64), tables=stacked(tyres),
+        slope=max(table.cornering for table in tyres), road=road_of(scene, procedure, names),
+        brakes=of_wheels(front, front, rear, rear), chambers=chambers_of(scene, plane.wheels),
+        steer=np.zeros(plane.wheels), substeps=scene.run.substeps, sample=scene.run.sample,
+        speed_given=scene.controller.true_speed,
+    )  # fmt: skip
+
+
+def vehicle_of(scene: BrakingScene) -> Truck:
+    """Parameters of the scene's vehicle with what the scene overrides."""
+    name, file = scene.vehicle.parameters, scene.file
+    if name.endswith(".toml"):
+        path = scene.path(name, "vehicle.parameters")
+        table, file = parse(path), path.name
+        vehicle = read(Truck, table, file)
+    elif name == "paper":
+        vehicle = PAPER
+    else:
+        raise InputError(file, "vehicle.parameters", name, "no such set; a file of your own ends in .toml", ("paper",))
+    if scene.vehicle.override:
+        changed = _merged(vehicle.model_dump(), scene.vehicle.override)
+        vehicle = read(Truck, changed, scene.file, "vehicle.override")
+    if scene.load_transfer is not None and "front" in scene.load_transfer.model_fields_set:
+        share = scene.load_transfer.front
+        parts = {"front": {"roll_share": share}, "rear": {"roll_share": 1.0 - share}}
+        vehicle = Truck(**_merged(vehicle.model_dump(), parts))
+    return vehicle
+
+
+def _merged(base: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested tables with some of their values changed."""
+    merged = dict(base)
+    for key, value in changes.items():
+        inner = base.get(key)
+        merged[key] = _merged(inner, value) if isinstance(inner, dict) and isinstance(value, Mapping) else value
+    return merged
+
+
+def sides(procedure: Procedure, stretch: Stretch) -> tuple[str, str]:
+    """Surfaces left and right of the line on a stretch, as the procedure has them."""
+    return stretch.left, procedure.right or stretch.right or stretch.left
+
+
+def surfaces_of(scene: BrakingScene, procedure: Procedure) -> list[str]:
+    """Names of all surfaces under a procedure, each once."""
+    return list(dict.fromkeys(name for stretch in scene.road.stretches for name in sides(procedure, stretch)))
+
+
+def road_of(scene: BrakingScene, procedure: Procedure, names: list[str]) -> Road:
+    """Road of a procedure, its surfaces by their places in ``names``."""
+    stretches = [Numbered(s.x, *(names.index(name) for name in sides(procedure, s))) for s in scene.road.stretches]
+    try:
+        return road(stretches, scene.road.line)
+    except InputError as error:
+        raise InputError(scene.file, "road.stretches", error.value, error.allowed) from None
+
+
+def table_of(scene: BrakingScene, name: str) -> TyreTable:
+    """Tyre table of a surface, its friction scaled as the scene says."""
+    if name not in SURFACES:
+        raise InputError(scene.file, "road.stretches", name, "no such surface", tuple(SURFACES))
+    scale = scene.tyres.scale.get(name, 1.0)
+    if not 0.0 < scale <= 2.0:
+        raise InputError(scene.file, f"tyres.scale.{name}", scale, "must be above 0 and at most 2")
+    return surface(name, scale)
+
+
+def brake_of(scene: BrakingScene, axle: str) -> Brake:
+    """Brake of one axle's wheels."""
+    own: BrakeTable = getattr(scene.brakes, axle)
+    return read(Brake, {
+        "push_out": own.push_out, "release": own.push_out if own.release is None else own.release,
+        "rising": own.gradient, "falling": own.gradient if own.falling is None else own.falling,
+    }, scene.file, f"brakes.{axle}")  # fmt: skip
+
+
+def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
+    """Chambers of all wheels; without dynamics their time constants are zero."""
+    own = scene.pressure
+    fill, empty = (0.0, 0.0) if own is None else (own.fill, own.empty)
+    return Chambers(np.full(wheels, fill), np.full(wheels, empty), scene.brakes.supply)
+
+
+def controller_of(scene: BrakingScene, wheels: int) -> Controller:
+    """The controller that the scene names, fresh for one run."""
+    kind = scene.controller.kind
+    if kind not in CONTROLLERS:
+        raise InputError(scene.file, "controller.kind", kind, "no such controller", tuple(CONTROLLERS))
+    try:
+        return CONTROLLERS[kind](wheels, **scene.controller.parameters)
+    except TypeError as error:
+        raise InputError(scene.file, "controller.parameters", scene.controller.parameters, str(error)) from None

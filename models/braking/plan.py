@@ -1,0 +1,54 @@
+"""What a scene of braking will compute: printed by ``twinrig show``, checked before any run."""
+
+from models.braking.of_scene import braked, controller_of, surfaces_of, vehicle_of
+from models.braking.scene import BrakingScene
+
+PROCEDURES = {
+    "straight": "straight braking",
+    "split": "straight braking on split friction, wheels straight ahead",
+    "turn": "braking in a turn, steering fixed as on the steady circle before",
+    "j_turn": "J-turn: the steering is turned and held as the brake is applied",
+}
+
+
+def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
+    """Everything that can be refused before a run is refused here, before any file is written."""
+    for procedure in scene.procedures.values():
+        controller_of(scene, braked(scene, procedure).plane.wheels)
+
+
+def describe(scene: BrakingScene) -> str:
+    """The scene's plan as text: vehicle, road, brakes, controller, procedure, effects and what is not computed."""
+    vehicle, run = vehicle_of(scene), scene.run
+    axles = (vehicle.front.x, vehicle.rear.x)
+    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
+    lines += [_line("vehicle", f"{scene.vehicle.parameters}: {vehicle.mass:g} kg, {vehicle.yaw_inertia:g} kg m^2, "
+                    f"axles at {axles[0]:g} and {axles[1]:g} m, wheels of {vehicle.front.radius:g} m; plane motion, "
+                    "wheels turn")]  # fmt: skip
+    lines += [_line("brakes", f"supply {scene.brakes.supply:g} bar")]
+    lines += [_line("controller", f"{scene.controller.kind}, every {1e3 * run.sample:g} ms")]
+    for name, own in scene.procedures.items():
+        names = ", ".join(surfaces_of(scene, own))
+        lines += [_line(name, f"{PROCEDURES[own.kind]}, from {own.speed:g} m/s on {names}")]
+    lines += [_line("step", f"{1e3 * run.sample / run.substeps:g} ms, {run.substeps} to a sample; order two, wheels "
+                    "exact within it")]  # fmt: skip
+    there, absent = effects(scene)
+    lines += [_line("effects", ", ".join(there) or "none")]
+    return "\n".join([*lines, _line("absent", ", ".join(absent) + " (not computed)")])
+
+
+def effects(scene: BrakingScene) -> tuple[list[str], list[str]]:
+    """Effects that the scene names, and those that it does not."""
+    brakes = (scene.brakes.front, scene.brakes.rear)
+    present = {
+        "load transfer": scene.load_transfer is not None,
+        "push-out": any(brake.push_out > 0.0 for brake in brakes),
+        "hysteresis": any(brake.release is not None or brake.falling is not None for brake in brakes),
+        "pressure dynamics": scene.pressure is not None,
+        "anti-lock system": scene.controller.kind != "none",
+    }
+    return [name for name, there in present.items() if there], [name for name, there in present.items() if not there]
+
+
+def _line(head: str, text: str) -> str:
+    return f"  {head:<10} {text}"

@@ -1,0 +1,152 @@
+"""Scenes of braking: a vehicle, the road under its tyres, brakes, a controller in the loop, and a test procedure."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from models.braking.controller import SAMPLE
+from models.errors import InputError
+from models.scene_file import SceneFile, checked
+from models.strict import Strict, quantity
+
+LARGEST_SPEED = 100.0
+"""m/s; no road vehicle brakes from more."""
+Procedures = Literal["straight", "split", "turn", "j_turn"]
+
+
+class VehicleTable(Strict):
+    """[vehicle]: mass, place of the axles, wheels."""
+
+    parameters: str = Field(default="paper", description="paper, or a TOML file with every parameter")
+    override: dict[str, Any] = Field(default_factory=dict, description="parameters that are changed")
+
+
+class LoadTransfer(Strict):
+    """[load_transfer]: semi-static, from the accelerations of the body; not named, loads stay as they are at rest."""
+
+    front: float = Field(default=0.3, ge=0.0, le=1.0, description="share of the front axle in that of cornering")
+
+
+class Stretch(Strict):
+    """One of [[road.stretches]]: surfaces from x on."""
+
+    x: float = quantity("m", "where it begins; the first also holds before", default=0.0, signed=True)
+    left: str = Field(description="surface left of the line")
+    right: str | None = Field(default=None, description="surface right of it, if it is another one")
+
+
+class RoadTable(Strict):
+    """[road]: stretches along x, each with its surfaces left and right of a line."""
+
+    stretches: list[Stretch] = Field(default=[Stretch(left="ice")], min_length=1, description="along the road")
+    line: float = quantity("m", "y of the line between left and right", default=0.0, signed=True)
+
+
+class TyreTables(Strict):
+    """[tyres]: friction of the surfaces."""
+
+    scale: dict[str, float] = Field(default_factory=dict, description="factor on the friction of a surface")
+
+
+class BrakeTable(Strict):
+    """[brakes.front], [brakes.rear]: torque by pressure, a straight line where no more is said."""
+
+    gradient: float = quantity("N m/bar", "of the torque while pressure rises")
+    push_out: float = quantity("bar", "pressure above which torque rises from none", default=0.0, zero=True)
+    release: float | None = quantity("bar", "pressure at which a falling torque ends; push_out if not said",
+                                     default=None, zero=True)  # fmt: skip
+    falling: float | None = quantity("N m/bar", "gradient while pressure falls; as rising if not said", default=None)
+
+
+class BrakesTable(Strict):
+    """[brakes]: of each axle, and the pressure that the pedal lets through."""
+
+    front: BrakeTable = BrakeTable(gradient=1500.0)
+    rear: BrakeTable = BrakeTable(gradient=1200.0)
+    supply: float = quantity("bar", "pressure at the valves", default=6.0)
+
+
+class PressureTable(Strict):
+    """[pressure]: first-order chambers; not named, they follow their valves at once."""
+
+    fill: float = quantity("s", "time constant of filling", default=0.15)
+    empty: float = quantity("s", "time constant of emptying", default=0.1)
+
+
+class ControllerTable(Strict):
+    """[controller]: what is in the loop; its parameters are checked by itself."""
+
+    kind: str = Field(default="none", description="none, or the name of a controller")
+    parameters: dict[str, Any] = Field(default_factory=dict, description="of the controller")
+    true_speed: bool = Field(default=True, description="the vehicle's speed is given to it")
+
+
+class Procedure(Strict):
+    """[procedures.NAME]: what the driver does. Left is positive."""
+
+    kind: Procedures = Field(default="straight", description="straight, split, turn or j_turn")
+    speed: float = quantity("m/s", "at which the brake is applied", default=11.11)
+    right: str | None = Field(default=None, description="surface right of the line on every stretch (split)")
+    steer: float | None = quantity("rad", "fixed angle of the front wheels (j_turn)", default=None, signed=True)
+    radius: float | None = quantity("m", "of the steady circle before braking (turn)", default=None, signed=True)
+
+
+class RunTable(Strict):
+    """[run]."""
+
+    sample: float = quantity("s", "time between two exchanges with the controller", default=SAMPLE)
+    substeps: int = Field(default=4, ge=1, le=1000, description="steps of the vehicle within a sample")
+    duration: float = quantity("s", "after which a run ends that does not stop", default=60.0)
+
+
+class BrakingScene(SceneFile):
+    """One scene of braking; tables that are effects are None where the scene does not name them."""
+
+    system: Literal["braking"] = "braking"
+    study: str = Field(default="braking", description="the study that runs the scene")
+    vehicle: VehicleTable = VehicleTable()
+    load_transfer: LoadTransfer | None = Field(default=None, description="semi-static load transfer")
+    road: RoadTable = RoadTable()
+    tyres: TyreTables = TyreTables()
+    brakes: BrakesTable = BrakesTable()
+    pressure: PressureTable | None = Field(default=None, description="dynamics of the chambers")
+    controller: ControllerTable = ControllerTable()
+    procedures: dict[str, Procedure] = Field(min_length=1, description="driven one by one, a table each")
+    run: RunTable = RunTable()
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> BrakingScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(BrakingScene, table, file, folder)
+    for name, own in scene.procedures.items():
+        _check_procedure(own, scene.file, f"procedures.{name}")
+    _check_run(scene)
+    return scene
+
+
+READ = {"straight": (), "split": ("right",), "turn": ("radius",), "j_turn": ("steer",)}
+"""Keys that a procedure reads beside its speed; it needs each of them."""
+
+
+def _check_procedure(own: Procedure, file: str, place: str) -> None:
+    if own.speed > LARGEST_SPEED:
+        raise InputError(file, f"{place}.speed", own.speed, f"must be at most {LARGEST_SPEED:g} m/s")
+    for key in ("right", "steer", "radius"):
+        value = getattr(own, key)
+        if value is not None and key not in READ[own.kind]:
+            raise InputError(file, f"{place}.{key}", value, f"has no meaning for {own.kind}")
+        if value is None and key in READ[own.kind]:
+            raise InputError(file, f"{place}.{key}", None, f"is missing: {own.kind} needs it")
+    if own.steer is not None and abs(own.steer) > 1.0:
+        raise InputError(file, f"{place}.steer", own.steer, "must be at most 1 rad, of either sign")
+    if own.radius is not None and abs(own.radius) < 10.0:
+        raise InputError(file, f"{place}.radius", own.radius, "must be at least 10 m, of either sign")
+
+
+def _check_run(scene: BrakingScene) -> None:
+    if not 1e-4 <= scene.run.sample <= 0.1:
+        raise InputError(scene.file, "run.sample", scene.run.sample, "must be from 0.0001 to 0.1 s")
+    if scene.run.duration > 1000.0:
+        raise InputError(scene.file, "run.duration", scene.run.duration, "must be at most 1000 s")

@@ -1,0 +1,99 @@
+"""A stop in the paper's terms: distances, turning, decelerations, and of each wheel slips, locks and pressures.
+
+Source: the tables beside Figs 2 and 3 of G. Palmkvist and O. Nordstrom, A hybrid laboratory test method for anti-lock
+systems. Both decelerations are given that may be called mean: v0^2 / 2d and v0 / T differ by a few per cent.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.braking.figures_of_merit import Locks, equivalent_deceleration, lock_table, mean_fully_developed
+from models.braking.plane_step import LOCKED, SLIP
+from models.braking.run import Path
+
+SLOWEST = 1.0
+"""m/s: slips and slip angles of a vehicle that hardly moves mean nothing, and are left out below this speed."""
+LIMITS = (0.2, 0.5)
+"""Slips of which it is told how much of the time they are exceeded: chosen, the paper's are not legible."""
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Quantities over time of a run: of the first unit's centre of mass, along and across its path.
+
+    times, speed, way, side_slip, across (n,): s, m/s, m, rad, m/s^2 to the left; lengths (n - 1,): of the samples (s).
+    """
+
+    path: Path
+
+    @property
+    def times(self) -> np.ndarray:
+        """Of the samples (n,) in s."""
+        return self.path.times
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """Of the samples (n - 1,) in s."""
+        return np.diff(self.path.times)
+
+    @property
+    def speed(self) -> np.ndarray:
+        """(n,) m/s."""
+        return np.hypot(self.path.states[:, 1, 0], self.path.states[:, 1, 1])
+
+    @property
+    def way(self) -> np.ndarray:
+        """Length (n,) of the path so far in m."""
+        steps = np.diff(self.path.states[:, 0, :2], axis=0)
+        return np.concatenate(([0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))))
+
+    @property
+    def side_slip(self) -> np.ndarray:
+        """Angle (n,) from the vehicle's x axis to its velocity in rad; 0 where it is slower than SLOWEST."""
+        course = np.arctan2(self.path.states[:, 1, 1], self.path.states[:, 1, 0])
+        angle = np.remainder(course - self.path.states[:, 0, 2] + np.pi, 2.0 * np.pi) - np.pi
+        return np.where(self.speed > SLOWEST, angle, 0.0)
+
+    @property
+    def across(self) -> np.ndarray:
+        """Mean acceleration (n - 1,) across the path in every sample, in m/s^2, to the left."""
+        before, after = self.path.states[:-1, 1, :2], self.path.states[1:, 1, :2]
+        size = np.maximum(self.speed[:-1], 1e-9)
+        change = (after - before) / np.maximum(self.lengths, 1e-12)[:, None]
+        return (before[:, 0] * change[:, 1] - before[:, 1] * change[:, 0]) / size
+
+    def of_vehicle(self) -> dict[str, float]:
+        """What the whole vehicle did, by name and unit."""
+        path, speed, way = self.path, self.speed, self.way
+        slip, lateral = int(np.argmax(np.abs(self.side_slip))), int(np.argmax(np.abs(self.across)))
+        time, distance = float(path.times[-1]), float(way[-1])
+        return {
+            "initial speed [m/s]": float(speed[0]), "stopping distance [m]": distance, "stopping time [s]": time,
+            "x [m]": float(path.states[-1, 0, 0] - path.states[0, 0, 0]),
+            "y [m]": float(path.states[-1, 0, 1] - path.states[0, 0, 1]),
+            "final yaw [deg]": float(np.degrees(path.states[-1, 0, 2] - path.states[0, 0, 2])),
+            "v0^2/2d [m/s^2]": equivalent_deceleration(float(speed[0]), distance),
+            "v0/T [m/s^2]": float(speed[0] - speed[-1]) / time,
+            "MFDD [m/s^2]": mean_fully_developed(path.times, way, speed),
+            "largest side slip [deg]": float(np.degrees(self.side_slip[slip])), "at [s]": float(path.times[slip]),
+            "largest lateral acceleration [m/s^2]": float(self.across[lateral]),
+            "at, too [s]": float(path.times[lateral]),
+        }  # fmt: skip
+
+    def of_wheels(self) -> dict[str, np.ndarray]:
+        """What each wheel (W,) did while the vehicle was faster than SLOWEST, by name and unit."""
+        path, fast = self.path, self.speed[:-1] > SLOWEST
+        lengths, slips = self.lengths[fast], path.reports[fast][:, :, SLIP]
+        pressures, whole = path.pressures[1:][fast], float(self.lengths[fast].sum())
+        found = {"mean slip": lengths @ slips / whole, "largest slip": slips.max(axis=0)}
+        found |= {f"slip above {limit:g} [% of time]": 100.0 * (lengths @ (slips > limit)) / whole for limit in LIMITS}
+        locks = self.locks()
+        return found | {
+            "locked above 15 km/h [s]": locks.time, "longest lock [s]": locks.longest,
+            "mean pressure [bar]": lengths @ pressures / whole, "final pressure [bar]": path.pressures[-1],
+        }  # fmt: skip
+
+    def locks(self) -> Locks:
+        """Locks of the wheels above 15 km/h."""
+        return lock_table(self.lengths, self.path.reports[:, :, LOCKED] > 0.0, self.speed[:-1])

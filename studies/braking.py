@@ -1,0 +1,89 @@
+"""Braking with an anti-lock system in the loop: procedures driven one by one, in the paper's terms and as figures."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path as File
+from typing import Any
+
+import numpy as np
+
+from models.braking.of_scene import braked, controller_of
+from models.braking.plane_step import FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE
+from models.braking.run import Path
+from models.braking.scene import BrakingScene
+from models.braking.stop_report import Stop
+from models.errors import RunFailed
+
+SYSTEM = "braking"
+Progress = Callable[[str, float], None]
+WHEELS = ("front left", "front right", "rear left", "rear right")
+
+
+def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: Progress) -> dict[str, Any]:
+    """Drive every procedure; saves NAME.nc and NAME.png of each, also of one that failed, until it did."""
+    from studies.braking_figures import stop_figure
+
+    failed, table, answer = {}, list[str](), {}
+    for i, (name, own) in enumerate(scene.procedures.items()):
+        progress(name, i / len(scene.procedures))
+        vehicle = braked(scene, own)
+        start = time.perf_counter()
+        try:
+            path = vehicle.run(controller_of(scene, vehicle.plane.wheels), own.speed, scene.run.duration)
+        except RunFailed as error:
+            failed[name], path = str(error), getattr(error, "partial", None)
+        seconds = time.perf_counter() - start
+        if path is None or len(path.times) < 3:
+            continue
+        stop = Stop(path)
+        save(scene, name, path, folder / f"{name}.nc")
+        stop_figure(scene, name, stop, folder / f"{name}.png")
+        answer[name] = {**stop.of_vehicle(), **{key: value.tolist() for key, value in stop.of_wheels().items()}}
+        table += lines(name, stop, seconds)
+    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": table}
+
+
+def lines(name: str, stop: Stop, seconds: float) -> list[str]:
+    """Tables of one procedure: of the vehicle, and of its wheels."""
+    ended = "" if stop.path.stands else "; it does not stand"
+    rows = [f"  {name.replace('_', ' ')}: {stop.times[-1]:.2f} s in {seconds:.2f} s{ended}"]
+    rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.of_vehicle().items()]
+    names = WHEELS[: stop.path.turning.shape[1]]
+    rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel:>13}" for wheel in names)]
+    return rows + [f"    {key:<40}" + "".join(f"{value:>13.2f}" for value in values)
+                   for key, values in stop.of_wheels().items()]  # fmt: skip
+
+
+REPORTS = {"force_x": (FORCE_X, "N"), "force_y": (FORCE_Y, "N"), "load": (LOAD, "N"), "slip": (SLIP, "1"),
+           "slip_angle": (SLIP_ANGLE, "rad")}  # fmt: skip
+
+
+def save(scene: BrakingScene, name: str, path: Path, file: File) -> None:
+    """The path as netCDF with units; wheels' forces, loads and slips are those of the last step of every sample."""
+    import json
+
+    import xarray as xr
+
+    from models.result import Result, provenance
+
+    units = [f"heading_{k}" for k in range(path.states.shape[2] - 2)]
+    wheel, moving = ("time", "wheel"), ("time", "coordinate")
+    data = xr.Dataset(
+        {"positions": (moving, path.states[:, 0], {"units": "m, m, rad"}),
+         "rates": (moving, path.states[:, 1], {"units": "m/s, m/s, rad/s"}),
+         "turning": (wheel, path.turning, {"units": "rad/s"}), "pressure": (wheel, path.pressures, {"units": "bar"}),
+         "torque": (wheel, path.torques, {"units": "N m"})}
+        | {key: (wheel, np.concatenate((np.full((1, path.turning.shape[1]), np.nan), path.reports[:, :, column])),
+                 {"units": unit}) for key, (column, unit) in REPORTS.items()},
+        {"time": ("time", path.times, {"units": "s"}), "coordinate": ["x", "y", *units],
+         "wheel": list(WHEELS[: path.turning.shape[1]])},
+    )  # fmt: skip
+    data.attrs = {"title": f"{scene.title}: {name}", "stands": int(path.stands),
+                  "scene_table": json.dumps(scene.table()), "provenance": json.dumps(provenance())}  # fmt: skip
+    Result(data).save(file)
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("braking")

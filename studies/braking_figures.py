@@ -1,0 +1,87 @@
+"""Figures of a stop: speeds, slips, pressures and torques over time, and the path on the road with its surfaces."""
+
+from pathlib import Path as File
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from models.braking.of_scene import sides
+from models.braking.plane_step import SLIP
+from models.braking.scene import BrakingScene
+from models.braking.stop_report import SLOWEST, Stop
+from studies.figures import save
+
+WHEELS = ("front left", "front right", "rear left", "rear right", "trailer front left", "trailer front right",
+          "trailer rear left", "trailer rear right")  # fmt: skip
+COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#66c2a5", "#cc79a7", "#e7b5d1")
+GROUND = {"dry": "#9a9a9a", "wet": "#7f9bb3", "snow": "#eceff1", "ice": "#cfe8f3"}
+OTHER = "#e8dcc8"
+"""Colours of the road; of a surface of the user's own."""
+
+
+def stop_figure(scene: BrakingScene, name: str, stop: Stop, file: File) -> File:
+    """Six panels: speeds, slips, pressures, motion, torques, path."""
+    own = scene.procedures[name]
+    figure, axes = plt.subplots(2, 3, figsize=(14, 7.2))
+    distance, time = stop.of_vehicle()["stopping distance [m]"], stop.times[-1]
+    ended = f"stands after {distance:.2f} m and {time:.2f} s" if stop.path.stands else f"still moves at {time:.1f} s"
+    figure.suptitle(f"{scene.title}: {name.replace('_', ' ')} from {own.speed:g} m/s, {scene.controller.kind}; {ended}",
+                    x=0.01, ha="left", fontweight="bold")  # fmt: skip
+    _speeds(axes[0, 0], stop)
+    slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports[:, :, SLIP], np.nan)
+    _wheels(axes[0, 1], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
+    _wheels(axes[0, 2], stop.times, stop.path.pressures, "Pressure in each chamber", "pressure [bar]")
+    _motion(axes[1, 0], stop)
+    _wheels(axes[1, 1], stop.times, stop.path.torques / 1e3, "Torque of each brake", "torque [kN m]")
+    road(axes[1, 2], scene, name, stop)
+    axes[0, 1].legend(ncols=2, fontsize=8)
+    return save(figure, file)
+
+
+def _speeds(axis: plt.Axes, stop: Stop) -> None:
+    radius = stop.speed[0] / stop.path.turning[0]
+    for i, values in enumerate((stop.path.turning * radius).T):
+        axis.plot(stop.times, values, color=COLOURS[i], lw=0.8, label=WHEELS[i])
+    axis.plot(stop.times, stop.speed, color="#222222", lw=1.6, label="vehicle")
+    axis.set(xlabel="time [s]", ylabel="speed [m/s]", title="Speed of the vehicle, and of each wheel's rim")
+    axis.legend(fontsize=8)
+
+
+def _wheels(axis: plt.Axes, times: np.ndarray, values: np.ndarray, title: str, label: str) -> None:
+    for i, row in enumerate(values.T):
+        axis.plot(times, row, color=COLOURS[i], lw=0.8, label=WHEELS[i])
+    axis.set(xlabel="time [s]", ylabel=label, title=title)
+
+
+def _motion(axis: plt.Axes, stop: Stop) -> None:
+    """Yaw, side slip in degrees and lateral acceleration."""
+    axis.plot(stop.times, np.degrees(stop.path.states[:, 0, 2]), color="#0072b2", label="yaw angle [deg]")
+    axis.plot(stop.times, np.degrees(stop.side_slip), color="#d55e00", label="side slip [deg]")
+    axis.plot(stop.times[1:], stop.across, color="#009e73", lw=0.8, label="lateral acceleration [m/s²]")
+    axis.set(xlabel="time [s]", ylabel="see legend", title="Motion beside the direction of travel")
+    low, high = axis.get_ylim()
+    axis.set_ylim(min(low, -1.0), max(high, 1.0))
+    axis.legend(fontsize=8)
+
+
+def road(axis: plt.Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
+    """The path from above with the vehicle's outline now and then, on its surfaces."""
+    x, y, yaw = stop.path.states[:, 0, 0], stop.path.states[:, 0, 1], stop.path.states[:, 0, 2]
+    low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0
+    first, last = x.min() - 6.0, x.max() + 6.0
+    told = set[str]()
+    starts = [first] + [s.x for s in scene.road.stretches[1:]] + [last]
+    for stretch, begin, end in zip(scene.road.stretches, starts[:-1], starts[1:], strict=True):
+        left, right = sides(scene.procedures[name], stretch)
+        for surface, bottom, top in ((left, scene.road.line, high), (right, low, scene.road.line)):
+            axis.fill_between([max(begin, first), min(end, last)], bottom, top, color=GROUND.get(surface, OTHER), lw=0,
+                              label=None if surface in told else surface)  # fmt: skip
+            told.add(surface)
+    axis.plot(x, y, color="#222222", label="centre of mass")
+    for i in np.searchsorted(stop.way, np.linspace(0.0, stop.way[-1], 6)).clip(0, len(x) - 1):
+        corners = np.array([[3.0, 1.1], [3.0, -1.1], [-3.0, -1.1], [-3.0, 1.1], [3.0, 1.1]])
+        turned = corners @ np.array([[np.cos(yaw[i]), np.sin(yaw[i])], [-np.sin(yaw[i]), np.cos(yaw[i])]])
+        axis.plot(x[i] + turned[:, 0], y[i] + turned[:, 1], color="#222222", lw=0.7)
+    axis.set(xlabel="x [m]", ylabel="y [m]", title="Path on the road, from above", xlim=(first, last), ylim=(low, high))
+    axis.grid(False)
+    axis.legend(fontsize=8, loc="upper left")
