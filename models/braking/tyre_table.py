@@ -1,12 +1,13 @@
 """Friction of a tyre by tables: mu_x(slip angle, slip, load) and mu_y = g(slip angle, slip) h(slip angle, load).
 
-Between the nodes each is linear in every variable, at the nodes exact, beyond the last node constant. Source: G.
+Between the nodes each is linear in every variable, at the nodes exact, beyond the last node constant; slopes are those
+of the cell. Their resultant does not exceed the largest of either. Source: G.
 Palmkvist and O. Nordstrom, A hybrid laboratory test method for anti-lock systems (IAVSD extensive summaries): friction
 is "defined at distinct points and by linear interpolation".
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from models.errors import InputError
 
 LARGEST_FRICTION = 3.0
 """No tyre on any road has more."""
+ROUNDED = 0.01
+"""Share by which friction in both directions together may be above the largest in one: figures are rounded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +67,21 @@ class TyreTable:
             raise InputError(self.name, "mu_x", float(self.mu_x[:, :, 0].max()), "must be 0 at slip 0")
         if self.h[0].any():
             raise InputError(self.name, "h", float(self.h[0].max()), "must be 0 at slip angle 0")
+        self._check_resultant()
+
+    def _check_resultant(self) -> None:
+        """Both together not above the largest mu_x or mu_y: linear in slip and load, so only angles lie between."""
+        peak = max(self.mu_x.max(), (self.g[:, None, :] * self.h[:, :, None]).max())
+        for share in (0.0, 0.25, 0.5, 0.75) if self.angles.size > 1 else (0.0,):
+            x, g, h = (values + share * np.diff(values, axis=0, append=values[-1:]) for values in
+                       (self.mu_x, self.g, self.h))  # fmt: skip
+            total = np.hypot(x, g[:, None, :] * h[:, :, None])
+            if total.max() > peak * (1.0 + ROUNDED):
+                i, j, k = np.unravel_index(total.argmax(), total.shape)
+                place = (f"slip angle {np.rad2deg(self.angles[i]):.4g} deg, load {self.loads[j]:g} N, slip "
+                         f"{self.slips[k]:g}")  # fmt: skip
+                raise InputError(self.name, place, float(total[i, j, k]), "both together must not be above the largest "
+                                 f"of either alone, {peak:.6g}, by more than {ROUNDED:.0%}")  # fmt: skip
 
     @property
     def cornering(self) -> float:
@@ -74,15 +92,34 @@ class TyreTable:
 
     def refined(self, angles: np.ndarray, slips: np.ndarray, loads: np.ndarray) -> "TyreTable":
         """The same functions on nodes that include these tables' own: linear interpolation loses nothing."""
+        mu_x, g, h = self._at(angles, slips, loads)
+        return TyreTable(angles, slips, loads, mu_x, g, h, self.name)
+
+    def scaled(self, factor: float) -> "TyreTable":
+        """The same tyre where friction is ``factor`` times as large."""
+        return replace(self, mu_x=factor * self.mu_x, h=factor * self.h)
+
+    def friction(self, angles: np.ndarray, slips: np.ndarray, load: float) -> tuple[np.ndarray, np.ndarray]:
+        """mu_x and mu_y (a, s) at slip angles (rad, from 0), slips from 0 to 1 and a load (N)."""
+        mu_x, g, h = self._at(np.asarray(angles, dtype=float), np.asarray(slips, dtype=float), np.array([load]))
+        return mu_x[:, 0, :], g * h
+
+    def _at(self, angles: np.ndarray, slips: np.ndarray, loads: np.ndarray) -> list[np.ndarray]:
+        """mu_x, g and h at other nodes."""
         mu_x = _along(_along(_along(self.mu_x, 0, self.angles, angles), 1, self.loads, loads), 2, self.slips, slips)
         g = _along(_along(self.g, 0, self.angles, angles), 1, self.slips, slips)
-        h = _along(_along(self.h, 0, self.angles, angles), 1, self.loads, loads)
-        return TyreTable(angles, slips, loads, mu_x, g, h, self.name)
+        return [mu_x, g, _along(_along(self.h, 0, self.angles, angles), 1, self.loads, loads)]
 
 
 def _along(values: np.ndarray, axis: int, old: np.ndarray, new: np.ndarray) -> np.ndarray:
     """Values at new nodes along one axis, linear between the old ones and constant beyond."""
-    return np.apply_along_axis(lambda row: np.interp(new, old, row), axis, values)
+    if np.array_equal(old, new):
+        return values
+    cell = np.interp(new, old, np.arange(old.size))
+    low = np.minimum(cell.astype(int), max(old.size - 2, 0))
+    share = np.expand_dims(cell - low, tuple(range(1, values.ndim - axis)))
+    below, above = values.take(low, axis), values.take(np.minimum(low + 1, old.size - 1), axis)
+    return (1.0 - share) * below + share * above
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,126 @@
+"""Tyre tables: exact at nodes, bounded, slopes per cell; curves, `.tir` and CSV files that fill them."""
+
+import numpy as np
+import pytest
+
+from models.braking.magic_formula import PACEJKA, SURFACES, Curve, filled, surface
+from models.braking.tyre_table import TyreTable, across, along, place, stacked
+from models.errors import InputError
+
+
+def small(peak=0.8):
+    """Two loads, three angles, three slips: every figure of its own."""
+    mu_x = np.array([[[0.0, 0.8, 0.6], [0.0, 0.7, 0.5]], [[0.0, 0.5, 0.45], [0.0, 0.4, 0.42]],
+                     [[0.0, 0.1, 0.2], [0.0, 0.12, 0.19]]]) * peak / 0.8  # fmt: skip
+    g = np.array([[1.0, 0.6, 0.1], [1.0, 0.7, 0.2], [1.0, 0.9, 0.5]])
+    h = np.array([[0.0, 0.0], [0.7, 0.6], [0.65, 0.62]]) * peak / 0.8
+    return TyreTable(np.array([0.0, 0.1, 0.4]), np.array([0.0, 0.2, 1.0]), np.array([1e4, 3e4]), mu_x, g, h, "small")
+
+
+def at(tables, number, angle, load, slip):
+    """mu_x and mu_y by the compiled functions."""
+    i, p = place(tables.angles, angle)
+    j, q = place(tables.loads, load)
+    k, w = place(tables.slips, slip)
+    mu = [along(number, i, p, j, q, node, tables.mu_x) for node in (k, min(k + 1, tables.slips.size - 1))]
+    return (1 - w) * mu[0] + w * mu[1], across(number, angle, load, slip, *tables.packed[:3], *tables.packed[4:])
+
+
+def test_exact_at_nodes_linear_between_constant_beyond():
+    table = small()
+    tables = stacked([table])
+    for i, angle in enumerate(table.angles):
+        for j, load in enumerate(table.loads):
+            for k, slip in enumerate(table.slips):
+                assert at(tables, 0, angle, load, slip) == (table.mu_x[i, j, k], table.g[i, k] * table.h[i, j])
+    # the middle of a cell is the mean of its eight corners, and mu_y that of g times that of h
+    x, y = at(tables, 0, 0.25, 2e4, 0.6)
+    assert x == pytest.approx(table.mu_x[1:, :, 1:].mean(), rel=1e-14)
+    assert y == pytest.approx(table.g[1:, 1:].mean() * table.h[1:].mean(), rel=1e-14)
+    assert at(tables, 0, 1.5, 9e9, 1.0) == at(tables, 0, 0.4, 3e4, 1.0)
+    assert at(tables, 0, 0.2, 1.0, 0.3) == at(tables, 0, 0.2, 1e4, 0.3)
+
+
+def test_the_union_of_nodes_loses_nothing():
+    one, other = small(), filled(*SURFACES["ice"], angles=np.array([0, 0.03, 0.25]), slips=np.array([0, 0.15, 1.0]))
+    both = stacked([one, other])
+    rng = np.random.default_rng(5)
+    for angle, load, slip in rng.uniform((0, 5e3, 0), (0.5, 4e4, 1), (60, 3)):
+        for number, table in enumerate((one, other)):
+            # g and h lie between nodes of the union as between their own: equal to rounding
+            assert at(both, number, angle, load, slip) == pytest.approx(at(stacked([table]), 0, angle, load, slip),
+                                                                        rel=1e-13, abs=1e-15)  # fmt: skip
+            x, y = table.friction([angle], [slip], load)
+            assert (x[0, 0], y[0, 0]) == pytest.approx(at(both, number, angle, load, slip), rel=1e-13, abs=1e-15)
+
+
+def test_slopes_are_those_of_the_cell():
+    tables = stacked([small()])
+    for low, high in ((0.0, 0.2), (0.2, 1.0)):
+        ends = [at(tables, 0, 0.05, 1.5e4, slip)[0] for slip in (low, high)]
+        inner = [at(tables, 0, 0.05, 1.5e4, low + share * (high - low))[0] for share in (0.1, 0.9)]
+        assert (inner[1] - inner[0]) / 0.8 == pytest.approx(ends[1] - ends[0], rel=1e-12)
+
+
+def between(table, exact):
+    """Largest distance (x, y) of a table from its curves between nodes, and its largest resultant."""
+    angles = np.concatenate((np.linspace(0, 0.25, 181), np.linspace(0.26, np.pi / 2, 90)))
+    slips = np.concatenate((np.linspace(0, 0.25, 173), np.linspace(0.26, 1, 61)))
+    x, y = table.friction(angles, slips, 1e4)
+    tangent = np.tan(angles)[:, None]
+    total = np.maximum(np.hypot(slips, tangent), 1e-300)
+    want_x, want_y = exact[0](total) * slips / total, exact[1](total) * tangent / total
+    return np.abs(x - want_x).max(), np.abs(y - want_y).max(), np.hypot(x, y).max()
+
+
+@pytest.mark.parametrize("name", PACEJKA)
+def test_magic_formulas_are_met_between_nodes_and_never_above_their_peak(name):
+    table, curves = surface(name), PACEJKA[name]
+    off_x, off_y, most = between(table, curves)
+    assert off_x < 1e-4 and off_y < 1e-4  # of mu: what the nodes promise
+    assert most <= max(curve.D for curve in curves)
+    assert table.mu_x.max() == pytest.approx(curves[0].D, abs=1e-4)
+
+
+def test_one_curve_for_both_directions_is_not_above_its_peak():
+    table = surface("dry asphalt")
+    # nodes are capped at the peak; between them g times h bulges by 4e-6 of it
+    assert between(table, SURFACES["dry asphalt"])[2] <= table.mu_x.max() * (1 + 1e-5)
+    x = table.friction([0.0], [0.17], 1e4)[0][0, 0]
+    assert x == pytest.approx(1.2801 * (1 - np.exp(-23.99 * 0.17)) - 0.52 * 0.17, abs=1e-4)
+
+
+def test_friction_falls_with_the_load_as_asked():
+    table = surface("dry", load=2e4, fall=0.1)
+    slips, angles = np.array([0.12]), np.array([0.1])
+    x, y = (np.array([table.friction(angles, slips, load)[i][0, 0] for load in (5e3, 2e4, 3e4, 4e4)]) for i in (0, 1))
+    assert x / x[1] == pytest.approx([1.075, 1.0, 0.95, 0.9], rel=1e-12)
+    assert y / y[1] == pytest.approx([1.075, 1.0, 0.95, 0.9], rel=1e-12)
+    half = table.scaled(0.5).friction(angles, slips, 3e4)
+    assert (half[0][0, 0], half[1][0, 0]) == pytest.approx((x[2] / 2, y[2] / 2), rel=1e-12)
+
+
+def test_front_and_rear_differ():
+    assert surface("dry").h.max() == pytest.approx(0.935, abs=1e-4)
+    assert surface("dry/rear").h.max() == pytest.approx(0.961, abs=1e-4)
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ({"slips": np.array([0.0, 0.2, 0.9])}, "slips = 0.9"), ({"angles": np.array([0.0, 0.4, 0.1])}, "rise strictly"),
+    ({"loads": np.array([0.0, 1.0])}, "loads"), ({"g": np.full((3, 3), np.nan)}, "g = nan"),
+    ({"mu_x": np.full((3, 2, 3), 0.1)}, "at slip 0"), ({"h": np.full((3, 2), 0.1)}, "at slip angle 0"),
+    ({"h": np.array([[0.0, 0.0], [0.7, 0.6], [0.65, 0.62]]) * 5}, "0 to 3"),
+    ({"g": np.array([[1.0, 1.0, 1.0]] * 3)}, "slip angle 5.73 deg, load 10000 N, slip 0.2 = 0.86"),
+])  # fmt: skip
+def test_what_no_tyre_can_have_is_told(change, said):
+    from dataclasses import replace
+
+    with pytest.raises(InputError, match=said):
+        replace(small(), **change)
+
+
+def test_a_surface_that_is_none_is_told():
+    with pytest.raises(InputError, match="did you mean 'snow'"):
+        surface("snw")
+    with pytest.raises(InputError, match="fall = 1"):
+        filled(Curve(1, 10, 1.6, 0), Curve(1, 10, 1.6, 0), fall=1.0)
