@@ -51,22 +51,3 @@ class AllApplied:
     def sample(self, given: Sample) -> Command:
         """Apply."""
         return Command(valves=np.full(self.wheels, 1 if given.brake else -1))
-
-
-@dataclass
-class SlipBangBang:
-    """Releases above a slip, applies below a lower one, and does between them what it did before."""
-
-    wheels: int
-    release: float = 0.15
-    apply: float = 0.08
-
-    def __post_init__(self) -> None:
-        self._valves = np.ones(self.wheels, dtype=np.int64)
-
-    def sample(self, given: Sample) -> Command:
-        """By the given speed of the vehicle."""
-        slip = 1.0 - given.wheels / max(given.speed, 0.1)
-        self._valves[slip > self.release] = -1
-        self._valves[slip < self.apply] = 1
-        return Command(valves=self._valves.copy())

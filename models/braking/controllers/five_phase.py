@@ -1,0 +1,77 @@
+"""The five-phase hybrid controller: by the wheel's acceleration alone, round a limit cycle about the tyre's peak.
+
+    1  pressure falls at ``falling``  until y >= e1
+    2  it holds                       until y >= e2
+    3  it rises at ``fast``           until y <= e3
+    4  it holds                       until y <= e4
+    5  it rises at ``slow``           until y <= -e5, then phase 1
+
+with y = r w' the acceleration of the wheel's rim. It begins with phase 3 until y <= -e5. Source: W. Pasillas-Lepine,
+Hybrid modeling and limit cycle analysis for a class of five-phase anti-lock brake algorithms, Vehicle System Dynamics
+44 (2006) 173-188; M. Gerard, W. Pasillas-Lepine, E. de Vries, M. Verhaegen, Adaptation of hybrid five-phase ABS
+algorithms for experimental validation, AAC 2010. e1 has to be large enough for the wheel not to lock in phase 2.
+"""
+
+from dataclasses import dataclass
+
+from models.braking.controller import Command, Sample
+from models.braking.controllers.per_wheel import Common, PerWheel
+from models.errors import InputError
+
+
+@dataclass
+class FivePhase(Common):
+    """Thresholds of the wheel's acceleration (m/s^2) and rates of its pressure (bar/s)."""
+
+    wheels: int
+    e1: float = 5.0
+    e2: float = 8.0
+    e3: float = 4.0
+    e4: float = 0.5
+    e5: float = 6.0
+    falling: float = 30.0
+    fast: float = 15.0
+    slow: float = 3.0
+
+    def __post_init__(self) -> None:
+        self.check(e1=self.e1, e5=self.e5, falling=self.falling, fast=self.fast, slow=self.slow)
+        if not self.e1 < self.e2 or not self.e4 < self.e3 < self.e2:
+            raise InputError("", "controller.parameters.e2", self.e2, "must be above e1 and e3, and e3 above e4")
+        self._loop = PerWheel(self.wheels, self, lambda: _Logic(self), pressures=True)
+
+    def sample(self, given: Sample) -> Command:
+        """Pressures."""
+        return self._loop.command(given)
+
+
+FIRST = 0
+
+
+def follows(phase: int, y: float, own: FivePhase) -> bool:
+    """Whether a phase is over at an acceleration y of the wheel's rim (m/s^2)."""
+    if phase == 1:
+        return y >= own.e1
+    if phase == 2:
+        return y >= own.e2
+    if phase == 3:
+        return y <= own.e3
+    return y <= own.e4 if phase == 4 else y <= -own.e5
+
+
+def rate(phase: int, own: FivePhase) -> float:
+    """Rate of the pressure (bar/s) in a phase."""
+    return (own.fast, -own.falling, 0.0, own.fast, 0.0, own.slow)[phase]
+
+
+class _Logic:
+    def __init__(self, own: FivePhase) -> None:
+        self._own, self._phase, self._pressure = own, FIRST, 0.0
+
+    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+        if follows(self._phase, gains, self._own):
+            self._phase = self._phase % 5 + 1
+        if self._phase == 1 and slip < 0.0:
+            self._phase = 2
+        raised = self._pressure + rate(self._phase, self._own) * self._own.period
+        self._pressure = min(max(raised, 0.0), supply)
+        return self._pressure
