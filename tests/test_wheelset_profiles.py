@@ -124,10 +124,10 @@ def test_ledger_closes_to_the_order_of_rk4(wheelset):
 
 
 def test_ledger_with_friction_and_flange():
-    """FASTSIM's cells and Hertz' first touch are less smooth; what is missing is small, and gets less with the step."""
-    (one, _), (two, found) = (worst(ON_PROFILES, 50.0, "fastsim", 5e-3, step, 0.4) for step in (4e-4, 1e-4))
-    assert two < one / 4.0**1.5
-    assert two < 2e-3 * (found.creep + found.contact_damping)[-1]
+    """FASTSIM's kinks do not keep the ledger open; Hertz' first touch takes half an order: 3.3 seen."""
+    (one, _), (two, found) = (worst(ON_PROFILES, 50.0, "fastsim", 5e-3, step, 0.4) for step in (4e-4, 2e-4))
+    assert two < one / 2.0**3
+    assert two < 2e-5 * (found.creep + found.contact_damping)[-1]
     assert np.ptp(found.contacts) > 20.0  # J: the flange is pressed
 
 

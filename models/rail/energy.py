@@ -3,15 +3,17 @@
 Has: kinetic energy, that of the springs, of gravity (with what the vehicle weighs on the axle), and the work done on
 the elastic contacts so far, flanges of cones included. Came in: the work of the drive, which holds the frame at its
 speed against the creep forces along the track. Went out: in the suspension's dampers, in the contacts' damping and in
-creep. Powers are known at the path's instants and added up by cubics, to the fourth order in their distance.
+creep. Each work is a state more: its power is added up at the stages of RK4 with the weights of RK4, as the path itself
+came about. So the ledger closes to the integrator's order also where creep forces have kinks, at which a curve through
+the powers of the path's instants would not.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
+from models.rail import equations as eq
 from models.rail.equations import (
     ARM,
     CARRIED,
@@ -56,20 +58,31 @@ class Ledger:
 
 
 def ledger(equations: Equations, path: Path) -> Ledger:
-    """The ledger of a path whose every step was kept."""
-    contacts, states = path.contacts, path.states
-    springs, dampers = _suspension(equations.body, states)
-    out = -contacts.sum(axis=1)
-    works = {"contacts": out[:, ELASTIC_POWER], "drive": equations.speed * out[:, FX], "dampers": dampers,
-             "contact_damping": out[:, DAMPING_POWER], "creep": out[:, POWER]}  # fmt: skip
-    w = equations.wheelset
+    """The ledger of a path by RK4, of any implementation, whose every step was kept."""
+    states, w = path.states, equations.wheelset
     gravity = -(w.mass * GRAVITY + 2.0 * equations.body[CARRIED]) * states[:, Z]
-    return Ledger(path.times, _kinetic(equations, states), springs, gravity,
-                  **{name: _work(path.times, power) for name, power in works.items()})  # fmt: skip
+    return Ledger(path.times, _kinetic(equations, states), _suspension(equations.body, states)[0], gravity,
+                  *_works(equations, path).T)  # fmt: skip
 
 
-def _work(times: np.ndarray, power: np.ndarray) -> np.ndarray:
-    return CubicSpline(times, power).antiderivative()(times)
+def _works(equations: Equations, path: Path) -> np.ndarray:
+    """Works (n, 5) in the order of the ledger, by the stages of every step."""
+    start, step = path.states[:-1], np.diff(path.times)[:, None]
+    done, rates = np.zeros((len(path.times), 5)), np.zeros_like(start)
+    for ahead, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
+        rates, powers = _there(equations, start + ahead * step * rates)
+        done[1:] += weight / 6.0 * step * powers
+    return done.cumsum(axis=0)
+
+
+def _there(equations: Equations, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rates (n, 10) of states and the powers (n, 5) that the works add up."""
+    rates, contacts = np.empty_like(states), equations.blank(len(states))
+    for state, rate, contact in zip(states, rates, contacts, strict=True):
+        eq.rates(state, *equations.given, rate, contact)
+    out = -contacts.sum(axis=1)
+    return rates, np.column_stack([out[:, ELASTIC_POWER], equations.speed * out[:, FX], _suspension(
+        equations.body, states)[1], out[:, DAMPING_POWER], out[:, POWER]])  # fmt: skip
 
 
 def _kinetic(equations: Equations, states: np.ndarray) -> np.ndarray:
