@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from models.braking.of_scene import braked, controller_of
+from models.braking.of_scene import controller_of
 from models.braking.plane_step import FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE
+from models.braking.procedures import ready
 from models.braking.run import Path
 from models.braking.scene import BrakingScene
 from models.braking.stop_report import Stop
@@ -24,15 +25,15 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
     from studies.braking_figures import stop_figure
 
     failed, table, answer = {}, list[str](), {}
-    for i, (name, own) in enumerate(scene.procedures.items()):
+    for i, name in enumerate(scene.procedures):
         progress(name, i / len(scene.procedures))
-        vehicle = braked(scene, own)
-        start = time.perf_counter()
+        vehicle, start = ready(scene, name)
+        begun = time.perf_counter()
         try:
-            path = vehicle.run(controller_of(scene, vehicle.plane.wheels), own.speed, scene.run.duration)
+            path: Path | None = vehicle.run(controller_of(scene, vehicle.plane.wheels), start, scene.run.duration)
         except RunFailed as error:
             failed[name], path = str(error), getattr(error, "partial", None)
-        seconds = time.perf_counter() - start
+        seconds = time.perf_counter() - begun
         if path is None or len(path.times) < 3:
             continue
         stop = Stop(path)

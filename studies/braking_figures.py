@@ -84,4 +84,4 @@ def road(axis: plt.Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
         axis.plot(x[i] + turned[:, 0], y[i] + turned[:, 1], color="#222222", lw=0.7)
     axis.set(xlabel="x [m]", ylabel="y [m]", title="Path on the road, from above", xlim=(first, last), ylim=(low, high))
     axis.grid(False)
-    axis.legend(fontsize=8, loc="upper left")
+    axis.legend(fontsize=8, loc="upper left", frameon=True, facecolor="white", framealpha=1.0)

@@ -1,12 +1,14 @@
 """From a scene of braking to a vehicle on its road, ready to run."""
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from models.braking.brake import Brake, of_wheels
-from models.braking.controller import AllApplied, Controller, SlipBangBang
+from models.braking.controller import Controller
+from models.braking.controllers import CONTROLLERS
 from models.braking.magic_formula import SURFACES, surface
 from models.braking.plane_vehicle import PAPER, Truck, truck
 from models.braking.pressure import Chambers
@@ -18,9 +20,6 @@ from models.braking.tyre_table import TyreTable, stacked
 from models.errors import InputError
 from models.scene_file import parse
 from models.strict import read
-
-CONTROLLERS = {"none": AllApplied, "slip_bang_bang": SlipBangBang}
-"""What ``controller.kind`` names."""
 
 
 def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
@@ -118,7 +117,15 @@ def controller_of(scene: BrakingScene, wheels: int) -> Controller:
     kind = scene.controller.kind
     if kind not in CONTROLLERS:
         raise InputError(scene.file, "controller.kind", kind, "no such controller", tuple(CONTROLLERS))
+    make, given = CONTROLLERS[kind], scene.controller.parameters
+    known = tuple(field.name for field in fields(make) if field.name not in ("wheels", "period"))
+    for name, value in given.items():
+        if name not in known:
+            raise InputError(scene.file, f"controller.parameters.{name}", value, f"no parameter of {kind}", known)
+    period = {"period": scene.run.sample} if kind != "none" else {}
     try:
-        return CONTROLLERS[kind](wheels, **scene.controller.parameters)
-    except TypeError as error:
-        raise InputError(scene.file, "controller.parameters", scene.controller.parameters, str(error)) from None
+        return make(wheels, **given, **period)
+    except InputError as error:
+        raise InputError(scene.file, error.place, error.value, error.allowed) from None
+    except TypeError:
+        raise InputError(scene.file, "controller.parameters", given, "must be numbers") from None

@@ -1,6 +1,7 @@
 """What a scene of braking will compute: printed by ``twinrig show``, checked before any run."""
 
-from models.braking.of_scene import braked, controller_of, surfaces_of, vehicle_of
+from models.braking.of_scene import controller_of, surfaces_of, vehicle_of
+from models.braking.procedures import ready
 from models.braking.scene import BrakingScene
 
 PROCEDURES = {
@@ -13,8 +14,8 @@ PROCEDURES = {
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
-    for procedure in scene.procedures.values():
-        controller_of(scene, braked(scene, procedure).plane.wheels)
+    for name in scene.procedures:
+        controller_of(scene, ready(scene, name)[0].plane.wheels)
 
 
 def describe(scene: BrakingScene) -> str:
@@ -34,7 +35,7 @@ def describe(scene: BrakingScene) -> str:
                     "exact within it")]  # fmt: skip
     there, absent = effects(scene)
     lines += [_line("effects", ", ".join(there) or "none")]
-    return "\n".join([*lines, _line("absent", ", ".join(absent) + " (not computed)")])
+    return "\n".join([*lines, _line("absent", ", ".join(absent) + " (not computed)" if absent else "nothing")])
 
 
 def effects(scene: BrakingScene) -> tuple[list[str], list[str]]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,6 +36,13 @@ class Path:
     stands: bool
 
 
+class Start(NamedTuple):
+    """What a run goes on from: positions and rates (2, 2 + U), and speeds of the wheels' turning (W,) in rad/s."""
+
+    state: np.ndarray
+    turning: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class Braked:
     """A vehicle on a road with brakes, ready to run. kind (W,) : which tyre each wheel has; steer (W,) : rad."""
@@ -53,27 +60,33 @@ class Braked:
     speed_given: bool = True
     switch: float = 0.0
 
-    def run(self, controller: Controller, speed: float, duration: float = 60.0) -> Path:
-        """From steady rolling along x at a speed (m/s); the brake switch closes at ``switch``.
+    def rolling(self, speed: float) -> Start:
+        """Steady rolling along x at a speed (m/s)."""
+        state = np.zeros((2, 2 + self.plane.masses.size))
+        state[1, 0] = speed
+        return Start(state, speed / self.plane.radius)
+
+    def run(self, controller: Controller, start: float | Start, duration: float = 60.0) -> Path:
+        """From a start, or steady rolling along x at a speed (m/s); the brake switch closes at ``switch``.
 
         Raises RunFailed, which names the time and whose ``partial`` is the path until then.
         """
         units, wheels = self.plane.masses.size, self.plane.wheels
-        state, turning = np.zeros((2, 2 + units)), speed / self.plane.radius
-        state[1, 0] = speed
+        given = start if isinstance(start, Start) else self.rolling(start)
+        state, turning = given.state.copy(), given.turning.copy()
         air, torques = still(self.chambers, self.sample), np.zeros((self.substeps + 1, wheels))
         found = np.zeros(2 + units)
         report, time, status, number = np.zeros((wheels, REPORTED)), 0.0, 0, 0
         rows = [(time, state.copy(), turning.copy(), air.pressure.copy(), air.torque.copy())]
-        reports = []
+        reports = list[np.ndarray]()
         step = self.sample / self.substeps
         with _kept(rows, reports):
             while status != AT_REST and time < duration - 1e-9:
                 braked = time >= self.switch - 1e-9
                 known = float(np.hypot(*state[1, :2])) if self.speed_given else np.nan
                 supply = float(air.supply[0])
-                given = Sample(number, round(time * 1e9), turning * self.plane.radius, braked, supply, known)
-                command = ask(controller, given)
+                asked = Sample(number, round(time * 1e9), turning * self.plane.radius, braked, supply, known)
+                command = ask(controller, asked)
                 if command.pressures is None:
                     by_valves(command.valves, self.sample, air, self.chambers, self.brakes, torques)
                 else:
@@ -99,6 +112,6 @@ def _kept(rows: list[Any], reports: list[Any]) -> Iterator[None]:
 
 
 def _path(rows: list[Any], reports: list[Any], stands: bool) -> Path:
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
-    wheels = columns[2].shape[1]
-    return Path(*columns, np.array(reports).reshape(-1, wheels, REPORTED), stands)
+    times, states, turning, pressures, torques = (np.array(column) for column in zip(*rows, strict=True))
+    return Path(times, states, turning, pressures, torques,
+                np.array(reports).reshape(-1, turning.shape[1], REPORTED), stands)  # fmt: skip

@@ -1,0 +1,99 @@
+"""The driver's part of a test: straight braking, split friction, braking in a turn, J-turn; all with fixed steering."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import root
+
+from models.braking.of_scene import braked
+from models.braking.plane_step import REPORTED, step_on
+from models.braking.run import Braked, Start
+from models.braking.scene import BrakingScene
+from models.braking.surfaces import under_wheels
+from models.errors import InputError
+
+STEERED = 2
+"""Wheels that are steered: those of the first axle, in parallel."""
+BLINK = 1e-5
+"""s: time over which the accelerations of a steady turn are taken."""
+STEADY = 1e-6
+"""m/s^2, and rad/s^2 times 1 m: what is left of a steady turn's accelerations."""
+
+
+def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
+    """Vehicle and start of a procedure; InputError for a circle that tyres cannot hold."""
+    own = scene.procedures[name]
+    vehicle = braked(scene, own)
+    if own.radius is not None:
+        turn = steady_turn(vehicle, own.speed, own.radius)
+        if turn is None:
+            allowed = f"tyres do not hold a steady circle of this radius at {own.speed:g} m/s on this surface"
+            raise InputError(scene.file, f"procedures.{name}.radius", own.radius, allowed)
+        return replace(vehicle, steer=turn.steer), turn.start
+    return replace(vehicle, steer=steered(vehicle, own.steer or 0.0)), vehicle.rolling(own.speed)
+
+
+def steered(vehicle: Braked, angle: float) -> np.ndarray:
+    """Steer angles (W,) with the front wheels at one angle (rad)."""
+    return np.where(np.arange(vehicle.plane.wheels) < STEERED, angle, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyTurn:
+    """A steady circle: steer angles (W,) in rad, and the state with which the first unit heads along x."""
+
+    steer: np.ndarray
+    start: Start
+
+
+def steady_turn(vehicle: Braked, speed: float, radius: float) -> SteadyTurn | None:
+    """Circle of the first unit's centre of mass (m, positive to the left) at a speed (m/s); None if there is none.
+
+    All wheels roll freely: the drive that holds the speed is not there, so that the vehicle slows down by the drag of
+    its slip angles. Unknown are the steer angle, the side slip and the headings of the units behind.
+    """
+    units, rate = vehicle.plane.masses.size, speed / radius
+
+    def state(unknown: np.ndarray) -> np.ndarray:
+        both = np.zeros((2, 2 + units))
+        both[0, 3:], both[1, 2:] = unknown[2:], rate
+        both[1, :2] = speed * np.cos(unknown[1]), speed * np.sin(unknown[1])
+        return both
+
+    def left(unknown: np.ndarray) -> np.ndarray:
+        found = _accelerations(vehicle, state(unknown), steered(vehicle, unknown[0]))
+        across = found[1] * np.cos(unknown[1]) - found[0] * np.sin(unknown[1])
+        return np.concatenate(([across - speed * rate], found[2:]))
+
+    wheelbase = np.ptp(vehicle.plane.place[vehicle.plane.unit == 0, 0])
+    guess = np.zeros(1 + units)
+    guess[0] = wheelbase / radius
+    solved = root(left, guess, tol=1e-12)
+    if np.abs(left(solved.x)).max() > STEADY or np.abs(solved.x).max() > 1.0:
+        return None
+    steer = steered(vehicle, solved.x[0])
+    return SteadyTurn(steer, Start(state(solved.x), _rolling(vehicle, state(solved.x), steer)))
+
+
+def _rolling(vehicle: Braked, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
+    """Speeds of turning (W,) of wheels without slip."""
+    plane, headings, rates = vehicle.plane, state[0, 2:], state[1, 2:]
+    ahead = np.column_stack((np.cos(headings), np.sin(headings)))
+    aside = np.column_stack((-ahead[:, 1], ahead[:, 0]))
+    centres = state[1, :2] + plane.reach @ (rates[:, None] * aside)
+    own = plane.unit
+    spun = rates[own, None] * (plane.place[:, :1] * aside[own] - plane.place[:, 1:] * ahead[own])
+    course = headings[own] + steer
+    along = np.column_stack((np.cos(course), np.sin(course)))
+    return ((centres[own] + spun) * along).sum(axis=1) / plane.radius
+
+
+def _accelerations(vehicle: Braked, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
+    """Accelerations (2 + U,) of a vehicle whose wheels roll without brakes."""
+    plane, none, turning = vehicle.plane, np.zeros(vehicle.plane.wheels), _rolling(vehicle, state, steer)
+    surface, found = np.zeros((plane.wheels, 3)), np.zeros(state.shape[1])
+    found[:2] = state[1, 2] * np.array([-state[1, 1], state[1, 0]])
+    under_wheels(state, 0.0, plane, vehicle.kind, vehicle.road, surface)
+    step_on(state.copy(), turning, none, none, BLINK, steer, surface, vehicle.slope * 9.81 * BLINK, plane,
+            vehicle.tables.packed, found, np.zeros((plane.wheels, REPORTED)))  # fmt: skip
+    return found
