@@ -7,119 +7,159 @@ are those of that speed.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from models.braking.plane_chain import accelerations, centre_acceleration, load_on, point
+from models.braking.plane_chain import factor, inertia, rows, solve
 from models.braking.tyre_table import across, place
 from models.braking.wheel_step import wheel_step
 from models.compiled import njit
 
-CLOSE = 1e-10
-"""Change of the accelerations (m/s^2, and rad/s^2 times 1 m) at which the loads are taken to be found."""
-MOST_ROUNDS = 100
+CLOSE, HALF_CLOSE = 1e-9, 1e-6
+"""Change of the accelerations (m/s^2, and rad/s^2 times 1 m) at which the loads are taken to be found, in a whole step
+and in the half step that only leads to its middle."""
+PATIENCE, MOST_ROUNDS = 12, 200
+"""Rounds after which Anderson's method gives way to a damped one, and after which there is no answer."""
 FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE, LOCKED, TURNING = range(7)
 """Columns of what each wheel reports: mean forces on it (N) in its own axes, load (N), mean slip, slip angle (rad),
 time locked (s), speed of turning at the end (rad/s)."""
 REPORTED = 7
+START, RATE, ALONG, ASIDE, ANGLE, CELL, PART, BASE, TURNED, RADIUS, SPIN, FIRST, SECOND, SHARE = range(14)
+"""Columns of what is known of each wheel: speed of its centre along it at the start, what its rate has besides the
+accelerations, speeds along and across it where slip angles are taken, slip angle with its cell and part in the tables,
+load besides the accelerations, speed of turning at the start, radius, inertia, tables and the share of the second."""
+KNOWN = 14
+
+
+class Frame(NamedTuple):
+    """What a step's rounds have in common, for W wheels and n coordinates, of which those from ``free`` on are free.
+
+    along, across (W, n): see ``rows``; press (W, n): load by accelerations; known (W, 14): see above; mass (n, n): the
+    factor of the mass matrix; right (n,): forces besides the tyres' ones.
+    """
+
+    along: np.ndarray
+    across: np.ndarray
+    press: np.ndarray
+    known: np.ndarray
+    mass: np.ndarray
+    right: np.ndarray
+    free: int
 
 
 @njit(cache=True, error_model="numpy")
-def own_speeds(i, plane, positions, rates, steer):
-    """Speeds (m/s) of the centre of wheel i along and across the wheel, and its heading (rad)."""
-    k = plane.unit[i]
-    vx, vy = point(k, plane.place[i, 0], plane.place[i, 1], positions, rates, plane.reach)
-    heading = positions[2 + k] + steer[i]
-    c, s = math.cos(heading), math.sin(heading)
-    return c * vx + s * vy, c * vy - s * vx, heading
+def times(row, vector):
+    """Scalar product."""
+    total = 0.0
+    for a in range(vector.size):
+        total += row[a] * vector[a]
+    return total
 
 
 @njit(cache=True, error_model="numpy")
-def tyre(i, start, middle, end, load, turning, torque0, torque1, step, plane, surface, regular, tables, report):
-    """Fill the report of wheel i; start, middle, end: its speeds along and, in the middle, across (u, v)."""
-    angles, slips, loads, mu_x, g, h = tables
-    sign = 1.0 if start >= 0.0 else -1.0
-    u, v = max(sign * middle[0], 0.0), middle[1]
-    angle = math.atan2(abs(v), max(u, regular))
-    first, second, share = surface[i, 0], surface[i, 1], surface[i, 2]
-    p, q = place(angles, angle), place(loads, load)
-    grip = (int(first), int(second), share, p[0], p[1], q[0], q[1], load)
-    w, force, slip, locked = wheel_step(sign * start, sign * end, sign * turning[i], torque0[i], torque1[i], step,
-                                        plane.radius[i], plane.spin[i], grip, slips, mu_x)  # fmt: skip
-    size = min(max(abs(slip), 0.0), 1.0)
-    side = across(int(first), angle, load, size, angles, slips, loads, g, h)
-    if share > 0.0:
-        side += share * (across(int(second), angle, load, size, angles, slips, loads, g, h) - side)
-    side *= load
-    if locked >= step * (1.0 - 1e-12):
-        total, speed = math.hypot(force, side), math.hypot(u, v)
-        if speed > 0.0:
-            force, side = total * u / speed, total * abs(v) / speed
-    report[i, FORCE_X], report[i, FORCE_Y] = -sign * force, -math.copysign(side, v) if v != 0.0 else 0.0
-    report[i, LOAD], report[i, SLIP], report[i, SLIP_ANGLE] = load, slip, math.copysign(angle, v)
-    report[i, LOCKED], report[i, TURNING] = locked, sign * w
+def begin(turning, surface, plane, known):
+    """Fill what is known of the wheels and stays so for a whole step."""
+    for i in range(turning.size):
+        known[i, TURNED], known[i, RADIUS], known[i, SPIN] = turning[i], plane.radius[i], plane.spin[i]
+        for c in range(3):
+            known[i, FIRST + c] = surface[i, c]
 
 
 @njit(cache=True, error_model="numpy")
-def given_loads(positions, rates, found, plane, loads):
-    """Fill the wheels' loads (N) under accelerations (2 + U); a wheel that would lift bears none."""
+def settle(positions, rates, steer, regular, starts, plane, angles, frame, found):
+    """Fill the frame at a state; ``starts`` at the start of the step, whose speeds along the wheels it keeps."""
     for i in range(plane.unit.size):
-        k = plane.group[i]
-        ax, ay = centre_acceleration(k, positions, rates, found, plane.reach)
-        c, s = math.cos(positions[2 + k]), math.sin(positions[2 + k])
-        loads[i] = max(plane.static[i] + plane.by_x[i] * (c * ax + s * ay) + plane.by_y[i] * (c * ay - s * ax), 0.0)
+        known, along, aside, g, k = frame.known[i], frame.along[i], frame.across[i], plane.group[i], plane.unit[i]
+        ahead, left = rows(g, 0.0, 0.0, positions[2 + g], positions, rates, plane.reach, along, aside)
+        for a in range(rates.size):
+            frame.press[i, a] = plane.by_x[i] * along[a] + plane.by_y[i] * aside[a]
+        known[BASE] = plane.static[i] + plane.by_x[i] * ahead + plane.by_y[i] * left
+        ahead, _ = rows(k, plane.place[i, 0], plane.place[i, 1], positions[2 + k] + steer[i], positions, rates,
+                        plane.reach, along, aside)  # fmt: skip
+        u, v = times(along, rates), times(aside, rates)
+        if starts:
+            known[START] = u
+        forwards = u if known[START] >= 0.0 else -u
+        known[RATE], known[ALONG], known[ASIDE] = ahead + v * rates[2 + k], max(forwards, 0.0), v
+        known[ANGLE] = math.atan2(abs(v), max(forwards, regular))
+        known[CELL], known[PART] = place(angles, known[ANGLE])
+    inertia(positions, rates, plane.masses, plane.inertias, plane.reach, frame.mass, frame.right)
+    for a in range(frame.free, rates.size):
+        for b in range(frame.free):
+            frame.right[a] -= frame.mass[a, b] * found[b]
+    factor(frame.mass, frame.free)
 
 
 @njit(cache=True, error_model="numpy")
-def under(found, start, middle, turning, torque0, torque1, step, steer, surface, regular, plane, tables, out, report):
-    """Fill ``out`` (2 + U) with the accelerations by the tyres' forces if they were ``found``: the map whose fixed
-    point is wanted. start, middle : positions and rates (2, 2 + U) at the start and where slip angles are taken."""
-    wheels, size = plane.unit.size, out.size
-    loads, total, end = np.empty(wheels), np.zeros(size), np.empty((2, size))
-    end[1] = start[1] + step * found
-    end[0] = start[0] + 0.5 * step * (start[1] + end[1])
-    given_loads(middle[0], middle[1], found, plane, loads)
-    for i in range(wheels):
-        before, _, _ = own_speeds(i, plane, start[0], start[1], steer)
-        u, v, heading = own_speeds(i, plane, middle[0], middle[1], steer)
-        after, _, _ = own_speeds(i, plane, end[0], end[1], steer)
-        tyre(i, before, (u, v), after, loads[i], turning, torque0, torque1, step, plane, surface, regular, tables,
-             report)  # fmt: skip
-        c, s = math.cos(heading), math.sin(heading)
-        fx, fy = report[i, FORCE_X], report[i, FORCE_Y]
-        load_on(plane.unit[i], plane.place[i, 0], plane.place[i, 1], c * fx - s * fy, s * fx + c * fy, middle[0],
-                plane.reach, total)  # fmt: skip
-    out[:] = found
-    accelerations(middle[0], middle[1], total, plane.masses, plane.inertias, plane.reach, plane.hooked, out)
+def tyre(known, rate, load, torque0, torque1, step, tables, report):
+    """Fill the report (7,) of a wheel whose centre's speed along it changes at a ``rate`` (m/s^2)."""
+    angles, slips, loads, mu_x, g, h = tables
+    start, v, sign = known[START], known[ASIDE], 1.0 if known[START] >= 0.0 else -1.0
+    first, second, share, i, p = int(known[FIRST]), int(known[SECOND]), known[SHARE], int(known[CELL]), known[PART]
+    j, q = place(loads, load)
+    grip = (first, second, share, i, p, j, q, load)
+    w, force, slip, locked = wheel_step(sign * start, sign * (start + step * rate), sign * known[TURNED], torque0,
+                                        torque1, step, known[RADIUS], known[SPIN], grip, slips, mu_x)  # fmt: skip
+    angle, size = known[ANGLE], min(abs(slip), 1.0)
+    side = across(first, angle, load, size, angles, slips, loads, g, h)
+    if share > 0.0:
+        side += share * (across(second, angle, load, size, angles, slips, loads, g, h) - side)
+    side *= load
+    speed = math.hypot(known[ALONG], v)
+    if locked > 0.0 and speed > 0.0:  # a locked tyre's force is against the way it slides
+        total, part = math.hypot(force, side), min(locked / step, 1.0)
+        force += part * (total * known[ALONG] / speed - force)
+        side += part * (total * abs(v) / speed - side)
+    report[FORCE_X], report[FORCE_Y] = -sign * force, -math.copysign(side, v) if v != 0.0 else 0.0
+    report[LOAD], report[SLIP], report[SLIP_ANGLE] = load, slip, math.copysign(known[ANGLE], v)
+    report[LOCKED], report[TURNING] = locked, sign * w
 
 
 @njit(cache=True, error_model="numpy")
-def stage(start, middle, turning, torque0, torque1, step, steer, surface, regular, plane, tables, found, report):
-    """Mean accelerations over a step, into ``found`` (2 + U): what stands there is where the search begins.
+def respond(found, torque0, torque1, step, tables, frame, out, report):
+    """Fill ``out`` (n,) with the accelerations by the tyres' forces if they were ``found``: the map whose fixed point
+    is wanted. A wheel that would lift bears none."""
+    for a in range(out.size):
+        out[a] = found[a] if a < frame.free else frame.right[a]
+    for i in range(torque0.size):
+        known, along, aside = frame.known[i], frame.along[i], frame.across[i]
+        load = max(known[BASE] + times(frame.press[i], found), 0.0)
+        tyre(known, known[RATE] + times(along, found), load, torque0[i], torque1[i], step, tables, report[i])
+        for a in range(frame.free, out.size):
+            out[a] += along[a] * report[i, FORCE_X] + aside[a] * report[i, FORCE_Y]
+    solve(frame.mass, frame.free, out)
 
-    Anderson's method of depth one. Returns the rounds that it took; MOST_ROUNDS if the loads were not found.
+
+@njit(cache=True, error_model="numpy")
+def stage(torque0, torque1, step, close, tables, frame, found, report):
+    """Mean accelerations over a step, into ``found`` (n,): what stands there is where the search begins.
+
+    Anderson's method of depth one, damped where that does not settle. Returns whether they were found.
     """
     size = found.size
     out, off, off0, out0 = np.empty(size), np.empty(size), np.zeros(size), np.zeros(size)
-    for rounds in range(1, MOST_ROUNDS + 1):
-        under(found, start, middle, turning, torque0, torque1, step, steer, surface, regular, plane, tables, out,
-              report)  # fmt: skip
-        off[:] = out - found
-        if not np.abs(off).max() > CLOSE:
+    for rounds in range(MOST_ROUNDS):
+        respond(found, torque0, torque1, step, tables, frame, out, report)
+        most, product, square = 0.0, 0.0, 0.0
+        for a in range(size):
+            off[a] = out[a] - found[a]
+            most = max(most, abs(off[a]))
+            product += off[a] * (off[a] - off0[a])
+            square += (off[a] - off0[a]) ** 2
+        if not most > close:
             found[:] = out
-            return rounds
-        mix = 0.0
-        if rounds > 1:
-            change = off - off0
-            mix = (off * change).sum() / (change * change).sum()
-            mix = min(max(mix, -2.0), 0.75) if math.isfinite(mix) else 0.0
-        found[:] = out - mix * (out - out0)
-        off0[:], out0[:] = off, out
-    return MOST_ROUNDS
+            return most == most
+        mix = min(max(product / square, -2.0), 0.75) if 0 < rounds < PATIENCE and square > 0.0 else 0.0
+        for a in range(size):
+            kept = out[a] - mix * (out[a] - out0[a])
+            found[a] = kept if rounds < PATIENCE else found[a] + 0.5 * off[a]
+            off0[a], out0[a] = off[a], out[a]
+    return False
 
 
 @njit(cache=True, error_model="numpy")
-def comes_to_rest(rates, found, step, plane):
+def comes_to_rest(rates, turning, found, step, plane):
     """Time (s) within the step at which the vehicle stands, or -1 if it does not.
 
     Friction takes speed away until there is none, and only the time grid would let it turn round: it stands where its
@@ -131,6 +171,8 @@ def comes_to_rest(rates, found, step, plane):
         speed += weight * rates[a] ** 2
         both += weight * rates[a] * found[a]
         rate += weight * found[a] ** 2
+    if speed == 0.0 and not turning.any():
+        return 0.0
     if rate == 0.0 or both >= 0.0 or -both > step * rate or speed > 2.25 * step * step * rate:
         return -1.0
     return -both / rate
@@ -138,30 +180,32 @@ def comes_to_rest(rates, found, step, plane):
 
 @njit(cache=True, error_model="numpy")
 def step_on(state, turning, torque0, torque1, step, steer, surface, regular, plane, tables, found, report):
-    """One step of ``state`` (2, 2 + U), positions and rates, and ``turning`` (W,): speeds of the wheels (rad/s).
+    """One step of ``state`` (2, n), positions and rates, and ``turning`` (W,): speeds of the wheels (rad/s).
 
     torque0, torque1 : of the brakes (W,) at the step's ends; steer (W,) : angles of the wheels in their units (rad);
-    surface (W, 3) : tables of each wheel and the share of the second; regular : m/s; found (2 + U,) : accelerations,
+    surface (W, 3) : tables of each wheel and the share of the second; regular : m/s; found (n,) : accelerations,
     those of the step before on entry. Returns the time (s) of the step at which the vehicle comes to rest, ``step``
     if it does not, -1 if the loads were not found.
     """
-    start, middle = state.copy(), state.copy()
-    torque = 0.5 * (torque0 + torque1)
-    if stage(start, start, turning, torque0, torque, 0.5 * step, steer, surface, regular, plane, tables, found,
-             report) == MOST_ROUNDS:  # fmt: skip
-        return -1.0
-    rest = -1.0 if plane.hooked else comes_to_rest(start[1], found, step, plane)
-    if rest >= 0.0:
-        state[0] = start[0] + rest * start[1] + 0.5 * rest * rest * found
-        state[1] = 0.0
-        turning[:] = 0.0
-        return rest
-    middle[1] = start[1] + 0.5 * step * found
-    middle[0] = start[0] + 0.25 * step * (start[1] + middle[1])
-    if stage(start, middle, turning, torque0, torque1, step, steer, surface, regular, plane, tables, found,
-             report) == MOST_ROUNDS:  # fmt: skip
-        return -1.0
-    state[1] = start[1] + step * found
-    state[0] = start[0] + 0.5 * step * (start[1] + state[1])
+    wheels, size = turning.size, found.size
+    frame = Frame(np.empty((wheels, size)), np.empty((wheels, size)), np.empty((wheels, size)),
+                  np.empty((wheels, KNOWN)), np.empty((size, size)), np.empty(size),
+                  2 if plane.hooked else 0)  # fmt: skip
+    place0, rate0, middle = state[0].copy(), state[1].copy(), 0.5 * (torque0 + torque1)
+    begin(turning, surface, plane, frame.known)
+    for half in (True, False):
+        settle(state[0], state[1], steer, regular, half, plane, tables[0], frame, found)
+        time, last = (0.5 * step, middle) if half else (step, torque1)
+        if not stage(torque0, last, time, HALF_CLOSE if half else CLOSE, tables, frame, found, report):
+            return -1.0
+        rest = comes_to_rest(rate0, turning, found, step, plane) if half and not plane.hooked else -1.0
+        if rest >= 0.0:
+            time = rest
+        for a in range(size):
+            state[1, a] = rate0[a] + time * found[a]
+            state[0, a] = place0[a] + 0.5 * time * (rate0[a] + state[1, a])
+        if rest >= 0.0:
+            state[1], turning[:] = 0.0, 0.0
+            return rest
     turning[:] = report[:, TURNING]
     return step
