@@ -77,7 +77,7 @@ def write_table(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]])
     np.savetxt(path, values, fmt="%.17g", delimiter=",", header=",".join(names), comments="")
 
 
-def _text(path: str | Path) -> str:
+def whole_text(path: str | Path) -> str:
     """Whole text of a file; whatever prevents reading it is the user's to repair."""
     try:
         return Path(path).read_bytes().decode("utf-8-sig")
@@ -89,7 +89,7 @@ def _text(path: str | Path) -> str:
 
 def _header_and_rows(path: str | Path) -> tuple[tuple[int, str], Lines]:
     """Numbered header line and numbered rows, without comments and empty lines."""
-    text = _text(path)
+    text = whole_text(path)
     lines = [(i, line.strip()) for i, line in enumerate(text.split("\n"), start=1)]
     used = [(i, line) for i, line in lines if line and not line.startswith("#")]
     if not used:
