@@ -100,8 +100,9 @@ def _accepted(server: socket.socket, process: subprocess.Popen[bytes] | None, st
     while time.perf_counter() < end:
         with suppress(TimeoutError):
             return server.accept()[0]
-        if process is not None and process.poll() is not None:
-            raise RunFailed("controller", f"crash: its command ended with status {process.returncode} and no connection")
+        status = None if process is None else process.poll()
+        if status is not None:
+            raise RunFailed("controller", f"crash: its command ended with status {status} before it connected")
     where = f"{LOOPBACK}:{server.getsockname()[1]}"
     raise RunFailed("controller", f"silence: nobody connected to {where} within {start:g} s")
 
