@@ -1,0 +1,64 @@
+"""Which surface is under which wheel: along the road, on either side of a line, shared within a step."""
+
+import numpy as np
+import pytest
+
+from models.braking.plane_vehicle import PAPER, truck
+from models.braking.surfaces import Stretch, check_way, road, under_wheels
+from models.errors import InputError
+
+PLANE = truck(PAPER)
+KINDS = np.array([0, 0, 1, 1])
+ROAD = road([Stretch(0.0, 0, 1), Stretch(10.0, 2, 3), Stretch(12.0, 0, 0)], line=0.5, kinds=2)
+FRONT, REAR = PAPER.front.x, PAPER.rear.x
+
+
+def under(x, y=0.0, vx=0.0, vy=0.0, step=0.1, own=ROAD):
+    surface = np.empty((4, 3))
+    under_wheels(np.array([[x, y, 0.0], [vx, vy, 0.0]]), step, PLANE, KINDS, own, surface)
+    return surface
+
+
+def test_each_wheel_has_the_surface_under_it_and_its_own_tyre():
+    # front wheels at 11 m, rear ones at 7.39 m; left ones at y = 0.95 and 0.9, right ones on the other side of 0.5
+    found = under(11.0 - FRONT)
+    assert found[:, 0].tolist() == [4.0, 6.0, 1.0, 3.0] and not found[:, 2].any()
+    assert under(-1e6)[:, 0].tolist() == [0.0, 2.0, 1.0, 3.0]
+    assert under(1e6)[:, 0].tolist() == [0.0, 0.0, 1.0, 1.0]
+
+
+@pytest.mark.parametrize("speed", [10.0, -10.0])
+def test_a_step_over_an_edge_has_the_share_of_the_way_whichever_the_direction(speed):
+    # of the metre of a step, 0.3 m lie beyond x = 10
+    start = 9.3 if speed > 0 else 10.3
+    left_front = under(start - FRONT, vx=speed)[0]
+    assert left_front[:2].tolist() == [0.0, 4.0] and left_front[2] == pytest.approx(0.3, abs=1e-12)
+
+
+@pytest.mark.parametrize("speed", [2.0, -2.0])
+def test_a_step_over_the_line_has_the_share_of_the_way(speed):
+    # the left front wheel is at y + 0.95: of its 0.2 m, 0.05 m lie left of the line
+    y = 0.5 - 0.95 + (-0.15 if speed > 0 else 0.05)
+    left_front = under(0.0, y, vy=speed)[0]
+    assert left_front[:2].tolist() == [2.0, 0.0] and left_front[2] == pytest.approx(0.25, abs=1e-12)
+
+
+def test_shares_of_successive_steps_add_up_to_the_way():
+    # whatever the step, friction summed over the way is that of the road: 2 m of surface 2 between two of 0
+    for step in (0.01, 0.037, 0.11):
+        x = 9.0 - FRONT + step * 10.0 * np.arange(round(4.0 / (10.0 * step)))
+        rows = np.array([under(place, vx=10.0, step=step)[0] for place in x])
+        on = (rows[:, 0] == 4.0) * (1.0 - rows[:, 2]) + (rows[:, 1] == 4.0) * rows[:, 2]
+        assert on.sum() * step * 10.0 == pytest.approx(2.0, abs=1e-9)
+
+
+def test_roads_that_cannot_be_are_told():
+    for wrong in ([], [Stretch(0, 0, 0), Stretch(0, 1, 1)], [Stretch(np.nan, 0, 0)]):
+        with pytest.raises(InputError, match="rise strictly"):
+            road(wrong)
+    with pytest.raises(InputError, match="count from 0"):
+        road([Stretch(0, -1, 0)])
+    check_way(ROAD, 2.0)
+    with pytest.raises(InputError, match=r"stretches = 2.0: .*more substeps"):
+        check_way(ROAD, 2.1)
+    check_way(road([Stretch(0, 0, 0), Stretch(0.1, 1, 1)]), 50.0)  # the last and the first have no end
