@@ -14,7 +14,7 @@ from models.braking.plane_step import REPORTED
 from models.braking.plane_vehicle import Plane
 from models.braking.port.ask import ask
 from models.braking.pressure import Chambers, by_pressures, by_valves, still
-from models.braking.surfaces import Road
+from models.braking.surfaces import Road, check_way
 from models.braking.tyre_table import Tables
 from models.errors import RunFailed
 
@@ -80,6 +80,7 @@ class Braked:
         rows = [(time, state.copy(), turning.copy(), air.pressure.copy(), air.torque.copy())]
         reports = list[np.ndarray]()
         step = self.sample / self.substeps
+        check_way(self.road, step * float(np.hypot(*state[1, :2])))
         with _kept(rows, reports):
             while status != AT_REST and time < duration - 1e-9:
                 braked = time >= self.switch - 1e-9
