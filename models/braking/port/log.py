@@ -1,0 +1,72 @@
+"""Every exchange in a file, and a controller that replays it.
+
+File: the line ``twinrig braking port log 1``, one line with 64 hexadecimal digits that name the scene, then per
+exchange the frame of the question and that of the answer, as in ``frame``.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import BinaryIO
+
+from models.braking.controller import Command, Controller, Sample
+from models.braking.port.ask import checked
+from models.braking.port.frame import ANSWER, QUESTION, answer, command, question
+from models.errors import InputError, RunFailed
+
+TITLE = b"twinrig braking port log 1\n"
+RECORD = QUESTION.size + ANSWER.size
+
+
+def name_of(scene: str) -> str:
+    """64 hexadecimal digits that name a scene by its text."""
+    return sha256(scene.encode()).hexdigest()
+
+
+@dataclass
+class Logged:
+    """A controller whose exchanges are written as they happen."""
+
+    inner: Controller
+    file: BinaryIO
+
+    def sample(self, given: Sample) -> Command:
+        """Its answer, written down; one that breaks the port's rules is not."""
+        said = checked(self.inner.sample(given), given)
+        self.file.write(question(given) + answer(given.number, said))
+        return said
+
+
+@contextmanager
+def logged(inner: Controller, path: Path, scene: str) -> Iterator[Logged]:
+    """A controller with its log for as long as the block lasts; scene: of ``name_of``."""
+    with path.open("wb") as file:
+        file.write(TITLE + scene.encode() + b"\n")
+        yield Logged(inner, file)
+
+
+class Replay:
+    """Answers as a log does, as long as it is asked as the log was; raises InputError for the log of another scene."""
+
+    def __init__(self, path: Path, scene: str) -> None:
+        try:
+            title, name, records = path.read_bytes().split(b"\n", 2)
+        except (OSError, ValueError) as error:
+            raise InputError(path.name, "replay", None, f"is no log: {error}") from None
+        if title + b"\n" != TITLE:
+            raise InputError(path.name, "replay", None, "is no log of this version")
+        if name != scene.encode():
+            raise InputError(path.name, "replay", None, "is the log of another scene")
+        self._records, self._path = records, path
+
+    def sample(self, given: Sample) -> Command:
+        """The logged answer; raises RunFailed if the log has none, or if the question was another one."""
+        start = given.number * RECORD
+        record, place = self._records[start : start + RECORD], f"sample {given.number}: {self._path.name}"
+        if len(record) < RECORD:
+            raise RunFailed("replay", f"{place} has ended", 1e-9 * given.time)
+        if record[: QUESTION.size] != question(given):
+            raise RunFailed("replay", f"{place} was asked something else", 1e-9 * given.time)
+        return command(record[QUESTION.size :], given.number)

@@ -1,0 +1,115 @@
+"""The port as a scene gives it: what stands behind it, its signals, faults, log and clock; opened for one run."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from models.braking.controller import Controller
+from models.braking.port import fmu_port, socket_port
+from models.braking.port.callable import Within, named_controller
+from models.braking.port.faults import Fault, Faulty, missing_teeth
+from models.braking.port.log import Replay, logged, name_of
+from models.braking.port.pace import WallClock
+from models.braking.port.sensors import Conversion, sensed
+from models.braking.port.teeth import Counted, Teeth
+from models.errors import InputError
+from models.strict import Strict, quantity
+
+BEHIND = ("callable", "command", "port", "fmu", "replay")
+"""What can stand behind the port in place of a controller of the scene; at most one does."""
+
+
+class PortTable(Strict):
+    """[port]: paths are seen from the scene's folder."""
+
+    callable: str | None = Field(default=None, description="module:Name or file.py:Name, a class")
+    parameters: dict[str, Any] = Field(default_factory=dict, description="of the callable")
+    command: list[str] | None = Field(default=None, min_length=1, description="starts a process that connects")
+    port: int | None = Field(default=None, ge=1, le=65535, description="of this machine, at which a process connects")
+    fmu: str | None = Field(default=None, description="an FMU file, FMI 2 co-simulation")
+    replay: str | None = Field(default=None, description="a log of this scene")
+    timeout: float = quantity("s", "for one answer", default=1.0)
+    start: float = quantity("s", "for a process to connect", default=20.0)
+    pace: Literal["simulated", "wall"] = Field(default="simulated", description="simulated, or wall: the clock's")
+    log: str | None = Field(default=None, description="file to which every exchange is written")
+    signals: Conversion = Conversion()
+    pressures: Conversion = Conversion()
+    teeth: Teeth | None = Field(default=None, description="signals are counted from teeth; not named, they are known")
+    faults: list[Fault] = Field(default_factory=list, description="on demand")
+
+    @model_validator(mode="after")
+    def _one_behind(self) -> "PortTable":
+        named = [key for key in BEHIND if getattr(self, key) is not None]
+        if len(named) > 1:
+            raise ValueError(f"at most one of {', '.join(BEHIND)} can be there, not {' and '.join(named)}")
+        if self.parameters and self.callable is None:
+            raise ValueError("parameters has no meaning without callable")
+        if self.teeth is None and any(fault.kind == "tooth" for fault in self.faults):
+            raise ValueError("a missing tooth needs signals that are counted from teeth")
+        return self
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the port needs to know of a run. radius (W,): of the wheels, m; sample: s; scene: its text, by which a log
+    is known; folder: of its paths; file: its name, for messages.
+    """
+
+    radius: np.ndarray
+    sample: float
+    scene: str = ""
+    folder: Path = Path()
+    file: str = ""
+
+
+@contextmanager
+def opened(table: PortTable, run: Run, own: Controller) -> Iterator[tuple[Controller, WallClock | None]]:
+    """The controller of one run, for as long as the block lasts, and its clock if it keeps to one.
+
+    own : stands behind the port if the table names nothing else. Raises InputError, RunFailed.
+    """
+    _check(table, run)
+    with ExitStack() as stack:
+        inner = stack.enter_context(_behind(table, run, own))
+        clock = WallClock(inner, run.sample) if table.pace == "wall" else None
+        watched: Controller = inner if clock is None else clock
+        if table.log is not None:
+            watched = stack.enter_context(logged(watched, run.folder / table.log, name_of(run.scene)))
+        faulty = Faulty(watched, table.faults) if table.faults else watched
+        teeth = None if table.teeth is None else Counted(table.teeth, run.radius, partial(missing_teeth, table.faults))
+        yield sensed(faulty, run.radius.size, table.signals, table.pressures, teeth=teeth), clock
+
+
+@contextmanager
+def _behind(table: PortTable, run: Run, own: Controller) -> Iterator[Controller]:
+    """What answers."""
+    with ExitStack() as stack:
+        if table.command is not None or table.port is not None:
+            link = socket_port.connected(table.command, table.port or 0, table.timeout, table.start, run.folder)
+            yield stack.enter_context(link)
+        elif table.fmu is not None:
+            fmu = stack.enter_context(fmu_port.opened(run.folder / table.fmu, run.radius.size, run.sample))
+            yield Within(fmu, table.timeout)
+        elif table.replay is not None:
+            yield Replay(run.folder / table.replay, name_of(run.scene))
+        elif table.callable is not None:
+            made = named_controller(table.callable, run.folder, run.radius.size, table.parameters, run.file)
+            yield Within(made, table.timeout)
+        else:
+            yield own
+
+
+def _check(table: PortTable, run: Run) -> None:
+    wheels = run.radius.size
+    for i, fault in enumerate(table.faults):
+        for wheel in fault.of(wheels):
+            if not 0 <= wheel < wheels:
+                raise InputError(run.file, f"port.faults.{i}.wheels", wheel, f"must be from 0 to {wheels - 1}")
+        if fault.tooth is not None and table.teeth is not None and fault.tooth >= table.teeth.teeth:
+            raise InputError(run.file, f"port.faults.{i}.tooth", fault.tooth, f"must be below {table.teeth.teeth}")
