@@ -13,7 +13,7 @@ from models.braking.controller import SAMPLE, Controller, Sample
 from models.braking.plane_step import REPORTED
 from models.braking.plane_vehicle import Plane
 from models.braking.port.ask import ask
-from models.braking.pressure import Chambers, by_pressures, by_valves, still
+from models.braking.pressure import RELEASE, Chambers, by_pressures, by_valves, still
 from models.braking.surfaces import Road, check_way
 from models.braking.tyre_table import Tables
 from models.errors import RunFailed
@@ -69,6 +69,8 @@ class Braked:
     def run(self, controller: Controller, start: float | Start, duration: float = 60.0) -> Path:
         """From a start, or steady rolling along x at a speed (m/s); the brake switch closes at ``switch``.
 
+        Until then no valve lets anything through, whatever the controller commands.
+
         Raises RunFailed, which names the time and whose ``partial`` is the path until then.
         """
         units, wheels = self.plane.masses.size, self.plane.wheels
@@ -79,7 +81,7 @@ class Braked:
         report, time, status, number = np.zeros((wheels, REPORTED)), 0.0, 0, 0
         rows = [(time, state.copy(), turning.copy(), air.pressure.copy(), air.torque.copy())]
         reports = list[np.ndarray]()
-        step = self.sample / self.substeps
+        step, released = self.sample / self.substeps, np.full(wheels, RELEASE)
         check_way(self.road, step * float(np.hypot(*state[1, :2])))
         with _kept(rows, reports):
             while status != AT_REST and time < duration - 1e-9:
@@ -89,7 +91,7 @@ class Braked:
                 asked = Sample(number, round(time * 1e9), turning * self.plane.radius, braked, supply, known)
                 command = ask(controller, asked)
                 if command.pressures is None:
-                    by_valves(command.valves, self.sample, air, self.chambers, self.brakes, torques)
+                    by_valves(command.valves if braked else released, self.sample, air, self.chambers, self.brakes, torques)
                 else:
                     by_pressures(command.pressures, air, self.brakes, torques)
                 status, used = advance(state, turning, torques, step, self.steer, self.slope, self.plane, self.kind,

@@ -15,7 +15,6 @@ from pydantic import Field
 from models.braking.controller import Sample
 from models.strict import Strict, quantity
 
-
 Missing = Callable[[int, int, float], bool]
 
 
