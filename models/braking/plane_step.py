@@ -1,9 +1,9 @@
 """One step of a braked vehicle in the plane: wheels exact, their mean forces to the vehicle, loads solved.
 
 A half step gives the state in the middle, and the whole step takes its slip angles, loads and friction there: order
-two. In both, loads follow from accelerations and these from the tyres' forces under the loads; the fixed point is found
-to ``CLOSE``. Below ``regular``, the speed at which the tyres' cornering stiffness is as fast as the step, slip angles
-are those of that speed.
+two. Loads follow from accelerations and these from the tyres' forces under the loads; the whole step finds the fixed
+point to ``CLOSE``. Below ``regular``, the speed at which cornering stiffness is as fast as the step, slip angles are
+those of that speed.
 """
 
 import math
@@ -16,11 +16,11 @@ from models.braking.tyre_table import across, place
 from models.braking.wheel_step import wheel_step
 from models.compiled import njit
 
-CLOSE, HALF_CLOSE = 1e-9, 1e-6
-"""Change of the accelerations (m/s^2, and rad/s^2 times 1 m) at which the loads are taken to be found, in a whole step
-and in the half step that only leads to its middle."""
-PATIENCE, MOST_ROUNDS = 12, 200
-"""Rounds after which Anderson's method gives way to a damped one, and after which there is no answer."""
+CLOSE = 1e-9
+"""Change of the accelerations (m/s^2, and rad/s^2 times 1 m) at which the loads are taken to be found."""
+HALF_ROUNDS, PATIENCE, MOST_ROUNDS = 2, 12, 200
+"""Rounds of a half step, to whose loads those of the step before are close enough for order two; rounds after which
+Anderson's method gives way to a damped one; rounds after which there is no answer."""
 FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE, LOCKED, TURNING = range(7)
 """Columns of what each wheel reports: mean forces on it (N) in its own axes, load (N), mean slip, slip angle (rad),
 time locked (s), speed of turning at the end (rad/s)."""
@@ -132,30 +132,30 @@ def respond(found, torque0, torque1, step, tables, frame, out, report):
 
 
 @njit(cache=True, error_model="numpy")
-def stage(torque0, torque1, step, close, tables, frame, found, report):
+def stage(torque0, torque1, step, most, tables, frame, found, report):
     """Mean accelerations over a step, into ``found`` (n,): what stands there is where the search begins.
 
-    Anderson's method of depth one, damped where that does not settle. Returns whether they were found.
+    Anderson's method of depth one, damped where that does not settle, for at most so many rounds. Returns the last
+    change.
     """
-    size = found.size
+    size, change = found.size, math.inf
     out, off, off0, out0 = np.empty(size), np.empty(size), np.zeros(size), np.zeros(size)
-    for rounds in range(MOST_ROUNDS):
+    for rounds in range(most):
         respond(found, torque0, torque1, step, tables, frame, out, report)
-        most, product, square = 0.0, 0.0, 0.0
+        change, product, square = 0.0, 0.0, 0.0
         for a in range(size):
             off[a] = out[a] - found[a]
-            most = max(most, abs(off[a]))
+            change = max(change, abs(off[a]))
             product += off[a] * (off[a] - off0[a])
             square += (off[a] - off0[a]) ** 2
-        if not most > close:
-            found[:] = out
-            return most == most
-        mix = min(max(product / square, -2.0), 0.75) if 0 < rounds < PATIENCE and square > 0.0 else 0.0
+        done = not change > CLOSE or rounds == most - 1
+        mix = min(max(product / square, -2.0), 0.75) if rounds > 0 and square > 0.0 and not done else 0.0
         for a in range(size):
-            kept = out[a] - mix * (out[a] - out0[a])
-            found[a] = kept if rounds < PATIENCE else found[a] + 0.5 * off[a]
+            found[a] = out[a] - mix * (out[a] - out0[a]) if done or rounds < PATIENCE else found[a] + 0.5 * off[a]
             off0[a], out0[a] = off[a], out[a]
-    return False
+        if done:
+            break
+    return change
 
 
 @njit(cache=True, error_model="numpy")
@@ -196,7 +196,8 @@ def step_on(state, turning, torque0, torque1, step, steer, surface, regular, pla
     for half in (True, False):
         settle(state[0], state[1], steer, regular, half, plane, tables[0], frame, found)
         time, last = (0.5 * step, middle) if half else (step, torque1)
-        if not stage(torque0, last, time, HALF_CLOSE if half else CLOSE, tables, frame, found, report):
+        most = HALF_ROUNDS if half else MOST_ROUNDS
+        if not stage(torque0, last, time, most, tables, frame, found, report) <= (math.inf if half else CLOSE):
             return -1.0
         rest = comes_to_rest(rate0, turning, found, step, plane) if half and not plane.hooked else -1.0
         if rest >= 0.0:

@@ -30,9 +30,10 @@ def phi_1(z):
 
 
 @njit(cache=True, error_model="numpy")
-def phi_2(z):
-    """(phi_1(z) - 1) / z."""
-    return (math.expm1(z) / z - 1.0) / z if abs(z) > 1e-3 else 0.5 + z / 6.0 + z * z / 24.0 + z**3 / 120.0
+def passed(way, rate, decay, time):
+    """Integral over a time of what covers a way with a rate that decays as exp(-decay t)."""
+    z = decay * time
+    return time * way * (0.5 + z / 12.0) if abs(z) < 0.01 else (rate * time - way) / decay
 
 
 @njit(cache=True, error_model="numpy")
@@ -83,9 +84,9 @@ def roll(slip, left, kappa, fade, held, grip, slips, mu_x):
         time = _way(decay, rate, target - slip)
         if used + time >= left:
             some = left - used
-            area += some * (slip + rate * some * phi_2(-decay * some))
-            return left, slip + rate * some * phi_1(-decay * some), area
-        area += time * (slip + rate * time * phi_2(-decay * time))
+            way = rate * some * phi_1(-decay * some)
+            return left, slip + way, area + some * slip + passed(way, rate, decay, some)
+        area += time * slip + passed(target - slip, rate, decay, time)
         used, slip, turned = used + time, target, 0
     return used, math.nan, area
 
