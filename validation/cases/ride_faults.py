@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from validation.faults import ride
+from validation.faults.ride import CAMPAIGN
 from validation.rows import Row, System, Table
 
 TITLE = "Planted faults of ride: what each check sees"
@@ -12,13 +12,13 @@ SYSTEM: System = "ride"
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Every fault under every check; the quick share is all of it."""
-    found = ride.measure()
-    return ride.rows(found), {"faults": found}
+    found = CAMPAIGN.measure()
+    return CAMPAIGN.rows(found), {"faults": found}
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Every fault with what sees it and what does not."""
-    return [ride.table(data["faults"])]
+    return [CAMPAIGN.table(data["faults"])]
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:

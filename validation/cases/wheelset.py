@@ -20,6 +20,7 @@ from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
 from models.rail.of_scene import IMPLEMENTATIONS, implementation
 from models.rail.orbit import Orbit, beside, refined, solved
 from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
+from validation.faults.patches import with_globals
 from validation.rows import Row, System, Table, at_most, behaves, within
 
 TITLE = "A wheelset on straight track"
@@ -292,17 +293,10 @@ def spin_reversed() -> Iterator[None]:
         wf.creep(contacts, slip, *others)
 
     source = wf.wheel_forces.py_func
-    with mock.patch.object(eq, "wheel_forces", _with(source, creep=faulty)), mock.patch.object(
+    with mock.patch.object(eq, "wheel_forces", with_globals(source, creep=faulty)), mock.patch.object(
         eq, "rates", eq.rates.py_func
     ):
         yield
-
-
-def _with(function: Callable[..., Any], **others: Any) -> Callable[..., Any]:
-    """The same function with other globals."""
-    from types import FunctionType
-
-    return FunctionType(function.__code__, function.__globals__ | others, function.__name__)
 
 
 def _fault_rows() -> list[Row]:

@@ -6,6 +6,7 @@ Each is called once per built model and gives a context that can be entered agai
 import math
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from types import FunctionType
 from typing import Any
 from unittest.mock import patch
 
@@ -41,6 +42,11 @@ def _owner(path: str) -> tuple[Any, str]:
     for parent in parents:
         owner = getattr(owner, parent)
     return owner, name
+
+
+def with_globals(function: Callable[..., Any], **others: Any) -> Callable[..., Any]:
+    """The same function with other globals."""
+    return FunctionType(function.__code__, function.__globals__ | others, function.__name__)
 
 
 # Exudyn

@@ -1,10 +1,7 @@
-"""Faults of ride, planted one at a time into road, vehicle, covariance and weighting, and the checks that see them.
-
-What a check compares with is computed once without a fault, by a route that the fault does not touch.
-"""
+"""Faults of ride, planted one at a time into road, vehicle, covariance and weighting, and the checks that see them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -22,32 +19,12 @@ from models.ride.weighting import WEIGHTINGS, weighting
 from models.road import two_track
 from models.vehicles import spatial_linear, vehicle_file
 from models.vehicles.spatial import SpatialVehicle
+from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
-from validation.rows import Row, System, Table, finding, within
 
-SYSTEM: System = "ride"
 SPEED = 17.0
 INERTIA = np.diag([207.26524557936952, 1565.8178787125541, 1791.5995300122856])
 """Published inertia (kg m^2) of the whole sprung mass of R19, which body and engine share."""
-
-
-@dataclass(frozen=True)
-class Check:
-    """measure() -> size; what exceeds ``tolerance`` is seen."""
-
-    title: str
-    unit: str
-    tolerance: float
-    measure: Callable[[], float]
-
-
-@dataclass(frozen=True)
-class Fault:
-    """A fault in words, where it is planted, and what it changes meanwhile."""
-
-    name: str
-    place: str
-    inside: Patch
 
 
 def _system(name: str, road: Callable[[LinearVehicle], Excitation]) -> tuple[LinearVehicle, Excitation, DelayedSystem]:
@@ -279,60 +256,4 @@ FAULTS = (
 )  # fmt: skip
 
 
-def measure() -> list[dict[str, Any]]:
-    """Size over tolerance of every check, without a fault first and then with each."""
-    clean = {"fault": "no fault", "place": "nowhere", "ratios": _ratios()}
-    return [clean, *({"fault": own.name, "place": own.place, "ratios": _with(own.inside)} for own in FAULTS)]
-
-
-def _with(fault: Patch) -> dict[str, float]:
-    with fault()():
-        return _ratios()
-
-
-def _ratios() -> dict[str, float]:
-    return {name: check.measure() / check.tolerance for name, check in CHECKS.items()}
-
-
-def seen(record: dict[str, Any]) -> list[str]:
-    """Checks that see a fault."""
-    return [name for name, ratio in record["ratios"].items() if not ratio <= 1.0]
-
-
-def rows(records: list[dict[str, Any]]) -> list[Row]:
-    """Caught, false alarms, and what one check alone catches."""
-    clean, *found = records
-    single = [f"{record['fault']} ({seen(record)[0]})" for record in found if len(seen(record)) == 1]
-    return [
-        within("ride_faults.caught", SYSTEM, "faults planted in ride that a check catches",
-               sum(bool(seen(record)) for record in found), "faults", len(FAULTS), 0,
-               "every one of them is a wrong vehicle, road or covariance", "native"),
-        within("ride_faults.false_alarms", SYSTEM, "alarms of the checks of ride without a fault", len(seen(clean)),
-               "alarms", 0, 0, "a check that cries without a fault is no check", "native"),
-        finding("ride_faults.single", SYSTEM, "faults planted in ride that one check alone catches", len(single),
-                "faults", "few", "what would pass if that check were dropped: " + (", ".join(single) or "none"),
-                "native"),
-    ]  # fmt: skip
-
-
-def table(records: list[dict[str, Any]]) -> Table:
-    """Every fault with what sees it."""
-    lines = tuple(
-        (
-            record["fault"],
-            record["place"],
-            _sizes(record),
-            ", ".join(name for name in CHECKS if name not in seen(record)),
-        )
-        for record in records[1:]
-    )
-    note = (
-        "Sizes relative, as each check takes them: "
-        + "; ".join(f"{name}: {check.title} (allowed {check.tolerance:g})" for name, check in CHECKS.items())
-        + "."
-    )
-    return Table("Faults of ride, one at a time", note, ("fault", "planted in", "caught by", "not seen by"), lines)
-
-
-def _sizes(record: dict[str, Any]) -> str:
-    return ", ".join(f"{name} {record['ratios'][name] * CHECKS[name].tolerance:.1g}" for name in seen(record))
+CAMPAIGN = Campaign("ride_faults", "ride", "ride", CHECKS, FAULTS)

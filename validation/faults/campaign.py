@@ -1,0 +1,103 @@
+"""Faults planted one at a time, checks that see them or not, and what a report says of both.
+
+What a check compares with is computed once without a fault, by a route that the fault does not touch.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from models.errors import RunFailed
+from validation.faults.patches import Patch
+from validation.rows import Row, System, Table, finding, within
+
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Check:
+    """measure() -> size; what exceeds ``tolerance`` is seen."""
+
+    title: str
+    unit: str
+    tolerance: float
+    measure: Callable[[], float]
+
+    def size(self) -> float:
+        """What is measured; infinite where the fault lets a run fail."""
+        try:
+            return self.measure()
+        except RunFailed:
+            return math.inf
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault in words, where it is planted, and what it changes meanwhile."""
+
+    name: str
+    place: str
+    inside: Patch
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Faults in one thing, ``what``, and the checks that are run under each; ``id`` begins the ids of its rows."""
+
+    id: str
+    what: str
+    system: System
+    checks: dict[str, Check]
+    faults: tuple[Fault, ...]
+
+    def measure(self) -> list[Record]:
+        """Size over tolerance of every check, without a fault first and then with each."""
+        clean = {"fault": "no fault", "place": "nowhere", "ratios": self._ratios()}
+        return [clean, *({"fault": own.name, "place": own.place, "ratios": self._with(own)} for own in self.faults)]
+
+    def _with(self, fault: Fault) -> dict[str, float]:
+        with fault.inside()():
+            return self._ratios()
+
+    def _ratios(self) -> dict[str, float]:
+        return {name: check.size() / check.tolerance for name, check in self.checks.items()}
+
+    def rows(self, records: list[Record]) -> list[Row]:
+        """Caught, false alarms, and what one check alone catches."""
+        clean, *found = records
+        single = [f"{record['fault']} ({seen(record)[0]})" for record in found if len(seen(record)) == 1]
+        return [
+            within(f"{self.id}.caught", self.system, f"faults planted in {self.what} that a check catches",
+                   sum(bool(seen(record)) for record in found), "faults", len(self.faults), 0,
+                   "every one of them makes it wrong", "native"),
+            within(f"{self.id}.false_alarms", self.system, f"alarms of the checks of {self.what} without a fault",
+                   len(seen(clean)), "alarms", 0, 0, "a check that cries without a fault is no check", "native"),
+            finding(f"{self.id}.single", self.system, f"faults planted in {self.what} that one check alone catches",
+                    len(single), "faults", "few",
+                    "what would pass if that check were dropped: " + (", ".join(single) or "none"), "native"),
+        ]  # fmt: skip
+
+    def table(self, records: list[Record]) -> Table:
+        """Every fault with what sees it."""
+        lines = tuple((record["fault"], record["place"], self._sizes(record),
+                       ", ".join(name for name in self.checks if name not in seen(record)))
+                      for record in records[1:])  # fmt: skip
+        checks = (f"{name}: {check.title} (allowed {check.tolerance:g})" for name, check in self.checks.items())
+        return Table(f"Faults of {self.what}, one at a time", f"Sizes as each check takes them: {'; '.join(checks)}.",
+                     ("fault", "planted in", "caught by", "not seen by"), lines)  # fmt: skip
+
+    def _sizes(self, record: Record) -> str:
+        return ", ".join(f"{name} {record['ratios'][name] * self.checks[name].tolerance:.1g}" for name in seen(record))
+
+
+def seen(record: Record) -> list[str]:
+    """Checks that see a fault."""
+    return [name for name, ratio in record["ratios"].items() if not ratio <= 1.0]
+
+
+def off(found: Any, wanted: Any) -> float:
+    """Largest difference by the largest."""
+    return float(np.abs(np.asarray(found) - wanted).max() / np.abs(wanted).max())

@@ -1,0 +1,244 @@
+"""Faults of a wheelset, planted in the written equations, which run as plain Python meanwhile; what sees them."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any, Literal
+from unittest import mock
+
+import numpy as np
+
+from models.contact.linear_theory import forces as kalker
+from models.engines.wheelset_mujoco import MujocoWheelset
+from models.rail import energy
+from models.rail import equations as eq
+from models.rail import wheel_forces as wf
+from models.rail.eigenvalues import wavelength
+from models.rail.equations import Equations
+from models.rail.linear import klingel
+from models.rail.profile_contact import N_Y, Y_, Z_
+from models.rail.wheelset import CHOSEN
+from validation.faults.campaign import Campaign, Check, Fault, off
+from validation.faults.patches import Context, Patch, attribute, with_globals
+
+Law = Literal["linear", "fastsim"]
+STATES = np.array([
+    [3e-3, 4e-5, -1e-4, 4e-3, 0.0, 0.02, 0.01, 0.2, 0.3, 0.5],
+    [-4e-3, 2e-5, 2e-4, 1e-2, 0.0, -0.05, 0.0, 0.1, -0.4, 2.0],
+])  # fmt: skip
+"""Moved from rest (m, rad, m/s, rad/s): the second one slides all over."""
+MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
+SPEED, SLIDING = 60.0, 1
+TINY = 1e-6
+"""s: half the time over which energies are differentiated."""
+
+
+def equations(law: Law = "fastsim") -> Equations:
+    """The chosen wheelset, with coarse cells."""
+    return Equations(CHOSEN, SPEED, law, 7)
+
+
+@cache
+def states() -> np.ndarray:
+    """States (2, 10) about rest."""
+    return equations().rest + STATES
+
+
+@cache
+def by_engine() -> np.ndarray:
+    """Rates (2, 10) by MuJoCo."""
+    built = MujocoWheelset(CHOSEN, SPEED, cells=7)
+    return np.array([built.rates(state) for state in states()])
+
+
+def _engine() -> float:
+    return max(off(equations().rates(state), rates) for state, rates in zip(states(), by_engine(), strict=True))
+
+
+def _mirror() -> float:
+    own = equations()
+    return max(off(MIRROR * own.rates(MIRROR * state), own.rates(state)) for state in states())
+
+
+def _balance() -> float:
+    """Change of the energy held, by its differences along the motion, less the powers."""
+    own, there = equations(), states()
+    rates, powers = energy._there(own, there)
+    ahead, behind = (_held(own, there + part * TINY * rates) for part in (1.0, -1.0))
+    stored, driven, *lost = powers.T
+    found = (ahead - behind) / (2.0 * TINY) + stored - driven + sum(lost)
+    return float(np.abs(found).max() / np.abs(powers).max())
+
+
+def _held(own: Equations, there: np.ndarray) -> np.ndarray:
+    weight = own.wheelset.mass * energy.GRAVITY + 2.0 * own.body[eq.CARRIED]
+    return energy._kinetic(own, there) + energy._suspension(own.body, there)[0] - weight * there[:, eq.Z]
+
+
+def _reports(state: np.ndarray, law: Law = "fastsim") -> np.ndarray:
+    own = equations(law)
+    report = own.blank()
+    eq.rates(state, *own.given, np.empty(eq.STATES), report)
+    return report
+
+
+def _friction() -> float:
+    """Creep forces of wheels that slide all over, by mu N, less 1; infinite if they have power."""
+    report = _reports(states()[SLIDING])
+    if report[:, wf.POWER].max() > 0.0:
+        return np.inf
+    bound = CHOSEN.friction * report[:, wf.LOAD]
+    return float(np.abs(np.hypot(report[:, wf.FX], report[:, wf.FY]) / bound - 1.0).max())
+
+
+def _wave() -> float:
+    return abs(wavelength(Equations, CHOSEN) / klingel(CHOSEN) - 1.0)
+
+
+def _rest() -> float:
+    """Spin and carried load at rest."""
+    own = equations()
+    report = _reports(own.rest)
+    up = report[:, wf.LOAD] * np.cos(report[:, wf.ANGLE]) - report[:, wf.FY] * np.sin(report[:, wf.ANGLE])
+    return max(abs(own.rest[eq.SPIN] * CHOSEN.radius / SPEED + 1.0), abs(up.sum() / CHOSEN.load - 1.0))
+
+
+def _linear() -> float:
+    """Creep forces and moment of the linear law against Kalker's theory at the creepages that are reported."""
+    report = _reports(states()[0], "linear")
+    a, b, x, y, spin = report[:, [wf.A, wf.B, wf.XI_1, wf.XI_2, wf.XI_3]].T
+    wanted = kalker(a, b, x, y, spin, CHOSEN.pair)
+    return max(off(report[:, k], value) for k, value in zip((wf.FX, wf.FY, wf.MZ), wanted, strict=True))
+
+
+CHECKS = {
+    "engine": Check("rates at two states by MuJoCo", "of the largest", 1e-10, _engine),
+    "mirror": Check("rates of the mirror image", "of the largest", 1e-12, _mirror),
+    "balance": Check("change of energy by the powers", "of the largest", 1e-6, _balance),
+    "friction": Check("force of sliding wheels by mu N, little of it by spin, no power", "relative", 1e-3, _friction),
+    "wave": Check("Klingel's wavelength in closed form", "relative", 1e-3, _wave),
+    "rest": Check("spin and load at rest", "relative", 1e-5, _rest),
+    "linear": Check("forces by Kalker's linear theory", "of the largest", 1e-9, _linear),
+}
+
+
+def written(**functions: Any) -> Patch:
+    """The equations as plain Python, the forces of both rails with functions replaced."""
+
+    def prepare() -> Context:
+        @contextmanager
+        def context() -> Iterator[None]:
+            faulty = with_globals(wf.wheel_forces.py_func, **functions)
+            with mock.patch.object(eq, "wheel_forces", faulty), mock.patch.object(eq, "rates", eq.rates.py_func):
+                yield
+
+        return context
+
+    return prepare
+
+
+def after(change: Callable[..., None]) -> Patch:
+    """The rates changed after they were found: change(state, body, rates)."""
+
+    def with_change(real: Any) -> Any:
+        def rates(state: Any, speed: Any, body: Any, *rest: Any) -> None:
+            real(state, speed, body, *rest)
+            change(state, body, rest[-2])
+
+        return rates
+
+    return attribute("models.rail.equations:rates", with_change)
+
+
+def creeping(change: Callable[[Any, Any], None], speed: float = 1.0) -> Patch:
+    """The creep law with contacts and slip changed, or another speed, before."""
+
+    def creep(contacts: Any, slip: Any, velocity: float, *rest: Any) -> None:
+        contacts, slip = contacts.copy(), slip.copy()
+        change(contacts, slip)
+        wf.creep(contacts, slip, speed * velocity, *rest)
+
+    return written(creep=creep)
+
+
+def touching(change: Callable[[Any], None]) -> Patch:
+    """Places of contact changed."""
+
+    def contact_points(y: float, z: float, roll: float, yaw: float, p: Any, touches: Any) -> None:
+        wf.contact_points(y, z, roll, yaw, p, touches)
+        change(touches)
+
+    return written(contact_points=contact_points)
+
+
+def _nothing(*_: Any) -> None:
+    pass
+
+
+def _spin_reversed(contacts: Any, slip: Any) -> None:
+    slip[:, 2] *= -1.0
+
+
+def _shared(contacts: Any, slip: Any) -> None:
+    contacts[:, 2] = contacts[:, 2].mean()
+
+
+def _rougher(contacts: Any, slip: Any) -> None:
+    contacts[:, 3] *= 1.01
+
+
+def _turned_back(contacts: Any, slip: Any, *rest: Any) -> None:
+    """The creep law with the moment of spin the other way."""
+    wf.creep(contacts, slip, *rest)
+    rest[-1][:, 2] *= -1.0
+
+
+def _swapped(touches: Any) -> None:
+    """Each wheel on its own side with the other one's contact."""
+    own = touches[:, [Y_, N_Y]].copy()
+    touches[:] = touches[::-1].copy()
+    touches[:, [Y_, N_Y]] = own
+
+
+def _other_normal(touches: Any) -> None:
+    touches[:, N_Y] *= -1.0
+
+
+def _longer_arm(touches: Any) -> None:
+    touches[:, Z_] *= 1.01
+
+
+def _no_gyroscope(state: Any, body: Any, rates: Any) -> None:
+    whirl, cosine = body[eq.ALONG] * state[eq.SPIN] / body[eq.ACROSS], np.cos(state[eq.ROLL])
+    rates[eq.ROLL_RATE] -= whirl * state[eq.YAW_RATE] * cosine
+    rates[eq.YAW_RATE] += whirl * state[eq.ROLL_RATE] / cosine
+
+
+def _one_gyroscope(state: Any, body: Any, rates: Any) -> None:
+    rates[eq.ROLL_RATE] -= body[eq.ALONG] * state[eq.SPIN] / body[eq.ACROSS] * state[eq.YAW_RATE]
+
+
+def _damped_twice(real: Any) -> Any:
+    def rates(state: Any, speed: Any, body: Any, *rest: Any) -> None:
+        body = body.copy()
+        body[eq.DX : eq.DZ + 1] *= 2.0
+        real(state, speed, body, *rest)
+
+    return rates
+
+
+FAULTS = (
+    Fault("sign of the spin creepage", "creep law", creeping(_spin_reversed)),
+    Fault("sign of the spin moment", "creep law", written(creep=_turned_back)),
+    Fault("creepage by a speed 2 % off", "creep law", creeping(_nothing, 1.02)),
+    Fault("load not distributed: both wheels have the mean", "creep law", creeping(_shared)),
+    Fault("friction 1 % off", "creep law", creeping(_rougher)),
+    Fault("depth, place and radius of left and right contact swapped", "contact", touching(_swapped)),
+    Fault("normal leans the other way", "contact", touching(_other_normal)),
+    Fault("arm of the contact forces 1 % off", "contact", touching(_longer_arm)),
+    Fault("no gyroscopic moments", "body", after(_no_gyroscope)),
+    Fault("one gyroscopic moment missing", "body", after(_one_gyroscope)),
+    Fault("dampers twice as strong", "suspension", attribute("models.rail.equations:rates", _damped_twice)),
+)
+
+CAMPAIGN = Campaign("rolling_faults.wheelset", "a wheelset", "rolling-vehicle", CHECKS, FAULTS)
