@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from models.braking.of_scene import controller_of
 from models.braking.plane_step import FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE
-from models.braking.procedures import ready
+from models.braking.procedures import drive
 from models.braking.run import Path
 from models.braking.scene import BrakingScene
 from models.braking.stop_report import Stop
@@ -27,10 +26,9 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
     failed, table, answer = {}, list[str](), {}
     for i, name in enumerate(scene.procedures):
         progress(name, i / len(scene.procedures))
-        vehicle, start = ready(scene, name)
         begun = time.perf_counter()
         try:
-            path: Path | None = vehicle.run(controller_of(scene, vehicle.plane.wheels), start, scene.run.duration)
+            path: Path | None = drive(scene, name)
         except RunFailed as error:
             failed[name], path = str(error), getattr(error, "partial", None)
         seconds = time.perf_counter() - begun

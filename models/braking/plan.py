@@ -1,6 +1,7 @@
 """What a scene of braking will compute: printed by ``twinrig show``, checked before any run."""
 
 from models.braking.of_scene import controller_of, surfaces_of, vehicle_of
+from models.braking.port.setup import BEHIND
 from models.braking.procedures import ready
 from models.braking.scene import BrakingScene
 
@@ -27,7 +28,7 @@ def describe(scene: BrakingScene) -> str:
                     f"axles at {axles[0]:g} and {axles[1]:g} m, wheels of {vehicle.front.radius:g} m; plane motion, "
                     "wheels turn")]  # fmt: skip
     lines += [_line("brakes", f"supply {scene.brakes.supply:g} bar")]
-    lines += [_line("controller", f"{scene.controller.kind}, every {1e3 * run.sample:g} ms")]
+    lines += [_line("controller", f"{behind(scene)}, every {1e3 * run.sample:g} ms")]
     for name, own in scene.procedures.items():
         names = ", ".join(surfaces_of(scene, own))
         lines += [_line(name, f"{PROCEDURES[own.kind]}, from {own.speed:g} m/s on {names}")]
@@ -38,15 +39,25 @@ def describe(scene: BrakingScene) -> str:
     return "\n".join([*lines, _line("absent", ", ".join(absent) + " (not computed)" if absent else "nothing")])
 
 
+def behind(scene: BrakingScene) -> str:
+    """What answers at the port."""
+    named = [] if scene.port is None else [key for key in BEHIND if getattr(scene.port, key) is not None]
+    return f"{named[0]} {getattr(scene.port, named[0])}" if named else scene.controller.kind
+
+
 def effects(scene: BrakingScene) -> tuple[list[str], list[str]]:
     """Effects that the scene names, and those that it does not."""
-    brakes = (scene.brakes.front, scene.brakes.rear)
+    brakes, port = (scene.brakes.front, scene.brakes.rear), scene.port
     present = {
         "load transfer": scene.load_transfer is not None,
         "push-out": any(brake.push_out > 0.0 for brake in brakes),
         "hysteresis": any(brake.release is not None or brake.falling is not None for brake in brakes),
         "pressure dynamics": scene.pressure is not None,
-        "anti-lock system": scene.controller.kind != "none",
+        "anti-lock system": behind(scene) != "none",
+        "signals from teeth": port is not None and port.teeth is not None,
+        "conversion of signals": port is not None and bool(port.signals.model_fields_set),
+        "conversion of pressures": port is not None and bool(port.pressures.model_fields_set),
+        "faults": port is not None and bool(port.faults),
     }
     return [name for name, there in present.items() if there], [name for name, there in present.items() if not there]
 

@@ -1,13 +1,16 @@
 """The driver's part of a test: straight braking, split friction, braking in a turn, J-turn; all with fixed steering."""
 
+import json
 from dataclasses import dataclass, replace
+from pathlib import Path as Folder
 
 import numpy as np
 from scipy.optimize import root
 
-from models.braking.of_scene import braked
+from models.braking.of_scene import braked, controller_of
 from models.braking.plane_step import REPORTED, step_on
-from models.braking.run import Braked, Start
+from models.braking.port.setup import Run, opened
+from models.braking.run import Braked, Path, Start
 from models.braking.scene import BrakingScene
 from models.braking.surfaces import under_wheels
 from models.errors import InputError
@@ -31,6 +34,17 @@ def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
             raise InputError(scene.file, f"procedures.{name}.radius", own.radius, allowed)
         return replace(vehicle, steer=turn.steer), turn.start
     return replace(vehicle, steer=steered(vehicle, own.steer or 0.0)), vehicle.rolling(own.speed)
+
+
+def drive(scene: BrakingScene, name: str) -> Path:
+    """One run of a procedure, whatever stands behind the port; InputError, or RunFailed with the path until then."""
+    vehicle, start = ready(scene, name)
+    own = controller_of(scene, vehicle.plane.wheels)
+    if scene.port is None:
+        return vehicle.run(own, start, scene.run.duration)
+    port = Run(vehicle.plane.radius, scene.run.sample, json.dumps(scene.table()), Folder(scene.folder), scene.file)
+    with opened(scene.port, port, own) as (controller, _):
+        return vehicle.run(controller, start, scene.run.duration)
 
 
 def steered(vehicle: Braked, angle: float) -> np.ndarray:

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from models.braking.controller import SAMPLE
+from models.braking.port.setup import PortTable
 from models.errors import InputError
 from models.scene_file import SceneFile, checked
 from models.strict import Strict, quantity
@@ -48,6 +49,8 @@ class TyreTables(Strict):
     """[tyres]: friction of the surfaces."""
 
     scale: dict[str, float] = Field(default_factory=dict, description="factor on the friction of a surface")
+    files: dict[str, str] = Field(default_factory=dict, description="CSV or .tir file of the friction on a surface")
+    own_rear: bool = Field(default=False, description="rear tyres by their own figures, where a surface has them")
 
 
 class BrakeTable(Strict):
@@ -113,6 +116,7 @@ class BrakingScene(SceneFile):
     brakes: BrakesTable = BrakesTable()
     pressure: PressureTable | None = Field(default=None, description="dynamics of the chambers")
     controller: ControllerTable = ControllerTable()
+    port: PortTable | None = Field(default=None, description="what stands behind the port, its signals and faults")
     procedures: dict[str, Procedure] = Field(min_length=1, description="driven one by one, a table each")
     run: RunTable = RunTable()
 

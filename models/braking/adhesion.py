@@ -1,0 +1,151 @@
+"""Adhesion utilisation measured as test engineers do it: first k of each axle braked alone, then z with the system on.
+
+The procedure of UN R13, Annex 13, appendix 2, in a simulation that repeats exactly; not checked against the text of the
+regulation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.braking.controller import Command, Sample
+from models.braking.figures_of_merit import (
+    KMH,
+    Axles,
+    adhesion_front,
+    adhesion_of_vehicle,
+    adhesion_rear,
+    braking_rate,
+    crossing,
+    mean_of_fastest,
+    split_rate,
+)
+from models.braking.of_scene import braked, controller_of, vehicle_of
+from models.braking.plane_step import LOCKED
+from models.braking.plane_vehicle import GRAVITY
+from models.braking.run import Braked, Path
+from models.braking.scene import BrakingScene, Procedure, RoadTable, Stretch
+from models.braking.stop_report import Stop
+from models.errors import InputError
+
+HALVINGS = 9
+"""Of the interval in which the pressure lies at which an axle locks: 1/500 of the supply pressure."""
+BELOW_LOCK = (1.0, 0.98, 0.96)
+"""Pressures of the three runs, by the largest that does not lock."""
+
+
+@dataclass(frozen=True)
+class Adhesion:
+    """k of the front and of the rear axle on one surface."""
+
+    front: float
+    rear: float
+
+
+@dataclass(frozen=True)
+class Utilised:
+    """Braking rate z with the system on, k_M of the vehicle, and how much of it is used, epsilon = z / k_M."""
+
+    z: float
+    k: Adhesion
+    k_vehicle: float
+
+    @property
+    def epsilon(self) -> float:
+        """At least 0.75 of a category 1 system; above 1 calls for k to be measured again."""
+        return self.z / self.k_vehicle
+
+
+@dataclass(frozen=True)
+class Held:
+    """Pressures (W,) in bar that stay, as on a test without anti-lock system."""
+
+    pressures: np.ndarray
+
+    def sample(self, given: Sample) -> Command:
+        """Always the same."""
+        return Command(pressures=self.pressures)
+
+
+def axles(scene: BrakingScene) -> Axles:
+    """Loads and lengths of the scene's vehicle."""
+    own = vehicle_of(scene)
+    weight = own.mass * GRAVITY
+    front = weight * -own.rear.x / own.wheelbase
+    return Axles(front, weight - front, own.wheelbase, own.height)
+
+
+def alone(scene: BrakingScene, surface: str) -> Braked:
+    """The scene's vehicle on one surface everywhere."""
+    plain = scene.model_copy(update={"road": RoadTable(stretches=[Stretch(left=surface)])})
+    return braked(plain, Procedure())
+
+
+def adhesion(scene: BrakingScene, surface: str) -> Adhesion:
+    """k of both axles of a surface, each braked alone from 50 km/h without locking."""
+    vehicle, own = alone(scene, surface), axles(scene)
+    return Adhesion(adhesion_front(_rate(scene, vehicle, 0), own), adhesion_rear(_rate(scene, vehicle, 1), own))
+
+
+def _rate(scene: BrakingScene, vehicle: Braked, axle: int) -> float:
+    """z of the fastest runs with one axle braked, from 40 to 20 km/h."""
+    wheels = np.arange(vehicle.plane.wheels) // 2 == axle
+
+    def run(pressure: float) -> Path:
+        return vehicle.run(Held(np.where(wheels, pressure, 0.0)), 50.0 * KMH, scene.run.duration)
+
+    low, high = 0.0, scene.brakes.supply
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if _locks(run(middle)) else (middle, high)
+    times = [_between(run(share * low), 40.0, 20.0) for share in BELOW_LOCK]
+    if not np.isfinite(times).any():
+        raise InputError(scene.file, "run.duration", scene.run.duration, "is too short to slow down to 20 km/h with "
+                         f"the {'rear' if axle else 'front'} axle alone")  # fmt: skip
+    return braking_rate(40.0 * KMH, 20.0 * KMH, mean_of_fastest(np.array(times)))
+
+
+def _locks(path: Path) -> bool:
+    """Whether a wheel locks above 20 km/h."""
+    fast = Stop(path).speed[:-1] > 20.0 * KMH
+    return bool((path.reports[fast][:, :, LOCKED] > 0.0).any())
+
+
+def _between(path: Path, high: float, low: float) -> float:
+    """Time (s) from one speed to another, in km/h; not a number if the vehicle does not get there."""
+    stop = Stop(path)
+    return crossing(stop.times, stop.speed, low * KMH) - crossing(stop.times, stop.speed, high * KMH)
+
+
+def utilisation(scene: BrakingScene, surface: str, k: Adhesion | None = None) -> Utilised:
+    """epsilon of the scene's system on a surface: z from 45 to 15 km/h, braked from 55 km/h."""
+    own, found = axles(scene), k or adhesion(scene, surface)
+    vehicle = alone(scene, surface)
+    path = vehicle.run(controller_of(scene, vehicle.plane.wheels), 55.0 * KMH, scene.run.duration)
+    z = braking_rate(45.0 * KMH, 15.0 * KMH, _between(path, 45.0, 15.0))
+    return Utilised(z, found, adhesion_of_vehicle(z, found.front, found.rear, own))
+
+
+@dataclass(frozen=True)
+class Split:
+    """Braking rate z on split friction and what is asked of it: at least the larger of 0.75 (4 k_L + k_H)/5 and k_L."""
+
+    z: float
+    k_low: float
+    k_high: float
+
+    @property
+    def asked(self) -> float:
+        """Least z."""
+        return split_rate(self.k_low, self.k_high)
+
+
+def split(scene: BrakingScene, name: str) -> Split:
+    """z of a split procedure from 50 km/h, between 40 and 20 km/h, and k_M of both surfaces of its first stretch."""
+    own, first = scene.procedures[name], scene.road.stretches[0]
+    both = [adhesion(scene, surface) for surface in (first.left, own.right or first.right or first.left)]
+    vehicle = braked(scene, own)
+    path = vehicle.run(controller_of(scene, vehicle.plane.wheels), 50.0 * KMH, scene.run.duration)
+    z = braking_rate(40.0 * KMH, 20.0 * KMH, _between(path, 40.0, 20.0))
+    k = sorted(adhesion_of_vehicle(z, one.front, one.rear, axles(scene)) for one in both)
+    return Split(z, k[0], k[1])

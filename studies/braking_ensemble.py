@@ -1,0 +1,132 @@
+"""How anti-lock braking scatters run by run: two ensembles of stops, their means, scatter and a test between them."""
+
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.braking.scene import BrakingScene, build
+from models.braking.stops import Scatter, Stops, Welch, scatter, welch
+from models.ensemble.runner import Progress as Done
+from models.ensemble.runner import processes, run_paths
+from models.errors import InputError
+from models.strict import Strict, quantity, read
+from models.tables import write_table
+
+SYSTEM = "braking"
+Progress = Callable[[str, float], None]
+BLOCKS = "blocks"
+"""Folder of the finished blocks, within that of the results: a killed run can be resumed."""
+BLOCK = 5
+"""Runs per block."""
+SHOWN = {"distance": "stopping distance [m]", "time": "stopping time [s]", "deceleration": "v0/T [m/s^2]",
+         "aside": "y [m]", "yaw": "final yaw [deg]"}  # fmt: skip
+
+
+class Options(Strict):
+    """[options] of this study."""
+
+    runs: int = Field(100, ge=2, le=100_000, description="stops in each ensemble")
+    procedure: str = Field("straight", description="name of the procedure that is repeated")
+    speed_spread: float = quantity("", "standard deviation of the initial speed, relative", default=0.002, zero=True)
+    seed: int = Field(1, ge=0, le=2**62, description="of the speeds")
+    workers: int = Field(2, ge=1, le=256, description="processes that compute; the results do not depend on it")
+    other: dict[str, Any] = Field(default_factory=dict, description="what the second ensemble has otherwise, as tables")
+    names: list[str] = Field(["first", "second"], min_length=2, max_length=2, description="of both ensembles")
+
+
+def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
+    """Refuse a procedure that is none, and a second ensemble that cannot be."""
+    options = read(Options, scene.options, scene.file, "options")
+    if options.procedure not in scene.procedures:
+        raise InputError(scene.file, "options.procedure", options.procedure, "no such procedure",
+                         tuple(scene.procedures))  # fmt: skip
+    build(merged(scene.table(), options.other), f"{scene.file} with options.other", Path(scene.folder))
+
+
+def merged(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested tables with some of their values changed; a table that gives another ``kind`` replaces the old one."""
+    out = dict(table)
+    for key, value in changes.items():
+        old = table.get(key)
+        both = isinstance(old, Mapping) and isinstance(value, Mapping) and "kind" not in value
+        out[key] = merged(old, value) if both else value  # type: ignore[arg-type]
+    return out
+
+
+def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Two ensembles; saves ``stops.csv`` and ``ensemble.png``."""
+    check(scene, engines)
+    options = read(Options, scene.options, scene.file, "options")
+    tables = [scene.table(), merged(scene.table(), options.other)][: 2 if options.other else 1]
+    found = []
+    with processes(options.workers) if options.workers > 1 else nullcontext() as pool:
+        for i, table in enumerate(tables):
+            job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread,
+                        options.seed + i)  # fmt: skip
+
+            def tell(done: Done, i: int = i) -> None:
+                progress(f"{options.names[i]}: {done}", (i + done.done / done.paths) / len(tables))
+
+            found.append(run_paths(job, options.runs, folder / BLOCKS / options.names[i], pool, BLOCK, tell))
+    for name, arrays in zip(options.names, found, strict=False):
+        columns = {"speed": ("m/s", arrays["speed"])}
+        columns |= {key: (label.partition("[")[2][:-1], arrays[key]) for key, label in SHOWN.items()}
+        write_table(folder / f"{name}.csv", columns)
+    scatters = [{key: scatter(arrays[key]) for key in SHOWN} for arrays in found]
+    tests = {key: welch(scatters[0][key], scatters[1][key]) for key in SHOWN} if len(found) > 1 else {}
+    _figure(scene, options, found, scatters, tests, folder)
+    return {"scene": scene.title, "folder": str(folder), "failed": {}, "table": table_of(options, scatters, tests),
+            "answer": {"means": [{key: one[key].mean for key in SHOWN} for one in scatters],
+                       "p": {key: test.p for key, test in tests.items()}}}  # fmt: skip
+
+
+def table_of(options: Options, scatters: list[dict[str, Scatter]], tests: dict[str, Welch]) -> list[str]:
+    """Means with their standard errors, scatter, and Welch's test."""
+    lines = [f"  {options.runs} stops in each ensemble, initial speed scatters by {100 * options.speed_spread:g} %",
+             "    " + " " * 26 + "".join(f"{name + ': mean':>24}{'scatter':>10}" for name, _ in
+                                          zip(options.names, scatters, strict=False))]  # fmt: skip
+    for key, label in SHOWN.items():
+        parts = "".join(f"{one[key].mean:>14.3f} +- {one[key].error:<6.3f}{one[key].deviation:>10.3f}"
+                        for one in scatters)  # fmt: skip
+        lines.append(f"    {label:<26}{parts}")
+    for key in tests:
+        test = tests[key]
+        if np.isfinite(test.t) and test.half_width > 0.0:
+            lines.append(f"  difference of {SHOWN[key]}: {test.difference:+.3f}, 95 % interval "
+                         f"+-{test.half_width:.3f}; Welch's t = {test.t:.2f}, {test.freedoms:.0f} degrees of freedom, "
+                         f"p = {test.p:.2g}")  # fmt: skip
+    return lines
+
+
+def _figure(scene: BrakingScene, options: Options, found: list[dict[str, np.ndarray]],
+            scatters: list[dict[str, Scatter]], tests: dict[str, Welch], folder: Path) -> None:  # fmt: skip
+    from studies.figures import plt, save
+
+    figure, (histogram, cloud) = plt.subplots(1, 2, figsize=(11, 4.2))
+    edges = np.histogram_bin_edges(np.concatenate([arrays["distance"] for arrays in found]), bins=24)
+    for i, (arrays, one) in enumerate(zip(found, scatters, strict=True)):
+        own = one["distance"]
+        label = f"{options.names[i]}: {own.mean:.2f} m, scatter {own.deviation:.2f} m"
+        histogram.hist(arrays["distance"], edges, color=f"C{i}", alpha=0.5, label=label)
+        histogram.axvline(own.mean, color=f"C{i}")
+        cloud.plot(arrays["speed"], arrays["distance"], "o", ms=3, color=f"C{i}", alpha=0.6, label=options.names[i])
+    speeds = np.sort(found[0]["speed"])
+    cloud.plot(speeds, scatters[0]["distance"].mean * (speeds / speeds.mean()) ** 2, color="#222222", lw=0.9,
+               label="by the square of the speed alone")  # fmt: skip
+    said = f"; Welch's test of the means: p = {tests['distance'].p:.2g}" if tests else ""
+    histogram.set(xlabel="stopping distance [m]", ylabel="stops", title="Stopping distances and their means")
+    cloud.set(xlabel="initial speed [m/s]", ylabel="stopping distance [m]", title="They scatter by more than the speed")
+    histogram.legend(fontsize=8)
+    cloud.legend(fontsize=8)
+    figure.suptitle(f"{scene.title}: {options.runs} stops each{said}", x=0.01, ha="left", fontweight="bold")
+    save(figure, folder / "ensemble.png")
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("braking_ensemble")
