@@ -91,7 +91,8 @@ class Braked:
                 asked = Sample(number, round(time * 1e9), turning * self.plane.radius, braked, supply, known)
                 command = ask(controller, asked)
                 if command.pressures is None:
-                    by_valves(command.valves if braked else released, self.sample, air, self.chambers, self.brakes, torques)
+                    valves = command.valves if braked else released
+                    by_valves(valves, self.sample, air, self.chambers, self.brakes, torques)
                 else:
                     by_pressures(command.pressures, air, self.brakes, torques)
                 status, used = advance(state, turning, torques, step, self.steer, self.slope, self.plane, self.kind,
