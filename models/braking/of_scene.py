@@ -9,13 +9,13 @@ import numpy as np
 from models.braking.brake import Brake, of_wheels
 from models.braking.controller import Controller
 from models.braking.controllers import CONTROLLERS
-from models.braking.magic_formula import SURFACES, surface
 from models.braking.plane_vehicle import PAPER, Truck, truck
 from models.braking.pressure import Chambers
 from models.braking.run import Braked
 from models.braking.scene import BrakeTable, BrakingScene, Procedure, Stretch
 from models.braking.surfaces import Road, road
 from models.braking.surfaces import Stretch as Numbered
+from models.braking.tyre_source import NAMES, SCALES, from_file, named
 from models.braking.tyre_table import TyreTable, stacked
 from models.errors import InputError
 from models.scene_file import parse
@@ -26,10 +26,10 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
     """The scene's vehicle with its brakes on the road of a procedure; InputError for what does not fit together."""
     plane = truck(vehicle_of(scene), transfer=scene.load_transfer is not None)
     names = surfaces_of(scene, procedure)
-    tyres = [table_of(scene, name) for name in names]
+    tyres = [table_of(scene, name, rear) for name in names for rear in kinds_of(scene)]
     front, rear = (brake_of(scene, axle) for axle in ("front", "rear"))
     return Braked(
-        plane=plane, kind=np.zeros(plane.wheels, dtype=np.int64), tables=stacked(tyres),
+        plane=plane, kind=np.where(np.arange(plane.wheels) < 2, 0, len(kinds_of(scene)) - 1), tables=stacked(tyres),
         slope=max(table.cornering for table in tyres), road=road_of(scene, procedure, names),
         brakes=of_wheels(front, front, rear, rear), chambers=chambers_of(scene, plane.wheels),
         steer=np.zeros(plane.wheels), substeps=scene.run.substeps, sample=scene.run.sample,
@@ -81,19 +81,28 @@ def road_of(scene: BrakingScene, procedure: Procedure, names: list[str]) -> Road
     """Road of a procedure, its surfaces by their places in ``names``."""
     stretches = [Numbered(s.x, *(names.index(name) for name in sides(procedure, s))) for s in scene.road.stretches]
     try:
-        return road(stretches, scene.road.line)
+        return road(stretches, scene.road.line, len(kinds_of(scene)))
     except InputError as error:
         raise InputError(scene.file, "road.stretches", error.value, error.allowed) from None
 
 
-def table_of(scene: BrakingScene, name: str) -> TyreTable:
-    """Tyre table of a surface, its friction scaled as the scene says."""
-    if name not in SURFACES:
-        raise InputError(scene.file, "road.stretches", name, "no such surface", tuple(SURFACES))
+def kinds_of(scene: BrakingScene) -> tuple[bool, ...]:
+    """Kinds of tyres: whether each is the rear one."""
+    return (False, True) if scene.tyres.own_rear else (False,)
+
+
+def table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
+    """Tyre table of a surface, from the scene's file if it has one, its friction scaled as the scene says."""
     scale = scene.tyres.scale.get(name, 1.0)
-    if not 0.0 < scale <= 2.0:
+    if not SCALES[0] < scale <= SCALES[1]:
         raise InputError(scene.file, f"tyres.scale.{name}", scale, "must be above 0 and at most 2")
-    return surface(name, scale)
+    if name in scene.tyres.files:
+        table = from_file(scene.path(scene.tyres.files[name], f"tyres.files.{name}"))
+    elif name in NAMES:
+        table = named(name, rear)
+    else:
+        raise InputError(scene.file, "road.stretches", name, "no such surface", (*NAMES, *scene.tyres.files))
+    return table if scale == 1.0 else table.scaled(scale)
 
 
 def brake_of(scene: BrakingScene, axle: str) -> Brake:
