@@ -16,9 +16,9 @@ from models.braking.tyre_table import across, place
 from models.braking.wheel_step import wheel_step
 from models.compiled import njit
 
-CLOSE = 1e-9
+CLOSE = 1e-8
 """Change of the accelerations (m/s^2, and rad/s^2 times 1 m) at which the loads are taken to be found."""
-HALF_ROUNDS, PATIENCE, MOST_ROUNDS = 2, 12, 200
+HALF_ROUNDS, PATIENCE, MOST_ROUNDS = 1, 12, 200
 """Rounds of a half step, to whose loads those of the step before are close enough for order two; rounds after which
 Anderson's method gives way to a damped one; rounds after which there is no answer."""
 FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE, LOCKED, TURNING = range(7)

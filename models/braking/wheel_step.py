@@ -62,23 +62,23 @@ def roll(slip, left, kappa, fade, held, grip, slips, mu_x):
     cell = place(slips, abs(slip))[0]
     if slip < 0.0:
         cell = -cell - 1 if slip >= -1.0 else -last - 1
+    low, high = node_force(max(cell, -last), grip, mu_x), node_force(cell + 1, grip, mu_x)
     for _ in range(MOST_PIECES):
-        tail = cell < -last
-        edge = -last if tail else cell
-        force, slope = node_force(edge, grip, mu_x), 0.0
-        if not tail:
-            slope = (node_force(cell + 1, grip, mu_x) - force) / (node(cell + 1, slips) - node(cell, slips))
-        rate = kappa * (held - force - slope * (slip - node(edge, slips))) + (1.0 - slip) * fade
-        if rate > 0.0:
-            target, turn = node(cell + 1, slips), 1
-        else:
-            target, turn = (-math.inf if tail else node(cell, slips)), -1
+        tail, top = cell < -last, node(cell + 1, slips)
+        bottom = -math.inf if tail else node(cell, slips)
+        slope = (high - low) / (top - bottom)
+        rate = kappa * (held - high - slope * (slip - top)) + (1.0 - slip) * fade
+        target, turn = (top, 1) if rate > 0.0 else (bottom, -1)
         if rate != 0.0 and target == slip:
             if turned == -turn:  # either cell sends it into the other one: by rounding, it rests on their node
                 return left, slip, area + slip * (left - used)
             cell, turned = cell + turn, turn
             if cell == last:
                 return used, 1.0, area
+            if turn > 0:
+                low, high = high, node_force(cell + 1, grip, mu_x)
+            else:
+                low, high = node_force(max(cell, -last), grip, mu_x), low
             continue
         decay = kappa * slope + fade
         time = _way(decay, rate, target - slip)
@@ -137,6 +137,8 @@ def wheel_step(u0, u1, w0, torque0, torque1, step, radius, inertia, grip, slips,
         else:
             start = (u0 + (u1 - u0) * now / step) * (1.0 - slip) / radius
             used, slip, part = roll(min(slip, 1.0), left, kappa, fade, held, grip, slips, mu_x)
+            if used == 0.0 and slip >= 1.0:  # by rounding alone: it can neither turn nor be held
+                used = left
             now += used
             end = (u0 + (u1 - u0) * now / step) * (1.0 - slip) / radius
             impulse += inertia * (end - start) / radius + held * used
