@@ -27,12 +27,12 @@ class AccelerationPhases(Common):
     deep, above which a wheel that does not rise is released; pulse : samples per step of pressure."""
 
     wheels: int
-    falls: float = -6.0
-    rises: float = 1.0
-    rises_fast: float = 12.0
-    slip: float = 0.06
-    deep: float = 0.15
-    pulse: int = 6
+    falls: float = -20.0
+    rises: float = 2.0
+    rises_fast: float = 20.0
+    slip: float = 0.035
+    deep: float = 0.1
+    pulse: int = 4
 
     def __post_init__(self) -> None:
         self.check(minus_falls=-self.falls, rises=self.rises, slip=self.slip, deep=self.deep, pulse=self.pulse,

@@ -9,7 +9,9 @@
 with y = r w' the acceleration of the wheel's rim. It begins with phase 3 until y <= -e5. Source: W. Pasillas-Lepine,
 Hybrid modeling and limit cycle analysis for a class of five-phase anti-lock brake algorithms, Vehicle System Dynamics
 44 (2006) 173-188; M. Gerard, W. Pasillas-Lepine, E. de Vries, M. Verhaegen, Adaptation of hybrid five-phase ABS
-algorithms for experimental validation, AAC 2010. e1 has to be large enough for the wheel not to lock in phase 2.
+algorithms for experimental validation, AAC 2010. e1 has to be large enough for the wheel not to lock in phase 2. Where
+one set of thresholds has to do for all roads two rules of ours hold the cycle together: a wheel that in phase 2 gains
+speed no more (y <= e4) goes on with phase 5, and one at a deep slip with phase 1.
 """
 
 from dataclasses import dataclass
@@ -21,7 +23,7 @@ from models.errors import InputError
 
 @dataclass
 class FivePhase(Common):
-    """Thresholds of the wheel's acceleration (m/s^2) and rates of its pressure (bar/s)."""
+    """Thresholds of the wheel's acceleration (m/s^2) and rates of its pressure (bar/s); deep : slip of phase 1."""
 
     wheels: int
     e1: float = 5.0
@@ -32,9 +34,10 @@ class FivePhase(Common):
     falling: float = 30.0
     fast: float = 15.0
     slow: float = 3.0
+    deep: float = 0.3
 
     def __post_init__(self) -> None:
-        self.check(e1=self.e1, e5=self.e5, falling=self.falling, fast=self.fast, slow=self.slow)
+        self.check(e1=self.e1, e5=self.e5, falling=self.falling, fast=self.fast, slow=self.slow, deep=self.deep)
         if not self.e1 < self.e2 or not self.e4 < self.e3 < self.e2:
             raise InputError("", "controller.parameters.e2", self.e2, "must be above e1 and e3, and e3 above e4")
         self._loop = PerWheel(self.wheels, self, lambda: _Logic(self), pressures=True)
@@ -47,15 +50,11 @@ class FivePhase(Common):
 FIRST = 0
 
 
-def follows(phase: int, y: float, own: FivePhase) -> bool:
-    """Whether a phase is over at an acceleration y of the wheel's rim (m/s^2)."""
-    if phase == 1:
-        return y >= own.e1
-    if phase == 2:
-        return y >= own.e2
-    if phase == 3:
-        return y <= own.e3
-    return y <= own.e4 if phase == 4 else y <= -own.e5
+def end_of(phase: int, own: FivePhase) -> tuple[float, float]:
+    """Sign of the way in which the wheel's acceleration (m/s^2) ends a phase, and the level at which it does."""
+    if phase in (1, 2):
+        return 1.0, own.e1 if phase == 1 else own.e2
+    return -1.0, {3: own.e3, 4: own.e4}.get(phase, -own.e5)
 
 
 def rate(phase: int, own: FivePhase) -> float:
@@ -68,10 +67,13 @@ class _Logic:
         self._own, self._phase, self._pressure = own, FIRST, 0.0
 
     def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
-        if follows(self._phase, gains, self._own):
+        sign, level = end_of(self._phase, self._own)
+        if sign * (gains - level) >= 0.0:
             self._phase = self._phase % 5 + 1
-        if self._phase == 1 and slip < 0.0:
-            self._phase = 2
+        elif self._phase == 2 and gains <= self._own.e4:
+            self._phase = 5
+        if self._phase != 1 and slip > self._own.deep:
+            self._phase = 1
         raised = self._pressure + rate(self._phase, self._own) * self._own.period
         self._pressure = min(max(raised, 0.0), supply)
         return self._pressure

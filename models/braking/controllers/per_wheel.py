@@ -1,4 +1,4 @@
-"""What all controllers share: a logic per wheel or axle, the vehicle's speed, and the end of control when it is slow."""
+"""What all controllers share: a logic per wheel or axle, the vehicle's speed, and an end of control when it is slow."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
