@@ -1,0 +1,89 @@
+"""What a tyre does on the surfaces of a scene of braking: friction along and across over slip, slip angle and load."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.braking.of_scene import kinds_of, surfaces_of, table_of
+from models.braking.scene import BrakingScene
+from models.braking.tyre_table import TyreTable
+from models.errors import InputError
+from models.strict import Strict, read
+from models.tables import write_table
+
+SYSTEM = "braking"
+Progress = Callable[[str, float], None]
+
+
+class Options(Strict):
+    """[options] of this study."""
+
+    slip_angles: list[float] = Field([0.0, 2.0, 4.0, 8.0, 16.0], min_length=1, description="slip angles in deg")
+    load: float = Field(15e3, gt=0, le=1e6, description="load of the figure in N")
+
+
+def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
+    """Refuse options and tyres that cannot be."""
+    options = read(Options, scene.options, scene.file, "options")
+    if not all(0.0 <= angle <= 90.0 for angle in options.slip_angles):
+        raise InputError(scene.file, "options.slip_angles", options.slip_angles, "must be from 0 to 90 deg")
+    tables_of(scene)
+
+
+def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Every tyre of the scene: saves tyre.png, and a CSV of each that can be read as a tyre again."""
+    from studies.tyre_figure import tyre_figure
+
+    options = read(Options, scene.options, scene.file, "options")
+    tables = tables_of(scene)
+    tyre_figure(tables, options.slip_angles, options.load, scene.title, folder / "tyre.png")
+    answer = {name: figures(table, options.load) for name, table in tables.items()}
+    for name, table in tables.items():
+        save_csv(table, options, folder / f"{name.replace('/', '_').replace(' ', '_')}.csv")
+    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": answer,
+            "table": lines(answer, options.load)}  # fmt: skip
+
+
+def tables_of(scene: BrakingScene) -> dict[str, TyreTable]:
+    """Tables by name of all surfaces under all procedures, a rear tyre of its own beside the front one."""
+    names = dict.fromkeys(name for procedure in scene.procedures.values() for name in surfaces_of(scene, procedure))
+    return {f"{name}/rear" if rear else name: table_of(scene, name, rear)
+            for name in names for rear in kinds_of(scene)}  # fmt: skip
+
+
+def figures(table: TyreTable, load: float) -> dict[str, float]:
+    """What engineers ask of a tyre first, under one load (N)."""
+    x, y = table.friction(table.angles, table.slips, load)
+    little_slip, little_angle = table.slips[1], table.angles[min(1, table.angles.size - 1)]
+    return {
+        "peak along": float(x[0].max()), "at slip [%]": 100.0 * float(table.slips[x[0].argmax()]),
+        "locked": float(x[0, -1]), "slope [1/%]": 0.01 * float(x[0, 1] / little_slip),
+        "peak across": float(y[:, 0].max()), "at slip angle [deg]": float(np.rad2deg(table.angles[y[:, 0].argmax()])),
+        "slope [1/deg]": float(y[:, 0][min(1, len(y) - 1)] / np.rad2deg(little_angle)) if little_angle else 0.0,
+    }  # fmt: skip
+
+
+def lines(answer: dict[str, dict[str, float]], load: float) -> list[str]:
+    """The figures of all tyres side by side."""
+    width = max(12, *(len(name) + 2 for name in answer))
+    rows = [f"  {'mu under ' + format(load / 1e3, '.4g') + ' kN':<22}" + "".join(f"{name:>{width}}" for name in answer)]
+    keys = next(iter(answer.values()))
+    return rows + [f"  {key:<22}" + "".join(f"{own[key]:>{width}.4g}" for own in answer.values()) for key in keys]
+
+
+def save_csv(table: TyreTable, options: Options, path: Path) -> None:
+    """Friction at the slip angles of the figure and at none, at all slips of the table."""
+    angles = np.unique([0.0, *options.slip_angles])
+    x, y = table.friction(np.deg2rad(angles), table.slips, options.load)
+    angle, slip = (axis.ravel() for axis in np.meshgrid(angles, table.slips, indexing="ij"))
+    write_table(path, {"slip angle": ("deg", angle), "slip": ("-", slip), "mu_x": ("-", x.ravel()),
+                       "mu_y": ("-", y.ravel())})  # fmt: skip
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("tyre")
