@@ -6,24 +6,36 @@ from pathlib import Path as File
 from typing import Any
 
 import numpy as np
+from pydantic import Field
 
+from models.braking.adhesion import split, utilisation
+from models.braking.figures_of_merit import NOT_CHECKED
+from models.braking.plan import behind
 from models.braking.plane_step import FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE
 from models.braking.procedures import drive
 from models.braking.run import Path
 from models.braking.scene import BrakingScene
 from models.braking.stop_report import Stop
 from models.errors import RunFailed
+from models.strict import Strict, read
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
 WHEELS = ("front left", "front right", "rear left", "rear right")
 
 
+class Options(Strict):
+    """[options] of this study."""
+
+    adhesion: bool = Field(True, description="measure adhesion utilisation too, by many short runs")
+
+
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: Progress) -> dict[str, Any]:
     """Drive every procedure; saves NAME.nc and NAME.png of each, also of one that failed, until it did."""
     from studies.braking_figures import stop_figure
 
-    failed, table, answer = {}, list[str](), {}
+    options = read(Options, scene.options, scene.file, "options")
+    failed, table, answer = {}, list[str](), dict[str, dict[str, Any]]()
     for i, name in enumerate(scene.procedures):
         progress(name, i / len(scene.procedures))
         begun = time.perf_counter()
@@ -38,15 +50,34 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
         save(scene, name, path, folder / f"{name}.nc")
         stop_figure(scene, name, stop, folder / f"{name}.png")
         answer[name] = {**stop.of_vehicle(), **{key: value.tolist() for key, value in stop.of_wheels().items()}}
-        table += lines(name, stop, seconds)
+        told = engineers(scene, name, stop) if options.adhesion else {}
+        answer[name] |= told
+        table += lines(name, stop, seconds, told)
     return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": table}
 
 
-def lines(name: str, stop: Stop, seconds: float) -> list[str]:
+def engineers(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
+    """Figures of merit of a procedure, by name and unit; none where they have no meaning."""
+    own, surface = scene.procedures[name], scene.road.stretches[0].left
+    if own.radius is not None:
+        return {f"after 1 s: {key}": value for key, value in stop.in_turn(own.radius).items()}
+    if behind(scene) == "none" or own.kind == "j_turn":
+        return {}
+    if own.kind == "split":
+        both = split(scene, name)
+        return {"z_MALS": both.z, "z_MALS asked for": both.asked, "k low": both.k_low, "k high": both.k_high}
+    used = utilisation(scene, surface)
+    return {"z_AL": used.z, "k front": used.k.front, "k rear": used.k.rear, "k of the vehicle": used.k_vehicle,
+            "adhesion utilisation epsilon": used.epsilon}  # fmt: skip
+
+
+def lines(name: str, stop: Stop, seconds: float, told: dict[str, float]) -> list[str]:
     """Tables of one procedure: of the vehicle, and of its wheels."""
     ended = "" if stop.path.stands else "; it does not stand"
     rows = [f"  {name.replace('_', ' ')}: {stop.times[-1]:.2f} s in {seconds:.2f} s{ended}"]
     rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.of_vehicle().items()]
+    rows += [f"    {key:<40}{value:>10.3f}" for key, value in told.items()]
+    rows += [f"    ({NOT_CHECKED})"] if told else []
     names = WHEELS[: stop.path.turning.shape[1]]
     rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel:>13}" for wheel in names)]
     return rows + [f"    {key:<40}" + "".join(f"{value:>13.2f}" for value in values)

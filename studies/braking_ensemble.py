@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from models.braking.procedures import drive
 from models.braking.scene import BrakingScene, build
 from models.braking.stops import Scatter, Stops, Welch, scatter, welch
 from models.ensemble.runner import Progress as Done
@@ -63,6 +64,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     options = read(Options, scene.options, scene.file, "options")
     tables = [scene.table(), merged(scene.table(), options.other)][: 2 if options.other else 1]
     found = []
+    progress("loading", 0.0)
+    drive(scene, options.procedure)  # compiles what is not compiled yet, once and not in every worker
     with processes(options.workers) if options.workers > 1 else nullcontext() as pool:
         for i, table in enumerate(tables):
             job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread,

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.braking.figures_of_merit import Locks, equivalent_deceleration, lock_table, mean_fully_developed
+from models.braking.figures_of_merit import (
+    Locks,
+    equivalent_deceleration,
+    lock_table,
+    mean_fully_developed,
+    yaw_ratio,
+)
 from models.braking.plane_step import LOCKED, SLIP
 from models.braking.run import Path
 
@@ -93,6 +99,23 @@ class Stop:
             "locked above 15 km/h [s]": locks.time, "longest lock [s]": locks.longest,
             "mean pressure [bar]": lengths @ pressures / whole, "final pressure [bar]": path.pressures[-1],
         }  # fmt: skip
+
+    def in_turn(self, radius: float, time: float = 1.0) -> dict[str, float]:
+        """What it did ``time`` (s) after the brake was applied on a circle (m, positive to the left), by name and unit.
+
+        Source: ISO 14794 (heavy vehicles), ISO 7975 (cars); not checked against the text of the standard.
+        """
+        speed, yaw_rate, slip = (float(np.interp(time, self.times, values)) for values in
+                                 (self.speed, self.path.states[:, 1, 2], self.side_slip))  # fmt: skip
+        place = [np.interp(time, self.times, self.path.states[:, 0, i]) for i in range(2)]
+        vx, vy = self.path.states[0, 1, :2] / self.speed[0]
+        centre = self.path.states[0, 0, :2] + radius * np.array([-vy, vx])
+        return {
+            "yaw rate by that of the circle": yaw_ratio(yaw_rate, speed, radius),
+            "mean deceleration [m/s^2]": float(self.speed[0] - speed) / time,
+            "outside of the circle [m]": float(np.hypot(*(place - centre)) - abs(radius)),
+            "side slip [deg]": float(np.degrees(slip)),
+        }
 
     def locks(self) -> Locks:
         """Locks of the wheels above 15 km/h."""

@@ -1,0 +1,119 @@
+"""The paper's figures of its J-turn on ice: friction and steer angle fitted to two of them, the others compared.
+
+A calibration, no validation: the paper prints neither its tyre matrices nor its steer angle.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from models.braking.procedures import drive
+from models.braking.scene import BrakingScene
+from models.braking.stop_report import Stop
+from models.braking.stops import Scatter, Stops, scatter
+from models.ensemble.runner import processes, run_paths
+from models.errors import InputError, RunFailed
+from models.strict import Strict, quantity, read
+
+SYSTEM = "braking"
+Progress = Callable[[str, float], None]
+PAPER = {
+    "deceleration": ("mean deceleration v0/T [m/s^2]", "1.36 +- 0.02", "1.37 +- 0.4", "fitted"),
+    "aside": ("y-displacement [m]", "7.5 +- 0.7", "7.2 +- 0.3", "fitted"),
+    "distance": ("stopping distance [m]", "44.4 +- 1.2", "44.4 +- 0.5", "compared"),
+    "time": ("stopping time [s]", "8.15 in one run", "", "compared"),
+    "yaw": ("final yaw [deg]", "21.3 in one run, a guessed reading", "", "compared"),
+}  # fmt: skip
+"""What the paper prints of its simulation and its measurements. "0.4" stands in print, where 0.04 would fit."""
+WANTED = {"deceleration": 1.36, "aside": 7.5}
+
+
+class Options(Strict):
+    """[options] of this study."""
+
+    procedure: str = Field("j_turn", description="name of the J-turn")
+    surface: str = Field("ice", description="whose friction is fitted")
+    runs: int = Field(10, ge=2, le=1000, description="stops of which the means are fitted")
+    last: int = Field(40, ge=2, le=1000, description="stops of which the results are the means")
+    rounds: int = Field(6, ge=1, le=50, description="of the fit")
+    speed_spread: float = quantity("", "standard deviation of the initial speed, relative", default=0.002, zero=True)
+    seed: int = Field(1, ge=0, le=2**62, description="of the speeds")
+    workers: int = Field(2, ge=1, le=256, description="processes that compute")
+
+
+def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
+    """Refuse a procedure that is no J-turn."""
+    options = read(Options, scene.options, scene.file, "options")
+    own = scene.procedures.get(options.procedure)
+    if own is None or own.kind != "j_turn":
+        names = tuple(name for name, one in scene.procedures.items() if one.kind == "j_turn")
+        raise InputError(scene.file, "options.procedure", options.procedure, "must be a J-turn of the scene", names)
+    if own.steer is not None and own.steer <= 0.0:
+        raise InputError(scene.file, f"procedures.{options.procedure}.steer", own.steer, "must be above 0 to be fitted")
+
+
+def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Fit, then run once more; saves ``calibration.csv`` and ``calibration.png``, a stop as fitted."""
+    from studies.braking import save
+    from studies.braking_figures import stop_figure
+
+    check(scene, engines)
+    options = read(Options, scene.options, scene.file, "options")
+    steer = scene.procedures[options.procedure].steer
+    assert steer is not None
+    scale, steps = scene.tyres.scale.get(options.surface, 1.0), []
+    progress("loading", 0.0)
+    drive(scene, options.procedure)  # compiles what is not compiled yet, once and not in every worker
+    with processes(options.workers) as pool:
+        for i in range(options.rounds):
+            progress(f"fit, round {i + 1}", i / (options.rounds + 2))
+            means = _means(fitted(scene, options, scale, steer), options, options.runs, pool)
+            steps.append((scale, steer, means["deceleration"].mean, means["aside"].mean))
+            scale *= WANTED["deceleration"] / means["deceleration"].mean
+            steer *= WANTED["aside"] / means["aside"].mean
+        progress("as fitted", options.rounds / (options.rounds + 2))
+        last = fitted(scene, options, scale, steer)
+        found = _means(last, options, options.last, pool, options.seed + 1)
+    rows = ["scale,steer [rad],deceleration [m/s^2],aside [m]"]
+    rows += [",".join(f"{value:.9g}" for value in step) for step in steps]
+    (folder / "calibration.csv").write_text("\n".join(rows) + "\n")
+    stop = Stop(drive(last, options.procedure))
+    save(last, options.procedure, stop.path, folder / "calibration.nc")
+    stop_figure(last, options.procedure, stop, folder / "calibration.png")
+    return {"scene": scene.title, "folder": str(folder), "failed": {}, "table": table(options, scale, steer, found),
+            "answer": {"scale": scale, "steer": steer, **{key: one.mean for key, one in found.items()}}}  # fmt: skip
+
+
+def fitted(scene: BrakingScene, options: Options, scale: float, steer: float) -> BrakingScene:
+    """The scene with another friction and steer angle; RunFailed where the fit leaves what is possible."""
+    if not (0.05 < scale < 2.0 and steer < 1.0):
+        raise RunFailed("calibration", f"the fit goes astray: friction times {scale:.3g}, steer angle {steer:.3g} rad")
+    own = scene.procedures[options.procedure].model_copy(update={"steer": steer})
+    tyres = scene.tyres.model_copy(update={"scale": {**scene.tyres.scale, options.surface: scale}})
+    return scene.model_copy(update={"tyres": tyres, "procedures": {**scene.procedures, options.procedure: own}})
+
+
+def _means(scene: BrakingScene, options: Options, runs: int, pool: Any, seed: int | None = None) -> dict[str, Scatter]:
+    job = Stops(scene.table(), scene.file, scene.folder, options.procedure, options.speed_spread,
+                options.seed if seed is None else seed)  # fmt: skip
+    found = run_paths(job, runs, executor=pool, block=max(1, runs // (2 * options.workers)))
+    return {key: scatter(found[key]) for key in PAPER}
+
+
+def table(options: Options, scale: float, steer: float, found: dict[str, Scatter]) -> list[str]:
+    """What was fitted, and each figure beside the paper's."""
+    lines = [f"  calibration: friction of {options.surface} times {scale:.4f}, steer angle {steer:.5f} rad",
+             f"  means of {options.last} stops, +- the scatter of one",
+             f"    {'':<34}{'here':>18}   {'paper, simulated':<36}{'paper, measured':<18}"]  # fmt: skip
+    for key, (label, simulated, measured, how) in PAPER.items():
+        here = f"{found[key].mean:.3f} +- {found[key].deviation:.3f}"
+        lines.append(f"    {label:<34}{here:>18}   {simulated:<36}{measured:<18}{how}")
+    return lines
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("braking_calibration")

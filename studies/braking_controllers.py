@@ -1,0 +1,140 @@
+"""Controllers of anti-lock brakes compared on several surfaces in all procedures, by distance and course."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.braking.plan import check as check_scene
+from models.braking.procedures import drive
+from models.braking.scene import BrakingScene, ControllerTable, RoadTable, Stretch
+from models.braking.stop_report import Stop
+from models.errors import RunFailed
+from models.strict import Strict, read
+
+SYSTEM = "braking"
+Progress = Callable[[str, float], None]
+SHOWN = {"distance [m]": "stopping distance [m]", "v0^2/2d [m/s^2]": "v0^2/2d [m/s^2]", "y [m]": "y [m]",
+         "yaw [deg]": "final yaw [deg]", "side slip [deg]": "largest side slip [deg]"}  # fmt: skip
+
+
+class Options(Strict):
+    """[options] of this study."""
+
+    surfaces: dict[str, str] = Field({"ice": "snow", "snow": "dry", "dry": "snow"}, min_length=1,
+                                     description="and what lies right of each in split procedures")  # fmt: skip
+    controllers: dict[str, ControllerTable] = Field(
+        {kind: ControllerTable(kind=kind) for kind in ("slip_bang_bang", "acceleration_phases", "slip_pi")},
+        min_length=1, description="tables as [controller], by their names",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run: names of surface, procedure and controller, and the scene of it alone."""
+
+    surface: str
+    procedure: str
+    controller: str
+    scene: BrakingScene
+
+
+def cases(scene: BrakingScene) -> list[Case]:
+    """All runs, surface by surface."""
+    options = read(Options, scene.options, scene.file, "options")
+    return [Case(surface, name, controller, _alone(scene, surface, right, name, table))
+            for surface, right in options.surfaces.items() for name in scene.procedures
+            for controller, table in options.controllers.items()]  # fmt: skip
+
+
+def _alone(scene: BrakingScene, surface: str, right: str, name: str, controller: ControllerTable) -> BrakingScene:
+    """The scene with one procedure on one surface under one controller."""
+    own = scene.procedures[name]
+    if own.kind == "split":
+        own = own.model_copy(update={"right": right})
+    return scene.model_copy(update={"road": RoadTable(stretches=[Stretch(left=surface)]), "controller": controller,
+                                    "procedures": {name: own}})  # fmt: skip
+
+
+def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
+    """Refuse what a controller or a surface cannot be."""
+    for case in cases(scene):
+        check_scene(case.scene, engines)
+
+
+def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Drive all; saves ``controllers.csv`` and ``controllers.png``."""
+    every, found, failed = cases(scene), list[tuple[Case, dict[str, float]]](), dict[str, str]()
+    for i, case in enumerate(every):
+        progress(f"{case.surface}, {case.procedure}, {case.controller}", i / len(every))
+        try:
+            path = drive(case.scene, case.procedure)
+        except RunFailed as error:
+            failed[f"{case.surface}, {case.procedure}, {case.controller}"] = str(error)
+            continue
+        stop = Stop(path)
+        values = stop.of_vehicle()
+        found.append((case, {key: values[name] for key, name in SHOWN.items()}
+                      | {"locked [s]": float(stop.locks().time.max())}))  # fmt: skip
+    _save(found, folder / "controllers.csv")
+    _figure(scene, found, folder / "controllers.png")
+    answer = [{"surface": case.surface, "procedure": case.procedure, "controller": case.controller, **values}
+              for case, values in found]  # fmt: skip
+    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": table(found)}
+
+
+def table(found: list[tuple[Case, dict[str, float]]]) -> list[str]:
+    """One line per run."""
+    heads = [*SHOWN, "locked [s]"]
+    lines = [f"  {'surface':<10}{'procedure':<12}{'controller':<22}" + "".join(f"{head:>17}" for head in heads)]
+    for case, values in found:
+        name = case.procedure.replace("_", " ")
+        lines.append(f"  {case.surface:<10}{name:<12}{case.controller:<22}"
+                     + "".join(f"{values[head]:>17.2f}" for head in heads))  # fmt: skip
+    return [*lines, "  locked: longest of the wheels, above 15 km/h"]
+
+
+def _save(found: list[tuple[Case, dict[str, float]]], file: Path) -> None:
+    heads = list(found[0][1]) if found else []
+    rows = [",".join(["surface", "procedure", "controller", *heads])]
+    rows += [",".join([case.surface, case.procedure, case.controller, *(f"{values[head]:.17g}" for head in heads)])
+             for case, values in found]  # fmt: skip
+    file.write_text("\n".join(rows) + "\n")
+
+
+PANELS = {"v0^2/2d [m/s^2]": "Equivalent deceleration", "yaw [deg]": "Final yaw angle"}
+
+
+def _figure(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], file: Path) -> None:
+    """Bars by procedure, a column of panels per surface, one colour per controller."""
+    from studies.figures import plt, save
+
+    surfaces = list(dict.fromkeys(case.surface for case, _ in found))
+    names, kinds = list(scene.procedures), list(dict.fromkeys(case.controller for case, _ in found))
+    figure, axes = plt.subplots(len(PANELS), max(len(surfaces), 1), figsize=(4.4 * max(len(surfaces), 1), 6.4),
+                                squeeze=False, sharey="row")  # fmt: skip
+    width = 0.8 / max(len(kinds), 1)
+    for column, surface in enumerate(surfaces):
+        for row, (key, heading) in enumerate(PANELS.items()):
+            axis = axes[row, column]
+            for k, kind in enumerate(kinds):
+                own = {case.procedure: values[key] for case, values in found
+                       if case.surface == surface and case.controller == kind}  # fmt: skip
+                heights = [own.get(name, np.nan) for name in names]
+                axis.bar(np.arange(len(names)) + (k - (len(kinds) - 1) / 2) * width, heights, width * 0.95,
+                         label=kind.replace("_", " "), color=f"C{k}")  # fmt: skip
+            axis.set_xticks(range(len(names)), [name.replace("_", " ") for name in names])
+            axis.set(title=f"{heading} on {surface}", ylabel=key.replace("^2", "²") if column == 0 else "")
+    if found:
+        axes[0, 0].legend(fontsize=8)
+    figure.suptitle(f"{scene.title}: no bar, no stop", x=0.01, ha="left", fontweight="bold")
+    save(figure, file)
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("braking_controllers")
