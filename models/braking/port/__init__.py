@@ -5,6 +5,7 @@
     callable.py     a Python class, named as "module:Name" or "file.py:Name"
     socket_port.py  a second process over a loopback socket; client.py and client_example.c are its other end
     fmu_port.py     an FMU, FMI 2 co-simulation; example_slave.py is one
+    example.py      the controller that both examples are
     sensors.py      signals with gain, offset, noise and bits; teeth.py counts them from a toothed wheel with a timer
     faults.py       lost and delayed samples, stuck valves
     log.py          every exchange in a file, and a controller that replays it

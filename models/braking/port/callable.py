@@ -41,7 +41,7 @@ def _find(name: str, folder: Path, file: str) -> Callable[..., Any]:
         raise InputError(file, "callable", name, f"was not loaded: {type(error).__name__}: {error}") from error
     choices = tuple(key for key in vars(module) if not key.startswith("_"))
     if attribute not in choices:
-        raise InputError(file, "callable", name, f"{place} has no such name", choices)
+        raise InputError(file, "callable", attribute, f"{place} has no such name", choices)
     return getattr(module, attribute)
 
 

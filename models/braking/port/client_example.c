@@ -1,4 +1,4 @@
-/* A controller at the port of a braked vehicle: slip bang-bang. Run as: client_example PORT. Frames: see frame.py.
+/* A controller at the port of a braked vehicle: that of example.py. Run as: client_example PORT. Frames: see frame.py.
    Build on a little-endian machine: cc -O2 -ffp-contract=off -o client_example client_example.c */
 #include <arpa/inet.h>
 #include <netinet/tcp.h>

@@ -1,10 +1,10 @@
-"""An example of a controller as an FMU: slip bang-bang. Build: ``pythonfmu build -f example_slave.py``."""
+"""The example of a controller as an FMU. Build: ``pythonfmu build -f example_slave.py``."""
 
 import numpy as np
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 from models.braking.controller import Sample
-from models.braking.controllers.slip_bang_bang import SlipBangBang
+from models.braking.port.example import Example
 
 
 class ExampleSlave(Fmi2Slave):
@@ -21,7 +21,7 @@ class ExampleSlave(Fmi2Slave):
         for name in ("supply", "speed"):
             self.register_variable(Real(name, causality=Fmi2Causality.input))
         self.register_variable(Boolean("brake", causality=Fmi2Causality.input, variability=Fmi2Variability.discrete))
-        self._number, self._controller = 0, SlipBangBang(4)
+        self._number, self._controller = 0, Example(4)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Answer to the inputs as they are."""

@@ -1,0 +1,443 @@
+"""The port: one controller behind every way gives the same bits, and whatever it does wrong ends in a named error."""
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import models.braking.port as port
+from models.braking.brake import PAPER_FRONT, PAPER_REAR, of_wheels
+from models.braking.controller import SAMPLE, Command, Sample
+from models.braking.magic_formula import surface
+from models.braking.plane_vehicle import PAPER, truck
+from models.braking.port import frame, socket_port
+from models.braking.port.ask import ControllerFailed, ask
+from models.braking.port.callable import Within, named_controller
+from models.braking.port.client import serve
+from models.braking.port.example import Example
+from models.braking.port.faults import Fault, Faulty
+from models.braking.port.pace import WallClock
+from models.braking.port.sensors import Conversion, sensed
+from models.braking.port.setup import PortTable, Run, opened
+from models.braking.port.socket_port import connected
+from models.braking.port.teeth import Counted, Teeth
+from models.braking.pressure import Chambers
+from models.braking.run import Braked
+from models.braking.surfaces import Stretch, road
+from models.braking.tyre_table import stacked
+from models.errors import InputError, RunFailed
+from models.strict import read
+
+HERE = Path(port.__path__[0])
+SHORT = 0.2
+"""Seconds of braking."""
+RADIUS = np.full(4, 0.5)
+
+
+class Says:
+    """Answers what a function makes of the sample."""
+
+    def __init__(self, answer):
+        self.answer, self.seen = answer, []
+
+    def sample(self, given):
+        self.seen.append(given)
+        return self.answer(given)
+
+
+def held(given):
+    return Command(valves=np.zeros(4, dtype=np.int64))
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    chambers = Chambers(np.full(4, 0.05), np.full(4, 0.05), 6.0)
+    ice = surface("ice")
+    brakes = of_wheels(PAPER_FRONT, PAPER_FRONT, PAPER_REAR, PAPER_REAR)
+    return Braked(plane=truck(PAPER), kind=np.zeros(4, dtype=np.int64), tables=stacked([ice]), slope=ice.cornering,
+                  road=road([Stretch(0.0, 0, 0)]), brakes=brakes, chambers=chambers, steer=np.zeros(4))  # fmt: skip
+
+
+def of(number=0, wheels=(11.0, 10.0, 9.0, 8.0), speed=11.0):
+    return Sample(number, round(number * SAMPLE * 1e9), np.array(wheels), True, 6.0, speed)
+
+
+def same(path, other):
+    names = ("times", "states", "turning", "pressures", "torques", "reports")
+    return all(np.array_equal(getattr(path, name), getattr(other, name)) for name in names)
+
+
+@contextmanager
+def client(behave, timeout=0.1):
+    """A connection whose other end is a thread that does ``behave(link)``."""
+
+    def act(number):
+        with socket.create_connection(("127.0.0.1", number)) as link:
+            behave(link)
+
+    with socket_port.listening() as server:
+        thread = threading.Thread(target=act, args=(server.getsockname()[1],))
+        thread.start()
+        link = server.accept()[0]
+        try:
+            with link:
+                yield socket_port.SocketPort(link, timeout)
+        finally:
+            thread.join(5.0)
+    assert not thread.is_alive()
+
+
+def test_frames_are_as_documented():
+    raw = frame.question(of(3))
+    assert len(raw) == 104 and raw[:4] == b"TRQ1" and raw[16:18] == b"\x04\x03" and not any(raw[18:24])
+    assert int.from_bytes(raw[4:8], "little") == 3 and int.from_bytes(raw[8:16], "little") == 16_500_000
+    assert np.frombuffer(raw, "<f8", offset=24).tolist() == [6.0, 11.0, 11.0, 10.0, 9.0, 8.0, 0.0, 0.0, 0.0, 0.0]
+    back = frame.sample(raw)
+    assert (back.number, back.time, back.brake, back.wheels.tolist()) == (3, 16_500_000, True, [11.0, 10.0, 9.0, 8.0])
+    said = frame.answer(3, Command(pressures=np.array([0.1, 0.2, 0.3, 1e-300])))
+    assert len(said) == 80 and said[:4] == b"TRA1" and said[8:10] == b"P\x04"
+    assert frame.command(said, 3).pressures.tolist() == [0.1, 0.2, 0.3, 1e-300]
+
+
+def test_a_speed_that_is_not_given_is_told_so():
+    raw = frame.question(of(speed=np.nan))
+    assert raw[17] == frame.SWITCH and np.isnan(frame.sample(raw).speed)
+
+
+def test_a_thread_at_the_socket_gives_the_same_bits(vehicle):
+    answered = []
+    with socket_port.listening() as server:
+        number = server.getsockname()[1]
+        thread = threading.Thread(target=lambda: answered.append(serve(Example(4), number)))
+        thread.start()
+        link = server.accept()[0]
+        with link:
+            path = vehicle.run(socket_port.SocketPort(link, 1.0), 11.0, SHORT)
+        thread.join(5.0)
+    assert same(path, vehicle.run(Example(4), 11.0, SHORT)) and answered == [len(path.times) - 1]
+    assert (path.pressures[1:] < path.pressures[:-1]).any()  # it did release
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+def test_the_client_in_c_gives_the_same_bits(vehicle, tmp_path):
+    program = tmp_path / "client"
+    source = HERE / "client_example.c"
+    words = ["cc", "-O2", "-Wall", "-Werror", "-ffp-contract=off", "-o", str(program), str(source)]
+    subprocess.run(words, check=True)
+    with connected([str(program), "{port}"], 0, 1.0, 5.0) as other:
+        path = vehicle.run(other, 11.0, SHORT)
+    assert same(path, vehicle.run(Example(4), 11.0, SHORT))
+
+
+def test_an_fmu_gives_the_same_bits(vehicle, tmp_path):
+    builder = pytest.importorskip("pythonfmu").FmuBuilder
+    file = builder.build_FMU(HERE / "example_slave.py", dest=tmp_path)
+    with opened(PortTable(fmu=Path(file).name), Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)) as (other, _):
+        path = vehicle.run(other, 11.0, SHORT)
+    assert same(path, vehicle.run(Example(4), 11.0, SHORT))
+
+
+def test_an_fmu_without_fmpy_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "fmpy", None)
+    table, run = PortTable(fmu="a.fmu"), Run(RADIUS, SAMPLE)
+    with pytest.raises(InputError, match=r"twinrig\[fmi\]"), opened(table, run, Example(4)):
+        pass
+
+
+def test_a_file_that_is_no_fmu(tmp_path):
+    (tmp_path / "a.fmu").write_text("no")
+    table = PortTable(fmu="a.fmu")
+    with pytest.raises(InputError, match="no FMU"), opened(table, Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)):
+        pass
+
+
+def _said(**changes):
+    """What a client does that answers with a changed frame."""
+
+    def behave(link):
+        number = int.from_bytes(link.recv(104)[4:8], "little")
+        raw = bytearray(frame.answer(number, Command(pressures=np.array([1.0, 1.0, 1.0, 1.0]))))
+        for place, value in changes.get("bytes", {}).items():
+            raw[place : place + len(value)] = value
+        link.sendall(bytes(raw)[: changes.get("cut", 80)] + b"x" * changes.get("more", 0))
+        if changes.get("stay"):
+            link.recv(1)
+
+    return behave
+
+
+def _double(value):
+    return np.array([value]).tobytes()
+
+
+NONSENSE = {
+    "not a number": _said(bytes={16: _double(np.nan)}),
+    "below zero": _said(bytes={24: _double(-1.0)}),
+    "no state of a valve": _said(bytes={8: b"V", 16: _double(0.5)}),
+    "wrong length": _said(bytes={9: b"\x03"}),
+    "wrong length: an answer of more than 80 bytes": _said(more=1),
+    "wrong frame": _said(bytes={0: b"HTTP"}),
+    "wrong number": _said(bytes={4: b"\x07"}),
+    "crash: the connection was closed after 10 of 80 bytes": _said(cut=10),
+    "crash: the connection was closed after no answer": _said(cut=0),
+    "silence: 10 of 80 bytes within 0.1 s": _said(cut=10, stay=True),
+    "silence: no answer within 0.1 s": _said(cut=0, stay=True),
+}
+
+
+@pytest.mark.parametrize("name", NONSENSE)
+def test_nonsense_at_the_socket_is_named_in_time(name):
+    begun = time.perf_counter()
+    with client(NONSENSE[name]) as other, pytest.raises(ControllerFailed, match=name) as told:
+        ask(other, of(2))
+    assert time.perf_counter() - begun < 0.1 + 0.5  # the time-out, and a busy machine
+    assert told.value.number == 2 and told.value.time == pytest.approx(2 * SAMPLE) and "sample 2" in str(told.value)
+
+
+def test_a_drip_of_bytes_is_no_answer():
+    def drip(link):
+        link.recv(104)
+        for _ in range(10):
+            time.sleep(0.02)
+            try:
+                link.sendall(b"T")
+            except OSError:
+                return
+
+    with client(drip, 0.05) as other, pytest.raises(ControllerFailed, match="of 80 bytes within"):
+        ask(other, of())
+
+
+def _raises(given):
+    raise ValueError("no idea")
+
+
+def _sleeps(given):
+    time.sleep(5.0)
+
+
+def _loops(given):
+    while True:
+        try:
+            pass
+        except Exception:
+            continue
+
+
+@pytest.mark.parametrize(("answer", "name"), [
+    (_raises, "crash: ValueError: no idea"),
+    (_sleeps, "silence: no answer within 0.05 s"),
+    (_loops, "silence: no answer within 0.05 s"),
+    (lambda given: None, "wrong frame"),
+    (lambda given: Command(), "wrong frame"),
+    (lambda given: Command(valves=np.ones(3)), "wrong length: 3 values for 4 wheels"),
+    (lambda given: Command(valves=np.array([1, 1, 1, 2])), "no state of a valve: 2 is none"),
+    (lambda given: Command(pressures=np.array([1, 1, np.inf, 1])), "not a number: inf"),
+    (lambda given: Command(pressures=np.array([1, -1e-9, 1, 1])), "below zero"),
+    (lambda given: Command(pressures=["a"] * 4), "wrong frame"),
+])  # fmt: skip
+def test_nonsense_of_a_callable_is_named(answer, name):
+    begun = time.perf_counter()
+    with pytest.raises(ControllerFailed, match=name):
+        ask(Within(Says(answer), 0.05), of())
+    assert time.perf_counter() - begun < 0.5
+
+
+def test_a_failed_run_keeps_what_it_recorded(vehicle):
+    def dies(given):
+        return held(given) if given.number < 5 else _raises(given)
+
+    with pytest.raises(ControllerFailed, match="sample 5: crash") as told:
+        vehicle.run(Says(dies), 11.0, SHORT)
+    partial = told.value.partial
+    assert len(partial.times) == 6 and not partial.stands and partial.reports.shape[:2] == (5, 4)
+    assert np.array_equal(partial.states, vehicle.run(Says(held), 11.0, 5 * SAMPLE).states)
+
+
+def test_a_command_that_ends_at_once_and_one_that_never_connects(monkeypatch):
+    monkeypatch.setattr(socket_port, "GRACE", 0.01)
+    with pytest.raises(RunFailed, match="status 3 before it connected"), connected(["sh", "-c", "exit 3"], 0, 1.0, 2.0):
+        pass
+    with pytest.raises(RunFailed, match="nobody connected to"), connected(["sleep", "30"], 0, 1.0, 0.1):
+        pass
+    with pytest.raises(InputError, match="cannot be started"), connected(["/no/such/program"], 0, 1.0, 0.1):
+        pass
+
+
+def test_no_process_stays(monkeypatch, tmp_path):
+    monkeypatch.setattr(socket_port, "GRACE", 0.01)
+    words = ["sh", "-c", "sleep 30 & echo $! > child; echo $$ > parent; wait"]
+    with pytest.raises(RunFailed), connected(words, 0, 1.0, 0.2, tmp_path):
+        pass
+    for name in ("parent", "child"):
+        number = int((tmp_path / name).read_text())
+        with pytest.raises(OSError):
+            for _ in range(20):  # an orphan is collected by its new parent, soon
+                os.kill(number, 0)
+                if "Z" in Path(f"/proc/{number}/stat").read_text().split()[2]:
+                    raise OSError("collected soon")
+                time.sleep(0.01)
+
+
+def test_the_socket_listens_on_this_machine_alone():
+    with socket_port.listening() as server:
+        assert server.getsockname()[0] == "127.0.0.1"
+
+
+def test_a_log_replays_bit_for_bit_and_knows_its_scene(vehicle, tmp_path):
+    run = Run(RADIUS, SAMPLE, "a scene", tmp_path)
+    with opened(PortTable(log="a.log"), run, Example(4)) as (own, _):
+        path = vehicle.run(own, 11.0, SHORT)
+    with opened(PortTable(replay="a.log"), run, Says(_raises)) as (replayed, _):
+        assert same(path, vehicle.run(replayed, 11.0, SHORT))
+    with opened(PortTable(replay="a.log"), run, Example(4)) as (replayed, _), \
+            pytest.raises(RunFailed, match="was asked something else"):  # fmt: skip
+        vehicle.run(replayed, np.nextafter(11.0, 12.0), SHORT)
+    with opened(PortTable(replay="a.log"), run, Example(4)) as (replayed, _), \
+            pytest.raises(RunFailed, match=f"sample {len(path.times) - 1}: a.log has ended"):  # fmt: skip
+        vehicle.run(replayed, 11.0, SHORT + 0.1)
+    with pytest.raises(InputError, match="another scene"), \
+            opened(PortTable(replay="a.log"), Run(RADIUS, SAMPLE, "another", tmp_path), Example(4)):  # fmt: skip
+        pass
+    (tmp_path / "no.log").write_bytes(b"no")
+    with pytest.raises(InputError, match="no log"), opened(PortTable(replay="no.log"), run, Example(4)):
+        pass
+
+
+def test_the_wall_clock_changes_no_number_and_counts_overruns(vehicle):
+    clock = WallClock(Example(4), SAMPLE)
+    begun = time.perf_counter()
+    path = vehicle.run(clock, 11.0, 0.1)
+    assert time.perf_counter() - begun >= 0.1 - 2 * SAMPLE
+    assert same(path, vehicle.run(Example(4), 11.0, 0.1))
+
+    def slow(given):
+        time.sleep(0.02 if given.number == 1 else 0.0)
+        return held(given)
+
+    late = WallClock(Says(slow), SAMPLE)
+    vehicle.run(late, 11.0, 4 * SAMPLE)
+    assert late.overruns >= 1 and late.worst >= 0.02 - SAMPLE - 1e-4
+    assert "overruns, the worst by" in late.report()
+
+
+def test_the_switch_closes_in_time(vehicle):
+    from dataclasses import replace
+
+    seen = Says(lambda given: Command(valves=np.ones(4)))
+    path = replace(vehicle, switch=0.05).run(seen, 11.0, 0.1)
+    closed = [given.brake for given in seen.seen]
+    assert closed == [SAMPLE * i >= 0.05 - 1e-9 for i in range(len(closed))]
+    assert not path.pressures[: closed.index(True) + 1].any() and path.pressures[closed.index(True) + 1].all()
+
+
+def test_conversion_to_bits_and_nothing_without_it():
+    says = Says(held)
+    sensed(says, 4, Conversion(), Conversion()).sample(of())
+    assert says.seen[0].wheels.tolist() == [11.0, 10.0, 9.0, 8.0]
+    converted = sensed(says, 4, Conversion(bits=3, range=14.0), Conversion())
+    converted.sample(of(wheels=(0.9, 1.1, 99.0, -1.0)))  # codes of 2 m/s: 0, 1, the last, 0
+    assert says.seen[1].wheels.tolist() == [0.0, 2.0, 14.0, 0.0]
+
+
+def test_noise_gain_and_offset_of_signals_and_pressures():
+    says = Says(lambda given: Command(pressures=np.full(4, 2.0)))
+    own = Conversion(gain=2.0, offset=1.0, noise=0.5, seed=7)
+    one, other = (sensed(says, 4, own, own) for _ in range(2))
+    back = np.array([one.sample(of(i)).pressures for i in range(2500)])
+    seen = np.array([given.wheels for given in says.seen])
+    assert np.array_equal(back[2000], other.sample(of(2000)).pressures)  # noise is that of the sample, in any order
+    assert np.array_equal(says.seen[-1].wheels, seen[2000])
+    for off in (back - 5.0, seen - 2.0 * of().wheels - 1.0):
+        # 10 000 numbers: mean within 4 sigma / 100, deviation within 4 sigma / sqrt(20 000)
+        assert abs(off.mean()) < 4 * 0.5 / 100 and abs(off.std() - 0.5) < 4 * 0.5 / 141
+    assert abs(np.corrcoef(back[:, 0], seen[:, 0])[0, 1]) < 0.08  # not the same noise; 4 / sqrt(2500)
+
+
+def test_a_counted_wheel_of_steady_speed_is_exact_to_a_tick():
+    counted, way = Counted(Teeth(teeth=100, tick=1e-6), RADIUS), 2 * np.pi * 0.5 / 100
+    speeds = (20.0, 7.0, 3.0, 0.0)
+    for i in range(40):
+        shown = counted(of(i, speeds))
+    # one tick in the time of the edges of one sample, or in that of one tooth where it takes longer
+    for got, speed in zip(shown[:3], speeds[:3], strict=True):
+        assert abs(got - speed) <= speed * 2e-6 / max(way / speed, SAMPLE - way / speed)
+    assert counted(of(40, (20.0, 7.0, 3.0, 0.0)))[3] == 0.0
+
+
+def test_a_wheel_that_stops_is_seen_to_fall_and_one_that_slows_is_followed():
+    counted, way = Counted(Teeth(teeth=50), RADIUS), 2 * np.pi * 0.5 / 50
+    shown = [counted(of(i, (10.0 if i < 4 else 0.0,) * 4))[0] for i in range(40)]
+    assert all(b <= a for a, b in pairwise(shown[3:]))
+    assert shown[-1] <= way / (34 * SAMPLE)  # at most one tooth since
+    slowing = Counted(Teeth(teeth=100), RADIUS)
+    for i in range(60):
+        true = 20.0 - 8.0 * SAMPLE * i
+        got = slowing(of(i, (true,) * 4))[0]
+        # the mean since the edge before: at most a sample and two teeth old
+        assert i < 2 or -1e-3 <= got - true <= 8.0 * (SAMPLE + 2 * way / true)
+
+
+def test_a_missing_tooth_makes_one_dip_per_turn():
+    teeth, turn = 20, 2 * np.pi * 0.5
+    speed = turn / (20 * SAMPLE)  # one tooth per sample
+    whole = Counted(Teeth(teeth=teeth), RADIUS)
+    less = Counted(Teeth(teeth=teeth), RADIUS, lambda wheel, tooth, time: wheel == 1 and tooth == 5)
+    rows = np.array([[*whole(of(i, (speed,) * 4))[:2], *less(of(i, (speed,) * 4))[:2]] for i in range(61)])[3:]
+    assert np.allclose(rows[:, :3], speed, rtol=1e-3)
+    assert (rows[:, 3] < 0.6 * speed).sum() in (3, 6)  # at the gap, and while it waits, in each of three turns
+
+
+def test_lost_and_delayed_samples_and_stuck_valves():
+    says = Says(lambda given: Command(valves=np.full(4, 1 if given.number < 5 else -1)))
+    faults = [Fault(kind="lost", start=2 * SAMPLE, end=4 * SAMPLE, wheels=[0]),
+              Fault(kind="delayed", start=3 * SAMPLE, samples=2, wheels=[1]),
+              Fault(kind="stuck", start=5 * SAMPLE, wheels=[2]),
+              Fault(kind="stuck", start=2 * SAMPLE, end=3 * SAMPLE, wheels=[3], state=0)]  # fmt: skip
+    faulty = Faulty(says, faults)
+    valves = np.array([faulty.sample(of(i, (float(i),) * 4)).valves for i in range(8)])
+    seen = np.array([given.wheels for given in says.seen])
+    assert seen[:, 0].tolist() == [0, 1, 1, 1, 4, 5, 6, 7]
+    assert seen[:, 1].tolist() == [0, 1, 2, 1, 2, 3, 4, 5]
+    assert seen[:, 2].tolist() == list(range(8))
+    assert valves[:, 2].tolist() == [1] * 8 and valves[:, 1].tolist() == [1] * 5 + [-1] * 3
+    assert valves[:, 3].tolist() == [1, 1, 0, 1, 1, -1, -1, -1]
+
+
+@pytest.mark.parametrize(("table", "told"), [
+    ({"callable": "a:B", "fmu": "c.fmu"}, "at most one of"),
+    ({"callabel": "a:B"}, "callable"),
+    ({"faults": [{"kind": "delayed"}]}, "needs samples"),
+    ({"faults": [{"kind": "lost", "state": 1}]}, "no meaning"),
+    ({"faults": [{"kind": "tooth", "tooth": 1}]}, "counted from teeth"),
+    ({"signals": {"bits": 12}}, "together"),
+    ({"timeout": 0.0}, "above 0"),
+])  # fmt: skip
+def test_a_table_that_cannot_be(table, told):
+    with pytest.raises(InputError, match=told):
+        read(PortTable, table, "scene.toml", "port")
+
+
+def test_a_fault_of_a_wheel_that_is_not_there():
+    table = PortTable(faults=[Fault(kind="lost", wheels=[4])])
+    with pytest.raises(InputError, match="from 0 to 3"), opened(table, Run(RADIUS, SAMPLE), Example(4)):
+        pass
+
+
+def test_a_callable_by_its_name(tmp_path):
+    (tmp_path / "mine.py").write_text("class Mine:\n    def __init__(self, wheels, x=1):\n        self.x = x\n"
+                                      "    def sample(self, given):\n        return None\nNOT = 1\n")  # fmt: skip
+    assert named_controller("mine.py:Mine", tmp_path, 4, {"x": 3}).x == 3
+    for name, told in (("mine.py:Min", "did you mean 'Mine'"), ("mine.py", "must be"), ("no.py:A", "not loaded"),
+                       ("mine.py:NOT", "not made"), ("builtins:list", "no method sample")):  # fmt: skip
+        with pytest.raises(InputError, match=told):
+            named_controller(name, tmp_path, 4, {})
