@@ -8,6 +8,7 @@ same wheel under the same controller as it runs, by samples.
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -46,21 +47,19 @@ class Frozen:
         for name in ("speed", "load", "radius", "inertia"):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise InputError("", name, getattr(self, name), "must be above 0")
-        tables, (j, q) = stacked([self.tyre]), place(self.tyre.loads, self.load)
-        object.__setattr__(self, "_slips", tables.slips)
-        object.__setattr__(self, "_mu", tables.mu_x)
-        object.__setattr__(self, "_grip", (0, 0, 0.0, 0, 0.0, int(j), float(q), float(self.load)))
-        object.__setattr__(self, "_brakes", of_wheels(self.brake))
 
     @property
     def peak(self) -> float:
         """Largest force (N) of the tyre."""
-        return max(node_force(k, self._grip, self._mu) for k in range(self._slips.size))
+        *_, grip, slips, mu_x = self.packed
+        return max(node_force(k, grip, mu_x) for k in range(slips.size))
 
-    @property
+    @cached_property
     def packed(self) -> tuple:
-        """As compiled functions take it."""
-        return self.speed, self.radius, self.inertia, self._brakes, self._grip, self._slips, self._mu
+        """As compiled functions take it: speed, radius, inertia, brakes, grip, slips, mu_x."""
+        tables, (j, q) = stacked([self.tyre]), place(self.tyre.loads, self.load)
+        grip = (0, 0, 0.0, 0, 0.0, int(j), float(q), float(self.load))
+        return self.speed, self.radius, self.inertia, of_wheels(self.brake), grip, tables.slips, tables.mu_x
 
     def rolling(self) -> np.ndarray:
         """State (5,) of a wheel that rolls without torque, at time 0."""
@@ -176,7 +175,8 @@ def sampled(frozen: Frozen, controller: FivePhase, cycles: int = 30, substeps: i
 
     Raises RunFailed if it does not cycle.
     """
-    state, after, starts, number, falling = frozen.rolling(), np.empty(5), [], 0, False
+    state, after, number, falling = frozen.rolling(), np.empty(5), 0, False
+    starts: list[np.ndarray] = []
     while len(starts) <= cycles + skip:
         wheels = np.array([frozen.radius * state[TURNING]])
         given = Sample(number, round(number * SAMPLE * 1e9), wheels, True, 1e3, frozen.speed)
@@ -184,7 +184,7 @@ def sampled(frozen: Frozen, controller: FivePhase, cycles: int = 30, substeps: i
         if pressure < state[PRESSURE] and not falling:
             starts.append(state.copy())
         falling, number = pressure < state[PRESSURE], number + 1
-        state[PRESSURE], state[TORQUE] = pressure, torque(0, pressure, state[TORQUE], frozen._brakes)
+        state[PRESSURE], state[TORQUE] = pressure, torque(0, pressure, state[TORQUE], frozen.packed[3])
         for _ in range(substeps):
             go_on(state, 0.0, SAMPLE / substeps, frozen.packed, after)
             state[:] = after

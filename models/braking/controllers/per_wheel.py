@@ -53,8 +53,8 @@ class PerWheel:
         for axle in common.select_low:
             if not (isinstance(axle, int) and 0 <= 2 * axle + 1 < wheels):
                 raise InputError("", "controller.parameters.select_low", axle, f"must be axles 0 to {wheels // 2 - 1}")
-        shared = [(2 * axle, 2 * axle + 1) for axle in common.select_low]
-        alone = [(i,) for i in range(wheels) if i // 2 not in common.select_low]
+        shared: list[tuple[int, ...]] = [(2 * axle, 2 * axle + 1) for axle in common.select_low]
+        alone: list[tuple[int, ...]] = [(i,) for i in range(wheels) if i // 2 not in common.select_low]
         self._groups = sorted(shared + alone)
         self._logics = [logic() for _ in self._groups]
         self._common, self._pressures, self._wheels = common, pressures, wheels
