@@ -75,6 +75,7 @@ def lines(name: str, stop: Stop, seconds: float, told: dict[str, float]) -> list
     """Tables of one procedure: of the vehicle, and of its wheels."""
     ended = "" if stop.path.stands else "; it does not stand"
     rows = [f"  {name.replace('_', ' ')}: {stop.times[-1]:.2f} s in {seconds:.2f} s{ended}"]
+    rows += [f"    {stop.path.clock}"] if stop.path.clock else []
     rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.of_vehicle().items()]
     rows += [f"    {key:<40}{value:>10.3f}" for key, value in told.items()]
     rows += [f"    ({NOT_CHECKED})"] if told else []

@@ -31,7 +31,9 @@ from models.braking.port.setup import PortTable, Run, opened
 from models.braking.port.socket_port import connected
 from models.braking.port.teeth import Counted, Teeth
 from models.braking.pressure import Chambers
+from models.braking.procedures import drive
 from models.braking.run import Braked
+from models.braking.scene import build
 from models.braking.surfaces import Stretch, road
 from models.braking.tyre_table import stacked
 from models.errors import InputError, RunFailed
@@ -438,6 +440,19 @@ def test_a_callable_by_its_name(tmp_path):
                                       "    def sample(self, given):\n        return None\nNOT = 1\n")  # fmt: skip
     assert named_controller("mine.py:Mine", tmp_path, 4, {"x": 3}).x == 3
     for name, told in (("mine.py:Min", "did you mean 'Mine'"), ("mine.py", "must be"), ("no.py:A", "not loaded"),
-                       ("mine.py:NOT", "not made"), ("builtins:list", "no method sample")):  # fmt: skip
+                       ("mine.py:NOT", "not made"), ("types:SimpleNamespace", "not made|no method sample")):  # fmt: skip
         with pytest.raises(InputError, match=told):
             named_controller(name, tmp_path, 4, {})
+
+
+def test_a_scene_logs_and_replays_what_it_drives(tmp_path):
+    base = {"system": "braking", "title": "t", "run": {"duration": 0.1}, "procedures": {"one": {"speed": 11.0}}}
+
+    def driven(port, **more):
+        return drive(build({**base, **more, "port": port}, "scene.toml", tmp_path), "one")
+
+    path = driven({"log": "{procedure}.log"}, controller={"kind": "slip_bang_bang"})
+    again = driven({"replay": "one.log", "pace": "wall"})  # whatever controller the scene names: the log answers
+    assert same(path, again) and "overruns" in again.clock and not path.clock
+    with pytest.raises(InputError, match="another scene"):
+        driven({"replay": "one.log"}, run={"duration": 0.2})

@@ -42,9 +42,12 @@ def drive(scene: BrakingScene, name: str) -> Path:
     own = controller_of(scene, vehicle.plane.wheels)
     if scene.port is None:
         return vehicle.run(own, start, scene.run.duration)
-    port = Run(vehicle.plane.radius, scene.run.sample, json.dumps(scene.table()), Folder(scene.folder), scene.file)
-    with opened(scene.port, port, own) as (controller, _):
-        return vehicle.run(controller, start, scene.run.duration)
+    known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}
+    text = json.dumps([name, known], sort_keys=True)  # a log is that of a vehicle and its drive, whatever answered
+    port = Run(vehicle.plane.radius, scene.run.sample, text, Folder(scene.folder), scene.file, name)
+    with opened(scene.port, port, own) as (controller, clock):
+        path = vehicle.run(controller, start, scene.run.duration)
+    return path if clock is None else replace(path, clock=clock.report())
 
 
 def steered(vehicle: Braked, angle: float) -> np.ndarray:

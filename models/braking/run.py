@@ -24,7 +24,8 @@ class Path:
     """What a run recorded at every sample, the start included.
 
     times (n,) : s; states (n, 2, 2 + U) : positions and rates; turning, pressures, torques (n, W) : rad/s, bar, N m;
-    reports (n - 1, W, 7) : of the last step of every sample, see ``plane_step``; stands : whether it ended at rest.
+    reports (n - 1, W, 7) : of the last step of every sample, see ``plane_step``; stands : whether it ended at rest;
+    clock : what the clock on the wall told of overruns, if the run kept to it.
     """
 
     times: np.ndarray
@@ -34,6 +35,7 @@ class Path:
     torques: np.ndarray
     reports: np.ndarray
     stands: bool
+    clock: str = ""
 
 
 class Start(NamedTuple):
@@ -45,7 +47,11 @@ class Start(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Braked:
-    """A vehicle on a road with brakes, ready to run. kind (W,) : which tyre each wheel has; steer (W,) : rad."""
+    """A vehicle on a road with brakes, ready to run.
+
+    kind (W,) : which tyre each wheel has; steer (W,) : rad; engine : ``models.engines.braking.Carried`` if an engine
+    is to carry the chassis.
+    """
 
     plane: Plane
     kind: np.ndarray
@@ -59,6 +65,8 @@ class Braked:
     sample: float = SAMPLE
     speed_given: bool = True
     switch: float = 0.0
+    engine: Any = None
+    relaxation: np.ndarray | None = None
 
     def rolling(self, speed: float) -> Start:
         """Steady rolling along x at a speed (m/s)."""
@@ -82,7 +90,9 @@ class Braked:
         rows = [(time, state.copy(), turning.copy(), air.pressure.copy(), air.torque.copy())]
         reports = list[np.ndarray]()
         step, released = self.sample / self.substeps, np.full(wheels, RELEASE)
+        go_on = advance if self.engine is None else self.engine.advance
         check_way(self.road, step * float(np.hypot(*state[1, :2])))
+        go = advance if self.relaxation is None else _lagging(self.relaxation)
         with _kept(rows, reports):
             while status != AT_REST and time < duration - 1e-9:
                 braked = time >= self.switch - 1e-9
@@ -95,7 +105,7 @@ class Braked:
                     by_valves(valves, self.sample, air, self.chambers, self.brakes, torques)
                 else:
                     by_pressures(command.pressures, air, self.brakes, torques)
-                status, used = advance(state, turning, torques, step, self.steer, self.slope, self.plane, self.kind,
+                status, used = go(state, turning, torques, step, self.steer, self.slope, self.plane, self.kind,
                                        self.road, self.tables.packed, found, report)  # fmt: skip
                 time, number = time + used, number + 1
                 if status in (NOT_FOUND, LIFTED):
@@ -103,6 +113,14 @@ class Braked:
                 rows.append((time, state.copy(), turning.copy(), air.pressure.copy(), air.torque.copy()))
                 reports.append(report.copy())
         return _path(rows, reports, status == AT_REST)
+
+
+def _lagging(lengths: np.ndarray) -> Callable[..., Any]:
+    """``advance`` with tyres of relaxation lengths (W,) that begin without slip angles."""
+    from models.braking.relaxation import advance_lagging
+
+    lag = np.zeros(lengths.size)
+    return lambda *given: advance_lagging(*given, lengths, lag)
 
 
 @contextmanager

@@ -26,7 +26,7 @@ BEHIND = ("callable", "command", "port", "fmu", "replay")
 
 
 class PortTable(Strict):
-    """[port]: paths are seen from the scene's folder."""
+    """[port]: paths are seen from the scene's folder; {procedure} in them is the name of what is driven."""
 
     callable: str | None = Field(default=None, description="module:Name or file.py:Name, a class")
     parameters: dict[str, Any] = Field(default_factory=dict, description="of the callable")
@@ -66,6 +66,11 @@ class Run:
     scene: str = ""
     folder: Path = Path()
     file: str = ""
+    procedure: str = ""
+
+    def path(self, name: str) -> Path:
+        """A file that the table names."""
+        return self.folder / name.replace("{procedure}", self.procedure)
 
 
 @contextmanager
@@ -80,7 +85,7 @@ def opened(table: PortTable, run: Run, own: Controller) -> Iterator[tuple[Contro
         clock = WallClock(inner, run.sample) if table.pace == "wall" else None
         watched: Controller = inner if clock is None else clock
         if table.log is not None:
-            watched = stack.enter_context(logged(watched, run.folder / table.log, name_of(run.scene)))
+            watched = stack.enter_context(logged(watched, run.path(table.log), name_of(run.scene)))
         faulty = Faulty(watched, table.faults) if table.faults else watched
         teeth = None if table.teeth is None else Counted(table.teeth, run.radius, partial(missing_teeth, table.faults))
         yield sensed(faulty, run.radius.size, table.signals, table.pressures, teeth=teeth), clock
@@ -94,10 +99,10 @@ def _behind(table: PortTable, run: Run, own: Controller) -> Iterator[Controller]
             link = socket_port.connected(table.command, table.port or 0, table.timeout, table.start, run.folder)
             yield stack.enter_context(link)
         elif table.fmu is not None:
-            fmu = stack.enter_context(fmu_port.opened(run.folder / table.fmu, run.radius.size, run.sample))
+            fmu = stack.enter_context(fmu_port.opened(run.path(table.fmu), run.radius.size, run.sample))
             yield Within(fmu, table.timeout)
         elif table.replay is not None:
-            yield Replay(run.folder / table.replay, name_of(run.scene))
+            yield Replay(run.path(table.replay), name_of(run.scene))
         elif table.callable is not None:
             made = named_controller(table.callable, run.folder, run.radius.size, table.parameters, run.file)
             yield Within(made, table.timeout)
