@@ -74,7 +74,7 @@ def _answer(drives: dict[str, Drive]) -> dict[str, float]:
 def _line(name: str, answer: dict[str, float]) -> str:
     yaw, lateral, load, used = list(answer.values())[:4]
     gap = answer.get("largest difference of the engines")
-    return (f"    {name:<16}{yaw:>8.3f} 1/s{lateral:>8.2f} m/s^2{load:>10.0f} N{100 * used:>8.0f} %"
+    return (f"    {name:<16}{yaw:>6.3f} rad/s{lateral:>8.2f} m/s^2{load:>10.0f} N{100 * used:>8.0f} %"
             + (f"{gap:>10.1e}" if gap is not None else ""))  # fmt: skip
 
 

@@ -117,7 +117,7 @@ def branch_figure(orbits: Sequence[Orbit], wheelset: Wheelset, title: str, path:
         axis.set(ylabel="amplitude of the lateral displacement [mm]", ylim=(0, None))
     begins = speeds[amplitudes <= 1.02e-3 * clearance] if (amplitudes <= 1e-3 * clearance).any() else speeds[:1]
     margin = 0.2 * np.ptp(begins) + 0.05
-    middle.set(xlim=(begins.min() - margin, begins.max() + margin), ylim=(0, 1.1 * clearance), title="where it begins")
+    middle.set(xlim=(begins.min() - margin, begins.max() + margin), ylim=(0, 1.1 * clearance), title="Where it begins")
     left.annotate("flanges touch", (speeds.max(), clearance), (0, -11), textcoords="offset points", ha="right",
                   fontsize=8)  # fmt: skip
     ends = np.array([speeds.min(), speeds.max()])

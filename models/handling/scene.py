@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -31,9 +31,13 @@ class TyreTable(Strict):
     """[tyres]: what the vehicle file does not say of wheels and tyres."""
 
     friction: float = quantity("", "coefficient between tyre and road", default=0.9)
-    half_width: float = quantity("m", "of the patch, across", default=0.09)
-    inclination: float = quantity("rad", "of the left wheels about their forward axis; the right ones mirrored",
-                                  default=0.0, signed=True)  # fmt: skip
+    half_width: float = Field(default=0.09, gt=0.0, le=0.5, description="m, of the patch, across")
+    inclination: float = Field(
+        default=0.0,
+        ge=-0.5,
+        le=0.5,
+        description="rad, of the left wheels about their forward axis; the right ones mirrored",
+    )
     cells: int = Field(default=21, ge=3, le=200, description="of the patch's net, per strip")
     spin_inertia: float = quantity("kg m^2", "of a wheel about its axle, chosen", default=1.7)
     brake_rate: float = quantity("rad/s", "spin from which a brake's torque is whole", default=1.0)
@@ -42,7 +46,7 @@ class TyreTable(Strict):
 class RoadTable(Strict):
     """[road]: rough, where a manoeuvre says so; one surface for all manoeuvres."""
 
-    iso8608: str = Field(default="A", pattern="^[A-H]$", description="class, its mean level")
+    iso8608: Literal["A", "B", "C", "D", "E", "F", "G", "H"] = Field(default="A", description="class, its mean level")
     waves: int = Field(default=48, ge=1, le=10_000, description="plane waves that make up the surface")
     seed: int = Field(default=1, ge=0, le=2**62, description="of the waves")
 
