@@ -1,0 +1,214 @@
+"""A quarter vehicle braked to a stop: distances against the exact answer, other schemes, locking and standstill."""
+
+import math
+from functools import cache
+from itertools import pairwise, product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.braking.magic_formula import SURFACES, surface
+from models.braking.plane_vehicle import GRAVITY
+from models.braking.quarter import PLACE, SPEED, TURNING, Quarter, Stop, braked
+from models.braking.surfaces import Stretch, road
+from models.braking.tyre_table import Tables, TyreTable, stacked
+from validation.braking_schemes import PATIENCE, SCHEMES, exact, stopped
+from validation.rows import Row, System, Table, at_most, finding, within
+
+TITLE = "Braking to a stop"
+SYSTEM: System = "anti-lock"
+FRONT = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
+"""A front wheel of the paper's truck under what it bears while braking."""
+STEP = 5.5e-3
+"""The paper's step (s)."""
+HEADLINE = {"ice, 3 % slip": ("ice", 0.03, 11.11), "dry, 6 % slip": ("dry", 0.06, 22.22),
+            "ice, light": ("ice", 0.003, 11.11), "dry, light": ("dry", 0.004, 22.22)}  # fmt: skip
+"""Surface, slip that settles, speed (m/s)."""
+FURTHER = {"snow": ("snow", 0.04, 13.9, 1.0, 1.0), "snow, light": ("snow", 0.004, 13.9, 1.0, 1.0),
+           "wet": ("wet", 0.05, 22.22, 1.0, 1.0), "wet, light": ("wet", 0.003, 22.22, 1.0, 1.0),
+           "slow": ("dry", 0.03, 3.0, 1.0, 1.0), "fast": ("dry", 0.03, 40.0, 1.0, 1.0),
+           "light vehicle": ("ice", 0.02, 11.11, 0.2, 1.0), "heavy vehicle": ("ice", 0.02, 11.11, 5.0, 1.0),
+           "light wheel": ("wet", 0.03, 11.11, 1.0, 0.1), "heavy wheel": ("wet", 0.03, 11.11, 1.0, 4.0)}  # fmt: skip
+"""The same with factors of mass and spin inertia."""
+BOUND = 5e-4
+STEPS = {True: (STEP, 2e-2), False: (1e-4, 5e-4, 1e-3, 2e-3, STEP, 1e-2, 2e-2)}
+"""Steps (s) of the sweep and the figure, by ``quick``."""
+LEVELS = np.linspace(0.0, 1.5, 16)
+"""Torque of the brake by that of locking."""
+AFTER = 2.0
+"""Time (s) for which a vehicle that stands is watched."""
+EVEN = road([Stretch(0.0, 0, 0)])
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """All rows; quick: the four headline cases, two steps, two surfaces."""
+    curves = {name: _curve(*one, STEPS[quick]) for name, one in HEADLINE.items()}
+    rows = [row for name, curve in curves.items() for row in _headline_rows(name, curve)]
+    if not quick:
+        rows += [_further_row(name, *one) for name, one in FURTHER.items()]
+    rows += [*_sweep_rows(("ice", "dry") if quick else tuple(SURFACES), LEVELS[::5] if quick else LEVELS, STEPS[quick]),
+             _locked_row(), _release_row(), _friction_row(9 if quick else 25)]  # fmt: skip
+    return rows, {"curves": curves, "steps": STEPS[quick]}
+
+
+@cache
+def met(on: str, scale: float = 1.0) -> tuple[TyreTable, Tables]:
+    """Table of a surface, as it is and for compiled functions."""
+    tyre = surface(on, scale)
+    return tyre, stacked([tyre])
+
+
+def steady(quarter: Quarter, tyre: TyreTable, slip: float) -> tuple[float, float]:
+    """Force (N) at a slip and the torque (N m) under which it stays."""
+    force = quarter.mass * GRAVITY * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
+    return force, quarter.steady_torque(slip, force)
+
+
+def stop(quarter: Quarter, tyre: tuple[TyreTable, Tables], torque: float, speed: float, step: float = STEP,
+         after: float = 0.0, turning: float | None = None) -> Stop:  # fmt: skip
+    """Braked by a constant torque (N m) for twice the time that it takes at the least of both forces, and ``after``."""
+    least = min(torque / quarter.radius, quarter.mass * GRAVITY * float(tyre[0].mu_x[0, 0, -1]))
+    steps = math.ceil((2.0 * speed * quarter.mass / least + 0.5 + after) / step) if torque > 0.0 else 1000
+    return braked(quarter, tyre[1], EVEN, np.full(steps + 1, torque), step, speed, turning)
+
+
+def _curve(name: str, slip: float, speed: float, steps: tuple[float, ...]) -> dict[str, Any]:
+    """Error of the stopping distance by step, of every scheme, and the speed at which it still rolls."""
+    tyre, _ = both = met(name)
+    torque = steady(FRONT, tyre, slip)[1]
+    true = exact(FRONT, tyre, torque, speed)
+    others = {key: [stopped(key, FRONT, tyre, torque, speed, step) for step in steps] for key in SCHEMES}
+    own = [stop(FRONT, both, torque, speed, step).distance / true - 1.0 for step in steps]
+    force = steady(FRONT, tyre, slip)[0]
+    held = stop(FRONT, both, torque, speed, turning=(1.0 - slip) * speed / FRONT.radius).distance
+    return {"exact": true, "ours": own, "steady": held / (FRONT.mass * speed**2 / (2.0 * force)) - 1.0,
+            "others": {key: [way / true - 1.0 for way, _ in found] for key, found in others.items()},
+            "rolls": {key: [left for _, left in found] for key, found in others.items()},
+            "at": steps.index(STEP)}  # fmt: skip
+
+
+def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
+    key, at = f"braking_stop.{name.replace(', ', '.').replace(' %', '').replace(' ', '.')}", curve["at"]
+    why = f"asked for; the exact distance is {curve['exact']:.6f} m, from the slip's own equation to 1e-9"
+    rows = [at_most(f"{key}.distance", SYSTEM, f"{name}, 5.5 ms: stopping distance from rolling", curve["ours"][at], "",
+                    BOUND, why, "closed form"),
+            at_most(f"{key}.steady", SYSTEM, f"{name}, 5.5 ms: stopping distance at constant slip", curve["steady"], "",
+                    1e-7, "m v^2 / (2 F); exact in each step but the last, at rest", "closed form")]  # fmt: skip
+    for scheme, errors in curve["others"].items():
+        left = curve["rolls"][scheme][at]
+        said = f", and still rolls at {left:.2g} m/s in {PATIENCE:g} times the time of stopping" if left else ""
+        rows.append(finding(f"{key}.{scheme.split()[-1].lower()}", SYSTEM, f"{name}, 5.5 ms: {scheme}{said}",
+                            100.0 * errors[at], "%", f"{100.0 * curve['ours'][at]:.1e} % of ours",
+                            "the same vehicle, torque and table", "closed form"))  # fmt: skip
+    return rows
+
+
+def _further_row(name: str, on: str, slip: float, speed: float, mass: float, spin: float) -> Row:
+    quarter = Quarter(mass=mass * FRONT.mass, radius=FRONT.radius, spin_inertia=spin * FRONT.spin_inertia)
+    tyre, _ = both = met(on)
+    torque = steady(quarter, tyre, slip)[1]
+    error = stop(quarter, both, torque, speed).distance / exact(quarter, tyre, torque, speed) - 1.0
+    return at_most(f"braking_stop.further.{name.replace(', ', '.').replace(' ', '-')}", SYSTEM,
+                   f"{name} ({on}, {100 * slip:g} % slip, {speed:g} m/s), 5.5 ms: stopping distance", error, "", BOUND,
+                   "as the four above", "closed form")  # fmt: skip
+
+
+def faults_of(found: Stop, radius: float, brakes: bool) -> list[str]:
+    """What is wrong with a stop: names of rules it breaks."""
+    rim, speed = radius * found.path[:, TURNING], found.path[:, SPEED]
+    broken = {"no number": not np.isfinite(found.path).all(), "turns backwards": rim.min() < 0.0,
+              "turns faster than it rolls": (rim - speed).max() > 1e-12 * speed[0],
+              "does not stop": brakes and found.rest < 0,
+              "creeps": found.rest >= 0 and bool(np.abs(speed[found.rest :]).max() > 0.0
+                                                 or np.ptp(found.path[found.rest :, PLACE]) > 0.0)}  # fmt: skip
+    return [name for name, wrong in broken.items() if wrong]
+
+
+def _sweep_rows(surfaces: tuple[str, ...], levels: np.ndarray, steps: tuple[float, ...]) -> list[Row]:
+    wrong, runs = list[str](), 0
+    for on, level, step in product(surfaces, levels, steps):
+        tyre = met(on)
+        lock = float(tyre[0].mu_x.max()) * FRONT.mass * GRAVITY * FRONT.radius
+        found = faults_of(stop(FRONT, tyre, level * lock, 11.11, step, AFTER), FRONT.radius, bool(level))
+        wrong += [f"{on}, {level:g} of lock, {1e3 * step:g} ms: {', '.join(found)}"] if found else []
+        runs += 1
+    what = (f"{runs} stops from 11.11 m/s: {len(surfaces)} surfaces, brakes from 0 to 1.5 of lock, steps of "
+            f"{1e3 * min(steps):g} to {1e3 * max(steps):g} ms, watched for {AFTER:g} s of standstill: those with no "
+            f"number, a wheel speed outside 0 to v / r, no stop, or any motion after it: {'; '.join(wrong[:3])}")
+    return [within("braking_stop.sweep", SYSTEM, what.removesuffix(": "), len(wrong), "runs", 0, 0,
+                   "asked for: v = 0 exactly at the end, and less than 1 mm/s after it", "none")]  # fmt: skip
+
+
+def _locked_row() -> Row:
+    errors = []
+    for on in SURFACES:
+        tyre = met(on)
+        torque = 2.0 * FRONT.mass * GRAVITY * FRONT.radius * float(tyre[0].mu_x.max())
+        way = stop(FRONT, tyre, torque, 11.11, turning=0.0).distance
+        errors.append(abs(way * 2.0 * GRAVITY * float(tyre[0].mu_x[0, 0, -1]) / 11.11**2 - 1.0))
+    return at_most("braking_stop.locked", SYSTEM, "locked wheels on four surfaces: stopping distance against "
+                   "v^2 / (2 mu g)", max(errors), "", 1e-9, "asked for", "closed form")  # fmt: skip
+
+
+def _release_row() -> Row:
+    errors = []
+    for on, step in product(SURFACES, (1e-3, STEP, 2e-2)):
+        tyre, tables = met(on)
+        sliding = FRONT.mass * GRAVITY * float(tyre.mu_x[0, 0, -1]) * FRONT.radius
+        times = step * np.arange(math.ceil(0.8 / step) + 1)
+        found = braked(FRONT, tables, EVEN, np.maximum(sliding * (1.5 - times / 0.8037), 0.0), step, 20.0, 0.0)
+        errors.append(abs(found.released - 0.5 * 0.8037))
+    return at_most("braking_stop.release", SYSTEM, "locked wheels on four surfaces under a torque that falls, steps of "
+                   "1, 5.5 and 20 ms: time at which they turn again", max(errors), "s", 1e-3,
+                   "asked for: the time at which torque falls to that of sliding", "closed form")  # fmt: skip
+
+
+def _friction_row(levels: int) -> Row:
+    torque = 3.0 * FRONT.mass * GRAVITY * FRONT.radius
+    ways = [stop(FRONT, met("ice", float(scale)), torque, 11.11).distance for scale in np.geomspace(0.3, 8.0, levels)]
+    return within("braking_stop.friction", SYSTEM, f"{levels} levels of friction, brakes beyond lock: those at which "
+                  "the stopping distance does not fall", sum(b >= a for a, b in pairwise(ways)), "", 0, 0, "asked for",
+                  "none")  # fmt: skip
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Error of the stopping distance by scheme and step."""
+    names = ("ours", *SCHEMES)
+    lines = [(case, scheme, *(f"{100.0 * error:+.2g}{'*' if left else ''}" for error, left in _errors(curve, scheme)))
+             for case, curve in data["curves"].items() for scheme in names]  # fmt: skip
+    note = (f"In per cent of the exact distance. *: it does not stop in {PATIENCE:g} times its time;"
+            " the way until then.")
+    heads = ("case", "scheme", *(f"{1e3 * step:g} ms" for step in data["steps"]))
+    return [Table("Stopping distance of a quarter vehicle", note, heads, tuple(lines))]
+
+
+def _errors(curve: dict[str, Any], scheme: str) -> list[tuple[float, float]]:
+    if scheme == "ours":
+        return [(error, 0.0) for error in curve["ours"]]
+    return list(zip(curve["others"][scheme], curve["rolls"][scheme], strict=True))
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Error over step, a panel per headline case."""
+    from studies.figures import plt
+
+    figure, axes = plt.subplots(2, 2, figsize=(11, 8), sharex=True, sharey=True)
+    styles = {"ours": "o-", "explicit Euler": "D:", "RK4": "s--", "paper's, literal": "^-."}
+    for ax, (name, curve) in zip(axes.flat, data["curves"].items(), strict=True):
+        for scheme, style in styles.items():
+            errors = 100.0 * np.abs([error for error, _ in _errors(curve, scheme)])
+            label = "exact wheel, mean force (ours)" if scheme == "ours" else scheme
+            ax.loglog(1e3 * np.array(data["steps"]), np.maximum(errors, 1e-7), style, label=label)
+            never = [(1e3 * step, error) for step, error, (_, left) in
+                     zip(data["steps"], errors, _errors(curve, scheme), strict=True) if left]  # fmt: skip
+            ax.plot(*np.reshape(never, (-1, 2)).T, "x", color="black", markersize=9)
+        ax.axhline(100.0 * BOUND, color="grey", linewidth=0.8)
+        ax.axvline(1e3 * STEP, color="grey", linewidth=0.8, linestyle=":")
+        ax.set(title=name, xlabel="step [ms]", ylabel="error of the stopping distance [%]")
+        ax.label_outer()
+    figure.suptitle("A quarter vehicle braked to a stop by a constant torque")
+    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    caption = (f"Error of the stopping distance over the step; grey: the bound of {100 * BOUND:g} % and the paper's "
+               "step. Crosses: the scheme chatters and never stops. Errors below 1e-7 % are drawn there.")
+    return [(caption, figure)]
