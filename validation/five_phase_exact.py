@@ -1,0 +1,116 @@
+"""The five-phase limit cycle in closed form from node to node of the tyre table: no step, and none of its code.
+
+In a cell of the table the force is F0 + c s, torque is T + m t, and J v s' = r (T + m t) - r^2 (F0 + c s) is solved by
+s = a + b t + (s0 - a) exp(-k t), k = r^2 c / (J v). Its rate is monotone, so that r w' = -v s' meets a threshold at a
+logarithm, s turns back at most once, and a node is met at a root between two times that enclose it.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """speed (m/s), radius (m), inertia (kg m^2); slips and forces (N) at the nodes of the table."""
+
+    speed: float
+    radius: float
+    inertia: float
+    slips: np.ndarray
+    forces: np.ndarray
+
+
+class Piece:
+    """Solution from slip s0 and torque (N m) that changes at a rate (N m/s), in cell i of the table."""
+
+    def __init__(self, wheel: Wheel, i: int, s0: float, torque: float, rate: float) -> None:
+        way = wheel.slips[i + 1] - wheel.slips[i]
+        c = (wheel.forces[i + 1] - wheel.forces[i]) / way
+        f0 = wheel.forces[i] - c * wheel.slips[i]
+        per = wheel.radius / (wheel.inertia * wheel.speed)
+        self.s0, self.v, self.k = s0, wheel.speed, per * wheel.radius * c
+        self.alpha, self.beta = per * (torque - wheel.radius * f0), per * rate
+        self.flat = abs(self.k) < 1e-9
+        self.b = 0.0 if self.flat else self.beta / self.k
+        self.a = 0.0 if self.flat else (self.alpha - self.b) / self.k
+        self.force = (f0, c)
+
+    def slip(self, t: float) -> float:
+        """s."""
+        if self.flat:
+            return self.s0 + self.alpha * t + 0.5 * self.beta * t * t
+        return self.a + self.b * t + (self.s0 - self.a) * math.exp(-self.k * t)
+
+    def rim(self, t: float) -> float:
+        """r w' (m/s^2)."""
+        if self.flat:
+            return -self.v * (self.alpha + self.beta * t)
+        return -self.v * (self.b - self.k * (self.s0 - self.a) * math.exp(-self.k * t))
+
+    def impulse(self, t: float) -> float:
+        """Integral of the tyre's force (N s)."""
+        if self.flat:
+            area = self.s0 * t + self.alpha * t * t / 2.0 + self.beta * t**3 / 6.0
+        else:
+            area = self.a * t + self.b * t * t / 2.0 - (self.s0 - self.a) * math.expm1(-self.k * t) / self.k
+        return self.force[0] * t + self.force[1] * area
+
+    def meets(self, level: float) -> float:
+        """Time at which r w' is at a level; infinite if never."""
+        if self.flat:
+            time = (-level / self.v - self.alpha) / self.beta if self.beta else math.inf
+        else:
+            share = (self.b + level / self.v) / (self.k * (self.s0 - self.a)) if self.s0 != self.a else -1.0
+            time = -math.log(share) / self.k if share > 0.0 else math.inf
+        return time if time > 0.0 else math.inf
+
+    def leaves(self, low: float, high: float, until: float) -> tuple[float, int]:
+        """Time before ``until`` at which the slip meets the lower or the upper node, and which, -1 or 1; else 0."""
+        turn = min(self.meets(0.0), until)
+        for start, end in ((0.0, turn), (turn, until)):
+            for node, side in ((low, -1), (high, 1)):
+                if end > start and side * (self.slip(end) - node) > 0.0:
+                    if side * (self.slip(start) - node) >= 0.0:
+                        return start, side
+                    return _root(lambda t, node=node: self.slip(t) - node, start, end), side  # type: ignore[misc]
+        return until, 0
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    return float(brentq(function, low, high, xtol=1e-16, rtol=1e-14))
+
+
+def phase(wheel: Wheel, at: list[float], rate: float, sign: float, level: float) -> None:
+    """Move ``at`` (slip, torque, time, impulse) on to the end of a phase at a rate of torque (N m/s)."""
+    i = min(int(np.searchsorted(wheel.slips, at[0], side="right")) - 1, wheel.slips.size - 2)
+    for _ in range(100_000):
+        piece = Piece(wheel, i, at[0], at[1], rate)
+        if sign * (piece.rim(0.0) - level) >= 0.0:
+            return
+        met = min(piece.meets(level), 0.1)
+        time, side = piece.leaves(wheel.slips[i], wheel.slips[i + 1], met)
+        ended = side == 0 and met < 0.1
+        at[:] = [piece.slip(time), at[1] + rate * time, at[2] + time, at[3] + piece.impulse(time)]
+        if ended:
+            return
+        if side != 0:
+            at[0], i = float(wheel.slips[i + (side > 0)]), i + side
+    raise ArithmeticError("a phase that does not end")
+
+
+def cycle(wheel: Wheel, phases: list[tuple[float, float, float]], cycles: int = 40) -> tuple[float, float]:
+    """Period (s) and mean force by the largest, of the last of some cycles.
+
+    phases : rate of torque (N m/s), sign and level of the end, of the beginning and of phases 1 to 5.
+    """
+    at = [0.0, 0.0, 0.0, 0.0]
+    phase(wheel, at, *phases[0])
+    for _ in range(cycles):
+        at[2:] = [0.0, 0.0]
+        for one in phases[1:]:
+            phase(wheel, at, *one)
+    return at[2], at[3] / at[2] / float(wheel.forces.max())
