@@ -1,6 +1,6 @@
 """A braked vehicle with its controller in the loop, sample by sample, until it stands or its time is over."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -90,9 +90,9 @@ class Braked:
         rows = [(time, state.copy(), turning.copy(), air.pressure.copy(), air.torque.copy())]
         reports = list[np.ndarray]()
         step, released = self.sample / self.substeps, np.full(wheels, RELEASE)
-        go_on = advance if self.engine is None else self.engine.advance
         check_way(self.road, step * float(np.hypot(*state[1, :2])))
         go = advance if self.relaxation is None else _lagging(self.relaxation)
+        go = go if self.engine is None else self.engine.advance
         with _kept(rows, reports):
             while status != AT_REST and time < duration - 1e-9:
                 braked = time >= self.switch - 1e-9
@@ -116,10 +116,10 @@ class Braked:
 
 
 def _lagging(lengths: np.ndarray) -> Callable[..., Any]:
-    """``advance`` with tyres of relaxation lengths (W,) that begin without slip angles."""
+    """``advance`` with tyres of relaxation lengths (W,) in m, which begin in a steady state."""
     from models.braking.relaxation import advance_lagging
 
-    lag = np.zeros(lengths.size)
+    lag = np.full(lengths.size, np.nan)
     return lambda *given: advance_lagging(*given, lengths, lag)
 
 

@@ -46,6 +46,7 @@ class FreeMujoco(FreeModel):
         _weigh(self.model, own, driven.vehicle.bodies)
         self.data = mujoco.MjData(self.model)
         self.law = timed_law(driven.kernel)
+        self._marcher = Marcher(self.model)
         check(self.model, self.data)
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -59,4 +60,4 @@ class FreeMujoco(FreeModel):
         """Positions and rates (steps + 1, 2 n) by MuJoCo's RK4; RunFailed where it gives up."""
         self.model.opt.timestep, start = step, np.concatenate((q, v))
         with installed(self.law):
-            return np.vstack((start, Marcher(self.model).run(start[None], steps)[0]))
+            return np.vstack((start, self._marcher.run(start[None], steps)[0]))
