@@ -113,6 +113,7 @@ def _figure(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], fil
     from studies.figures import plt, save
 
     surfaces = list(dict.fromkeys(case.surface for case, _ in found))
+    rights = read(Options, scene.options, scene.file, "options").surfaces
     names, kinds = list(scene.procedures), list(dict.fromkeys(case.controller for case, _ in found))
     figure, axes = plt.subplots(len(PANELS), max(len(surfaces), 1), figsize=(4.4 * max(len(surfaces), 1), 6.4),
                                 squeeze=False, sharey="row")  # fmt: skip
@@ -127,10 +128,11 @@ def _figure(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], fil
                 axis.bar(np.arange(len(names)) + (k - (len(kinds) - 1) / 2) * width, heights, width * 0.95,
                          label=kind.replace("_", " "), color=f"C{k}")  # fmt: skip
             axis.set_xticks(range(len(names)), [name.replace("_", " ") for name in names])
-            axis.set(title=f"{heading} on {surface}", ylabel=key.replace("^2", "²") if column == 0 else "")
+            axis.set(title=f"{heading} on {surface}; split: {rights[surface]} on the right",
+                     ylabel=key.replace("^2", "²") if column == 0 else "")  # fmt: skip
     if found:
         axes[0, 0].legend(fontsize=8)
-    figure.suptitle(f"{scene.title}: no bar, no stop", x=0.01, ha="left", fontweight="bold")
+    figure.suptitle(f"{scene.title}, each procedure from its speed to a stop", x=0.01, ha="left", fontweight="bold")
     save(figure, file)
 
 

@@ -1,0 +1,140 @@
+"""Scenes of braking: what they refuse, what they call absent, how procedures begin, that failed runs are kept."""
+
+import re
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.braking.controller import Command
+from models.braking.of_scene import braked
+from models.braking.plan import check, describe
+from models.braking.port.ask import ControllerFailed
+from models.braking.procedures import drive, ready
+from models.braking.scene import build
+from models.errors import InputError
+from models.systems import load
+
+SCENES = Path(__file__).parents[1] / "studies" / "scenes"
+PLAIN = {"title": "t", "system": "braking", "run": {"duration": 0.3}, "procedures": {"stop": {"speed": 10.0}}}
+
+
+def scene(**tables):
+    return build({**PLAIN, **tables}, "s.toml")
+
+
+@pytest.mark.parametrize(("tables", "place", "said"), [
+    ({"procedures": {}}, "procedures", "at least 1"),
+    ({"procedures": {"a": {"kind": "jturn"}}}, "procedures.a.kind", "j_turn"),
+    ({"procedures": {"a": {"kind": "j_turn"}}}, "procedures.a.steer", "missing"),
+    ({"procedures": {"a": {"steer": 0.1}}}, "procedures.a.steer", "no meaning for straight"),
+    ({"procedures": {"a": {"kind": "turn", "radius": 1.0}}}, "procedures.a.radius", "at least 10 m"),
+    ({"procedures": {"a": {"speed": 200.0}}}, "procedures.a.speed", "100 m/s"),
+    ({"brakes": {"front": {"gradient": 9.0, "push_outt": 1.0}}}, "brakes.front.push_outt", "push_out"),
+    ({"run": {"sample": 5.5}}, "run.sample", "0.1 s"),
+    ({"loadtransfer": {}}, "loadtransfer", "load_transfer"),
+])  # fmt: skip
+def test_what_a_scene_cannot_be_is_told_by_its_key(tables, place, said):
+    with pytest.raises(InputError) as error:
+        scene(**tables)
+    assert error.value.file == "s.toml" and error.value.place == place and said in str(error.value)
+
+
+@pytest.mark.parametrize(("tables", "place", "said"), [
+    ({"controller": {"kind": "slip_bangbang"}}, "controller.kind", "slip_bang_bang"),
+    ({"controller": {"kind": "slip_pi", "parameters": {"gian": 1.0}}}, "controller.parameters.gian", "gain"),
+    ({"controller": {"kind": "slip_pi", "parameters": {"gain": -1.0}}}, "controller.parameters.gain", "above 0"),
+    ({"road": {"stretches": [{"left": "icy"}]}}, "road.stretches", "ice"),
+    ({"road": {"stretches": [{"x": 5.0, "left": "ice"}, {"x": 5.0, "left": "dry"}]}}, "road.stretches", "rise"),
+    ({"vehicle": {"parameters": "papr"}}, "vehicle.parameters", "paper"),
+    ({"vehicle": {"override": {"mas": 1.0}}}, "vehicle.override.mas", "mass"),
+    ({"brakes": {"front": {"gradient": 1.0, "release": 1.0}}}, "brakes.front", "push_out"),
+    ({"tyres": {"scale": {"ice": 3.0}}}, "tyres.scale.ice", "at most 2"),
+])  # fmt: skip
+def test_what_reading_does_not_find_is_refused_before_a_run(tables, place, said):
+    with pytest.raises(InputError) as error:
+        check(scene(**tables), ())
+    assert error.value.place == place and said in str(error.value)
+
+
+def test_a_plan_names_what_is_absent_and_what_is_there():
+    plain, full = describe(scene()), describe(load(SCENES / "braking.toml"))
+    absent = re.search(r"absent +(.*) \(not computed\)", plain)[1]
+    for effect in ("load transfer", "push-out", "hysteresis", "pressure dynamics", "anti-lock system", "faults"):
+        assert effect in absent
+    assert re.search(r"effects +load transfer, push-out, hysteresis, pressure dynamics, anti-lock system", full)
+
+
+def test_without_load_transfer_and_dynamics_nothing_of_them_is_computed():
+    bare, full = braked(scene(), scene().procedures["stop"]), load(SCENES / "braking.toml")
+    assert not bare.plane.by_x.any() and not bare.plane.by_y.any() and not bare.chambers.fill.any()
+    assert braked(full, full.procedures["straight"]).plane.by_x.all()
+
+
+@pytest.mark.parametrize("radius", [137.0, -137.0])
+def test_a_turn_begins_on_its_steady_circle(radius):
+    own = scene(procedures={"a": {"kind": "turn", "speed": 8.0, "radius": radius}}, load_transfer={})
+    vehicle, start = ready(own, "a")
+    path = replace(vehicle, switch=1.0).run(Applied(), start, 0.5)
+    centre = radius * np.array([-start.state[1, 1], start.state[1, 0]]) / 8.0
+    off = np.hypot(*(path.states[:, 0, :2] - centre).T) - abs(radius)
+    assert abs(start.state[1, 2] - 8.0 / radius) < 1e-12 and np.sign(vehicle.steer[0]) == np.sign(radius)
+    assert np.abs(off).max() < 1e-4  # m, within 4 m of way; without its side slip at the start it is some cm
+
+
+def test_a_circle_that_the_tyres_cannot_hold_is_refused():
+    with pytest.raises(InputError, match=r"procedures\.a\.radius.*do not hold"):
+        check(scene(procedures={"a": {"kind": "turn", "speed": 30.0, "radius": 50.0}}), ())
+
+
+class Applied:
+    """All valves open, and for ``samples`` of them an answer."""
+
+    def __init__(self, samples=10**6):
+        self.samples = samples
+
+    def sample(self, given):
+        if given.number == self.samples:
+            raise ValueError("dead")
+        return Command(valves=np.full(4, 1 if given.brake else -1))
+
+
+def test_a_controller_that_dies_leaves_the_path_until_then():
+    vehicle, start = ready(scene(), "stop")
+    with pytest.raises(ControllerFailed, match="dead") as error:
+        vehicle.run(Applied(5), start)
+    assert len(error.value.partial.times) == 6 and error.value.partial.reports.shape[0] == 5
+
+
+def test_split_friction_turns_to_the_better_side_and_equal_friction_not_at_all():
+    both = {"split": {"kind": "split", "speed": 10.0, "right": "snow"}, "straight": {"speed": 10.0}}
+    own = scene(procedures=both, load_transfer={})
+    assert drive(own, "split").states[-1, 0, 2] < -1e-3
+    straight = drive(own, "straight")
+    assert not straight.states[:, 0, 1:].any() and straight.states[-1, 1, 0] < 10.0
+
+
+def test_the_study_saves_tables_figures_and_paths(tmp_path):
+    import xarray as xr
+
+    from studies.braking import run
+
+    own = scene(options={"adhesion": False}, controller={"kind": "slip_bang_bang"})
+    summary = run(own, (), tmp_path, lambda text, part: None)
+    assert summary["answer"]["stop"]["initial speed [m/s]"] == 10.0 and not summary["failed"]
+    with xr.open_dataset(tmp_path / "stop.nc", engine="h5netcdf") as data:
+        assert data["pressure"].attrs["units"] == "bar" and data["pressure"].shape[1] == 4
+    assert (tmp_path / "stop.png").stat().st_size > 10_000
+
+
+def test_every_shipped_scene_of_braking_is_valid():
+    for path in SCENES.glob("braking*.toml"):
+        assert describe(build(tomllib.loads(path.read_text()), path.name))
+
+
+def test_the_braking_scene_of_the_readme_is_valid():
+    text = (Path(__file__).parents[1] / "README.md").read_text()
+    block = next(block for block in re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL) if '"braking"' in block)
+    check(build(tomllib.loads(block), "README.md"), ())
