@@ -25,17 +25,18 @@ FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE, LOCKED, TURNING = range(7)
 """Columns of what each wheel reports: mean forces on it (N) in its own axes, load (N), mean slip, slip angle (rad),
 time locked (s), speed of turning at the end (rad/s)."""
 REPORTED = 7
-START, RATE, ALONG, ASIDE, ANGLE, CELL, PART, BASE, TURNED, RADIUS, SPIN, FIRST, SECOND, SHARE = range(14)
+START, RATE, ALONG, ASIDE, ANGLE, CELL, PART, BASE, TURNED, RADIUS, SPIN, FIRST, SECOND, SHARE, LAGGED = range(15)
 """Columns of what is known of each wheel: speed of its centre along it at the start, what its rate has besides the
 accelerations, speeds along and across it where slip angles are taken, slip angle with its cell and part in the tables,
-load besides the accelerations, speed of turning at the start, radius, inertia, tables and the share of the second."""
-KNOWN = 14
+load besides the accelerations, speed of turning at the start, radius, inertia, tables and the share of the second, tan
+of a slip angle that lags (NaN if it does not)."""
+KNOWN = 15
 
 
 class Frame(NamedTuple):
     """What a step's rounds have in common, for W wheels and n coordinates, of which those from ``free`` on are free.
 
-    along, across (W, n): see ``rows``; press (W, n): load by accelerations; known (W, 14): see above; mass (n, n): the
+    along, across (W, n): see ``rows``; press (W, n): load by accelerations; known (W, 15): see above; mass (n, n): the
     factor of the mass matrix; right (n,): forces besides the tyres' ones.
     """
 
@@ -64,6 +65,7 @@ def begin(turning, surface, plane, known):
         known[i, TURNED], known[i, RADIUS], known[i, SPIN] = turning[i], plane.radius[i], plane.spin[i]
         for c in range(3):
             known[i, FIRST + c] = surface[i, c]
+        known[i, LAGGED] = surface[i, 3] if surface.shape[1] > 3 else math.nan
 
 
 @njit(cache=True, error_model="numpy")
@@ -81,8 +83,10 @@ def settle(positions, rates, steer, regular, starts, plane, angles, frame, found
         if starts:
             known[START] = u
         forwards = u if known[START] >= 0.0 else -u
-        known[RATE], known[ALONG], known[ASIDE] = ahead + v * rates[2 + k], max(forwards, 0.0), v
-        known[ANGLE] = math.atan2(abs(v), max(forwards, regular))
+        known[RATE], known[ALONG] = ahead + v * rates[2 + k], max(forwards, 0.0)
+        if not math.isnan(known[LAGGED]):
+            v = known[LAGGED] * max(forwards, regular)
+        known[ASIDE], known[ANGLE] = v, math.atan2(abs(v), max(forwards, regular))
         known[CELL], known[PART] = place(angles, known[ANGLE])
     inertia(positions, rates, plane.masses, plane.inertias, plane.reach, frame.mass, frame.right)
     for a in range(frame.free, rates.size):
@@ -183,9 +187,9 @@ def step_on(state, turning, torque0, torque1, step, steer, surface, regular, pla
     """One step of ``state`` (2, n), positions and rates, and ``turning`` (W,): speeds of the wheels (rad/s).
 
     torque0, torque1 : of the brakes (W,) at the step's ends; steer (W,) : angles of the wheels in their units (rad);
-    surface (W, 3) : tables of each wheel and the share of the second; regular : m/s; found (n,) : accelerations,
-    those of the step before on entry. Returns the time (s) of the step at which the vehicle comes to rest, ``step``
-    if it does not, -1 if the loads were not found.
+    surface (W, 3 or 4) : tables of each wheel, the share of the second, tan of a slip angle that lags; regular : m/s;
+    found (n,) : accelerations, those of the step before on entry. Returns the time (s) of the step at which the vehicle
+    comes to rest, ``step`` if it does not, -1 if the loads were not found.
     """
     wheels, size = turning.size, found.size
     frame = Frame(np.empty((wheels, size)), np.empty((wheels, size)), np.empty((wheels, size)),
