@@ -26,14 +26,14 @@ class FivePhase(Common):
     """Thresholds of the wheel's acceleration (m/s^2) and rates of its pressure (bar/s); deep : slip of phase 1."""
 
     wheels: int
-    e1: float = 5.0
-    e2: float = 8.0
-    e3: float = 4.0
-    e4: float = 0.5
-    e5: float = 6.0
-    falling: float = 30.0
-    fast: float = 15.0
-    slow: float = 3.0
+    e1: float = 4.0
+    e2: float = 5.0
+    e3: float = 4.5
+    e4: float = 1.0
+    e5: float = 13.0
+    falling: float = 40.0
+    fast: float = 20.0
+    slow: float = 5.0
     deep: float = 0.3
 
     def __post_init__(self) -> None:

@@ -1,0 +1,74 @@
+"""Measured chamber pressures that drive the vehicle open loop, and the measured wheel speeds to lay over its own.
+
+A table has ``time``, and of every wheel ``pressure_NAME``; beside them it may have ``speed_NAME``. The names are those
+of ``wheel_names``. It begins at time 0; between its rows pressures are linear.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from models.braking.controller import SAMPLE, Command, Sample
+from models.errors import InputError
+from models.tables import SECONDS, read_table
+
+BARS = {"bar": 1.0, "Pa": 1e-5, "kPa": 1e-2, "MPa": 10.0}
+SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6}
+LARGEST = 100.0
+"""bar; no brake chamber holds more."""
+
+
+def wheel_names(wheels: int) -> tuple[str, ...]:
+    """fl, fr, rl, rr of a truck; of more axles 1l, 1r, 2l ... in their order."""
+    axles = ("f", "r") if wheels == 4 else tuple(str(axle + 1) for axle in range((wheels + 1) // 2))
+    return tuple(axles[i // 2] + "lr"[i % 2] for i in range(wheels))
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPressures:
+    """A controller that takes no notice of its wheels: pressures by time, each the mean over its sample.
+
+    times (n,) : s, rising from 0; pressures (n, W) : bar; speeds (n, W) : m/s of the wheels' rims, None if they were
+    not measured. After the last row the last pressures stay.
+    """
+
+    times: np.ndarray
+    pressures: np.ndarray
+    speeds: np.ndarray | None = None
+    period: float = SAMPLE
+
+    def sample(self, given: Sample) -> Command:
+        """Pressures (W,) whose impulse over the sample is the measured one."""
+        start, end = given.time * 1e-9, given.time * 1e-9 + self.period
+        inside = self.times[(self.times > start) & (self.times < end)]
+        at = np.concatenate(([start], inside, [end]))
+        rows = np.column_stack([np.interp(at, self.times, column) for column in self.pressures.T])
+        return Command(pressures=np.trapezoid(rows, at, axis=0) / self.period)
+
+
+def read_pressures(path: str | Path, wheels: int, period: float = SAMPLE) -> MeasuredPressures:
+    """Measured pressures from a CSV with units; raises InputError for a file that cannot be used."""
+    names, header = wheel_names(wheels), _header(path)
+    columns = {"time": SECONDS, **{f"pressure_{name}": BARS for name in names}}
+    measured = any(f"speed_{name}" in header for name in names)
+    if measured:
+        columns |= {f"speed_{name}": SPEEDS for name in names}
+    table = read_table(path, columns, increasing="time", least=2)
+    if table["time"][0] != 0.0:
+        raise InputError(path, "time", float(table["time"][0]), "must begin at 0, when the brake is applied")
+    pressures = np.column_stack([table[f"pressure_{name}"] for name in names])
+    if pressures.min() < 0.0 or pressures.max() > LARGEST:
+        worst = pressures.min() if pressures.min() < 0.0 else pressures.max()
+        raise InputError(path, "pressure", float(worst), f"must be above the air's, from 0 to {LARGEST:g} bar")
+    speeds = np.column_stack([table[f"speed_{name}"] for name in names]) if measured else None
+    return MeasuredPressures(table["time"], pressures, speeds, period)
+
+
+def _header(path: str | Path) -> str:
+    """First line that is no remark, "" if the file cannot be read: what is wrong with it ``read_table`` tells."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return ""
+    return next((line for line in lines if line.strip() and not line.startswith("#")), "")
