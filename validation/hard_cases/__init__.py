@@ -10,7 +10,8 @@ from importlib import import_module
 from validation.hard_cases.case import Case
 
 FAMILIES = ("stepping", "sampled_input", "contact_points", "prescribed_pitch", "stabilisers", "invariants", "extremes",
-            "accelerometers", "drift", "kalman", "covariance", "contact", "ride", "rolling")  # fmt: skip
+            "accelerometers", "drift", "kalman", "covariance", "contact", "ride", "rolling",
+            "rolling_contacts")  # fmt: skip
 
 
 def all_cases() -> tuple[Case, ...]:

@@ -1,0 +1,200 @@
+"""Rolling contacts: wheels of the callback rig, a contact that jumps to another patch, a car on four tyres.
+
+Of the rig, the reference is the compiled kernel called alone; a car has none, and its reference is Runge and Kutta's
+method written out about MuJoCo's accelerations.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from models.engines.contact_bridge import Wheels, add_forces, check_step
+from models.engines.contact_bridge_exudyn import Forces, Rolling
+from models.engines.contact_bridge_mujoco import model, native_law
+from models.engines.mujoco_callback import installed
+from models.engines.spatial_protocol import SpatialRun
+from models.handling import forces as at
+from models.handling.in_engines import Drive, build, driven, energy, read, unaccounted
+from models.handling.numbers import Handling, Tyres
+from models.rail import wheel_forces as wf
+from models.rail.energy import ledger
+from models.rail.equations import Equations
+from models.rail.laid_profiles import Profiles
+from models.rail.wheel_forces import REGULAR
+from models.rail.wheelset import CHOSEN
+from models.vehicles.vehicle_file import load_vehicle
+from validation.hard_cases.case import Case
+from validation.hard_cases.rolling import built, off
+
+SLIDES = np.array([[0.02, 0.01, 0.0, 0.3], [-0.3, 0.1, 0.0, -2.0], [1e-6, -2e-6, 0.0, 1e-4], [0.0, 0.0, 0.0, 1.0]])
+"""Rates of four wheels: x', y', z' (m/s), yaw' (rad/s)."""
+LOCKED = Tyres(cells=11, fixed=("fl", "fr", "rl", "rr"))
+RAMP = np.array([[2.0 * np.pi / 10.0, 0.0, -0.08, 0.0], [0.0, 0.0, 0.08, 0.0]])
+"""A hill 16 cm high and 10 m long, flat at the start."""
+R19 = replace(load_vehicle("r19_free"), drags=())
+
+
+def on_rig(implementation: str, wheels: Wheels, rates: np.ndarray) -> np.ndarray:
+    """Forces (count, 4) on wheels in their places with these rates (count, 4)."""
+    q, v, f = np.zeros(wheels.size), rates.ravel(), np.zeros(wheels.size)
+    if implementation == "exudyn":
+        f = np.array(Forces(wheels).of(list(q), list(v)))
+    elif implementation == "mujoco":
+        own = model(replace(wheels, stiffness=(0.0,) * 4, damping=(0.0,) * 4), 1e-7)
+        data = mujoco.MjData(own)
+        data.qvel[:] = v
+        with installed(native_law()):
+            mujoco.mj_forward(own, data)
+        f = data.qfrc_passive.copy()
+    else:
+        add_forces(wheels.numbers, q, v, f)
+    return f.reshape(-1, 4)
+
+
+def beyond(wheels: Wheels, found: np.ndarray) -> float:
+    """Largest force by mu N, less 1; infinite where one has power."""
+    if (found * SLIDES).sum(axis=1).max() > 0.0 or not np.isfinite(found).all():
+        return np.inf
+    return max(0.0, float(np.hypot(found[:, 0], found[:, 1]).max() / (wheels.mu * wheels.load) - 1.0))
+
+
+def bounded(implementation: str, folder: Path, **changes: Any) -> float:
+    """Force beyond mu N at three speeds, zero included, and both theories that have a bound."""
+    found = []
+    for theory in ("fastsim", "simplified"):
+        for speed in (20.0, 0.0, -20.0):
+            wheels = Wheels(theory=theory, cells=7, speed=speed, **changes)
+            found.append(beyond(wheels, on_rig(implementation, wheels, SLIDES)))
+    return max(found)
+
+
+def jumps(implementation: str, folder: Path) -> float:
+    """Largest change of a force by mu N, as the speed passes 0 and both ends of what is mixed."""
+    found = []
+    for middle in (-REGULAR, 0.0, REGULAR):
+        one, other = (Wheels(cells=7, speed=middle + part) for part in (-1e-9, 1e-9))
+        change = on_rig(implementation, other, SLIDES) - on_rig(implementation, one, SLIDES)
+        found.append(np.abs(change[:, :2]).max() / (one.mu * one.load))
+    return float(max(found))
+
+
+def spinning(implementation: str, folder: Path) -> float:
+    """Force along the rail by mu N, of wheels that do nothing but spin; infinite if there is none across."""
+    wheels = Wheels(cells=7)
+    found = on_rig(implementation, wheels, SLIDES[[3, 3, 3, 3]]) / (wheels.mu * wheels.load)
+    return float(np.abs(found[:, 0]).max()) if np.abs(found[:, 1]).min() > 1e-3 else np.inf
+
+
+def too_long(implementation: str, folder: Path) -> float:
+    """A step of 1 ms at 0.1 m/s: explicit, or implicit without the slopes of what sticks."""
+    wheels = Wheels(1, speed=0.1)
+    start = (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
+    if implementation == "exudyn":
+        Rolling(wheels, Forces(wheels).of).run(*start, 200, 1e-3, "GeneralizedAlpha")
+    elif implementation == "mujoco":
+        model(wheels, 1e-3, "RK4")
+    else:
+        check_step("reference", wheels, "RK4", 1e-3)
+    return np.inf
+
+
+def jumping(implementation: str, folder: Path) -> float:
+    """Energy that the ledger of a wheelset leaves open while contacts come and go, by what creep took."""
+    own = built(implementation, CHOSEN.changed(profiles=Profiles()), 30.0)
+    motion = own.run(off(own, Y=3e-3, Y_RATE=0.2), 0.03, 1e-4)
+    carries = motion.contacts[:, :, wf.LOAD] > 0.0
+    if (carries[1:] != carries[:-1]).any(axis=1).sum() < 2 or motion.contacts[:, :, wf.POWER].max() > 0.0:
+        return np.inf
+    book = ledger(Equations(own.wheelset, own.speed, own.law, own.cells), motion)
+    return float(np.abs(book.residual).max() / book.creep[-1])
+
+
+def drive(implementation: str, handling: Handling, speed: float, duration: float, step: float) -> Drive:
+    """A run of the car."""
+    if implementation != "reference":
+        return driven(implementation, handling, speed, duration, step)
+    own, (q, v), n = build("mujoco", handling), handling.straight(speed), len(handling.vehicle.coordinates())
+    states = [np.concatenate((q, v))]
+
+    def rates(x: np.ndarray) -> np.ndarray:
+        return np.concatenate((x[n:], own.acceleration(0.0, x[:n], x[n:])))
+
+    for _ in range(round(duration / step)):
+        x = states[-1]
+        a = rates(x)
+        b = rates(x + 0.5 * step * a)
+        c = rates(x + 0.5 * step * b)
+        states.append(x + step / 6.0 * (a + 2.0 * b + 2.0 * c + rates(x + step * c)))
+    q_path, v_path = np.split(np.array(states), 2, axis=1)
+    return read(handling, SpatialRun(step * np.arange(len(states)), q_path, v_path))
+
+
+def wrong(run: Drive) -> bool:
+    """Whether a contact has power, or more than mu N."""
+    force = np.hypot(run.tyres[:, :, at.FX], run.tyres[:, :, at.FY])
+    bound = run.handling.tyres.friction * run.tyres[:, :, at.PRESS]
+    return bool(run.tyres[:, :, at.POWER].max() > 0.0 or (force > bound * (1.0 + 1e-9)).any())
+
+
+def leaping(implementation: str, folder: Path) -> float:
+    """Energy that nothing accounts for, by all of it, of a car that leaves a ramp with all wheels and lands."""
+    run = drive(implementation, Handling(R19, Tyres(cells=7), waves=RAMP), 25.0, 0.5, 5e-4)
+    loads = run.tyres[:, :, at.PRESS]
+    up = (loads == 0.0).all(axis=1)
+    if wrong(run) or not up.any() or (loads[-1] == 0.0).any():
+        return np.inf
+    return float(np.abs(unaccounted(run)).max() / energy(run)[0])
+
+
+def parked(implementation: str, folder: Path) -> float:
+    """Mean speed (m/s) of locked wheels on a slope, after the first swing."""
+    run = drive(implementation, Handling(R19, LOCKED, slope=0.1), 0.0, 0.05, 1e-4)
+    return np.inf if wrong(run) else float(np.abs(run.tyres[-250:, :, at.SLIP_X].mean(axis=0)).max())
+
+
+def locked(implementation: str, folder: Path) -> float:
+    """Force of locked wheels beside mu N against their sliding, by mu N."""
+    run = drive(implementation, Handling(R19, LOCKED), 15.0, 0.03, 1e-3)
+    bound = run.handling.tyres.friction * run.tyres[:, :, at.PRESS]
+    return float(np.abs(run.tyres[:, :, at.FX] / bound + 1.0).max())
+
+
+def back(implementation: str, folder: Path) -> float:
+    """Energy gained, by all that moves at first, of a car that rolls up a slope, stops and rolls back."""
+    run = drive(implementation, Handling(R19, Tyres(cells=7), slope=0.3), 0.005, 0.006, 4e-5)
+    ahead = run.velocity()[:, 0]
+    if wrong(run) or not ahead[0] > 0.0 > ahead[-1]:
+        return np.inf
+    return float(np.abs(unaccounted(run)).max() / np.abs(energy(run)).max())
+
+
+Error = Callable[[str, Path], float]
+RIG: tuple[tuple[str, str, Error], ...] = (
+    ("rig with friction of 1e-6", "next to nothing holds", partial(bounded, mu=1e-6)),
+    ("rig with friction of 1", "all that can hold", partial(bounded, mu=1.0)),
+    ("rig with a load of a micronewton", "patches of micrometres", partial(bounded, load=1e-6)),
+)
+CASES = (
+    *(Case(name, hard, "|F| <= mu N, no power; at rest, too", "mu N", 1e-8, "rounding of the approach", error)
+      for name, hard, error in RIG),
+    Case("rig that reverses", "leading edges become trailing ones", "forces do not jump", "mu N", 1e-5,
+         "slope times 2e-9 m/s", jumps),
+    Case("rig that only spins", "no creepage", "no force along the rail, some across", "mu N", 1e-9, "rounding",
+         spinning),
+    Case("rig at 0.1 m/s in steps of 1 ms", "friction damps at 1e5 1/s", "refused, or Newton's method says it failed",
+         "", 0.0, "exact", too_long, {"reference": "refused", "mujoco": "refused", "exudyn": "raised"}),
+    Case("contact that jumps to another patch", "loads come and go within steps", "energy is accounted for",
+         "of creep's", 1e-3, "error of the step", jumping),
+    Case("car off a ramp", "wheels lift off and land", "energy is accounted for", "of it", 1e-6, "error of the step",
+         leaping),
+    Case("car parked on a slope", "creepage by no speed", "creeps by less than 1 mm/s", "m/s", 1e-3, "asked for",
+         parked),
+    Case("car with locked wheels", "all bristles slide", "mu N against the sliding", "mu N", 1e-9, "rounding", locked),
+    Case("car that rolls back", "tyres' speed passes 0", "energy is accounted for", "of it", 1e-6,
+         "error of the step", back),
+)  # fmt: skip
