@@ -1,6 +1,8 @@
 """A wheelset: what its scene does not name is not read, has no element and no callback.
 
-Positive controls stand beside: what is named changes the counts by what it says.
+Positive controls stand beside: what is named changes the counts by what it says. The creep law is chosen at run time,
+by one comparison per call: FASTSIM is compiled, or loaded from disk, with the kernel that both laws share, but with the
+linear law it is never called and none of its numbers is read.
 """
 
 from typing import Any
