@@ -254,6 +254,16 @@ def test_nonsense_of_a_callable_is_named(answer, name):
     assert time.perf_counter() - begun < 0.5
 
 
+@pytest.mark.parametrize("table", [{"signals": {"gain": 0.9}}, {"faults": [{"kind": "stuck"}]}, {"log": "a.log"}, {}])
+@pytest.mark.parametrize(("answer", "name"), [
+    (lambda given: None, "wrong frame"), (lambda given: Command(pressures=np.full(4, -1.0)), "below zero"),
+])  # fmt: skip
+def test_nonsense_is_named_before_sensors_faults_and_log_can_hide_it(table, answer, name, tmp_path):
+    run = Run(RADIUS, SAMPLE, folder=tmp_path)
+    with opened(read(PortTable, table, ""), run, Says(answer)) as (other, _), pytest.raises(ControllerFailed, match=name):
+        ask(other, of())
+
+
 def test_a_failed_run_keeps_what_it_recorded(vehicle):
     def dies(given):
         return held(given) if given.number < 5 else _raises(given)
@@ -440,7 +450,7 @@ def test_a_callable_by_its_name(tmp_path):
                                       "    def sample(self, given):\n        return None\nNOT = 1\n")  # fmt: skip
     assert named_controller("mine.py:Mine", tmp_path, 4, {"x": 3}).x == 3
     for name, told in (("mine.py:Min", "did you mean 'Mine'"), ("mine.py", "must be"), ("no.py:A", "not loaded"),
-                       ("mine.py:NOT", "not made"), ("types:SimpleNamespace", "not made|no method sample")):  # fmt: skip
+                       ("mine.py:NOT", "not made"), ("types:SimpleNamespace", "not made|no method")):  # fmt: skip
         with pytest.raises(InputError, match=told):
             named_controller(name, tmp_path, 4, {})
 

@@ -1,6 +1,7 @@
 """One exchange with a controller: whatever it does wrong ends the run in one named error."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,6 +32,17 @@ def ask(controller: Controller, given: Sample) -> Command:
     except Exception as error:
         raise ControllerFailed(given, "crash", f"{type(error).__name__}: {error}") from error
     return checked(command, given)
+
+
+@dataclass
+class Asked:
+    """A controller whose answers are checked before anything is done with them."""
+
+    inner: Controller
+
+    def sample(self, given: Sample) -> Command:
+        """Its answer; raises ControllerFailed."""
+        return ask(self.inner, given)
 
 
 def checked(command: Command, given: Sample) -> Command:

@@ -75,7 +75,7 @@ class Sensed:
     teeth: Counted | None = None
 
     def sample(self, given: Sample) -> Command:
-        """Its answer to what it sees, as it arrives."""
+        """Its answer to what it sees, as it arrives; a pressure that arrives as one below none is none."""
         seen = given.wheels if self.teeth is None else self.teeth(given)
         command = self.inner.sample(replace(given, wheels=self.wheels(given.number, seen)))
         if command.pressures is None:

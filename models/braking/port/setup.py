@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from models.braking.controller import Controller
 from models.braking.port import fmu_port, socket_port
+from models.braking.port.ask import Asked
 from models.braking.port.callable import Within, named_controller
 from models.braking.port.faults import Fault, Faulty, missing_teeth
 from models.braking.port.log import Replay, logged, name_of
@@ -81,14 +82,16 @@ def opened(table: PortTable, run: Run, own: Controller) -> Iterator[tuple[Contro
     """
     _check(table, run)
     with ExitStack() as stack:
-        inner = stack.enter_context(_behind(table, run, own))
+        inner = Asked(stack.enter_context(_behind(table, run, own)))
         clock = WallClock(inner, run.sample) if table.pace == "wall" else None
         watched: Controller = inner if clock is None else clock
         if table.log is not None:
             watched = stack.enter_context(logged(watched, run.path(table.log), name_of(run.scene)))
         faulty = Faulty(watched, table.faults) if table.faults else watched
         teeth = None if table.teeth is None else Counted(table.teeth, run.radius, partial(missing_teeth, table.faults))
-        yield sensed(faulty, run.radius.size, table.signals, table.pressures, teeth=teeth), clock
+        plain = teeth is None and table.signals == table.pressures == Conversion()
+        wheels = run.radius.size
+        yield faulty if plain else sensed(faulty, wheels, table.signals, table.pressures, teeth=teeth), clock
 
 
 @contextmanager

@@ -1,0 +1,224 @@
+"""One controller behind every way through the port, what each costs, and what becomes of a run whose controller fails.
+
+Bits are compared of whole runs: times, motion, wheels, pressures, torques, forces. Costs are those of one exchange, of
+all ways in turn. A controller fails in a second process that knows the port by its documented bytes alone, or as a
+Python class; the run must end with that fault's name, at its sample, in time, and hold what it recorded until then.
+"""
+
+import shutil
+import subprocess
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import models.braking.port as port
+from models.braking.controller import SAMPLE, Controller, Sample
+from models.braking.port.ask import ControllerFailed, ask
+from models.braking.port.example import Example
+from models.braking.port.setup import PortTable, Run, opened
+from models.braking.procedures import drive
+from models.braking.run import Path as Driven
+from models.braking.scene import build
+from validation import misbehaving_client
+from validation.rows import Row, System, Table, at_most, behaves, finding, not_run
+
+TITLE = "The controller port: same bits on every way, and controllers that fail"
+SYSTEM: System = "anti-lock"
+EXAMPLE = "models.braking.port.example:Example"
+TIMEOUT = 0.2
+"""s for one answer of a controller that fails."""
+PATIENCE = 1.0
+"""s beyond that: a busy machine starts, wakes and ends processes late."""
+FAULTS = {
+    "NaN": "not a number", "infinite": "not a number", "NaN as a valve": "not a number",
+    "negative pressure": "below zero", "valve in no state": "no state of a valve", "too few wheels": "wrong length",
+    "too many bytes": "wrong length", "part of a frame": "silence", "another protocol": "wrong frame",
+    "answer to another sample": "wrong number", "silence": "silence", "late": "silence", "died": "crash",
+}  # fmt: skip
+"""What a second process does wrong, and the name under which the run must end."""
+CLASSES = {
+    "raises": ("crash", "raise KeyError('speed')"),
+    "never comes back": ("silence", "while True: pass"),
+    "returns nothing": ("wrong frame", "return None"),
+    "returns NaN": ("not a number", "return Command(pressures=np.full(4, np.nan))"),
+    "returns three": ("wrong length", "return Command(valves=np.ones(3))"),
+}
+"""The same of a class: its name, and what it does."""
+ROUND = 100
+"""Exchanges of a round."""
+QUICK = ("NaN", "too few wheels", "silence", "died")
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows of bits, costs and faults; quick: half a second of braking, few faults."""
+    ways = _ways(folder, second=not quick)
+    rows = _bits(ways, folder, 0.5 if quick else 4.0)
+    costs = _costs(ways, folder, 5 if quick else 40)
+    rows += [finding(f"braking_port.cost.{_id(name)}", SYSTEM, f"one exchange, {name}", cost, "us", "",
+                     f"best of rounds of {ROUND} in which all ways have their turn", "none")
+             for name, cost in costs.items()]  # fmt: skip
+    told = [_process(kind, folder) for kind in (QUICK if quick else FAULTS)]
+    told += [_class(kind, folder) for kind in (("never comes back",) if quick else CLASSES)]
+    return rows + [row for one in told for row in _fault_rows(one)], {"costs": costs, "faults": told}
+
+
+def _scene(folder: Path, duration: float, table: dict[str, Any]) -> Any:
+    straight = {"straight": {"kind": "straight", "speed": 11.11}}
+    return build({"system": "braking", "title": "port", "procedures": straight, "run": {"duration": duration},
+                  "port": table}, "port.toml", folder)  # fmt: skip
+
+
+def _ways(folder: Path, second: bool) -> dict[str, dict[str, Any] | str]:
+    """Tables of all ways by name; text tells why one is not there."""
+    ways: dict[str, dict[str, Any] | str] = {"callable": {"callable": EXAMPLE}}
+    if second:
+        ways["second process in Python"] = {"command": [sys.executable, "-m", "models.braking.port.client", EXAMPLE,
+                                                        "{port}"]}  # fmt: skip
+    ways["second process in C"] = _built_c(folder)
+    ways["FMU"] = _built_fmu(folder)
+    return ways
+
+
+def _built_c(folder: Path) -> dict[str, Any] | str:
+    compiler, source = shutil.which("cc"), Path(port.__path__[0]) / "client_example.c"
+    if compiler is None:
+        return "no C compiler here"
+    subprocess.run([compiler, "-O2", "-ffp-contract=off", "-o", str(folder / "client"), str(source)], check=True)
+    return {"command": [str(folder / "client"), "{port}"]}
+
+
+def _built_fmu(folder: Path) -> dict[str, Any] | str:
+    try:
+        from pythonfmu import FmuBuilder
+    except ImportError:
+        return "needs pythonfmu and fmpy: pip install 'twinrig[test]'"
+    return {"fmu": FmuBuilder.build_FMU(Path(port.__path__[0]) / "example_slave.py", dest=folder).name}
+
+
+def _bits(ways: dict[str, dict[str, Any] | str], folder: Path, duration: float) -> list[Row]:
+    """Every way against the callable, then the replay of its log."""
+    first = drive(_scene(folder, duration, {"callable": EXAMPLE, "log": "port.log"}), "straight")
+    rows = []
+    for name, table in {**ways, "replay": {"replay": "port.log"}}.items():
+        key, what = f"braking_port.bits.{_id(name)}", f"{len(first.times) - 1} samples, {name}"
+        if isinstance(table, str):
+            rows.append(not_run(key, SYSTEM, what, table))
+            continue
+        found = _same(first, drive(_scene(folder, duration, table), "straight"))
+        rows.append(behaves(key, SYSTEM, what, found, "same bits", "doubles pass every way whole", "none"))
+    return [*rows, _alive(first)]
+
+
+def _alive(path: Driven) -> Row:
+    """Bits could be the same of a controller that does nothing."""
+    turns = int((np.diff(np.sign(np.diff(path.pressures, axis=0)), axis=0) != 0).sum())
+    return behaves("braking_port.bits.alive", SYSTEM, f"pressures turn, here {turns} times",
+                   "yes" if turns > 8 else "no", "yes", "bits of a controller that does nothing prove nothing")
+
+
+def _same(path: Driven, other: Driven) -> str:
+    names = ("times", "states", "turning", "pressures", "torques", "reports")
+    apart = [name for name in names if not np.array_equal(getattr(path, name), getattr(other, name))]
+    return f"other {', '.join(apart)}" if apart else "same bits"
+
+
+def _costs(ways: dict[str, dict[str, Any] | str], folder: Path, rounds: int) -> dict[str, float]:
+    """Microseconds of one exchange by way, at its best: what else the machine does is no cost of the port."""
+    run, seconds = Run(np.full(4, 0.5), SAMPLE, folder=folder), dict[str, list[float]]()
+    with ExitStack() as stack:
+        controllers = {name: stack.enter_context(opened(PortTable(**table), run, Example(4)))[0]
+                       for name, table in ways.items() if isinstance(table, dict)}  # fmt: skip
+        for i in range(rounds):
+            for name, controller in controllers.items():
+                seconds.setdefault(name, []).append(_timed(controller, i * ROUND))
+    return {name: 1e6 * min(values) / ROUND for name, values in seconds.items()}
+
+
+def _timed(controller: Controller, first: int) -> float:
+    samples = [Sample(i, round(1e9 * SAMPLE * i), np.full(4, 10.0 + 0.01 * (i % 7)), True, 6.0, 11.0)
+               for i in range(first, first + ROUND)]  # fmt: skip
+    start = time.perf_counter()
+    for given in samples:
+        ask(controller, given)
+    return time.perf_counter() - start
+
+
+def _process(kind: str, folder: Path) -> dict[str, Any]:
+    words = [sys.executable, "-S", str(Path(misbehaving_client.__file__)), kind, "{port}"]
+    return _failed(f"second process: {kind}", FAULTS[kind], {"command": words}, folder)
+
+
+def _class(kind: str, folder: Path) -> dict[str, Any]:
+    name, does = CLASSES[kind]
+    well = f"        if given.number < {misbehaving_client.WELL}: return Command(valves=np.ones(4))\n"
+    (folder / "fails.py").write_text(
+        "import numpy as np\nfrom models.braking.controller import Command\nclass Fails:\n"
+        "    def __init__(self, wheels): pass\n    def sample(self, given):\n" + well + f"        {does}\n"
+    )
+    return _failed(f"class that {kind}", name, {"callable": "fails.py:Fails"}, folder)
+
+
+def _failed(kind: str, name: str, table: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """How a run with a controller that fails ended, and how long after its last good sample."""
+    watched = _Watch()
+    found = {"kind": kind, "expected": name, "name": "no error", "number": -1, "kept": 0, "message": ""}
+    try:
+        with watched:
+            drive(_scene(folder, 1.0, {**table, "timeout": TIMEOUT}), "straight")
+    except ControllerFailed as error:
+        kept = 0 if error.partial is None else len(error.partial.times) - 1
+        found |= {"name": error.name, "number": error.number, "kept": kept, "message": str(error)}
+    return {**found, "seconds": time.perf_counter() - watched.last}
+
+
+class _Watch:
+    """Notes when each exchange begins."""
+
+    def __enter__(self) -> "_Watch":
+        import models.braking.run as run
+
+        self.last, self._run, self._ask = time.perf_counter(), run, run.ask
+        run.ask = self._noted
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._run.ask = self._ask
+
+    def _noted(self, controller: Controller, given: Sample) -> Any:
+        self.last = time.perf_counter()
+        return self._ask(controller, given)
+
+
+def _fault_rows(one: dict[str, Any]) -> list[Row]:
+    well = misbehaving_client.WELL
+    found = one["name"] if (one["number"], one["kept"]) == (well, well) else f"{one['name']} at {one['number']}"
+    key = f"braking_port.fault.{_id(one['kind'])}"
+    return [
+        behaves(key, SYSTEM, f"{one['kind']}, after {well} samples that are kept", found, one["expected"],
+                "named, at its sample, with the path until then"),
+        at_most(f"{key}.seconds", SYSTEM, f"{one['kind']}: until the run has ended", one["seconds"], "s",
+                TIMEOUT + PATIENCE, f"time-out {TIMEOUT:g} s and {PATIENCE:g} s to end a process", "none"),
+    ]  # fmt: skip
+
+
+def _id(name: str) -> str:
+    return name.replace(": ", ".").replace(" ", "-")
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Costs, and every fault with its message."""
+    costs = tuple((name, f"{cost:.1f}") for name, cost in data["costs"].items())
+    faults = tuple((one["kind"], one["message"], f"{one['seconds']:.3f}") for one in data["faults"])
+    return [
+        Table("Cost of one exchange", f"Of {1e6 * SAMPLE:g} us between two samples.", ("way", "us"), costs),
+        Table("Controllers that fail", f"Time-out {TIMEOUT:g} s.", ("what it does", "message", "s"), faults),
+    ]
+
+
+def draw(data: dict[str, Any]) -> dict[str, Any]:
+    """None: tables say all."""
+    return {}

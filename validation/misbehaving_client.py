@@ -1,0 +1,54 @@
+"""A process at the socket of a braked vehicle that answers well a few times and then does one thing wrong.
+
+Run as ``python misbehaving_client.py KIND PORT``; it knows the port by its documented bytes alone.
+"""
+
+import os
+import socket
+import struct
+import sys
+import time
+
+WELL = 20
+"""Samples that are answered well."""
+NAN = float("nan")
+
+
+def frame(number: int, magic: bytes = b"TRA1", mode: bytes = b"V", wheels: int = 4, first: float = 1.0) -> bytes:
+    """An answer."""
+    return struct.pack("<4sIBB6x8d", magic, number, mode[0], wheels, first, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def wrong(kind: str, number: int, link: socket.socket) -> None:
+    """Do it, and wait until the other end has had enough."""
+    if kind == "died":
+        os._exit(9)
+    if kind == "late":
+        time.sleep(0.4)
+    link.sendall({
+        "NaN": frame(number, mode=b"P", first=NAN), "infinite": frame(number, mode=b"P", first=float("inf")),
+        "NaN as a valve": frame(number, first=NAN), "negative pressure": frame(number, mode=b"P", first=-1.0),
+        "valve in no state": frame(number, first=0.5), "too few wheels": frame(number, wheels=3),
+        "too many bytes": frame(number) + b"\0", "part of a frame": frame(number)[:33],
+        "another protocol": b"HTTP/1.1 200 OK\r\n" + 63 * b" ", "answer to another sample": frame(number - 1),
+        "late": frame(number), "silence": b"",
+    }[kind])  # fmt: skip
+    link.recv(1)
+
+
+def main(kind: str, port: str) -> None:
+    """Answer, then do what ``kind`` says."""
+    with socket.create_connection(("127.0.0.1", int(port))) as link:
+        while True:
+            asked = link.recv(104, socket.MSG_WAITALL)
+            if len(asked) < 104:
+                return
+            number = struct.unpack_from("<I", asked, 4)[0]
+            if number >= WELL:
+                wrong(kind, number, link)
+                return
+            link.sendall(frame(number))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
