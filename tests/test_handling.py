@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from models.errors import InputError
+from models.errors import InputError, RunFailed
+from models.handling.in_engines import driven
 from models.handling.numbers import Controls, Handling, Tyres
 from models.handling.road import plane_waves
 from models.handling.scene import build
@@ -129,3 +130,11 @@ def test_a_step_that_cannot_follow_slow_tyres_is_told() -> None:
 
     with pytest.raises(RunFailed, match=r"damps its wheel faster than steps of 0\.001 s"):
         driven("mujoco", Handling(R19, Tyres(fixed=("fl", "fr", "rl", "rr")), slope=0.05), 0.0, 0.05, 1e-3)
+
+
+def test_car_that_turns_over_is_no_result() -> None:
+    """Friction of a race track on a high car's steer: 89 m/s^2 were printed for it once."""
+    controls = Controls(steer=((0.1, 0.0), (0.3, 0.3)))
+    handling = Handling(R19, replace(Tyres(), friction=1.5), controls)
+    with pytest.raises(RunFailed, match=r"turns over.*t = "):
+        driven("mujoco", handling, 60.0, 1.5, 1e-3)

@@ -10,11 +10,14 @@ from models.errors import RunFailed
 from models.handling import forces as at
 from models.handling.numbers import GRAVITY, Handling
 from models.handling.tyre import SLOW
-from models.vehicles.free_vehicle import chassis_of
+from models.vehicles.free_vehicle import SWAY, chassis_of
 from models.vehicles.spatial import FREEDOMS
 
 LIMIT = 2.78
 """Step times rate up to which the classical Runge-Kutta method damps what is damped."""
+
+UPRIGHT = 0.5
+"""Roll and pitch (rad) beyond which the car turns over: its suspension moves along the upright of the road's plane."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +71,18 @@ def read(handling: Handling, run: SpatialRun, engine: str = "") -> Drive:
                report, ledger)  # fmt: skip
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
+    _check_upright(handling, run, engine)
     _check_step(handling, run, report, engine)
     return Drive(handling, run, report, ledger)
+
+
+def _check_upright(h: Handling, run: SpatialRun, engine: str) -> None:
+    """Refuse a run whose car turns over: what follows is no car's motion."""
+    leans = [h.vehicle.coordinates().index((SWAY, turn)) for turn in ("rx", "ry")]
+    over = (np.abs(run.positions[:, leans]) > UPRIGHT).any(axis=1)
+    if over.any():
+        raise RunFailed(engine, f"the car turns over: it leans by more than {UPRIGHT} rad; drive more slowly, steer less "
+                        "or take less friction", float(run.times[np.argmax(over)]))  # fmt: skip
 
 
 def _check_step(h: Handling, run: SpatialRun, report: np.ndarray, engine: str) -> None:
