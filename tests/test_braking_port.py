@@ -260,7 +260,8 @@ def test_nonsense_of_a_callable_is_named(answer, name):
 ])  # fmt: skip
 def test_nonsense_is_named_before_sensors_faults_and_log_can_hide_it(table, answer, name, tmp_path):
     run = Run(RADIUS, SAMPLE, folder=tmp_path)
-    with opened(read(PortTable, table, ""), run, Says(answer)) as (other, _), pytest.raises(ControllerFailed, match=name):
+    failing = Says(answer)
+    with opened(read(PortTable, table, ""), run, failing) as (other, _), pytest.raises(ControllerFailed, match=name):
         ask(other, of())
 
 
