@@ -81,8 +81,8 @@ def _check_upright(h: Handling, run: SpatialRun, engine: str) -> None:
     leans = [h.vehicle.coordinates().index((SWAY, turn)) for turn in ("rx", "ry")]
     over = (np.abs(run.positions[:, leans]) > UPRIGHT).any(axis=1)
     if over.any():
-        raise RunFailed(engine, f"the car turns over: it leans by more than {UPRIGHT} rad; drive more slowly, steer less "
-                        "or take less friction", float(run.times[np.argmax(over)]))  # fmt: skip
+        raise RunFailed(engine, f"the car turns over: it leans by more than {UPRIGHT} rad; drive more slowly or "
+                        "steer less", float(run.times[np.argmax(over)]))  # fmt: skip
 
 
 def _check_step(h: Handling, run: SpatialRun, report: np.ndarray, engine: str) -> None:
