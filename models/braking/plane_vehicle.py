@@ -69,6 +69,13 @@ class Plane(NamedTuple):
 
 def truck(vehicle: Truck, transfer: bool = True) -> Plane:
     """Numbers of a vehicle of two axles; without ``transfer`` its loads stay as they are at rest."""
+    none = np.zeros(4, dtype=np.int64)
+    return Plane(np.array([vehicle.mass]), np.array([vehicle.yaw_inertia]), np.zeros((1, 1)), none, none.copy(),
+                 *wheels(vehicle, transfer), 0)  # fmt: skip
+
+
+def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:
+    """place (4, 2), radius, spin, static, by_x and by_y (4,) of ``Plane`` for the wheels of two axles under a body."""
     if not vehicle.front.x > 0.0 > vehicle.rear.x:
         raise InputError("", "rear.x", vehicle.rear.x, "must be below 0, and front.x above")
     shares = vehicle.front.roll_share + vehicle.rear.roll_share
@@ -83,10 +90,8 @@ def truck(vehicle: Truck, transfer: bool = True) -> Plane:
             roll = -side * axle.roll_share * vehicle.mass * vehicle.height / axle.track
             rows.append([axle.x, side * axle.track / 2.0, axle.radius, axle.spin_inertia, weight * share / 2.0,
                          pitch * transfer, roll * transfer])  # fmt: skip
-    x, y, radius, spin, static, by_x, by_y = np.ascontiguousarray(np.array(rows).T)
-    none = np.zeros(4, dtype=np.int64)
-    return Plane(np.array([vehicle.mass]), np.array([vehicle.yaw_inertia]), np.zeros((1, 1)), none, none.copy(),
-                 np.column_stack((x, y)), radius, spin, static, by_x, by_y, 0)  # fmt: skip
+    x, y, *others = np.ascontiguousarray(np.array(rows).T)
+    return np.column_stack((x, y)), *others
 
 
 PAPER = Truck(
