@@ -9,6 +9,7 @@ import numpy as np
 
 from models.errors import RunFailed
 from models.rail import wheel_forces as wf
+from models.rail.climbing import flange_share, nadal
 from models.rail.eigenvalues import growth, hunting, locus, wavelength
 from models.rail.energy import ledger
 from models.rail.equations import ROLL, SPIN, YAW, Y, Z
@@ -180,6 +181,7 @@ def _motions(scene: WheelsetScene, paths: dict[str, dict[float, Motion]]) -> lis
         lines.append(f"    {speed:g} m/s: {_ending(own)}")
         lines += [f"      {engine}: within {np.abs(other[speed].states - own.states).max():.1e} of {name} (m, rad, s)"
                   for engine, other in paths.items() if engine != name]  # fmt: skip
+        lines += _climbs(wheelset_of(scene), own)
         power = own.contacts[:, :, wf.POWER]
         book = ledger(equations_of(scene, "reference", speed), own)
         lines.append(f"      power of the creep forces: from {power.min():,.3g} to {power.max():.3g} W at a patch; "
@@ -187,6 +189,15 @@ def _motions(scene: WheelsetScene, paths: dict[str, dict[float, Motion]]) -> lis
         lines.append(f"      energy: the drive gives {book.drive[-1]:,.4g} J, dampers take {book.dampers[-1]:,.4g} J; "
                      f"{np.abs(book.residual).max():.1e} J are not accounted for")  # fmt: skip
     return lines
+
+
+def _climbs(wheelset: Wheelset, motion: Motion) -> list[str]:
+    """A line for a path on which a cone's flange is pushed harder than it would bear without climbing."""
+    share, limit = flange_share(motion.contacts), nadal(wheelset.friction)
+    if wheelset.profiles is not None or share <= limit:
+        return []
+    return [f"      DOUBT: a flange is pushed with {share:.2g} times its wheel's load; beyond {limit:.2g} (Nadal, 70 "
+            "degrees) it may climb, which cones cannot show: use [profiles]"]  # fmt: skip
 
 
 def _ending(motion: Motion) -> str:

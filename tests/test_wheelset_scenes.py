@@ -5,11 +5,14 @@ import tomllib
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pytest
 
 from models.errors import InputError, RunFailed
 from models.rail import equations as eq
 from models.rail import plan
+from models.rail import wheel_forces as wf
+from models.rail.climbing import flange_share, nadal
 from models.rail.eigenvalues import free, growth
 from models.rail.equations import Equations
 from models.rail.limit_cycle import attained
@@ -153,3 +156,14 @@ def test_the_scene_of_the_readme_is_a_valid_scene():
     (block,) = (found for found in re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
                 if 'system = "wheelset"' in found)  # fmt: skip
     plan.check(build(tomllib.loads(block), "README.md"), ("reference",))
+
+
+def test_limit_of_climbing() -> None:
+    """Without friction a flange climbs only beyond the tangent of its angle; a wheel without load climbs at once."""
+    assert nadal(0.0) == pytest.approx(np.tan(np.radians(70.0)), rel=1e-15)
+    reports = np.zeros((3, 2, wf.REPORTED))
+    assert flange_share(reports) == 0.0
+    reports[1, 0, wf.FLANGE_FORCE], reports[1, 0, wf.LOAD] = -2e4, 1e4
+    assert flange_share(reports) == 2.0
+    reports[1, 0, wf.LOAD] = 0.0
+    assert flange_share(reports) == np.inf
