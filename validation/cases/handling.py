@@ -42,7 +42,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Tyre, engines and mirror image; in the full run also turns, stops, slopes, energy, planted faults, price."""
     duration = 0.3 if quick else 1.0
     drives = {engine: driven(engine, lane_change(), SPEED, duration) for engine in ("mujoco", "exudyn")}
-    rows = [_engines_row(drives), *_tyre_rows(), _power_row(drives["mujoco"]), _mirror_row(duration)]
+    rows = [_engines_row(drives), *_tyre_rows(), _power_row(drives["mujoco"]), _mirror_row(duration),
+            _threads_row()]  # fmt: skip
     if not quick:
         rows += [*_turn_rows(), *_stop_rows(), _slope_row(), *_energy_rows(), *_fault_rows(), _price_row()]
     return rows, {}
@@ -243,6 +244,20 @@ def _price_row() -> Row:
     ratio = max(float(full / (none + kernel) - 1.0), 0.0)
     return at_most("handling.price", SYSTEM, "step of MuJoCo with four tyres (22 x 21 cells), by a step without them "
                    "and what the kernel takes alone, less 1", ratio, "", 0.3, "least seconds of interleaved rounds",
+                   "none")  # fmt: skip
+
+
+def _threads_row() -> Row:
+    """Lane changes at three speeds, together in MuJoCo's loop."""
+    handling = lane_change()
+    own = FreeMujoco(driven_by(handling))
+    own.model.opt.timestep = 1e-3
+    starts = np.array([np.concatenate(handling.straight(speed)) for speed in (20.0, 25.0, 30.0)])
+    with installed(own.law):
+        serial, both = (Marcher(own.model, threads).run(starts, 50) for threads in (1, 2))
+    said = "identical" if serial.tobytes() == both.tobytes() else f"{np.abs(serial - both).max():.1e} apart"
+    return behaves("handling.threads", SYSTEM, "three lane changes marched by MuJoCo in two threads beside one, to the "
+                   "last bit", said, "identical", "the callback writes nothing but its own run's forces",
                    "none")  # fmt: skip
 
 
