@@ -1,0 +1,95 @@
+"""A quarter vehicle under a sampled controller: the product's, and a tight reference that shares only the controller.
+
+The reference integrates m u' = -F, J w' = r F - T by DOP853 within every sample, mu straight from the magic formula,
+T by the brake's law along the chamber's exponential, and the wheel's stop and its release as events.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from models.braking.brake import Brake, of_wheels
+from models.braking.controller import SAMPLE, Controller, Sample
+from models.braking.magic_formula import SURFACES, surface
+from models.braking.plane_vehicle import GRAVITY
+from models.braking.pressure import APPLY, RELEASE, Chambers
+from models.braking.quarter import Quarter
+from models.braking.run import Braked
+from models.braking.surfaces import Stretch, road
+from models.braking.tyre_table import stacked
+
+SUPPLY, FILL, EMPTY = 10.0, 0.15, 0.1
+SLOWEST = 0.02
+"""Speed (m/s) at which the reference ends; the rest of its way is that of its deceleration."""
+
+
+def own_distance(quarter: Quarter, brake: Brake, on: str, controller: Controller, speed: float, substeps: int) -> float:
+    """Stopping distance (m) by the product's step."""
+    tyre, one = surface(on), np.ones(1)
+    vehicle = Braked(quarter.plane, np.zeros(1, dtype=np.int64), stacked([tyre]), tyre.cornering,
+                     road([Stretch(0.0, 0, 0)]), of_wheels(brake), Chambers(FILL * one, EMPTY * one, SUPPLY),
+                     np.zeros(1), substeps=substeps)  # fmt: skip
+    return float(vehicle.run(controller, speed).states[-1, 0, 0])
+
+
+def reference_distance(quarter: Quarter, brake: Brake, on: str, controller: Controller, speed: float,
+                       tolerance: float = 1e-10) -> float:  # fmt: skip
+    """The same by the reference, at a relative tolerance."""
+    y, pressure, torque, number = np.array([0.0, speed, speed / quarter.radius]), 0.0, 0.0, 0
+    load, curve = quarter.mass * GRAVITY, SURFACES[on][0]
+    while y[1] > SLOWEST:
+        given = Sample(number, round(number * SAMPLE * 1e9), y[2:] * quarter.radius, True, SUPPLY, float(y[1]))
+        valve = int(np.asarray(controller.sample(given).valves)[0])
+        law = _law(pressure, torque, valve, brake)
+        y = _sample(y, law, quarter, lambda s: load * float(curve(s)), tolerance)
+        pressure, torque, number = law(SAMPLE)[0], law(SAMPLE)[1], number + 1
+    slowing = load * float(curve(1.0)) / quarter.mass  # so slow, all is applied and the wheel stands
+    return float(y[0] + max(y[1], 0.0) ** 2 / (2.0 * slowing))
+
+
+def _law(pressure: float, torque: float, valve: int, brake: Brake) -> Callable[[float], tuple[float, float]]:
+    """Pressure (bar) and torque (N m) by the time (s) in a sample."""
+
+    def at(time: float) -> tuple[float, float]:
+        p = pressure
+        if valve == APPLY:
+            p = SUPPLY + (pressure - SUPPLY) * np.exp(-time / FILL)
+        elif valve == RELEASE:
+            p = pressure * np.exp(-time / EMPTY)
+        up, down = brake.rising * max(p - brake.push_out, 0.0), brake.falling * max(p - brake.release, 0.0)
+        return p, max(up, min(down, torque))
+
+    return at
+
+
+def _sample(y: np.ndarray, law: Any, quarter: Quarter, force: Any, tolerance: float) -> np.ndarray:
+    """One sample from x, u, w; a wheel that stops is held while its brake can."""
+    radius, inertia, now = quarter.radius, quarter.spin_inertia, 0.0
+
+    def turning(t: float, q: np.ndarray) -> list[float]:
+        f = force(min(max(1.0 - radius * q[2] / max(q[1], 1e-6), 0.0), 1.0))
+        return [q[1], -f / quarter.mass, (radius * f - law(t)[1]) / inertia]
+
+    def stops(t: float, q: np.ndarray) -> float:
+        return float(q[2])
+
+    def lets_go(t: float, q: np.ndarray) -> float:
+        return float(law(t)[1] - radius * force(1.0))
+
+    def sliding(t: float, q: np.ndarray) -> list[float]:
+        return [q[1], -force(1.0) / quarter.mass, 0.0]
+
+    for event in (stops, lets_go):
+        event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
+    while now < SAMPLE:
+        held = y[2] <= 1e-12 and law(now)[1] > radius * force(1.0)
+        found = solve_ivp(sliding if held else turning, (now, SAMPLE), y, "DOP853", rtol=tolerance, atol=1e-12,
+                          events=lets_go if held else stops)  # fmt: skip
+        now, y = float(found.t[-1]), found.y[:, -1].copy()
+        if found.status == 1:
+            y[2] = 0.0
+            if held:
+                y[2] = 1e-9  # free again: the road turns it on
+    return y
