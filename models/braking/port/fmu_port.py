@@ -95,7 +95,7 @@ def _names(description: Any, wheels: int, file: str) -> dict[str, tuple[int, str
     """Variables by name; raises InputError if one is missing or of a type that does not fit."""
     names = {one.name: (one.valueReference, one.type) for one in description.modelVariables}
     kind = "valve" if "valve_1" in names else "pressure"
-    wanted = {f"wheel_{i + 1}": ("Real",) for i in range(wheels)}
+    wanted: dict[str, tuple[str, ...]] = {f"wheel_{i + 1}": ("Real",) for i in range(wheels)}
     wanted |= {f"{kind}_{i + 1}": ("Real", "Integer") if kind == "valve" else ("Real",) for i in range(wheels)}
     wanted |= {name: (kind_of,) for name, kind_of in OPTIONAL.items() if name in names}
     for name, types in wanted.items():
