@@ -22,7 +22,8 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
          "contact_simplified", "contact_profiles", "manchester", "ride_road", "ride_covariance", "ride_engines",
          "ride_varying_speed", "ride_nonlinear", "ride_faults", "hub_forces", "contact_price", "fastsim", "wheelset",
-         "rolling_faults", "contact_bridges", "handling", "braking_stop", "braking_port")  # fmt: skip
+         "rolling_faults", "contact_bridges", "handling", "braking_stop", "braking_port",
+         "braking_controllers")  # fmt: skip
 """Case modules in the order of the report."""
 
 
@@ -96,6 +97,7 @@ def seeds() -> dict[str, int]:
     from studies.six_runs import Options
     from validation import checks, contact_set, fitted_roads, timing
     from validation.cases import (
+        braking_controllers,
         contact_price,
         drift_off,
         drift_solvers,
@@ -131,7 +133,8 @@ def seeds() -> dict[str, int]:
             "table of contacts": contact_price.SEED, "made road": fitted_roads.SEED,
             "states of ride": ride_engines.SEED, "twins of ride": ride_covariance.SEED,
             "copies of ride": ride_varying_speed.SEED, "nonlinear ride": ride_nonlinear.SEED,
-            "drawn wheelsets": wheelset.SEED, "rough road of handling": handling.SEED}  # fmt: skip
+            "drawn wheelsets": wheelset.SEED, "rough road of handling": handling.SEED,
+            "speeds on ice": braking_controllers.SEED}  # fmt: skip
 
 
 def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:

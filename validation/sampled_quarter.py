@@ -43,9 +43,9 @@ def reference_distance(quarter: Quarter, brake: Brake, on: str, controller: Cont
         given = Sample(number, round(number * SAMPLE * 1e9), y[2:] * quarter.radius, True, SUPPLY, float(y[1]))
         valve = int(np.asarray(controller.sample(given).valves)[0])
         law = _law(pressure, torque, valve, brake)
-        y = _sample(y, law, quarter, lambda s: load * float(curve(s)), tolerance)
+        y = _sample(y, law, quarter, lambda s: load * float(curve(np.array(s))), tolerance)
         pressure, torque, number = law(SAMPLE)[0], law(SAMPLE)[1], number + 1
-    slowing = load * float(curve(1.0)) / quarter.mass  # so slow, all is applied and the wheel stands
+    slowing = load * float(curve(np.array(1.0))) / quarter.mass  # so slow, all is applied and the wheel stands
     return float(y[0] + max(y[1], 0.0) ** 2 / (2.0 * slowing))
 
 

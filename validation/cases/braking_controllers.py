@@ -13,7 +13,7 @@ from models.braking.controller import SAMPLE
 from models.braking.controllers import CONTROLLERS
 from models.braking.controllers.five_phase import FivePhase, end_of, rate
 from models.braking.frozen import Cycle, Frozen, limit_cycle, sampled
-from models.braking.magic_formula import SURFACES, surface
+from models.braking.magic_formula import surface
 from models.braking.plane_vehicle import GRAVITY, PAPER, truck
 from models.braking.pressure import APPLY, RELEASE, Chambers, by_valves, still
 from models.braking.quarter import Quarter
@@ -171,7 +171,7 @@ def stop(on: str, name: str, speed: float) -> dict[str, float]:
     path = truck_stop(on, name, speed)
     speeds = np.hypot(path.states[:, 1, 0], path.states[:, 1, 1])
     last = int(np.argmax(speeds < LOCK_FREE))
-    used = (speed**2 - speeds[last] ** 2) / (2.0 * path.states[last, 0, 0]) / GRAVITY / SURFACES[on][0].D
+    used = (speed**2 - speeds[last] ** 2) / (2.0 * path.states[last, 0, 0]) / GRAVITY / surface(on).mu_x.max()
     locked = 1e3 * SAMPLE * max(_longest(wheel > 0.0) for wheel in path.reports[:last, :, 5].T)
     return {"distance": float(path.states[-1, 0, 0]), "time": float(path.times[-1]), "used": float(used),
             "locked": float(locked), "stands": float(path.stands)}  # fmt: skip
