@@ -1,0 +1,175 @@
+"""Faults planted in a braked vehicle, one at a time, and the checks that see them.
+
+Compiled code cannot be patched, so faults are planted in what it is given: the vehicle's numbers, tables, brakes,
+signals; and the force of the start of a step by the scheme that is written so.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from models.braking import brake, plane_vehicle, tyre_table
+from models.braking.advance import advance
+from models.braking.plane_step import FORCE_X, FORCE_Y, LOAD, REPORTED
+from models.braking.plane_vehicle import GRAVITY, PAPER, Plane
+from models.braking.surfaces import Stretch, road
+from validation.braking_schemes import LITERAL, stopped
+from validation.cases import braking_stop as stops
+from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.patches import Patch, attribute
+
+EVEN, SPLIT = road([Stretch(0.0, 0, 0)]), road([Stretch(0.0, 1, 0)])
+STEP = 5.5e-3
+
+
+def _first_step(own: Any, steer: float = 0.0, speed: float = 10.0) -> tuple[np.ndarray, np.ndarray, Plane]:
+    """State and report after one step of the truck with all wheels locked; the left side dry, the right ice."""
+    plane = plane_vehicle.truck(PAPER)
+    tables = tyre_table.stacked([stops.met("ice")[0], stops.met("dry")[0]])
+    state, report = np.zeros((2, 3)), np.zeros((4, REPORTED))
+    state[1, 0] = speed
+    turning, angles = np.zeros(4), steer * (plane.place[:, 0] > 0.0)
+    if steer:
+        turning[:] = speed / plane.radius
+    level = 0.0 if steer else 1e5
+    advance(state, turning, np.full((2, 4), level), STEP, angles, 10.0, plane, np.zeros(4, dtype=np.int64), own,
+            tables.packed, np.zeros(3), report)  # fmt: skip
+    return state, report, plane
+
+
+def _light() -> float:
+    """Quarter vehicle, light braking on dry road: way against the exact one."""
+    tyre, _ = both = stops.met("dry")
+    level = stops.steady(stops.FRONT, tyre, 0.004)[1]
+    return abs(stops.stop(stops.FRONT, both, level, 11.11).distance / _way() - 1.0)
+
+
+@cache
+def _way() -> float:
+    """The exact way (m)."""
+    return stops.exact(stops.Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35), stops.met("dry")[0],
+                       _LEVEL, 11.11)  # fmt: skip
+
+
+_LEVEL = stops.steady(stops.FRONT, stops.met("dry")[0], 0.004)[1]
+
+
+def _transfer() -> float:
+    """Locked on even friction: load of the front wheels against W (b + mu h) / (2 L), relative."""
+    _, report, _ = _first_step(EVEN)
+    slide = float(stops.met("ice")[0].mu_x[0, 0, -1])
+    base = 1.42 + 2.19
+    wanted = 5640.0 * GRAVITY * (2.19 + slide * 1.2) / (2.0 * base)
+    return float(np.abs(report[:2, LOAD] / wanted - 1.0).max())
+
+
+def _split() -> float:
+    """Locked, the left side dry: yaw acceleration against the moment of the reported forces."""
+    state, report, _ = _first_step(SPLIT)
+    x, y = np.array([1.42, 1.42, -2.19, -2.19]), np.array([0.95, -0.95, 0.9, -0.9])
+    moment = float(x @ report[:, FORCE_Y] - y @ report[:, FORCE_X])
+    return float(abs(state[1, 2] / (STEP * moment / 25000.0) - 1.0))
+
+
+def _turns_left() -> float:
+    """Steered to the left: 1 if the truck does not yaw to the left, and 1 if it is not the left that is unloaded."""
+    state, report, _ = _first_step(EVEN, 0.05)
+    return float(not state[1, 2] > 0.0) + float(not report[0, LOAD] < report[1, LOAD])
+
+
+def _pulls_left() -> float:
+    """Dry on the left: 1 if the truck does not yaw to the left."""
+    return float(not _first_step(SPLIT)[0][1, 2] > 0.0)
+
+
+def _loop() -> float:
+    """Area of a brake's loop from 0 to 5 bar and back against its closed form, by it."""
+    own = brake.of_wheels(brake.Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
+    pressures = np.concatenate((np.linspace(0.0, 5.0, 401), np.linspace(5.0, 0.0, 401)))
+    level, found = 0.0, []
+    for pressure in pressures:
+        level = brake.torque(0, pressure, level, own)
+        found.append(level)
+    top, down = 1400.0 * 4.2, 1500.0
+    left = 0.3 + top / down
+    wanted = 0.5 * top * (left - 0.3) + top * (5.0 - left) - 0.5 * top * 4.2
+    return float(abs(-np.trapezoid(found, pressures) / wanted - 1.0))
+
+
+def _push_out() -> float:
+    """Torque (N m) of the paper's front brake at 0.7 bar."""
+    return float(brake.torque(0, 0.7, 0.0, brake.of_wheels(brake.PAPER_FRONT)))
+
+
+def _nodes() -> float:
+    """Friction of the stacked table at its own nodes against the tyre's."""
+    own = stops.met("dry")[0]
+    tables = tyre_table.stacked([own])
+    return float(np.abs(np.interp(own.slips, tables.slips, tables.mu_x[0, 0, 0]) - own.mu_x[0, 0]).max())
+
+
+CHECKS = {
+    "light stop": Check("stopping distance, light braking, exact", "relative", 5e-4, _light),
+    "transfer": Check("front loads of the locked truck, closed form", "relative", 1e-6, _transfer),
+    "split": Check("yaw acceleration on split friction by its moment", "relative", 1e-6, _split),
+    "turns left": Check("sign of yaw and roll in a left turn", "", 0.5, _turns_left),
+    "pulls left": Check("sign of yaw on split friction", "", 0.5, _pulls_left),
+    "loop": Check("area of a brake's loop, closed form", "relative", 1e-3, _loop),
+    "push-out": Check("torque below push-out", "N m", 1e-9, _push_out),
+    "nodes": Check("tables at the tyre's own nodes", "", 1e-12, _nodes),
+}
+
+
+def _truck(**change: Callable[[np.ndarray], np.ndarray]) -> Patch:
+    """Numbers of every truck changed."""
+    return attribute("models.braking.plane_vehicle:truck", lambda real: lambda *own: _changed(real(*own), change))
+
+
+def _changed(plane: Plane, change: dict[str, Callable[[np.ndarray], np.ndarray]]) -> Plane:
+    own: dict[str, Any] = {name: of(getattr(plane, name)) for name, of in change.items()}
+    return plane._replace(**own)
+
+
+def _brakes(change: Callable[[Any], Any]) -> Patch:
+    return attribute("models.braking.brake:of_wheels", lambda real: lambda *own: change(real(*own)))
+
+
+def _literal(real: Any) -> Any:
+    """The vehicle driven by the force of the start of each step."""
+
+    def stop(quarter: Any, tyre: Any, torque: float, speed: float, *rest: Any, **more: Any) -> Any:
+        way = stopped(LITERAL, quarter, tyre[0], torque, speed, STEP)[0]
+        return stops.Stop(np.array([[0.0, 0.0, speed, 0.0, 0.0], [0.0, way, 0.0, 0.0, 0.0]]), 1)
+
+    return stop
+
+
+def _tables(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
+    from dataclasses import replace
+
+    return attribute("models.braking.tyre_table:stacked", lambda real: lambda tables: (
+        lambda found: replace(found, mu_x=np.ascontiguousarray(change(found.mu_x))))(real(tables)))  # fmt: skip
+
+
+FAULTS = (
+    Fault("force of the start of the step", "step", attribute("validation.cases.braking_stop:stop", _literal)),
+    Fault("load transfer with the other sign", "vehicle", _truck(by_x=np.negative)),
+    Fault("roll transfer with the other sign", "vehicle", _truck(by_y=np.negative)),
+    Fault("left and right swapped", "vehicle", _truck(place=lambda p: p * np.array([1.0, -1.0]))),
+    Fault("track halved", "vehicle", _truck(place=lambda p: p * np.array([1.0, 0.5]))),
+    Fault("yaw inertia 1 % too large", "vehicle", _truck(inertias=lambda own: 1.01 * own)),
+    Fault("height of the centre of mass 1 % too large", "vehicle",
+          _truck(by_x=lambda own: 1.01 * own, by_y=lambda own: 1.01 * own)),
+    Fault("front and rear swapped", "vehicle", _truck(place=lambda p: p * np.array([-1.0, 1.0]))),
+    Fault("hysteresis without a width", "brake", _brakes(lambda own: own._replace(release=own.push_out))),
+    Fault("hysteresis reversed", "brake",
+          _brakes(lambda own: own._replace(release=own.push_out, push_out=own.release))),
+    Fault("push-out pressure ignored", "brake", _brakes(lambda own: own._replace(push_out=0.0 * own.push_out))),
+    Fault("falling pressure by the rising gradient", "brake", _brakes(lambda own: own._replace(falling=own.rising))),
+    Fault("friction read one node late", "tyre", _tables(lambda mu: np.roll(mu, 1, axis=3) * (mu > 0.0))),
+    Fault("friction 1 % too large", "tyre", _tables(lambda mu: 1.01 * mu)),
+)  # fmt: skip
+
+CAMPAIGN = Campaign("braking_faults", "braking", "anti-lock", CHECKS, FAULTS)
