@@ -1,0 +1,136 @@
+"""The braked vehicle in the plane: loads, symmetries, the end at rest, engines, the trailer."""
+
+import numpy as np
+import pytest
+
+from models.braking.advance import AT_REST, FINE, advance
+from models.braking.magic_formula import surface
+from models.braking.plane_step import LOAD, REPORTED
+from models.braking.plane_vehicle import GRAVITY, PAPER, truck
+from models.braking.surfaces import Stretch, road
+from models.braking.trailer import CHOSEN, follow, hooked
+from models.braking.tyre_table import Tables, TyreTable, stacked
+from models.braking.written import turned
+from models.engines.braking import Carried
+
+LOCKING = np.full(4, 1e5)
+ICE = surface("ice")
+
+
+def braked(torques, *, tables=None, steer=0.0, speed=10.0, until=0.0, step=5.5e-3, plane=None, go=advance, yaw=0.0,
+           duration=200.0, side=0.0):  # fmt: skip
+    """State, time and last report of a stop, or of what is left at a speed or a time."""
+    tables, plane = tables or stacked([ICE]), plane or truck(PAPER)
+    state, turning = np.zeros((2, 3)), speed / plane.radius
+    state[1] = speed, side, yaw
+    found, report, time, status = np.zeros(3), np.zeros((4, REPORTED)), 0.0, FINE
+    front, way = np.array([steer, steer, 0.0, 0.0]), road([Stretch(0.0, 0, 0)])
+    while status == FINE and np.hypot(*state[1, :2]) > until and time < duration - 1e-9:
+        status, used = go(state, turning, np.tile(torques, (2, 1)), step, front, ICE.cornering, plane,
+                          np.zeros(4, dtype=int), way, tables.packed, found, report)  # fmt: skip
+        time += used
+    assert status in (FINE, AT_REST)
+    return state, time, report, turning
+
+
+def constant(mu: float) -> Tables:
+    """Friction that is the same at every slip from 0.1 on."""
+    flat = np.broadcast_to(np.array([0.0, mu, mu]), (3, 1, 3)).copy()
+    nodes = np.array([0.0, 0.1, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
+    return stacked([TyreTable(*nodes, flat, np.ones((3, 3)) * np.array([1.0, 0.0, 0.0]), np.array([[0.0], [mu], [mu]]))])
+
+
+def test_locked_wheels_stop_in_the_closed_form():
+    for step in (1e-4, 5.5e-3, 2e-2):
+        state, time, *_ = braked(LOCKING, tables=constant(0.4), step=step, speed=10.0)
+        # the wheels' own stop, v / r in J v / (r T) = 0.3 ms, gives back less force than a locked wheel has
+        assert state[0, 0] == pytest.approx(100.0 / (2.0 * 0.4 * GRAVITY), rel=2e-3)
+        assert not state[1].any()
+    state, time, *_ = _locked_from_the_start(constant(0.4))
+    assert state[0, 0] == pytest.approx(100.0 / (2.0 * 0.4 * GRAVITY), rel=1e-9)
+
+
+def _locked_from_the_start(tables):
+    plane = truck(PAPER)
+    still = plane._replace(radius=plane.radius * 1e9)  # wheels that turn at next to no speed: locked at once
+    return braked(LOCKING * 1e9, tables=tables, plane=still)
+
+
+def test_load_transfer_of_all_and_of_single_axles():
+    plane, mu = truck(PAPER), 0.4
+    m, h, base = PAPER.mass, PAPER.height, PAPER.wheelbase
+    light = plane._replace(spin=np.full(4, 1e-9))
+    static = plane.static.reshape(2, 2).sum(1)
+    whole, front, rear = mu * GRAVITY, mu * static[0] / (m * (1 - mu * h / base)), mu * static[1] / (m * (1 + mu * h / base))
+    for torques, slowing in (((1e5, 1e5), whole), ((1e5, 0.0), front), ((0.0, 1e5), rear)):
+        _, _, report, _ = braked(np.repeat(torques, 2), tables=constant(mu), plane=light, duration=0.5)
+        loads = report[:, LOAD].reshape(2, 2).sum(1)
+        assert loads == pytest.approx(static + m * slowing * h / base * np.array([1.0, -1.0]), rel=1e-6)
+
+
+def test_equal_friction_gives_no_yaw_at_all_and_mirrored_steering_a_mirrored_path():
+    straight = braked(np.array([900.0, 900.0, 600.0, 600.0]))[0]
+    assert straight[0, 1] == 0.0 and straight[0, 2] == 0.0
+    left, right = (braked(np.array([900.0, 900.0, 600.0, 600.0]), steer=s, duration=3.0)[0] for s in (0.03, -0.03))
+    assert left[0, 1] > 0.5
+    assert np.abs(left * [1.0, -1.0, -1.0] - right).max() < 1e-10
+
+
+def test_locked_front_wheels_do_not_steer():
+    state, *_ = braked(np.array([1e5, 1e5, 0.0, 0.0]), steer=0.05, until=1.0)
+    assert abs(state[0, 1]) < 1e-3
+
+
+@pytest.mark.parametrize("step", [1e-4, 5.5e-3, 2e-2])
+def test_every_end_is_at_rest_and_stays(step):
+    for torque in (0.0, 30.0, 700.0, 1e5):
+        for yaw, side in ((0.0, 0.0), (2.0, -3.0), (0.0, 0.6)):
+            torques = np.array([torque, torque, 0.5 * torque, 0.0])
+            state, time, _, turning = braked(torques, steer=0.03, speed=0.5, yaw=yaw, side=side, step=step, duration=2.0)
+            assert np.isfinite(state).all() and np.isfinite(turning).all()
+    state, time, report, turning = braked(np.full(4, 5e3), steer=0.03, speed=1.0, yaw=2.0, side=1.0, step=step)
+    assert not state[1].any() and not turning.any()
+    again = state.copy()
+    status, used = advance(again, turning, np.full((3, 4), 5e3), step, np.zeros(4), ICE.cornering, truck(PAPER),
+                           np.zeros(4, dtype=int), road([Stretch(0.0, 0, 0)]), stacked([ICE]).packed, np.zeros(3),
+                           report)  # fmt: skip
+    assert status == AT_REST and np.array_equal(again, state)
+
+
+def test_backwards_is_forwards_seen_from_behind():
+    torques = np.array([900.0, 900.0, 600.0, 600.0])
+    ahead, back = (braked(torques, speed=v, duration=1.0)[0] for v in (8.0, -8.0))
+    # loads move to the other axle, which has the same friction: the way is the same
+    assert back[0, 0] == pytest.approx(-ahead[0, 0], rel=1e-3)
+
+
+@pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
+def test_engines_carry_the_chassis_as_the_compiled_step_does(engine):
+    torques, plane = np.array([900.0, 900.0, 600.0, 600.0]), truck(PAPER)
+    own = braked(torques, steer=0.03, step=1e-3, duration=0.5)[0]
+    carried = braked(torques, steer=0.03, step=1e-3, duration=0.5, go=Carried(engine, plane).advance)[0]
+    assert own[0, 1] > 0.05
+    assert carried == pytest.approx(own, abs=1e-6)  # both are of order two
+
+
+@pytest.mark.full
+def test_the_truck_written_out_turns_as_the_compiled_one():
+    where = turned(PAPER, ICE, 0.03, (900.0, 600.0), 11.11, 6.0)
+    state, time, *_ = braked(np.array([900.0, 900.0, 600.0, 600.0]), steer=0.03, speed=11.11, step=1e-3, duration=where.time)
+    assert state[0] == pytest.approx([where.x, where.y, where.heading], abs=2e-3)
+
+
+def rolling(slope: float) -> Tables:
+    """Friction across the wheel alone, as steep as ``slope`` (1/rad)."""
+    mu = np.array([[0.0], [0.01 * slope], [0.01 * slope]])
+    nodes = np.array([0.0, 0.01, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
+    return stacked([TyreTable(*nodes, np.zeros((3, 1, 3)), np.ones((3, 3)), mu)])
+
+
+def test_trailer_on_a_straight_pull():
+    v, step, n = 0.2, 5e-4, 8000
+    state = np.array([[0.0, 0.0, 0.5, 0.5], [v, 0.0, -v * np.sin(0.5) / CHOSEN.drawbar, 0.0]])
+    states, forces = follow(hooked(CHOSEN), rolling(100.0), state, np.tile([v, 0.0], (n + 1, 1)), step, 100.0, np.zeros(4))
+    angle = 2.0 * np.arctan(np.tan(0.25) * np.exp(-v * n * step / CHOSEN.drawbar))
+    assert states[-1, 0, 2] == pytest.approx(angle, rel=1e-4)
+    assert np.hypot(*forces[-1]) < 50.0  # it only rolls
