@@ -59,7 +59,8 @@ def tables(data: dict[str, Any]) -> list[Table]:
     shown = (("distance", 2), ("time", 2), ("used", 3), ("locked", 0))
     rows = [(name, *(f"{one[key]:.{digits}f}" for key, digits in shown)) for name, one in data["stops"].items()]
     return [Table("Straight stops by controller", "Utilisation: mean deceleration above 15 km/h by that of the tyre's "
-                  "peak on all wheels. Full supply of 8 bar, speed of the vehicle given, 4 substeps.",
+                  "peak on all wheels; on the dry road the front brakes at their 8 bar bound it, not the tyres. "
+                  "Speed of the vehicle given, 4 substeps.",
                   ("stop", "distance in m", "time in s", "utilisation", "longest lock above 15 km/h in ms"),
                   tuple(rows))]  # fmt: skip
 
