@@ -36,23 +36,27 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
 
     options = read(Options, scene.options, scene.file, "options")
     failed, table, answer = {}, list[str](), dict[str, dict[str, Any]]()
+    engines = engines or ("reference",)
     for i, name in enumerate(scene.procedures):
-        progress(name, i / len(scene.procedures))
-        begun = time.perf_counter()
-        try:
-            path: Path | None = drive(scene, name)
-        except RunFailed as error:
-            failed[name], path = str(error), getattr(error, "partial", None)
-        seconds = time.perf_counter() - begun
-        if path is None or len(path.times) < 3:
+        paths, seconds = dict[str, Path](), dict[str, float]()
+        for j, engine in enumerate(engines):
+            progress(f"{name}, {engine}", (i * len(engines) + j) / (len(scene.procedures) * len(engines)))
+            begun = time.perf_counter()
+            try:
+                path: Path | None = drive(scene, name, engine)
+            except RunFailed as error:
+                failed[f"{name}, {engine}"], path = str(error), error.partial
+            seconds[engine] = time.perf_counter() - begun
+            if path is not None and len(path.times) > 2:
+                paths[engine] = path
+                save(scene, name, path, folder / (f"{name}.nc" if len(engines) == 1 else f"{name}_{engine}.nc"))
+        if not paths:
             continue
-        stop = Stop(path)
-        save(scene, name, path, folder / f"{name}.nc")
+        stop = Stop(next(iter(paths.values())))
         stop_figure(scene, name, stop, folder / f"{name}.png")
-        answer[name] = {**stop.of_vehicle(), **{key: value.tolist() for key, value in stop.of_wheels().items()}}
         told = engineers(scene, name, stop) if options.adhesion else {}
-        answer[name] |= told
-        table += lines(name, stop, seconds, told)
+        answer[name] = {**stop.of_vehicle(), **{key: value.tolist() for key, value in stop.of_wheels().items()}, **told}
+        table += lines(name, stop, told) + compared(paths, seconds)
     return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": table}
 
 
@@ -71,10 +75,21 @@ def engineers(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
             "adhesion utilisation epsilon": used.epsilon}  # fmt: skip
 
 
-def lines(name: str, stop: Stop, seconds: float, told: dict[str, float]) -> list[str]:
+def compared(paths: dict[str, Path], seconds: dict[str, float]) -> list[str]:
+    """A line per engine: where it stopped, and how long that took."""
+    rows = []
+    for engine, path in paths.items():
+        x, y, yaw = path.states[-1, 0, :3]
+        clock = f"; {path.clock}" if path.clock else ""
+        rows.append(f"    {engine:<12}x {x:8.3f} m, y {y:8.3f} m, yaw {np.degrees(yaw):8.3f} deg after "
+                    f"{path.times[-1]:.3f} s; {len(path.times) - 1} samples in {seconds[engine]:.2f} s{clock}")
+    return rows
+
+
+def lines(name: str, stop: Stop, told: dict[str, float]) -> list[str]:
     """Tables of one procedure: of the vehicle, and of its wheels."""
-    ended = "" if stop.path.stands else "; it does not stand"
-    rows = [f"  {name.replace('_', ' ')}: {stop.times[-1]:.2f} s in {seconds:.2f} s{ended}"]
+    ended = "" if stop.path.stands else ": it does not stand"
+    rows = [f"  {name.replace('_', ' ')}{ended}"]
     rows += [f"    {stop.path.clock}"] if stop.path.clock else []
     rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.of_vehicle().items()]
     rows += [f"    {key:<40}{value:>10.3f}" for key, value in told.items()]

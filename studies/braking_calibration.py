@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import Field
 
+from models.braking.plan import check_reference
 from models.braking.procedures import drive
 from models.braking.scene import BrakingScene
 from models.braking.stop_report import Stop
@@ -45,6 +46,7 @@ class Options(Strict):
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Refuse a procedure that is no J-turn."""
+    check_reference(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     own = scene.procedures.get(options.procedure)
     if own is None or own.kind != "j_turn":

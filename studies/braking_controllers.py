@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from models.braking.plan import check as check_scene
+from models.braking.plan import check_reference
 from models.braking.procedures import drive
 from models.braking.scene import BrakingScene, ControllerTable, RoadTable, Stretch
 from models.braking.stop_report import Stop
@@ -61,8 +62,9 @@ def _alone(scene: BrakingScene, surface: str, right: str, name: str, controller:
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Refuse what a controller or a surface cannot be."""
+    check_reference(scene, engines)
     for case in cases(scene):
-        check_scene(case.scene, engines)
+        check_scene(case.scene, ("reference",))
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:

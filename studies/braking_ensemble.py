@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from models.braking.plan import check_reference
 from models.braking.procedures import drive
 from models.braking.scene import BrakingScene, build
 from models.braking.stops import Scatter, Stops, Welch, scatter, welch
@@ -41,6 +42,7 @@ class Options(Strict):
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Refuse a procedure that is none, and a second ensemble that cannot be."""
+    check_reference(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     if options.procedure not in scene.procedures:
         raise InputError(scene.file, "options.procedure", options.procedure, "no such procedure",

@@ -33,7 +33,7 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
         slope=max(table.cornering for table in tyres), road=road_of(scene, procedure, names),
         brakes=of_wheels(front, front, rear, rear), chambers=chambers_of(scene, plane.wheels),
         steer=np.zeros(plane.wheels), substeps=scene.run.substeps, sample=scene.run.sample,
-        speed_given=scene.controller.true_speed,
+        speed_given=scene.controller.true_speed, relaxation=lags_of(scene, plane.wheels),
     )  # fmt: skip
 
 
@@ -114,11 +114,19 @@ def brake_of(scene: BrakingScene, axle: str) -> Brake:
     }, scene.file, f"brakes.{axle}")  # fmt: skip
 
 
+def lags_of(scene: BrakingScene, wheels: int) -> np.ndarray | None:
+    """Relaxation lengths (W,) in m, None where slip angles do not lag."""
+    own = scene.relaxation
+    return None if own is None else np.where(np.arange(wheels) < 2, own.front, own.rear)
+
+
 def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
     """Chambers of all wheels; without dynamics their time constants are zero."""
-    own = scene.pressure
-    fill, empty = (0.0, 0.0) if own is None else (own.fill, own.empty)
-    return Chambers(np.full(wheels, fill), np.full(wheels, empty), scene.brakes.supply)
+    own, none = scene.pressure, np.zeros(wheels)
+    if own is None:
+        return Chambers(none, none, scene.brakes.supply)
+    held = Chambers(none + own.fill, none + own.empty, scene.brakes.supply, delay=own.delay)
+    return held if own.reservoir is None else held._replace(volumes=none + own.volume, reservoir=own.reservoir)
 
 
 def controller_of(scene: BrakingScene, wheels: int) -> Controller:

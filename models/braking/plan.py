@@ -4,6 +4,7 @@ from models.braking.of_scene import controller_of, surfaces_of, vehicle_of
 from models.braking.port.setup import BEHIND
 from models.braking.procedures import ready
 from models.braking.scene import BrakingScene
+from models.errors import InputError, Refused
 
 PROCEDURES = {
     "straight": "straight braking",
@@ -15,8 +16,17 @@ PROCEDURES = {
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
+    if scene.relaxation is not None and engines and engines != ("reference",):
+        raise Refused(engines[-1], "the lag of tyres is not in its steps: use --engine reference", scene.file)
     for name in scene.procedures:
         controller_of(scene, ready(scene, name)[0].plane.wheels)
+
+
+def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
+    """Refuse an engine on its own where a study computes by the reference."""
+    if engines and "reference" not in engines:
+        allowed = f"the study {scene.study!r} computes by the reference: leave it out"
+        raise InputError("--engine", "", engines[0], allowed)
 
 
 def describe(scene: BrakingScene) -> str:
@@ -52,7 +62,10 @@ def effects(scene: BrakingScene) -> tuple[list[str], list[str]]:
         "load transfer": scene.load_transfer is not None,
         "push-out": any(brake.push_out > 0.0 for brake in brakes),
         "hysteresis": any(brake.release is not None or brake.falling is not None for brake in brakes),
+        "tyre relaxation": scene.relaxation is not None,
         "pressure dynamics": scene.pressure is not None,
+        "delay of valves": scene.pressure is not None and scene.pressure.delay > 0.0,
+        "reservoir": scene.pressure is not None and scene.pressure.reservoir is not None,
         "anti-lock system": behind(scene) != "none",
         "signals from teeth": port is not None and port.teeth is not None,
         "conversion of signals": port is not None and bool(port.signals.model_fields_set),

@@ -36,9 +36,13 @@ def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
     return replace(vehicle, steer=steered(vehicle, own.steer or 0.0)), vehicle.rolling(own.speed)
 
 
-def drive(scene: BrakingScene, name: str) -> Path:
+def drive(scene: BrakingScene, name: str, engine: str = "reference") -> Path:
     """One run of a procedure, whatever stands behind the port; InputError, or RunFailed with the path until then."""
     vehicle, start = ready(scene, name)
+    if engine != "reference":
+        from models.engines.braking import Carried
+
+        vehicle = replace(vehicle, engine=Carried(engine, vehicle.plane))
     own = controller_of(scene, vehicle.plane.wheels)
     if scene.port is None:
         return vehicle.run(own, start, scene.run.duration)

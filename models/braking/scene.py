@@ -76,6 +76,16 @@ class PressureTable(Strict):
 
     fill: float = quantity("s", "time constant of filling", default=0.15)
     empty: float = quantity("s", "time constant of emptying", default=0.1)
+    delay: float = quantity("s", "of the valves", default=0.0, zero=True)
+    reservoir: float | None = quantity("l", "of the supply; not said, its pressure stays", default=None)
+    volume: float = quantity("l", "of one chamber, which the reservoir fills", default=1.5)
+
+
+class Relaxation(Strict):
+    """[relaxation]: slip angles lag; not named, tyres answer at once."""
+
+    front: float = quantity("m", "relaxation length across the front wheels")
+    rear: float = quantity("m", "relaxation length across the rear wheels")
 
 
 class ControllerTable(Strict):
@@ -113,6 +123,7 @@ class BrakingScene(SceneFile):
     load_transfer: LoadTransfer | None = Field(default=None, description="semi-static load transfer")
     road: RoadTable = RoadTable()
     tyres: TyreTables = TyreTables()
+    relaxation: Relaxation | None = Field(default=None, description="lag of the slip angles")
     brakes: BrakesTable = BrakesTable()
     pressure: PressureTable | None = Field(default=None, description="dynamics of the chambers")
     controller: ControllerTable = ControllerTable()
@@ -152,5 +163,7 @@ def _check_procedure(own: Procedure, file: str, place: str) -> None:
 def _check_run(scene: BrakingScene) -> None:
     if not 1e-4 <= scene.run.sample <= 0.1:
         raise InputError(scene.file, "run.sample", scene.run.sample, "must be from 0.0001 to 0.1 s")
+    if scene.pressure is not None and scene.pressure.delay > 1.0:
+        raise InputError(scene.file, "pressure.delay", scene.pressure.delay, "must be at most 1 s")
     if scene.run.duration > 1000.0:
         raise InputError(scene.file, "run.duration", scene.run.duration, "must be at most 1000 s")

@@ -82,9 +82,10 @@ class Stop:
             "v0^2/2d [m/s^2]": equivalent_deceleration(float(speed[0]), distance),
             "v0/T [m/s^2]": float(speed[0] - speed[-1]) / time,
             "MFDD [m/s^2]": mean_fully_developed(path.times, way, speed),
-            "largest side slip [deg]": float(np.degrees(self.side_slip[slip])), "at [s]": float(path.times[slip]),
+            "largest side slip [deg]": float(np.degrees(self.side_slip[slip])),
+            "largest side slip at [s]": float(path.times[slip]),
             "largest lateral acceleration [m/s^2]": float(self.across[lateral]),
-            "at, too [s]": float(path.times[lateral]),
+            "largest lateral acceleration at [s]": float(path.times[lateral]),
         }  # fmt: skip
 
     def of_wheels(self) -> dict[str, np.ndarray]:
