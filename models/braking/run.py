@@ -91,7 +91,7 @@ class Braked:
         reports = list[np.ndarray]()
         step, released = self.sample / self.substeps, np.full(wheels, RELEASE)
         check_way(self.road, step * float(np.hypot(*state[1, :2])))
-        go = advance if self.relaxation is None else _lagging(self.relaxation)
+        go = advance if self.relaxation is None else _lagging(self.relaxation, state)
         go = go if self.engine is None else self.engine.advance
         with _kept(rows, reports):
             while status != AT_REST and time < duration - 1e-9:
@@ -115,11 +115,12 @@ class Braked:
         return _path(rows, reports, status == AT_REST)
 
 
-def _lagging(lengths: np.ndarray) -> Callable[..., Any]:
-    """``advance`` with tyres of relaxation lengths (W,) in m, which begin in a steady state."""
+def _lagging(lengths: np.ndarray, state: np.ndarray) -> Callable[..., Any]:
+    """``advance`` with tyres of relaxation lengths (W,) in m: straight ahead they begin without slip angles, whatever
+    the wheels are steered then, and in a turn as in a steady one."""
     from models.braking.relaxation import advance_lagging
 
-    lag = np.full(lengths.size, np.nan)
+    lag = np.full(lengths.size, np.nan if state[1, 1:].any() else 0.0)
     return lambda *given: advance_lagging(*given, lengths, lag)
 
 

@@ -1,0 +1,70 @@
+"""Tyres whose slip angles lag: the law exact, nothing of it where it is absent, at rest in the end."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.braking.controller import AllApplied
+from models.braking.magic_formula import surface
+from models.braking.plane_vehicle import PAPER, truck
+from models.braking.procedures import ready
+from models.braking.relaxation import lag_on, taken_up
+from models.braking.scene import build
+
+
+def test_the_law_is_exact_whatever_the_step():
+    a, u, v, length = 0.02, 8.0, 0.6, 0.5
+    once = taken_up(a, u, v, 0.1, length)
+    assert once == pytest.approx(v / u + (a - v / u) * np.exp(-u * 0.1 / length), rel=1e-14)
+    assert taken_up(taken_up(a, u, v, 0.03, length), u, v, 0.07, length) == pytest.approx(once, rel=1e-14)
+    assert taken_up(a, -u, v, 0.1, length) == once  # backwards it relaxes as well
+    assert taken_up(a, 0.0, v, 0.1, length) == a + v * 0.1 / length  # at rest it is a spring
+    assert taken_up(a, u, v, 9.0, length) == pytest.approx(v / u, rel=1e-14)
+
+
+def stop(length=None, steer=0.03, substeps=4, duration=20.0):
+    scene = build({"title": "t", "system": "braking", "road": {"stretches": [{"left": "snow"}]},
+                   "brakes": {"supply": 0.8}, "pressure": {}, "run": {"substeps": substeps},
+                   "procedures": {"j": {"kind": "j_turn", "speed": 9.0, "steer": steer}}})  # fmt: skip
+    vehicle, start = ready(scene, "j")
+    if length is not None:
+        vehicle = replace(vehicle, relaxation=np.full(4, length))
+    return vehicle.run(AllApplied(4), start, duration)
+
+
+def test_a_j_turn_with_lag_tends_to_the_one_without_and_mirrors():
+    without, little, much = stop(), stop(0.01), stop(0.8)
+    y = [path.states[-1, 0, 1] for path in (without, little, much)]
+    assert all(path.stands and not path.states[-1, 1].any() for path in (without, little, much))  # at rest, exactly
+    # of 3 m, 1 cm of lag changes 0.2 mm and 80 cm 14 mm
+    assert y[1] == pytest.approx(y[0], abs=5e-4) and 0.005 < abs(y[2] - y[0]) < 0.05
+    assert abs(much.states[9, 1, 2]) < 0.9 * abs(without.states[9, 1, 2])  # yaw rate builds up later
+    assert stop(0.8, -0.03).states[-1, 0, 1] == pytest.approx(-y[2], rel=1e-12)
+
+
+def test_the_step_is_of_second_order():
+    fine = stop(0.5, substeps=16, duration=0.6).states[100, 0]
+    errors = [np.abs(stop(0.5, substeps=n, duration=0.6).states[100, 0] - fine).max() for n in (1, 2)]
+    assert errors[1] < 0.3 * errors[0] < 1e-5  # a quarter, in m
+
+
+def test_it_damps_at_rest():
+    # a wheel's share of a mass on its tyre alone, at rest along it and pushed aside at 0.3 m/s
+    plane, slope, step = truck(PAPER), surface("ice").cornering, 5.5e-3
+    lag, surfaces, state = np.zeros(4), np.zeros((4, 4)), np.array([[0.0, 0.0, 0.0], [0.0, 0.3, 0.0]])
+    way = 0.0
+    for _ in range(round(2.0 / step)):
+        for half in (True, False):
+            lag_on(state, 0.5 * step, np.zeros(4), plane, slope, np.full(4, 0.3), lag, surfaces)
+            if half:
+                state[1, 1] -= step * 9.81 * slope * surfaces[:, 3].mean()
+                way += step * state[1, 1]
+    assert abs(state[1, 1]) < 1e-3 and abs(way) < 0.02  # without the damper it keeps rocking at 0.3 m/s
+
+
+def test_a_run_without_it_imports_nothing_of_it():
+    code = "import sys, models.braking.run; sys.exit('models.braking.relaxation' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
