@@ -21,6 +21,9 @@ CLOSE = 1e-8
 HALF_ROUNDS, PATIENCE, MOST_ROUNDS = 1, 12, 200
 """Rounds of a half step, to whose loads those of the step before are close enough for order two; rounds after which
 Anderson's method gives way to a damped one; rounds after which there is no answer."""
+NEARLY = 0.98
+"""Slip from which on the direction of the force goes over to that of a locked tyre: without a jump, which would leave
+some loads without an answer."""
 FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE, LOCKED, TURNING = range(7)
 """Columns of what each wheel reports: mean forces on it (N) in its own axes, load (N), mean slip, slip angle (rad),
 time locked (s), speed of turning at the end (rad/s)."""
@@ -111,8 +114,8 @@ def tyre(known, rate, load, torque0, torque1, step, tables, report):
         side += share * (across(second, angle, load, size, angles, slips, loads, g, h) - side)
     side *= load
     speed = math.hypot(known[ALONG], v)
-    if locked > 0.0 and speed > 0.0:  # a locked tyre's force is against the way it slides
-        total, part = math.hypot(force, side), min(locked / step, 1.0)
+    if slip > NEARLY and speed > 0.0:  # a locked tyre's force is against the way it slides
+        total, part = math.hypot(force, side), min((slip - NEARLY) / (1.0 - NEARLY), 1.0)
         force += part * (total * known[ALONG] / speed - force)
         side += part * (total * abs(v) / speed - side)
     report[FORCE_X], report[FORCE_Y] = -sign * force, -math.copysign(side, v) if v != 0.0 else 0.0

@@ -54,18 +54,18 @@ def node_force(k, grip, mu_x):
 
 @njit(cache=True, error_model="numpy")
 def roll(slip, left, kappa, fade, held, grip, slips, mu_x):
-    """A turning wheel for at most ``left`` seconds or until it locks: time used, slip then, integral of the slip (s).
+    """A wheel at a slip from -1 to 1 for at most ``left`` seconds or until it leaves them.
 
-    kappa : r^2 / (J u) in 1/(N s); fade : u' / u in 1/s; held : T / r in N.
+    kappa : r^2 / (J u) in 1/(N s); fade : u' / u in 1/s; held : T / r in N. Returns the time used, slip then and
+    integral of the slip (s).
     """
     last, used, area, turned = slips.size - 1, 0.0, 0.0, 0
     cell = place(slips, abs(slip))[0]
     if slip < 0.0:
-        cell = -cell - 1 if slip >= -1.0 else -last - 1
-    low, high = node_force(max(cell, -last), grip, mu_x), node_force(cell + 1, grip, mu_x)
+        cell = -cell - 1
+    low, high = node_force(cell, grip, mu_x), node_force(cell + 1, grip, mu_x)
     for _ in range(MOST_PIECES):
-        tail, top = cell < -last, node(cell + 1, slips)
-        bottom = -math.inf if tail else node(cell, slips)
+        bottom, top = node(cell, slips), node(cell + 1, slips)
         slope = (high - low) / (top - bottom)
         rate = kappa * (held - high - slope * (slip - top)) + (1.0 - slip) * fade
         target, turn = (top, 1) if rate > 0.0 else (bottom, -1)
@@ -73,12 +73,12 @@ def roll(slip, left, kappa, fade, held, grip, slips, mu_x):
             if turned == -turn:  # either cell sends it into the other one: by rounding, it rests on their node
                 return left, slip, area + slip * (left - used)
             cell, turned = cell + turn, turn
-            if cell == last:
-                return used, 1.0, area
+            if cell == last or cell < -last:
+                return used, slip, area
             if turn > 0:
                 low, high = high, node_force(cell + 1, grip, mu_x)
             else:
-                low, high = node_force(max(cell, -last), grip, mu_x), low
+                low, high = node_force(cell, grip, mu_x), low
             continue
         decay = kappa * slope + fade
         time = _way(decay, rate, target - slip)
@@ -94,7 +94,7 @@ def roll(slip, left, kappa, fade, held, grip, slips, mu_x):
 @njit(cache=True, error_model="numpy")
 def _way(decay, rate, way):
     """Time in which a rate that decays as exp(-decay t) covers a way of its sign; infinite if it never does."""
-    if rate == 0.0 or math.isinf(way):
+    if rate == 0.0:
         return math.inf
     share = decay * way / rate
     if share >= 1.0:
@@ -109,8 +109,8 @@ def wheel_step(u0, u1, w0, torque0, torque1, step, radius, inertia, grip, slips,
     """A wheel whose centre goes from speed u0 to u1, both from 0 on, while the brake's torque goes from one to another.
 
     w0 : speed of turning (rad/s), negative if against the direction of u. Torques in N m, from 0 on, linear in time.
-    Returns the speed of turning at the end, the mean force (N, positive if it brakes the vehicle), the mean slip and
-    the time (s) for which the wheel was locked.
+    Returns the speed of turning at the end, the mean force (N, positive if it brakes the vehicle), the mean slip, for
+    which slips below -1 count as -1, and the time (s) for which the wheel was locked.
     """
     u0, u1 = max(u0, SLOWEST), max(u1, 0.0)
     mean = max(0.5 * (u0 + u1), SLOWEST)
@@ -134,16 +134,29 @@ def wheel_step(u0, u1, w0, torque0, torque1, step, radius, inertia, grip, slips,
             area += free - now
             locked += free - now
             now, slip, freed = free, 1.0, True
-        else:
-            start = (u0 + (u1 - u0) * now / step) * (1.0 - slip) / radius
-            used, slip, part = roll(min(slip, 1.0), left, kappa, fade, held, grip, slips, mu_x)
-            if used == 0.0 and slip >= 1.0:  # by rounding alone: it can neither turn nor be held
-                used = left
+            continue
+        u = u0 + (u1 - u0) * now / step
+        start = u * (1.0 - slip) / radius
+        ahead, gain_on = radius * start - 2.0 * u, -radius * (radius * sliding + held * radius) / inertia
+        gain_on -= 2.0 * (u1 - u0) / step
+        if slip < -1.0 or (slip == -1.0 and gain_on > 0.0):  # it turns twice as fast as it rolls: friction is steady
+            used = min(left, -ahead / gain_on) if gain_on < 0.0 else left
             now += used
-            end = (u0 + (u1 - u0) * now / step) * (1.0 - slip) / radius
-            impulse += inertia * (end - start) / radius + held * used
-            area += part
-            freed = False
-            if not slip <= 1.0:
-                return math.nan, math.nan, math.nan, math.nan
+            impulse -= sliding * used
+            area -= used
+            if now >= step:
+                turned = start - radius * (sliding + held) * used / inertia
+                return turned, impulse / step, area / step, locked
+            slip, freed = -1.0, False
+            continue
+        used, slip, part = roll(min(slip, 1.0), left, kappa, fade, held, grip, slips, mu_x)
+        if used == 0.0:  # by rounding alone: neither what lies beyond nor this takes it
+            used = left
+        now += used
+        end = (u0 + (u1 - u0) * now / step) * (1.0 - slip) / radius
+        impulse += inertia * (end - start) / radius + held * used
+        area += part
+        freed = False
+        if not slip <= 1.0:
+            return math.nan, math.nan, math.nan, math.nan
     return u1 * (1.0 - slip) / radius, impulse / step, area / step, locked
