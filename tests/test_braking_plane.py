@@ -37,16 +37,17 @@ def constant(mu: float) -> Tables:
     """Friction that is the same at every slip from 0.1 on."""
     flat = np.broadcast_to(np.array([0.0, mu, mu]), (3, 1, 3)).copy()
     nodes = np.array([0.0, 0.1, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
-    return stacked([TyreTable(*nodes, flat, np.ones((3, 3)) * np.array([1.0, 0.0, 0.0]), np.array([[0.0], [mu], [mu]]))])
+    g, h = np.ones((3, 3)) * np.array([1.0, 0.0, 0.0]), np.array([[0.0], [mu], [mu]])
+    return stacked([TyreTable(*nodes, flat, g, h)])
 
 
 def test_locked_wheels_stop_in_the_closed_form():
     for step in (1e-4, 5.5e-3, 2e-2):
-        state, time, *_ = braked(LOCKING, tables=constant(0.4), step=step, speed=10.0)
+        state, *_ = braked(LOCKING, tables=constant(0.4), step=step, speed=10.0)
         # the wheels' own stop, v / r in J v / (r T) = 0.3 ms, gives back less force than a locked wheel has
         assert state[0, 0] == pytest.approx(100.0 / (2.0 * 0.4 * GRAVITY), rel=2e-3)
         assert not state[1].any()
-    state, time, *_ = _locked_from_the_start(constant(0.4))
+    state, *_ = _locked_from_the_start(constant(0.4))
     assert state[0, 0] == pytest.approx(100.0 / (2.0 * 0.4 * GRAVITY), rel=1e-9)
 
 
@@ -61,7 +62,8 @@ def test_load_transfer_of_all_and_of_single_axles():
     m, h, base = PAPER.mass, PAPER.height, PAPER.wheelbase
     light = plane._replace(spin=np.full(4, 1e-9))
     static = plane.static.reshape(2, 2).sum(1)
-    whole, front, rear = mu * GRAVITY, mu * static[0] / (m * (1 - mu * h / base)), mu * static[1] / (m * (1 + mu * h / base))
+    whole, share = mu * GRAVITY, mu * h / base
+    front, rear = mu * static[0] / (m * (1.0 - share)), mu * static[1] / (m * (1.0 + share))
     for torques, slowing in (((1e5, 1e5), whole), ((1e5, 0.0), front), ((0.0, 1e5), rear)):
         _, _, report, _ = braked(np.repeat(torques, 2), tables=constant(mu), plane=light, duration=0.5)
         loads = report[:, LOAD].reshape(2, 2).sum(1)
@@ -77,23 +79,23 @@ def test_equal_friction_gives_no_yaw_at_all_and_mirrored_steering_a_mirrored_pat
 
 
 def test_locked_front_wheels_do_not_steer():
-    state, *_ = braked(np.array([1e5, 1e5, 0.0, 0.0]), steer=0.05, until=1.0)
+    state, *_ = braked(np.array([1e9, 1e9, 0.0, 0.0]), steer=0.05, until=1.0)  # locked at once
     assert abs(state[0, 1]) < 1e-3
 
 
-@pytest.mark.parametrize("step", [1e-4, 5.5e-3, 2e-2])
+@pytest.mark.parametrize("step", [pytest.param(1e-4, marks=pytest.mark.full), 5.5e-3, 2e-2])
 def test_every_end_is_at_rest_and_stays(step):
     for torque in (0.0, 30.0, 700.0, 1e5):
         for yaw, side in ((0.0, 0.0), (2.0, -3.0), (0.0, 0.6)):
             torques = np.array([torque, torque, 0.5 * torque, 0.0])
-            state, time, _, turning = braked(torques, steer=0.03, speed=0.5, yaw=yaw, side=side, step=step, duration=2.0)
+            state, _, _, turning = braked(torques, steer=0.03, speed=0.5, yaw=yaw, side=side, step=step, duration=2.0)
             assert np.isfinite(state).all() and np.isfinite(turning).all()
-    state, time, report, turning = braked(np.full(4, 5e3), steer=0.03, speed=1.0, yaw=2.0, side=1.0, step=step)
+    state, _, report, turning = braked(np.full(4, 5e3), steer=0.03, speed=1.0, yaw=2.0, side=1.0, step=step)
     assert not state[1].any() and not turning.any()
     again = state.copy()
-    status, used = advance(again, turning, np.full((3, 4), 5e3), step, np.zeros(4), ICE.cornering, truck(PAPER),
-                           np.zeros(4, dtype=int), road([Stretch(0.0, 0, 0)]), stacked([ICE]).packed, np.zeros(3),
-                           report)  # fmt: skip
+    status, _ = advance(again, turning, np.full((3, 4), 5e3), step, np.zeros(4), ICE.cornering, truck(PAPER),
+                        np.zeros(4, dtype=int), road([Stretch(0.0, 0, 0)]), stacked([ICE]).packed, np.zeros(3),
+                        report)  # fmt: skip
     assert status == AT_REST and np.array_equal(again, state)
 
 
@@ -116,7 +118,8 @@ def test_engines_carry_the_chassis_as_the_compiled_step_does(engine):
 @pytest.mark.full
 def test_the_truck_written_out_turns_as_the_compiled_one():
     where = turned(PAPER, ICE, 0.03, (900.0, 600.0), 11.11, 6.0)
-    state, time, *_ = braked(np.array([900.0, 900.0, 600.0, 600.0]), steer=0.03, speed=11.11, step=1e-3, duration=where.time)
+    torques = np.array([900.0, 900.0, 600.0, 600.0])
+    state, *_ = braked(torques, steer=0.03, speed=11.11, step=1e-3, duration=where.time)
     assert state[0] == pytest.approx([where.x, where.y, where.heading], abs=2e-3)
 
 
@@ -127,10 +130,12 @@ def rolling(slope: float) -> Tables:
     return stacked([TyreTable(*nodes, np.zeros((3, 1, 3)), np.ones((3, 3)), mu)])
 
 
+@pytest.mark.full
 def test_trailer_on_a_straight_pull():
     v, step, n = 0.2, 5e-4, 8000
     state = np.array([[0.0, 0.0, 0.5, 0.5], [v, 0.0, -v * np.sin(0.5) / CHOSEN.drawbar, 0.0]])
-    states, forces = follow(hooked(CHOSEN), rolling(100.0), state, np.tile([v, 0.0], (n + 1, 1)), step, 100.0, np.zeros(4))
+    hook = np.tile([v, 0.0], (n + 1, 1))
+    states, forces = follow(hooked(CHOSEN), rolling(100.0), state, hook, step, 100.0, np.zeros(4))
     angle = 2.0 * np.arctan(np.tan(0.25) * np.exp(-v * n * step / CHOSEN.drawbar))
     assert states[-1, 0, 2] == pytest.approx(angle, rel=1e-4)
     assert np.hypot(*forces[-1]) < 50.0  # it only rolls
