@@ -15,13 +15,12 @@ from models.braking.plane_step import FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE
 from models.braking.procedures import drive
 from models.braking.run import Path
 from models.braking.scene import BrakingScene
-from models.braking.stop_report import Stop
+from models.braking.stop_report import WHEELS, Stop
 from models.errors import RunFailed
 from models.strict import Strict, read
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
-WHEELS = ("front left", "front right", "rear left", "rear right")
 
 
 class Options(Strict):
@@ -95,8 +94,8 @@ def lines(name: str, stop: Stop, told: dict[str, float]) -> list[str]:
     rows += [f"    {key:<40}{value:>10.3f}" for key, value in told.items()]
     rows += [f"    ({NOT_CHECKED})"] if told else []
     names = WHEELS[: stop.path.turning.shape[1]]
-    rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel:>13}" for wheel in names)]
-    return rows + [f"    {key:<40}" + "".join(f"{value:>13.2f}" for value in values)
+    rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel.replace('trailer ', 'tr. '):>17}" for wheel in names)]
+    return rows + [f"    {key:<40}" + "".join(f"{value:>17.2f}" for value in values)
                    for key, values in stop.of_wheels().items()]  # fmt: skip
 
 

@@ -46,9 +46,11 @@ class Case:
 def cases(scene: BrakingScene) -> list[Case]:
     """All runs, surface by surface."""
     options = read(Options, scene.options, scene.file, "options")
-    return [Case(surface, name, controller, _alone(scene, surface, right, name, table))
+    trains = [scene] if scene.trailer is None else [scene.model_copy(update={"trailer": None}), scene]
+    return [Case(surface, name, controller + " + trailer" * (own.trailer is not None),
+                 _alone(own, surface, right, name, table))
             for surface, right in options.surfaces.items() for name in scene.procedures
-            for controller, table in options.controllers.items()]  # fmt: skip
+            for own in trains for controller, table in options.controllers.items()]  # fmt: skip
 
 
 def _alone(scene: BrakingScene, surface: str, right: str, name: str, controller: ControllerTable) -> BrakingScene:
@@ -91,10 +93,10 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 def table(found: list[tuple[Case, dict[str, float]]]) -> list[str]:
     """One line per run."""
     heads = [*SHOWN, "locked [s]"]
-    lines = [f"  {'surface':<10}{'procedure':<12}{'controller':<22}" + "".join(f"{head:>17}" for head in heads)]
+    lines = [f"  {'surface':<10}{'procedure':<12}{'controller':<32}" + "".join(f"{head:>17}" for head in heads)]
     for case, values in found:
         name = case.procedure.replace("_", " ")
-        lines.append(f"  {case.surface:<10}{name:<12}{case.controller:<22}"
+        lines.append(f"  {case.surface:<10}{name:<12}{case.controller:<32}"
                      + "".join(f"{values[head]:>17.2f}" for head in heads))  # fmt: skip
     return [*lines, "  locked: longest of the wheels, above 15 km/h"]
 
@@ -116,6 +118,7 @@ def _figure(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], fil
 
     surfaces = list(dict.fromkeys(case.surface for case, _ in found))
     rights = read(Options, scene.options, scene.file, "options").surfaces
+    each = len(read(Options, scene.options, scene.file, "options").controllers)
     names, kinds = list(scene.procedures), list(dict.fromkeys(case.controller for case, _ in found))
     figure, axes = plt.subplots(len(PANELS), max(len(surfaces), 1), figsize=(4.4 * max(len(surfaces), 1), 6.4),
                                 squeeze=False, sharey="row")  # fmt: skip
@@ -128,7 +131,8 @@ def _figure(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], fil
                        if case.surface == surface and case.controller == kind}  # fmt: skip
                 heights = [own.get(name, np.nan) for name in names]
                 axis.bar(np.arange(len(names)) + (k - (len(kinds) - 1) / 2) * width, heights, width * 0.95,
-                         label=kind.replace("_", " "), color=f"C{k}")  # fmt: skip
+                         label=kind.replace("_", " "), color=f"C{k % each}",
+                         alpha=1.0 if k < each else 0.5)  # fmt: skip
             axis.set_xticks(range(len(names)), [name.replace("_", " ") for name in names])
             axis.set(title=f"{heading} on {surface}; split: {rights[surface]} on the right",
                      ylabel=key.replace("^2", "²") if column == 0 else "")  # fmt: skip

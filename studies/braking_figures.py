@@ -8,11 +8,9 @@ import numpy as np
 from models.braking.of_scene import sides
 from models.braking.plane_step import SLIP
 from models.braking.scene import BrakingScene
-from models.braking.stop_report import SLOWEST, Stop
+from models.braking.stop_report import SLOWEST, WHEELS, Stop
 from studies.figures import save
 
-WHEELS = ("front left", "front right", "rear left", "rear right", "trailer front left", "trailer front right",
-          "trailer rear left", "trailer rear right")  # fmt: skip
 COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#66c2a5", "#cc79a7", "#e7b5d1")
 GROUND = {"dry": "#9a9a9a", "wet": "#7f9bb3", "snow": "#eceff1", "ice": "#cfe8f3"}
 OTHER = "#e8dcc8"

@@ -76,8 +76,8 @@ def axles(scene: BrakingScene) -> Axles:
 
 
 def alone(scene: BrakingScene, surface: str) -> Braked:
-    """The scene's vehicle on one surface everywhere."""
-    plain = scene.model_copy(update={"road": RoadTable(stretches=[Stretch(left=surface)])})
+    """The scene's vehicle without trailer, on one surface everywhere."""
+    plain = scene.model_copy(update={"trailer": None, "road": RoadTable(stretches=[Stretch(left=surface)])})
     return braked(plain, Procedure())
 
 
@@ -144,7 +144,7 @@ def split(scene: BrakingScene, name: str) -> Split:
     """z of a split procedure from 50 km/h, between 40 and 20 km/h, and k_M of both surfaces of its first stretch."""
     own, first = scene.procedures[name], scene.road.stretches[0]
     both = [adhesion(scene, surface) for surface in (first.left, own.right or first.right or first.left)]
-    vehicle = braked(scene, own)
+    vehicle = braked(scene.model_copy(update={"trailer": None}), own)
     path = vehicle.run(controller_of(scene, vehicle.plane.wheels), 50.0 * KMH, scene.run.duration)
     z = braking_rate(40.0 * KMH, 20.0 * KMH, _between(path, 40.0, 20.0))
     k = sorted(adhesion_of_vehicle(z, one.front, one.rear, axles(scene)) for one in both)

@@ -9,12 +9,13 @@ import numpy as np
 from models.braking.brake import Brake, of_wheels
 from models.braking.controller import Controller
 from models.braking.controllers import CONTROLLERS
-from models.braking.plane_vehicle import PAPER, Truck, truck
+from models.braking.plane_vehicle import PAPER, Plane, Truck, truck
 from models.braking.pressure import Chambers
 from models.braking.run import Braked
 from models.braking.scene import BrakeTable, BrakingScene, Procedure, Stretch
 from models.braking.surfaces import Road, road
 from models.braking.surfaces import Stretch as Numbered
+from models.braking.trailer import train
 from models.braking.tyre_source import NAMES, SCALES, from_file, named
 from models.braking.tyre_table import TyreTable, stacked
 from models.errors import InputError
@@ -24,17 +25,27 @@ from models.strict import read
 
 def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
     """The scene's vehicle with its brakes on the road of a procedure; InputError for what does not fit together."""
-    plane = truck(vehicle_of(scene), transfer=scene.load_transfer is not None)
+    plane = plane_of(scene)
     names = surfaces_of(scene, procedure)
     tyres = [table_of(scene, name, rear) for name in names for rear in kinds_of(scene)]
-    front, rear = (brake_of(scene, axle) for axle in ("front", "rear"))
+    front, rear, behind = (brake_of(scene, axle) for axle in ("front", "rear", "trailer"))
     return Braked(
         plane=plane, kind=np.where(np.arange(plane.wheels) < 2, 0, len(kinds_of(scene)) - 1), tables=stacked(tyres),
         slope=max(table.cornering for table in tyres), road=road_of(scene, procedure, names),
-        brakes=of_wheels(front, front, rear, rear), chambers=chambers_of(scene, plane.wheels),
+        brakes=of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
+        chambers=chambers_of(scene, plane.wheels),
         steer=np.zeros(plane.wheels), substeps=scene.run.substeps, sample=scene.run.sample,
         speed_given=scene.controller.true_speed, relaxation=lags_of(scene, plane.wheels),
     )  # fmt: skip
+
+
+def plane_of(scene: BrakingScene) -> Plane:
+    """Numbers of the truck, or of the truck and its trailer."""
+    own, transfer = vehicle_of(scene), scene.load_transfer is not None
+    try:
+        return truck(own, transfer) if scene.trailer is None else train(own, scene.trailer, transfer)
+    except InputError as error:
+        raise InputError(scene.file, f"vehicle or trailer: {error.place}", error.value, error.allowed) from None
 
 
 def vehicle_of(scene: BrakingScene) -> Truck:

@@ -59,6 +59,7 @@ def effects(scene: BrakingScene) -> tuple[list[str], list[str]]:
     """Effects that the scene names, and those that it does not."""
     brakes, port = (scene.brakes.front, scene.brakes.rear), scene.port
     present = {
+        "trailer": scene.trailer is not None,
         "load transfer": scene.load_transfer is not None,
         "push-out": any(brake.push_out > 0.0 for brake in brakes),
         "hysteresis": any(brake.release is not None or brake.falling is not None for brake in brakes),

@@ -19,6 +19,10 @@ STEERED = 2
 """Wheels that are steered: those of the first axle, in parallel."""
 BLINK = 1e-5
 """s: time over which the accelerations of a steady turn are taken."""
+SPEEDS = np.linspace(0.1, 1.0, 10)
+"""Shares of the speed through which a steady turn is followed: other solutions slide beyond the tyres' peak."""
+LARGEST = 0.5
+"""rad: steer angle, side slip and angles of hinges of a turn that is one."""
 STEADY = 1e-6
 """m/s^2, and rad/s^2 times 1 m: what is left of a steady turn's accelerations."""
 
@@ -73,27 +77,30 @@ def steady_turn(vehicle: Braked, speed: float, radius: float) -> SteadyTurn | No
     All wheels roll freely: the drive that holds the speed is not there, so that the vehicle slows down by the drag of
     its slip angles. Unknown are the steer angle, the side slip and the headings of the units behind.
     """
-    units, rate = vehicle.plane.masses.size, speed / radius
+    units = vehicle.plane.masses.size
 
-    def state(unknown: np.ndarray) -> np.ndarray:
+    def state(unknown: np.ndarray, own: float) -> np.ndarray:
         both = np.zeros((2, 2 + units))
-        both[0, 3:], both[1, 2:] = unknown[2:], rate
-        both[1, :2] = speed * np.cos(unknown[1]), speed * np.sin(unknown[1])
+        both[0, 3:], both[1, 2:] = unknown[2:], own / radius
+        both[1, :2] = own * np.cos(unknown[1]), own * np.sin(unknown[1])
         return both
 
-    def left(unknown: np.ndarray) -> np.ndarray:
-        found = _accelerations(vehicle, state(unknown), steered(vehicle, unknown[0]))
+    def left(unknown: np.ndarray, own: float) -> np.ndarray:
+        found = _accelerations(vehicle, state(unknown, own), steered(vehicle, unknown[0]))
         across = found[1] * np.cos(unknown[1]) - found[0] * np.sin(unknown[1])
-        return np.concatenate(([across - speed * rate], found[2:]))
+        return np.concatenate(([across - own**2 / radius], found[2:]))
 
-    wheelbase = np.ptp(vehicle.plane.place[vehicle.plane.unit == 0, 0])
-    guess = np.zeros(1 + units)
-    guess[0] = wheelbase / radius
-    solved = root(left, guess, tol=1e-12)
-    if np.abs(left(solved.x)).max() > STEADY or np.abs(solved.x).max() > 1.0:
-        return None
-    steer = steered(vehicle, solved.x[0])
-    return SteadyTurn(steer, Start(state(solved.x), _rolling(vehicle, state(solved.x), steer)))
+    plane = vehicle.plane
+    last = np.array([plane.reach[k].sum() + plane.place[plane.unit == k, 0].min() for k in range(units)])
+    guess = np.zeros(1 + units)  # of wheels that roll along the circle: the last ones of each unit on its tangent
+    guess[0], guess[1] = np.ptp(plane.place[plane.unit == 0, 0]) / radius, -last[0] / radius
+    guess[2:] = (last[1:] - last[0]) / radius
+    for own in speed * SPEEDS:
+        guess = root(left, guess, (own,), tol=1e-12).x
+        if np.abs(left(guess, own)).max() > STEADY or np.abs(guess).max() > LARGEST:
+            return None
+    steer = steered(vehicle, guess[0])
+    return SteadyTurn(steer, Start(state(guess, speed), _rolling(vehicle, state(guess, speed), steer)))
 
 
 def _rolling(vehicle: Braked, state: np.ndarray, steer: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from models.braking.controller import SAMPLE
 from models.braking.port.setup import PortTable
+from models.braking.trailer import Trailer
 from models.errors import InputError
 from models.scene_file import SceneFile, checked
 from models.strict import Strict, quantity
@@ -64,10 +65,11 @@ class BrakeTable(Strict):
 
 
 class BrakesTable(Strict):
-    """[brakes]: of each axle, and the pressure that the pedal lets through."""
+    """[brakes]: of each axle, of all wheels of a trailer, and the pressure that the pedal lets through."""
 
     front: BrakeTable = BrakeTable(gradient=1500.0)
     rear: BrakeTable = BrakeTable(gradient=1200.0)
+    trailer: BrakeTable = BrakeTable(gradient=1200.0)
     supply: float = quantity("bar", "pressure at the valves", default=6.0)
 
 
@@ -85,7 +87,7 @@ class Relaxation(Strict):
     """[relaxation]: slip angles lag; not named, tyres answer at once."""
 
     front: float = quantity("m", "relaxation length across the front wheels")
-    rear: float = quantity("m", "relaxation length across the rear wheels")
+    rear: float = quantity("m", "relaxation length across all others")
 
 
 class ControllerTable(Strict):
@@ -120,6 +122,7 @@ class BrakingScene(SceneFile):
     system: Literal["braking"] = "braking"
     study: str = Field(default="braking", description="the study that runs the scene")
     vehicle: VehicleTable = VehicleTable()
+    trailer: Trailer | None = Field(default=None, description="a drawbar trailer of two axles")
     load_transfer: LoadTransfer | None = Field(default=None, description="semi-static load transfer")
     road: RoadTable = RoadTable()
     tyres: TyreTables = TyreTables()

@@ -18,6 +18,8 @@ from models.braking.figures_of_merit import (
 from models.braking.plane_step import LOCKED, SLIP
 from models.braking.run import Path
 
+WHEELS = ("front left", "front right", "rear left", "rear right", "trailer front left", "trailer front right",
+          "trailer rear left", "trailer rear right")  # fmt: skip
 SLOWEST = 1.0
 """m/s: slips and slip angles of a vehicle that hardly moves mean nothing, and are left out below this speed."""
 LIMITS = (0.2, 0.5)
