@@ -70,8 +70,9 @@ class Plane(NamedTuple):
 def truck(vehicle: Truck, transfer: bool = True) -> Plane:
     """Numbers of a vehicle of two axles; without ``transfer`` its loads stay as they are at rest."""
     none = np.zeros(4, dtype=np.int64)
+    place, radius, spin, static, by_x, by_y = wheels(vehicle, transfer)
     return Plane(np.array([vehicle.mass]), np.array([vehicle.yaw_inertia]), np.zeros((1, 1)), none, none.copy(),
-                 *wheels(vehicle, transfer), 0)  # fmt: skip
+                 place, radius, spin, static, by_x, by_y, 0)  # fmt: skip
 
 
 def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:

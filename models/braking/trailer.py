@@ -6,6 +6,8 @@ of the body. The hook bears no load, and its force is taken to act at the ground
 the wheelbase from one axle to the other.
 """
 
+from typing import Any
+
 import numpy as np
 from pydantic import Field
 
@@ -30,7 +32,8 @@ class Trailer(Truck):
 def hooked(trailer: Trailer, transfer: bool = True) -> Plane:
     """Numbers of a trailer whose hook, the first two coordinates, follows a prescribed motion."""
     reach = np.array([[-trailer.drawbar, 0.0], [-trailer.drawbar, -trailer.front.x]])
-    return Plane(*_units(trailer), reach, *_wheels(trailer, 0, transfer), 1)
+    parts: list[Any] = [*_units(trailer), reach, *_wheels(trailer, 0, transfer), 1]
+    return Plane(*parts)
 
 
 def train(vehicle: Truck, trailer: Trailer, transfer: bool = True) -> Plane:
@@ -39,7 +42,8 @@ def train(vehicle: Truck, trailer: Trailer, transfer: bool = True) -> Plane:
     reach[1:, 0], reach[1:, 1], reach[2, 2] = trailer.hook, -trailer.drawbar, -trailer.front.x
     units = (np.concatenate((a, b)) for a, b in zip(own[:2], _units(trailer), strict=True))
     both = (np.concatenate((a, b)) for a, b in zip(own[3:11], _wheels(trailer, 1, transfer), strict=True))
-    return Plane(*units, reach, *both, 0)
+    parts: list[Any] = [*units, reach, *both, 0]
+    return Plane(*parts)
 
 
 def _units(trailer: Trailer) -> tuple[np.ndarray, np.ndarray]:

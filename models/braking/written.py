@@ -41,7 +41,8 @@ def turned(vehicle: Truck, tyre: TyreTable, steer: float, torques: tuple[float, 
     found = solve_ivp(equations, (0.0, 200.0), start, method="LSODA", rtol=TIGHT, atol=TIGHT, events=slow)
     if not found.success or not found.t_events[0].size:
         raise RunFailed("written", "the vehicle does not slow down", float(found.t[-1]))
-    return Turned(*(float(value) for value in found.y_events[0][0][:3]), float(found.t_events[0][0]))
+    x, y, heading = found.y_events[0][0][:3]
+    return Turned(float(x), float(y), float(heading), float(found.t_events[0][0]))
 
 
 class _Equations:
