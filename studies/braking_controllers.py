@@ -25,7 +25,7 @@ SHOWN = {"distance [m]": "stopping distance [m]", "v0^2/2d [m/s^2]": "v0^2/2d [m
 class Options(Strict):
     """[options] of this study."""
 
-    surfaces: dict[str, str] = Field({"ice": "snow", "snow": "dry", "dry": "ice"}, min_length=1,
+    surfaces: dict[str, str] = Field({"ice": "snow", "snow": "dry", "dry": "snow"}, min_length=1,
                                      description="and what lies right of each in split procedures")  # fmt: skip
     controllers: dict[str, ControllerTable] = Field(
         {kind: ControllerTable(kind=kind) for kind in ("slip_bang_bang", "acceleration_phases", "slip_pi")},
