@@ -78,7 +78,7 @@ def stopped(scheme: str, quarter: Quarter, tyre: TyreTable, torque: float, speed
             step: float) -> tuple[float, float]:  # fmt: skip
     """Stopping distance (m) by one of SCHEMES under a constant torque (N m), from rolling at a speed (m/s).
 
-    A scheme that chatters may never stop. After PATIENCE times the time that the torque's own force would take, the way
+    A scheme may chatter or creep for ever. After PATIENCE times the time that the torque alone would take, the way
     until then is given, with the speed (m/s) that is left, else 0.
     """
     most = int(PATIENCE * speed * quarter.mass * quarter.radius / (torque * step))

@@ -1,0 +1,53 @@
+"""A braked quarter vehicle: the quick case passes, and what it judges by can see what it is there to see."""
+
+import numpy as np
+import pytest
+
+from models.braking.quarter import Stop
+from models.errors import InputError
+from validation.braking_schemes import LITERAL, exact, stopped
+from validation.cases import braking_faults
+from validation.cases import braking_stop as case
+from validation.faults.braking import FAULTS
+
+
+def test_all_rows_pass(tmp_path):
+    rows, data = case.measure(True, tmp_path)
+    assert [row.reason for row in rows if row.status != "passed"] == []
+    assert len(case.tables(data)[0].rows) == 16
+
+
+def test_the_literal_scheme_would_fail():
+    tyre, _ = case.met("dry")
+    torque = case.steady(case.FRONT, tyre, 0.06)[1]
+    error = stopped(LITERAL, case.FRONT, tyre, torque, 22.22, case.STEP)[0] / exact(case.FRONT, tyre, torque, 22.22) - 1
+    assert 0.05 < error < 0.08  # 6.4 %: force of the start of the step on the vehicle
+
+
+def test_the_exact_way_of_a_wheel_that_locks_at_once_is_that_of_sliding():
+    tyre, _ = case.met("ice")
+    slide = 11.11**2 / (2.0 * case.GRAVITY * float(tyre.mu_x[0, 0, -1]))
+    assert exact(case.FRONT, tyre, 1e7, 11.11) == pytest.approx(slide, rel=1e-4)  # it locks within a millisecond
+
+
+@pytest.mark.parametrize(("row", "column", "value", "said"), [
+    (2, 3, -1e-9, "turns backwards"), (1, 3, 20.1, "turns faster than it rolls"), (3, 2, 1e-4, "creeps"),
+    (3, 1, 5.001, "creeps"), (1, 2, np.nan, "no number"),
+])  # fmt: skip
+def test_each_rule_of_a_stop_is_seen_to_break(row, column, value, said):
+    path = np.array([[0.0, 0.0, 10.0, 20.0, 0.0], [0.5, 4.0, 5.0, 9.0, 0.0], [1.0, 5.0, 0.0, 0.0, 0.0],
+                     [1.5, 5.0, 0.0, 0.0, 0.0]])  # fmt: skip
+    assert case.faults_of(Stop(path, 2), 0.5, True) == []
+    path[row, column] = value
+    assert said in case.faults_of(Stop(path, 2), 0.5, True)
+
+
+def test_a_torque_that_drives_is_refused():
+    with pytest.raises(InputError, match="brake opposes"):
+        case.braked(case.FRONT, case.met("ice")[1], case.EVEN, np.array([0.0, -1.0]), case.STEP, 10.0)
+
+
+def test_every_planted_fault_is_caught_and_nothing_else(tmp_path):
+    rows, _ = braking_faults.measure(True, tmp_path)
+    assert [row.reason for row in rows if row.status != "passed"] == []
+    assert len(FAULTS) >= 10
