@@ -1,0 +1,137 @@
+"""A braked truck in the plane: both engines and the written form beside the compiled step, symmetries, the trailer."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.braking.advance import FINE, advance
+from models.braking.magic_formula import surface
+from models.braking.plane_step import REPORTED
+from models.braking.plane_vehicle import PAPER, truck
+from models.braking.surfaces import Stretch, road
+from models.braking.trailer import CHOSEN, follow, hooked
+from models.braking.tyre_table import Tables, TyreTable, stacked
+from models.braking.written import Turned, turned
+from models.engines.braking import Carried
+from validation.rows import Row, System, Table, at_most, finding
+
+TITLE = "Braking in a turn, in engines and with a trailer"
+SYSTEM: System = "anti-lock"
+STEP, SPEED, UNTIL, STEER = 1e-3, 11.11, 0.5, 0.03
+TORQUES = (870.0, 580.0)
+"""Of each front and each rear wheel (N m): the truck goes 60 m, and no wheel locks."""
+ICE = surface("ice")
+STIFF = 100.0
+"""Slope of the trailer's tyres (1/rad), towards wheels that only roll."""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Turn by all means, mirror image, straight way, trailer; the quick share turns down to 10 m/s only."""
+    until = 10.0 if quick else UNTIL
+    own = turn(until)
+    beside = {"written out": turned(PAPER, ICE, STEER, TORQUES, SPEED, until)}
+    beside |= {name: turn(until, go=Carried(name, truck(PAPER)).advance) for name in ("exudyn", "mujoco")}
+    rows = [at_most(f"braking_engines.{name.replace(' ', '_')}", SYSTEM, f"end of the turn, {name} beside the compiled "
+                    "step at 1 ms", float(np.hypot(other.x - own.x, other.y - own.y)), "m", 5e-3,
+                    "the same vehicle by other equations and another method", "native" if name == "written out"
+                    else "shared kernel") for name, other in beside.items()]  # fmt: skip
+    rows += [*_symmetry_rows(until, own), *_trailer_rows(quick)]
+    rows.append(finding("braking_engines.speed", SYSTEM, "compiled truck, samples of 5.5 ms in 4 steps, no controller",
+                        speed(), "times real time", 100.0, "required with the controller in the loop", "none"))
+    turns = {"compiled step": own, **beside}
+    return rows, {name: list(where) for name, where in turns.items()}
+
+
+def turn(until: float, steer: float = STEER, go: Callable[..., Any] = advance) -> Turned:
+    """The truck from SPEED to another (m/s) on ice; the last step is shared in proportion."""
+    plane, state = truck(PAPER), np.zeros((2, 3))
+    state[1, 0], turning, torques = SPEED, SPEED / plane.radius, np.tile(np.repeat(TORQUES, 2), (2, 1))
+    found, report, passed = np.zeros(3), np.zeros((4, REPORTED)), 0.0
+    rest = (np.array([steer, steer, 0.0, 0.0]), ICE.cornering, plane, np.zeros(4, dtype=int),
+            road([Stretch(0.0, 0, 0)]), stacked([ICE]).packed, found, report)  # fmt: skip
+    while True:
+        before = state.copy()
+        status, used = go(state, turning, torques, STEP, *rest)
+        fast, slow = np.hypot(*before[1, :2]), np.hypot(*state[1, :2])
+        if status != FINE or slow <= until:
+            share = (fast - until) / (fast - slow)
+            place = before[0] + share * (state[0] - before[0])
+            x, y, heading = (float(value) for value in place)
+            return Turned(x, y, heading, float(passed + share * used))
+        passed += used
+
+
+def speed(samples: int = 300) -> float:
+    """Simulated seconds in one of the processor, at steady braking."""
+    plane, state = truck(PAPER), np.zeros((2, 3))
+    state[1, 0], turning, torques = SPEED, SPEED / plane.radius, np.tile(np.repeat(TORQUES, 2), (5, 1))
+    rest = (np.array([STEER, STEER, 0.0, 0.0]), ICE.cornering, plane, np.zeros(4, dtype=int),
+            road([Stretch(0.0, 0, 0)]), stacked([ICE]).packed, np.zeros(3), np.zeros((4, REPORTED)))  # fmt: skip
+    start = time.process_time()
+    for _ in range(samples):
+        advance(state, turning, torques, 5.5e-3 / 4, *rest)
+    return samples * 5.5e-3 / (time.process_time() - start)
+
+
+def _symmetry_rows(until: float, own: Turned) -> list[Row]:
+    mirrored, straight = turn(until, -STEER), turn(until, 0.0)
+    apart = max(abs(mirrored.x - own.x), abs(mirrored.y + own.y), abs(mirrored.heading + own.heading))
+    return [at_most("braking_engines.mirror", SYSTEM, "mirrored turn beside the turn", apart, "m, rad", 1e-9,
+                    "left and right differ by rounding alone", "closed form"),
+            at_most("braking_engines.no_yaw", SYSTEM, "yaw and lateral way without steering on equal friction",
+                    abs(straight.heading) + abs(straight.y), "m, rad", 0.0, "equal forces have no moment",
+                    "closed form")]  # fmt: skip
+
+
+def rolling(slope: float) -> Tables:
+    """Friction across the wheel alone, steep as ``slope`` (1/rad) up to 0.01 rad."""
+    mu = np.array([[0.0], [0.01 * slope], [0.01 * slope]])
+    nodes = np.array([0.0, 0.01, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
+    return stacked([TyreTable(*nodes, np.zeros((3, 1, 3)), np.ones((3, 3)), mu)])
+
+
+def _trailer_rows(quick: bool) -> list[Row]:
+    """Straight pull at 0.2 m/s; circle of 15 m at 0.5 m/s in the full share."""
+    why = "wheels that only roll: low speed, stiff tyres"
+    rows = [at_most("braking_engines.pull", SYSTEM, "drawbar angle on a straight pull, relative", straight_pull(),
+                    "", 1e-4, why, "closed form")]  # fmt: skip
+    if not quick:
+        rows += [at_most(f"braking_engines.circle_{name}", SYSTEM, f"radius of the {name} axle on a circle, relative",
+                         off, "", 1e-4, why, "closed form")
+                 for name, off in zip(("front", "rear"), circle(), strict=True)]  # fmt: skip
+    return rows
+
+
+def straight_pull(angle: float = 0.5, v: float = 0.2, step: float = 5e-4, duration: float = 4.0) -> float:
+    """Error of tan(psi / 2) = tan(psi_0 / 2) exp(-v t / L), relative to the angle."""
+    n = round(duration / step)
+    state = np.array([[0.0, 0.0, angle, angle], [v, 0.0, -v * np.sin(angle) / CHOSEN.drawbar, 0.0]])
+    states, _ = follow(hooked(CHOSEN), rolling(STIFF), state, np.tile([v, 0.0], (n + 1, 1)), step, STIFF, np.zeros(4))
+    exact = 2.0 * np.arctan(np.tan(angle / 2.0) * np.exp(-v * duration / CHOSEN.drawbar))
+    return abs(float(states[-1, 0, 2] / exact - 1.0))
+
+
+def circle(radius: float = 15.0, v: float = 0.5, step: float = 2e-4, duration: float = 20.0) -> tuple[float, float]:
+    """Errors of R_front^2 = R_hook^2 - L^2 and R_rear^2 = R_front^2 - wheelbase^2, relative to the radii."""
+    turn, times = v / radius, step * np.arange(round(duration / step) + 1)
+    hook = v * np.column_stack((-np.sin(turn * times), np.cos(turn * times)))
+    front = np.sqrt(radius**2 - CHOSEN.drawbar**2)
+    rear = np.sqrt(front**2 - CHOSEN.wheelbase**2)
+    first = np.pi / 2.0 - np.arcsin(CHOSEN.drawbar / radius)
+    state = np.array([[radius, 0.0, first, first - np.arcsin(CHOSEN.wheelbase / front)], [*hook[0], turn, turn]])
+    states, _ = follow(hooked(CHOSEN), rolling(STIFF), state, hook, step, STIFF, np.zeros(4))
+    x, y, drawbar, body = states[-1, 0]
+    at = np.array([x, y]) - CHOSEN.drawbar * np.array([np.cos(drawbar), np.sin(drawbar)])
+    behind = at - CHOSEN.wheelbase * np.array([np.cos(body), np.sin(body)])
+    return abs(float(np.hypot(*at) / front - 1.0)), abs(float(np.hypot(*behind) / rear - 1.0))
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Ends of the turn."""
+    rows = tuple((name, *(f"{value:.6f}" for value in where)) for name, where in data.items())
+    return [Table("End of the turn", "On ice, front wheels steered by 0.03 rad, constant torques.",
+                  ("by", "x, m", "y, m", "heading, rad", "time, s"), rows)]  # fmt: skip
+
