@@ -16,7 +16,7 @@ def commands():
 
 def test_both_commands_are_what_ci_runs_tests_first():
     main, tests = commands()
-    assert main.endswith("twinrig validate --quick") and tests.endswith("python -m pytest")
+    assert main.endswith("twinrig validate --quick") and tests.endswith("python -m pytest -n 2")
     lines = (ROOT / ".ci" / "run").read_text().splitlines()
     assert lines.index(tests) < lines.index(main)
 
