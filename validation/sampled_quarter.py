@@ -4,7 +4,7 @@ The reference integrates m u' = -F, J w' = r F - T by DOP853 within every sample
 T by the brake's law along the chamber's exponential, and the wheel's stop and its release as events.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,10 @@ from models.braking.surfaces import Stretch, road
 from models.braking.tyre_table import stacked
 
 SUPPLY, FILL, EMPTY = 10.0, 0.15, 0.1
-SLOWEST = 0.02
-"""Speed (m/s) at which the reference ends; the rest of its way is that of its deceleration."""
+SLOWEST = 0.06
+"""Speed (m/s) at which the reference ends, above what one sample takes; the rest of its way is that of sliding."""
+Stretches = Sequence[tuple[float, Callable[[float], float]]]
+"""Stretches of a road: where each begins (m), and mu by the slip."""
 
 
 def own_distance(quarter: Quarter, brake: Brake, on: str, controller: Controller, speed: float, substeps: int) -> float:
@@ -37,15 +39,21 @@ def own_distance(quarter: Quarter, brake: Brake, on: str, controller: Controller
 def reference_distance(quarter: Quarter, brake: Brake, on: str, controller: Controller, speed: float,
                        tolerance: float = 1e-10) -> float:  # fmt: skip
     """The same by the reference, at a relative tolerance."""
+    curve = SURFACES[on][0]
+    return tight_distance(quarter, brake, [(0.0, lambda s: float(curve(np.array(s))))], controller, speed, tolerance)
+
+
+def tight_distance(quarter: Quarter, brake: Brake, stretches: Stretches, controller: Controller, speed: float,
+                   tolerance: float = 1e-10, method: Any = "DOP853") -> float:  # fmt: skip
+    """Stopping distance (m) by the reference on a road of stretches; method : of scipy."""
     y, pressure, torque, number = np.array([0.0, speed, speed / quarter.radius]), 0.0, 0.0, 0
-    load, curve = quarter.mass * GRAVITY, SURFACES[on][0]
     while y[1] > SLOWEST:
         given = Sample(number, round(number * SAMPLE * 1e9), y[2:] * quarter.radius, True, SUPPLY, float(y[1]))
         valve = int(np.asarray(controller.sample(given).valves)[0])
         law = _law(pressure, torque, valve, brake)
-        y = _sample(y, law, quarter, lambda s: load * float(curve(np.array(s))), tolerance)
+        y = _sample(y, law, quarter, stretches, {"method": method, "rtol": tolerance, "atol": 1e-2 * tolerance})
         pressure, torque, number = law(SAMPLE)[0], law(SAMPLE)[1], number + 1
-    slowing = load * float(curve(np.array(1.0))) / quarter.mass  # so slow, all is applied and the wheel stands
+    slowing = GRAVITY * _under(y[0], stretches)[0](1.0)  # so slow, all is applied and the wheel stands
     return float(y[0] + max(y[1], 0.0) ** 2 / (2.0 * slowing))
 
 
@@ -64,9 +72,19 @@ def _law(pressure: float, torque: float, valve: int, brake: Brake) -> Callable[[
     return at
 
 
-def _sample(y: np.ndarray, law: Any, quarter: Quarter, force: Any, tolerance: float) -> np.ndarray:
+def _under(x: float, stretches: Stretches) -> tuple[Callable[[float], float], float]:
+    """mu by the slip at x (m), and where that ends."""
+    number = sum(begin <= x + 1e-10 for begin, _ in stretches[1:])
+    return stretches[number][1], stretches[number + 1][0] if number + 1 < len(stretches) else np.inf
+
+
+def _sample(y: np.ndarray, law: Any, quarter: Quarter, stretches: Stretches, options: dict[str, Any]) -> np.ndarray:
     """One sample from x, u, w; a wheel that stops is held while its brake can."""
-    radius, inertia, now = quarter.radius, quarter.spin_inertia, 0.0
+    radius, inertia, load, now = quarter.radius, quarter.spin_inertia, quarter.mass * GRAVITY, 0.0
+    mu, end = _under(y[0], stretches)
+
+    def force(slip: float) -> float:
+        return load * mu(slip)
 
     def turning(t: float, q: np.ndarray) -> list[float]:
         f = force(min(max(1.0 - radius * q[2] / max(q[1], 1e-6), 0.0), 1.0))
@@ -81,14 +99,19 @@ def _sample(y: np.ndarray, law: Any, quarter: Quarter, force: Any, tolerance: fl
     def sliding(t: float, q: np.ndarray) -> list[float]:
         return [q[1], -force(1.0) / quarter.mass, 0.0]
 
-    for event in (stops, lets_go):
+    def passes(t: float, q: np.ndarray) -> float:
+        return float(min(end - q[0], 1.0))
+
+    for event in (stops, lets_go, passes):
         event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
     while now < SAMPLE:
         held = y[2] <= 1e-12 and law(now)[1] > radius * force(1.0)
-        found = solve_ivp(sliding if held else turning, (now, SAMPLE), y, "DOP853", rtol=tolerance, atol=1e-12,
-                          events=lets_go if held else stops)  # fmt: skip
+        found = solve_ivp(sliding if held else turning, (now, SAMPLE), y, **options,
+                          events=(lets_go if held else stops, passes))  # fmt: skip
         now, y = float(found.t[-1]), found.y[:, -1].copy()
-        if found.status == 1:
+        if found.t_events[1].size:
+            mu, end = _under(y[0], stretches)
+        elif found.status == 1:
             y[2] = 0.0
             if held:
                 y[2] = 1e-9  # free again: the road turns it on

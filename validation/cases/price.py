@@ -13,7 +13,7 @@ from validation.price import ride, speed
 from validation.price import runner as cost
 from validation.price.figure import draw as draw_figure
 from validation.price.force_calls import counted
-from validation.price.problems import Problem, Setting, force_excited, road_excited, wheelset
+from validation.price.problems import Problem, Setting, braking_stop, force_excited, road_excited, wheelset
 from validation.price.rows import rows_of
 from validation.price.tables import tables as cost_tables
 from validation.rows import Row, System, Table, at_most, behaves, finding, within
@@ -21,7 +21,7 @@ from validation.rows import Row, System, Table, at_most, behaves, finding, withi
 TITLE = "What accuracy costs"
 SYSTEM: System = "cost"
 PROBLEMS: tuple[Callable[[bool], Problem], ...] = (road_excited.problem, force_excited.problem,
-                                                   wheelset.problem)  # fmt: skip
+                                                   wheelset.problem, braking_stop.problem)  # fmt: skip
 ROUNDS = {True: 5, False: 15}
 """Interleaved rounds of timing, by ``quick``."""
 LEAST = {True: 0.004, False: 0.01}

@@ -1,0 +1,207 @@
+"""Problem D: an anti-lock stop of a quarter vehicle from snow on to a wet road.
+
+The valves are those that a slip controller set in one fine run, replayed to every solver alike: in the loop itself one
+valve that changes a sample earlier moves the distance by more than any step, and the error would not be the step's.
+The torque is given at the ends of all steps, and linear between them. No method keeps an order above one for sure: the
+tyre's table has kinks, friction changes in one place, the wheel locks, and torque has a kink where pressure passes the
+push-out. Those above are therefore left open.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+
+from models.braking.brake import PAPER_FRONT, of_wheels
+from models.braking.controller import SAMPLE, Command, Controller, Sample
+from models.braking.controllers import CONTROLLERS
+from models.braking.magic_formula import surface
+from models.braking.plane_vehicle import GRAVITY
+from models.braking.pressure import Chambers, by_valves, still
+from models.braking.quarter import Quarter, braked
+from models.braking.run import Braked
+from models.braking.surfaces import Stretch, road
+from models.braking.tyre_table import stacked
+from models.compiled import njit
+from models.errors import RunFailed
+from validation.braking_schemes import literal, rates
+from validation.price.problems import Setting
+from validation.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
+
+VEHICLE = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
+"""A front wheel of the paper's truck under what it bears while braking."""
+SURFACES, CHANGE, SPEED = ("snow", "wet"), 10.0, 11.11
+"""Surfaces, where the second begins (m), speed at the start (m/s)."""
+FINE = 64
+"""Substeps of the run whose valves are replayed."""
+MORE = 40
+"""Samples for which the last valves are kept: time for schemes that stop late."""
+OURS, EULER, RK4, LITERAL = "exact wheel", "Euler", "RK4", "literal"
+WALKS = {OURS: 2, EULER: 1, RK4: 4, LITERAL: 1}
+"""Force calls of a step; of ours, walks from node to node of the tyre's table."""
+SUBSTEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
+ORDERS = {EULER: 1, LITERAL: 1}
+FULL = {OURS: SUBSTEPS, EULER: SUBSTEPS, RK4: SUBSTEPS, LITERAL: SUBSTEPS}
+QUICK = {OURS: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (8, 64)}
+"""The named share of FULL that the quick report takes."""
+SOLVERS = {True: (("DOP853", 1e-9), ("LSODA", 1e-9)), False: (("DOP853", 1e-12), ("LSODA", 1e-11))}
+"""Reference solvers with their relative tolerances, by ``quick``: a Runge-Kutta method and a multistep one."""
+
+
+@dataclass
+class Tape:
+    """A controller whose valves are kept."""
+
+    inner: Controller
+    valves: list[int]
+
+    def sample(self, given: Sample) -> Command:
+        """The inner one's answer."""
+        command = self.inner.sample(given)
+        self.valves.append(int(np.asarray(command.valves)[0]))
+        return Command(valves=np.array(self.valves[-1:]))
+
+
+@dataclass(frozen=True)
+class Played:
+    """A controller that sets the valves of a tape, the last one for ever."""
+
+    valves: np.ndarray
+
+    def sample(self, given: Sample) -> Command:
+        """The valve of the sample."""
+        return Command(valves=self.valves[min(given.number, self.valves.size - 1), None])
+
+
+@dataclass(frozen=True)
+class Result:
+    """Stopping distance (m), and what it took."""
+
+    distance: float
+    counts: dict[str, int]
+
+
+@dataclass(frozen=True)
+class Solver:
+    """A run that is ready."""
+
+    run: Callable[[], Result]
+
+
+@njit(cache=True, error_model="numpy")
+def march(method, u, w, torques, change, mass, radius, inertia, slips, mu, step):
+    """Way (m) until the speed is 0 and the steps (s) taken; method 0 Euler, 1 RK4, 2 the paper's; -1: does not stop.
+
+    torques (n + 1,) in N m at the ends of steps; mu (2, s) : before and behind ``change`` (m).
+    """
+    x = 0.0
+    for n in range(torques.size - 1):
+        now, middle, then = torques[n], 0.5 * (torques[n] + torques[n + 1]), torques[n + 1]
+        table = mu[0] if x < change else mu[1]
+        a, b = rates(u, w, now, mass, radius, inertia, slips, table)
+        if method == 2:
+            after, turning = literal(u, w, middle, mass, radius, inertia, slips, table, step)
+        elif method == 1:
+            a2, b2 = rates(u + 0.5 * step * a, w + 0.5 * step * b, middle, mass, radius, inertia, slips, table)
+            a3, b3 = rates(u + 0.5 * step * a2, w + 0.5 * step * b2, middle, mass, radius, inertia, slips, table)
+            a4, b4 = rates(u + step * a3, w + step * b3, then, mass, radius, inertia, slips, table)
+            after = u + step / 6.0 * (a + 2.0 * a2 + 2.0 * a3 + a4)
+            turning = w + step / 6.0 * (b + 2.0 * b2 + 2.0 * b3 + b4)
+        else:
+            after, turning = u + step * a, w + step * b
+        if after <= 0.0:
+            return x + 0.5 * u * step * u / (u - after), n + 1
+        x += 0.5 * step * (u + after)
+        u, w = after, max(turning, 0.0)
+    return x, -1
+
+
+class BrakingStop:
+    """The problem with its reference; see ``validation.price.problems.Problem``."""
+
+    key = "braking"
+    note = (f"Steps are those of {1e3 * SAMPLE:g} ms, the paper's, and its parts. The exact wheel walks twice in one, "
+            "from node to node; literal is the paper's scheme as it is written.")  # fmt: skip
+
+    def __init__(self, quick: bool) -> None:
+        self.title = (f"Anti-lock stop of a quarter vehicle from {SPEED:g} m/s, {SURFACES[0]} and from {CHANGE:g} m on "
+                      f"{SURFACES[1]}, valves replayed")  # fmt: skip
+        self.units, self.bound = {"stopping distance": "m"}, 10.0
+        self.tolerances: tuple[float, ...] = (1e-2, 1e-3) if quick else (1e-2, 1e-3, 1e-4)
+        self._tables = [surface(name) for name in SURFACES]
+        self._slips = np.unique(np.concatenate([table.slips for table in self._tables]))
+        self._mu = np.array([np.interp(self._slips, table.slips, table.mu_x[0, 0]) for table in self._tables])
+        self._road = road([Stretch(0.0, 0, 0), Stretch(CHANGE, 1, 1)])
+        self._chambers, self._brakes = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY), of_wheels(PAPER_FRONT)
+        self._valves = self._taped()
+        self.duration = self._valves.size * SAMPLE
+        solvers = SOLVERS[quick]
+        self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
+        self._true, other = (self._by(*one) for one in solvers)
+        self.uncertainty = {"stopping distance": abs(self._true - other)}
+
+    def settings(self, quick: bool) -> tuple[Setting, ...]:
+        """FULL, or its named share QUICK."""
+        chosen = QUICK if quick else FULL
+        return tuple(self.setting("reference", method, SAMPLE / n) for method, some in chosen.items() for n in some)
+
+    def setting(self, engine: str, method: str, value: float) -> Setting:
+        """A setting by its curve and the longest step (s) up to ``value`` that divides a sample."""
+        return Setting(engine, method, SAMPLE / math.ceil(SAMPLE / value * (1 - 1e-9)), ORDERS.get(method, 0))
+
+    def build(self, setting: Setting) -> Solver:
+        """The stop by one method in steps."""
+        substeps = round(SAMPLE / setting.value)
+        run = self._ours if setting.method == OURS else partial(self._others, setting.method)
+        return Solver(partial(run, substeps))
+
+    def errors(self, solution: Result) -> dict[str, float]:
+        """That of the stopping distance."""
+        return {"stopping distance": abs(solution.distance - self._true)}
+
+    def _taped(self) -> np.ndarray:
+        """Valves (n,) of the controller's own run, one a sample, and the last ones for a while."""
+        tape = Tape(CONTROLLERS["slip_bang_bang"](1), [])
+        kind, slope = np.zeros(1, dtype=np.int64), max(table.cornering for table in self._tables)
+        Braked(VEHICLE.plane, kind, stacked(self._tables), slope, self._road, self._brakes, self._chambers,
+               np.zeros(1), substeps=FINE).run(tape, SPEED)  # fmt: skip
+        return np.array(tape.valves + [tape.valves[-1]] * MORE)
+
+    def _by(self, method: str, tolerance: float) -> float:
+        """Distance (m) by scipy, with the change of friction, locking and release as events."""
+        stretches = [(begin, partial(self._friction, i)) for i, begin in enumerate((0.0, CHANGE))]
+        return tight_distance(VEHICLE, PAPER_FRONT, stretches, Played(self._valves), SPEED, tolerance, method)
+
+    def _friction(self, i: int, slip: float) -> float:
+        return float(np.interp(slip, self._slips, self._mu[i]))
+
+    def _torques(self, substeps: int) -> np.ndarray:
+        """Torque (N m) at the ends of all steps."""
+        air, part = still(self._chambers, SAMPLE), np.zeros((substeps + 1, 1))
+        found = [np.zeros(1)]
+        for valve in self._valves:
+            by_valves(np.array([valve]), SAMPLE, air, self._chambers, self._brakes, part)
+            found.append(part[1:, 0].copy())
+        return np.concatenate(found)
+
+    def _ours(self, substeps: int) -> Result:
+        stop = braked(VEHICLE, stacked(self._tables), self._road, self._torques(substeps), SAMPLE / substeps, SPEED)
+        if stop.rest < 0:
+            raise RunFailed("reference", "it does not stop", self.duration)
+        return Result(stop.distance, {"steps": stop.rest, "force calls": WALKS[OURS] * stop.rest})
+
+    def _others(self, method: str, substeps: int) -> Result:
+        number = (EULER, RK4, LITERAL).index(method)
+        way, steps = march(number, SPEED, SPEED / VEHICLE.radius, self._torques(substeps), CHANGE, VEHICLE.mass,
+                           VEHICLE.radius, VEHICLE.spin_inertia, self._slips, self._mu, SAMPLE / substeps)  # fmt: skip
+        if steps < 0:
+            raise RunFailed("reference", "it does not stop", self.duration)
+        return Result(way, {"steps": steps, "force calls": WALKS[method] * steps})
+
+
+@cache
+def problem(quick: bool) -> BrakingStop:
+    """The problem, its reference computed once per process."""
+    return BrakingStop(quick)
