@@ -53,18 +53,28 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
             continue
         stop = Stop(next(iter(paths.values())))
         stop_figure(scene, name, stop, folder / f"{name}.png")
-        told = engineers(scene, name, stop) if options.adhesion else {}
+        told = dict[str, float]()
+        try:
+            told = engineers(scene, name, stop) if options.adhesion else {}
+        except RunFailed as error:
+            failed[f"{name}, figures of merit"] = str(error)
         answer[name] = {**stop.of_vehicle(), **{key: value.tolist() for key, value in stop.of_wheels().items()}, **told}
         table += lines(name, stop, told) + compared(paths, seconds)
     return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": table}
 
 
 def engineers(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
-    """Figures of merit of a procedure, by name and unit; none where they have no meaning."""
+    """Figures of merit of a procedure, by name and unit; none where they have no meaning.
+
+    Nor are there any that need runs of their own where a client that connects once, or a log, is behind the port.
+    """
     own, surface = scene.procedures[name], scene.road.stretches[0].left
     if own.radius is not None:
+        if stop.times[-1] < 1.0:
+            return {}
         return {f"after 1 s: {key}": value for key, value in stop.in_turn(own.radius).items()}
-    if behind(scene) == "none" or own.kind == "j_turn":
+    once = scene.port is not None and (scene.port.port is not None or scene.port.replay is not None)
+    if behind(scene) == "none" or own.kind == "j_turn" or once:
         return {}
     if own.kind == "split":
         both = split(scene, name)

@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from models.braking.of_scene import sides
+from models.braking.plan import behind
 from models.braking.plane_step import SLIP
 from models.braking.scene import BrakingScene
 from models.braking.stop_report import SLOWEST, WHEELS, Stop
@@ -23,7 +24,7 @@ def stop_figure(scene: BrakingScene, name: str, stop: Stop, file: File) -> File:
     figure, axes = plt.subplots(2, 3, figsize=(14, 7.2))
     distance, time = stop.of_vehicle()["stopping distance [m]"], stop.times[-1]
     ended = f"stands after {distance:.2f} m and {time:.2f} s" if stop.path.stands else f"still moves at {time:.1f} s"
-    figure.suptitle(f"{scene.title}: {name.replace('_', ' ')} from {own.speed:g} m/s, {scene.controller.kind}; {ended}",
+    figure.suptitle(f"{scene.title}: {name.replace('_', ' ')} from {own.speed:g} m/s, {behind(scene)}; {ended}",
                     x=0.01, ha="left", fontweight="bold")  # fmt: skip
     _speeds(axes[0, 0], stop)
     slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports[:, :, SLIP], np.nan)

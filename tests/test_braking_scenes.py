@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from models.braking.adhesion import Adhesion, utilisation
 from models.braking.controller import Command
 from models.braking.of_scene import braked
 from models.braking.plan import check, describe
 from models.braking.port.ask import ControllerFailed
+from models.braking.port.example import Example
 from models.braking.procedures import drive, ready
 from models.braking.scene import build
-from models.errors import InputError
+from models.errors import InputError, Refused
 from models.systems import load
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
@@ -52,6 +54,7 @@ def test_what_a_scene_cannot_be_is_told_by_its_key(tables, place, said):
     ({"vehicle": {"override": {"mas": 1.0}}}, "vehicle.override.mas", "mass"),
     ({"brakes": {"front": {"gradient": 1.0, "release": 1.0}}}, "brakes.front", "push_out"),
     ({"tyres": {"scale": {"ice": 3.0}}}, "tyres.scale.ice", "at most 2"),
+    ({"tyres": {"scale": {"icee": 1.1}}}, "tyres.scale.icee", "no such surface"),
 ])  # fmt: skip
 def test_what_reading_does_not_find_is_refused_before_a_run(tables, place, said):
     with pytest.raises(InputError) as error:
@@ -114,6 +117,24 @@ def test_split_friction_turns_to_the_better_side_and_equal_friction_not_at_all()
     assert drive(own, "split").states[-1, 0, 2] < -1e-3
     straight = drive(own, "straight")
     assert not straight.states[:, 0, 1:].any() and straight.states[-1, 1, 0] < 10.0
+
+
+def test_the_system_whose_adhesion_is_measured_is_the_one_behind_the_port(monkeypatch):
+    class Released(Example):
+        def sample(self, given):
+            return Command(pressures=np.full(4, 0.5))
+
+    monkeypatch.setattr("models.braking.port.example.Example", Released)
+    tables = {"run": {"duration": 60.0}, "controller": {"kind": "slip_bang_bang"}}
+    port = {"callable": "models.braking.port.example:Example"}
+    own, others = (utilisation(scene(**tables, **more), "ice", Adhesion(0.17, 0.17)).z for more in ({}, {"port": port}))
+    expected = 0.5 * 2 * (1500.0 + 1200.0) / 0.5 / (5640.0 * 9.81 + 2 * (13.35 + 27.0) / 0.25 * 9.81)
+    assert others == pytest.approx(expected, rel=0.02) and own > 1.3 * others
+
+
+def test_an_engine_that_would_leave_the_lag_of_tyres_out_is_refused():
+    with pytest.raises(Refused, match="lag of tyres"):
+        drive(scene(relaxation={"front": 0.5, "rear": 0.5}), "straight", "mujoco")
 
 
 def test_the_study_saves_tables_figures_and_paths(tmp_path):

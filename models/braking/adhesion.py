@@ -20,9 +20,10 @@ from models.braking.figures_of_merit import (
     mean_of_fastest,
     split_rate,
 )
-from models.braking.of_scene import braked, controller_of, vehicle_of
+from models.braking.of_scene import braked, vehicle_of
 from models.braking.plane_step import LOCKED
 from models.braking.plane_vehicle import GRAVITY
+from models.braking.procedures import looped
 from models.braking.run import Braked, Path
 from models.braking.scene import BrakingScene, Procedure, RoadTable, Stretch
 from models.braking.stop_report import Stop
@@ -87,6 +88,12 @@ def adhesion(scene: BrakingScene, surface: str) -> Adhesion:
     return Adhesion(adhesion_front(_rate(scene, vehicle, 0), own), adhesion_rear(_rate(scene, vehicle, 1), own))
 
 
+def _held_by_system(scene: BrakingScene, name: str, vehicle: Braked, speed: float) -> Path:
+    """A run from a speed (km/h) with the scene's controller, or what stands behind its port, which logs nothing."""
+    port = None if scene.port is None else scene.port.model_copy(update={"log": None})
+    return looped(scene.model_copy(update={"port": port}), name, vehicle, vehicle.rolling(speed * KMH))
+
+
 def _rate(scene: BrakingScene, vehicle: Braked, axle: int) -> float:
     """z of the fastest runs with one axle braked, from 40 to 20 km/h."""
     wheels = np.arange(vehicle.plane.wheels) // 2 == axle
@@ -117,11 +124,11 @@ def _between(path: Path, high: float, low: float) -> float:
     return crossing(stop.times, stop.speed, low * KMH) - crossing(stop.times, stop.speed, high * KMH)
 
 
-def utilisation(scene: BrakingScene, surface: str, k: Adhesion | None = None) -> Utilised:
-    """epsilon of the scene's system on a surface: z from 45 to 15 km/h, braked from 55 km/h."""
+def utilisation(scene: BrakingScene, surface: str, k: Adhesion | None = None, name: str = "adhesion") -> Utilised:
+    """epsilon of the scene's system on a surface: z from 45 to 15 km/h, braked from 55 km/h; the port knows the run by
+    its name."""
     own, found = axles(scene), k or adhesion(scene, surface)
-    vehicle = alone(scene, surface)
-    path = vehicle.run(controller_of(scene, vehicle.plane.wheels), 55.0 * KMH, scene.run.duration)
+    path = _held_by_system(scene, name, alone(scene, surface), 55.0)
     z = braking_rate(45.0 * KMH, 15.0 * KMH, _between(path, 45.0, 15.0))
     return Utilised(z, found, adhesion_of_vehicle(z, found.front, found.rear, own))
 
@@ -145,7 +152,7 @@ def split(scene: BrakingScene, name: str) -> Split:
     own, first = scene.procedures[name], scene.road.stretches[0]
     both = [adhesion(scene, surface) for surface in (first.left, own.right or first.right or first.left)]
     vehicle = braked(scene.model_copy(update={"trailer": None}), own)
-    path = vehicle.run(controller_of(scene, vehicle.plane.wheels), 50.0 * KMH, scene.run.duration)
+    path = _held_by_system(scene, name, vehicle, 50.0)
     z = braking_rate(40.0 * KMH, 20.0 * KMH, _between(path, 40.0, 20.0))
     k = sorted(adhesion_of_vehicle(z, one.front, one.rear, axles(scene)) for one in both)
     return Split(z, k[0], k[1])

@@ -26,6 +26,10 @@ from models.strict import read
 def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
     """The scene's vehicle with its brakes on the road of a procedure; InputError for what does not fit together."""
     plane = plane_of(scene)
+    for name, scale in scene.tyres.scale.items():
+        if name not in (*NAMES, *scene.tyres.files):
+            known = (*NAMES, *scene.tyres.files)
+            raise InputError(scene.file, f"tyres.scale.{name}", scale, "no such surface", known)
     names = surfaces_of(scene, procedure)
     tyres = [table_of(scene, name, rear) for name in names for rear in kinds_of(scene)]
     front, rear, behind = (brake_of(scene, axle) for axle in ("front", "rear", "trailer"))

@@ -2,9 +2,9 @@
 
 from models.braking.of_scene import controller_of, surfaces_of, vehicle_of
 from models.braking.port.setup import BEHIND
-from models.braking.procedures import ready
+from models.braking.procedures import check_engine, ready
 from models.braking.scene import BrakingScene
-from models.errors import InputError, Refused
+from models.errors import InputError
 
 PROCEDURES = {
     "straight": "straight braking",
@@ -16,8 +16,8 @@ PROCEDURES = {
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
-    if scene.relaxation is not None and engines and engines != ("reference",):
-        raise Refused(engines[-1], "the lag of tyres is not in its steps: use --engine reference", scene.file)
+    for engine in engines:
+        check_engine(scene, engine)
     for name in scene.procedures:
         controller_of(scene, ready(scene, name)[0].plane.wheels)
 

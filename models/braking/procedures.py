@@ -13,7 +13,7 @@ from models.braking.port.setup import Run, opened
 from models.braking.run import Braked, Path, Start
 from models.braking.scene import BrakingScene
 from models.braking.surfaces import under_wheels
-from models.errors import InputError
+from models.errors import InputError, Refused
 
 STEERED = 2
 """Wheels that are steered: those of the first axle, in parallel."""
@@ -41,12 +41,25 @@ def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
 
 
 def drive(scene: BrakingScene, name: str, engine: str = "reference") -> Path:
-    """One run of a procedure, whatever stands behind the port; InputError, or RunFailed with the path until then."""
+    """One run of a procedure, whatever stands behind the port; InputError, Refused, or RunFailed with the path until
+    then."""
+    check_engine(scene, engine)
     vehicle, start = ready(scene, name)
     if engine != "reference":
         from models.engines.braking import Carried
 
         vehicle = replace(vehicle, engine=Carried(engine, vehicle.plane))
+    return looped(scene, name, vehicle, start)
+
+
+def check_engine(scene: BrakingScene, engine: str) -> None:
+    """Refuse an engine that would leave an effect of the scene out."""
+    if scene.relaxation is not None and engine != "reference":
+        raise Refused(engine, "the lag of tyres is not in its steps: use --engine reference", scene.file)
+
+
+def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start) -> Path:
+    """One run from a start with the scene's controller in the loop, or with what stands behind the port instead."""
     own = controller_of(scene, vehicle.plane.wheels)
     if scene.port is None:
         return vehicle.run(own, start, scene.run.duration)

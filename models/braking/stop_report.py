@@ -81,7 +81,7 @@ class Stop:
             "x [m]": float(path.states[-1, 0, 0] - path.states[0, 0, 0]),
             "y [m]": float(path.states[-1, 0, 1] - path.states[0, 0, 1]),
             "final yaw [deg]": float(np.degrees(path.states[-1, 0, 2] - path.states[0, 0, 2])),
-            "v0^2/2d [m/s^2]": equivalent_deceleration(float(speed[0]), distance),
+            "v0^2/2d [m/s^2]": equivalent_deceleration(float(speed[0]), distance) if path.stands else float("nan"),
             "v0/T [m/s^2]": float(speed[0] - speed[-1]) / time,
             "MFDD [m/s^2]": mean_fully_developed(path.times, way, speed),
             "largest side slip [deg]": float(np.degrees(self.side_slip[slip])),
