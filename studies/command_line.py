@@ -59,9 +59,9 @@ def list_scenes() -> None:
     """List the scenes that come with twinrig, the effects, the parameter sets and the engines."""
     from models.engines.catalogue import CATALOGUE
     from models.scene import effect_names, parameter_sets
-    from models.scene_file import changed
+    from models.scene_file import parse
 
-    scenes = {path.stem: changed(path, ())["title"] for path in sorted(SCENES.glob("*.toml"))}
+    scenes = {path.stem: parse(path)["title"] for path in sorted(SCENES.glob("*.toml"))}
     effects = {name: _first_sentence(f"models.effects.{name}") for name in effect_names()}
     sets = {name: import_module(f"models.parameters.{name}").SOURCE for name in parameter_sets()}
     _print_list("scenes (twinrig run NAME, or a file of your own)", scenes)

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from models.braking.of_scene import kinds_of, surfaces_of, table_of
+from models.braking.plan import check_reference
 from models.braking.scene import BrakingScene
 from models.braking.tyre_table import TyreTable
 from models.errors import InputError
@@ -27,6 +28,7 @@ class Options(Strict):
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Refuse options and tyres that cannot be."""
+    check_reference(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     if not all(0.0 <= angle <= 90.0 for angle in options.slip_angles):
         raise InputError(scene.file, "options.slip_angles", options.slip_angles, "must be from 0 to 90 deg")

@@ -91,8 +91,8 @@ class Stop:
         }  # fmt: skip
 
     def of_wheels(self) -> dict[str, np.ndarray]:
-        """What each wheel (W,) did while the vehicle was faster than SLOWEST, by name and unit."""
-        path, fast = self.path, self.speed[:-1] > SLOWEST
+        """What each wheel (W,) did while the vehicle was faster than SLOWEST or half its initial speed, by name and unit."""
+        path, fast = self.path, self.speed[:-1] > min(SLOWEST, 0.5 * self.speed[0])
         lengths, slips = self.lengths[fast], path.reports[fast][:, :, SLIP]
         pressures, whole = path.pressures[1:][fast], float(self.lengths[fast].sum())
         found = {"mean slip": lengths @ slips / whole, "largest slip": slips.max(axis=0)}
