@@ -16,6 +16,7 @@ from models.braking.port.ask import ControllerFailed
 from models.braking.port.example import Example
 from models.braking.procedures import drive, ready
 from models.braking.scene import build
+from models.braking.stop_report import Stop
 from models.errors import InputError, Refused
 from models.systems import load
 
@@ -135,6 +136,11 @@ def test_the_system_whose_adhesion_is_measured_is_the_one_behind_the_port(monkey
 def test_an_engine_that_would_leave_the_lag_of_tyres_out_is_refused():
     with pytest.raises(Refused, match="lag of tyres"):
         drive(scene(relaxation={"front": 0.5, "rear": 0.5}), "straight", "mujoco")
+
+
+def test_a_stop_from_walking_pace_has_figures_of_its_wheels():
+    slips = Stop(drive(scene(procedures={"stop": {"speed": 0.5}}, run={"duration": 3.0}), "stop")).of_wheels()
+    assert 0.0 < slips["mean slip"].min() <= slips["largest slip"].max() <= 1.0
 
 
 def test_the_study_saves_tables_figures_and_paths(tmp_path):

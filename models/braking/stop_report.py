@@ -91,7 +91,7 @@ class Stop:
         }  # fmt: skip
 
     def of_wheels(self) -> dict[str, np.ndarray]:
-        """What each wheel (W,) did while the vehicle was faster than SLOWEST or half its initial speed, by name and unit."""
+        """What each wheel (W,) did above SLOWEST, or above half of a lower initial speed, by name and unit."""
         path, fast = self.path, self.speed[:-1] > min(SLOWEST, 0.5 * self.speed[0])
         lengths, slips = self.lengths[fast], path.reports[fast][:, :, SLIP]
         pressures, whole = path.pressures[1:][fast], float(self.lengths[fast].sum())
