@@ -1,5 +1,6 @@
 """A braked vehicle with its controller in the loop, sample by sample, until it stands or its time is over."""
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -96,7 +97,7 @@ class Braked:
         with _kept(rows, reports):
             while status != AT_REST and time < duration - 1e-9:
                 braked = time >= self.switch - 1e-9
-                known = float(np.hypot(*state[1, :2])) if self.speed_given else np.nan
+                known = math.hypot(state[1, 0], state[1, 1]) if self.speed_given else math.nan
                 supply = float(air.supply[0])
                 asked = Sample(number, round(time * 1e9), turning * self.plane.radius, braked, supply, known)
                 command = ask(controller, asked)

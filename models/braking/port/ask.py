@@ -49,6 +49,10 @@ def checked(command: Command, given: Sample) -> Command:
     """The same answer if each wheel has one state of its valve or one pressure; raises ControllerFailed."""
     if not isinstance(command, Command) or (command.valves is None) == (command.pressures is None):
         raise ControllerFailed(given, "wrong frame", "needs either valves or pressures")
+    valves = command.valves
+    ready = isinstance(valves, np.ndarray) and valves.dtype == np.int64 and valves.shape == given.wheels.shape
+    if ready and all(-1 <= value <= 1 for value in valves.tolist()):
+        return command
     values = _array(command.pressures if command.valves is None else command.valves, given)
     for value in values.tolist():
         if not math.isfinite(value):
