@@ -103,6 +103,7 @@ def lines(name: str, stop: Stop, told: dict[str, float]) -> list[str]:
     rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.of_vehicle().items()]
     rows += [f"    {key:<40}{value:>10.3f}" for key, value in told.items()]
     rows += [f"    ({NOT_CHECKED})"] if told else []
+    rows += ["    (without steering correction, and of the vehicle without trailer)"] if "z_MALS" in told else []
     names = WHEELS[: stop.path.turning.shape[1]]
     rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel.replace('trailer ', 'tr. '):>17}" for wheel in names)]
     return rows + [f"    {key:<40}" + "".join(f"{value:>17.2f}" for value in values)
