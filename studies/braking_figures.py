@@ -68,6 +68,8 @@ def road(axis: plt.Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
     x, y, yaw = stop.path.states[:, 0, 0], stop.path.states[:, 0, 1], stop.path.states[:, 0, 2]
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0
     first, last = x.min() - 6.0, x.max() + 6.0
+    lacking = max(0.7 * (last - first) - (high - low), 0.0) / 2.0  # one scale both ways, in an axis of the usual shape
+    low, high = low - lacking, high + lacking
     told = set[str]()
     starts = [first] + [s.x for s in scene.road.stretches[1:]] + [last]
     for stretch, begin, end in zip(scene.road.stretches, starts[:-1], starts[1:], strict=True):
@@ -81,6 +83,7 @@ def road(axis: plt.Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
         corners = np.array([[3.0, 1.1], [3.0, -1.1], [-3.0, -1.1], [-3.0, 1.1], [3.0, 1.1]])
         turned = corners @ np.array([[np.cos(yaw[i]), np.sin(yaw[i])], [-np.sin(yaw[i]), np.cos(yaw[i])]])
         axis.plot(x[i] + turned[:, 0], y[i] + turned[:, 1], color="#222222", lw=0.7)
-    axis.set(xlabel="x [m]", ylabel="y [m]", title="Path on the road, from above", xlim=(first, last), ylim=(low, high))
+    axis.set(xlabel="x [m]", ylabel="y [m]", title="Path on the road, from above", xlim=(first, last), ylim=(low, high),
+             aspect="equal")  # fmt: skip
     axis.grid(False)
     axis.legend(fontsize=8, loc="upper left", frameon=True, facecolor="white", framealpha=1.0)
