@@ -7,8 +7,8 @@ constraints are soft (a fifth of the enforced moment is lost), so a prescribed p
 without that joint, and inverse dynamics of the full one for the moment.
 """
 
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Collection
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from mujoco import rollout
 
 from models.assembly import Assembly
+from models.engines.mujoco_quiet import quiet
 from models.engines.protocol import Settings, Trajectory, guard
 from models.errors import RunFailed
 from models.vehicles.description import Strut, Vehicle
@@ -89,17 +90,6 @@ def _held(spec: mujoco.MjSpec, vehicle: Vehicle, gear: float) -> None:
     for axle in vehicle.axles:
         spec.add_actuator(name=f"{axle.name} force", target=f"{axle.wheel} z", trntype=mujoco.mjtTrn.mjTRN_JOINT,
                           gear=[gear, 0, 0, 0, 0, 0], gainprm=[1.0 if gear else 0.0, *[0] * 9])
-
-
-@contextmanager
-def quiet() -> Iterator[None]:
-    """Keep MuJoCo from printing warnings and writing a log into the user's folder: the guard reports them."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda text: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 @dataclass

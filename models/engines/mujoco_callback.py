@@ -18,6 +18,7 @@ from numba import carray, cfunc, types
 from numba.extending import intrinsic, register_jitable
 
 from models.engines.mujoco_layout import offset
+from models.engines.mujoco_quiet import quiet
 
 HEADER = 7
 """Numbers before those of the springs."""
@@ -127,7 +128,10 @@ def _offsets(*fields: str) -> list[int]:
 
 @contextmanager
 def installed(law) -> Iterator[None]:
-    """Install a compiled callback for the block only: MuJoCo's callbacks are global to the process."""
+    """Install a compiled callback for the block only: MuJoCo's callbacks are global to the process.
+
+    Meanwhile MuJoCo is quiet: what it would warn of is raised by whoever runs it.
+    """
     if law is None:
         yield
         return
@@ -135,6 +139,7 @@ def installed(law) -> Iterator[None]:
         raise RuntimeError("another MuJoCo callback is installed in this process")
     mujoco.set_mjcb_passive(law.ctypes)
     try:
-        yield
+        with quiet():
+            yield
     finally:
         mujoco.set_mjcb_passive(None)

@@ -15,9 +15,10 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from models.engines.mujoco import CHUNK, quiet
+from models.engines.mujoco import CHUNK
 from models.engines.mujoco_callback import installed
 from models.engines.mujoco_layout import check
+from models.engines.mujoco_quiet import quiet
 from models.engines.protocol import Settings, guard
 from models.engines.spatial_mujoco_callback import spatial_law
 from models.engines.spatial_protocol import (

@@ -49,7 +49,7 @@ class MujocoThreads(NoisePaths):
         """States (paths, steps + 1, 8) of all models, and whether MuJoCo warned of anything."""
         from mujoco import rollout
 
-        from models.engines.mujoco import quiet
+        from models.engines.mujoco_quiet import quiet
 
         start = np.concatenate(([0.0], self.base.initial))
         controls = None

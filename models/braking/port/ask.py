@@ -50,8 +50,8 @@ def checked(command: Command, given: Sample) -> Command:
     if not isinstance(command, Command) or (command.valves is None) == (command.pressures is None):
         raise ControllerFailed(given, "wrong frame", "needs either valves or pressures")
     valves = command.valves
-    ready = isinstance(valves, np.ndarray) and valves.dtype == np.int64 and valves.shape == given.wheels.shape
-    if ready and all(-1 <= value <= 1 for value in valves.tolist()):
+    whole = valves if isinstance(valves, np.ndarray) and valves.dtype == np.int64 else None
+    if whole is not None and whole.shape == given.wheels.shape and all(-1 <= one <= 1 for one in whole.tolist()):
         return command
     values = _array(command.pressures if command.valves is None else command.valves, given)
     for value in values.tolist():
