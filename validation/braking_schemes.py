@@ -52,21 +52,26 @@ def literal(u, w, torque, mass, radius, inertia, slips, mu, step):
 
 
 @njit(cache=True, error_model="numpy")
+def advanced(scheme, u, w, now, middle, then, mass, radius, inertia, slips, mu, step):
+    """Speed and turning after one step of a scheme, 0 Euler, 1 RK4, 2 literal, under the brake's torques (N m) at its
+    start, middle and end."""
+    if scheme == 2:
+        return literal(u, w, middle, mass, radius, inertia, slips, mu, step)
+    a, b = rates(u, w, now, mass, radius, inertia, slips, mu)
+    if scheme == 0:
+        return u + step * a, w + step * b
+    a2, b2 = rates(u + 0.5 * step * a, w + 0.5 * step * b, middle, mass, radius, inertia, slips, mu)
+    a3, b3 = rates(u + 0.5 * step * a2, w + 0.5 * step * b2, middle, mass, radius, inertia, slips, mu)
+    a4, b4 = rates(u + step * a3, w + step * b3, then, mass, radius, inertia, slips, mu)
+    return u + step / 6.0 * (a + 2.0 * a2 + 2.0 * a3 + a4), w + step / 6.0 * (b + 2.0 * b2 + 2.0 * b3 + b4)
+
+
+@njit(cache=True, error_model="numpy")
 def distance(scheme, u, w, torque, mass, radius, inertia, slips, mu, step, most):
     """Way (m) until the speed is 0 by a scheme, 0 Euler, 1 RK4, 2 literal, and the speed (m/s) after ``most`` steps."""
     x = 0.0
     for _ in range(most):
-        a, b = rates(u, w, torque, mass, radius, inertia, slips, mu)
-        if scheme == 2:
-            after, turning = literal(u, w, torque, mass, radius, inertia, slips, mu, step)
-        elif scheme == 1:
-            a2, b2 = rates(u + 0.5 * step * a, w + 0.5 * step * b, torque, mass, radius, inertia, slips, mu)
-            a3, b3 = rates(u + 0.5 * step * a2, w + 0.5 * step * b2, torque, mass, radius, inertia, slips, mu)
-            a4, b4 = rates(u + step * a3, w + step * b3, torque, mass, radius, inertia, slips, mu)
-            after = u + step / 6.0 * (a + 2.0 * a2 + 2.0 * a3 + a4)
-            turning = w + step / 6.0 * (b + 2.0 * b2 + 2.0 * b3 + b4)
-        else:
-            after, turning = u + step * a, w + step * b
+        after, turning = advanced(scheme, u, w, torque, torque, torque, mass, radius, inertia, slips, mu, step)
         if after <= 0.0:
             return x + 0.5 * u * step * u / (u - after), 0.0
         x += 0.5 * step * (u + after)

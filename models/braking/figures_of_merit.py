@@ -79,14 +79,6 @@ def equivalent_deceleration(speed: float, distance: float) -> float:
     return speed**2 / (2.0 * distance)
 
 
-def corrected_distance(distance: float, nominal: float, actual: float) -> float:
-    """Stopping distance (m) brought to the nominal speed: s (v_nominal / v_actual)^2.
-
-    Source: ISO 21994 (cars) and ISO 16552 (heavy vehicles); not checked against the text of the standard.
-    """
-    return distance * (nominal / actual) ** 2
-
-
 def braking_rate(high: float, low: float, time: float) -> float:
     """z of a vehicle that takes ``time`` (s) from one speed to a lower one (m/s).
 
@@ -129,14 +121,6 @@ def adhesion_of_vehicle(z: float, k_front: float, k_rear: float, axles: Axles) -
     """
     front, rear = axles.dynamic(z)
     return (k_front * front + k_rear * rear) / axles.weight
-
-
-def adhesion_utilisation(z: float, k_front: float, k_rear: float, axles: Axles) -> float:
-    """epsilon = z_AL / k_M; a category 1 system has at least 0.75, more than 1 asks to measure k again.
-
-    Source: UN R13, Annex 13; not checked against the text of the regulation.
-    """
-    return z / adhesion_of_vehicle(z, k_front, k_rear, axles)
 
 
 def split_rate(k_low: float, k_high: float) -> float:

@@ -152,11 +152,6 @@ def _turned(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
 
 
-def total_mass(handling: Handling) -> float:
-    """kg."""
-    return sum(body.mass for body in handling.vehicle.bodies)
-
-
 def friction_distance(speed: float, mu: float) -> float:
     """Distance (m) in which sliding friction alone stops: v^2 / (2 mu g)."""
     return speed**2 / (2.0 * mu * GRAVITY)

@@ -26,7 +26,7 @@ from models.braking.surfaces import Stretch, road
 from models.braking.tyre_table import stacked
 from models.compiled import njit
 from models.errors import RunFailed
-from validation.braking_schemes import literal, rates
+from validation.braking_schemes import advanced
 from validation.price.problems import Setting
 from validation.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
 
@@ -98,19 +98,9 @@ def march(method, u, w, torques, change, mass, radius, inertia, slips, mu, step)
     """
     x = 0.0
     for n in range(torques.size - 1):
-        now, middle, then = torques[n], 0.5 * (torques[n] + torques[n + 1]), torques[n + 1]
         table = mu[0] if x < change else mu[1]
-        a, b = rates(u, w, now, mass, radius, inertia, slips, table)
-        if method == 2:
-            after, turning = literal(u, w, middle, mass, radius, inertia, slips, table, step)
-        elif method == 1:
-            a2, b2 = rates(u + 0.5 * step * a, w + 0.5 * step * b, middle, mass, radius, inertia, slips, table)
-            a3, b3 = rates(u + 0.5 * step * a2, w + 0.5 * step * b2, middle, mass, radius, inertia, slips, table)
-            a4, b4 = rates(u + step * a3, w + step * b3, then, mass, radius, inertia, slips, table)
-            after = u + step / 6.0 * (a + 2.0 * a2 + 2.0 * a3 + a4)
-            turning = w + step / 6.0 * (b + 2.0 * b2 + 2.0 * b3 + b4)
-        else:
-            after, turning = u + step * a, w + step * b
+        after, turning = advanced(method, u, w, torques[n], 0.5 * (torques[n] + torques[n + 1]), torques[n + 1], mass,
+                                  radius, inertia, slips, table, step)  # fmt: skip
         if after <= 0.0:
             return x + 0.5 * u * step * u / (u - after), n + 1
         x += 0.5 * step * (u + after)

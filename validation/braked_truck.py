@@ -1,0 +1,71 @@
+"""The paper's truck under constant brake torques, and what it must do by closed forms."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from models.braking.advance import AT_REST, FINE, advance
+from models.braking.magic_formula import surface
+from models.braking.plane_step import LOAD, REPORTED
+from models.braking.plane_vehicle import GRAVITY, PAPER, Plane, truck
+from models.braking.surfaces import Stretch, road
+from models.braking.tyre_table import Tables, TyreTable, stacked
+from models.errors import RunFailed
+
+ICE = surface("ice")
+LOCKS = 1e9
+"""Torque (N m) that locks a wheel at once."""
+
+
+def braked(torques: np.ndarray, *, tables: Tables | None = None, steer: float = 0.0, speed: float = 10.0,
+           until: float = 0.0, step: float = 5.5e-3, plane: Plane | None = None, go: Callable[..., Any] = advance,
+           yaw: float = 0.0, duration: float = 200.0, side: float = 0.0) -> Any:  # fmt: skip
+    """State, time, last report and wheels' turning at the end of a stop, or at a speed (m/s) or a time (s) before.
+
+    torques (4,) : N m; steer : rad, of the front wheels; yaw, side : rates at the start; go : ``advance`` or an
+    engine's.
+    """
+    tables, plane = tables or stacked([ICE]), plane or truck(PAPER)
+    state, turning = np.zeros((2, 3)), speed / plane.radius
+    state[1] = speed, side, yaw
+    found, report, time, status = np.zeros(3), np.zeros((4, REPORTED)), 0.0, FINE
+    front, way = np.array([steer, steer, 0.0, 0.0]), road([Stretch(0.0, 0, 0)])
+    while status == FINE and np.hypot(*state[1, :2]) > until and time < duration - 1e-9:
+        status, used = go(state, turning, np.tile(torques, (2, 1)), step, front, ICE.cornering, plane,
+                          np.zeros(4, dtype=int), way, tables.packed, found, report)  # fmt: skip
+        time += used
+    if status not in (FINE, AT_REST):
+        raise RunFailed("braking", "the truck does not come to its end", time)
+    return state, time, report, turning
+
+
+def constant(mu: float) -> Tables:
+    """Friction that is the same at every slip from 0.1 on."""
+    flat = np.broadcast_to(np.array([0.0, mu, mu]), (3, 1, 3)).copy()
+    nodes = np.array([0.0, 0.1, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
+    g, h = np.ones((3, 3)) * np.array([1.0, 0.0, 0.0]), np.array([[0.0], [mu], [mu]])
+    return stacked([TyreTable(*nodes, flat, g, h)])
+
+
+def transfer_errors(mu: float = 0.4) -> dict[str, float]:
+    """Loads of the axles against their closed form, by those at rest, with all wheels locked, the front or the rear.
+
+    Friction mu on a part of the weight slows the whole mass: z = mu F / (m g -+ mu m g h / E) for one axle, and the
+    axles' loads change by m z g h / E.
+    """
+    plane, lift = truck(PAPER), PAPER.height / PAPER.wheelbase
+    light, static = plane._replace(spin=np.full(4, 1e-9)), plane.static.reshape(2, 2).sum(1)
+    slowing = {"all wheels": mu * GRAVITY, "front wheels": mu * static[0] / (PAPER.mass * (1.0 - mu * lift)),
+               "rear wheels": mu * static[1] / (PAPER.mass * (1.0 + mu * lift))}  # fmt: skip
+    torques, errors = {"all wheels": (1e5, 1e5), "front wheels": (1e5, 0.0), "rear wheels": (0.0, 1e5)}, {}
+    for name, torque in torques.items():
+        _, _, report, _ = braked(np.repeat(torque, 2), tables=constant(mu), plane=light, duration=0.5)
+        wanted = static + PAPER.mass * slowing[name] * lift * np.array([1.0, -1.0])
+        errors[name] = float(np.abs(report[:, LOAD].reshape(2, 2).sum(1) / wanted - 1.0).max())
+    return errors
+
+
+def sideways_with_locked_front_wheels() -> float:
+    """Lateral way (m) of a truck on ice from 10 to 1 m/s whose front wheels are steered by 0.05 rad, but locked."""
+    return float(braked(np.array([LOCKS, LOCKS, 0.0, 0.0]), steer=0.05, until=1.0)[0][0, 1])
