@@ -1,0 +1,59 @@
+"""What a measurement file says of itself: channels, their groups of one clock each, and samples block by block."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+BLOCK = 60_000
+"""Samples of a block: a minute at 1 kHz."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel, in the file's own words.
+
+    group : channels of one group share their sampling times. count : samples. period : s as the file says, None where
+    it lists times instead. resolution : what values are rounded to, in ``unit``; 0 where they are floating point.
+    """
+
+    name: str
+    unit: str
+    comment: str
+    group: int
+    count: int
+    period: float | None
+    resolution: float = 0.0
+
+
+@dataclass(frozen=True)
+class Block:
+    """Successive samples of some channels of one group.
+
+    first : index of the first one. times (n,) : s since ``Source.start``, as in the file, whatever their order;
+    values (n, channels) : in the file's units, NaN where nothing was measured.
+    """
+
+    first: int
+    times: np.ndarray
+    values: np.ndarray
+
+
+class Source(Protocol):
+    """One file, opened; each format has one in ``models.measured.formats``."""
+
+    path: Path
+    channels: tuple[Channel, ...]
+    start: datetime | None
+    """When time was 0, with its zone; None where the file does not say."""
+    comment: str
+
+    def blocks(self, names: Sequence[str], length: int = BLOCK, first: int = 0) -> Iterator[Block]:
+        """Blocks of at most ``length`` samples of channels of one group, from sample ``first`` on.
+
+        Raises InputError that names the file and the byte, line or sample where it cannot be read.
+        """
+        ...

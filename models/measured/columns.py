@@ -1,0 +1,62 @@
+"""Samples of many signals on disk, one signal after another: any signal whole, or all of them block by block.
+
+Nothing but the part asked for is in memory. What is written is counted in a journal beside it, written whole or not at
+all, so that whoever is interrupted goes on where the journal says.
+"""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+from models.errors import InputError
+
+ITEM = np.dtype("<f8")
+
+
+class Columns:
+    """Samples (signals, count) of doubles in one file; NaN is no measurement."""
+
+    def __init__(self, path: Path, names: tuple[str, ...], count: int) -> None:
+        """Open what was begun with the same names and count, or begin anew; InputError where another was begun."""
+        self.path, self.names, self.count = path, names, count
+        self._journal = path.with_suffix(".json")
+        own = {"names": list(names), "count": count}
+        if self._journal.is_file():
+            found = json.loads(self._journal.read_text())
+            if {key: found.get(key) for key in own} != own:
+                raise InputError(path, "", None, "holds other signals: choose another folder")
+            self.done = int(found["done"])
+        else:
+            with path.open("wb") as file:
+                file.truncate(len(names) * count * ITEM.itemsize)
+            self.close(0)
+
+    def close(self, done: int) -> None:
+        """Say that the first ``done`` samples of every signal are complete."""
+        self.done = done
+        text = json.dumps({"names": list(self.names), "count": self.count, "done": done})
+        part = self._journal.with_suffix(".part")
+        part.write_text(text)
+        os.replace(part, self._journal)
+
+    def write(self, first: int, values: np.ndarray) -> None:
+        """Samples (n, signals) from sample ``first`` on; they count as complete up to their end."""
+        with self.path.open("r+b") as file:
+            for i, column in enumerate(np.asarray(values, ITEM).T):
+                file.seek((i * self.count + first) * ITEM.itemsize)
+                file.write(np.ascontiguousarray(column).tobytes())
+            file.flush()
+            os.fsync(file.fileno())
+        self.close(first + len(values))
+
+    def read(self, name: str, first: int = 0, count: int | None = None) -> np.ndarray:
+        """Samples (n,) of one signal."""
+        n = self.count - first if count is None else min(count, self.count - first)
+        offset = (self.names.index(name) * self.count + first) * ITEM.itemsize
+        return np.fromfile(self.path, ITEM, n, offset=offset)
+
+    def block(self, names: tuple[str, ...], first: int, count: int) -> np.ndarray:
+        """Samples (n, names) of several signals."""
+        return np.column_stack([self.read(name, first, count) for name in names])

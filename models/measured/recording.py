@@ -1,0 +1,54 @@
+"""Signals in SI on one clock: what every check, run and page reads."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from datetime import datetime
+
+import numpy as np
+
+from models.measured.channel import BLOCK
+from models.measured.columns import Columns
+from models.measured.finding import Finding
+from models.measured.signal import Signal
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Measured signals on one clock.
+
+    period : s; count : samples, the first at t = 0. start : when that was, None if no file says. noticed : what was
+    found while reading and bringing onto one clock (gaps, repeated times, jitter, drift between clocks). comment : of
+    the files.
+    """
+
+    signals: tuple[Signal, ...]
+    columns: Columns
+    period: float
+    start: datetime | None = None
+    comment: str = ""
+    noticed: tuple[Finding, ...] = field(default=())
+
+    @property
+    def count(self) -> int:
+        """Samples of every signal."""
+        return self.columns.count
+
+    @property
+    def duration(self) -> float:
+        """Time (s) of the last sample."""
+        return self.period * (self.count - 1)
+
+    def find(self, quantity: str, at: str = "", component: str = "") -> tuple[Signal, ...]:
+        """Signals of a quantity, of one place or component if named, in the order of the map."""
+        return tuple(s for s in self.signals if s.quantity == quantity and at in ("", s.at)
+                     and component in ("", s.component))  # fmt: skip
+
+    def samples(self, signal: Signal) -> np.ndarray:
+        """All samples (count,) of one signal, SI; NaN where nothing was measured."""
+        return self.columns.read(signal.name)
+
+    def blocks(self, signals: tuple[Signal, ...], length: int = BLOCK) -> Iterator[tuple[int, np.ndarray]]:
+        """Index of the first sample, and samples (n, signals), block by block."""
+        names = tuple(s.name for s in signals)
+        for first in range(0, self.count, length):
+            yield first, self.columns.block(names, first, length)
