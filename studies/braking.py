@@ -10,6 +10,8 @@ from pydantic import Field
 
 from models.braking.adhesion import split, utilisation
 from models.braking.figures_of_merit import NOT_CHECKED
+from models.braking.measured_pressures import MeasuredPressures, write_pressures
+from models.braking.of_scene import measured_of, plane_of
 from models.braking.plan import behind
 from models.braking.plane_step import FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE
 from models.braking.procedures import drive
@@ -30,7 +32,8 @@ class Options(Strict):
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: Progress) -> dict[str, Any]:
-    """Drive every procedure; saves NAME.nc and NAME.png of each, also of one that failed, until it did."""
+    """Drive every procedure; saves NAME.nc, NAME.png and NAME_pressures.csv of each, also of one that failed, until it
+    did."""
     from studies.braking_figures import stop_figure
 
     options = read(Options, scene.options, scene.file, "options")
@@ -52,21 +55,40 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
         if not paths:
             continue
         stop = Stop(next(iter(paths.values())))
-        stop_figure(scene, name, stop, folder / f"{name}.png")
+        radius = plane_of(scene).radius
+        measured, rims = measured_of(scene, name, radius.size), stop.path.turning * radius
+        write_pressures(folder / f"{name}_pressures.csv", stop.times, stop.path.pressures, rims)
+        stop_figure(scene, name, stop, folder / f"{name}.png", measured)
         told = dict[str, float]()
         try:
             told = engineers(scene, name, stop) if options.adhesion else {}
         except RunFailed as error:
             failed[f"{name}, figures of merit"] = str(error)
-        answer[name] = {**stop.of_vehicle(), **{key: value.tolist() for key, value in stop.of_wheels().items()}, **told}
-        table += lines(name, stop, told) + compared(paths, seconds)
+        wheels = stop.of_wheels() | beside(measured, stop, rims)
+        answer[name] = {**stop.of_vehicle(), **{key: value.tolist() for key, value in wheels.items()}, **told}
+        table += lines(name, stop, told, wheels) + ended(measured, stop) + compared(paths, seconds)
     return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": table}
+
+
+def beside(measured: MeasuredPressures | None, stop: Stop, rims: np.ndarray) -> dict[str, np.ndarray]:
+    """By how much the speeds of rims (n, W) in m/s differ from measured ones, if there are any."""
+    if measured is None or measured.speeds is None:
+        return {}
+    return {"rim less measured, rms [m/s]": measured.rms(stop.times, rims)}
+
+
+def ended(measured: MeasuredPressures | None, stop: Stop) -> list[str]:
+    """A line if the run lasts longer than its measured pressures."""
+    if measured is None or measured.times[-1] > stop.times[-2]:
+        return []
+    return [f"    measured pressures end at {measured.times[-1]:.3f} s: from then on the last ones stay"]
 
 
 def engineers(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
     """Figures of merit of a procedure, by name and unit; none where they have no meaning.
 
-    Nor are there any that need runs of their own where a client that connects once, or a log, is behind the port.
+    Nor are there any that need runs of their own where a client that connects once, or a log, is behind the port, or
+    where the pressures were measured.
     """
     own, surface = scene.procedures[name], scene.road.stretches[0].left
     if own.radius is not None:
@@ -74,7 +96,7 @@ def engineers(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
             return {}
         return {f"after 1 s: {key}": value for key, value in stop.in_turn(own.radius).items()}
     once = scene.port is not None and (scene.port.port is not None or scene.port.replay is not None)
-    if behind(scene) == "none" or own.kind == "j_turn" or once:
+    if behind(scene) == "none" or scene.measured is not None or own.kind == "j_turn" or once:
         return {}
     if own.kind == "split":
         both = split(scene, name)
@@ -95,10 +117,9 @@ def compared(paths: dict[str, Path], seconds: dict[str, float]) -> list[str]:
     return rows
 
 
-def lines(name: str, stop: Stop, told: dict[str, float]) -> list[str]:
+def lines(name: str, stop: Stop, told: dict[str, float], wheels: dict[str, np.ndarray]) -> list[str]:
     """Tables of one procedure: of the vehicle, and of its wheels."""
-    ended = "" if stop.path.stands else ": it does not stand"
-    rows = [f"  {name.replace('_', ' ')}{ended}"]
+    rows = [f"  {name.replace('_', ' ')}" + ": it does not stand" * (not stop.path.stands)]
     rows += [f"    {stop.path.clock}"] if stop.path.clock else []
     rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.of_vehicle().items()]
     rows += [f"    {key:<40}{value:>10.3f}" for key, value in told.items()]
@@ -107,7 +128,7 @@ def lines(name: str, stop: Stop, told: dict[str, float]) -> list[str]:
     names = WHEELS[: stop.path.turning.shape[1]]
     rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel.replace('trailer ', 'tr. '):>17}" for wheel in names)]
     return rows + [f"    {key:<40}" + "".join(f"{value:>17.2f}" for value in values)
-                   for key, values in stop.of_wheels().items()]  # fmt: skip
+                   for key, values in wheels.items()]  # fmt: skip
 
 
 REPORTS = {"force_x": (FORCE_X, "N"), "force_y": (FORCE_Y, "N"), "load": (LOAD, "N"), "slip": (SLIP, "1"),

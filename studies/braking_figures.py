@@ -5,7 +5,8 @@ from pathlib import Path as File
 import matplotlib.pyplot as plt
 import numpy as np
 
-from models.braking.of_scene import sides
+from models.braking.measured_pressures import MeasuredPressures
+from models.braking.of_scene import plane_of, sides
 from models.braking.plan import behind
 from models.braking.plane_step import SLIP
 from models.braking.scene import BrakingScene
@@ -18,15 +19,17 @@ OTHER = "#e8dcc8"
 """Colours of the road; of a surface of the user's own."""
 
 
-def stop_figure(scene: BrakingScene, name: str, stop: Stop, file: File) -> File:
+def stop_figure(scene: BrakingScene, name: str, stop: Stop, file: File,
+                measured: MeasuredPressures | None = None) -> File:  # fmt: skip
     """Six panels: speeds, slips, pressures, motion, torques, path."""
     own = scene.procedures[name]
     figure, axes = plt.subplots(2, 3, figsize=(14, 7.2))
     distance, time = stop.of_vehicle()["stopping distance [m]"], stop.times[-1]
     ended = f"stands after {distance:.2f} m and {time:.2f} s" if stop.path.stands else f"still moves at {time:.1f} s"
-    figure.suptitle(f"{scene.title}: {name.replace('_', ' ')} from {own.speed:g} m/s, {behind(scene)}; {ended}",
+    figure.suptitle(f"{scene.title}: {name.replace('_', ' ')} from {own.speed:g} m/s, "
+                    f"{behind(scene).replace('{procedure}', name)}; {ended}",
                     x=0.01, ha="left", fontweight="bold")  # fmt: skip
-    _speeds(axes[0, 0], stop)
+    _speeds(axes[0, 0], stop, stop.path.turning * plane_of(scene).radius, measured)
     slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports[:, :, SLIP], np.nan)
     _wheels(axes[0, 1], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
     _wheels(axes[0, 2], stop.times, stop.path.pressures, "Pressure in each chamber", "pressure [bar]")
@@ -37,10 +40,12 @@ def stop_figure(scene: BrakingScene, name: str, stop: Stop, file: File) -> File:
     return save(figure, file)
 
 
-def _speeds(axis: plt.Axes, stop: Stop) -> None:
-    radius = stop.speed[0] / stop.path.turning[0]
-    for i, values in enumerate((stop.path.turning * radius).T):
+def _speeds(axis: plt.Axes, stop: Stop, rims: np.ndarray, measured: MeasuredPressures | None) -> None:
+    for i, values in enumerate(rims.T):
         axis.plot(stop.times, values, color=COLOURS[i], lw=0.8, label=WHEELS[i])
+    if measured is not None and measured.speeds is not None:
+        for i, values in enumerate(measured.speeds.T):
+            axis.plot(measured.times, values, color=COLOURS[i], lw=1.4, ls=":", label="measured" if i == 0 else None)
     axis.plot(stop.times, stop.speed, color="#222222", lw=1.6, label="vehicle")
     axis.set(xlabel="time [s]", ylabel="speed [m/s]", title="Speed of the vehicle, and of each wheel's rim")
     axis.legend(fontsize=8)
@@ -55,7 +60,8 @@ def _wheels(axis: plt.Axes, times: np.ndarray, values: np.ndarray, title: str, l
 def _motion(axis: plt.Axes, stop: Stop) -> None:
     """Yaw, side slip in degrees and lateral acceleration."""
     axis.plot(stop.times, np.degrees(stop.path.states[:, 0, 2]), color="#0072b2", label="yaw angle [deg]")
-    axis.plot(stop.times, np.degrees(stop.side_slip), color="#d55e00", label="side slip [deg]")
+    slip = np.where(stop.speed > SLOWEST, np.degrees(stop.side_slip), np.nan)
+    axis.plot(stop.times, slip, color="#d55e00", label="side slip [deg]")
     axis.plot(stop.times[1:], stop.across, color="#009e73", lw=0.8, label="lateral acceleration [m/s²]")
     axis.set(xlabel="time [s]", ylabel="see legend", title="Motion beside the direction of travel")
     low, high = axis.get_ylim()

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from models.braking.brake import Brake, of_wheels, torque
-from models.braking.controller import SAMPLE, Sample
-from models.braking.measured_pressures import read_pressures
+from models.braking.controller import SAMPLE
 from models.braking.pressure import APPLY, HOLD, RELEASE, Air, Chambers, by_pressures, by_valves, still
 from models.errors import InputError
 
@@ -114,27 +113,3 @@ def test_commanded_pressures_are_there_at_once():
     torques = np.full((4, 1), np.nan)
     by_pressures(np.array([2.75]), air, BRAKES, torques)
     assert (torques == 3000.0).all() and air.pressure[0] == 2.75
-
-
-HEAD = "time [s], pressure_fl [bar], pressure_fr [kPa], pressure_rl [bar], pressure_rr [bar]"
-
-
-def test_measured_pressures(tmp_path):
-    file = tmp_path / "run.csv"
-    file.write_text(HEAD + "\n0, 0, 0, 1, 1\n0.011, 2, 200, 1, 1\n")
-    found = read_pressures(file, 4)
-    said = found.sample(Sample(1, round(SAMPLE * 1e9), np.zeros(4), True, 6.0, 1.0)).pressures
-    np.testing.assert_allclose(said, [1.5, 1.5, 1.0, 1.0], rtol=1e-9)
-    assert found.speeds is None
-
-
-@pytest.mark.parametrize(("text", "word"), [
-    (HEAD + "\n0.5, 0, 0, 1, 1\n1, 2, 2, 1, 1\n", "begin at 0"),
-    (HEAD + "\n0, 0, 0, 1, 1\n1, -2, 2, 1, 1\n", "above the air"),
-    (HEAD.replace("fr", "xx") + "\n0, 0, 0, 1, 1\n1, 2, 2, 1, 1\n", "pressure_fr"),
-])  # fmt: skip
-def test_measured_pressures_that_cannot_be_used(tmp_path, text, word):
-    file = tmp_path / "run.csv"
-    file.write_text(text)
-    with pytest.raises(InputError, match=word):
-        read_pressures(file, 4)

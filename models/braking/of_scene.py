@@ -9,6 +9,7 @@ import numpy as np
 from models.braking.brake import Brake, of_wheels
 from models.braking.controller import Controller
 from models.braking.controllers import CONTROLLERS
+from models.braking.measured_pressures import MeasuredPressures, read_pressures
 from models.braking.plane_vehicle import PAPER, Plane, Truck, truck
 from models.braking.pressure import Chambers
 from models.braking.run import Braked
@@ -144,8 +145,23 @@ def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
     return held if own.reservoir is None else held._replace(volumes=none + own.volume, reservoir=own.reservoir)
 
 
-def controller_of(scene: BrakingScene, wheels: int) -> Controller:
-    """The controller that the scene names, fresh for one run."""
+def measured_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPressures | None:
+    """Measured pressures that drive a procedure, None if there are none; they leave nothing for a controller to do."""
+    if scene.measured is None:
+        return None
+    others = {"controller": scene.controller.kind != "none", "port": scene.port, "pressure": scene.pressure}
+    for key, there in others.items():
+        if there:
+            raise InputError(scene.file, key, None, "has no meaning with [measured]: its pressures are the chambers'")
+    name = scene.measured.file.replace("{procedure}", procedure)
+    return read_pressures(scene.path(name, "measured.file"), wheels, scene.run.sample)
+
+
+def controller_of(scene: BrakingScene, wheels: int, procedure: str) -> Controller:
+    """What sets the pressures of a procedure, fresh for one run: measured ones, or the controller of the scene."""
+    measured = measured_of(scene, procedure, wheels)
+    if measured is not None:
+        return measured
     kind = scene.controller.kind
     if kind not in CONTROLLERS:
         raise InputError(scene.file, "controller.kind", kind, "no such controller", tuple(CONTROLLERS))

@@ -19,7 +19,7 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     for engine in engines:
         check_engine(scene, engine)
     for name in scene.procedures:
-        controller_of(scene, ready(scene, name)[0].plane.wheels)
+        controller_of(scene, ready(scene, name)[0].plane.wheels, name)
 
 
 def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
@@ -50,7 +50,9 @@ def describe(scene: BrakingScene) -> str:
 
 
 def behind(scene: BrakingScene) -> str:
-    """What answers at the port."""
+    """What answers at the port, or sets the pressures without being asked."""
+    if scene.measured is not None:
+        return f"measured pressures {scene.measured.file}"
     named = [] if scene.port is None else [key for key in BEHIND if getattr(scene.port, key) is not None]
     return f"{named[0]} {getattr(scene.port, named[0])}" if named else scene.controller.kind
 
@@ -67,7 +69,8 @@ def effects(scene: BrakingScene) -> tuple[list[str], list[str]]:
         "pressure dynamics": scene.pressure is not None,
         "delay of valves": scene.pressure is not None and scene.pressure.delay > 0.0,
         "reservoir": scene.pressure is not None and scene.pressure.reservoir is not None,
-        "anti-lock system": behind(scene) != "none",
+        "anti-lock system": scene.measured is None and behind(scene) != "none",
+        "measured pressures": scene.measured is not None,
         "signals from teeth": port is not None and port.teeth is not None,
         "conversion of signals": port is not None and bool(port.signals.model_fields_set),
         "conversion of pressures": port is not None and bool(port.pressures.model_fields_set),

@@ -60,7 +60,7 @@ def check_engine(scene: BrakingScene, engine: str) -> None:
 
 def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start) -> Path:
     """One run from a start with the scene's controller in the loop, or with what stands behind the port instead."""
-    own = controller_of(scene, vehicle.plane.wheels)
+    own = controller_of(scene, vehicle.plane.wheels, name)
     if scene.port is None:
         return vehicle.run(own, start, scene.run.duration)
     known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}

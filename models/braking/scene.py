@@ -98,6 +98,12 @@ class ControllerTable(Strict):
     true_speed: bool = Field(default=True, description="the vehicle's speed is given to it")
 
 
+class Measured(Strict):
+    """[measured]: chamber pressures drive the vehicle open loop, in place of a controller."""
+
+    file: str = Field(description="CSV of them, and of wheel speeds if they were measured; {procedure} is its name")
+
+
 class Procedure(Strict):
     """[procedures.NAME]: what the driver does. Left is positive."""
 
@@ -131,6 +137,7 @@ class BrakingScene(SceneFile):
     pressure: PressureTable | None = Field(default=None, description="dynamics of the chambers")
     controller: ControllerTable = ControllerTable()
     port: PortTable | None = Field(default=None, description="what stands behind the port, its signals and faults")
+    measured: Measured | None = Field(default=None, description="pressures that were measured, instead of a controller")
     procedures: dict[str, Procedure] = Field(min_length=1, description="driven one by one, a table each")
     run: RunTable = RunTable()
 
