@@ -11,7 +11,8 @@ BLOCK = 4096
 """Samples per block; part of what names a sample, so it never changes."""
 
 
-FORCES, GYRO, GYRO_BIAS, PITCH_SENSOR, ACCELEROMETERS, ROAD, BRAKE_SIGNALS, BRAKE_PRESSURES, SPEED = range(9)
+(FORCES, GYRO, GYRO_BIAS, PITCH_SENSOR, ACCELEROMETERS, ROAD, BRAKE_SIGNALS, BRAKE_PRESSURES, SPEED, TRANSDUCERS,
+ DROPOUTS) = range(11)  # fmt: skip
 """Sources of noise; a new one takes the next number."""
 
 

@@ -17,6 +17,15 @@ def readings(places: np.ndarray, pitch: np.ndarray, rate: np.ndarray, heave_acce
     turn = matrix(from_cardan(none, pitch, none))
     alpha, w = (np.column_stack([none, values, none]) for values in (pitch_acceleration, rate))
     felt = (heave_acceleration - gravity)[:, None] * turn[:, 2]  # S^T along the global vertical
+    return in_space(places, felt, w, alpha)
+
+
+def in_space(places: np.ndarray, felt: np.ndarray, w: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+    """Specific forces (n, sensors, 3) in m/s^2, in the body's axes, eqs (16), (17), whatever its motion.
+
+    places : (sensors, 3) in m from a point of the body that feels ``felt`` (n, 3); w, alpha : (n, 3), the body's rates
+    and their derivatives about its own axes, rad/s and rad/s^2. Any right-handed axes.
+    """
     lever = skew(alpha) + skew(w) @ skew(w)
     return felt[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(places))
 

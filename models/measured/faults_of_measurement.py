@@ -1,0 +1,133 @@
+"""What a real measurement adds to the truth: gain, bias, delay, noise, quantisation, dropouts, each by its name.
+
+Nothing that is not named acts. An amount is given to a channel, to all channels of a transducer (what a signal is
+``at``) or to all of a quantity; the closest name counts. Every channel has its own stream of noise, so that a further
+channel changes none of the others.
+"""
+
+from collections.abc import Iterable
+from zlib import crc32
+
+import numpy as np
+from pydantic import Field
+
+from models.errors import InputError, suggestion
+from models.measured.signal import Signal
+from models.noise import DROPOUTS, TRANSDUCERS, normal
+from models.strict import Strict, quantity
+
+Amounts = dict[str, float]
+"""Name of a channel, a transducer or a quantity -> amount in SI."""
+ROOM = 1.25
+"""Full scale of a quantised channel by its largest value: an amplifier is not driven to its end."""
+
+
+class Quantisation(Strict):
+    """[virtual.quantisation]: values are rounded to the steps of a converter."""
+
+    bits: int = Field(ge=2, le=32, description="of the converter; its range is 1.25 times a channel's largest value")
+    channels: list[str] = Field(default=[], description="channels, transducers or quantities; none named: all")
+
+
+class Dropouts(Strict):
+    """[virtual.dropouts]: a transducer falls silent, with all its channels at once."""
+
+    rate: float = quantity("1/s", "mean number of dropouts of each transducer")
+    length: float = quantity("s", "of a dropout")
+    channels: list[str] = Field(default=[], description="channels, transducers or quantities; none named: all")
+
+
+class Faults(Strict):
+    """[virtual.faults]: what each channel adds to the truth; an effect that is not named is absent."""
+
+    gain: Amounts = Field(default={}, description="relative error of the factor, 0.02 for 2 % too much")
+    bias: Amounts = Field(default={}, description="added, in SI")
+    delay: Amounts = Field(default={}, description="s, by which a channel is late")
+    noise: Amounts = Field(default={}, description="standard deviation of white noise on every sample, in SI")
+    quantisation: Quantisation | None = Field(default=None, description="rounding to the steps of a converter")
+    dropouts: Dropouts | None = Field(default=None, description="gaps, all channels of a transducer at once")
+
+
+def amount(amounts: Amounts, signal: Signal) -> float:
+    """What is named for a signal: its channel before its transducer before its quantity; 0 if nothing is."""
+    return next((amounts[name] for name in _names(signal) if name in amounts), 0.0)
+
+
+def check(faults: Faults, signals: Iterable[Signal], file: str = "", place: str = "virtual.faults") -> None:
+    """Raise InputError for a name that no signal has, a negative noise or a delay out of reach."""
+    known = tuple(dict.fromkeys(name for signal in signals for name in _names(signal)))
+    tables = {"gain": faults.gain, "bias": faults.bias, "delay": faults.delay, "noise": faults.noise}
+    lists = {"quantisation": faults.quantisation, "dropouts": faults.dropouts}
+    named = [(kind, name) for kind, amounts in tables.items() for name in amounts]
+    named += [(f"{kind}.channels", name) for kind, own in lists.items() if own for name in own.channels]
+    for kind, name in named:
+        if name not in known:
+            raise InputError(file, f"{place}.{kind}", name, f"no such channel, transducer or quantity"
+                             f"{suggestion(name, known)}")  # fmt: skip
+    for kind in ("noise", "delay"):
+        for name, value in tables[kind].items():
+            if value < 0:
+                raise InputError(file, f"{place}.{kind}.{name}", value, "must be 0 or more")
+
+
+def measured(faults: Faults, signals: tuple[Signal, ...], truth: np.ndarray, step: float, every: int, seed: int,
+             path: int = 0) -> np.ndarray:  # fmt: skip
+    """Samples (m, signals) of every ``every``-th row of the truth (n, signals), ``step`` (s) apart; NaN: no sample.
+
+    seed and path name the noise: the same ones give the same samples, whoever asks.
+    """
+    period = step * every
+    columns = []
+    for signal, true in zip(signals, truth.T, strict=True):
+        late = amount(faults.delay, signal)
+        values = (1.0 + amount(faults.gain, signal)) * _late(true, step, every, late) + amount(faults.bias, signal)
+        values = values + amount(faults.noise, signal) * _stream(signal.channel, seed, path, len(values), TRANSDUCERS)
+        if faults.quantisation and _among(faults.quantisation.channels, signal):
+            values = quantised(values, faults.quantisation.bits)
+        if faults.dropouts and _among(faults.dropouts.channels, signal):
+            values[silent(faults.dropouts, signal.at, seed, path, len(values), period)] = np.nan
+        columns.append(values)
+    return np.column_stack(columns)
+
+
+def quantised(values: np.ndarray, bits: int) -> np.ndarray:
+    """Values (n,) rounded to the steps of a converter of so many bits with some room above the largest one."""
+    largest = float(np.abs(values).max())
+    if largest == 0.0:
+        return values
+    each = 2.0 * ROOM * largest / 2**bits
+    return each * np.rint(values / each)
+
+
+def silent(dropouts: Dropouts, at: str, seed: int, path: int, count: int, period: float) -> np.ndarray:
+    """Whether each of ``count`` samples of a transducer is lost (count,); the first and the last one never are."""
+    from scipy.stats import norm
+
+    begins = _stream(at, seed, path, count, DROPOUTS) > norm.isf(min(dropouts.rate * period, 1.0))
+    length = max(round(dropouts.length / period), 1)
+    lost = np.convolve(begins, np.ones(length))[:count] > 0.5
+    lost[[0, -1]] = False
+    return lost
+
+
+def _late(true: np.ndarray, step: float, every: int, delay: float) -> np.ndarray:
+    """Every ``every``-th sample as it was ``delay`` (s) before; what was before the start stood still."""
+    if delay == 0.0:
+        return true[::every].copy()
+    at = np.maximum(step * every * np.arange(len(true[::every])) - delay, 0.0)
+    from scipy.interpolate import make_interp_spline
+
+    return np.asarray(make_interp_spline(step * np.arange(len(true)), true, k=3)(at))
+
+
+def _stream(name: str, seed: int, path: int, count: int, source: int) -> np.ndarray:
+    """Normal samples (count,) that belong to a name."""
+    return normal(seed, (path << 32) + crc32(name.encode()), count, 1, source=source)[:, 0]
+
+
+def _names(signal: Signal) -> tuple[str, ...]:
+    return signal.channel, signal.at, signal.quantity
+
+
+def _among(names: list[str], signal: Signal) -> bool:
+    return not names or not set(names).isdisjoint(_names(signal))
