@@ -1,0 +1,127 @@
+"""Scenes of an engineer's own measurements: files and their channel map, vehicle, stabiliser, what is handed on."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from models.errors import InputError
+from models.measured.signal import Frame, Quantity
+from models.scene_file import SceneFile, checked
+from models.strict import Strict, quantity
+
+Engine = Literal["reference", "exudyn", "mujoco"]
+
+
+class Vehicle(Strict):
+    """[vehicle]: a vehicle file and the body that the others ride on, or a parameter set of the pitch plane."""
+
+    file: str | None = Field(default=None, description="a vehicle that comes with twinrig, or a TOML file of your own")
+    chassis: str = Field(default="body", description="the body with all six freedoms")
+    parameters: str | None = Field(default=None, description="of the pitch-plane vehicle: a set, or a TOML file")
+
+
+class MappedChannel(Strict):
+    """One of [[files.channels]]: what a channel of the file measures."""
+
+    channel: str = Field(description="name in the file")
+    quantity: Quantity = Field(description="what it measures")
+    at: str = Field(min_length=1, description="hub, body, connector or sensor that it belongs to")
+    component: Literal["x", "y", "z", "roll", "pitch", "yaw", ""] = Field(default="", description="axis")
+    frame: Frame | None = Field(default=None, description="whose axes")
+    sign: Literal[1, -1] = Field(default=1, description="-1 where the file counts the other way")
+    unit: str | None = Field(default=None, description="where the file names none, or another than it means")
+    gravity: bool = Field(default=True, description="whether an acceleration includes it: +9.81 m/s^2 upwards at rest")
+    check: bool = Field(default=False, description="only compared with, never put in")
+
+
+class MeasuredFile(Strict):
+    """One of [[files]]: CSV, MDF4, RPC III or TDMS."""
+
+    file: str = Field(description="the file, beside the scene")
+    offset: float = quantity("s", "added to its clock", default=0.0, signed=True)
+    channels: list[MappedChannel] = Field(min_length=1, description="what its channels measure")
+
+
+class Sensor(Strict):
+    """[sensors.NAME]: where an accelerometer or gyro sits."""
+
+    body: str = Field(description="that carries it")
+    position: list[float] = Field(min_length=3, max_length=3, description="x, y, z in m, in the vehicle's design axes")
+
+
+class Clock(Strict):
+    """[clock]: of the recording; without it that of the wheel forces."""
+
+    rate: float | None = quantity("Hz", "samples per second of the recording", default=None)
+    start: float = quantity("s", "left out at the beginning", default=0.0, zero=True)
+    duration: float | None = quantity("s", "taken of what follows; else all", default=None)
+
+
+class Deviations(Strict):
+    """[noise]: standard deviation of the white noise on each sample; what is not named is estimated by the checks."""
+
+    force: float | None = quantity("N", "of every force sample", default=None)
+    moment: float | None = quantity("N m", "of every moment sample", default=None)
+    angle: float | None = quantity("rad", "of every angle", default=None)
+    rate: float | None = quantity("rad/s", "of every angular rate", default=None)
+
+
+class Stabilise(Strict):
+    """[stabilise]: how roll and pitch are held."""
+
+    method: Literal["kalman", "prescribed", "none"] = Field(default="kalman", description="what holds roll and pitch")
+    bandwidth: float = quantity("Hz", "of the moment towards the filter's estimate", default=0.7)
+    model: float = quantity("rad/s^2", "deviation of what springs add to the rigid vehicle, to the filter", default=1.0)
+    smoothing: float = quantity("Hz", "low-pass of angles before they are enforced", default=5.0)
+
+
+class Run(Strict):
+    """[run]."""
+
+    engine: Engine = Field(default="mujoco", description="that computes it; --engine names another")
+    step: float | None = quantity("s", "of Runge-Kutta 4; else the clock's period, or a part of it", default=None)
+
+
+class HandOn(Strict):
+    """[hand_on]: what the fatigue group gets."""
+
+    sections: list[str] | None = Field(default=None, description="springs, mounts, bars, joints; all if not named")
+    formats: list[Literal["csv", "mf4", "rsp", "tdms"]] = Field(default=["csv"], description="of the section forces")
+    slopes: list[float] = Field(default=[3.0, 5.0, 8.0], min_length=1, description="Woehler exponents")
+
+
+class MeasuredScene(SceneFile):
+    """One scene of a recording."""
+
+    system: Literal["measured"] = "measured"
+    study: str = Field(default="recording", description="the study that runs the scene")
+    vehicle: Vehicle
+    files: list[MeasuredFile] = Field(default=[], description="what was measured")
+    sensors: dict[str, Sensor] = Field(default={}, description="where accelerometers sit")
+    clock: Clock = Clock()
+    noise: Deviations = Deviations()
+    stabilise: Stabilise = Stabilise()
+    run: Run = Run()
+    hand_on: HandOn = HandOn()
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> MeasuredScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(MeasuredScene, table, file, folder)
+    _check_vehicle(scene)
+    names = [each.file for each in scene.files]
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise InputError(file, f"files.{i}.file", name, "is named twice: put all its channels into one [[files]]")
+    return scene
+
+
+def _check_vehicle(scene: MeasuredScene) -> None:
+    own = scene.vehicle
+    if (own.file is None) == (own.parameters is None):
+        raise InputError(scene.file, "vehicle", None, "name either file, of a vehicle in space, or parameters, of the "
+                         "pitch-plane vehicle")  # fmt: skip
+    if own.parameters is not None and "chassis" in own.model_fields_set:
+        raise InputError(scene.file, "vehicle.chassis", own.chassis, "belongs to a vehicle file: drop it")

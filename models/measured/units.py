@@ -1,0 +1,87 @@
+"""Units as measurement systems spell them, turned into SI by pint: strictly, for each quantity."""
+
+import re
+from functools import cache
+from typing import Any
+
+from models.errors import InputError, suggestion
+from models.measured.signal import UNITS, Quantity
+
+SPELT = {
+    "Grad": "degree", "Grad/s": "degree/s", "deg.": "degree", "deg./s": "degree/s", "U/min": "rpm", "rev/min": "rpm",
+    "kp": "kgf", "Newton": "N", "newton": "N", "-": "", "strain": "", "ustrain": "microstrain",
+}  # fmt: skip
+"""Whole spellings that pint does not know or takes for something else: Grad is German for degree, to pint 1e9 rad."""
+AMBIGUOUS = ("grad",)
+"""Degrees to some, gon to others."""
+GRAVITY = ("g", "G", "gn", "g_n")
+"""In a unit of acceleration; to pint a gram."""
+TURNS = {"radian", "milliradian", "microradian", "degree", "millidegree", "turn", "revolutions_per_minute", "grade",
+         "arcminute", "arcsecond"}  # fmt: skip
+"""One of these must be in a unit of an angle: to pint turns, percent and pure numbers are one kind."""
+EXAMPLES: dict[Quantity, tuple[str, ...]] = {
+    "force": ("N", "kN", "lbf"), "moment": ("N m", "kN m", "lbf ft"), "acceleration": ("m/s^2", "g", "mm/s^2"),
+    "angular rate": ("rad/s", "deg/s", "rpm"), "angle": ("rad", "mrad", "deg"), "travel": ("m", "mm", "in"),
+    "strain": ("m/m", "um/m", "microstrain", "%"),
+}  # fmt: skip
+
+
+def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float:
+    """Factor of a unit: value in SI = value * factor.
+
+    Raises InputError at ``file`` and ``place`` for a unit that nobody knows or that is of another quantity.
+    """
+    found = _parsed(unit, quantity)
+    if found is None:
+        raise InputError(file, place, unit, f"no such unit is known: write {_like(quantity)}{_meant(unit, quantity)}")
+    if not found.is_compatible_with(_si(quantity)):
+        raise InputError(file, place, unit, f"{_kind(found)}, and the channel is mapped as {quantity}: write "
+                         f"{_like(quantity)}, or map it as what it is{_meant(unit, quantity)}")  # fmt: skip
+    turned = bool(TURNS & set(re.split(r"[^a-z_]+", str(found))))
+    if turned != (quantity in ("angle", "angular rate")):
+        what = "is a unit of angle" if turned else "does not say whether of a turn, a degree or a radian"
+        raise InputError(file, place, unit, f"{what}, and the channel is mapped as {quantity}: write {_like(quantity)}")
+    return float(_registry().Quantity(1.0, found).to(_si(quantity)).magnitude)
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def _si(quantity: Quantity) -> Any:
+    return _registry().parse_units(UNITS[quantity].replace("-", ""))
+
+
+def _parsed(unit: str, quantity: Quantity) -> Any:
+    """A unit of pint's, None where it knows none such."""
+    text = unit.strip().strip("[]").strip()
+    if quantity == "acceleration" and text in GRAVITY:
+        text = "standard_gravity"
+    text = re.sub(r"\b([kMmcd]|da)?N[.\-·]?m\b", r"\1N m", SPELT.get(text, text))  # Nm is a number of metres to pint
+    text = re.sub(r"(?<=/)(s|sec)(2|²)$", "s^2", text)
+    try:
+        return None if text.split("/")[0] in AMBIGUOUS else _registry().parse_units(text)
+    except Exception:  # pint's parser raises whatever its tokens raise, down to AssertionError
+        return None
+
+
+def _kind(found: Any) -> str:
+    """What a unit is of, in an engineer's words."""
+    if "volt" in str(found) or "ampere" in str(found):
+        return f"is the unit of a raw reading ({found:~P}), which needs the sensor's calibration in the logger"
+    same = [name for name in UNITS if found.is_compatible_with(_si(name))]
+    if found.dimensionless:
+        return "is a pure number"
+    return f"is a unit of {same[0]}" if same else f"is {found:P}"
+
+
+def _meant(unit: str, quantity: Quantity) -> str:
+    return suggestion(unit, EXAMPLES[quantity])
+
+
+def _like(quantity: Quantity) -> str:
+    *others, last = EXAMPLES[quantity]
+    return f"{', '.join(others)} or {last}"
