@@ -281,12 +281,9 @@ def _hold(torque, e, joint, chassis, twisted):
 
 
 @njit(cache=True, error_model="numpy")
-def all_forces(numbers, t, q, v, f, report, ledger):
-    """Add the forces (N, N m) on all coordinates to ``f``; all are arrays, report (tyres, REPORTED), ledger (LEDGER,).
-
-    t : s; q, v : positions and rates of the coordinates (m, rad; m/s, rad/s) in the vehicle's order.
-    """
-    n, w, chassis = int(numbers[JOINTS]), int(numbers[TYRES]), int(numbers[CHASSIS])
+def enter(numbers, q, v, f, ledger):
+    """Add the forces of all parts to ``f``. Returns the carrier's frame, the tree, its forces and moments: none."""
+    n = int(numbers[JOINTS])
     turned, place, axes, speed = np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
     turning, pushed, twisted = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
     tree = (turned, place, axes, speed, turning)
@@ -298,8 +295,30 @@ def all_forces(numbers, t, q, v, f, report, ledger):
     _inwards(rows, n, place, axes, pushed, twisted, f)
     for k in range(3):  # what acts between the vehicle's parts does not push the carrier
         pushed[2, k] = twisted[2, k] = 0.0
-    cosine, sine, knots = math.cos(q[2]), math.sin(q[2]), int(numbers[KNOTS])
+    cosine, sine = math.cos(q[2]), math.sin(q[2])
     frame = (cosine, sine, q[0], q[1], cosine * v[0] + sine * v[1], cosine * v[1] - sine * v[0], v[2])
+    return frame, tree, pushed, twisted
+
+
+@njit(cache=True, error_model="numpy")
+def leave(numbers, frame, tree, pushed, twisted, f, ledger):
+    """Drag, and what tyres and drag push and twist, added to ``f`` and ledger."""
+    n = int(numbers[JOINTS])
+    _drag(numbers, int(numbers[CHASSIS]), frame, tree, pushed, twisted, ledger)
+    _inwards(numbers[HEADER : HEADER + PER_JOINT * n], n, tree[1], tree[2], pushed, twisted, f)
+    f[0] += frame[0] * pushed[2, 0] - frame[1] * pushed[2, 1]
+    f[1] += frame[1] * pushed[2, 0] + frame[0] * pushed[2, 1]
+    f[2] += twisted[2, 2]
+
+
+@njit(cache=True, error_model="numpy")
+def all_forces(numbers, t, q, v, f, report, ledger):
+    """Add the forces (N, N m) on all coordinates to ``f``; all are arrays, report (tyres, REPORTED), ledger (LEDGER,).
+
+    t : s; q, v : positions and rates of the coordinates (m, rad; m/s, rad/s) in the vehicle's order.
+    """
+    w, chassis, knots = int(numbers[TYRES]), int(numbers[CHASSIS]), int(numbers[KNOTS])
+    frame, tree, pushed, twisted = enter(numbers, q, v, f, ledger)
     steer, steering = control(numbers, int(numbers[OF_KNOTS]), STEER, knots, t)
     braking = control(numbers, int(numbers[OF_KNOTS]), BRAKE, knots, t)[0]
     driving = control(numbers, int(numbers[OF_KNOTS]), DRIVE, knots, t)[0]
@@ -316,13 +335,9 @@ def all_forces(numbers, t, q, v, f, report, ledger):
     for i in range(w):
         tyre = tyres[PER_TYRE * i :]
         _creep(tyre, found[i], ways[i], chassis, f, tree, pushed, twisted, report[i])
-        _torque(tyre, braking, driving, v, ways[i, 5], chassis, f, turning, twisted, ledger, report[i])
+        _torque(tyre, braking, driving, v, ways[i, 5], chassis, f, tree[4], twisted, ledger, report[i])
         ledger[STEER_POWER] -= tyre[STEERED] * steering * report[i, STEER_MOMENT]
-    _drag(numbers, chassis, frame, tree, pushed, twisted, ledger)
-    _inwards(rows, n, place, axes, pushed, twisted, f)
-    f[0] += cosine * pushed[2, 0] - sine * pushed[2, 1]
-    f[1] += sine * pushed[2, 0] + cosine * pushed[2, 1]
-    f[2] += twisted[2, 2]
+    leave(numbers, frame, tree, pushed, twisted, f, ledger)
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,0 +1,84 @@
+"""A braked vehicle on its suspension in an engine: "exudyn" or "mujoco" has bodies, joints, masses and weights.
+
+Each step (s) the wheels are exact under the torques that they have, with loads and slip angles in the middle of the
+step, to which half a step by the accelerations leads; the engine then marches the whole step by its own Runge-Kutta
+method around the compiled forces, the tyres' mean ones held at their contacts and turned with their wheels.
+"""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from models.braking.advance import AT_REST, FINE
+from models.braking.plane_step import KNOWN, begin, comes_to_rest
+from models.braking.plane_vehicle import Plane
+from models.braking.sprung import PITCH, ROLL, Sprung
+from models.braking.sprung_forces import ROW, STEER, fill, held, hold
+from models.braking.surfaces import under_wheels
+from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.errors import RunFailed
+
+UPRIGHT = 0.5
+"""Roll and pitch (rad) beyond which the vehicle turns over."""
+
+
+class OnSprings:
+    """The vehicle in an engine; ``advance`` stands in for the compiled one of that name, with all coordinates."""
+
+    def __init__(self, engine: str, vehicle: Sprung) -> None:
+        own, wheels = vehicle.handling, len(vehicle.handling.vehicle.tyres)
+        self.engine, self.size, self.names = engine, vehicle.size, vehicle.names
+        self.numbers = table = np.concatenate((own.numbers, np.zeros(ROW * wheels)))
+        self._rows = table[own.numbers.size :].reshape(wheels, ROW)
+        driven = Driven(own.vehicle, own.gravity, table, held, lambda block, t, n: fill(block, n, table))
+        self._model: FreeModel = free_model(engine, driven)
+        self._rates, self._known = np.zeros(wheels), np.empty((wheels, KNOWN))
+
+    def advance(self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float, steer: np.ndarray,
+                slope: float, plane: Plane, kind: np.ndarray, road: Any, tables: tuple[np.ndarray, ...],
+                found: np.ndarray, report: np.ndarray) -> tuple[int, float]:  # fmt: skip
+        """As ``models.braking.advance.advance``, ``state`` (2, n) having all coordinates and their rates."""
+        surface, time = np.empty((turning.size, 3)), 0.0
+        self._rows[:, STEER] = steer
+        for before, after in pairwise(torques):
+            under_wheels(state, step, plane, kind, road, surface)
+            begin(turning, surface, plane, self._known)
+            used = self._step(state, turning, before, after, step, slope * 9.81 * step, plane, tables, found, report)
+            time += used
+            if used < step:
+                return AT_REST, time
+            if np.abs(state[0, [ROLL, PITCH]]).max() > UPRIGHT:
+                raise RunFailed(self.engine, f"the vehicle turns over: it leans by more than {UPRIGHT} rad", time)
+        return FINE, time
+
+    def _step(self, state: np.ndarray, turning: np.ndarray, torque0: np.ndarray, torque1: np.ndarray, step: float,
+              regular: float, plane: Plane, tables: tuple[np.ndarray, ...], found: np.ndarray,
+              report: np.ndarray) -> float:  # fmt: skip
+        """Time (s) of the step at which the vehicle comes to rest, ``step`` if it does not."""
+        numbers, known, (q, v) = self.numbers, self._known, state
+        hold(numbers, q, v, torque0, 0.5 * (torque0 + torque1), 0.5 * step, self._rates, regular, True, tables, known,
+             report)  # fmt: skip
+        rates = self.accelerations(q, v)
+        found[:] = rates[: found.size]
+        rest = comes_to_rest(v[: found.size], turning, found, step, plane)
+        if rest >= 0.0:
+            q += rest * v + 0.5 * rest**2 * rates
+            v[: found.size], turning[:] = 0.0, 0.0
+            return rest
+        half = 0.5 * step
+        hold(numbers, q + half * v + 0.5 * half**2 * rates, v + half * rates, torque0, torque1, step, self._rates,
+             regular, False, tables, known, report)  # fmt: skip
+        self._hand_over()
+        state[:] = self._model.march(q, v, 1, step)[-1].reshape(2, -1)
+        turning[:] = report[:, -1]
+        return step
+
+    def accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """(n,) by the engine, with the forces that are held."""
+        self._hand_over()
+        return self._model.acceleration(0.0, q, v)
+
+    def _hand_over(self) -> None:
+        if hasattr(self._model, "model"):
+            self._model.model.numeric_data[:] = self.numbers
