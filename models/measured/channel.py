@@ -8,6 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
+from models.measured.finding import Finding
+
 BLOCK = 60_000
 """Samples of a block: a minute at 1 kHz."""
 
@@ -45,11 +47,25 @@ class Block:
 class Source(Protocol):
     """One file, opened; each format has one in ``models.measured.formats``."""
 
-    path: Path
-    channels: tuple[Channel, ...]
-    start: datetime | None
-    """When time was 0, with its zone; None where the file does not say."""
-    comment: str
+    @property
+    def path(self) -> Path:
+        """The file."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """All channels of numbers over time; their names differ."""
+
+    @property
+    def start(self) -> datetime | None:
+        """When time was 0, with its zone; None where the file does not say."""
+
+    @property
+    def comment(self) -> str:
+        """Comment of the file, lines parted by line ends."""
+
+    @property
+    def noticed(self) -> tuple[Finding, ...]:
+        """What had to be said in opening it: cut off, repeated names, channels left out, how numbers are written."""
 
     def blocks(self, names: Sequence[str], length: int = BLOCK, first: int = 0) -> Iterator[Block]:
         """Blocks of at most ``length`` samples of channels of one group, from sample ``first`` on.

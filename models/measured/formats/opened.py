@@ -1,0 +1,115 @@
+"""What the readers of all formats share: channels chosen by name, blocks cut and checked, one kind of error."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from models.errors import InputError
+from models.measured.channel import BLOCK, Block, Channel
+from models.measured.finding import Finding, Weight
+
+Span = tuple[int, int]
+"""First sample and number of samples."""
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A file whose channels are known; its samples are read when asked for, and no handle stays open between."""
+
+    path: Path
+    channels: tuple[Channel, ...]
+    start: datetime | None
+    comment: str
+    noticed: tuple[Finding, ...]
+
+    def blocks(self, names: Sequence[str], length: int = BLOCK, first: int = 0) -> Iterator[Block]:
+        """Blocks of channels of one group, as ``models.measured.channel.Source`` says."""
+        chosen = self._chosen(names)
+        count = self.channels[chosen[0]].count
+        return self._checked(chosen, [(i, min(length, count - i)) for i in range(first, count, length)])
+
+    def pieces(self, chosen: list[int], spans: list[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Times (n,) in s and values (n, chosen) of each span, by the format; fewer where the file ends."""
+        raise NotImplementedError
+
+    def _chosen(self, names: Sequence[str]) -> list[int]:
+        """Indices of channels, which must be of one group."""
+        place = {channel.name: i for i, channel in enumerate(self.channels)}
+        for name in names:
+            if name not in place:
+                raise InputError(self.path, "channel", name, "the file has no such channel", tuple(place))
+        chosen = [place[name] for name in names]
+        if len({self.channels[i].group for i in chosen}) != 1:
+            raise InputError(self.path, "channels", list(names), "one or more channels of one sampling rate are needed")
+        return chosen
+
+    def _checked(self, chosen: list[int], spans: list[Span]) -> Iterator[Block]:
+        """Blocks that are complete, with times and values that are numbers or NaN."""
+        with readable(self.path):
+            for (first, count), (times, values) in zip(spans, self.pieces(chosen, spans), strict=True):
+                if len(times) != count:
+                    raise InputError(self.path, f"sample {first + len(times)}", None,
+                                     f"the data end here, although {first + count} samples or more are announced")
+                self._finite(first, ["time"], times[:, None], np.isfinite(times[:, None]))
+                self._finite(first, [self.channels[i].name for i in chosen], values, ~np.isinf(values))
+                yield Block(first, times, values)
+
+    def _finite(self, first: int, names: list[str], values: np.ndarray, good: np.ndarray) -> None:
+        """Refuse the first value that is not a measured one."""
+        if not good.all():
+            row, column = (int(i[0]) for i in np.nonzero(~good))
+            raise InputError(self.path, f"channel {names[column]!r}, sample {first + row}", float(values[row, column]),
+                             "a finite value is needed (NaN in a channel says that nothing was measured)")
+
+
+@contextmanager
+def readable(path: Path) -> Iterator[None]:
+    """Whatever a reader raises on a damaged file becomes one message."""
+    try:
+        yield
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(path, "", None, f"the file cannot be read: {error.strerror or error}") from None
+    except Exception as error:
+        why = f"{type(error).__name__}: {error}".splitlines()[0]
+        raise InputError(path, "", None, f"the file is damaged and cannot be read ({why})") from error
+
+
+def notice(path: Path, weight: Weight, text: str, place: str = "") -> Finding:
+    """What a reader has to say of a file that it read all the same."""
+    return Finding("file", weight, place or path.name, text)
+
+
+def told_apart(path: Path, names: Sequence[str]) -> tuple[list[str], list[Finding]]:
+    """Names of which each occurs once: a repeated ``Fz`` becomes ``Fz (1)``, ``Fz (2)``, and that is said."""
+    uses, taken, own = Counter(names), set(names), []
+    for name in names:
+        if uses[name] == 1:
+            own.append(name)
+            continue
+        numbers = (f"{name} ({k})" for k in range(1, len(names) + len(taken) + 1))
+        own.append(next(text for text in numbers if text not in taken))
+        taken.add(own[-1])
+    found = [notice(path, "doubt", f"{uses[name]} channels are called {name!r}: they are read as "
+                    + ", ".join(repr(n) for n, o in zip(own, names, strict=True) if o == name), name)
+             for name in uses if uses[name] > 1]  # fmt: skip
+    return own, found
+
+
+def zoned(path: Path, text: str) -> tuple[datetime | None, list[Finding]]:
+    """Start from text in ISO 8601; None, and a word about it, where it is no date or has no zone."""
+    try:
+        start = datetime.fromisoformat(text.strip())
+    except ValueError:
+        return None, [notice(path, "doubt", f"the start {text.strip()!r} is not a date such as "
+                             "2026-11-21T08:00:00+00:00, and is not used")]
+    if start.tzinfo is None:
+        return None, [notice(path, "doubt", f"the start {text.strip()!r} names no time zone, and is not used: "
+                             "write it as 2026-11-21T08:00:00+00:00")]
+    return start, []
