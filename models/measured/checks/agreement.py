@@ -1,0 +1,208 @@
+"""Do hub forces and inertial signals belong to one vehicle? What each channel accounts for, by cross spectra.
+
+Expected readings are the vehicle's response to all measured forces. What a channel, or all channels of a hub or a
+file, accounts for is set against what is left of the readings when all others are taken off: where the two correlate
+best is the time by which that channel is late, and their ratio, in least squares, the factor by which it is wrong. The
+one fault that leaves least unexplained is taken out, and the search begins anew, until none is worth its name.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+
+from models.measured.signal import Signal
+
+Kind = Literal["late", "factor", "swapped"]
+KNOWN = 0.03
+"""Share of an expected reading by which a vehicle file is taken to be wrong at the least: nobody knows his car better."""
+REACH, GRID = 0.25, 5e-4
+"""s: delays looked at, and their spacing before the parabola through the best three."""
+CERTAIN = 40.0
+"""Fall of chi square that one more parameter must bring: chance does so once in 10^9."""
+SMALL_DELAY, SMALL_FACTOR = 5e-4, 0.01
+"""s and a share: what is smaller does no harm, and no vehicle file is good enough to tell."""
+FAULTS = 8
+"""Faults looked for at the most."""
+SMOOTHED = 9
+"""Lines over which the unexplained spectrum is averaged."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Signals that are wrong together. forces : whether of hubs; own : their numbers among those or the readings."""
+
+    name: str
+    forces: bool
+    own: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """late : size in s; factor : recorded by true value; swapped : size is the share that is explained only then.
+
+    error : standard error of the size, of random errors alone. fall : of chi square.
+    """
+
+    kind: Kind
+    name: str
+    signals: tuple[Signal, ...]
+    size: float
+    error: float
+    fall: float
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Cross spectra and the vehicle between them, at frequencies (f,) in Hz.
+
+    between (f, k, c) : mean of reading times conj(force); forces (f, c, c); readings (f, k) : powers. response
+    (f, k, c) : of the vehicle, with every correction so far. averages : independent ones in each mean.
+    """
+
+    frequencies: np.ndarray
+    inputs: tuple[Signal, ...]
+    outputs: tuple[Signal, ...]
+    forces: np.ndarray
+    between: np.ndarray
+    readings: np.ndarray
+    response: np.ndarray
+    averages: float
+
+    @property
+    def expected(self) -> np.ndarray:
+        """Powers (f, k) of the expected readings."""
+        return _power(self.response, self.forces)
+
+    @property
+    def left(self) -> np.ndarray:
+        """Powers (f, k) that stay unexplained."""
+        shared = np.einsum("fkc,fkc->fk", self.between, self.response.conj()).real
+        return np.maximum(self.readings - 2 * shared + self.expected, 0.0)
+
+    @property
+    def unexplained(self) -> np.ndarray:
+        """Root of the unexplained share (k,) of every reading's power."""
+        return np.sqrt(self.left.sum(axis=0) / self.readings.sum(axis=0))
+
+    @property
+    def weights(self) -> np.ndarray:
+        """By the unexplained power itself, smoothed, so that a line that nobody explains counts for little."""
+        kernel = np.ones(SMOOTHED) / SMOOTHED
+        known = KNOWN**2 * np.maximum(self.expected, 1e-3 * self.expected.mean(axis=0))
+        smooth = [np.convolve(np.pad(row, SMOOTHED // 2, mode="edge"), kernel, "valid") for row in (self.left + known).T]
+        return self.averages / np.maximum(np.stack(smooth, axis=1), np.finfo(float).tiny)
+
+    def search(self) -> tuple["Agreement", tuple[Fault, ...]]:
+        """All faults, the worst first, and what is left without them."""
+        now, faults = self, list[Fault]()
+        while len(faults) < FAULTS:
+            found = max(now._offers(), key=lambda offer: offer[0].fall, default=None)
+            if found is None:
+                break
+            faults.append(found[0])
+            now = found[1]
+        return now, tuple(faults)
+
+    def _offers(self) -> Iterator[tuple[Fault, "Agreement"]]:
+        """Every single fault that would explain more and is large enough to be named."""
+        weights = self.weights
+        for group in self.groups():
+            yield from self._late(group, weights)
+            yield from self._wrong(group, weights)
+        yield from self._swapped(weights)
+
+    def groups(self) -> Iterator[Group]:
+        """Every signal alone, those of one hub or sensor, of one file, and all readings: the fewer the earlier."""
+        for forces, signals in ((True, self.inputs), (False, self.outputs)):
+            keys = [[f"{s.name}" for s in signals], [f"all channels of {s.at}" for s in signals],
+                    [f"all {s.quantity} channels" for s in signals], [f"all channels of {s.file}" for s in signals]]
+            seen = set()
+            for names in keys if forces else [*keys, ["all inertial channels"] * len(signals)]:
+                for name in dict.fromkeys(names):
+                    own = tuple(i for i, other in enumerate(names) if other == name)
+                    if own not in seen and not (forces and len(own) == len(signals)):
+                        seen.add(own)
+                        yield Group(name, forces, own)
+
+    def _share(self, group: Group) -> tuple[np.ndarray, np.ndarray]:
+        """Cross power (f, k) of what is left without the group with what it accounts for, and the power of that."""
+        own = np.zeros_like(self.response)
+        pick = list(group.own)
+        if not group.forces:
+            own[:, pick] = self.response[:, pick]
+            return np.einsum("fkc,fkc->fk", self.between, own.conj()), _power(own, self.forces)
+        own[:, :, pick] = self.response[:, :, pick]
+        rest = self.between - (self.response - own) @ self.forces
+        return np.einsum("fkc,fkc->fk", rest, own.conj()), _power(own, self.forces)
+
+    def _late(self, group: Group, weights: np.ndarray) -> Iterator[tuple[Fault, "Agreement"]]:
+        cross, power = self._share(group)
+        line = (weights * cross).sum(axis=1)
+        turn = -2j * np.pi * self.frequencies * (1 if group.forces else -1)
+        times = GRID * np.arange(-round(REACH / GRID), round(REACH / GRID) + 1)
+        likely = (np.exp(np.outer(times, turn)) @ line).real
+        best = int(np.argmax(likely[1:-1])) + 1
+        late = float(times[best] + GRID * _vertex(*likely[best - 1 : best + 2]))
+        fall = 2 * float((np.exp(turn * late) @ line - line.sum()).real)
+        steep = 2 * float((np.abs(turn) ** 2 @ (weights * power)).sum())
+        if fall > CERTAIN and steep > 0 and abs(late) > max(SMALL_DELAY, 4 * steep**-0.5):
+            fault = Fault("late", group.name, self._signals(group), late, steep**-0.5, fall)
+            yield fault, self._corrected(group, np.exp(-turn * late))
+
+    def _wrong(self, group: Group, weights: np.ndarray) -> Iterator[tuple[Fault, "Agreement"]]:
+        cross, power = ((weights * part).sum() for part in self._share(group))
+        if not power > 0:
+            return
+        ratio = float(cross.real / power)
+        fall, error = float(power) * (ratio - 1) ** 2, float(2 * power) ** -0.5
+        factor = 1 / ratio if group.forces and ratio else ratio
+        if fall > CERTAIN and abs(ratio - 1) > max(SMALL_FACTOR, 4 * error):
+            fault = Fault("factor", group.name, self._signals(group), factor, error * abs(factor / ratio), fall)
+            yield fault, self._corrected(group, np.full(len(self.frequencies), ratio, complex))
+
+    def _swapped(self, weights: np.ndarray) -> Iterator[tuple[Fault, "Agreement"]]:
+        """Two hubs as a whole, or two and two."""
+        hubs = tuple(dict.fromkeys(s.at for s in self.inputs))
+        pairs = list(combinations(hubs, 2))
+        twice = [(a, b) for a, b in combinations(pairs, 2) if not set(a) & set(b)]
+        before = float((weights * self.left).sum())
+        for exchanged in (*((pair,) for pair in pairs), *twice):
+            order = self._order(exchanged)
+            if order is None:
+                continue
+            other = replace(self, response=self.response[:, :, order])
+            fall = before - float((weights * other.left).sum())
+            if fall > CERTAIN and other.left.sum() < self.left.sum():
+                name = " and ".join(f"{a} with {b}" for a, b in exchanged)
+                share = float(np.sqrt(np.mean(self.unexplained**2)))
+                yield Fault("swapped", name, tuple(s for pair in exchanged for s in self.inputs if s.at in pair), share,
+                            float(np.sqrt(np.mean(other.unexplained**2))), fall), other  # fmt: skip
+
+    def _order(self, exchanged: tuple[tuple[str, str], ...]) -> list[int] | None:
+        to = {a: b for one, two in exchanged for a, b in ((one, two), (two, one))}
+        places = {(s.at, s.quantity, s.component): i for i, s in enumerate(self.inputs)}
+        keys = [(to.get(s.at, s.at), s.quantity, s.component) for s in self.inputs]
+        return [places[key] for key in keys] if all(key in places for key in keys) else None
+
+    def _signals(self, group: Group) -> tuple[Signal, ...]:
+        return tuple((self.inputs if group.forces else self.outputs)[i] for i in group.own)
+
+    def _corrected(self, group: Group, by: np.ndarray) -> "Agreement":
+        """With true by recorded forces (f,), or recorded by true readings."""
+        response, pick = self.response.copy(), list(group.own)
+        index = (slice(None), slice(None), pick) if group.forces else (slice(None), pick)
+        response[index] *= by[:, None, None]
+        return replace(self, response=response)
+
+
+def _power(response: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    return np.einsum("fkc,fkc->fk", response @ forces, response.conj()).real
+
+
+def _vertex(left: float, middle: float, right: float) -> float:
+    """Where the parabola through three values at -1, 0, 1 has its vertex."""
+    bend = left - 2 * middle + right
+    return 0.5 * (left - right) / bend if bend < 0 else 0.0

@@ -1,0 +1,66 @@
+"""What measured forces at the hubs do to accelerometers, gyros and angles of a vehicle: its linear response.
+
+About its design position, by differences of the written-out equations: M q'' = ... becomes q'' = A q + D q' + B u. What
+is looked at lies well above the drift of the free vehicle, so that neither its start nor its growth matters.
+"""
+
+import numpy as np
+
+from models.engines.hub_forces import HubModel, build
+from models.hub_forces.cut_vehicle import GRAVITY, CutVehicle
+from models.hub_forces.kernel import WRENCH
+from models.hub_forces.table import Drive
+from models.measured.checks.place import Place
+from models.measured.signal import Signal
+from models.vehicles.kinematics import Kinematics
+
+STEP = 1e-3
+NUDGE = 1e-5
+"""m and rad, m/s and rad/s: of the differences; the equations are smooth over metres."""
+PUSH = 100.0
+"""N and N m: of the differences by forces, in which the equations are linear."""
+AXES = {"x": 0, "y": 1, "z": 2, "roll": 0, "pitch": 1, "yaw": 2}
+
+
+class Response:
+    """The linear vehicle: q'' = stiff q + damped q' + pushed u, u (6 h,) in N and N m, in a frame."""
+
+    def __init__(self, vehicle: CutVehicle, frame: str) -> None:
+        self.vehicle, self.motion = vehicle, Kinematics(vehicle.tree)
+        model, n = _built(vehicle, frame), vehicle.size
+        rest, moved = np.zeros(n), NUDGE * np.eye(n)
+        self.stiff = np.column_stack([(model.accelerations(0.0, d, rest) - model.accelerations(0.0, -d, rest))
+                                      / (2 * NUDGE) for d in moved])  # fmt: skip
+        self.damped = np.column_stack([(model.accelerations(0.0, rest, d) - model.accelerations(0.0, rest, -d))
+                                       / (2 * NUDGE) for d in moved])  # fmt: skip
+        still, hubs = model.accelerations(0.0, rest, rest), WRENCH * len(vehicle.hubs)
+        self.pushed = np.column_stack([(model.accelerations((i + 1) * STEP / 2, rest, rest) - still) / PUSH
+                                       for i in range(hubs)])  # fmt: skip
+
+    def at(self, frequencies: np.ndarray, signals: tuple[Signal, ...], places: tuple[Place, ...]) -> np.ndarray:
+        """Transfer functions (f, signals, 6 h) at frequencies (f,) in Hz; each signal at its place."""
+        own, n = 2j * np.pi * frequencies[:, None, None], self.vehicle.size
+        q = np.linalg.solve(own**2 * np.eye(n) - own * self.damped - self.stiff, self.pushed[None].astype(complex))
+        rows = np.stack([self._row(own[:, 0], s, place) for s, place in zip(signals, places, strict=True)], axis=1)
+        return np.asarray(rows @ q)
+
+    def _row(self, own: np.ndarray, signal: Signal, place: Place) -> np.ndarray:
+        """(f, n): reading by coordinates, at own = i omega (f, 1)."""
+        axis, turn = AXES[signal.component], self.motion.turn(place.body)
+        if signal.quantity == "angle":
+            return np.broadcast_to(turn[axis], (len(own), self.vehicle.size))
+        if signal.quantity == "angular rate":
+            return own * turn[axis]
+        shift = self.motion.shift(place.body, place.position)[axis]
+        weighs = signal.gravity and signal.frame in ("body", "sensor")  # a tilted sensor feels part of the weight
+        tilt = GRAVITY * np.array([-turn[1], turn[0], 0 * turn[0]])[axis] if weighs else 0.0
+        return own**2 * shift + tilt
+
+
+def _built(vehicle: CutVehicle, frame: str) -> HubModel:
+    """A model that at half step 0 carries its static loads, and at half step i + 1 also a push on component i."""
+    hubs = WRENCH * len(vehicle.hubs)
+    rows = np.zeros((hubs + 1, hubs))
+    rows[:, 2::WRENCH] = vehicle.loads
+    rows[1:] += PUSH * np.eye(hubs)
+    return build("reference", vehicle, Drive(rows, frame), STEP, STEP * (hubs // 2))
