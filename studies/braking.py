@@ -14,7 +14,7 @@ from models.braking.measured_pressures import MeasuredPressures, write_pressures
 from models.braking.of_scene import measured_of, plane_of
 from models.braking.plan import behind
 from models.braking.plane_step import FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE
-from models.braking.procedures import drive
+from models.braking.procedures import drive, step_steer
 from models.braking.run import Path
 from models.braking.scene import BrakingScene
 from models.braking.stop_report import WHEELS, Stop
@@ -84,6 +84,10 @@ def ended(measured: MeasuredPressures | None, stop: Stop) -> list[str]:
     return [f"    measured pressures end at {measured.times[-1]:.3f} s: from then on the last ones stay"]
 
 
+STEP_STEER = ("without brakes: response time [s]", "without brakes: overshoot [%]",
+              "without brakes: steady yaw rate [deg/s]")  # fmt: skip
+
+
 def engineers(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
     """Figures of merit of a procedure, by name and unit; none where they have no meaning.
 
@@ -95,8 +99,12 @@ def engineers(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
         if stop.times[-1] < 1.0:
             return {}
         return {f"after 1 s: {key}": value for key, value in stop.in_turn(own.radius).items()}
+    if own.kind == "j_turn":
+        found = step_steer(scene, name)
+        values = [np.nan] * 3 if found is None else [found.time, 100.0 * found.overshoot, np.degrees(found.steady)]
+        return dict(zip(STEP_STEER, values, strict=True))
     once = scene.port is not None and (scene.port.port is not None or scene.port.replay is not None)
-    if behind(scene) == "none" or scene.measured is not None or own.kind == "j_turn" or once:
+    if behind(scene) == "none" or scene.measured is not None or once:
         return {}
     if own.kind == "split":
         both = split(scene, name)

@@ -52,7 +52,10 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     if own is None or own.kind != "j_turn":
         names = tuple(name for name, one in scene.procedures.items() if one.kind == "j_turn")
         raise InputError(scene.file, "options.procedure", options.procedure, "must be a J-turn of the scene", names)
-    if own.steer is not None and own.steer <= 0.0:
+    if own.steer is None:
+        allowed = "has no meaning here: one angle is fitted, steer"
+        raise InputError(scene.file, f"procedures.{options.procedure}.steering", own.steering, allowed)
+    if own.steer <= 0.0:
         raise InputError(scene.file, f"procedures.{options.procedure}.steer", own.steer, "must be above 0 to be fitted")
 
 

@@ -10,7 +10,7 @@ PROCEDURES = {
     "straight": "straight braking",
     "split": "straight braking on split friction, wheels straight ahead",
     "turn": "braking in a turn, steering fixed as on the steady circle before",
-    "j_turn": "J-turn: the steering is turned and held as the brake is applied",
+    "j_turn": "J-turn: the steering is turned as the brake is applied, at once or by time",
 }
 
 

@@ -1,4 +1,4 @@
-"""The driver's part of a test: straight braking, split friction, braking in a turn, J-turn; all with fixed steering."""
+"""The driver's part of a test: straight braking, split friction, braking in a turn, J-turn, steered without looking."""
 
 import json
 from dataclasses import dataclass, replace
@@ -7,14 +7,18 @@ from pathlib import Path as Folder
 import numpy as np
 from scipy.optimize import root
 
+from models.braking.controller import Command, Sample
 from models.braking.of_scene import braked, controller_of
 from models.braking.plane_step import REPORTED, step_on
 from models.braking.port.setup import Run, opened
 from models.braking.run import Braked, Path, Start
-from models.braking.scene import BrakingScene
+from models.braking.scene import BrakingScene, Procedure
+from models.braking.steering import Response, Steering, response
 from models.braking.surfaces import under_wheels
 from models.errors import InputError, Refused
 
+UNBRAKED = 4.0
+"""s: for which the response to steering is watched after its last knot."""
 STEERED = 2
 """Wheels that are steered: those of the first axle, in parallel."""
 BLINK = 1e-5
@@ -37,7 +41,34 @@ def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
             allowed = f"tyres do not hold a steady circle of this radius at {own.speed:g} m/s on this surface"
             raise InputError(scene.file, f"procedures.{name}.radius", own.radius, allowed)
         return replace(vehicle, steer=turn.steer), turn.start
-    return replace(vehicle, steer=steered(vehicle, own.steer or 0.0)), vehicle.rolling(own.speed)
+    start, steering = vehicle.rolling(own.speed), steering_of(own, vehicle)
+    return replace(vehicle, steer=steering(0.0), steering=steering if own.steering else None), start
+
+
+def steering_of(own: Procedure, vehicle: Braked) -> Steering:
+    """What the driver does at the wheel from time 0 on; one angle is there at once."""
+    knots = own.steering or [[0.0, own.steer or 0.0]]
+    times, angles = np.array(knots, float).T
+    return Steering(times, angles, steered(vehicle, 1.0))
+
+
+@dataclass(frozen=True)
+class Released:
+    """No pressure anywhere, for wheels (W,)."""
+
+    wheels: int
+
+    def sample(self, given: Sample) -> Command:
+        """None."""
+        return Command(pressures=np.zeros(self.wheels))
+
+
+def step_steer(scene: BrakingScene, name: str) -> Response | None:
+    """How fast the vehicle of a J-turn answers to its steering without brakes; None where no yaw rate is steady."""
+    vehicle, start = ready(scene, name)
+    steering = steering_of(scene.procedures[name], vehicle)
+    path = vehicle.run(Released(vehicle.plane.wheels), start, float(steering.times[-1]) + UNBRAKED)
+    return response(path.times, path.states[:, 1, 2], steering.half)
 
 
 def drive(scene: BrakingScene, name: str, engine: str = "reference") -> Path:

@@ -50,8 +50,8 @@ class Start(NamedTuple):
 class Braked:
     """A vehicle on a road with brakes, ready to run.
 
-    kind (W,) : which tyre each wheel has; steer (W,) : rad; engine : ``models.engines.braking.Carried`` if an engine
-    is to carry the chassis.
+    kind (W,) : which tyre each wheel has; steer (W,) : rad, or in its place steering : such angles by time (s), those
+    in the middle of each sample; engine : ``models.engines.braking.Carried`` if an engine is to carry the chassis.
     """
 
     plane: Plane
@@ -68,6 +68,7 @@ class Braked:
     switch: float = 0.0
     engine: Any = None
     relaxation: np.ndarray | None = None
+    steering: Callable[[float], np.ndarray] | None = None
 
     def rolling(self, speed: float) -> Start:
         """Steady rolling along x at a speed (m/s)."""
@@ -106,7 +107,8 @@ class Braked:
                     by_valves(valves, self.sample, air, self.chambers, self.brakes, torques)
                 else:
                     by_pressures(command.pressures, air, self.brakes, torques)
-                status, used = go(state, turning, torques, step, self.steer, self.slope, self.plane, self.kind,
+                steer = self.steer if self.steering is None else self.steering(time + 0.5 * self.sample)
+                status, used = go(state, turning, torques, step, steer, self.slope, self.plane, self.kind,
                                        self.road, self.tables.packed, found, report)  # fmt: skip
                 time, number = time + used, number + 1
                 if status in (NOT_FOUND, LIFTED):

@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field
 
 from models.braking.controller import SAMPLE
@@ -16,6 +17,9 @@ from models.strict import Strict, quantity
 LARGEST_SPEED = 100.0
 """m/s; no road vehicle brakes from more."""
 Procedures = Literal["straight", "split", "turn", "j_turn"]
+
+
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 class VehicleTable(Strict):
@@ -111,6 +115,8 @@ class Procedure(Strict):
     speed: float = quantity("m/s", "at which the brake is applied", default=11.11)
     right: str | None = Field(default=None, description="surface right of the line on every stretch (split)")
     steer: float | None = quantity("rad", "fixed angle of the front wheels (j_turn)", default=None, signed=True)
+    steering: list[Pair] | None = Field(default=None, min_length=1, description="angle of the front wheels by time in "
+                                        "place of steer, linear between: [[s, rad], ...] (j_turn)")  # fmt: skip
     radius: float | None = quantity("m", "of the steady circle before braking (turn)", default=None, signed=True)
 
 
@@ -151,23 +157,38 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Br
     return scene
 
 
-READ = {"straight": (), "split": ("right",), "turn": ("radius",), "j_turn": ("steer",)}
-"""Keys that a procedure reads beside its speed; it needs each of them."""
+READ = {"straight": (), "split": ("right",), "turn": ("radius",), "j_turn": ("steer", "steering")}
+"""Keys that a procedure reads beside its speed; it needs one of them."""
+STEEPEST = 1.0
+"""rad; no wheel is steered further."""
 
 
 def _check_procedure(own: Procedure, file: str, place: str) -> None:
     if own.speed > LARGEST_SPEED:
         raise InputError(file, f"{place}.speed", own.speed, f"must be at most {LARGEST_SPEED:g} m/s")
-    for key in ("right", "steer", "radius"):
-        value = getattr(own, key)
-        if value is not None and key not in READ[own.kind]:
-            raise InputError(file, f"{place}.{key}", value, f"has no meaning for {own.kind}")
-        if value is None and key in READ[own.kind]:
-            raise InputError(file, f"{place}.{key}", None, f"is missing: {own.kind} needs it")
-    if own.steer is not None and abs(own.steer) > 1.0:
-        raise InputError(file, f"{place}.steer", own.steer, "must be at most 1 rad, of either sign")
+    read = READ[own.kind]
+    there = [key for key in ("right", "steer", "steering", "radius") if getattr(own, key) is not None]
+    for key in there:
+        if key not in read:
+            raise InputError(file, f"{place}.{key}", getattr(own, key), f"has no meaning for {own.kind}")
+    if read and not there:
+        raise InputError(file, f"{place}.{read[0]}", None, f"is missing: {own.kind} needs {' or '.join(read)}")
+    if len(there) > 1:
+        raise InputError(file, f"{place}.{there[1]}", None, f"has no meaning beside {there[0]}: leave one out")
+    if own.steer is not None and abs(own.steer) > STEEPEST:
+        raise InputError(file, f"{place}.steer", own.steer, f"must be at most {STEEPEST:g} rad, of either sign")
+    if own.steering is not None:
+        _check_steering(own.steering, file, f"{place}.steering")
     if own.radius is not None and abs(own.radius) < 10.0:
         raise InputError(file, f"{place}.radius", own.radius, "must be at least 10 m, of either sign")
+
+
+def _check_steering(knots: list[Pair], file: str, place: str) -> None:
+    times, angles = np.array(knots, float).T
+    if (np.diff(times) <= 0.0).any() or times[0] < 0.0:
+        raise InputError(file, place, times.tolist(), "times must rise from knot to knot, from 0 on, in s")
+    if np.abs(angles).max() > STEEPEST:
+        raise InputError(file, place, angles.tolist(), f"angles must be at most {STEEPEST:g} rad, of either sign")
 
 
 def _check_run(scene: BrakingScene) -> None:
