@@ -84,13 +84,13 @@ def _tyre(hub, joints, m, q, v, height, rate, speed, place, wrench):
 
 
 @njit(cache=True, error_model="numpy")
-def _frame(head, hub):
+def frame(head, hub):
     """Row of ``m`` in whose axes a hub's wrench is given."""
     return 0 if head[FRAME] == 2.0 else int(head[CHASSIS] if head[FRAME] == 1.0 else hub[LAST]) + 1
 
 
 @njit(cache=True, error_model="numpy")
-def _into(own, vector, i, out, o):
+def into(own, vector, i, out, o):
     """Write a vector of space in the axes of a row of ``m``."""
     for k in range(3):
         r = TURNED + k
@@ -146,12 +146,12 @@ def forces(numbers, t, q, v, m, out, inside, wrenches, moments):
             out[j] -= inside[i] * travel[j]
     for i in range(count):
         hub, known = hubs[i], wrenches[i]
-        last, own = int(hub[LAST]), m[_frame(head, hub)]
+        last, own = int(hub[LAST]), m[frame(head, hub)]
         locate(m[last + 1], hub, ARM, place, 0)
         if head[ROAD] != 0.0:
             _tyre(hub, joints, m, q, v, row[i], row[count + i], head[SPEED], place, wrench)
-            _into(own, wrench, 0, known, 0)
-            _into(own, wrench, 3, known, 3)
+            into(own, wrench, 0, known, 0)
+            into(own, wrench, 3, known, 3)
         else:
             for k in range(WRENCH):
                 known[k] = row[WRENCH * i + k]

@@ -121,7 +121,7 @@ def _turned_tensor(own, body, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _resting(own, body, gravity, tensor, arm, a, t):
+def resting(own, body, gravity, tensor, arm, a, t):
     """Write a body's inertia and arm in space, and its acceleration and moment of momentum's rate without q''."""
     h = np.zeros(3)
     _turned_tensor(own, body, tensor)
@@ -147,7 +147,7 @@ def inertia(joints, bodies, m, gravity, mass, force):
     for b in range(len(bodies)):
         body = bodies[b]
         last, kg, count = int(body[LAST]), body[MASS], 0
-        _resting(m[last + 1], body, gravity, tensor, place, a, t)
+        resting(m[last + 1], body, gravity, tensor, place, a, t)
         for k in range(3):
             place[k] += m[last + 1, PLACE + k]
         j = last

@@ -1,21 +1,21 @@
 """A Kalman filter of roll and pitch beside the cut vehicle: measured angles and rates, and the measured hub forces.
 
-filterpy's ``KalmanFilter``. State: roll, pitch and their rates. The hub forces turn the rigid vehicle; that its springs
-give is noise of the acceleration, ``model`` (rad/s^2). Products of rates are neglected, and so is the difference of
-angles and turns about the body's axes, as is right for tilts of a few degrees.
+State: roll, pitch and their rates. The hub forces turn the rigid vehicle; that its springs give is noise of the
+acceleration, ``model`` (rad/s^2). Products of rates are neglected, and so is the difference of angles and turns about
+the body's axes, as is right for tilts of a few degrees. What was not measured, NaN, is left to the prediction.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from filterpy.kalman import KalmanFilter
 
 from models.errors import InputError
 from models.hub_forces.cut_vehicle import CutVehicle
 from models.hub_forces.measurement import Angles, HubForces
 from models.hub_forces.rigid import rigid
 from models.hub_forces.table import Drive
+from models.hub_forces.tilt_march import march
 from models.signals import Sampled, Smooth
 
 SURPRISE = 4.0
@@ -24,6 +24,10 @@ SURPRISE = 4.0
 UNEXPLAINED = 0.65
 """Largest part of the measured rates that the hub forces do not explain. The rigid vehicle leaves 0.3 to 0.45 of them
 on rough roads, for its springs give; forces in another frame than stated leave 0.8, exchanged hubs 2 and more."""
+BALANCED = 15.0
+"""s: the longest stretch over which moments are integrated to be compared with rates; beyond, small biases add up."""
+UNKNOWN = 0.1**2
+"""rad^2, rad^2/s^2: variance at the start of what is not measured there."""
 REMEDY = "check signs, units, order of the hubs and frame, or state larger deviations"
 
 
@@ -38,53 +42,86 @@ class Tilt:
     surprise: float
 
 
-def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, force_deviation: np.ndarray,
-             angle_deviations: tuple[float, float], model: float, file: str = "") -> Tilt:  # fmt: skip
-    """Filter angles sampled with the forces.
+@dataclass
+class FilterState:
+    """What a filter knows after a sample: state (4,), its covariance (4, 4), the sum of the normalised innovations
+    squared and their count, and the squares (2, 2) of unexplained and of whole rates of roll and pitch."""
+
+    x: np.ndarray = field(default_factory=lambda: np.full(4, np.nan))
+    p: np.ndarray = field(default_factory=lambda: np.full((4, 4), np.nan))
+    surprise: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    rates: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
+
+
+class TiltFilter:
+    """Filters angles sampled with the forces, block by block.
 
     force_deviation : (6 h,), N and N m, of each sample; angle_deviations : rad and rad/s; model : rad/s^2.
-    Raises InputError where measurement and forces contradict one another.
     """
-    own, dt = rigid(vehicle), forces.period
-    inverse = np.linalg.inv(own.inertia)[:2]
-    noise = own.turning(force_deviation)[:2, :2] + model**2 * np.eye(2)
-    push = np.vstack([np.eye(2) * dt**2 / 2, np.eye(2) * dt])
-    kalman = KalmanFilter(dim_x=4, dim_z=4, dim_u=2)
-    kalman.F, kalman.B = np.eye(4) + dt * np.eye(4, k=2), push
-    kalman.H, kalman.Q = np.eye(4), push @ noise @ push.T
-    kalman.R = np.diag(np.repeat(angle_deviations, 2)) ** 2
-    kalman.x, kalman.P = angles.samples[0][:, None].copy(), kalman.R.copy()
-    wrenches = _level(forces.samples, angles.samples) if forces.frame == "inertial" else forces.samples
-    turning = own.moments(wrenches) @ inverse.T
-    _check_balance(turning, angles, noise - model**2 * np.eye(2), angle_deviations[1], file)
-    states, spread, surprise = np.empty((len(angles.samples), 4)), np.empty((len(angles.samples), 4)), 0.0
-    for i, measured in enumerate(angles.samples):
-        if i:
-            kalman.predict(u=turning[i - 1][:, None])
-            kalman.update(measured)
-            surprise += float(kalman.y[:, 0] @ kalman.SI @ kalman.y[:, 0])
-        states[i], spread[i] = kalman.x[:, 0], np.sqrt(np.diag(kalman.P))
-    found = Tilt(states, spread, dt, surprise / max(4 * (len(states) - 1), 1))
-    if not found.surprise <= SURPRISE:
-        raise InputError(file, "angles", None, "contradict the hub forces: the squares of the innovations are "
-                         f"{found.surprise:.3g} times what the deviations allow (at most {SURPRISE:g}): {REMEDY}")
-    return found
+
+    def __init__(self, vehicle: CutVehicle, frame: str, period: float, force_deviation: np.ndarray,
+                 angle_deviations: tuple[float, float], model: float, file: str = "") -> None:  # fmt: skip
+        self.rigid, self.frame, self.period, self.file = rigid(vehicle), frame, period, file
+        self.forces_noise = self.rigid.turning(force_deviation)[:2, :2]
+        push = np.vstack([np.eye(2) * period**2 / 2, np.eye(2) * period])
+        self.noise = push @ (self.forces_noise + model**2 * np.eye(2)) @ push.T
+        self.variances = np.repeat(angle_deviations, 2) ** 2
+        self.inverse = np.linalg.inv(self.rigid.inertia)[:2]
+        self.state = FilterState()
+
+    def advance(self, wrenches: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Estimates (n, 4) and deviations at samples of hub forces (n, 6 h) and angles (n, 4), NaN where not measured.
+
+        The first sample is the last one of the block before. Raises InputError where angles and forces contradict
+        one another.
+        """
+        own, count = self.state, len(angles)
+        if np.isnan(own.x[0]):
+            own.x, own.p = np.nan_to_num(angles[0]), np.diag(np.where(np.isnan(angles[0]), UNKNOWN, self.variances))
+        level = _level(wrenches, np.nan_to_num(angles)) if self.frame == "inertial" else wrenches
+        turning = self.rigid.moments(level)
+        turning = turning @ self.inverse.T
+        self._check_balance(turning, angles[:, 2:])
+        states, spread = np.empty((count, 4)), np.empty((count, 4))
+        own.surprise += march(own.x, own.p, turning, angles, self.period, self.noise, self.variances, states, spread)
+        if not self.surprise <= SURPRISE:
+            raise InputError(self.file, "angles", None, "contradict the hub forces: the squares of the innovations are "
+                             f"{self.surprise:.3g} times what the deviations allow (at most {SURPRISE:g}): {REMEDY}")
+        return states, spread
+
+    @property
+    def surprise(self) -> float:
+        """Mean of the normalised innovations squared per measured value."""
+        return float(self.state.surprise[0] / max(self.state.surprise[1], 1.0))
+
+    def _check_balance(self, turning: np.ndarray, rates: np.ndarray) -> None:
+        """Refuse hub forces whose moments, integrated, are not the measured rates of roll and pitch.
+
+        turning : (n, 2), rad/s^2; rates : (n, 2), rad/s.
+        """
+        dt, length = self.period, round(BALANCED / self.period)
+        for first in range(0, len(rates) - 1, length):
+            part, own = turning[first : first + length + 1], rates[first : first + length + 1]
+            if not np.isfinite(own).all():
+                continue
+            integral = np.vstack((np.zeros(2), np.cumsum(part[1:] + part[:-1], axis=0) * dt / 2))
+            allowed = self.variances[2:] + np.diag(self.forces_noise) * dt * dt * len(own) / 6
+            self.state.rates += np.maximum(np.var(own - integral, axis=0) - 9 * allowed, 0.0), np.var(own, axis=0)
+        unexplained, whole = self.state.rates
+        share = np.sqrt(unexplained / np.where(whole > 0, whole, 1.0))
+        for name, found in zip(("roll", "pitch"), share, strict=True):
+            if not found <= UNEXPLAINED:
+                raise InputError(self.file, f"angles.{name}_rate", None, f"contradicts the hub forces: {found:.0%} of "
+                                 "it is not the integral of their moment "
+                                 f"(at most {UNEXPLAINED:.0%}): {REMEDY}")  # fmt: skip
 
 
-def _check_balance(turning: np.ndarray, angles: Angles, noise: np.ndarray, rate: float, file: str) -> None:
-    """Refuse hub forces whose moments, integrated, are not the measured rates of roll and pitch.
-
-    turning : (m, 2), rad/s^2; noise : (2, 2), covariance of what their noise adds; rate : rad/s, noise of the rates.
-    """
-    rates = angles.samples[:, 2:]
-    integral = np.vstack((np.zeros(2), np.cumsum(turning[1:] + turning[:-1], axis=0) * angles.period / 2))
-    lasting = angles.period * len(rates)
-    allowed = rate**2 + np.diag(noise) * angles.period * lasting / 6
-    share = np.sqrt(np.maximum(np.var(rates - integral, axis=0) - 9 * allowed, 0.0) / np.var(rates, axis=0))
-    for name, found in zip(("roll", "pitch"), share, strict=True):
-        if not found <= UNEXPLAINED:
-            raise InputError(file, f"angles.{name}_rate", None, f"contradicts the hub forces: {found:.0%} of it is not "
-                             f"the integral of their moment (at most {UNEXPLAINED:.0%}): {REMEDY}")
+def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, force_deviation: np.ndarray,
+             angle_deviations: tuple[float, float], model: float, file: str = "") -> Tilt:  # fmt: skip
+    """Filter angles sampled with the forces, see ``TiltFilter``."""
+    own = TiltFilter(vehicle, forces.frame, forces.period, force_deviation, angle_deviations, model, file)
+    states, spread = own.advance(forces.samples, angles.samples)
+    return Tilt(states, spread, forces.period, own.surprise)
 
 
 def _level(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:

@@ -1,0 +1,50 @@
+"""Compiled recursion of the Kalman filter of roll and pitch, one measured value after another."""
+
+import numpy as np
+
+from models.compiled import njit
+
+
+@njit(cache=True, error_model="numpy")
+def march(x, p, turning, measured, dt, noise, variances, states, spread):
+    """Filter samples 1, 2, ... from state ``x`` (4,) and covariance ``p`` (4, 4) at sample 0, both left at the last.
+
+    turning (n, 2) : rad/s^2, held from each sample on; measured (n, 4), NaN where nothing was; noise (4, 4) : what
+    the covariance gains in a step of dt (s); variances (4,) of measured values. Writes the states (n, 4) and their
+    deviations. Returns the sum of the normalised innovations squared and how many there were.
+    """
+    gain, surprise, used = np.empty(4), 0.0, 0
+    for i in range(len(measured)):
+        if i:
+            _predict(x, p, turning[i - 1], dt, noise)
+            for j in range(4):
+                if np.isnan(measured[i, j]):
+                    continue
+                s, off = p[j, j] + variances[j], measured[i, j] - x[j]
+                surprise += off * off / s
+                used += 1
+                for k in range(4):
+                    gain[k] = p[k, j] / s
+                for k in range(4):
+                    x[k] += gain[k] * off
+                    for m in range(4):
+                        p[k, m] -= gain[k] * s * gain[m]
+        for k in range(4):
+            states[i, k], spread[i, k] = x[k], np.sqrt(p[k, k])
+    return surprise, used
+
+
+@njit(cache=True, error_model="numpy")
+def _predict(x, p, turning, dt, noise):
+    """One step of angles by their rates and of rates by an acceleration."""
+    for k in range(2):
+        x[k] += dt * (x[2 + k] + 0.5 * dt * turning[k])
+        x[2 + k] += dt * turning[k]
+        for m in range(4):
+            p[k, m] += dt * p[2 + k, m]
+    for m in range(2):
+        for k in range(4):
+            p[k, m] += dt * p[k, 2 + m]
+    for k in range(4):
+        for m in range(4):
+            p[k, m] += noise[k, m]
