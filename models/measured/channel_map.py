@@ -66,9 +66,9 @@ def _signal(file: str, place: str, row: MappedChannel, source: Source, places: P
     _check_place(file, place, row, places)
     usual: Frame = "hub" if row.at in places.hubs else "inertial" if row.quantity == "angle" else "body"
     frame = row.frame or usual
-    allowed = ("hub", "body", "inertial") if row.at in places.hubs else ("body", "inertial", "sensor")
-    if frame not in allowed:
-        raise InputError(file, f"{place}.frame", frame, f"is no frame of a {row.quantity} at {row.at!r}", allowed)
+    frames = ("hub", "body", "inertial") if row.at in places.hubs else ("body", "inertial", "sensor")
+    if frame not in frames:
+        raise InputError(file, f"{place}.frame", frame, f"is no frame of a {row.quantity} at {row.at!r}", frames)
     check = row.check or row.quantity == "strain" or row.at in places.connectors
     return Signal(name, source.path.name, row.channel, row.quantity, row.at, row.component, frame, row.sign, unit,
                   factor, gravity=row.gravity, check=check)  # fmt: skip

@@ -41,14 +41,18 @@ class Columns:
         part.write_text(text)
         os.replace(part, self._journal)
 
-    def write(self, first: int, values: np.ndarray) -> None:
-        """Samples (n, signals) from sample ``first`` on; they count as complete up to their end."""
+    def put(self, names: tuple[str, ...], first: int, values: np.ndarray) -> None:
+        """Samples (n, names) of some signals from sample ``first`` on; the journal does not count them."""
         with self.path.open("r+b") as file:
-            for i, column in enumerate(np.asarray(values, ITEM).T):
-                file.seek((i * self.count + first) * ITEM.itemsize)
+            for name, column in zip(names, np.asarray(values, ITEM).T, strict=True):
+                file.seek((self.names.index(name) * self.count + first) * ITEM.itemsize)
                 file.write(np.ascontiguousarray(column).tobytes())
             file.flush()
             os.fsync(file.fileno())
+
+    def write(self, first: int, values: np.ndarray) -> None:
+        """Samples (n, signals) from sample ``first`` on; they count as complete up to their end."""
+        self.put(self.names, first, values)
         self.close(first + len(values))
 
     def read(self, name: str, first: int = 0, count: int | None = None) -> np.ndarray:
@@ -60,3 +64,8 @@ class Columns:
     def block(self, names: tuple[str, ...], first: int, count: int) -> np.ndarray:
         """Samples (n, names) of several signals."""
         return np.column_stack([self.read(name, first, count) for name in names])
+
+    def remove(self) -> None:
+        """Delete the file and its journal."""
+        self.path.unlink()
+        self._journal.unlink()

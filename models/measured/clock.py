@@ -1,0 +1,229 @@
+"""All channels of all files on one clock, in columns on disk.
+
+The rule. The clock is that of the wheel forces, the fastest of them, unless the scene names a rate; it begins with the
+first moment at which all wheel forces are there and ends with the last. Files are placed by their absolute start times
+where all say one, else each one's zero is the same moment; ``offset`` is added. What is slower, or as fast, is
+interpolated linearly; what is faster is freed of what the clock cannot show by a filter without phase. What lies in a
+gap of more than 1.5 of its own periods, or outside its file, is NaN.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+
+from models.errors import InputError
+from models.measured.channel import BLOCK, Source
+from models.measured.columns import Columns
+from models.measured.finding import Finding, Weight
+from models.measured.recording import Recording
+from models.measured.resampling import SAME, onto
+from models.measured.scene import MeasuredScene
+from models.measured.signal import Signal
+from models.measured.timing import EVEN, Timing, timing
+
+Progress = Callable[[str, float], None]
+COLUMNS, RAW, SOURCES = "recording.columns", "raw.columns", "sources.json"
+LEAST = 100
+"""Samples of the shortest recording."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Mapped signals of one group of one file, with their timing on the common time; ``shift`` (s) was added to it."""
+
+    source: Source
+    signals: tuple[Signal, ...]
+    timing: Timing
+    shift: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Channels, in the file's words."""
+        return tuple(signal.channel for signal in self.signals)
+
+    @property
+    def factors(self) -> np.ndarray:
+        """To SI, with sign."""
+        return np.array([signal.sign * signal.factor for signal in self.signals])
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Times start + i period, i < count, s of the common time."""
+
+    start: float
+    period: float
+    count: int
+
+    def times(self, first: int = 0, count: int | None = None) -> np.ndarray:
+        """Some or all of them."""
+        return self.start + self.period * np.arange(first, self.count if count is None else first + count)
+
+    def places(self, times: np.ndarray) -> np.ndarray:
+        """Nearest index of each time, which may lie outside."""
+        return np.rint((times - self.start) / self.period).astype(np.int64)
+
+
+def record(scene: MeasuredScene, sources: Sequence[Source], signals: Sequence[Signal], hubs: Sequence[str],
+           folder: Path, progress: Progress = lambda text, part: None) -> Recording:  # fmt: skip
+    """Bring mapped signals of opened files onto one clock, into columns in ``folder``.
+
+    hubs : where forces are put in; these set the clock. What is in the folder from the same files is taken as it is.
+    Raises InputError for files that do not overlap, or none of whose channels is a wheel force.
+    """
+    shifts, start, noticed = placed(scene, sources)
+    progress("reading times", 0.0)
+    groups = [each for i, source in enumerate(sources) for each in _groups(source, signals, shifts[i])]
+    leading = [group for group in groups if any(s.at in hubs and not s.check for s in group.signals)]
+    if not leading:
+        raise InputError(scene.file, "files", None, "no channel is mapped to a hub: wheel forces are what drives the "
+                         "vehicle")  # fmt: skip
+    grid = _grid(scene, leading)
+    noticed += [finding for group in groups for finding in (*group.timing.findings, *_outside(scene, group, grid))]
+    columns = _columns(folder, signals, sources, grid)
+    if columns.done < grid.count:
+        for i, group in enumerate(groups):
+            progress(f"reading {group.source.path.name}", i / len(groups))
+            (_direct if _even(group, grid) else _resampled)(group, grid, columns, folder)
+        columns.close(grid.count)
+    began = start + timedelta(seconds=grid.start) if start else None
+    comment = "\n".join(source.comment for source in sources if source.comment)
+    said = [finding for source in sources for finding in source.noticed]
+    said += [*noticed, _rule(scene, groups, grid)]
+    return Recording(tuple(signals), columns, grid.period, began, comment, tuple(said))
+
+
+def _rule(scene: MeasuredScene, groups: list[Group], grid: Grid) -> Finding:
+    """What was done to bring all onto one clock."""
+    ways: dict[str, list[str]] = {}
+    for group in groups:
+        own = f"{group.source.path.name} ({group.timing.rate:.6g} Hz)"
+        faster = group.timing.period < grid.period * (1 - SAME)
+        way = "as it is" if _even(group, grid) else "filtered without phase" if faster else "interpolated linearly"
+        ways.setdefault(way, []).append(own)
+    by = "the scene" if scene.clock.rate else "the wheel forces"
+    told = "; ".join(f"{way}: {', '.join(dict.fromkeys(names))}" for way, names in ways.items())
+    return Finding("clock", "note", "recording", f"The clock is that of {by}, {1 / grid.period:.6g} Hz, {grid.count} "
+                   f"samples; {told}.", 1 / grid.period, "Hz")  # fmt: skip
+
+
+def placed(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float], datetime | None, list[Finding]]:
+    """What is added to each file's times (s), when the common time was 0, and what to say of it."""
+    starts = [source.start for source in sources]
+    offsets = [file.offset for file in scene.files]
+    known = [start for start in starts if start is not None]
+    if len(known) == len(starts):
+        first = min(known)
+        return [(s - first).total_seconds() + o for s, o in zip(known, offsets, strict=True)], first, []
+    silent = ", ".join(source.path.name for source in sources if source.start is None)
+    weight: Weight = "doubt" if len(starts) > 1 else "note"
+    text = f"{silent}: no start time is given"
+    if len(starts) > 1:
+        text += ": the zero of every file is taken as the same moment; set offset of [[files]] if it is not"
+    found = Finding("start", weight, silent, f"{text}.")
+    return offsets, known[0] if len(starts) == 1 and known else None, [found]
+
+
+def _groups(source: Source, signals: Sequence[Signal], shift: float) -> Iterator[Group]:
+    """Groups of a file of which any channel is mapped."""
+    of = {channel.name: channel.group for channel in source.channels}
+    own = [signal for signal in signals if signal.file == source.path.name]
+    for number in dict.fromkeys(of[signal.channel] for signal in own):
+        mapped = tuple(signal for signal in own if of[signal.channel] == number)
+        times = np.concatenate([block.times for block in source.blocks([mapped[0].channel])])
+        where = source.path.name if len(set(of.values())) == 1 else f"{source.path.name}, {mapped[0].channel} ..."
+        found = timing(times, where, tuple(s.name for s in mapped[:1]))
+        yield Group(source, mapped, replace(found, times=found.times + shift), shift)
+
+
+def _grid(scene: MeasuredScene, leading: list[Group]) -> Grid:
+    own = scene.clock
+    fastest = min(leading, key=lambda group: group.timing.period)
+    period = 1.0 / own.rate if own.rate else fastest.timing.period
+    first, last = max(g.timing.times[0] for g in leading), min(g.timing.times[-1] for g in leading)
+    if first >= last:
+        spans = "; ".join(f"{g.source.path.name}: {g.timing.times[0]:.6g} to {g.timing.end:.6g} s" for g in leading)
+        raise InputError(scene.file, "files", None, f"the wheel forces do not overlap in time ({spans}): set offset")
+    times = fastest.timing.times
+    start = float(times[min(np.searchsorted(times, first + own.start - EVEN * period), len(times) - 1)])
+    end = last if own.duration is None else min(last, start + own.duration)
+    count = int(np.floor((end - start) / period + EVEN)) + 1
+    if own.duration is not None and start + own.duration > last + period:
+        raise InputError(scene.file, "clock.duration", own.duration, f"the wheel forces last {last - start:.6g} s")
+    if count < LEAST:
+        raise InputError(scene.file, "clock", None, f"{count} sample(s) of wheel forces are left: at least {LEAST} are "
+                         "needed")  # fmt: skip
+    return Grid(start, period, count)
+
+
+def _outside(scene: MeasuredScene, group: Group, grid: Grid) -> Iterator[Finding]:
+    """Say, or refuse, that a group does not cover the recording."""
+    end = grid.start + grid.period * (grid.count - 1)
+    late, early = group.timing.times[0] - grid.start, end - group.timing.end
+    place = f"{group.source.path.name}: {', '.join(group.names[:3])}{', ...' if len(group.names) > 3 else ''}"
+    if late >= end - grid.start or early >= end - grid.start:
+        raise InputError(scene.file, "files", None, f"{place} lies wholly outside the wheel forces "
+                         f"({grid.start:.6g} to {end:.6g} s): it runs from {group.timing.times[0]:.6g} to "
+                         f"{group.timing.end:.6g} s; set offset")  # fmt: skip
+    missing = max(late, 0.0) + max(early, 0.0)
+    if missing > 2 * max(grid.period, group.timing.period):
+        yield Finding("overlap", "doubt", group.source.path.name, f"{place} covers the recording but for "
+                      f"{missing:.4g} s at its ends, where nothing is known of it.", missing, "s",
+                      (group.signals[0].name,))  # fmt: skip
+
+
+def _columns(folder: Path, signals: Sequence[Signal], sources: Sequence[Source], grid: Grid) -> Columns:
+    """Columns of this recording, or those begun from the same files; InputError where the folder holds others."""
+    files = {source.path.name: [(at := source.path.stat()).st_size, at.st_mtime_ns] for source in sources}
+    now = {"files": files, "map": [[s.channel, s.sign, s.factor] for s in signals], "clock": [grid.start, grid.period]}
+    path = folder / SOURCES
+    if path.is_file() and json.loads(path.read_text()) != now:
+        raise InputError(path, "", None, "was written from other files or by another map: choose a new folder")
+    path.write_text(json.dumps(now))
+    return Columns(folder / COLUMNS, tuple(signal.name for signal in signals), grid.count)
+
+
+def _even(group: Group, grid: Grid) -> bool:
+    """Whether the samples of a group are those of the clock."""
+    own = group.timing
+    at = grid.places(own.times)
+    inside = (at >= 0) & (at < grid.count)
+    off = np.abs(own.times[inside] - grid.start - grid.period * at[inside])
+    return own.order is None and abs(own.period / grid.period - 1) <= EVEN and bool((off <= EVEN * grid.period).all())
+
+
+def _direct(group: Group, grid: Grid, columns: Columns, folder: Path) -> None:
+    """Samples that are on the clock already, block by block, with NaN between them."""
+    names, done = tuple(signal.name for signal in group.signals), 0
+    for block in group.source.blocks(group.names):
+        at = grid.places(block.times + group.shift)
+        inside = (at >= done) & (at < grid.count)
+        if inside.any():
+            last = int(at[inside][-1]) + 1
+            for first in range(done, last, BLOCK):
+                count = min(BLOCK, last - first)
+                here = inside & (at >= first) & (at < first + count)
+                values = np.full((count, len(names)), np.nan)
+                values[at[here] - first] = block.values[here] * group.factors
+                columns.put(names, first, values)
+            done = last
+    for first in range(done, grid.count, BLOCK):
+        columns.put(names, first, np.full((min(BLOCK, grid.count - first), len(names)), np.nan))
+
+
+def _resampled(group: Group, grid: Grid, columns: Columns, folder: Path) -> None:
+    """Samples of another clock, first as they are, then one signal after another onto this one."""
+    count = next(channel.count for channel in group.source.channels if channel.name == group.names[0])
+    raw = Columns(folder / RAW, group.names, count)
+    for block in group.source.blocks(group.names):
+        raw.put(group.names, block.first, block.values * group.factors)
+    times, order = grid.times(), group.timing.order
+    for signal in group.signals:
+        values = raw.read(signal.channel)
+        values = values if order is None else values[order]
+        columns.put((signal.name,), 0, onto(group.timing.times, values, group.timing.period, times)[:, None])
+    raw.remove()

@@ -1,0 +1,53 @@
+"""Samples onto an even clock: linearly where they are slower or as fast, without alias and phase where faster."""
+
+import numpy as np
+
+from models.measured.timing import EVEN, GAP
+
+PASS, STOP, ATTENUATION = 0.4, 0.5, 60.0
+"""Of the new rate: kept up to here, gone (dB) from here on."""
+SAME = 1e-6
+"""Relative difference of two rates that are one."""
+
+
+def onto(times: np.ndarray, values: np.ndarray, period: float, grid: np.ndarray) -> np.ndarray:
+    """Values (n,) at the times of an even grid (n,), s.
+
+    times (m,) : s, strictly rising, mostly ``period`` apart; values (m,) : NaN where nothing was measured. NaN wherever
+    two samples more than 1.5 periods apart lie around a point, and outside.
+    """
+    known = np.isfinite(values)
+    if np.count_nonzero(known) < 2:
+        return np.full(len(grid), np.nan)
+    times, values = times[known], values[known]
+    new = float(grid[1] - grid[0]) if len(grid) > 1 else period
+    if period < new * (1.0 - SAME):
+        found = _decimated(times, values, period, new, grid)
+    else:
+        found = np.interp(grid, times, values)
+    found[_unknown(times, period, grid)] = np.nan
+    return found
+
+
+def _unknown(times: np.ndarray, period: float, grid: np.ndarray) -> np.ndarray:
+    """Points (n,) that lie in a gap or outside, but for what rounding puts there."""
+    right = np.clip(np.searchsorted(times, grid), 1, len(times) - 1)
+    near = np.minimum(np.abs(grid - times[right - 1]), np.abs(times[right] - grid)) <= EVEN * period
+    wide = times[right] - times[right - 1] > GAP * period
+    return ((grid < times[0]) | (grid > times[-1]) | wide) & ~near
+
+
+def _decimated(times: np.ndarray, values: np.ndarray, period: float, new: float, grid: np.ndarray) -> np.ndarray:
+    """Low-pass by a symmetric kernel, which has no phase, then a cubic spline, which at that rate is exact enough."""
+    from scipy.interpolate import CubicSpline
+    from scipy.signal import firwin, kaiserord, oaconvolve
+
+    count = round((times[-1] - times[0]) / period) + 1
+    even = times[0] + period * np.arange(count)
+    nyquist, rate = 0.5 / period, 1.0 / new
+    taps, beta = kaiserord(ATTENUATION, (STOP - PASS) * rate / nyquist)
+    kernel = firwin(taps | 1, 0.5 * (PASS + STOP) * rate, window=("kaiser", beta), fs=2.0 * nyquist)
+    reach = min(len(kernel) // 2, count - 1)
+    padded = np.pad(np.interp(even, times, values), reach, mode="reflect", reflect_type="odd")
+    padded = np.pad(padded, len(kernel) // 2 - reach, mode="edge")
+    return np.asarray(CubicSpline(even, oaconvolve(padded, kernel, mode="valid"))(grid))
