@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 
 from models.braking.advance import AT_REST, FINE
-from models.braking.plane_step import KNOWN, begin, comes_to_rest
+from models.braking.plane_step import KNOWN, REPORTED, begin, comes_to_rest
 from models.braking.plane_vehicle import Plane
 from models.braking.sprung import PITCH, ROLL, Sprung
-from models.braking.sprung_forces import ROW, STEER, fill, held, hold
+from models.braking.sprung_forces import ROW, STEER, fill, held, held_forces, hold
 from models.braking.surfaces import under_wheels
 from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.errors import RunFailed
 
+BLINK = 1e-5
+"""s: time over which wheels that only roll are looked at."""
 UPRIGHT = 0.5
 """Roll and pitch (rad) beyond which the vehicle turns over."""
 
@@ -28,7 +30,7 @@ class OnSprings:
 
     def __init__(self, engine: str, vehicle: Sprung) -> None:
         own, wheels = vehicle.handling, len(vehicle.handling.vehicle.tyres)
-        self.engine, self.size, self.names = engine, vehicle.size, vehicle.names
+        self.engine, self.vehicle, self.size = engine, vehicle, vehicle.size
         self.numbers = table = np.concatenate((own.numbers, np.zeros(ROW * wheels)))
         self._rows = table[own.numbers.size :].reshape(wheels, ROW)
         driven = Driven(own.vehicle, own.gravity, table, held, lambda block, t, n: fill(block, n, table))
@@ -38,8 +40,13 @@ class OnSprings:
     def advance(self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float, steer: np.ndarray,
                 slope: float, plane: Plane, kind: np.ndarray, road: Any, tables: tuple[np.ndarray, ...],
                 found: np.ndarray, report: np.ndarray) -> tuple[int, float]:  # fmt: skip
-        """As ``models.braking.advance.advance``, ``state`` (2, n) having all coordinates and their rates."""
+        """As ``models.braking.advance.advance``, ``state`` (2, n) having all coordinates and their rates.
+
+        A run begins with zeros in ``found``.
+        """
         surface, time = np.empty((turning.size, 3)), 0.0
+        if not found.any():
+            self._rates[:] = 0.0
         self._rows[:, STEER] = steer
         for before, after in pairwise(torques):
             under_wheels(state, step, plane, kind, road, surface)
@@ -73,6 +80,19 @@ class OnSprings:
         state[:] = self._model.march(q, v, 1, step)[-1].reshape(2, -1)
         turning[:] = report[:, -1]
         return step
+
+    def rolling(self, state: np.ndarray, steer: np.ndarray, plane: Plane, kind: np.ndarray, road: Any,
+                tables: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
+        surface, known = np.empty((steer.size, 3)), self._known
+        none, motion, report = np.zeros(steer.size), np.empty((steer.size, 3)), np.empty((steer.size, REPORTED))
+        self._rows[:], self._rows[:, STEER] = 0.0, steer
+        held_forces(self.numbers, *state, np.zeros(self.size), motion)
+        turning = motion[:, 0] / plane.radius
+        under_wheels(state, 0.0, plane, kind, road, surface)
+        begin(turning, surface, plane, known)
+        hold(self.numbers, *state, none, none, BLINK, none.copy(), 0.0, True, tables, known, report)
+        return self.accelerations(*state), turning
 
     def accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """(n,) by the engine, with the forces that are held."""
