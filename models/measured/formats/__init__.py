@@ -1,9 +1,13 @@
 """Measurement files, opened by what is in them: CSV, ASAM MDF, MTS RPC III, TDMS."""
 
+from collections.abc import Sequence
+from datetime import datetime
+from importlib import import_module
 from pathlib import Path
 
 from models.errors import InputError, similar_file
 from models.measured.channel import Source
+from models.measured.formats.writing import Group, check_names, check_start, whole_file
 
 OTHERS = {b"PK\x03\x04": "a spreadsheet or an archive", b"\x89HDF": "HDF5", b"MATLAB": "MATLAB", b"\x1f\x8b": "packed",
           b"TDSh": "the index of a TDMS file, whose data are in the .tdms file beside it"}  # fmt: skip
@@ -27,6 +31,14 @@ def open_source(path: str | Path) -> Source:
         from models.measured.formats.mdf4 import open_mdf
 
         return open_mdf(path)
+    if head.startswith(b"TDSm"):
+        from models.measured.formats.tdms import open_tdms
+
+        return open_tdms(path)
+    if head[:32].split(b"\0")[0].strip() == b"FORMAT":
+        from models.measured.formats.rpc3 import open_rpc
+
+        return open_rpc(path)
     for magic, name in OTHERS.items():
         if head.startswith(magic):
             raise InputError(path, "", None, f"this is {name}; {KNOWN}")
@@ -35,6 +47,41 @@ def open_source(path: str | Path) -> Source:
     from models.measured.formats.csv import open_csv
 
     return open_csv(path)
+
+
+WRITERS = {".csv": "write_csv", ".mf4": "write_mdf4:write_mdf", ".rsp": "write_rpc3:write_rpc", ".tdms": "write_tdms"}
+"""Extension -> module and function."""
+
+
+def write(
+    path: str | Path, groups: Sequence[Group], start: datetime | None = None, comment: str = ""
+) -> Path:
+    """Write channels to a new file, in the format of its extension, block by block, whole or not at all.
+
+    Parameters
+    ----------
+    path : .csv, .mf4, .rsp or .tdms; it must not exist
+    groups : channels of one clock each; CSV and RPC III hold one group. Times are counted from ``start``
+    start : when the first samples were, with its zone
+    comment : of the file
+
+    Resolution: every bit in CSV, MDF and TDMS, 2^-24 of a value in RPC III.
+
+    Raises
+    ------
+    InputError : the file exists or cannot be written, or the format has no room for a name, a unit or a value; where
+        that can be known beforehand, before any block is taken
+    """
+    path = Path(path)
+    if path.suffix.lower() not in WRITERS:
+        raise InputError(path, "extension", path.suffix, "a format that can be written is needed", tuple(WRITERS))
+    check_names(path, groups)
+    check_start(path, start)
+    module, _, name = WRITERS[path.suffix.lower()].partition(":")
+    writer = getattr(import_module(f"models.measured.formats.{module}"), name or module)
+    with whole_file(path) as part:
+        writer(path, part, groups, start, comment)
+    return path
 
 
 def _head(path: Path) -> bytes:

@@ -9,7 +9,7 @@ whole channel is ever made.
 import logging
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ import numpy as np
 from models.errors import InputError
 from models.measured.channel import Channel
 from models.measured.finding import Finding
+from models.measured.formats.left_out import LeftOut
 from models.measured.formats.opened import Opened, Span, notice, readable, told_apart
 
 SECONDS = 1
@@ -69,22 +70,6 @@ def _values(mdf: Any, group: int, index: int, part: Any) -> np.ndarray:
     samples, invalid = mdf.get(group=group, index=index, data=part, samples_only=True)
     values = np.asarray(samples, float)
     return values if invalid is None else np.where(np.asarray(invalid, bool), np.nan, values)
-
-
-@dataclass
-class LeftOut:
-    """Names of what is left out, by reason."""
-
-    names: dict[str, list[str]] = field(default_factory=dict)
-
-    def add(self, why: str, name: str) -> None:
-        """One more."""
-        self.names.setdefault(why, []).append(name)
-
-    def findings(self, path: Path) -> list[Finding]:
-        """One sentence per reason."""
-        return [notice(path, "note", f"left out, {why}: {', '.join(names[:5])}" + (f" and {n} more" if n > 0 else ""))
-                for why, names in self.names.items() for n in [len(names) - 5]]  # fmt: skip
 
 
 def open_mdf(path: Path) -> MdfFile:

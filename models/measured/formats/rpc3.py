@@ -1,0 +1,183 @@
+"""MTS RPC III time histories: a header of named parameters, then groups of samples, channel after channel in each.
+
+The header is of 512-byte blocks, each of four parameters: 32 bytes of name, 96 of value, ended by a zero byte (source:
+MTS, RPC III file formats, as rpc3-file lays it out). One sampling period holds for all channels. Samples are whole
+numbers of 16 bits times a scale (their resolution), or floating-point numbers of 32 bits, which keep 2^-24 of a value.
+A file has whole groups; the parameter SAMPLES says how many samples count, and without it the last ones may be padding,
+which is said. The public reader loads a file whole, therefore this one.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from models.errors import InputError
+from models.measured.channel import Channel
+from models.measured.finding import Finding
+from models.measured.formats.opened import Opened, Span, notice, readable, told_apart, zoned
+
+BLOCK, KEY, RECORD = 512, 32, 128
+MOST_BLOCKS = 1024
+"""Header blocks: four times what the format allows, as there are files that need them."""
+TYPES: dict[str, np.dtype] = {"SHORT_INTEGER": np.dtype("<i2"), "FLOATING_POINT": np.dtype("<f4")}
+LITTLE = ("BINARY", "BINARY_IEEE_LITTLE_END")
+HISTORIES = ("DRIVE", "RESPONSE", "MULT_DRIVE", "MULT_RESP", "1", "2", "3", "4")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where samples are: byte of the first group, points of a group, channels in it, type, factor of each channel."""
+
+    begin: int
+    points: int
+    width: int
+    dtype: np.dtype
+    scales: np.ndarray
+    period: float
+
+
+@dataclass(frozen=True)
+class RpcFile(Opened):
+    """Groups of equal length, read through a window of the file."""
+
+    layout: Layout
+
+    def pieces(self, chosen: list[int], spans: list[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Read the groups that hold each span."""
+        own = self.layout
+        size = own.points * own.width * own.dtype.itemsize
+        with self.path.open("rb") as file:
+            for first, count in spans:
+                low, high = first // own.points, -(-(first + count) // own.points)
+                file.seek(own.begin + low * size)
+                data = np.frombuffer(file.read((high - low) * size), own.dtype).reshape(-1, own.width, own.points)
+                values = data[:, chosen].transpose(0, 2, 1).reshape(-1, len(chosen)).astype(float) * own.scales[chosen]
+                skipped = first - low * own.points
+                yield own.period * np.arange(first, first + count), values[skipped : skipped + count]
+
+
+def open_rpc(path: Path) -> RpcFile:
+    """Read the header and hold it against the length of the file; raises InputError."""
+    with readable(path):
+        parameters = read_parameters(path)
+        layout = _layout(path, parameters)
+        count, found = _count(path, parameters, layout)
+        indices = range(1, layout.width + 1)
+        names, repeated = told_apart(path, [_name(parameters, i) for i in indices])
+        steps = layout.scales if layout.dtype == TYPES["SHORT_INTEGER"] else np.zeros(layout.width)
+        channels = tuple(
+            Channel(name, parameters.get(f"UNITS.CHAN_{i}", "").strip(), _long(parameters, f"COMMENT.CHAN_{i}"), 0,
+                    count, layout.period, abs(float(steps[i - 1])))
+            for name, i in zip(names, indices, strict=True)
+        )  # fmt: skip
+        start, notes = zoned(path, parameters["DATE"]) if parameters.get("DATE", "").strip() else (None, [])
+        return RpcFile(path, channels, start, _long(parameters, "COMMENT"), tuple(found + repeated + notes), layout)
+
+
+def read_parameters(path: Path) -> dict[str, str]:
+    """Parameters of the header by name; the first three are at fixed places and say how many follow."""
+    with path.open("rb") as file:
+        head = file.read(BLOCK)
+        if len(head) < BLOCK:
+            raise InputError(path, f"byte {len(head)}", None, "the file ends in its header")
+        first = [_record(head, i) for i in range(3)]
+        if [key for key, _ in first] != ["FORMAT", "NUM_HEADER_BLOCKS", "NUM_PARAMS"]:
+            raise InputError(path, "header", [key for key, _ in first], "RPC III begins with FORMAT, NUM_HEADER_BLOCKS "
+                             "and NUM_PARAMS")
+        if first[0][1] not in LITTLE:
+            raise InputError(path, "header, FORMAT", first[0][1], f"one of {', '.join(LITTLE)} can be read")
+        blocks = whole(path, dict(first), "NUM_HEADER_BLOCKS", MOST_BLOCKS)
+        count = whole(path, dict(first), "NUM_PARAMS", 4 * blocks)
+        head += file.read(BLOCK * (blocks - 1))
+    if len(head) < BLOCK * blocks:
+        raise InputError(path, f"byte {len(head)}", None, f"the file ends in its header of {blocks} blocks")
+    return dict(_record(head, i) for i in range(count))
+
+
+def _record(head: bytes, i: int) -> tuple[str, str]:
+    """Name and value of one parameter, each ended by a zero byte."""
+    record = head[i * RECORD : (i + 1) * RECORD]
+    key, value = (part.split(b"\0")[0] for part in (record[:KEY], record[KEY:]))
+    try:
+        return key.decode("utf-8").strip(), value.decode("utf-8")
+    except UnicodeDecodeError:
+        return key.decode("latin-1").strip(), value.decode("latin-1")
+
+
+def whole(path: Path, parameters: dict[str, str], name: str, most: int) -> int:
+    """A whole number from 1 to ``most``."""
+    text = parameters.get(name, "").strip()
+    if not re.fullmatch(r"\d{1,18}(\.0*)?", text) or not 1 <= int(float(text)) <= most:
+        raise InputError(path, f"header, {name}", text, f"a whole number from 1 to {most} is needed")
+    return int(text.split(".")[0])
+
+
+def _real(path: Path, parameters: dict[str, str], name: str, positive: bool) -> float:
+    """Return a finite number."""
+    try:
+        value = float(parameters.get(name, ""))
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value) or (positive and value <= 0.0):
+        raise InputError(path, f"header, {name}", parameters.get(name, ""), "a finite number is needed"
+                         + (" above 0" if positive else ""))
+    return value
+
+
+def _layout(path: Path, parameters: dict[str, str]) -> Layout:
+    """How the samples lie in the file."""
+    for name, allowed in (("FILE_TYPE", ("TIME_HISTORY",)), ("TIME_TYPE", HISTORIES), ("DATA_TYPE", tuple(TYPES))):
+        found = parameters.get(name, allowed[0]).strip()
+        if found not in allowed:
+            raise InputError(path, f"header, {name}", found, "only time histories of one of these can be read", allowed)
+    dtype = TYPES[parameters.get("DATA_TYPE", "SHORT_INTEGER").strip()]
+    width = whole(path, parameters, "CHANNELS", 10**4)
+    points = whole(path, parameters, "PTS_PER_GROUP", 10**7)
+    if points % whole(path, parameters, "PTS_PER_FRAME", points):
+        raise InputError(path, "header, PTS_PER_GROUP", points, "a group must hold whole frames")
+    period = _real(path, parameters, "DELTA_T", True)
+    scales = np.ones(width)
+    if dtype == TYPES["SHORT_INTEGER"]:
+        scales = np.array([_real(path, parameters, f"SCALE.CHAN_{i}", False) for i in range(1, width + 1)])
+    return Layout(BLOCK * int(float(parameters["NUM_HEADER_BLOCKS"])), points, width, dtype, scales, period)
+
+
+def _count(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int, list[Finding]]:
+    """Samples that can be used, and what is missing or too many."""
+    frame = whole(path, parameters, "PTS_PER_FRAME", layout.points)
+    announced = frame * whole(path, parameters, "FRAMES", 10**12)
+    size = layout.points * layout.width * layout.dtype.itemsize
+    data = path.stat().st_size - layout.begin
+    there = layout.points * (data // size)
+    found = []
+    if "SAMPLES" in parameters:
+        announced = whole(path, parameters, "SAMPLES", announced)
+    else:
+        found.append(notice(path, "note", f"the header does not say how many of the {announced} samples are measured: "
+                            f"up to {layout.points - 1} at the end may be padding of the last group"))
+    count = min(announced, there)
+    if count == 0:
+        raise InputError(path, f"byte {layout.begin}", None, "the file ends before its first group of samples does")
+    if count < announced:
+        found.append(notice(path, "doubt", f"the header announces {announced} samples, but {count} are there in whole "
+                            "groups: the file is cut off"))
+    extra = data - size * -(-announced // layout.points)
+    if extra > 0:
+        found.append(notice(path, "doubt", f"{extra} bytes follow the samples that the header announces, unread"))
+    return count, found
+
+
+def _name(parameters: dict[str, str], i: int) -> str:
+    """Name of a channel, by its number where it has none."""
+    return parameters.get(f"DESC.CHAN_{i}", "").strip() or f"channel {i}"
+
+
+def _long(parameters: dict[str, str], name: str) -> str:
+    """Text that is spread over several parameters, NAME_1, NAME_2, ... with line ends written as ``\\n``."""
+    parts: list[str] = []
+    while (key := f"{name}_{len(parts) + 1}") in parameters:
+        parts.append(parameters[key])
+    return re.sub(r"\\(.)", lambda found: "\n" if found[1] == "n" else found[1], "".join(parts))

@@ -1,0 +1,185 @@
+"""TDMS, as LabVIEW and DIAdem write it, read by npTDMS: channels in groups, each with a clock of its own.
+
+A channel's times are wf_start_offset + i wf_increment after its wf_start_time; without an increment they are those of
+the one channel of its group that is called time and counts seconds. Time 0 of the file is the earliest wf_start_time.
+An index file beside the file is not read: it may be older than the data.
+"""
+
+import logging
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from models.errors import InputError
+from models.measured.channel import Channel
+from models.measured.finding import Finding
+from models.measured.formats.left_out import LeftOut
+from models.measured.formats.opened import Opened, Span, notice, readable, told_apart
+
+UNITS = ("unit_string", "NI_UnitDescription")
+CLOCKS = ("time", "zeit", "t")
+SECONDS = ("", "s", "sec", "seconds")
+LEAD, OPEN_END = 28, 2**64 - 1
+"""Bytes that lead in a segment, and the length of a segment that its writer never finished."""
+EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
+"""Where TDMS counts from: a start on this day is one that nobody set."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a channel is: group and name in the file, the name of the clock or first time and increment (s)."""
+
+    group: str
+    name: str
+    clock: str
+    first: float
+    increment: float
+
+
+@dataclass(frozen=True)
+class TdmsData(Opened):
+    """``places`` of every channel in the file."""
+
+    places: tuple[Place, ...]
+
+    def pieces(self, chosen: list[int], spans: list[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Read each channel's own part of each span."""
+        places = [self.places[i] for i in chosen]
+        with self.path.open("rb") as file:
+            data = opened(self.path, file)
+            for first, count in spans:
+                values = [np.asarray(data[one.group][one.name].read_data(first, count), float) for one in places]
+                least = min(len(column) for column in values)
+                yield _times(data, places[0], first, least), np.column_stack([column[:least] for column in values])
+
+
+def opened(path: Path, file: BinaryIO) -> Any:
+    """Return npTDMS's file, without a word on the terminal; InputError where the package is missing."""
+    try:
+        from nptdms import TdmsFile
+    except ImportError:
+        raise InputError(path, "", None, "TDMS files need npTDMS: pip install 'twinrig[measured]'") from None
+    logging.getLogger("nptdms").setLevel(logging.CRITICAL)
+    return TdmsFile.open(file, raw_timestamps=True)
+
+
+def _times(data: Any, place: Place, first: int, count: int) -> np.ndarray:
+    """Times (n,) in s since the start of the file."""
+    if place.clock:
+        return place.first + np.asarray(data[place.group][place.clock].read_data(first, count), float)
+    return place.first + place.increment * np.arange(first, first + count)
+
+
+def open_tdms(path: Path) -> TdmsData:
+    """List the channels of a file; raises InputError where it is damaged."""
+    with readable(path):
+        found = check_segments(path)
+        with path.open("rb") as file:
+            return _listed(path, opened(path, file), found)
+
+
+def check_segments(path: Path) -> list[Finding]:
+    """Follow the segments from one to the next; a last one that is cut off is said, any other damage raised."""
+    size, place = path.stat().st_size, 0
+    with path.open("rb") as file:
+        while place < size:
+            file.seek(place)
+            lead = file.read(LEAD)
+            if not b"TDSm".startswith(lead[:4]):
+                raise InputError(path, f"byte {place}", lead[:4].hex(" "), "a segment of TDMS must begin here")
+            if len(lead) < LEAD:
+                return [_cut(path, place)]
+            order = ">" if lead[4] & 0x40 else "<"
+            following, raw = struct.unpack(order + "QQ", lead[12:])
+            if following == OPEN_END or place + LEAD + following > size:
+                if place == 0 and LEAD + raw > size:
+                    raise InputError(path, f"byte {size}", None, "the file ends before its first samples")
+                return [_cut(path, place)]
+            if raw > following:
+                raise InputError(path, f"byte {place + 20}", raw, "the samples begin after the end of their segment")
+            place += LEAD + following
+    return []
+
+
+def _cut(path: Path, place: int) -> Finding:
+    return notice(path, "doubt", f"the segment at byte {place} is not complete: the file is cut off, and what is whole "
+                  "is read")  # fmt: skip
+
+
+def _listed(path: Path, data: Any, found: list[Finding]) -> TdmsData:
+    """Channels that hold numbers over time, those of one clock in one group."""
+    left = LeftOut()
+    usable = [(group, channel) for group in data.groups() for channel in group.channels() if _numeric(channel, left)]
+    if sum(len(channel) for _, channel in usable) > path.stat().st_size:
+        raise InputError(path, "channels", None, "more samples are announced than the file has bytes")
+    started = [start for _, channel in usable if (start := _started(channel)) is not None]
+    zero = min(started, default=None)
+    own = [(channel, place) for group, channel in usable
+           if (place := _place(group, channel, zero, left)) is not None]  # fmt: skip
+    found = [*found, *left.findings(path)]
+    if not own:
+        raise InputError(path, "channels", None, "; ".join(["no channel of numbers over time is in the file",
+                                                             *(one.text for one in found)]))  # fmt: skip
+    keys = [(place.group, place.clock, place.first, place.increment, len(channel)) for channel, place in own]
+    names, repeated = told_apart(path, [place.name for _, place in own])
+    channels = tuple(
+        Channel(name, _text(channel, *UNITS), _text(channel, "description"), keys.index(key), len(channel),
+                None if place.clock else place.increment, _resolution(channel))
+        for name, key, (channel, place) in zip(names, keys, own, strict=True)
+    )  # fmt: skip
+    comment = str(data.properties.get("description", "")).strip()
+    return TdmsData(path, channels, zero, comment, (*found, *repeated), tuple(place for _, place in own))
+
+
+def _numeric(channel: Any, left: LeftOut) -> bool:
+    """Whether a channel holds real numbers, one or more."""
+    kind = "" if channel.data_type is None else channel.dtype.kind
+    if len(channel) == 0 or kind not in "iuf" or kind == "":
+        left.add("no samples" if len(channel) == 0 else "no numbers", repr(channel.name))
+        return False
+    return True
+
+
+def _place(group: Any, channel: Any, zero: datetime | None, left: LeftOut) -> Place | None:
+    """Where a channel's samples and times are; None where it has no clock or is one."""
+    properties, start = channel.properties, _started(channel)
+    late = 0.0 if zero is None or start is None else (start - zero).total_seconds()
+    increment = float(properties.get("wf_increment", 0.0))
+    if str(properties.get("wf_xunit_string", "s")).casefold() not in SECONDS:
+        left.add("its clock does not count seconds", repr(channel.name))
+        return None
+    if np.isfinite(increment) and increment > 0.0:
+        return Place(group.name, channel.name, "", late + float(properties.get("wf_start_offset", 0.0)), increment)
+    clocks = [one for one in group.channels() if one.name.casefold() in CLOCKS and len(one) == len(channel)
+              and _text(one, *UNITS).casefold() in SECONDS]  # fmt: skip
+    if channel.name.casefold() in CLOCKS and clocks:
+        return None
+    if len(clocks) != 1:
+        left.add("no clock (wf_increment, or one channel 'time' in s of the same length)", repr(channel.name))
+        return None
+    return Place(group.name, channel.name, clocks[0].name, late, 0.0)
+
+
+def _started(channel: Any) -> datetime | None:
+    """When a channel began, in UTC; None where the file does not say."""
+    stamp = channel.properties.get("wf_start_time")
+    if not hasattr(stamp, "seconds"):
+        return None
+    start = EPOCH + timedelta(seconds=int(stamp.seconds), microseconds=round(stamp.second_fractions * 2**-64 * 1e6))
+    return None if start - EPOCH < timedelta(days=1) else start
+
+
+def _text(channel: Any, *names: str) -> str:
+    """First of some properties that is there."""
+    return next((str(channel.properties[name]).strip() for name in names if name in channel.properties), "")
+
+
+def _resolution(channel: Any) -> float:
+    """Step between values of whole numbers without a scaling; 0 otherwise."""
+    scaled = any(name.startswith("NI_Scale") for name in channel.properties)
+    return 1.0 if channel.dtype.kind in "iu" and not scaled else 0.0
