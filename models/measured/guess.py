@@ -1,0 +1,117 @@
+"""What a channel probably measures, from its name and unit: a scene to begin with, for an engineer to correct.
+
+Names are read in English and German, as FL_Fx, WFT_RR_MZ, Radkraft vorne links, ax_dash or Nickrate are written.
+"""
+
+import re
+from dataclasses import dataclass
+
+from models.errors import InputError
+from models.measured.channel import Channel, Source
+from models.measured.signal import UNITS, Quantity
+from models.measured.units import conversion
+
+CORNERS = {
+    "fl": r"fl|lf|vl|lv|front ?left|left ?front|vorne? ?links|links ?vorne?",
+    "fr": r"fr|rf|vr|rv|front ?right|right ?front|vorne? ?rechts|rechts ?vorne?",
+    "rl": r"rl|lr|hl|lh|rear ?left|left ?rear|hinten ?links|links ?hinten",
+    "rr": r"rr|hr|rh|rear ?right|right ?rear|hinten ?rechts|rechts ?hinten",
+}  # fmt: skip
+"""Hub of r19_free -> what it is called in names."""
+SPRINGS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
+"""Hub -> spring of r19_free."""
+WORDS: dict[Quantity, str] = {
+    "force": r"f[xyz]|force|rad(last|kraft)|kraft|load", "moment": r"m[xyz]|moment|torque|drehmoment",
+    "acceleration": r"a[xyz]|acc|accel(eration)?|beschl(eunigung)?",
+    "angular rate": r"(roll|pitch|yaw|nick|wank|gier) ?(rate|vel)|(nick|wank|gier)(rate|geschwindigkeit)|gyro|w[xyz]",
+    "angle": r"roll|pitch|yaw|heading|nick(winkel)?|wank(winkel)?|gier(winkel)?",
+    "travel": r"travel|federweg|weg|defl(ection)?|disp(lacement)?", "strain": r"strain|dms|sg|eps",
+}  # fmt: skip
+AXES = {"x": r"[fmaw]?x|long(itudinal)?|längs", "y": r"[fmaw]?y|lat(eral)?|quer",
+        "z": r"[fmaw]?z|vert(ical)?|hoch|vertikal"}  # fmt: skip
+TURNS = {"roll": r"roll.*|wank.*|w?x", "pitch": r"pitch.*|nick.*|w?y", "yaw": r"yaw.*|gier.*|heading|w?z"}
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Of one channel; ``unit`` is empty where the file's own will do, ``doubt`` is a word on what is not sure."""
+
+    channel: str
+    quantity: Quantity
+    at: str
+    component: str
+    unit: str
+    doubt: str
+
+
+def guess(channel: Channel) -> Guess | None:
+    """None where nothing can be made of a channel; what is missing in a guess is empty."""
+    words = " ".join(re.findall(r"[a-zäöü]+", re.sub(r"([a-zäöü])([A-Z])", r"\1 \2", channel.name).lower()))
+    kinds = _by_unit(channel.unit) or tuple(WORDS)
+    what = next((kind for kind in kinds if _has(WORDS[kind], words)), kinds[0] if len(kinds) == 1 else None)
+    if what is None:
+        return None
+    corner = next((hub for hub, names in CORNERS.items() if _has(names, words)), "")
+    axes = TURNS if what in ("angular rate", "angle") else AXES if what in ("force", "moment", "acceleration") else {}
+    component = next((axis for axis, names in axes.items() if _has(names, words)), "")
+    unit = "" if channel.unit.strip() or what == "strain" else UNITS[what]
+    doubts = [f"the file names no unit: is it {unit}?"] if unit else []
+    if what == "force" and corner and not component:
+        component = "z"
+        doubts.append("vertical?")
+    if what == "acceleration":
+        doubts.append("where? name the place under [sensors]")
+    return Guess(channel.name, what, _place(what, corner, channel.name), component, unit, " ".join(doubts))
+
+
+def _place(what: Quantity, corner: str, name: str) -> str:
+    if what in ("force", "moment"):
+        return corner
+    if what == "travel":
+        return SPRINGS.get(corner, "")
+    return {"angle": "body", "angular rate": "body", "strain": name}.get(what, "")
+
+
+def _has(names: str, words: str) -> bool:
+    return re.search(rf"(?:^| )(?:{names})(?: |$)", words) is not None
+
+
+def _by_unit(unit: str) -> tuple[Quantity, ...]:
+    """Quantities of which this can be the unit; none for no unit, which says nothing."""
+    found = list[Quantity]()
+    for kind in UNITS if unit.strip() else ():
+        try:
+            conversion(unit, kind, "", "")
+            found.append(kind)
+        except InputError:
+            pass
+    return tuple(found)
+
+
+def scene_text(source: Source) -> str:
+    """A scene for this file, as TOML, with what was guessed, and as comments what was not."""
+    found = {channel.name: guess(channel) for channel in source.channels}
+    lines = [f'title = "{source.path.stem}"', 'system = "measured"', 'study = "recording"', "", "[vehicle]",
+             'file = "r19_free"                # or a file of your own, whose tyres are then the hubs below',
+             'chassis = "body"', "", "[[files]]", f'file = "{source.path.name}"', "channels = ["]  # fmt: skip
+    lines += [_row(name, own) for name, own in found.items()]
+    return "\n".join([*lines, "]", ""])
+
+
+def _row(name: str, own: Guess | None) -> str:
+    """An entry of the map, as a comment where anything is missing."""
+    if own is None:
+        return f"  # {{ channel = {_quoted(name)} }},  # not known"
+    free = own.quantity in ("travel", "strain")
+    entries = {"channel": name, "quantity": own.quantity, "at": own.at or "?",
+               "component": own.component or ("" if free else "?"), "unit": own.unit}  # fmt: skip
+    text = ", ".join(f"{key} = {_quoted(value)}" for key, value in entries.items() if value)
+    told = f"  # {own.doubt}" if own.doubt else ""
+    return f"  {'# ' if '?' in entries.values() else ''}{{ {text} }},{told}"
+
+
+def _quoted(text: str) -> str:
+    """A TOML string."""
+    import json
+
+    return json.dumps(text, ensure_ascii=False)
