@@ -34,6 +34,7 @@ SYSTEMS = {
     "handling": System("models.handling.scene", "models.handling.plan", ("exudyn", "mujoco")),
     "hub-forces": System("models.hub_forces.scene", "models.hub_forces.plan", ("reference", "exudyn", "mujoco")),
     "braking": System("models.braking.scene", "models.braking.plan", ("reference", "exudyn", "mujoco")),
+    "measured": System("models.measured.scene", "models.measured.plan", ("reference", "exudyn", "mujoco")),
     "pictures": System("studies.pictures.scene", "studies.pictures.plan", ("exudyn", "mujoco")),
     "wheel-rail": System("models.rail.benchmark_scene", "models.rail.benchmark_plan"),
 }

@@ -14,6 +14,9 @@ from typer.exceptions import TyperException
 
 SCENES = Path(__file__).parent / "scenes"
 
+MEASURED = (".csv", ".txt", ".mf4", ".mdf", ".dat", ".rsp", ".tdms")
+"""Files that ``show`` takes for measurements."""
+
 app = typer.Typer(
     add_completion=False, pretty_exceptions_enable=False,
     help="Ground vehicles built in Exudyn, in MuJoCo and by hand, held to closed forms and to one another.",
@@ -84,7 +87,11 @@ def _print_list(title: str, entries: dict[str, str]) -> None:
 
 @app.command()
 def show(scene: SceneName, changes: Changes = None) -> None:
-    """Print what a scene will compute, per engine, without running it."""
+    """Print what a scene will compute, without running it, or what is in a measurement file, with a scene for it."""
+    if Path(scene).suffix.lower() in MEASURED:
+        from models.measured.listing import describe
+
+        return print(describe(Path(scene)))
     loaded = _load(scene, changes)
     print(_plan(loaded).describe(loaded))
 
@@ -100,6 +107,7 @@ def run(
 ) -> None:
     """Run a scene and save its results and figures."""
     loaded = _load(scene, changes)
+    engine = engine or getattr(getattr(loaded, "run", None), "engine", None)
     _finish(loaded, _engines(engine, loaded.system), out, resume, as_json)
 
 

@@ -7,9 +7,12 @@ from typing import Any, Literal
 from pydantic import Field
 
 from models.errors import InputError
+from models.hub_forces.cut_vehicle import CutVehicle, cut
 from models.measured.signal import Frame, Quantity
+from models.measured.virtual import VirtualTable
 from models.scene_file import SceneFile, checked
 from models.strict import Strict, quantity
+from models.vehicles.vehicle_file import load_vehicle
 
 Engine = Literal["reference", "exudyn", "mujoco"]
 
@@ -99,6 +102,7 @@ class MeasuredScene(SceneFile):
     study: str = Field(default="recording", description="the study that runs the scene")
     vehicle: Vehicle
     files: list[MeasuredFile] = Field(default=[], description="what was measured")
+    virtual: VirtualTable | None = Field(default=None, description="a virtual measurement in place of files")
     sensors: dict[str, Sensor] = Field(default={}, description="where accelerometers sit")
     clock: Clock = Clock()
     noise: Deviations = Deviations()
@@ -106,11 +110,18 @@ class MeasuredScene(SceneFile):
     run: Run = Run()
     hand_on: HandOn = HandOn()
 
+    def cut_vehicle(self) -> CutVehicle:
+        """The vehicle without its tyres; raises InputError."""
+        assert self.vehicle.file is not None
+        return cut(load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file"), self.vehicle.chassis)
+
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> MeasuredScene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(MeasuredScene, table, file, folder)
     _check_vehicle(scene)
+    if bool(scene.files) == (scene.virtual is not None):
+        raise InputError(file, "files", None, "give either [[files]] that were measured, or a table [virtual]")
     names = [each.file for each in scene.files]
     for i, name in enumerate(names):
         if name in names[:i]:

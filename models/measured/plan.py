@@ -1,0 +1,107 @@
+"""What a scene of a recording will compute: printed by ``twinrig show``, checked before any run."""
+
+from collections.abc import Sequence
+
+from models.errors import InputError
+from models.hub_forces.cut_vehicle import CutVehicle
+from models.measured.channel import Source
+from models.measured.channel_map import Places, signals
+from models.measured.formats import open_source
+from models.measured.scene import MeasuredScene
+from models.measured.signal import Signal
+
+MISSING = "no vertical force is mapped at {}: without it the vehicle falls"
+
+
+def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
+    """Everything that can be refused before a run is refused here, before any file is written."""
+    if len(engines) != 1:
+        raise InputError("--engine", "", "all", "a recording is run in one engine: name one, or leave it out")
+    vehicle = scene.cut_vehicle()
+    _check_names(scene, vehicle)
+    if scene.virtual is None:
+        mapped(scene, opened(scene), vehicle)
+
+
+def opened(scene: MeasuredScene) -> tuple[Source, ...]:
+    """The files of a scene; raises InputError."""
+    return tuple(open_source(scene.path(file.file, f"files.{i}.file")) for i, file in enumerate(scene.files))
+
+
+def mapped(scene: MeasuredScene, sources: Sequence[Source], vehicle: CutVehicle) -> tuple[Signal, ...]:
+    """Signals of all files; raises InputError, also where a wheel has no vertical force or the stabiliser no angles."""
+    found = signals(scene, sources, places(scene, vehicle))
+    driving = {(s.quantity, s.at, s.component) for s in found if not s.check}
+    for hub in vehicle.hubs:
+        if ("force", hub, "z") not in driving:
+            raise InputError(scene.file, "files", None, MISSING.format(repr(hub)))
+    wanted = [("angle", axis) for axis in ("roll", "pitch")] if scene.stabilise.method != "none" else []
+    wanted += [("angular rate", axis) for axis in ("roll", "pitch")] if scene.stabilise.method == "kalman" else []
+    for quantity, axis in wanted:
+        if (quantity, vehicle.chassis, axis) not in driving:
+            raise InputError(scene.file, "stabilise.method", scene.stabilise.method, f"needs the {quantity} "
+                             f"{axis!r} of {vehicle.chassis!r}, which no channel is mapped to: map it, or say 'none'")
+    return found
+
+
+def places(scene: MeasuredScene, vehicle: CutVehicle) -> Places:
+    """Where a channel of this vehicle can be."""
+    connectors = tuple(element.name for element in vehicle.elements)
+    return Places(vehicle.hubs, tuple(body.name for body in vehicle.whole.bodies), connectors, tuple(scene.sensors))
+
+
+def _check_names(scene: MeasuredScene, vehicle: CutVehicle) -> None:
+    from models.measured.sections import names
+
+    bodies = tuple(body.name for body in vehicle.whole.bodies)
+    for name, sensor in scene.sensors.items():
+        if sensor.body not in bodies:
+            raise InputError(scene.file, f"sensors.{name}.body", sensor.body, "the vehicle has no such body", bodies)
+    known = names(vehicle)
+    for name in scene.hand_on.sections or ():
+        if name not in known:
+            raise InputError(scene.file, "hand_on.sections", name, "the vehicle has no such section", known)
+
+
+def describe(scene: MeasuredScene) -> str:
+    """The scene's plan as text."""
+    vehicle = scene.cut_vehicle()
+    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"),
+             _line("vehicle", f"{vehicle.tree.name}: {vehicle.size} freedoms, cut at {', '.join(vehicle.hubs)}")]
+    lines += _virtual(scene) if scene.virtual is not None else _files(scene, vehicle)
+    own = scene.stabilise
+    how = {"kalman": f"Kalman filter of roll and pitch, a moment towards it of {own.bandwidth:g} Hz",
+           "prescribed": f"measured roll and pitch enforced, smoothed at {own.smoothing:g} Hz",
+           "none": "nothing"}  # fmt: skip
+    lines += [_line("runs", f"free, and held by: {how[own.method]}; {scene.run.engine}"),
+              _line("hand on", f"{', '.join(scene.hand_on.sections or ['every section'])}; as "
+                               f"{', '.join(scene.hand_on.formats)}; damage of slopes "
+                               f"{', '.join(f'{slope:g}' for slope in scene.hand_on.slopes)}")]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _virtual(scene: MeasuredScene) -> list[str]:
+    own = scene.virtual
+    assert own is not None
+    return [_line("measured", f"virtually: {own.duration:g} s on ISO 8608 class {own.road.iso8608} at "
+                              f"{own.road.speed:g} m/s, {own.sampling_rate:g} Hz, written as {own.format} and read back")]
+
+
+def _files(scene: MeasuredScene, vehicle: CutVehicle) -> list[str]:
+    """Every file with its channels as they will be read."""
+    sources, lines = opened(scene), list[str]()
+    found = mapped(scene, sources, vehicle)
+    for source in sources:
+        began = f", began {source.start.isoformat(sep=' ')}" if source.start else ""
+        lines.append(_line("file", f"{source.path.name}: {len(source.channels)} channels{began}"))
+        for s in (s for s in found if s.file == source.path.name):
+            what = f"{s.quantity} {s.component}".strip()
+            sign, use = "-" if s.sign < 0 else "", ", only compared with" if s.check else ""
+            lines.append(_line("", f"{s.channel:<24} {what} at {s.at}, axes {s.frame}, {sign}{s.factor:g} x "
+                                   f"[{s.unit}]{use}"))  # fmt: skip
+        lines += [_line(f.weight, f.text) for f in source.noticed]
+    return lines
+
+
+def _line(head: str, text: str) -> str:
+    return f"  {head:<10} {text}"
