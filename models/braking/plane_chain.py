@@ -7,12 +7,10 @@ prescribed, only the headings are free.
 
 import math
 
-import numpy as np
-
-from models.compiled import njit
+from models.compiled import lean
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def point(k, x, y, positions, rates, reach):
     """Velocity (2) in the ground's axes of the point (x, y) of unit k, in that unit's axes."""
     vx, vy = rates[0], rates[1]
@@ -25,7 +23,7 @@ def point(k, x, y, positions, rates, reach):
     return vx, vy
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def place_of(k, x, y, positions, reach):
     """Place (2) on the ground of the point (x, y) of unit k."""
     px, py = positions[0], positions[1]
@@ -38,7 +36,7 @@ def place_of(k, x, y, positions, reach):
     return px, py
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def rows(k, x, y, heading, positions, rates, reach, along, across):
     """Fill the two rows (n,) that give the velocity of the point (x, y) of unit k in axes of a ``heading``.
 
@@ -59,11 +57,13 @@ def rows(k, x, y, heading, positions, rates, reach, along, across):
     return ahead, aside
 
 
-@njit(cache=True, error_model="numpy")
-def inertia(positions, rates, masses, inertias, reach, mass, right):
-    """Fill the mass matrix (n, n) and what its product with the accelerations has besides the forces (n,)."""
+@lean
+def inertia(positions, rates, masses, inertias, reach, mass, right, along, across):
+    """Fill the mass matrix (n, n) and what its product with the accelerations has besides the forces (n,).
+
+    along, across (n,) : room to work in.
+    """
     mass[:], right[:] = 0.0, 0.0
-    along, across = np.empty(right.size), np.empty(right.size)
     for k in range(masses.size):
         ahead, aside = rows(k, 0.0, 0.0, 0.0, positions, rates, reach, along, across)
         for a in range(right.size):
@@ -73,7 +73,7 @@ def inertia(positions, rates, masses, inertias, reach, mass, right):
         mass[2 + k, 2 + k] += inertias[k]
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def factor(mass, first):
     """Cholesky's factor of the mass matrix from row ``first`` on, in place of its lower triangle."""
     for a in range(first, mass.shape[0]):
@@ -84,7 +84,7 @@ def factor(mass, first):
             mass[a, b] = math.sqrt(rest) if a == b else rest / mass[b, b]
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def solve(mass, first, right):
     """Forces (n,) to accelerations from row ``first`` on, in place, by ``factor``'s."""
     for a in range(first, right.size):

@@ -14,7 +14,7 @@ import numpy as np
 from models.braking.plane_chain import factor, inertia, rows, solve
 from models.braking.tyre_table import across, place
 from models.braking.wheel_step import wheel_step
-from models.compiled import njit
+from models.compiled import lean, njit
 
 CLOSE = 1e-8
 """Change of the accelerations (m/s^2, and rad/s^2 times 1 m) at which the loads are taken to be found."""
@@ -40,7 +40,8 @@ class Frame(NamedTuple):
     """What a step's rounds have in common, for W wheels and n coordinates, of which those from ``free`` on are free.
 
     along, across (W, n): see ``rows``; press (W, n): load by accelerations; known (W, 15): see above; mass (n, n): the
-    factor of the mass matrix; right (n,): forces besides the tyres' ones.
+    factor of the mass matrix; right (n,): forces besides the tyres' ones; tried (3, n): what a round gave, what the one
+    before gave, and by how much that was off.
     """
 
     along: np.ndarray
@@ -49,10 +50,11 @@ class Frame(NamedTuple):
     known: np.ndarray
     mass: np.ndarray
     right: np.ndarray
+    tried: np.ndarray
     free: int
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def times(row, vector):
     """Scalar product."""
     total = 0.0
@@ -61,7 +63,7 @@ def times(row, vector):
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def begin(turning, surface, plane, known):
     """Fill what is known of the wheels and stays so for a whole step."""
     for i in range(turning.size):
@@ -71,7 +73,7 @@ def begin(turning, surface, plane, known):
         known[i, LAGGED] = surface[i, 3] if surface.shape[1] > 3 else math.nan
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def settle(positions, rates, steer, regular, starts, plane, angles, frame, found):
     """Fill the frame at a state; ``starts`` at the start of the step, whose speeds along the wheels it keeps."""
     for i in range(plane.unit.size):
@@ -91,31 +93,33 @@ def settle(positions, rates, steer, regular, starts, plane, angles, frame, found
             v = known[LAGGED] * max(forwards, regular)
         known[ASIDE], known[ANGLE] = v, math.atan2(abs(v), max(forwards, regular))
         known[CELL], known[PART] = place(angles, known[ANGLE])
-    inertia(positions, rates, plane.masses, plane.inertias, plane.reach, frame.mass, frame.right)
+    inertia(positions, rates, plane.masses, plane.inertias, plane.reach, frame.mass, frame.right,
+            frame.tried[0], frame.tried[1])  # fmt: skip
     for a in range(frame.free, rates.size):
         for b in range(frame.free):
             frame.right[a] -= frame.mass[a, b] * found[b]
     factor(frame.mass, frame.free)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def tyre(known, rate, load, torque0, torque1, step, tables, report):
     """Fill the report (7,) of a wheel whose centre's speed along it changes at a ``rate`` (m/s^2)."""
-    angles, slips, loads, mu_x, g, h = tables
+    _, slips, loads, mu_x, g, h = tables
     start, v, sign = known[START], known[ASIDE], 1.0 if known[START] >= 0.0 else -1.0
-    first, second, share, i, p = int(known[FIRST]), int(known[SECOND]), known[SHARE], int(known[CELL]), known[PART]
+    first, second, share = int(known[FIRST]), int(known[SECOND]), known[SHARE]
+    c, p = int(known[CELL]), known[PART]
     j, q = place(loads, load)
-    grip = (first, second, share, i, p, j, q, load)
+    grip = (first, second, share, c, p, j, q, load)
     w, force, slip, locked = wheel_step(sign * start, sign * (start + step * rate), sign * known[TURNED], torque0,
                                         torque1, step, known[RADIUS], known[SPIN], grip, slips, mu_x)  # fmt: skip
-    angle, size = known[ANGLE], min(abs(slip), 1.0)
-    side = across(first, angle, load, size, angles, slips, loads, g, h)
+    k, part = place(slips, abs(slip))
+    side = across(first, c, p, j, q, k, part, g, h)
     if share > 0.0:
-        side += share * (across(second, angle, load, size, angles, slips, loads, g, h) - side)
+        side += share * (across(second, c, p, j, q, k, part, g, h) - side)
     side *= load
-    speed = math.hypot(known[ALONG], v)
-    if slip > NEARLY and speed > 0.0:  # a locked tyre's force is against the way it slides
-        total, part = math.hypot(force, side), min((slip - NEARLY) / (1.0 - NEARLY), 1.0)
+    if slip > NEARLY and (known[ALONG] > 0.0 or v != 0.0):  # a locked tyre's force is against the way it slides
+        total, speed = math.hypot(force, side), math.hypot(known[ALONG], v)
+        part = min((slip - NEARLY) / (1.0 - NEARLY), 1.0)
         force += part * (total * known[ALONG] / speed - force)
         side += part * (total * abs(v) / speed - side)
     report[FORCE_X], report[FORCE_Y] = -sign * force, -math.copysign(side, v) if v != 0.0 else 0.0
@@ -123,7 +127,7 @@ def tyre(known, rate, load, torque0, torque1, step, tables, report):
     report[LOCKED], report[TURNING] = locked, sign * w
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def respond(found, torque0, torque1, step, tables, frame, out, report):
     """Fill ``out`` (n,) with the accelerations by the tyres' forces if they were ``found``: the map whose fixed point
     is wanted. A wheel that would lift bears none."""
@@ -138,34 +142,34 @@ def respond(found, torque0, torque1, step, tables, frame, out, report):
     solve(frame.mass, frame.free, out)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def stage(torque0, torque1, step, most, tables, frame, found, report):
     """Mean accelerations over a step, into ``found`` (n,): what stands there is where the search begins.
 
     Anderson's method of depth one, damped where that does not settle, for at most so many rounds. Returns the last
     change.
     """
-    size, change = found.size, math.inf
-    out, off, off0, out0 = np.empty(size), np.empty(size), np.zeros(size), np.zeros(size)
+    change, out, out0, off0 = math.inf, frame.tried[0], frame.tried[1], frame.tried[2]
     for rounds in range(most):
         respond(found, torque0, torque1, step, tables, frame, out, report)
         change, product, square = 0.0, 0.0, 0.0
-        for a in range(size):
-            off[a] = out[a] - found[a]
-            change = max(change, abs(off[a]))
-            product += off[a] * (off[a] - off0[a])
-            square += (off[a] - off0[a]) ** 2
+        for a in range(found.size):
+            off = out[a] - found[a]
+            change = max(change, abs(off))
+            product += off * (off - off0[a])
+            square += (off - off0[a]) ** 2
         done = not change > CLOSE or rounds == most - 1
         mix = min(max(product / square, -2.0), 0.75) if rounds > 0 and square > 0.0 and not done else 0.0
-        for a in range(size):
-            found[a] = out[a] - mix * (out[a] - out0[a]) if done or rounds < PATIENCE else found[a] + 0.5 * off[a]
-            off0[a], out0[a] = off[a], out[a]
+        for a in range(found.size):
+            off0[a] = out[a] - found[a]
+            found[a] = out[a] - mix * (out[a] - out0[a]) if done or rounds < PATIENCE else found[a] + 0.5 * off0[a]
+            out0[a] = out[a]
         if done:
             break
     return change
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def comes_to_rest(rates, turning, found, step, plane):
     """Time (s) within the step at which the vehicle stands, or -1 if it does not.
 
@@ -197,7 +201,7 @@ def step_on(state, turning, torque0, torque1, step, steer, surface, regular, pla
     wheels, size = turning.size, found.size
     frame = Frame(np.empty((wheels, size)), np.empty((wheels, size)), np.empty((wheels, size)),
                   np.empty((wheels, KNOWN)), np.empty((size, size)), np.empty(size),
-                  2 if plane.hooked else 0)  # fmt: skip
+                  np.zeros((3, size)), 2 if plane.hooked else 0)  # fmt: skip
     place0, rate0, middle = state[0].copy(), state[1].copy(), 0.5 * (torque0 + torque1)
     begin(turning, surface, plane, frame.known)
     for half in (True, False):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.braking.plane_chain import place_of, point
-from models.compiled import njit
+from models.compiled import lean
 from models.errors import InputError
 
 
@@ -56,7 +56,7 @@ def check_way(own: Road, way: float) -> None:
                          "longer stretches or more substeps")  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def under_wheels(state, step, plane, kind, road, surface):
     """Fill ``surface`` (W, 3): tables of each wheel and the share of the second.
 

@@ -82,7 +82,7 @@ def follow(plane: Plane, tables: Tables, state: np.ndarray, hook: np.ndarray, st
 def _follow(states, forces, turning, hook, step, regular, plane, tables, torques):
     wheels, size = turning.size, states.shape[2]
     surface, steer, report, found = np.zeros((wheels, 3)), np.zeros(wheels), np.zeros((wheels, 7)), np.zeros(size)
-    mass, right = np.empty((size, size)), np.empty(size)
+    mass, (right, along, across) = np.empty((size, size)), np.empty((3, size))
     for n in range(hook.shape[0] - 1):
         state = states[n].copy()
         found[:2] = (hook[n + 1] - hook[n]) / step
@@ -90,7 +90,7 @@ def _follow(states, forces, turning, hook, step, regular, plane, tables, torques
             return False
         states[n + 1] = state
         inertia(0.5 * (states[n, 0] + state[0]), 0.5 * (states[n, 1] + state[1]), plane.masses, plane.inertias,
-                plane.reach, mass, right)  # fmt: skip
+                plane.reach, mass, right, along, across)  # fmt: skip
         forces[n] = (mass @ found - right)[:2]
         for i in range(wheels):
             psi = 0.5 * (states[n, 0, 2 + plane.unit[i]] + state[0, 2 + plane.unit[i]])

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.compiled import njit
+from models.compiled import lean
 from models.errors import InputError
 
 LARGEST_FRICTION = 3.0
@@ -148,7 +148,7 @@ def stacked(tables: Sequence[TyreTable]) -> Tables:
     return Tables(*nodes, *(np.stack([getattr(t, name) for t in fine]) for name in ("mu_x", "g", "h")))
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def place(nodes, value):
     """Cell at which a value lies, and the share of that cell below it; held at the ends."""
     last = nodes.size - 1
@@ -166,13 +166,10 @@ def place(nodes, value):
     return low, (value - nodes[low]) / (nodes[low + 1] - nodes[low])
 
 
-@njit(cache=True, error_model="numpy")
-def across(table, angle, load, slip, angles, slips, loads, g, h):
-    """mu_y of one table at a slip angle (rad, from 0), a load (N) and a slip from 0 to 1."""
-    i, p = place(angles, angle)
-    j, q = place(loads, load)
-    k, w = place(slips, slip)
-    i1, j1, k1 = min(i + 1, angles.size - 1), min(j + 1, loads.size - 1), min(k + 1, slips.size - 1)
+@lean
+def across(table, i, p, j, q, k, w, g, h):
+    """mu_y of one table in cells i, j and k of slip angle, load and slip with shares p, q and w."""
+    i1, j1, k1 = min(i + 1, h.shape[1] - 1), min(j + 1, h.shape[2] - 1), min(k + 1, g.shape[2] - 1)
     by_slip = (1.0 - p) * ((1.0 - w) * g[table, i, k] + w * g[table, i, k1])
     by_slip += p * ((1.0 - w) * g[table, i1, k] + w * g[table, i1, k1])
     by_load = (1.0 - p) * ((1.0 - q) * h[table, i, j] + q * h[table, i, j1])
@@ -180,7 +177,7 @@ def across(table, angle, load, slip, angles, slips, loads, g, h):
     return by_slip * by_load
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def along(table, i, p, j, q, k, mu_x):
     """mu_x of one table at slip node k, in cells i and j of slip angle and load with shares p and q."""
     i1, j1 = min(i + 1, mu_x.shape[1] - 1), min(j + 1, mu_x.shape[2] - 1)

@@ -16,33 +16,33 @@ the stopping distance of light braking. A wheel that has stopped stays so while 
 import math
 
 from models.braking.tyre_table import along, place
-from models.compiled import njit
+from models.compiled import lean
 
 SLOWEST = 1e-9
 """Speed (m/s) below which a wheel's centre is taken to have this one: slip has no meaning at rest."""
 MOST_PIECES = 100_000
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def phi_1(z):
     """(exp(z) - 1) / z."""
     return math.expm1(z) / z if abs(z) > 1e-5 else 1.0 + z / 2.0 + z * z / 6.0
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def passed(way, rate, decay, time):
     """Integral over a time of what covers a way with a rate that decays as exp(-decay t)."""
     z = decay * time
     return time * way * (0.5 + z / 12.0) if abs(z) < 0.01 else (rate * time - way) / decay
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def node(k, slips):
     """Slip at node k; at -k the opposite one."""
     return slips[k] if k >= 0 else -slips[-k]
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def node_force(k, grip, mu_x):
     """Force (N) at slip node k, at -k the opposite one. grip: two tables, share of the second, cells, load."""
     first, second, share, i, p, j, q, load = grip
@@ -52,7 +52,7 @@ def node_force(k, grip, mu_x):
     return load * mu if k >= 0 else -load * mu
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def roll(slip, left, kappa, fade, held, grip, slips, mu_x):
     """A wheel at a slip from -1 to 1 for at most ``left`` seconds or until it leaves them.
 
@@ -91,7 +91,7 @@ def roll(slip, left, kappa, fade, held, grip, slips, mu_x):
     return used, math.nan, area
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _way(decay, rate, way):
     """Time in which a rate that decays as exp(-decay t) covers a way of its sign; infinite if it never does."""
     if rate == 0.0:
@@ -104,7 +104,7 @@ def _way(decay, rate, way):
     return -math.log1p(-share) / decay
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def wheel_step(u0, u1, w0, torque0, torque1, step, radius, inertia, grip, slips, mu_x):
     """A wheel whose centre goes from speed u0 to u1, both from 0 on, while the brake's torque goes from one to another.
 
