@@ -84,7 +84,7 @@ def _virtual(scene: MeasuredScene) -> list[str]:
     own = scene.virtual
     assert own is not None
     return [_line("measured", f"virtually: {own.duration:g} s on ISO 8608 class {own.road.iso8608} at "
-                              f"{own.road.speed:g} m/s, {own.sampling_rate:g} Hz, written as {own.format} and read back")]
+                              f"{own.road.speed:g} m/s, {own.sampling_rate:g} Hz, as {own.format} and back")]
 
 
 def _files(scene: MeasuredScene, vehicle: CutVehicle) -> list[str]:
