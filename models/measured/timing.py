@@ -89,7 +89,7 @@ def _gaps(times: np.ndarray, period: float, say: Say) -> None:
     if len(wide):
         longest = wide[np.argmax(steps[wide])]
         lost = float(np.sum(steps[wide] - period))
-        say("gaps", "doubt", f"{len(wide)} gap(s) in its clock, {lost:.4g} s in all, the longest from "
+        say("clock gaps", "note", f"{len(wide)} gap(s) in its clock, {lost:.4g} s in all, the longest from "
             f"{times[longest]:.6g} to {times[longest + 1]:.6g} s ({steps[longest]:.4g} s); nothing was measured there",
             float(steps[longest]), "s", times[[longest, longest + 1]])  # fmt: skip
 
