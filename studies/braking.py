@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.braking.adhesion import split, utilisation
+from models.braking.adhesion import NoAdhesion, split, utilisation
 from models.braking.figures_of_merit import NOT_CHECKED
 from models.braking.measured_pressures import MeasuredPressures, write_pressures
 from models.braking.of_scene import measured_of, plane_of
 from models.braking.plan import behind
 from models.braking.plane_step import FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE
-from models.braking.procedures import drive, step_steer
+from models.braking.procedures import drive, engines_of, step_steer
 from models.braking.run import Path
 from models.braking.scene import BrakingScene
 from models.braking.stop_report import WHEELS, Stop
@@ -38,7 +38,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
 
     options = read(Options, scene.options, scene.file, "options")
     failed, table, answer = {}, list[str](), dict[str, dict[str, Any]]()
-    engines = engines or ("reference",)
+    engines = engines_of(scene, engines)
     for i, name in enumerate(scene.procedures):
         paths, seconds = dict[str, Path](), dict[str, float]()
         for j, engine in enumerate(engines):
@@ -59,14 +59,16 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
         measured, rims = measured_of(scene, name, radius.size), stop.path.turning * radius
         write_pressures(folder / f"{name}_pressures.csv", stop.times, stop.path.pressures, rims)
         stop_figure(scene, name, stop, folder / f"{name}.png", measured)
-        told = dict[str, float]()
+        told, remarks = dict[str, float](), list[str]()
         try:
             told = engineers(scene, name, stop) if options.adhesion else {}
+        except NoAdhesion as error:
+            remarks = [f"    {error}"]
         except RunFailed as error:
             failed[f"{name}, figures of merit"] = str(error)
         wheels = stop.of_wheels() | beside(measured, stop, rims)
         answer[name] = {**stop.of_vehicle(), **{key: value.tolist() for key, value in wheels.items()}, **told}
-        table += lines(name, stop, told, wheels) + ended(measured, stop) + compared(paths, seconds)
+        table += lines(name, stop, told, wheels) + remarks + ended(measured, stop) + compared(paths, seconds)
     return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": table}
 
 
@@ -127,7 +129,7 @@ def compared(paths: dict[str, Path], seconds: dict[str, float]) -> list[str]:
 
 def lines(name: str, stop: Stop, told: dict[str, float], wheels: dict[str, np.ndarray]) -> list[str]:
     """Tables of one procedure: of the vehicle, and of its wheels."""
-    rows = [f"  {name.replace('_', ' ')}" + ": it does not stand" * (not stop.path.stands)]
+    rows = [f"  {name.replace('_', ' ')}" + _unfinished(stop)]
     rows += [f"    {stop.path.clock}"] if stop.path.clock else []
     rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.of_vehicle().items()]
     rows += [f"    {key:<40}{value:>10.3f}" for key, value in told.items()]
@@ -137,6 +139,12 @@ def lines(name: str, stop: Stop, told: dict[str, float], wheels: dict[str, np.nd
     rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel.replace('trailer ', 'tr. '):>17}" for wheel in names)]
     return rows + [f"    {key:<40}" + "".join(f"{value:>17.2f}" for value in values)
                    for key, values in wheels.items()]  # fmt: skip
+
+
+def _unfinished(stop: Stop) -> str:
+    if stop.path.stands:
+        return ""
+    return f": not stopped by {stop.times[-1]:g} s, still {stop.speed[-1]:.2f} m/s; all figures are those until then"
 
 
 REPORTS = {"force_x": (FORCE_X, "N"), "force_y": (FORCE_Y, "N"), "load": (LOAD, "N"), "slip": (SLIP, "1"),
@@ -151,16 +159,17 @@ def save(scene: BrakingScene, name: str, path: Path, file: File) -> None:
 
     from models.result import Result, provenance
 
-    units = [f"heading_{k}" for k in range(path.states.shape[2] - 2)]
+    units = ", ".join("rad" if name.split()[-1][0] in "hr" else "m" for name in path.coordinates)
+    rates = ", ".join(f"{unit}/s" for unit in units.split(", "))
     wheel, moving = ("time", "wheel"), ("time", "coordinate")
     data = xr.Dataset(
-        {"positions": (moving, path.states[:, 0], {"units": "m, m, rad"}),
-         "rates": (moving, path.states[:, 1], {"units": "m/s, m/s, rad/s"}),
+        {"positions": (moving, path.states[:, 0], {"units": units}),
+         "rates": (moving, path.states[:, 1], {"units": rates}),
          "turning": (wheel, path.turning, {"units": "rad/s"}), "pressure": (wheel, path.pressures, {"units": "bar"}),
          "torque": (wheel, path.torques, {"units": "N m"})}
         | {key: (wheel, np.concatenate((np.full((1, path.turning.shape[1]), np.nan), path.reports[:, :, column])),
                  {"units": unit}) for key, (column, unit) in REPORTS.items()},
-        {"time": ("time", path.times, {"units": "s"}), "coordinate": ["x", "y", *units],
+        {"time": ("time", path.times, {"units": "s"}), "coordinate": list(path.coordinates),
          "wheel": list(WHEELS[: path.turning.shape[1]])},
     )  # fmt: skip
     data.attrs = {"title": f"{scene.title}: {name}", "stands": int(path.stands),

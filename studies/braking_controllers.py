@@ -79,6 +79,9 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         except RunFailed as error:
             failed[f"{case.surface}, {case.procedure}, {case.controller}"] = str(error)
             continue
+        if not path.stands:
+            failed[f"{case.surface}, {case.procedure}, {case.controller}"] = f"not stopped by {path.times[-1]:g} s"
+            continue
         stop = Stop(path)
         values = stop.of_vehicle()
         found.append((case, {key: values[name] for key, name in SHOWN.items()}

@@ -148,9 +148,10 @@ def test_an_fmu_gives_the_same_bits(vehicle, tmp_path):
     assert same(path, vehicle.run(Example(4), 11.0, SHORT))
 
 
-def test_an_fmu_without_fmpy_names_the_extra(monkeypatch):
+def test_an_fmu_without_fmpy_names_the_extra(monkeypatch, tmp_path):
+    (tmp_path / "a.fmu").touch()
     monkeypatch.setitem(sys.modules, "fmpy", None)
-    table, run = PortTable(fmu="a.fmu"), Run(RADIUS, SAMPLE)
+    table, run = PortTable(fmu="a.fmu"), Run(RADIUS, SAMPLE, folder=tmp_path)
     with pytest.raises(InputError, match=r"twinrig\[fmi\]"), opened(table, run, Example(4)):
         pass
 

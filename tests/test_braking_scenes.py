@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.braking.adhesion import Adhesion, utilisation
+from models.braking.adhesion import Adhesion, NoAdhesion, utilisation
 from models.braking.controller import Command
 from models.braking.of_scene import braked
 from models.braking.plan import check, describe
@@ -19,6 +19,7 @@ from models.braking.scene import build
 from models.braking.stop_report import Stop
 from models.errors import InputError, Refused
 from models.systems import load
+from studies.braking import lines
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
 PLAIN = {"title": "t", "system": "braking", "run": {"duration": 0.3}, "procedures": {"stop": {"speed": 10.0}}}
@@ -165,3 +166,40 @@ def test_the_braking_scene_of_the_readme_is_valid():
     text = (Path(__file__).parents[1] / "README.md").read_text()
     block = next(block for block in re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL) if '"braking"' in block)
     check(build(tomllib.loads(block), "README.md"), ())
+
+
+@pytest.mark.parametrize(("tables", "place", "said"), [
+    ({"controller": {"kind": "slip_pi", "parameters": {"gian": 1.0}}}, "controller.parameters.gian", "gain"),
+    ({"tyres": {"files": {"ice": "tyre.csv"}}}, "line 1 (header), column 'slip', unit", "not known"),
+    ({"port": {"fmu": "no.fmu"}}, "port.fmu", "no such file"),
+    ({"port": {"replay": "tyre.csv", "faults": [{"kind": "lost", "wheels": [4]}]}}, "port.faults.0.wheels", "0 to 3"),
+])  # fmt: skip
+def test_what_a_scene_names_is_read_before_its_plan_is_shown(tmp_path, tables, place, said):
+    (tmp_path / "tyre.csv").write_text("slip [furlong]\n1\n")
+    with pytest.raises(InputError, match=said) as error:
+        describe(build({**PLAIN, **tables}, "s.toml", tmp_path))
+    assert error.value.place == place
+
+
+@pytest.mark.parametrize(("port", "place", "said"), [
+    ({"callable": "models.braking.port.example:Exampel"}, "port.callable", "Example"),
+    ({"command": ["/no/such/program"]}, "port.command", "cannot be started"),
+    ({"replay": "s.log"}, "port.replay", "is no log"),
+    ({"fmu": "s.log"}, "port.fmu", "is no FMU"),
+])  # fmt: skip
+def test_what_is_wrong_behind_the_port_is_told_by_the_scene_s_key(tmp_path, port, place, said):
+    (tmp_path / "s.log").write_text("x")
+    with pytest.raises(InputError, match=said) as error:
+        drive(build({**PLAIN, "port": port}, "s.toml", tmp_path), "stop")
+    assert error.value.file == "s.toml" and error.value.place == place
+
+
+def test_adhesion_of_an_axle_that_does_not_lock_is_not_told():
+    weak = scene(controller={"kind": "slip_bang_bang"}, brakes={"supply": 0.5}, road={"stretches": [{"left": "dry"}]})
+    with pytest.raises(NoAdhesion, match=r"front axle does not lock at the supply's 0.5 bar"):
+        utilisation(weak, "dry")
+
+
+def test_a_run_that_ends_before_the_vehicle_stands_says_so():
+    stop = Stop(drive(scene(), "stop"))
+    assert "not stopped by 0.3025 s, still 9.7" in lines("stop", stop, {}, {})[0]

@@ -27,12 +27,22 @@ from models.braking.procedures import looped
 from models.braking.run import Braked, Path
 from models.braking.scene import BrakingScene, Procedure, RoadTable, Stretch
 from models.braking.stop_report import Stop
-from models.errors import InputError
+from models.errors import RunFailed
 
+AXLES = ("front", "rear")
 HALVINGS = 9
 """Of the interval in which the pressure lies at which an axle locks: 1/500 of the supply pressure."""
+LONGEST = 120.0
+"""s: for which a run that measures adhesion may last, however long those of the scene are."""
 BELOW_LOCK = (1.0, 0.98, 0.96)
 """Pressures of the three runs, by the largest that does not lock."""
+
+
+class NoAdhesion(RunFailed):
+    """The procedure does not give a figure for this vehicle on this surface."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__("adhesion utilisation", f"not found: {reason}")
 
 
 @dataclass(frozen=True)
@@ -83,7 +93,7 @@ def alone(scene: BrakingScene, surface: str) -> Braked:
 
 
 def adhesion(scene: BrakingScene, surface: str) -> Adhesion:
-    """k of both axles of a surface, each braked alone from 50 km/h without locking."""
+    """k of both axles of a surface, each braked alone from 50 km/h without locking; raises NoAdhesion."""
     vehicle, own = alone(scene, surface), axles(scene)
     return Adhesion(adhesion_front(_rate(scene, vehicle, 0), own), adhesion_rear(_rate(scene, vehicle, 1), own))
 
@@ -91,7 +101,8 @@ def adhesion(scene: BrakingScene, surface: str) -> Adhesion:
 def _held_by_system(scene: BrakingScene, name: str, vehicle: Braked, speed: float) -> Path:
     """A run from a speed (km/h) with the scene's controller, or what stands behind its port, which logs nothing."""
     port = None if scene.port is None else scene.port.model_copy(update={"log": None})
-    return looped(scene.model_copy(update={"port": port}), name, vehicle, vehicle.rolling(speed * KMH))
+    lasting = scene.run.model_copy(update={"duration": LONGEST})
+    return looped(scene.model_copy(update={"port": port, "run": lasting}), name, vehicle, vehicle.rolling(speed * KMH))
 
 
 def _rate(scene: BrakingScene, vehicle: Braked, axle: int) -> float:
@@ -99,16 +110,17 @@ def _rate(scene: BrakingScene, vehicle: Braked, axle: int) -> float:
     wheels = np.arange(vehicle.plane.wheels) // 2 == axle
 
     def run(pressure: float) -> Path:
-        return vehicle.run(Held(np.where(wheels, pressure, 0.0)), 50.0 * KMH, scene.run.duration)
+        return vehicle.run(Held(np.where(wheels, pressure, 0.0)), 50.0 * KMH, LONGEST)
 
     low, high = 0.0, scene.brakes.supply
+    if not _locks(run(high)):
+        raise NoAdhesion(f"the {AXLES[axle]} axle does not lock at the supply's {high:g} bar")
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if _locks(run(middle)) else (middle, high)
     times = [_between(run(share * low), 40.0, 20.0) for share in BELOW_LOCK]
     if not np.isfinite(times).any():
-        raise InputError(scene.file, "run.duration", scene.run.duration, "is too short to slow down to 20 km/h with "
-                         f"the {'rear' if axle else 'front'} axle alone")  # fmt: skip
+        raise NoAdhesion(f"the {AXLES[axle]} axle alone does not slow the vehicle down to 20 km/h")
     return braking_rate(40.0 * KMH, 20.0 * KMH, mean_of_fastest(np.array(times)))
 
 

@@ -1,8 +1,8 @@
 """What a scene of braking will compute: printed by ``twinrig show``, checked before any run."""
 
-from models.braking.of_scene import controller_of, surfaces_of, vehicle_of
-from models.braking.port.setup import BEHIND
-from models.braking.procedures import check_engine, ready
+from models.braking.of_scene import braked, controller_of, surfaces_of, vehicle_of
+from models.braking.port.setup import BEHIND, check_port
+from models.braking.procedures import check_engine, engines_of, port_of, ready
 from models.braking.scene import BrakingScene
 from models.errors import InputError
 
@@ -16,10 +16,20 @@ PROCEDURES = {
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
-    for engine in engines:
+    for engine in engines_of(scene, engines):
         check_engine(scene, engine)
+    _check_parts(scene)
     for name in scene.procedures:
-        controller_of(scene, ready(scene, name)[0].plane.wheels, name)
+        ready(scene, name)
+
+
+def _check_parts(scene: BrakingScene) -> None:
+    """Tyres, brakes, road, controller and port, without a step of the vehicle."""
+    for name, own in scene.procedures.items():
+        vehicle = braked(scene, own)
+        controller_of(scene, vehicle.plane.wheels, name)
+        if scene.port is not None:
+            check_port(scene.port, port_of(scene, name, vehicle))
 
 
 def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
@@ -30,12 +40,18 @@ def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def describe(scene: BrakingScene) -> str:
-    """The scene's plan as text: vehicle, road, brakes, controller, procedure, effects and what is not computed."""
+    """The scene's plan as text: vehicle, road, brakes, controller, procedure, effects and what is not computed.
+
+    Raises InputError for parts that cannot be.
+    """
+    _check_parts(scene)
     vehicle, run = vehicle_of(scene), scene.run
     axles = (vehicle.front.x, vehicle.rear.x)
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
-    lines += [_line("vehicle", f"{scene.vehicle.parameters}: {vehicle.mass:g} kg, {vehicle.yaw_inertia:g} kg m^2, "
-                    f"axles at {axles[0]:g} and {axles[1]:g} m, wheels of {vehicle.front.radius:g} m; plane motion, "
+    motion = "plane motion" if scene.vehicle.file is None else "suspension, roll and pitch"
+    name = scene.vehicle.file or scene.vehicle.parameters
+    lines += [_line("vehicle", f"{name}: {vehicle.mass:g} kg, {vehicle.yaw_inertia:g} kg m^2, "
+                    f"axles at {axles[0]:g} and {axles[1]:g} m, wheels of {vehicle.front.radius:g} m; {motion}, "
                     "wheels turn")]  # fmt: skip
     lines += [_line("brakes", f"supply {scene.brakes.supply:g} bar")]
     lines += [_line("controller", f"{behind(scene)}, every {1e3 * run.sample:g} ms")]
@@ -62,7 +78,8 @@ def effects(scene: BrakingScene) -> tuple[list[str], list[str]]:
     brakes, port = (scene.brakes.front, scene.brakes.rear), scene.port
     present = {
         "trailer": scene.trailer is not None,
-        "load transfer": scene.load_transfer is not None,
+        "load transfer": scene.load_transfer is not None or scene.vehicle.file is not None,
+        "suspension, roll and pitch": scene.vehicle.file is not None,
         "push-out": any(brake.push_out > 0.0 for brake in brakes),
         "hysteresis": any(brake.release is not None or brake.falling is not None for brake in brakes),
         "tyre relaxation": scene.relaxation is not None,

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import root
 
 from models.braking.controller import Command, Sample
-from models.braking.of_scene import braked, controller_of
+from models.braking.of_scene import SPRUNG_ENGINE, braked, controller_of, on_springs
 from models.braking.plane_step import REPORTED, step_on
 from models.braking.port.setup import Run, opened
 from models.braking.run import Braked, Path, Start
@@ -37,6 +37,10 @@ def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
     vehicle = braked(scene, own)
     if own.radius is not None:
         turn = steady_turn(vehicle, own.speed, own.radius)
+        if turn is not None and vehicle.sprung is not None:
+            from models.braking.sprung_turn import sprung_turn
+
+            turn = sprung_turn(vehicle, own.speed, own.radius, turn)
         if turn is None:
             allowed = f"tyres do not hold a steady circle of this radius at {own.speed:g} m/s on this surface"
             raise InputError(scene.file, f"procedures.{name}.radius", own.radius, allowed)
@@ -71,12 +75,22 @@ def step_steer(scene: BrakingScene, name: str) -> Response | None:
     return response(path.times, path.states[:, 1, 2], steering.half)
 
 
-def drive(scene: BrakingScene, name: str, engine: str = "reference") -> Path:
+def engines_of(scene: BrakingScene, asked: tuple[str, ...]) -> tuple[str, ...]:
+    """Engines that were asked for, of several those that have such a vehicle; where none were, the usual one."""
+    if scene.vehicle.file is None:
+        return asked or ("reference",)
+    return tuple(name for name in asked if name != "reference") if len(asked) > 1 else asked or (SPRUNG_ENGINE,)
+
+
+def drive(scene: BrakingScene, name: str, engine: str | None = None) -> Path:
     """One run of a procedure, whatever stands behind the port; InputError, Refused, or RunFailed with the path until
     then."""
+    (engine,) = engines_of(scene, (engine,) if engine else ())
     check_engine(scene, engine)
     vehicle, start = ready(scene, name)
-    if engine != "reference":
+    if vehicle.sprung is not None:
+        vehicle = replace(vehicle, engine=on_springs(engine, vehicle.sprung))
+    elif engine != "reference":
         from models.engines.braking import Carried
 
         vehicle = replace(vehicle, engine=Carried(engine, vehicle.plane))
@@ -87,6 +101,8 @@ def check_engine(scene: BrakingScene, engine: str) -> None:
     """Refuse an engine that would leave an effect of the scene out."""
     if scene.relaxation is not None and engine != "reference":
         raise Refused(engine, "the lag of tyres is not in its steps: use --engine reference", scene.file)
+    if scene.vehicle.file is not None and engine == "reference":
+        raise Refused(engine, "it has no suspension, roll and pitch: use --engine mujoco or exudyn", scene.file)
 
 
 def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start) -> Path:
@@ -94,12 +110,16 @@ def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start) -> Pat
     own = controller_of(scene, vehicle.plane.wheels, name)
     if scene.port is None:
         return vehicle.run(own, start, scene.run.duration)
-    known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}
-    text = json.dumps([name, known], sort_keys=True)  # a log is that of a vehicle and its drive, whatever answered
-    port = Run(vehicle.plane.radius, scene.run.sample, text, Folder(scene.folder), scene.file, name)
-    with opened(scene.port, port, own) as (controller, clock):
+    with opened(scene.port, port_of(scene, name, vehicle), own) as (controller, clock):
         path = vehicle.run(controller, start, scene.run.duration)
     return path if clock is None else replace(path, clock=clock.report())
+
+
+def port_of(scene: BrakingScene, name: str, vehicle: Braked) -> Run:
+    """What the port needs to know; a log is that of a vehicle and its drive, whatever answered."""
+    known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}
+    text = json.dumps([name, known], sort_keys=True)
+    return Run(vehicle.plane.radius, scene.run.sample, text, Folder(scene.folder), scene.file, name)
 
 
 def steered(vehicle: Braked, angle: float) -> np.ndarray:

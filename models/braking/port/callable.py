@@ -25,23 +25,23 @@ def named_controller(name: str, folder: Path, wheels: int, parameters: dict[str,
     try:
         made = make(wheels, **parameters)
     except Exception as error:
-        raise InputError(file, "callable", name, f"was not made: {type(error).__name__}: {error}") from error
+        raise InputError(file, "port.callable", name, f"was not made: {type(error).__name__}: {error}") from error
     if not callable(getattr(made, "sample", None)):
-        raise InputError(file, "callable", name, "makes something that has no method sample(given)")
+        raise InputError(file, "port.callable", name, "makes something that has no method sample(given)")
     return made
 
 
 def _find(name: str, folder: Path, file: str) -> Callable[..., Any]:
     place, _, attribute = name.rpartition(":")
     if not place or not attribute:
-        raise InputError(file, "callable", name, 'must be "module:Name" or "file.py:Name"')
+        raise InputError(file, "port.callable", name, 'must be "module:Name" or "file.py:Name"')
     try:
         module = _of_file(folder / place) if place.endswith(".py") else import_module(place)
     except Exception as error:
-        raise InputError(file, "callable", name, f"was not loaded: {type(error).__name__}: {error}") from error
+        raise InputError(file, "port.callable", name, f"was not loaded: {type(error).__name__}: {error}") from error
     choices = tuple(key for key in vars(module) if not key.startswith("_"))
     if attribute not in choices:
-        raise InputError(file, "callable", attribute, f"{place} has no such name", choices)
+        raise InputError(file, "port.callable", attribute, f"{place} has no such name", choices)
     return getattr(module, attribute)
 
 

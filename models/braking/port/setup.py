@@ -80,7 +80,7 @@ def opened(table: PortTable, run: Run, own: Controller) -> Iterator[tuple[Contro
 
     own : stands behind the port if the table names nothing else. Raises InputError, RunFailed.
     """
-    _check(table, run)
+    check_port(table, run)
     with ExitStack() as stack:
         inner = Asked(stack.enter_context(_behind(table, run, own)))
         clock = WallClock(inner, run.sample) if table.pace == "wall" else None
@@ -99,13 +99,18 @@ def _behind(table: PortTable, run: Run, own: Controller) -> Iterator[Controller]
     """What answers."""
     with ExitStack() as stack:
         if table.command is not None or table.port is not None:
-            link = socket_port.connected(table.command, table.port or 0, table.timeout, table.start, run.folder)
-            yield stack.enter_context(link)
+            with _told_of_scene(table, run):
+                link = socket_port.connected(table.command, table.port or 0, table.timeout, table.start, run.folder)
+                entered = stack.enter_context(link)
+            yield entered
         elif table.fmu is not None:
-            fmu = stack.enter_context(fmu_port.opened(run.path(table.fmu), run.radius.size, run.sample))
+            with _told_of_scene(table, run):
+                fmu = stack.enter_context(fmu_port.opened(run.path(table.fmu), run.radius.size, run.sample))
             yield Within(fmu, table.timeout)
         elif table.replay is not None:
-            yield Replay(run.path(table.replay), name_of(run.scene))
+            with _told_of_scene(table, run):
+                replay = Replay(run.path(table.replay), name_of(run.scene))
+            yield replay
         elif table.callable is not None:
             made = named_controller(table.callable, run.folder, run.radius.size, table.parameters, run.file)
             yield Within(made, table.timeout)
@@ -113,7 +118,23 @@ def _behind(table: PortTable, run: Run, own: Controller) -> Iterator[Controller]
             yield own
 
 
-def _check(table: PortTable, run: Run) -> None:
+@contextmanager
+def _told_of_scene(table: PortTable, run: Run) -> Iterator[None]:
+    """What is wrong with what a key names is told as that of the scene; what is wrong within a file, as the file's."""
+    try:
+        yield
+    except InputError as error:
+        if error.place not in BEHIND:
+            raise
+        raise InputError(run.file, f"port.{error.place}", getattr(table, error.place), error.allowed) from None
+
+
+def check_port(table: PortTable, run: Run) -> None:
+    """Refuse files that are not there and faults of wheels or teeth that are not."""
+    for key in ("fmu", "replay"):
+        name = getattr(table, key)
+        if name is not None and not run.path(name).is_file():
+            raise InputError(run.file, f"port.{key}", name, f"no such file, looked for as {str(run.path(name))!r}")
     wheels = run.radius.size
     for i, fault in enumerate(table.faults):
         for wheel in fault.of(wheels):
