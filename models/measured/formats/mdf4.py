@@ -8,7 +8,10 @@ whole channel is ever made.
 
 import logging
 import re
+import sys
+import traceback
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
@@ -21,6 +24,7 @@ from models.errors import InputError
 from models.measured.channel import Channel
 from models.measured.finding import Finding
 from models.measured.formats.left_out import LeftOut
+from models.measured.formats.mdf4_blocks import check_blocks
 from models.measured.formats.opened import Opened, Span, notice, readable, told_apart
 
 SECONDS = 1
@@ -56,13 +60,29 @@ class MdfFile(Opened):
 
 
 def opened(path: Path) -> Any:
-    """Return asammdf's file, without a word on the terminal; InputError where the package is missing."""
+    """Return asammdf's file, without a word on the terminal; InputError where it is damaged or the package missing."""
     try:
         from asammdf import MDF
     except ImportError:
         raise InputError(path, "", None, "MDF files need asammdf: pip install 'twinrig[measured]'") from None
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)
-    return MDF(path)
+    with _unheard():
+        try:
+            return MDF(path)
+        except Exception as error:
+            why = f"{type(error).__name__}: {error}".splitlines()[0]
+            traceback.clear_frames(error.__traceback__)
+    raise InputError(path, "", None, f"the file is damaged and cannot be read ({why})")
+
+
+@contextmanager
+def _unheard() -> Iterator[None]:
+    """Keep quiet what asammdf has to say when it takes down a file that it could not open."""
+    kept, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        yield
+    finally:
+        sys.unraisablehook = kept
 
 
 def _values(mdf: Any, group: int, index: int, part: Any) -> np.ndarray:
@@ -75,14 +95,25 @@ def _values(mdf: Any, group: int, index: int, part: Any) -> np.ndarray:
 def open_mdf(path: Path) -> MdfFile:
     """List the channels of a file; raises InputError where it is damaged."""
     with readable(path):
+        version = _version(path)
+        found = check_blocks(path) if version == 4 else []
         mdf = opened(path)
         try:
-            return _listed(path, mdf, int(mdf.version[0]))
+            return _listed(path, mdf, version, found)
         finally:
             mdf.close()
 
 
-def _listed(path: Path, mdf: Any, version: int) -> MdfFile:
+def _version(path: Path) -> int:
+    """Version of MDF, from the first 64 bytes of the file."""
+    with path.open("rb") as file:
+        found = re.match(rb"(?:MDF|UnFinMF) +([34])\.\d\d", file.read(64))
+    if found is None:
+        raise InputError(path, "byte 8", None, "MDF of version 3 or 4 can be read")
+    return int(found[1])
+
+
+def _listed(path: Path, mdf: Any, version: int, found: list[Finding]) -> MdfFile:
     """Channels that hold numbers over time."""
     left, places, channels = LeftOut(), [], []
     for g, group in enumerate(mdf.groups):
@@ -98,7 +129,7 @@ def _listed(path: Path, mdf: Any, version: int) -> MdfFile:
                 channels.append(channel)
             else:
                 left.add("no numbers", repr(channel.name))
-    found = left.findings(path)
+    found = found + left.findings(path)
     if not places:
         raise InputError(path, "channels", None, "; ".join(["no channel of numbers over time is in the file",
                                                              *(one.text for one in found)]))  # fmt: skip

@@ -54,7 +54,9 @@ class RpcFile(Opened):
                 low, high = first // own.points, -(-(first + count) // own.points)
                 file.seek(own.begin + low * size)
                 data = np.frombuffer(file.read((high - low) * size), own.dtype).reshape(-1, own.width, own.points)
-                values = data[:, chosen].transpose(0, 2, 1).reshape(-1, len(chosen)).astype(float) * own.scales[chosen]
+                samples = data[:, chosen].transpose(0, 2, 1).reshape(-1, len(chosen))
+                with np.errstate(invalid="ignore"):  # a NaN that signals is a NaN all the same
+                    values = samples.astype(float) * own.scales[chosen]
                 skipped = first - low * own.points
                 yield own.period * np.arange(first, first + count), values[skipped : skipped + count]
 

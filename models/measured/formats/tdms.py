@@ -62,9 +62,10 @@ def opened(path: Path, file: BinaryIO) -> Any:
     """Return npTDMS's file, without a word on the terminal; InputError where the package is missing."""
     try:
         from nptdms import TdmsFile
+        from nptdms.log import log_manager
     except ImportError:
         raise InputError(path, "", None, "TDMS files need npTDMS: pip install 'twinrig[measured]'") from None
-    logging.getLogger("nptdms").setLevel(logging.CRITICAL)
+    log_manager.set_level(logging.CRITICAL)
     return TdmsFile.open(file, raw_timestamps=True)
 
 
@@ -78,9 +79,9 @@ def _times(data: Any, place: Place, first: int, count: int) -> np.ndarray:
 def open_tdms(path: Path) -> TdmsData:
     """List the channels of a file; raises InputError where it is damaged."""
     with readable(path):
-        found = check_segments(path)
+        cut = check_segments(path)
         with path.open("rb") as file:
-            return _listed(path, opened(path, file), found)
+            return _listed(path, opened(path, file), cut)
 
 
 def check_segments(path: Path) -> list[Finding]:
@@ -111,7 +112,7 @@ def _cut(path: Path, place: int) -> Finding:
                   "is read")  # fmt: skip
 
 
-def _listed(path: Path, data: Any, found: list[Finding]) -> TdmsData:
+def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     """Channels that hold numbers over time, those of one clock in one group."""
     left = LeftOut()
     usable = [(group, channel) for group in data.groups() for channel in group.channels() if _numeric(channel, left)]
@@ -121,14 +122,18 @@ def _listed(path: Path, data: Any, found: list[Finding]) -> TdmsData:
     zero = min(started, default=None)
     own = [(channel, place) for group, channel in usable
            if (place := _place(group, channel, zero, left)) is not None]  # fmt: skip
-    found = [*found, *left.findings(path)]
+    found = [*cut, *left.findings(path)]
     if not own:
         raise InputError(path, "channels", None, "; ".join(["no channel of numbers over time is in the file",
                                                              *(one.text for one in found)]))  # fmt: skip
-    keys = [(place.group, place.clock, place.first, place.increment, len(channel)) for channel, place in own]
+    clocks = [(place.group, place.clock, place.first, place.increment) for _, place in own]
+    counts = [len(channel) for channel, _ in own]
+    if cut:
+        counts = [min(n for n, one in zip(counts, clocks, strict=True) if one == clock) for clock in clocks]
+    keys = list(zip(clocks, counts, strict=True))
     names, repeated = told_apart(path, [place.name for _, place in own])
     channels = tuple(
-        Channel(name, _text(channel, *UNITS), _text(channel, "description"), keys.index(key), len(channel),
+        Channel(name, _text(channel, *UNITS), _text(channel, "description"), keys.index(key), key[1],
                 None if place.clock else place.increment, _resolution(channel))
         for name, key, (channel, place) in zip(names, keys, own, strict=True)
     )  # fmt: skip

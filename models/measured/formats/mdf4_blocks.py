@@ -1,0 +1,133 @@
+"""Follows every link of an MDF 4 file before a library does: blocks are whole, chains end, records have their bytes.
+
+A library that follows damaged links may loop, ask for memory that no machine has, or return what is not there. Block
+layouts: ASAM MDF 4.1.
+"""
+
+import mmap
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from models.errors import InputError
+from models.measured.finding import Finding
+from models.measured.formats.opened import notice
+
+HEAD, FIRST = 24, 64
+"""Bytes of a block's head; where the first block, HD, begins."""
+CHAINED = (b"##DG", b"##CG", b"##CN", b"##DL", b"##LD", b"##EV", b"##AT", b"##CH", b"##FH", b"##SR", b"##CC", b"##HL")
+"""Blocks whose first link leads on to the next of their kind, or into their list."""
+PACKING = 1100
+"""Times that packed data may grow: beyond what deflate can do."""
+VLSD = 1
+"""Flag of a channel group whose records have lengths of their own."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Kind, links and the bytes after the links (the first hundred)."""
+
+    kind: bytes
+    length: int
+    links: tuple[int, ...]
+    data: bytes
+
+
+def check_blocks(path: Path) -> list[Finding]:
+    """Raise InputError at the byte where an MDF 4 file cannot be what it says; more records than announced are said."""
+    size = path.stat().st_size
+    if size < FIRST + HEAD:
+        raise InputError(path, f"byte {size}", None, "the file ends in its header")
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        if data[:8] == b"UnFinMF " or struct.unpack_from("<H", data, 60)[0]:
+            raise InputError(path, "byte 0", data[:8].decode("latin-1").strip(), "the recorder did not finish this "
+                             "file: let its software finalise it, or asammdf save it anew")
+        blocks = dict(_walk(path, data, size))
+        if blocks[FIRST].kind != b"##HD":
+            raise InputError(path, f"byte {FIRST}", None, "the header block ##HD is needed")
+    _chains(path, blocks)
+    groups = [(place, block) for place, block in blocks.items() if block.kind == b"##DG"]
+    return [found for place, block in groups for found in _records(path, place, block, blocks)]
+
+
+def _walk(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int, Block]]:
+    """Every block that a link leads to, with its place."""
+    seen, ahead = {FIRST}, [FIRST]
+    while ahead:
+        place = ahead.pop()
+        if not FIRST <= place <= size - HEAD or data[place : place + 2] != b"##":
+            raise InputError(path, f"byte {place}", None, f"a block must begin here; the file has {size} bytes: it is "
+                             "cut off or damaged")
+        length, count = struct.unpack_from("<QQ", data, place + 8)
+        if place + length > size or HEAD + 8 * count > length:
+            raise InputError(path, f"byte {place}", None, f"a block of {length} bytes with {count} links begins here; "
+                             f"the file has {size} bytes: it is cut off or damaged")
+        links = struct.unpack_from(f"<{count}Q", data, place + HEAD)
+        rest = place + HEAD + 8 * count
+        yield place, Block(data[place : place + 4], length, links, data[rest : min(rest + 100, place + length)])
+        new = {link for link in links if link} - seen
+        seen |= new
+        ahead += sorted(new)
+
+
+def _chains(path: Path, blocks: dict[int, Block]) -> None:
+    """Refuse a chain that leads back into itself."""
+    ended: set[int] = set()
+    for place in blocks:
+        chain: dict[int, None] = {}
+        while place and place not in ended and blocks[place].kind in CHAINED and blocks[place].links:
+            if place in chain:
+                raise InputError(path, f"byte {place}", None, "a chain of blocks leads back to this one")
+            chain[place] = None
+            place = blocks[place].links[0]
+        ended |= set(chain)
+
+
+def _records(path: Path, place: int, group: Block, blocks: dict[int, Block]) -> list[Finding]:
+    """Refuse channel groups that announce more records than their data group has bytes for; say where it has more."""
+    there = sum(_length(path, at, blocks) for at in _data(path, group.links[2], blocks))
+    id_size = group.data[0]
+    needed, loose, at = 0, False, group.links[1]
+    while at:
+        one = blocks[at]
+        _, cycles, flags = struct.unpack_from("<QQH", one.data)
+        own = sum(struct.unpack_from("<II", one.data, 24))
+        loose |= bool(flags & VLSD)
+        needed += 0 if flags & VLSD else cycles * (own + id_size)
+        at = one.links[0]
+    if needed > there:
+        raise InputError(path, f"byte {place}", None, f"the records of this data group need {needed} bytes, {there} are "
+                         "there")  # fmt: skip
+    if needed < there and not loose:
+        return [notice(path, "doubt", f"the data group at byte {place} has {there} bytes of records; {needed} are "
+                       "announced and read")]  # fmt: skip
+    return []
+
+
+def _data(path: Path, place: int, blocks: dict[int, Block]) -> list[int]:
+    """Places of the data blocks behind a link to them or to a list of them."""
+    found: list[int] = []
+    ahead = [place]
+    while ahead:
+        at = ahead.pop()
+        if not at:
+            continue
+        if len(found) > len(blocks):
+            raise InputError(path, f"byte {place}", None, "a list of data blocks names more of them than there are")
+        if blocks[at].kind in (b"##DL", b"##HL", b"##LD"):
+            ahead += blocks[at].links
+        else:
+            found.append(at)
+    return found
+
+
+def _length(path: Path, place: int, blocks: dict[int, Block]) -> int:
+    """Bytes of records in a data block, unpacked."""
+    block = blocks[place]
+    if block.kind != b"##DZ":
+        return block.length - HEAD - 8 * len(block.links)
+    plain, packed = struct.unpack_from("<QQ", block.data, 8)
+    if plain > PACKING * packed + HEAD:
+        raise InputError(path, f"byte {place}", plain, f"{packed} packed bytes cannot hold as many")
+    return int(plain)
