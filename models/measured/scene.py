@@ -76,7 +76,7 @@ class Stabilise(Strict):
 
     method: Literal["kalman", "prescribed", "none"] = Field(default="kalman", description="what holds roll and pitch")
     bandwidth: float = quantity("Hz", "of the moment towards the filter's estimate", default=0.7)
-    model: float = quantity("rad/s^2", "deviation of what springs add to the rigid vehicle, to the filter", default=1.0)
+    model: float = quantity("rad/s^2", "deviation of what springs add to a rigid vehicle, to the filter", default=10.0)
     smoothing: float = quantity("Hz", "low-pass of angles before they are enforced", default=5.0)
 
 
