@@ -97,8 +97,8 @@ def _records(path: Path, place: int, group: Block, blocks: dict[int, Block]) -> 
         needed += 0 if flags & VLSD else cycles * (own + id_size)
         at = one.links[0]
     if needed > there:
-        raise InputError(path, f"byte {place}", None, f"the records of this data group need {needed} bytes, {there} are "
-                         "there")  # fmt: skip
+        allowed = f"the records of this data group need {needed} bytes, and {there} are there"
+        raise InputError(path, f"byte {place}", None, allowed)
     if needed < there and not loose:
         return [notice(path, "doubt", f"the data group at byte {place} has {there} bytes of records; {needed} are "
                        "announced and read")]  # fmt: skip
