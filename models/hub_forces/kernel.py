@@ -41,9 +41,8 @@ WRENCH, GUIDING = 6, 6
 
 
 @njit(cache=True, error_model="numpy")
-def _element(e, joints, m, chassis, v, row):
-    """Force of an element; ``row`` (n,) becomes its travel by the joints behind the chassis."""
-    axis, end, by = np.empty(3), np.empty(3), np.empty(3)
+def _element(e, joints, m, chassis, v, row, axis, end, by):
+    """Force of an element; ``row`` (n,) becomes its travel by the joints behind the chassis. Room: three vectors."""
     turned(m[chassis + 1], e, AXIS, axis, 0)
     row[:] = 0.0
     travel, rate = -e[DESIGN], 0.0
@@ -138,10 +137,10 @@ def forces(numbers, t, q, v, m, out, inside, wrenches, moments):
     head, joints, bodies, elements, hubs, inputs = parts(numbers)
     row = inputs[min(max(int(np.rint(t * head[PER_TIME])), 0), len(inputs) - 1)]
     chassis, count = int(head[CHASSIS]), len(hubs)
-    place, wrench, travel = np.empty(3), np.empty(6), np.empty(len(joints))
+    place, wrench, travel, axis, by = np.empty(3), np.empty(6), np.empty(len(joints)), np.empty(3), np.empty(3)
     move(joints, q, v, m)
     for i in range(len(elements)):
-        inside[i] = _element(elements[i], joints, m, chassis, v, travel)
+        inside[i] = _element(elements[i], joints, m, chassis, v, travel, axis, place, by)
         for j in range(chassis + 1, len(joints)):
             out[j] -= inside[i] * travel[j]
     for i in range(count):

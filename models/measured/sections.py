@@ -24,8 +24,9 @@ AXES: tuple[tuple[str, Quantity, str, str], ...] = (
 )  # fmt: skip
 MOTION: tuple[tuple[str, Quantity | None, str, str], ...] = (
     ("x", None, "", "m"), ("y", None, "", "m"), ("z", None, "", "m"), ("heading", "angle", "yaw", "rad"),
-    ("pitch", "angle", "pitch", "rad"), ("roll", "angle", "roll", "rad"), ("roll rate", "angular rate", "roll", "rad/s"),
-    ("pitch rate", "angular rate", "pitch", "rad/s"), ("yaw rate", "angular rate", "yaw", "rad/s"),
+    ("pitch", "angle", "pitch", "rad"), ("roll", "angle", "roll", "rad"),
+    ("roll rate", "angular rate", "roll", "rad/s"), ("pitch rate", "angular rate", "pitch", "rad/s"),
+    ("yaw rate", "angular rate", "yaw", "rad/s"),
 )  # fmt: skip
 """Of the chassis: position and angles in the space, rates about its own axes."""
 
@@ -82,12 +83,13 @@ class Sections:
             known = names(self.vehicle)
             for name in (name for name in self.wanted if name not in known):
                 raise InputError("", "hand_on.sections", name, "the vehicle has no such section", known)
-        kept = [i for i, (answer, free) in enumerate(every)
-                if not free and (self.wanted is None or not answer.section or answer.section in self.wanted)]  # fmt: skip
+        asked = [self.wanted is None or answer.section in ("", *self.wanted) for answer, _ in every]
+        kept = [i for i, (_, free) in enumerate(every) if asked[i] and not free]
         joined = joints(self.vehicle)
         object.__setattr__(self, "answers", tuple(every[i][0] for i in kept))
         object.__setattr__(self, "columns", np.array(kept))
-        object.__setattr__(self, "_guides", (*_guides(self.vehicle, joined), _points(self.points, joined, self.vehicle)))
+        own = (*_guides(self.vehicle, joined), _points(self.points, joined))
+        object.__setattr__(self, "_guides", own)
 
     def read(self, numbers: np.ndarray, states: np.ndarray, every: int) -> np.ndarray:
         """Answers (n, answers) of states (n, 2 c), ``every`` half steps apart; ``numbers`` as in ``HubModel``."""
@@ -135,8 +137,9 @@ def _answers(vehicle: CutVehicle, frame: str, points: tuple[Point, ...]) -> list
         axes = "chassis" if frame == "body" else tyre.body
         found += [Answer(f"{hub} hub {axis}", unit, f"on the hub from outside, axes of {axes}", f"{hub} hub", what, hub,
                          component) for axis, what, component, unit in AXES]  # fmt: skip
-    found += [Answer(f"{point.name} a{axis}", "m/s^2", f"{'with' if point.gravity else 'without'} gravity, axes of "
-                     f"{point.body}", "", "acceleration", point.name, axis) for point in points for axis in "xyz"]  # fmt: skip
+    for p in points:
+        text = f"{'with' if p.gravity else 'without'} gravity, axes of {p.body}"
+        found += [Answer(f"{p.name} a{axis}", "m/s^2", text, "", "acceleration", p.name, axis) for axis in "xyz"]
     return list(zip(found, free + (len(found) - len(free)) * [False], strict=True))
 
 
@@ -168,6 +171,6 @@ def _line(name: str, parents: dict[str, str | None]) -> list[str]:
     return found
 
 
-def _points(points: tuple[Point, ...], joined: Joints, vehicle: CutVehicle) -> np.ndarray:
+def _points(points: tuple[Point, ...], joined: Joints) -> np.ndarray:
     rows = [[joined.last[p.body], *np.subtract(p.place, joined.origin[p.body]), float(p.gravity)] for p in points]
     return np.array(rows, float).reshape(len(points), 5)
