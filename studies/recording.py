@@ -1,0 +1,207 @@
+"""From an engineer's measurement files to section forces: read, checked, predicted, run, judged, handed on, a page."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.errors import RunFailed
+from models.hub_forces.cut_vehicle import CutVehicle
+from models.measured import plan
+from models.measured.checks import check as findings_of
+from models.measured.checks.noise import noise
+from models.measured.checks.place import Place
+from models.measured.clock import record
+from models.measured.finding import Finding
+from models.measured.pattern import write_pattern
+from models.measured.recording import Recording
+from models.measured.scene import MeasuredScene
+from models.measured.section_run import Hold, Outcome, SectionRun
+from models.measured.section_run import run as march
+from models.measured.sections import Point, Sections
+from models.measured.signal import Quantity
+from models.measured.virtual import VirtualMeasurement, virtual_measurement
+from models.strict import Strict, read
+from models.systems import load
+
+SYSTEM = "measured"
+BLOCKS = "work"
+"""Folder of what a killed run goes on with: samples on one clock, and runs with their checkpoints."""
+FREE = "free"
+NOISE: dict[str, Quantity] = {"force": "force", "moment": "moment", "angle": "angle", "rate": "angular rate"}
+"""Keys of the scene's table ``noise``, and the quantities that they are of."""
+Progress = Callable[[str, float], None]
+
+
+class Options(Strict):
+    """[options] of this study: none."""
+
+
+@dataclass
+class Found:
+    """What there is of a recording, in the order in which it was found; what was not reached is empty."""
+
+    scene: MeasuredScene
+    vehicle: CutVehicle
+    engine: str
+    recording: Recording
+    virtual: VirtualMeasurement | None = None
+    findings: tuple[Finding, ...] = ()
+    runs: dict[str, Outcome] = field(default_factory=dict)
+    failed: dict[str, str] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether an error in the recording forbids a run."""
+        return any(finding.weight == "error" for finding in self.findings)
+
+    @property
+    def held(self) -> Outcome | None:
+        """The run that is handed on: with the stabiliser, or free where the scene names none."""
+        return self.runs.get(self.scene.stabilise.method, self.runs.get(FREE))
+
+
+def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
+    """Refuse options: there are none."""
+    read(Options, scene.options, scene.file, "options")
+
+
+def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Do all of it; the page is written even where errors in the recording stop the run."""
+    from studies.recording_page import write
+
+    found = compute(scene, engines[-1], folder, progress)
+    page = write(found, folder / "recording.html")
+    return {"scene": found.scene.title, "folder": str(folder), "failed": _failed(found), "page": str(page),
+            "table": [*_told(found), f"  the page: {page}"]}  # fmt: skip
+
+
+def compute(scene: MeasuredScene, engine: str, folder: Path, progress: Progress = lambda text, part: None) -> Found:
+    """All but the page; raises InputError for files that cannot be read."""
+    work, vehicle = folder / BLOCKS, scene.cut_vehicle()
+    work.mkdir(parents=True, exist_ok=True)
+    watch = _Watch()
+    virtual = None
+    if scene.virtual is not None:
+        progress("virtual measurement", 0.0)
+        virtual = virtual_measurement(vehicle, scene.virtual, engine, scene.file)
+        scene = _written(scene, virtual, folder)
+        watch.lap("virtual measurement")
+    recording = _read(scene, vehicle, work, progress)
+    watch.lap("reading")
+    found = Found(scene, vehicle, engine, recording, virtual, seconds=watch.seconds)
+    progress("checks", 0.2)
+    found.findings = findings_of(recording, vehicle, _places(scene), _claimed(scene, recording))
+    watch.lap("checks")
+    if not found.stopped:
+        _run(found, work, progress)
+        watch.lap("runs")
+    return found
+
+
+def _written(scene: MeasuredScene, virtual: VirtualMeasurement, folder: Path) -> MeasuredScene:
+    """The scene that reads the virtual measurement's file, which is written unless a killed run has done so."""
+    assert scene.virtual is not None
+    path = folder / "scene.toml"
+    if not path.is_file():
+        write_pattern(scene, virtual, virtual.samples(scene.virtual.faults, scene.virtual.seed), folder)
+    return load(path)
+
+
+def _read(scene: MeasuredScene, vehicle: CutVehicle, work: Path, progress: Progress) -> Recording:
+    sources = plan.opened(scene)
+    signals = plan.mapped(scene, sources, vehicle)
+    return record(scene, sources, signals, vehicle.hubs, work, lambda text, part: progress(text, 0.2 * part))
+
+
+def _places(scene: MeasuredScene) -> dict[str, Place]:
+    """Where sensors sit."""
+    return {name: Place(s.body, (s.position[0], s.position[1], s.position[2])) for name, s in scene.sensors.items()}
+
+
+def _claimed(scene: MeasuredScene, recording: Recording) -> dict[str, float]:
+    """Noise that the scene states, by signal."""
+    stated = {quantity: getattr(scene.noise, key) for key, quantity in NOISE.items()}
+    return {s.name: stated[s.quantity] for s in recording.signals if stated.get(s.quantity) is not None}
+
+
+def _noise(found: Found) -> dict[str, float]:
+    """Noise as the scene states it; or else estimated, and not below what transducers have: filters hide noise."""
+    stated, usual = found.scene.noise, Hold()
+    out = dict[str, float]()
+    for key, quantity in NOISE.items():
+        sizes = [noise(found.recording, s) for s in found.recording.find(quantity) if not s.check]
+        least = float(getattr(usual, key))
+        out[key] = getattr(stated, key) or float(np.nanmax([least, np.nanmedian(sizes)] if sizes else [least]))
+    return out
+
+
+def _run(found: Found, work: Path, progress: Progress) -> None:
+    """Free, and with the stabiliser that the scene names; a run that fails keeps what it has."""
+    scene, own = found.scene, found.scene.stabilise
+    sections = Sections(found.vehicle, points=tuple(Point(name, *place) for name, place in _places(scene).items()))
+    hold = Hold(own.method, own.bandwidth, own.model, own.smoothing, **_noise(found))
+    holds = {FREE: Hold("none")} | ({own.method: hold} if own.method != "none" else {})
+    for i, (name, hold) in enumerate(holds.items()):
+        job = SectionRun(found.vehicle, found.recording, sections, found.engine, hold, scene.run.step, scene.file)
+        told = _left(f"{name} run", progress, 0.2 + 0.7 * i / len(holds), 0.7 / len(holds))
+        try:
+            found.runs[name] = march(job, work / name, told)
+        except RunFailed as error:
+            found.failed[name] = str(error)
+            if isinstance(error.partial, Outcome):
+                found.runs[name] = error.partial
+
+
+def _left(name: str, progress: Progress, begin: float, share: float) -> Callable[[float, float], None]:
+    """Progress of a run with the time that it will still take."""
+    started, first = time.monotonic(), [-1.0]
+
+    def told(done: float, whole: float) -> None:
+        first[0] = done if first[0] < 0 else first[0]
+        spent = time.monotonic() - started
+        left = f", {spent * (whole - done) / (done - first[0]):.0f} s left" if done > first[0] else ""
+        progress(f"{name}: {done:.0f} of {whole:.0f} s{left}", begin + share * done / max(whole, 1e-9))
+
+    return told
+
+
+class _Watch:
+    """Seconds of each part."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, name: str) -> None:
+        now = time.perf_counter()
+        self.seconds[name], self._last = now - self._last, now
+
+
+def _failed(found: Found) -> dict[str, str]:
+    """What makes the command end with 1: errors in the recording, or a failed run of what was to be handed on."""
+    if found.stopped:
+        count = sum(finding.weight == "error" for finding in found.findings)
+        return {"checks": f"{count} error(s) in the recording: nothing was run"}
+    return {name: text for name, text in found.failed.items() if name == found.scene.stabilise.method}
+
+
+def _told(found: Found) -> list[str]:
+    """Lines for the terminal: findings that matter, and how the runs ended."""
+    lines = [f"  {finding.weight}: {finding.text}" for finding in found.findings if finding.weight != "note"]
+    notes = sum(finding.weight == "note" for finding in found.findings)
+    lines.append(f"  {notes} things were looked at and found good: see the page")
+    for name, outcome in found.runs.items():
+        end = found.failed.get(name, "to the end")
+        lines.append(f"  {name} run: {outcome.done * outcome.period:.6g} s, {end}")
+    return lines
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("recording")
