@@ -1,8 +1,7 @@
 """Pseudo-damage of a load signal: rainflow cycles, each counted with a power of its range.
 
-Convention: ASTM E1049-85, section 5.4.4 (library ``rainflow``): what is left open at the end, the residue,
-counts as half cycles. Other conventions differ by a third on a drifting signal, so figures are comparable only
-under the same one. The Woehler exponent ``slope`` is 5 unless another is named.
+Convention: ASTM E1049-85, section 5.4.4: what is left open at the end, the residue, counts as half cycles. Other
+conventions differ by a third on a drifting signal, so figures are comparable only under the same one. The Woehler exponent ``slope`` is 5 unless another is named.
 """
 
 import numpy as np
@@ -27,20 +26,25 @@ def turning_points(load: np.ndarray) -> np.ndarray:
     return load[np.concatenate(([0], turns, [len(load) - 1]))]
 
 
+def checked(load: np.ndarray) -> np.ndarray:
+    """The load (n,) as doubles; InputError for one without a sample, or with one that is not finite."""
+    load = np.asarray(load, dtype=float)
+    if not len(load) or not np.isfinite(load).all():
+        found = f"{np.count_nonzero(~np.isfinite(load))} of {len(load)} samples are not finite"
+        raise InputError("", "load", None, f"{found}: damage needs at least one sample, and all of them finite")
+    return load
+
+
 def pseudo_damage(load: np.ndarray, slope: float = SLOPE) -> float:
     """Sum of count times range^slope over the rainflow cycles of ``load`` (n,); unit: that of the load, to ``slope``.
 
     A load that never turns has none. Raises InputError for a load without a sample, or with one that is not
     finite: damage of a broken run is not a number to compare.
     """
-    from rainflow import extract_cycles
+    from models.rainflow_cycles import cycles
 
-    if not len(load) or not np.isfinite(load).all():
-        found = f"{np.count_nonzero(~np.isfinite(load))} of {len(load)} samples are not finite"
-        raise InputError("", "load", None, f"{found}: damage needs at least one sample, and all of them finite")
-    turns = turning_points(load).tolist()
-    turns.append(turns[-1])  # changes no count, but the library drops the half cycle of two points alone
-    return float(sum(count * span**slope for span, _, count, _, _ in extract_cycles(turns)))
+    spans, _, counts = cycles(turning_points(checked(load)))
+    return float(np.sum(counts * spans**slope))
 
 
 def damage_ratio(load: np.ndarray, truth: np.ndarray, slope: float = SLOPE) -> float:
