@@ -10,6 +10,7 @@ from pydantic import Field
 
 from models.braking.adhesion import NoAdhesion, split, utilisation
 from models.braking.figures_of_merit import NOT_CHECKED
+from models.braking.hitch import of_hitch
 from models.braking.measured_pressures import MeasuredPressures, write_pressures
 from models.braking.of_scene import measured_of, plane_of
 from models.braking.plan import behind
@@ -66,8 +67,10 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
             remarks = [f"    {error}"]
         except RunFailed as error:
             failed[f"{name}, figures of merit"] = str(error)
+        train = of_hitch(stop) if scene.trailer is not None else {}
+        remarks += [f"    {key:<40}{value:>10.2f}" for key, value in train.items()]
         wheels = stop.of_wheels() | beside(measured, stop, rims)
-        answer[name] = {**stop.of_vehicle(), **{key: value.tolist() for key, value in wheels.items()}, **told}
+        answer[name] = {**stop.of_vehicle(), **{key: value.tolist() for key, value in wheels.items()}, **told, **train}
         table += lines(name, stop, told, wheels) + remarks + ended(measured, stop) + compared(paths, seconds)
     return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": table}
 
@@ -112,8 +115,9 @@ def engineers(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
         both = split(scene, name)
         return {"z_MALS": both.z, "z_MALS asked for": both.asked, "k low": both.k_low, "k high": both.k_high}
     used = utilisation(scene, surface)
-    return {"z_AL": used.z, "k front": used.k.front, "k rear": used.k.rear, "k of the vehicle": used.k_vehicle,
-            "adhesion utilisation epsilon": used.epsilon}  # fmt: skip
+    return {"z_AL": used.z, "k front": used.k.front, "k rear": used.k.rear, "k of all": used.k_vehicle,
+            "adhesion utilisation epsilon": used.epsilon,
+            **({} if used.k.trailer is None else {"k trailer": used.k.trailer})}  # fmt: skip
 
 
 def compared(paths: dict[str, Path], seconds: dict[str, float]) -> list[str]:

@@ -23,6 +23,9 @@ from models.errors import InputError
 from models.scene_file import parse
 from models.strict import read
 
+SPRUNG_ENGINE = "mujoco"
+"""Marches a vehicle on its suspension where no engine is asked for."""
+
 
 def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
     """The scene's vehicle with its brakes on the road of a procedure; InputError for what does not fit together."""
@@ -34,13 +37,15 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
     names = surfaces_of(scene, procedure)
     tyres = [table_of(scene, name, rear) for name in names for rear in kinds_of(scene)]
     front, rear, behind = (brake_of(scene, axle) for axle in ("front", "rear", "trailer"))
+    own = None if scene.vehicle.file is None else sprung_of(scene)
     return Braked(
         plane=plane, kind=np.where(np.arange(plane.wheels) < 2, 0, len(kinds_of(scene)) - 1), tables=stacked(tyres),
         slope=max(table.cornering for table in tyres), road=road_of(scene, procedure, names),
         brakes=of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
         chambers=chambers_of(scene, plane.wheels),
         steer=np.zeros(plane.wheels), substeps=scene.run.substeps, sample=scene.run.sample,
-        speed_given=scene.controller.true_speed, relaxation=lags_of(scene, plane.wheels),
+        speed_given=scene.controller.true_speed, relaxation=lags_of(scene, plane.wheels), sprung=own,
+        engine=None if own is None else on_springs(SPRUNG_ENGINE, own),
     )  # fmt: skip
 
 
@@ -53,8 +58,27 @@ def plane_of(scene: BrakingScene) -> Plane:
         raise InputError(scene.file, f"vehicle or trailer: {error.place}", error.value, error.allowed) from None
 
 
+def sprung_of(scene: BrakingScene) -> Any:
+    """The scene's vehicle on its suspension, a ``models.braking.sprung.Sprung``; InputError."""
+    from models.braking.sprung import sprung
+    from models.vehicles.vehicle_file import load_vehicle
+
+    own = scene.vehicle
+    return sprung(load_vehicle(str(own.file), scene.folder, scene.file, "vehicle.file"), float(own.spin_inertia or 0.0))
+
+
+def on_springs(engine: str, own: Any) -> Any:
+    """A vehicle on its suspension in an engine."""
+    from models.engines.braking_sprung import OnSprings
+
+    return OnSprings(engine, own)
+
+
 def vehicle_of(scene: BrakingScene) -> Truck:
-    """Parameters of the scene's vehicle with what the scene overrides."""
+    """Parameters of the scene's vehicle with what the scene overrides; of one on its suspension, those in the plane."""
+    if scene.vehicle.file is not None:
+        plane: Truck = sprung_of(scene).plane
+        return plane
     name, file = scene.vehicle.parameters, scene.file
     if name.endswith(".toml"):
         path = scene.path(name, "vehicle.parameters")

@@ -26,7 +26,8 @@ class Path:
 
     times (n,) : s; states (n, 2, 2 + U) : positions and rates; turning, pressures, torques (n, W) : rad/s, bar, N m;
     reports (n - 1, W, 7) : of the last step of every sample, see ``plane_step``; stands : whether it ended at rest;
-    clock : what the clock on the wall told of overruns, if the run kept to it.
+    coordinates : names of those of the states, the first three always x, y (m) and heading (rad); clock : what the
+    clock on the wall told of overruns, if the run kept to it.
     """
 
     times: np.ndarray
@@ -36,6 +37,7 @@ class Path:
     torques: np.ndarray
     reports: np.ndarray
     stands: bool
+    coordinates: tuple[str, ...] = ()
     clock: str = ""
 
 
@@ -52,6 +54,7 @@ class Braked:
 
     kind (W,) : which tyre each wheel has; steer (W,) : rad, or in its place steering : such angles by time (s), those
     in the middle of each sample; engine : ``models.engines.braking.Carried`` if an engine is to carry the chassis.
+    sprung : ``models.braking.sprung.Sprung`` of a vehicle on its suspension, which its engine then marches.
     """
 
     plane: Plane
@@ -68,11 +71,19 @@ class Braked:
     switch: float = 0.0
     engine: Any = None
     relaxation: np.ndarray | None = None
+    sprung: Any = None
     steering: Callable[[float], np.ndarray] | None = None
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates of a state."""
+        if self.sprung is not None:
+            return tuple(self.sprung.names)
+        return ("x", "y", *(f"heading_{k}" for k in range(self.plane.masses.size)))
 
     def rolling(self, speed: float) -> Start:
         """Steady rolling along x at a speed (m/s)."""
-        state = np.zeros((2, 2 + self.plane.masses.size))
+        state = np.zeros((2, len(self.coordinates)))
         state[1, 0] = speed
         return Start(state, speed / self.plane.radius)
 
@@ -95,7 +106,7 @@ class Braked:
         check_way(self.road, step * float(np.hypot(*state[1, :2])))
         go = advance if self.relaxation is None else _lagging(self.relaxation, state)
         go = go if self.engine is None else self.engine.advance
-        with _kept(rows, reports):
+        with _kept(rows, reports, self.coordinates):
             while status != AT_REST and time < duration - 1e-9:
                 braked = time >= self.switch - 1e-9
                 known = math.hypot(state[1, 0], state[1, 1]) if self.speed_given else math.nan
@@ -115,7 +126,7 @@ class Braked:
                     raise RunFailed("braking", "a wheel lifts off" if status == LIFTED else "no loads were found", time)
                 rows.append((time, state.copy(), turning.copy(), air.pressure.copy(), air.torque.copy()))
                 reports.append(report.copy())
-        return _path(rows, reports, status == AT_REST)
+        return _path(rows, reports, status == AT_REST, self.coordinates)
 
 
 def _lagging(lengths: np.ndarray, state: np.ndarray) -> Callable[..., Any]:
@@ -128,16 +139,16 @@ def _lagging(lengths: np.ndarray, state: np.ndarray) -> Callable[..., Any]:
 
 
 @contextmanager
-def _kept(rows: list[Any], reports: list[Any]) -> Iterator[None]:
+def _kept(rows: list[Any], reports: list[Any], names: tuple[str, ...]) -> Iterator[None]:
     """Gives a failed run the path until then."""
     try:
         yield
     except RunFailed as error:
-        error.partial = _path(rows, reports, False)
+        error.partial = _path(rows, reports, False, names)
         raise
 
 
-def _path(rows: list[Any], reports: list[Any], stands: bool) -> Path:
+def _path(rows: list[Any], reports: list[Any], stands: bool, names: tuple[str, ...]) -> Path:
     times, states, turning, pressures, torques = (np.array(column) for column in zip(*rows, strict=True))
     return Path(times, states, turning, pressures, torques,
-                np.array(reports).reshape(-1, turning.shape[1], REPORTED), stands)  # fmt: skip
+                np.array(reports).reshape(-1, turning.shape[1], REPORTED), stands, names)  # fmt: skip

@@ -27,6 +27,9 @@ class VehicleTable(Strict):
 
     parameters: str = Field(default="paper", description="paper, or a TOML file with every parameter")
     override: dict[str, Any] = Field(default_factory=dict, description="parameters that are changed")
+    file: str | None = Field(default=None, description="in their place a vehicle on its suspension: one that comes "
+                             "with twinrig, as r19_free, or a TOML file of your own")  # fmt: skip
+    spin_inertia: float | None = quantity("kg m^2", "of a wheel about its axle, which that file lacks", default=None)
 
 
 class LoadTransfer(Strict):
@@ -153,6 +156,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Br
     scene = checked(BrakingScene, table, file, folder)
     for name, own in scene.procedures.items():
         _check_procedure(own, scene.file, f"procedures.{name}")
+    _check_vehicle(scene)
     _check_run(scene)
     return scene
 
@@ -189,6 +193,22 @@ def _check_steering(knots: list[Pair], file: str, place: str) -> None:
         raise InputError(file, place, times.tolist(), "times must rise from knot to knot, from 0 on, in s")
     if np.abs(angles).max() > STEEPEST:
         raise InputError(file, place, angles.tolist(), f"angles must be at most {STEEPEST:g} rad, of either sign")
+
+
+def _check_vehicle(scene: BrakingScene) -> None:
+    """A vehicle on its suspension has loads of its own, and all that its file says."""
+    own, file = scene.vehicle, scene.file
+    if own.file is None:
+        if own.spin_inertia is not None:
+            raise InputError(file, "vehicle.spin_inertia", own.spin_inertia, "has no meaning without vehicle.file")
+        return
+    if own.spin_inertia is None:
+        raise InputError(file, "vehicle.spin_inertia", None, "is missing: a vehicle file does not say it")
+    there = {"vehicle.parameters": "parameters" in own.model_fields_set, "vehicle.override": bool(own.override)}
+    there |= {name: getattr(scene, name) is not None for name in ("load_transfer", "trailer", "relaxation")}
+    for place, named in there.items():
+        if named:
+            raise InputError(file, place, None, "has no meaning beside vehicle.file: springs carry that vehicle, alone")
 
 
 def _check_run(scene: BrakingScene) -> None:

@@ -15,7 +15,7 @@ from models.braking.figures_of_merit import (
     mean_fully_developed,
     yaw_ratio,
 )
-from models.braking.plane_step import LOCKED, SLIP
+from models.braking.plane_step import LOAD, LOCKED, SLIP
 from models.braking.run import Path
 
 WHEELS = ("front left", "front right", "rear left", "rear right", "trailer front left", "trailer front right",
@@ -88,7 +88,22 @@ class Stop:
             "largest side slip at [s]": float(path.times[slip]),
             "largest lateral acceleration [m/s^2]": float(self.across[lateral]),
             "largest lateral acceleration at [s]": float(path.times[lateral]),
-        }  # fmt: skip
+        } | self.of_body()  # fmt: skip
+
+    @property
+    def lean(self) -> np.ndarray | None:
+        """Roll to the right and pitch nose down (n, 2) in rad of a vehicle on its suspension, None of a plane one."""
+        places = [i for i, name in enumerate(self.path.coordinates) if name in ("sway rx", "sway ry")]
+        return self.path.states[:, 0, places] if places else None
+
+    def of_body(self) -> dict[str, float]:
+        """What the body on its suspension did, by name and unit; nothing of a plane one."""
+        if self.lean is None:
+            return {}
+        roll, pitch = np.degrees(self.lean).T
+        return {"largest roll [deg]": float(roll[np.argmax(np.abs(roll))]),
+                "largest pitch [deg]": float(pitch[np.argmax(np.abs(pitch))]),
+                "least wheel load [N]": float(self.path.reports[:, :, LOAD].min())}  # fmt: skip
 
     def of_wheels(self) -> dict[str, np.ndarray]:
         """What each wheel (W,) did above SLOWEST, or above half of a lower initial speed, by name and unit."""

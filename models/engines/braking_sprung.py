@@ -5,6 +5,7 @@ step, to which half a step by the accelerations leads; the engine then marches t
 method around the compiled forces, the tyres' mean ones held at their contacts and turned with their wheels.
 """
 
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -33,9 +34,14 @@ class OnSprings:
         self.engine, self.vehicle, self.size = engine, vehicle, vehicle.size
         self.numbers = table = np.concatenate((own.numbers, np.zeros(ROW * wheels)))
         self._rows = table[own.numbers.size :].reshape(wheels, ROW)
-        driven = Driven(own.vehicle, own.gravity, table, held, lambda block, t, n: fill(block, n, table))
-        self._model: FreeModel = free_model(engine, driven)
         self._rates, self._known = np.zeros(wheels), np.empty((wheels, KNOWN))
+
+    @cached_property
+    def _model(self) -> FreeModel:
+        """Built with the first step."""
+        own, table = self.vehicle.handling, self.numbers
+        driven = Driven(own.vehicle, own.gravity, table, held, lambda block, t, n: fill(block, n, table))
+        return free_model(self.engine, driven)
 
     def advance(self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float, steer: np.ndarray,
                 slope: float, plane: Plane, kind: np.ndarray, road: Any, tables: tuple[np.ndarray, ...],
