@@ -1,16 +1,27 @@
 """Measurement files, opened by what is in them: CSV, ASAM MDF, MTS RPC III, TDMS."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
 
 from models.errors import InputError, similar_file
 from models.measured.channel import Source
+from models.measured.formats.opened import Opened, notice
 from models.measured.formats.writing import Group, check_names, check_start, whole_file
 
-OTHERS = {b"PK\x03\x04": "a spreadsheet or an archive", b"\x89HDF": "HDF5", b"MATLAB": "MATLAB", b"\x1f\x8b": "packed",
-          b"TDSh": "the index of a TDMS file, whose data are in the .tdms file beside it"}  # fmt: skip
+READERS = {"CSV": ("csv", "open_csv"), "ASAM MDF": ("mdf4", "open_mdf"), "RPC III": ("rpc3", "open_rpc"),
+           "TDMS": ("tdms", "open_tdms")}  # fmt: skip
+"""Format -> module and function; imported when such a file is opened."""
+MAGIC = {
+    b"MDF ": "ASAM MDF", b"UnFinMF": "ASAM MDF", b"TDSm": "TDMS", b"PK\x03\x04": "a spreadsheet or an archive",
+    b"\x89HDF": "HDF5", b"MATLAB": "MATLAB", b"\x1f\x8b": "packed",
+    b"TDSh": "the index of a TDMS file, whose data are in the .tdms file beside it",
+}  # fmt: skip
+"""First bytes of a file -> what it is."""
+EXTENSIONS = {".csv": "CSV", ".txt": "CSV", ".mf4": "ASAM MDF", ".mdf": "ASAM MDF", ".dat": "ASAM MDF",
+              ".rsp": "RPC III", ".rpc": "RPC III", ".drv": "RPC III", ".tim": "RPC III", ".tdms": "TDMS"}  # fmt: skip
 KNOWN = "CSV, ASAM MDF (.mf4), MTS RPC III (.rsp) and TDMS can be read"
 
 
@@ -19,34 +30,34 @@ def open_source(path: str | Path) -> Source:
 
     Parameters
     ----------
-    path : the file; its first bytes decide what it is, and its extension only has to be looked at twice if they differ
+    path : the file; its first bytes decide what it is, and an extension that says otherwise is noticed
 
     Raises
     ------
     InputError : naming the file, and the byte, line or sample where it cannot be read
     """
     path = Path(path)
-    head = _head(path)
-    if head.startswith((b"MDF ", b"UnFinMF")):
-        from models.measured.formats.mdf4 import open_mdf
+    form, reader = _reader(path, _head(path))
+    source = reader(path)
+    usual = EXTENSIONS.get(path.suffix.lower(), form)
+    if usual == form:
+        return source
+    said = notice(path, "doubt", f"the extension {path.suffix} is that of {usual}, but the file is read as {form}")
+    return replace(source, noticed=(said, *source.noticed))
 
-        return open_mdf(path)
-    if head.startswith(b"TDSm"):
-        from models.measured.formats.tdms import open_tdms
 
-        return open_tdms(path)
+def _reader(path: Path, head: bytes) -> tuple[str, Callable[[Path], Opened]]:
+    """Format by the first bytes of a file, and the function that opens it."""
+    found = next((what for magic, what in MAGIC.items() if head.startswith(magic)), "")
     if head[:32].split(b"\0")[0].strip() == b"FORMAT":
-        from models.measured.formats.rpc3 import open_rpc
-
-        return open_rpc(path)
-    for magic, name in OTHERS.items():
-        if head.startswith(magic):
-            raise InputError(path, "", None, f"this is {name}; {KNOWN}")
-    if b"\0" in head:
-        raise InputError(path, "byte 0", head[:8].hex(" "), f"this is the beginning of no known format: {KNOWN}")
-    from models.measured.formats.csv import open_csv
-
-    return open_csv(path)
+        found = "RPC III"
+    if found and found not in READERS:
+        raise InputError(path, "", None, f"this is {found}; {KNOWN}")
+    if not found and b"\0" in head:
+        raise InputError(path, "byte 0", head[:8].hex(" "), f"this is the beginning of no known format; {KNOWN}")
+    form = found or "CSV"
+    module, name = READERS[form]
+    return form, getattr(import_module(f"models.measured.formats.{module}"), name)
 
 
 WRITERS = {".csv": "write_csv", ".mf4": "write_mdf4:write_mdf", ".rsp": "write_rpc3:write_rpc", ".tdms": "write_tdms"}

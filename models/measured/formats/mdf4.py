@@ -6,12 +6,13 @@ of text, bytes, arrays and structures are left out. Records are loaded block by 
 whole channel is ever made.
 """
 
+import io
 import logging
 import re
 import sys
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
@@ -46,43 +47,55 @@ class MdfFile(Opened):
 
     def pieces(self, chosen: list[int], spans: list[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Load the records of each span once, and take every channel from them."""
-        mdf = opened(self.path)
-        try:
+        with opened(self.path) as mdf:
             group = self.places[chosen[0]][0]
             for first, count in spans:
-                # the public calls load the records anew for each channel: 15 times as slow, and with the whole file
-                parts = list(mdf._mdf._load_data(mdf.groups[group], record_offset=first, record_count=count))
-                times = np.concatenate([mdf.get_master(group, data=part) for part in parts])
-                values = [np.concatenate([_values(mdf, *self.places[i], part) for part in parts]) for i in chosen]
-                yield times[:count], np.column_stack(values)[:count]
-        finally:
-            mdf.close()
+                with unheard():
+                    block = _block(mdf, group, [self.places[i][1] for i in chosen], first, count)
+                yield block
 
 
-def opened(path: Path) -> Any:
-    """Return asammdf's file, without a word on the terminal; InputError where it is damaged or the package missing."""
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """Give asammdf's file, without a word on the terminal; InputError where it is damaged or the package missing."""
     try:
         from asammdf import MDF
     except ImportError:
         raise InputError(path, "", None, "MDF files need asammdf: pip install 'twinrig[measured]'") from None
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)
-    with _unheard():
+    with path.open("rb") as file:  # a path would be mapped into memory as a whole
+        mdf, why = None, ""
+        with unheard():
+            try:
+                mdf = MDF(file)
+            except Exception as error:
+                why = f"{type(error).__name__}: {error}".splitlines()[0]
+                traceback.clear_frames(error.__traceback__)
+        if mdf is None:
+            raise InputError(path, "", None, f"the file is damaged and cannot be read ({why})")
         try:
-            return MDF(path)
-        except Exception as error:
-            why = f"{type(error).__name__}: {error}".splitlines()[0]
-            traceback.clear_frames(error.__traceback__)
-    raise InputError(path, "", None, f"the file is damaged and cannot be read ({why})")
+            yield mdf
+        finally:
+            mdf.close()
 
 
 @contextmanager
-def _unheard() -> Iterator[None]:
-    """Keep quiet what asammdf has to say when it takes down a file that it could not open."""
+def unheard() -> Iterator[None]:
+    """Keep quiet what asammdf prints, and what it has to say when it takes down a file that it could not open."""
     kept, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
-        yield
+        with redirect_stdout(io.StringIO()):
+            yield
     finally:
         sys.unraisablehook = kept
+
+
+def _block(mdf: Any, group: int, indices: list[int], first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values of some records, loaded once: the public calls load them, or the file, anew for each channel."""
+    parts = list(mdf._mdf._load_data(mdf.groups[group], record_offset=first, record_count=count))
+    times = np.concatenate([mdf.get_master(group, data=part) for part in parts])
+    values = [np.concatenate([_values(mdf, group, i, part) for part in parts]) for i in indices]
+    return times[:count], np.column_stack(values)[:count]
 
 
 def _values(mdf: Any, group: int, index: int, part: Any) -> np.ndarray:
@@ -97,11 +110,8 @@ def open_mdf(path: Path) -> MdfFile:
     with readable(path):
         version = _version(path)
         found = check_blocks(path) if version == 4 else []
-        mdf = opened(path)
-        try:
+        with opened(path) as mdf:
             return _listed(path, mdf, version, found)
-        finally:
-            mdf.close()
 
 
 def _version(path: Path) -> int:

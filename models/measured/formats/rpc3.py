@@ -68,6 +68,7 @@ def open_rpc(path: Path) -> RpcFile:
         layout = _layout(path, parameters)
         count, found = _count(path, parameters, layout)
         indices = range(1, layout.width + 1)
+        found += _numbers_of_names(path, parameters, layout.width)
         names, repeated = told_apart(path, [_name(parameters, i) for i in indices])
         steps = layout.scales if layout.dtype == TYPES["SHORT_INTEGER"] else np.zeros(layout.width)
         channels = tuple(
@@ -170,6 +171,15 @@ def _count(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int,
     if extra > 0:
         found.append(notice(path, "doubt", f"{extra} bytes follow the samples that the header announces, unread"))
     return count, found
+
+
+def _numbers_of_names(path: Path, parameters: dict[str, str], width: int) -> list[Finding]:
+    """Refuse names beyond the number of channels; say which channels have none."""
+    numbers = {int(found[1]) for key in parameters if (found := re.fullmatch(r"DESC\.CHAN_(\d{1,9})", key))}
+    if numbers and max(numbers) > width:
+        raise InputError(path, "header, CHANNELS", width, f"a channel {max(numbers)} is described as well")
+    unnamed = [str(i) for i in range(1, width + 1) if i not in numbers]
+    return [notice(path, "doubt", f"the header names no channel {', '.join(unnamed)}")] if unnamed else []
 
 
 def _name(parameters: dict[str, str], i: int) -> str:

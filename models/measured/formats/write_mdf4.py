@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.errors import InputError
+from models.measured.formats.mdf4 import unheard
 from models.measured.formats.writing import Group
 
 
@@ -27,7 +28,8 @@ def write_mdf(path: Path, part: Path, groups: Sequence[Group], start: datetime |
         for index, group in enumerate(groups):
             for first, values in group.rows(path):
                 _append(mdf, index, group, group.period * np.arange(first, first + len(values)), values)
-        mdf.save(part)
+        with unheard():
+            mdf.save(part)
     finally:
         mdf.close()
 
