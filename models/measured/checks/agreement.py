@@ -8,6 +8,7 @@ one fault that leaves least unexplained is taken out, and the search begins anew
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 from typing import Literal
 
@@ -17,9 +18,10 @@ from models.measured.signal import Signal
 
 Kind = Literal["late", "factor", "swapped"]
 KNOWN = 0.03
-"""Share of an expected reading by which a vehicle file is taken to be wrong at the least: nobody knows his car better."""
+"""Share of an expected reading by which a vehicle file is taken to be wrong at the least: no one knows a car better."""
 REACH, GRID = 0.25, 5e-4
 """s: delays looked at, and their spacing before the parabola through the best three."""
+TIMES = GRID * np.arange(-round(REACH / GRID), round(REACH / GRID) + 1)
 CERTAIN = 40.0
 """Fall of chi square that one more parameter must bring: chance does so once in 10^9."""
 SMALL_DELAY, SMALL_FACTOR = 5e-4, 0.01
@@ -43,7 +45,8 @@ class Group:
 class Fault:
     """late : size in s; factor : recorded by true value; swapped : size is the share that is explained only then.
 
-    error : standard error of the size, of random errors alone. fall : of chi square.
+    error : standard error of the size, of random errors alone; of swapped the share that is left when they are put
+    right. fall : of chi square. exchanged : hubs, each with the one whose channels it has.
     """
 
     kind: Kind
@@ -52,6 +55,7 @@ class Fault:
     size: float
     error: float
     fall: float
+    exchanged: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -71,10 +75,10 @@ class Agreement:
     response: np.ndarray
     averages: float
 
-    @property
+    @cached_property
     def expected(self) -> np.ndarray:
         """Powers (f, k) of the expected readings."""
-        return _power(self.response, self.forces)
+        return np.einsum("fkc,fkc->fk", self._told, self.response.conj()).real
 
     @property
     def left(self) -> np.ndarray:
@@ -92,7 +96,8 @@ class Agreement:
         """By the unexplained power itself, smoothed, so that a line that nobody explains counts for little."""
         kernel = np.ones(SMOOTHED) / SMOOTHED
         known = KNOWN**2 * np.maximum(self.expected, 1e-3 * self.expected.mean(axis=0))
-        smooth = [np.convolve(np.pad(row, SMOOTHED // 2, mode="edge"), kernel, "valid") for row in (self.left + known).T]
+        padded = np.pad(self.left + known, ((SMOOTHED // 2, SMOOTHED // 2), (0, 0)), mode="edge")
+        smooth = [np.convolve(row, kernel, "valid") for row in padded.T]
         return self.averages / np.maximum(np.stack(smooth, axis=1), np.finfo(float).tiny)
 
     def search(self) -> tuple["Agreement", tuple[Fault, ...]]:
@@ -117,40 +122,53 @@ class Agreement:
     def groups(self) -> Iterator[Group]:
         """Every signal alone, those of one hub or sensor, of one file, and all readings: the fewer the earlier."""
         for forces, signals in ((True, self.inputs), (False, self.outputs)):
-            keys = [[f"{s.name}" for s in signals], [f"all channels of {s.at}" for s in signals],
-                    [f"all {s.quantity} channels" for s in signals], [f"all channels of {s.file}" for s in signals]]
-            seen = set()
-            for names in keys if forces else [*keys, ["all inertial channels"] * len(signals)]:
+            keys = [[s.name for s in signals], [f"all channels of {s.at}" for s in signals],
+                    [f"all channels of {s.file}" for s in signals]]
+            if not forces:
+                keys += [[f"all {s.quantity} channels" for s in signals], ["all inertial channels"] * len(signals)]
+            seen = set[tuple[int, ...]]()
+            for names in keys:
                 for name in dict.fromkeys(names):
                     own = tuple(i for i, other in enumerate(names) if other == name)
                     if own not in seen and not (forces and len(own) == len(signals)):
                         seen.add(own)
                         yield Group(name, forces, own)
 
+    @cached_property
+    def _told(self) -> np.ndarray:
+        """Expected readings times conj(forces), (f, k, c)."""
+        return self.response @ self.forces
+
+    @cached_property
+    def _turns(self) -> np.ndarray:
+        """exp(i omega t) (t, f) of all delays."""
+        return np.exp(2j * np.pi * np.outer(TIMES, self.frequencies))
+
     def _share(self, group: Group) -> tuple[np.ndarray, np.ndarray]:
         """Cross power (f, k) of what is left without the group with what it accounts for, and the power of that."""
-        own = np.zeros_like(self.response)
         pick = list(group.own)
-        if not group.forces:
-            own[:, pick] = self.response[:, pick]
-            return np.einsum("fkc,fkc->fk", self.between, own.conj()), _power(own, self.forces)
-        own[:, :, pick] = self.response[:, :, pick]
-        rest = self.between - (self.response - own) @ self.forces
-        return np.einsum("fkc,fkc->fk", rest, own.conj()), _power(own, self.forces)
+        if group.forces:
+            own, among = self.response[:, :, pick], self.forces[:, pick][:, :, pick]
+            rest = self.between[:, :, pick] - self._told[:, :, pick] + own @ among
+            return np.einsum("fkc,fkc->fk", rest, own.conj()), _power(own, among)
+        cross, power = np.zeros((2, *self.readings.shape), complex)
+        own = self.response[:, pick]
+        cross[:, pick] = np.einsum("fkc,fkc->fk", self.between[:, pick], own.conj())
+        power[:, pick] = np.einsum("fkc,fkc->fk", self._told[:, pick], own.conj())
+        return cross, power.real
 
     def _late(self, group: Group, weights: np.ndarray) -> Iterator[tuple[Fault, "Agreement"]]:
         cross, power = self._share(group)
-        line = (weights * cross).sum(axis=1)
-        turn = -2j * np.pi * self.frequencies * (1 if group.forces else -1)
-        times = GRID * np.arange(-round(REACH / GRID), round(REACH / GRID) + 1)
-        likely = (np.exp(np.outer(times, turn)) @ line).real
+        line = (weights * (cross.conj() if group.forces else cross)).sum(axis=1)
+        likely = (self._turns @ line).real
         best = int(np.argmax(likely[1:-1])) + 1
-        late = float(times[best] + GRID * _vertex(*likely[best - 1 : best + 2]))
+        late = float(TIMES[best] + GRID * _vertex(*likely[best - 1 : best + 2]))
+        turn = 2j * np.pi * self.frequencies
         fall = 2 * float((np.exp(turn * late) @ line - line.sum()).real)
         steep = 2 * float((np.abs(turn) ** 2 @ (weights * power)).sum())
         if fall > CERTAIN and steep > 0 and abs(late) > max(SMALL_DELAY, 4 * steep**-0.5):
             fault = Fault("late", group.name, self._signals(group), late, steep**-0.5, fall)
-            yield fault, self._corrected(group, np.exp(-turn * late))
+            yield fault, self._corrected(group, np.exp(turn * late if group.forces else -turn * late))
 
     def _wrong(self, group: Group, weights: np.ndarray) -> Iterator[tuple[Fault, "Agreement"]]:
         cross, power = ((weights * part).sum() for part in self._share(group))
@@ -176,16 +194,27 @@ class Agreement:
             other = replace(self, response=self.response[:, :, order])
             fall = before - float((weights * other.left).sum())
             if fall > CERTAIN and other.left.sum() < self.left.sum():
-                name = " and ".join(f"{a} with {b}" for a, b in exchanged)
-                share = float(np.sqrt(np.mean(self.unexplained**2)))
-                yield Fault("swapped", name, tuple(s for pair in exchanged for s in self.inputs if s.at in pair), share,
-                            float(np.sqrt(np.mean(other.unexplained**2))), fall), other  # fmt: skip
+                yield _exchange(self, other, exchanged, fall), other
 
     def _order(self, exchanged: tuple[tuple[str, str], ...]) -> list[int] | None:
         to = {a: b for one, two in exchanged for a, b in ((one, two), (two, one))}
         places = {(s.at, s.quantity, s.component): i for i, s in enumerate(self.inputs)}
         keys = [(to.get(s.at, s.at), s.quantity, s.component) for s in self.inputs]
         return [places[key] for key in keys] if all(key in places for key in keys) else None
+
+    def typical(self) -> float:
+        """Share of the readings that stays unexplained, the median over them."""
+        return float(np.median(self.unexplained))
+
+    def errors(self) -> dict[str, tuple[float, float]]:
+        """Standard errors of delay (s) and factor of every signal alone, by name; infinite if it does nothing."""
+        weights, square = self.weights, (2 * np.pi * self.frequencies) ** 2
+        found = {}
+        for group in (group for group in self.groups() if len(group.own) == 1):
+            line = 2 * (weights * self._share(group)[1]).sum(axis=1)
+            with np.errstate(divide="ignore"):
+                found[group.name] = float((square @ line) ** -0.5), float(line.sum() ** -0.5)
+        return found
 
     def _signals(self, group: Group) -> tuple[Signal, ...]:
         return tuple((self.inputs if group.forces else self.outputs)[i] for i in group.own)
@@ -196,6 +225,13 @@ class Agreement:
         index = (slice(None), slice(None), pick) if group.forces else (slice(None), pick)
         response[index] *= by[:, None, None]
         return replace(self, response=response)
+
+
+def _exchange(now: Agreement, other: Agreement, exchanged: tuple[tuple[str, str], ...], fall: float) -> Fault:
+    signals = tuple(s for pair in exchanged for s in now.inputs if s.at in pair)
+    share, rest = (float(np.sqrt(np.mean(each.unexplained**2))) for each in (now, other))
+    both = tuple(way for a, b in exchanged for way in ((a, b), (b, a)))
+    return Fault("swapped", " and ".join(f"{a} with {b}" for a, b in exchanged), signals, share, rest, fall, both)
 
 
 def _power(response: np.ndarray, forces: np.ndarray) -> np.ndarray:

@@ -1,0 +1,48 @@
+"""Checks of a recording before anything is run with it: each file one, each finding a sentence with place and size.
+
+Errors stop what follows, doubts are carried into the report, notes say what was looked at and found good, or what
+would be needed to look at it.
+"""
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+
+from models.hub_forces.cut_vehicle import CutVehicle
+from models.measured.checks import clipped, factor, gaps, gravity, noise, rigid, shift, swapped, turning, weight
+from models.measured.checks.evidence import Evidence
+from models.measured.checks.place import Place
+from models.measured.finding import Finding, Weight
+from models.measured.recording import Recording
+
+CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
+    gaps.check, clipped.check, gravity.check, swapped.check, weight.check, factor.check, shift.check, turning.check,
+    rigid.check, noise.check,
+)  # fmt: skip
+"""In this order: what an earlier one has named, a later one does not name again."""
+FAMILIES = defaultdict(frozenset[str], {
+    **dict.fromkeys(("sign", "unit", "gain", "weight", "gravity"), frozenset({"size"})),
+    "noise": frozenset({"size", "value"}), "shift": frozenset({"time"}), "rigid": frozenset({"size", "time", "value"}), "clipped": frozenset({"value"}),
+})  # fmt: skip
+"""What the findings of a check are about: two of one kind about one channel say the same thing twice."""
+ORDER: tuple[Weight, ...] = ("error", "doubt", "note")
+
+
+def check(recording: Recording, vehicle: CutVehicle | None, places: Mapping[str, Place] | None = None,
+          claimed: Mapping[str, float] | None = None) -> tuple[Finding, ...]:  # fmt: skip
+    """All findings, errors first, with what was noticed while reading.
+
+    vehicle : None for one that is not in space; places : of accelerometers and gyros by name; claimed : white noise
+    (SI) on every sample that is stated, by name of signal.
+    """
+    evidence = Evidence(recording, vehicle, places or {}, claimed or {})
+    found = list(recording.noticed)
+    for each in CHECKS:
+        found += [finding for finding in each(evidence) if not _named(finding, found)]
+    return tuple(sorted(found, key=lambda finding: ORDER.index(finding.weight)))
+
+
+def _named(finding: Finding, before: list[Finding]) -> bool:
+    """Whether what is wrong with one of these channels is what an earlier finding has said."""
+    return finding.weight != "note" and any(
+        other.weight != "note" and FAMILIES[other.check] & FAMILIES[finding.check]
+        and set(other.signals) & set(finding.signals) for other in before)  # fmt: skip

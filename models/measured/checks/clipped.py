@@ -1,0 +1,68 @@
+"""Clipped and dead channels: values that pile up at an extreme, or never change."""
+
+import numpy as np
+
+from models.measured.checks.evidence import Evidence
+from models.measured.checks.runs import runs
+from models.measured.finding import Finding
+from models.measured.signal import UNITS, Signal
+
+NAME = "clipped"
+LEAST = 6
+"""Samples at the extreme value below which nothing is said."""
+PILE = 5
+"""Times as many as at the next value below it: the tail of a rounded channel has more of them farther in, not less."""
+STUCK = 0.1
+"""s: a channel that gives one value for longer stands still, if this is also USUAL times longer than is usual."""
+USUAL = 20
+
+
+def check(evidence: Evidence) -> list[Finding]:
+    """Sizes are shares of samples, in %, and s for a channel that stands still."""
+    found = [finding for signal in evidence.recording.signals for finding in _signal(evidence, signal)]
+    return found or [Finding(NAME, "note", "", "No channel is clipped or stands still.")]
+
+
+def _signal(evidence: Evidence, signal: Signal) -> list[Finding]:
+    values, period = evidence.recording.samples(signal), evidence.recording.period
+    good = values[np.isfinite(values)]
+    if len(good) and good.min() == good.max():
+        text = (f"{signal.name} reads {good[0]:.4g} {UNITS[signal.quantity]} from beginning to end: it is dead, or the "
+                "map names another channel. Leave it out or name the right one.")  # fmt: skip
+        return [Finding(NAME, "error", signal.name, text, evidence.recording.duration, "s", (signal.name,))]
+    ends = [_clipped(signal, values, good, end, period) for end in (good.min(), good.max())] if len(good) else []
+    found = [finding for finding in ends if finding]
+    return found or _stuck(signal, values, period)
+
+
+def _clipped(signal: Signal, values: np.ndarray, good: np.ndarray, end: float, period: float) -> Finding | None:
+    at = int(np.count_nonzero(good == end))
+    others = good[good != end]
+    next_to = others[np.argmin(np.abs(others - end))]
+    if at < LEAST or at < PILE * np.count_nonzero(good == next_to):
+        return None
+    own = runs(values == end)
+    if np.max(own[:, 1] - own[:, 0]) < 2:
+        return None
+    share, first = 100 * at / len(good), float(period * own[0, 0])
+    text = (f"{signal.name} is clipped at {end:.5g} {UNITS[signal.quantity]}: {at} samples in {len(own)} runs, "
+            f"{share:.3g} % of all, the first from {first:.4g} s on. What lay beyond is lost, and damage comes out too "
+            "small: measure again with a wider range, or leave these times out.")  # fmt: skip
+    return Finding(NAME, "doubt", signal.name, text, share, "%", (signal.name,), (first, float(period * own[0, 1])))
+
+
+def _stuck(signal: Signal, values: np.ndarray, period: float) -> list[Finding]:
+    """The longest time at one value, of a channel that otherwise changes."""
+    same = runs(np.diff(values) == 0)
+    if not len(same):
+        return []
+    longest = int(np.argmax(same[:, 1] - same[:, 0]))
+    usual = len(values) / (1 + np.count_nonzero(np.diff(values)))
+    if same[longest, 1] - same[longest, 0] < max(STUCK / period, USUAL * usual):
+        return []
+    first, end = (float(period * i) for i in same[longest])
+    held = f"{values[same[longest, 0]]:.5g} {UNITS[signal.quantity]}"
+    text = (f"{signal.name} stands still at {held} for {end - first:.4g} s from {first:.4g} s on: its last value was "
+            "held over a gap; leave these times out.")  # fmt: skip
+    return [Finding(NAME, "doubt" if signal.check else "error", signal.name, text, end - first, "s", (signal.name,),
+                    (first, end))]  # fmt: skip

@@ -1,0 +1,146 @@
+"""What every check looks at: the recording, the vehicle, where sensors sit, and what is worked out once for all."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from models.hub_forces.cut_vehicle import GRAVITY, CutVehicle
+from models.measured.checks.agreement import Agreement, Fault
+from models.measured.checks.means import mean
+from models.measured.checks.place import Place
+from models.measured.checks.ratios import wrong
+from models.measured.checks.response import AXES, Response
+from models.measured.checks.spectra import Spectra, spectra
+from models.measured.recording import Recording
+from models.measured.signal import Signal
+
+BAND = 1.0, 25.0
+"""Hz: above the drift of a free vehicle, below the bending of its body."""
+FELT = 5e-4
+"""Of a static load or of gravity: a mean that is smaller says nothing of unit and sign."""
+INERTIAL = ("acceleration", "angular rate", "angle")
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """places : of accelerometers and gyros by name; claimed : white noise (SI) that is stated, by name of signal."""
+
+    recording: Recording
+    vehicle: CutVehicle | None
+    places: Mapping[str, Place] = field(default_factory=dict)
+    claimed: Mapping[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def forces(self) -> tuple[Signal, ...]:
+        """Components of the hubs of the vehicle."""
+        hubs = self.vehicle.hubs if self.vehicle else ()
+        return tuple(s for s in self.recording.signals if s.at in hubs and s.component in ("x", "y", "z")
+                     and s.quantity in ("force", "moment"))  # fmt: skip
+
+    @cached_property
+    def inertial(self) -> tuple[Signal, ...]:
+        """Accelerations, rates and angles whose place on the vehicle is known."""
+        return tuple(s for s in self.recording.signals if s.quantity in INERTIAL and s.component in AXES
+                     and self.place(s) is not None)  # fmt: skip
+
+    def vertical(self) -> dict[str, Signal]:
+        """Vertical force of every hub that has one."""
+        return {s.at: s for s in self.forces if s.quantity == "force" and s.component == "z"}
+
+    def place(self, signal: Signal) -> Place | None:
+        """Where a signal is measured; None where neither the scene nor the vehicle says."""
+        if signal.at in self.places or self.vehicle is None:
+            return self.places.get(signal.at)
+        bodies = {body.name: body for body in self.vehicle.whole.bodies}
+        bodies |= {tyre.name: bodies[tyre.body] for tyre in self.vehicle.whole.tyres}
+        body = bodies.get(signal.at)
+        return Place(body.name, body.position) if body else None
+
+    @cached_property
+    def lacking(self) -> str:
+        """What would be needed to set forces and motion against each other; empty if nothing."""
+        if self.vehicle is None:
+            return "a vehicle in space"
+        bare = [hub for hub in self.vehicle.hubs if hub not in self.vertical()]
+        if bare:
+            return f"the vertical force of {', '.join(bare)}"
+        if not self.inertial:
+            return "an accelerometer or gyro whose place on the vehicle is known"
+        if self.dead:
+            return f"life in {', '.join(self.dead)}"
+        return "" if self._spectra is not None else "a few seconds without a gap in any channel"
+
+    @cached_property
+    def dead(self) -> tuple[str, ...]:
+        """Names of forces and inertial signals that never change."""
+        return tuple(s.name for s in (*self.forces, *self.inertial) if _still(self.recording.samples(s)))
+
+    @cached_property
+    def coarse(self) -> dict[Signal, float]:
+        """Recorded by true value where the mean says by itself that sign or unit are wrong.
+
+        Of vertical forces against the static loads, of vertical accelerometers with gravity against that.
+        """
+        loads = dict(zip(self.vehicle.hubs, self.vehicle.loads, strict=True)) if self.vehicle else {}
+        ratios = {s: self.mean(s) / loads[hub] for hub, s in self.vertical().items()}
+        ratios |= {s: self.mean(s) / GRAVITY for s in self.recording.find("acceleration", "", "z") if s.gravity}
+        return {s: ratio for s, ratio in ratios.items() if wrong(ratio, s)[0] in ("sign", "unit") and abs(ratio) > FELT}
+
+    def mean(self, signal: Signal) -> float:
+        """Of all samples, under a window."""
+        return float(mean(self.recording.samples(signal)[:, None])[0][0])
+
+    @cached_property
+    def _spectra(self) -> Spectra | None:
+        top = min(BAND[1], 0.4 / self.recording.period)
+        return spectra(self.recording, (*self.forces, *self.inertial), (BAND[0], top))
+
+    @cached_property
+    def agreement(self) -> Agreement | None:
+        """Forces and motion as they were recorded, less what means say of them; None where something is lacking."""
+        if self.lacking:
+            return None
+        assert self.vehicle is not None and self._spectra is not None
+        found, c = self._spectra, len(self.forces)
+        response = Response(self.vehicle, self.frame).at(found.frequencies, self.inertial, self._places)
+        hubs = [6 * self.vehicle.hubs.index(s.at) + 3 * (s.quantity == "moment") + AXES[s.component]
+                for s in self.forces]  # fmt: skip
+        readings = np.einsum("fkk->fk", found.cross[:, c:, c:]).real
+        forces, felt = (np.array([self.coarse.get(s, 1.0) for s in each]) for each in (self.forces, self.inertial))
+        response = response[:, :, hubs] / forces * felt[:, None]
+        return Agreement(found.frequencies, self.forces, self.inertial, found.cross[:, :c, :c],
+                         found.cross[:, c:, :c], readings, response, found.averages)  # fmt: skip
+
+    @property
+    def _places(self) -> tuple[Place, ...]:
+        found = [self.place(s) for s in self.inertial]
+        return tuple(place for place in found if place is not None)
+
+    @property
+    def frame(self) -> str:
+        """Of the hub forces."""
+        return self.forces[0].frame if self.forces else "hub"
+
+    @cached_property
+    def searched(self) -> tuple[Agreement, tuple[Fault, ...]] | None:
+        """What is left of the agreement without its faults, and the faults, the worst first."""
+        return self.agreement.search() if self.agreement else None
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """Faults between forces and motion; none where they cannot be set against each other."""
+        return self.searched[1] if self.searched else ()
+
+    def hub(self, signal: Signal) -> str:
+        """Hub that a force belongs to when exchanged hubs are put right."""
+        for fault in self.faults:
+            if fault.kind == "swapped" and signal.at in dict(fault.exchanged):
+                return dict(fault.exchanged)[signal.at]
+        return signal.at
+
+
+def _still(values: np.ndarray) -> bool:
+    """Whether all that was measured is one value."""
+    return bool(np.nanmin(values) == np.nanmax(values)) if np.isfinite(values).any() else True

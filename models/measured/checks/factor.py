@@ -1,0 +1,39 @@
+"""Sign, unit and calibration of every channel, by what it accounts for in the motion of the vehicle."""
+
+from models.measured.checks.agreement import Fault
+from models.measured.checks.evidence import Evidence
+from models.measured.checks.ratios import sentence
+from models.measured.finding import Finding
+
+TOLD = 0.02, 0.1
+"""Errors of a factor of which it is said in how many channels they would be seen."""
+
+
+def check(evidence: Evidence) -> list[Finding]:
+    """Sizes are shares in %, or recorded by true value where sign or unit is wrong."""
+    if evidence.lacking:
+        return [Finding("factor", "note", "", "Signs, units and factors were not checked by the motion of the vehicle: "
+                        f"this needs {evidence.lacking}.")]  # fmt: skip
+    return [_finding(fault) for fault in evidence.faults if fault.kind == "factor"] + [_told(evidence)]
+
+
+def _told(evidence: Evidence) -> Finding:
+    """Which channels move the vehicle enough to tell."""
+    assert evidence.searched is not None
+    errors = [4 * factor for _, factor in evidence.searched[0].errors().values()]
+    parts = [f"by {100 * size:.0f} % in {sum(error < size for error in errors)}" for size in TOLD]
+    text = f"A factor that is wrong {' and '.join(parts)} of {len(errors)} channels would be seen by the motion."
+    return Finding("gain", "note", "", text)
+
+
+def _finding(fault: Fault) -> Finding:
+    signal, names = fault.signals[0], tuple(s.name for s in fault.signals)
+    against = "what the motion of the vehicle and all other channels tell"
+    kind, text = sentence(fault.size, signal, against)
+    if len(fault.signals) > 1:
+        text = f"{fault.name[0].upper()}{fault.name[1:]} are wrong alike: {text}"
+    if kind in ("gain", "size"):
+        size, unit = 100 * (fault.size - 1), "%"
+        text += f" The factor is {fault.size:.4g} +- {2 * fault.error:.2g} (95 %), if the vehicle file is right."
+        return Finding("gain", "doubt", fault.name, text, size, unit, names)
+    return Finding(kind, "error", fault.name, text, fault.size, "1", names)

@@ -1,0 +1,45 @@
+"""Gaps: samples that were not measured."""
+
+import numpy as np
+
+from models.measured.checks.evidence import Evidence
+from models.measured.checks.runs import runs
+from models.measured.finding import Finding, Weight
+from models.measured.inputs import BRIDGED
+from models.measured.signal import Signal
+
+NAME = "gaps"
+
+
+def check(evidence: Evidence) -> list[Finding]:
+    """One finding for each set of channels that miss the same samples; its size is the longest gap in s."""
+    own = evidence.recording
+    sets: dict[tuple[tuple[int, int], ...], list[Signal]] = {}
+    for signal in own.signals:
+        lost = tuple(map(tuple, runs(~np.isfinite(own.samples(signal))).tolist()))
+        if lost:
+            sets.setdefault(lost, []).append(signal)
+    if not sets:
+        return [Finding(NAME, "note", "", f"No sample of any of the {len(own.signals)} channels is missing.")]
+    return [_finding(evidence, np.array(lost), tuple(signals)) for lost, signals in sets.items()]
+
+
+def _finding(evidence: Evidence, lost: np.ndarray, signals: tuple[Signal, ...]) -> Finding:
+    period, lengths = evidence.recording.period, lost[:, 1] - lost[:, 0]
+    longest = int(np.argmax(lengths))
+    first, end = period * lost[longest]
+    names = ", ".join(s.name for s in signals)
+    others = f"; {len(lost) - 1} shorter gaps, {period * (lengths.sum() - lengths[longest]):.3g} s together"
+    stops = any(_driving(s) for s in signals) and lengths[longest] * period > BRIDGED
+    remedy = ("leave it out with [clock] start and duration, for no run can go on without hub forces" if stops
+              else f"up to {BRIDGED:g} s are bridged in hub forces, and the filter goes on without angles")  # fmt: skip
+    text = (f"{names}: {period * lengths[longest]:.4g} s ({lengths[longest]} samples) are missing from {first:.4g} s on"
+            f"{others if len(lost) > 1 else ''}: {remedy}.")  # fmt: skip
+    weight: Weight = "error" if stops else "doubt"
+    return Finding(NAME, weight, names, text, float(period * lengths[longest]), "s", tuple(s.name for s in signals),
+                   (float(first), float(end)))  # fmt: skip
+
+
+def _driving(signal: Signal) -> bool:
+    """Whether a run needs it."""
+    return signal.quantity in ("force", "moment") and not signal.check

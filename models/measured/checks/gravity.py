@@ -1,0 +1,55 @@
+"""Accelerometers at rest feel +9.81 m/s^2 upwards: whether they include gravity, their sign, unit and axes."""
+
+from models.hub_forces.cut_vehicle import GRAVITY
+from models.measured.checks.evidence import Evidence
+from models.measured.checks.ratios import sentence
+from models.measured.finding import Finding
+from models.measured.signal import Signal
+
+NAME = "gravity"
+BIAS = 0.5
+"""m/s^2 by which a vertical mean may be off before it is named: a car on a grade of 20 % loses 0.2."""
+LEVEL = 3.0
+"""m/s^2 that a horizontal one may feel on average: a grade of 30 %."""
+
+
+def check(evidence: Evidence) -> list[Finding]:
+    """Sizes are in m/s^2, or recorded by true value where sign or unit is wrong."""
+    signals = [s for s in evidence.recording.find("acceleration") if s.component in ("x", "y", "z")]
+    if not signals:
+        return [Finding(NAME, "note", "", "Not looked at: no accelerometer.")]
+    found = [finding for s in signals if (finding := _signal(s, evidence.mean(s)))]
+    quiet = "Every vertical accelerometer feels gravity as its channel map says, and no other does."
+    return found or [Finding(NAME, "note", "", quiet)]
+
+
+def _signal(signal: Signal, found: float) -> Finding | None:
+    if signal.component == "z":
+        return _vertical(signal, found)
+    if not abs(found) > LEVEL:
+        return None
+    text = (f"{signal.name} reads {found:.3g} m/s^2 on average, but lies along {signal.component}: it feels gravity, "
+            "so that axes are exchanged or the mount is tilted; correct component and sign in the map.")  # fmt: skip
+    return Finding(NAME, "error", signal.name, text, found, "m/s^2", (signal.name,))
+
+
+def _vertical(signal: Signal, found: float) -> Finding | None:
+    if not signal.gravity:
+        if abs(found) < BIAS:
+            return None
+        text = (f"{signal.name} reads {found:.4g} m/s^2 on average, although the channel map says that gravity is not "
+                "included: drop gravity = false, or take off its zero.")  # fmt: skip
+        return Finding(NAME, "error", signal.name, text, found, "m/s^2", (signal.name,))
+    missing = GRAVITY - found
+    if abs(missing) < BIAS:
+        return None
+    if abs(found) < BIAS:
+        text = (f"{signal.name} reads {found:.3g} m/s^2 on average: {missing:.4g} m/s^2 of gravity are not included; "
+                "give gravity = false in the channel map.")  # fmt: skip
+        return Finding(NAME, "error", signal.name, text, missing, "m/s^2", (signal.name,))
+    kind, text = sentence(found / GRAVITY, signal, "gravity, which it feels on average")
+    if kind in ("sign", "unit"):
+        return Finding(kind, "error", signal.name, text, found / GRAVITY, "1", (signal.name,))
+    text = (f"{signal.name} reads {found:.4g} m/s^2 on average, {-missing:+.3g} m/s^2 off gravity: check its zero, its "
+            "factor and how it is mounted.")  # fmt: skip
+    return Finding(NAME, "doubt", signal.name, text, -missing, "m/s^2", (signal.name,))

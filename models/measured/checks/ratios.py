@@ -1,0 +1,52 @@
+"""What a channel that reads so many times the true value has wrong: its sign, its unit, or its calibration factor."""
+
+from typing import Literal
+
+import numpy as np
+
+from models.measured.signal import Quantity, Signal
+
+NAMES: dict[Quantity, dict[str, float]] = {
+    "force": {"N": 1.0, "daN": 10.0, "kN": 1e3, "lbf": 4.4482216, "kip": 4448.2216},
+    "moment": {"N m": 1.0, "kN m": 1e3, "lbf ft": 1.3558},
+    "acceleration": {"m/s^2": 1.0, "g": 9.80665, "mm/s^2": 1e-3, "ft/s^2": 0.3048},
+    "angular rate": {"rad/s": 1.0, "deg/s": np.pi / 180, "mrad/s": 1e-3},
+    "angle": {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3},
+    "travel": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "inch": 0.0254},
+    "strain": {"-": 1.0, "um/m": 1e-6, "%": 1e-2},
+}
+"""Units that files are written in, and their factors."""
+NEAR = 0.2
+"""Part by which a ratio may differ from that of two units; a calibration is not wrong by more than GAIN."""
+GAIN = 0.25
+Wrong = Literal["sign", "unit", "gain", "size"]
+
+
+def wrong(ratio: float, signal: Signal) -> tuple[Wrong, str]:
+    """Recorded by true value -> what is wrong, and where it is the unit which one was taken for which.
+
+    "size" is what no two usual units explain. Of several pairs, one with the unit of the map is preferred.
+    """
+    if ratio < 0:
+        return "sign", ""
+    if abs(ratio - 1) <= GAIN:
+        return "gain", ""
+    own = NAMES[signal.quantity]
+    far = {(own[taken] != signal.factor, abs(np.log(ratio * own[true] / own[taken]))): f"{true} taken for {taken}"
+           for true in own for taken in own if true != taken}  # fmt: skip
+    near = [pair for pair in far if pair[1] <= NEAR]
+    return ("unit", far[min(near)]) if near else ("size", "")
+
+
+def sentence(ratio: float, signal: Signal, against: str) -> tuple[Wrong, str]:
+    """What is wrong, and a complete sentence; ``against`` says what the true value was taken from."""
+    kind, unit = wrong(ratio, signal)
+    reads = f"{signal.name} reads {ratio:.4g} times {against}"
+    own = f"{signal.name} reads {abs(ratio - 1):.2%} too {'much' if ratio > 1 else 'little'} against {against}"
+    texts: dict[Wrong, str] = {
+        "sign": f"{reads}: its sign is wrong; give sign = {-signal.sign} in the channel map.",
+        "unit": f"{reads}, as {unit} does: correct its unit in the channel map.",
+        "gain": f"{own}: check its calibration factor.",
+        "size": f"{reads}, which no usual unit explains: check its calibration factor and the vehicle file.",
+    }
+    return kind, texts[kind]

@@ -1,0 +1,42 @@
+"""Hubs whose channels are exchanged: left and right, front and rear, across."""
+
+from models.measured.checks.agreement import Fault
+from models.measured.checks.evidence import Evidence
+from models.measured.finding import Finding
+
+NAME = "swapped"
+FITS = 0.3
+"""Share of the readings that may stay unexplained on average before vehicle and recording are called strangers."""
+
+
+def check(evidence: Evidence) -> list[Finding]:
+    """Sizes are the share of the inertial readings, in %, that stays unexplained as the channels are mapped."""
+    if evidence.searched is None:
+        return [Finding(NAME, "note", "", f"Exchanged hubs were not looked for: this needs {evidence.lacking}.")]
+    found = [_finding(fault) for fault in evidence.faults if fault.kind == "swapped"]
+    return [*found, _rest(evidence)]
+
+
+def _finding(fault: Fault) -> Finding:
+    text = (f"The channels of {fault.name} are exchanged: as mapped, the forces leave {100 * fault.size:.0f} % of the "
+            f"measured motion unexplained, exchanged {100 * fault.error:.0f} %; exchange their names in the channel "
+            "map.")  # fmt: skip
+    return Finding(NAME, "error", fault.name, text, 100 * fault.size, "%", tuple(s.name for s in fault.signals))
+
+
+def _rest(evidence: Evidence) -> Finding:
+    """How well forces and motion belong together without all that was found."""
+    assert evidence.searched is not None
+    left = evidence.searched[0]
+    share = left.unexplained
+    low, high = int(share.argmin()), int(share.argmax())
+    best, worst = (f"{100 * share[i]:.2g} % ({left.outputs[i].name})" for i in (low, high))
+    text = (f"Through the vehicle file the hub forces explain the inertial channels but for {best} to {worst} of their "
+            f"size between {left.frequencies[0]:.3g} and {left.frequencies[-1]:.3g} Hz")  # fmt: skip
+    told = left.typical()
+    if told <= FITS:
+        return Finding(NAME, "note", "", f"{text}.", 100 * told, "%")
+    text += (f"; typically {100 * told:.0f} % stay unexplained: forces, motion and vehicle do not belong together, "
+             "so that delays and factors are not to be relied upon. Check frame, places of the sensors and the "
+             "vehicle file.")  # fmt: skip
+    return Finding(NAME, "doubt", "", text, 100 * told, "%", tuple(s.name for s in left.outputs))

@@ -1,0 +1,120 @@
+"""Mean vertical forces against the static load of every hub and against the weight: sign, unit and calibration."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import null_space
+
+from models.hub_forces.cut_vehicle import GRAVITY, CutVehicle
+from models.hub_forces.kernel import WRENCH
+from models.hub_forces.rigid import rigid
+from models.measured.checks.evidence import Evidence
+from models.measured.checks.means import mean
+from models.measured.checks.ratios import sentence
+from models.measured.checks.response import AXES
+from models.measured.finding import Finding
+from models.measured.signal import Signal
+
+NAME = "weight"
+KNOWN = 1e-3
+"""Part of each hub's load by which a vehicle that is not wrong may differ from its file: tilt alone takes 0.1 %."""
+SMALL = 0.005
+"""Part of a load below which nothing is said."""
+CERTAIN = 25.0
+"""Fall of chi square that a wrong channel must bring."""
+
+
+@dataclass(frozen=True)
+class Balance:
+    """What is left of equilibrium, (e,): force, moments about x and y, and what elasticity alone decides (N, N m).
+
+    columns (e, h) : of an excess that is a whole load at one hub. inverse (e, e) : of the covariance.
+    """
+
+    left: np.ndarray
+    columns: np.ndarray
+    inverse: np.ndarray
+
+    def fit(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """Shares (p,) of columns (e, p) in what is left, their covariance, and the fall of chi square."""
+        normal = columns.T @ self.inverse @ columns
+        share = np.linalg.solve(normal, columns.T @ self.inverse @ self.left)
+        return share, np.linalg.inv(normal), float(share @ normal @ share)
+
+
+def check(evidence: Evidence) -> list[Finding]:
+    """Sizes are shares of the load, in %, or recorded by true value where sign or unit is wrong."""
+    vehicle, own = evidence.vehicle, {evidence.hub(s): s for s in evidence.vertical().values()}
+    if vehicle is None or set(own) != set(vehicle.hubs):
+        text = "Not compared with the weight: this needs a vehicle in space and the vertical force of every hub."
+        return [Finding(NAME, "note", "", text)]
+    signals = tuple(own[hub] for hub in vehicle.hubs)
+    numbers, samples = _samples(evidence, vehicle)
+    centre, spread = mean(samples)
+    loads, at = centre[[numbers.index(WRENCH * i + 2) for i in range(len(signals))]], vehicle.loads
+    coarse = [_coarse(s, load, static) for s, load, static in zip(signals, loads, at, strict=True)]
+    if any(coarse):
+        return [finding for finding in coarse if finding]
+    return _fine(_balance(vehicle, numbers, centre, spread), signals, at)
+
+
+def _samples(evidence: Evidence, vehicle: CutVehicle) -> tuple[list[int], np.ndarray]:
+    """Numbers (k,) of the components among all hubs', and their samples (n, k)."""
+    numbers = [WRENCH * vehicle.hubs.index(evidence.hub(s)) + 3 * (s.quantity == "moment") + AXES[s.component]
+               for s in evidence.forces]  # fmt: skip
+    return numbers, np.column_stack([evidence.recording.samples(s) for s in evidence.forces])
+
+
+def _coarse(signal: Signal, load: float, static: float) -> Finding | None:
+    kind, text = sentence(load / static, signal, f"the {static:.0f} N that rest on {signal.at} on average")
+    if kind == "gain":
+        return None
+    return Finding(NAME if kind == "size" else kind, "error", signal.name, text, load / static, "1", (signal.name,))
+
+
+def _balance(vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread: np.ndarray) -> Balance:
+    whole, hubs = rigid(vehicle), len(vehicle.hubs)
+    unit = np.eye(WRENCH * hubs)[numbers]
+    turning = whole.moments(unit)[:, :2].T
+    vertical = unit[:, 2::WRENCH].T
+    lift = np.vstack([np.ones(hubs), whole.arms[:, 1], -whole.arms[:, 0]])
+    elastic = null_space(lift).T
+    rows = np.vstack([vertical.sum(axis=0), turning, elastic @ vertical])
+    rest = np.concatenate([[whole.mass * GRAVITY, 0.0, 0.0], elastic @ vehicle.loads])
+    columns = np.vstack([lift, elastic]) * vehicle.loads
+    covariance = np.diag(np.diag(rows @ spread @ rows.T)) + KNOWN**2 * columns @ columns.T
+    return Balance(rows @ centre - rest, columns, np.linalg.inv(covariance))
+
+
+def _fine(balance: Balance, signals: tuple[Signal, ...], loads: np.ndarray) -> list[Finding]:
+    """Calibration of single channels, or another weight than the file's."""
+    names, weight = tuple(s.name for s in signals), float(loads.sum())
+    single = [balance.fit(balance.columns[:, [i]]) for i in range(len(signals))]
+    worst = max(range(len(signals)), key=lambda i: single[i][2])
+    force, error, fall = balance.fit(np.eye(len(balance.left))[:, :3])
+    share, own = float(single[worst][0][0]), float(single[worst][1][0, 0]) ** 0.5
+    excess, sure = float(force[0]) / weight, float(error[0, 0]) ** 0.5 / weight
+    if single[worst][2] > CERTAIN and abs(share) > max(SMALL, 4 * own) and single[worst][2] > fall - CERTAIN:
+        signal = signals[worst]
+        _, text = sentence(1 + share, signal, f"the {loads[worst]:.0f} N that rest on {signal.at} on average")
+        sure_text = f" The mean is known to {2 * own:.2%} (95 %), and what is too much acts at this hub alone."
+        return [Finding("gain", "doubt", signal.name, text + sure_text, 100 * share, "%", (signal.name,))]
+    if fall > CERTAIN and max(abs(excess), float(np.abs(force[1:]).max()) / weight) > max(SMALL, 4 * sure):
+        return [_other_weight(force, weight, sure, names)]
+    text = (f"The mean vertical forces carry the vehicle's weight of {weight:.0f} N to {excess:+.2%} (+-{2 * sure:.2%} "
+            f"at 95 %); a channel that is wrong by {max(100 * SMALL, 5 * _coarsest(single)):.2g} % would be seen.")
+    return [Finding(NAME, "note", "", text, 100 * excess, "%", names)]
+
+
+def _coarsest(single: list[tuple[np.ndarray, np.ndarray, float]]) -> float:
+    """Largest standard error of a channel's factor, in %."""
+    return 100 * max(float(error[0, 0]) ** 0.5 for _, error, _ in single)
+
+
+def _other_weight(force: np.ndarray, weight: float, sure: float, names: tuple[str, ...]) -> Finding:
+    """Force (3,) in N and N m that is too much."""
+    excess = float(force[0]) / weight
+    text = (f"The mean vertical forces carry {force[0]:+.0f} N ({excess:+.2%}, +-{2 * sure:.2%} at 95 %) more than the "
+            f"vehicle file weighs, with moments of {force[1]:+.0f} N m in roll and {force[2]:+.0f} N m in pitch: enter "
+            "the load that was on board into the vehicle file, or check the calibration of all wheels.")  # fmt: skip
+    return Finding(NAME, "doubt", "", text, 100 * excess, "%", names)
