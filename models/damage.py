@@ -1,7 +1,8 @@
 """Pseudo-damage of a load signal: rainflow cycles, each counted with a power of its range.
 
 Convention: ASTM E1049-85, section 5.4.4: what is left open at the end, the residue, counts as half cycles. Other
-conventions differ by a third on a drifting signal, so figures are comparable only under the same one. The Woehler exponent ``slope`` is 5 unless another is named.
+conventions differ by a third on a drifting signal, so figures are comparable only under the same one. The Woehler
+exponent ``slope`` is 5 unless another is named.
 """
 
 import numpy as np
