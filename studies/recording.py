@@ -15,13 +15,14 @@ from models.measured.checks import check as findings_of
 from models.measured.checks.noise import noise
 from models.measured.checks.place import Place
 from models.measured.clock import record
+from models.measured.counting import Counted, count
 from models.measured.finding import Finding
 from models.measured.pattern import write_pattern
 from models.measured.recording import Recording
 from models.measured.scene import MeasuredScene
 from models.measured.section_run import Hold, Outcome, SectionRun
 from models.measured.section_run import run as march
-from models.measured.sections import Point, Sections
+from models.measured.sections import Answer, Point, Sections
 from models.measured.signal import Quantity
 from models.measured.virtual import VirtualMeasurement, virtual_measurement
 from models.strict import Strict, read
@@ -63,6 +64,10 @@ class Found:
     def held(self) -> Outcome | None:
         """The run that is handed on: with the stabiliser, or free where the scene names none."""
         return self.runs.get(self.scene.stabilise.method, self.runs.get(FREE))
+
+    def counted(self, run: Outcome, answer: Answer) -> Counted:
+        """Damage, level crossings and range pairs of one answer of a run."""
+        return count(run.samples(answer), tuple(self.scene.hand_on.slopes))
 
 
 def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
