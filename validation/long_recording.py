@@ -18,8 +18,8 @@ from validation.cases.hub_forces import r19
 PERIOD, SEAM, BLOCK = 1e-3, 1000, 60_000
 """s; samples over which a repetition fades into the next; samples made at once."""
 PLACES = {"acc fl": (1.2, 0.6, 0.6), "acc fr": (1.2, -0.6, 0.6), "acc rear": (-1.3, 0.0, 0.6), "acc roof": (0.0, 0.0, 1.4)}
-FORCE, MOMENT, ANGLE, RATE, OTHER = 8.0, 1.0, 1.75e-3, 5e-3, 1e-3
-NOISE = {"force": FORCE, "moment": MOMENT, "angle": ANGLE, "angular rate": RATE}
+NOISE = {"force": 8.0, "moment": 1.0, "angle": 1.75e-3, "angular rate": 5e-3, "acceleration": 0.01, "travel": 1e-5}
+"""Standard deviations on every sample, SI."""
 SEED = 81
 
 
@@ -38,7 +38,7 @@ def pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndarray]:
 def blocks(seconds: float, repeated: float = 20.0) -> Iterator[np.ndarray]:
     """Samples (n, 60), block by block, of a recording of this length (s)."""
     signals, whole = pattern(repeated)
-    deviation = np.array([NOISE.get(signal.quantity, OTHER) for signal in signals])
+    deviation = np.array([NOISE[signal.quantity] for signal in signals])
     length, count = len(whole) - SEAM, round(seconds / PERIOD) + 1
     fade = np.linspace(0.0, 1.0, SEAM, endpoint=False)[:, None]
     once = whole[:length].copy()

@@ -7,6 +7,7 @@
 - ``NAME hub``: what acts on the hub NAME from outside, about the hub.
 """
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,6 +17,7 @@ from models.hub_forces.cut_vehicle import CutVehicle
 from models.hub_forces.kernel import WRENCH
 from models.hub_forces.section_kernel import CHASSIS_ROW, MOMENTS, POINT, felt
 from models.hub_forces.table import Joints, joints
+from models.measured.checks.place import Place
 from models.measured.signal import Quantity, Signal
 
 AXES: tuple[tuple[str, Quantity, str, str], ...] = (
@@ -174,3 +176,14 @@ def _line(name: str, parents: dict[str, str | None]) -> list[str]:
 def _points(points: tuple[Point, ...], joined: Joints) -> np.ndarray:
     rows = [[joined.last[p.body], *np.subtract(p.place, joined.origin[p.body]), float(p.gravity)] for p in points]
     return np.array(rows, float).reshape(len(points), 5)
+
+
+def points(vehicle: CutVehicle, signals: Iterable[Signal], places: Mapping[str, Place]) -> tuple[Point, ...]:
+    """Where accelerations are measured: at sensors, which ``places`` knows, and at centres of bodies."""
+    found = dict[str, Point]()
+    for signal in (signal for signal in signals if signal.quantity == "acceleration"):
+        if signal.at in places:
+            found[signal.at] = Point(signal.at, places[signal.at].body, places[signal.at].position, signal.gravity)
+        elif signal.at in {body.name for body in vehicle.whole.bodies}:
+            found[signal.at] = Point(signal.at, signal.at, vehicle.whole.body(signal.at).position, signal.gravity)
+    return tuple(found.values())
