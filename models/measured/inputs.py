@@ -1,8 +1,10 @@
 """What a recording puts into a cut vehicle: hub forces and angles sample by sample, and as rows at half steps.
 
 Every number depends on the samples about it alone, never on where a block begins: a run in blocks reads the same bits
-as a run in one piece. Gaps of at most ``BRIDGED`` s in a hub force are bridged by a straight line and told; longer
-ones are refused. Gaps in angles and rates are the filter's business; before angles are enforced they are bridged, too.
+as a run in one piece. Between samples hub forces follow the cubic through the four about it: a straight line takes 1 to
+2 % off the damage of bushes at 500 Hz. Gaps of at most ``BRIDGED`` s in a hub force are bridged (see ``gaps``) and
+told; longer ones are refused. Gaps in angles and rates are the filter's business; before angles are enforced they are
+bridged, too.
 """
 
 from dataclasses import dataclass
@@ -14,8 +16,9 @@ from models.errors import InputError
 from models.hub_forces.cut_vehicle import CutVehicle
 from models.hub_forces.kernel import FRAMES, WRENCH
 from models.measured.finding import Finding
+from models.measured.gaps import filled
 from models.measured.recording import Recording
-from models.measured.signal import Quantity, Signal
+from models.measured.signal import UNITS, Quantity, Signal
 from models.piecewise import interpolate
 from models.prescribed import smoothed
 from models.signals import Smooth
@@ -61,21 +64,31 @@ class Grid:
             raise InputError(file, "run.step", self.step, f"must be a part or a multiple of the recording's period of "
                              f"{self.period:g} s")  # fmt: skip
 
-    def rows(self, samples: np.ndarray, first: int, count: int) -> np.ndarray:
-        """Rows at half steps 0 .. count - 1 after sample ``first``; ``samples`` (n, columns) begin at that sample."""
+    def rows(self, samples: np.ndarray, count: int) -> np.ndarray:
+        """Rows at half steps 0 .. count - 1 after the first of ``samples`` (n, columns), on straight lines."""
+        return interpolate(samples, *self._places(count))
+
+    def cubic(self, samples: np.ndarray, count: int) -> np.ndarray:
+        """Rows at half steps 0 .. count - 1 after the second of ``samples`` (n, columns), by the cubic through the two
+        samples before and the two after each."""
+        at, u = self._places(count)
+        weights = (-u * (u - 1) * (u - 2) / 6, (u + 1) * (u - 1) * (u - 2) / 2, -(u + 1) * u * (u - 2) / 2,
+                   (u + 1) * u * (u - 1) / 6)  # fmt: skip
+        return np.asarray(sum(weight[:, None] * samples[at + i] for i, weight in enumerate(weights)))
+
+    def _places(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Sample before each half step, and the part of the period since then."""
         numerator, denominator = self.part.numerator, self.part.denominator
         place = np.arange(count) * numerator
-        return interpolate(samples, place // denominator, (place % denominator) / denominator)
+        return place // denominator, (place % denominator) / denominator
 
 
 @dataclass(frozen=True)
-class Gap:
-    """A stretch without values: samples ``first`` .. ``last`` - 1, and the values before and after it."""
+class Bridge:
+    """What stands for the lost samples ``first`` and following."""
 
     first: int
-    last: int
-    before: float
-    after: float
+    values: np.ndarray
 
 
 class Inputs:
@@ -106,6 +119,12 @@ class Inputs:
         """Hub forces (n, 6 h), N and N m, samples ``first`` .. first + count - 1; components not measured are 0."""
         return self._block(self.hubs, first, count, 0.0)
 
+    def around(self, first: int, count: int) -> np.ndarray:
+        """``wrenches`` with one sample before and two after; beyond its ends the recording goes on point-symmetrically."""
+        before, after = max(1 - first, 0), max(first + count + 2 - self.recording.count, 0)
+        known = self.wrenches(first - 1 + before, count + 3 - before)
+        return np.pad(known, ((before, after), (0, 0)), mode="reflect", reflect_type="odd")
+
     def tilt(self, first: int, count: int) -> np.ndarray:
         """Roll, pitch and their rates (n, 4), NaN where not measured; rates of gyros become those of the angles."""
         found = self._block(self.angles, first, count, np.nan)
@@ -126,9 +145,8 @@ class Inputs:
             if signal is not None:
                 out[:, i] = self.recording.columns.read(signal.name, first, count)
                 for gap in self._gaps.get(signal, ()):
-                    at = np.arange(max(gap.first, first), min(gap.last, first + len(out)))
-                    part = (at - gap.first + 1) / (gap.last - gap.first + 1)
-                    out[at - first, i] = gap.before + part * (gap.after - gap.before)
+                    at = np.arange(max(gap.first, first), min(gap.first + len(gap.values), first + len(out)))
+                    out[at - first, i] = gap.values[at - gap.first]
         return out
 
     def _check(self) -> None:
@@ -146,27 +164,23 @@ class Inputs:
             raise InputError("", "files.channels", None, f"hub forces must all be in one frame of {', '.join(FRAMES)}: "
                              f"these are in {', '.join(sorted(frames))}")  # fmt: skip
 
-    def _gaps_of(self, signal: Signal) -> tuple[Gap, ...]:
+    def _gaps_of(self, signal: Signal) -> tuple[Bridge, ...]:
         """Gaps of a signal; InputError where one is too long to be bridged."""
-        values, period = self.recording.samples(signal), self.recording.period
-        silent = ~np.isfinite(values)
-        if not silent.any():
+        values, found = filled(self.recording.samples(signal), period := self.recording.period, BRIDGED)
+        if not found:
             return ()
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], silent, [False])).astype(np.int8)))
-        found = list[Gap]()
-        for first, last in edges.reshape(-1, 2):
-            if (last - first) * period > BRIDGED * (1 + 1e-9):
-                raise InputError(signal.file, signal.channel, None, f"is silent from {first * period:.6g} s to "
-                                 f"{last * period:.6g} s: gaps of at most {BRIDGED:g} s are bridged; take a stretch "
-                                 "without this one (clock.start, clock.duration)")  # fmt: skip
-            before = values[first - 1] if first else values[last]
-            found.append(Gap(int(first), int(last), before, values[last] if last < len(values) else before))
-        longest = max(gap.last - gap.first for gap in found) * period
+        for gap in (gap for gap in found if np.isnan(gap.doubt)):
+            raise InputError(signal.file, signal.channel, None, f"is silent from {gap.first * period:.6g} s to "
+                             f"{gap.end * period:.6g} s: gaps of at most {BRIDGED:g} s are bridged; take a stretch "
+                             "without this one (clock.start, clock.duration)")  # fmt: skip
+        longest = max(gap.end - gap.first for gap in found) * period
+        worst = max(found, key=lambda gap: gap.doubt)
         self.findings.append(Finding(
             "gaps", "doubt", signal.name, f"{signal.name} is silent {len(found)} times, for at most {longest:.3g} s: "
-            "bridged by straight lines.", longest, "s", (signal.name,),
-            (found[0].first * period, found[-1].last * period)))  # fmt: skip
-        return tuple(found)
+            f"bridged by what the channel itself makes most likely, with a standard deviation of {worst.doubt:.3g} "
+            f"{UNITS[signal.quantity]} at {worst.first * period:.6g} s, the largest.", longest, "s", (signal.name,),
+            (found[0].first * period, found[-1].end * period)))  # fmt: skip
+        return tuple(Bridge(gap.first, values[gap.first : gap.end]) for gap in found)
 
 
 def _found(signals: list[Signal], what: Quantity, component: str, at: str) -> Signal | None:

@@ -198,15 +198,15 @@ class _March:
         """What drives the vehicle from a sample on."""
         own, grid, rows = self.own, self.own.grid, 2 * steps + 1
         samples = math.floor((rows - 1) * grid.part) + 2
-        wrenches = self.inputs.wrenches(first, samples)
-        drive = Drive(grid.rows(wrenches, 0, rows), self.inputs.frame)
+        wrenches = self.inputs.around(first, samples)
+        drive = Drive(grid.cubic(wrenches, rows), self.inputs.frame)
         if self.prescribed is not None:
             return Drive(drive.hubs, drive.frame, guide=self.prescribed.rows(first, rows))
         if own.hold.method == "none":
             return drive
         used = math.floor((rows - 1) * grid.part) + 1
-        tilt, _ = self.filter.advance(wrenches[:used], self.inputs.tilt(first, used))
-        guide = np.hstack([grid.rows(tilt, 0, rows), np.zeros((rows, 2))])
+        tilt, _ = self.filter.advance(wrenches[1 : used + 1], self.inputs.tilt(first, used))
+        guide = np.hstack([grid.rows(tilt, rows), np.zeros((rows, 2))])
         corner, (roll, pitch, _) = 2 * math.pi * own.hold.bandwidth, np.diag(rigid(own.vehicle).inertia)
         pull = (roll * corner**2, 2 * DAMPING * roll * corner, pitch * corner**2, 2 * DAMPING * pitch * corner)
         return Drive(drive.hubs, drive.frame, guide=guide, pull=pull)
