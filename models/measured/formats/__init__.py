@@ -17,7 +17,8 @@ READERS = {"CSV": ("csv", "open_csv"), "ASAM MDF": ("mdf4", "open_mdf"), "RPC II
 MAGIC = {
     b"MDF ": "ASAM MDF", b"UnFinMF": "ASAM MDF", b"TDSm": "TDMS", b"PK\x03\x04": "a spreadsheet or an archive",
     b"\x89HDF": "HDF5", b"MATLAB": "MATLAB", b"\x1f\x8b": "packed",
-    b"TDSh": "the index of a TDMS file, whose data are in the .tdms file beside it",
+    b"\xff\xfe": "text in UTF-16, which has to be saved as UTF-8", b"\xfe\xff": "text in UTF-16, which has to be saved "
+    "as UTF-8", b"TDSh": "the index of a TDMS file, whose data are in the .tdms file beside it",
 }  # fmt: skip
 """First bytes of a file -> what it is."""
 EXTENSIONS = {".csv": "CSV", ".txt": "CSV", ".mf4": "ASAM MDF", ".mdf": "ASAM MDF", ".dat": "ASAM MDF",

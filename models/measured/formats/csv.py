@@ -30,6 +30,8 @@ CHUNK = 1 << 22
 """Bytes read at once while rows are counted."""
 LONGEST = 1 << 20
 """Bytes of a line; a longer one is not text."""
+SAMPLE = 1 << 16
+"""Bytes of rows that show the decimal sign."""
 CLOCKS = ("time", "zeit", "t")
 SIGNS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _HEADING = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?", re.DOTALL)
@@ -144,8 +146,6 @@ def read_header(path: Path) -> tuple[Header, list[Finding]]:
 
 def _decoded(path: Path, raw: bytes, line: int, found: list[Finding]) -> str:
     """Text of one line; the code page of Western Europe where it is not UTF-8, which is said."""
-    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise InputError(path, "byte 0", None, "the file is in UTF-16: save it as UTF-8")
     try:
         return raw.decode("utf-8-sig" if line == 1 else "utf-8")
     except UnicodeDecodeError:
@@ -175,7 +175,7 @@ def find_layout(path: Path, header: Header) -> tuple[Layout, list[Finding]]:
     names = next(csv.reader([header.headings], delimiter=separator))
     with path.open("rb") as file:
         file.seek(header.begin)
-        sample = file.read(LONGEST)
+        sample = file.read(SAMPLE)
     comma = separator != "," and b"," in sample
     if comma and b"." in sample:
         raise InputError(path, f"line {header.line + 1} and after", None,

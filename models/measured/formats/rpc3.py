@@ -159,7 +159,7 @@ def _count(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int,
     if "SAMPLES" in parameters:
         announced = whole(path, parameters, "SAMPLES", announced)
     else:
-        found.append(notice(path, "note", f"the header does not say how many of the {announced} samples are measured: "
+        found.append(notice(path, "doubt", f"the header does not say how many of the {announced} samples are measured: "
                             f"up to {layout.points - 1} at the end may be padding of the last group"))
     count = min(announced, there)
     if count == 0:

@@ -5,13 +5,14 @@ the one channel of its group that is called time and counts seconds. Time 0 of t
 An index file beside the file is not read: it may be older than the data.
 """
 
+import io
 import logging
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
@@ -50,7 +51,7 @@ class TdmsData(Opened):
     def pieces(self, chosen: list[int], spans: list[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Read each channel's own part of each span."""
         places = [self.places[i] for i in chosen]
-        with self.path.open("rb") as file:
+        with Bounded(self.path) as file:
             data = opened(self.path, file)
             for first, count in spans:
                 values = [np.asarray(data[one.group][one.name].read_data(first, count), float) for one in places]
@@ -58,7 +59,19 @@ class TdmsData(Opened):
                 yield _times(data, places[0], first, least), np.column_stack([column[:least] for column in values])
 
 
-def opened(path: Path, file: BinaryIO) -> Any:
+class Bounded(io.BufferedReader):
+    """A file that makes room for what it has, not for what it is asked for: a damaged length may be of gigabytes."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(io.FileIO(path))
+        self.size = path.stat().st_size
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """Read no more bytes than are left."""
+        return super().read(size if size is None or size < 0 else min(size, max(self.size - self.tell(), 0)))
+
+
+def opened(path: Path, file: Bounded) -> Any:
     """Return npTDMS's file, without a word on the terminal; InputError where the package is missing."""
     try:
         from nptdms import TdmsFile
@@ -80,7 +93,7 @@ def open_tdms(path: Path) -> TdmsData:
     """List the channels of a file; raises InputError where it is damaged."""
     with readable(path):
         cut = check_segments(path)
-        with path.open("rb") as file:
+        with Bounded(path) as file:
             return _listed(path, opened(path, file), cut)
 
 

@@ -1,0 +1,175 @@
+"""An odd measurement file: how it is made, what must become of it, and how far what is read is from the truth."""
+
+import hashlib
+import time
+import tracemalloc
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from models.errors import InputError
+from models.measured.channel import Source
+from models.measured.formats import open_source, write
+from models.measured.formats.writing import Group
+
+Wanted = Literal["right", "named", "refused"]
+"""Read right, read right as far as it goes with a sentence about it, or refused with a reason."""
+Truth = Mapping[str, tuple[np.ndarray, np.ndarray]]
+COUNT, PERIOD = 40, 0.01
+"""Samples of the usual file, s between them."""
+TIMES = PERIOD * np.arange(COUNT)
+FZ, FX = 1000.0 + 2.0**-6 * np.arange(COUNT), -2.5 * np.arange(COUNT)
+"""Values with a few bits, which every format keeps exactly."""
+MEMORY, SECONDS = 5e7, 10.0
+"""Bytes and seconds that no file of some kilobytes may take, whatever it claims."""
+
+
+def usual(**changed: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Truth of the two channels of the usual file; another series under its name."""
+    return {name: (TIMES, changed.get(name, values)) for name, values in (("Fz", FZ), ("Fx", FX))}
+
+
+@dataclass(frozen=True)
+class Odd:
+    """One file.
+
+    make : writes it into a folder and returns its path. wanted, says : what must become of it, and a phrase of the
+    refusal or of what is noticed. truth : channel -> times and values; a named file may give the first of them.
+    greedy : whether it claims a size that must not be taken.
+    """
+
+    name: str
+    hard: str
+    make: Callable[[Path], Path]
+    wanted: Wanted
+    says: str = ""
+    truth: Truth = field(default_factory=usual)
+    greedy: bool = False
+
+    def error(self, folder: Path) -> float:
+        """Largest difference to the truth, inf where something is missing, or the reader's refusal; AssertionError
+        where a refusal says too little, the file was changed, or took more than it may.
+        """  # fmt: skip
+        folder.mkdir(parents=True, exist_ok=True)
+        path = self.make(folder)
+        before = _state(folder)
+        try:
+            return self._measured(path)
+        except InputError as refusal:
+            if path.name not in str(refusal) or self.says not in str(refusal) or "\n" in str(refusal):
+                raise AssertionError(f"{self.name}: {refusal} does not say {self.says!r}") from refusal
+            raise
+        finally:
+            if _state(folder) != before:
+                raise AssertionError(f"{self.name}: something was written beside {path} or into it")
+
+    def _measured(self, path: Path) -> float:
+        """Error of what is read, within the memory and the time of a small file."""
+        if not self.greedy:
+            return difference(open_source(path), self.truth, self.says if self.wanted == "named" else "")
+        tracemalloc.start()
+        began = time.perf_counter()
+        try:
+            return difference(open_source(path), self.truth, self.says if self.wanted == "named" else "")
+        finally:
+            peak = tracemalloc.get_traced_memory()[1]
+            tracemalloc.stop()
+            if peak > MEMORY or time.perf_counter() - began > SECONDS:
+                raise AssertionError(f"{self.name}: {peak / 1e6:.0f} MB, {time.perf_counter() - began:.1f} s")
+
+
+def _state(folder: Path) -> dict[str, str]:
+    """Digest of every file below a folder."""
+    return {str(p): hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def read(source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Times and values of every channel, read in six blocks or seven."""
+    found = {}
+    for group in {channel.group for channel in source.channels}:
+        names = [channel.name for channel in source.channels if channel.group == group]
+        count = next(channel.count for channel in source.channels if channel.group == group)
+        blocks = list(source.blocks(names, 1 + count // 6))
+        times, values = (np.concatenate([getattr(one, key) for one in blocks]) for key in ("times", "values"))
+        found |= {name: (times, values[:, i]) for i, name in enumerate(names)}
+    return found
+
+
+def difference(source: Source, truth: Truth, says: str) -> float:
+    """Largest difference between a file and the truth; inf where a channel, a sample or the sentence is missing."""
+    found, said = read(source), [one.text for one in source.noticed if one.weight != "note" or says]
+    if set(found) != set(truth) or not (any(says in text for text in said) if says else not said):
+        return np.inf
+    return max(_apart(found[name], truth[name], bool(says)) for name in truth)
+
+
+def _apart(found: tuple[np.ndarray, np.ndarray], truth: tuple[np.ndarray, np.ndarray], part: bool) -> float:
+    """Largest difference of times and values; a part of the samples will do where that was said."""
+    count = len(found[0])
+    if count == 0 or count > len(truth[0]) or (count < len(truth[0]) and not part):
+        return np.inf
+    times, values = truth[0][:count], truth[1][:count]
+    if not np.array_equal(np.isnan(found[1]), np.isnan(values)):
+        return np.inf
+    return float(max(np.abs(found[0] - times).max(), np.nanmax(np.abs(found[1] - values), initial=0.0)))
+
+
+def written(path: Path, names: tuple[str, ...] = ("Fz", "Fx"), values: np.ndarray | None = None) -> Path:
+    """Write the usual file, or other channels, in the format of the extension of ``path``."""
+    table = np.column_stack((FZ, FX)) if values is None else values
+    group = Group(names, ("N",) * len(names), ("",) * len(names), PERIOD, len(table), [table])
+    return write(path, [group])
+
+
+def patched(path: Path, place: int, new: bytes) -> Path:
+    """Replace bytes of a file."""
+    data = bytearray(path.read_bytes())
+    data[place : place + len(new)] = new
+    path.write_bytes(bytes(data))
+    return path
+
+
+def cut(path: Path, length: int) -> Path:
+    """Cut a file off."""
+    path.write_bytes(path.read_bytes()[:length])
+    return path
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A file of one format cut off at many places: refused, or the rest read right and named.
+
+    cuts : number of places, spread evenly over the file; 0 for every byte.
+    """
+
+    extension: str
+    cuts: int = 40
+
+    def silent(self, folder: Path) -> int:
+        """Cuts after which something is read that is not right or not said."""
+        folder.mkdir(parents=True, exist_ok=True)
+        path = written(folder / f"cut{self.extension}", values=_long() if self.extension == ".rsp" else None)
+        data = path.read_bytes()
+        table = _long() if self.extension == ".rsp" else np.column_stack((FZ, FX))
+        times = PERIOD * np.arange(len(table))
+        truth = {"Fz": (times, table[:, 0]), "Fx": (times, table[:, 1])}
+        places = range(len(data)) if self.cuts == 0 else np.linspace(0, len(data) - 1, self.cuts).astype(int).tolist()
+        return sum(self._is_silent(path, data[:place], truth) for place in places)
+
+    def _is_silent(self, path: Path, data: bytes, truth: Truth) -> bool:
+        """Whether one cut goes unseen."""
+        path.write_bytes(data)
+        try:
+            source = open_source(path)
+            own = {name: truth[name] for name in truth if name in {channel.name for channel in source.channels}}
+            return difference(source, own, "cut off") > 0.0
+        except InputError as refusal:
+            return path.name not in str(refusal)
+
+
+def _long() -> np.ndarray:
+    """Samples of three groups of RPC III and a half."""
+    return np.column_stack((np.arange(7000.0), -2.5 * np.arange(7000.0)))
