@@ -18,6 +18,7 @@ import numpy as np
 from models.braking.advance import AT_REST, FINE, LIFTED, NOT_FOUND
 from models.braking.plane_chain import point
 from models.braking.plane_step import LOAD, step_on
+from models.braking.samples import compiled
 from models.braking.surfaces import under_wheels
 from models.braking.wheel_step import SLOWEST, phi_1
 from models.compiled import njit
@@ -71,3 +72,7 @@ def advance_lagging(state, turning, torques, step, steer, slope, plane, kind, ro
             if report[i, LOAD] <= 0.0:
                 return LIFTED, time
     return FINE, time
+
+
+by_lagging_steps = compiled(advance_lagging, "by_lagging_steps")
+"""``by_steps`` with such tyres: after its arguments come ``length`` and ``lag``."""

@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from models.braking.advance import AT_REST, LIFTED, NOT_FOUND, advance
+from models.braking.advance import AT_REST, FINE, LIFTED, NOT_FOUND
 from models.braking.brake import Brakes
-from models.braking.controller import SAMPLE, Controller, Sample
-from models.braking.plane_step import REPORTED
+from models.braking.controller import SAMPLE, Command, Controller, Sample
 from models.braking.plane_vehicle import Plane
 from models.braking.port.ask import ask
-from models.braking.pressure import RELEASE, Chambers, by_pressures, by_valves, still
+from models.braking.pressure import RELEASE, Chambers, still
+from models.braking.row import Row, parts, row
+from models.braking.samples import Braking, Told, by_steps, moved
 from models.braking.surfaces import Road, check_way
 from models.braking.tyre_table import Tables
 from models.errors import RunFailed
@@ -94,61 +95,65 @@ class Braked:
 
         Raises RunFailed, which names the time and whose ``partial`` is the path until then.
         """
-        units, wheels = self.plane.masses.size, self.plane.wheels
-        given = start if isinstance(start, Start) else self.rolling(start)
-        state, turning = given.state.copy(), given.turning.copy()
-        air, torques = still(self.chambers, self.sample), np.zeros((self.substeps + 1, wheels))
-        found = np.zeros(2 + units)
-        report, time, status, number = np.zeros((wheels, REPORTED)), 0.0, 0, 0
-        rows = [(time, state.copy(), turning.copy(), air.pressure.copy(), air.torque.copy())]
-        reports = list[np.ndarray]()
-        step, released = self.sample / self.substeps, np.full(wheels, RELEASE)
-        check_way(self.road, step * float(np.hypot(*state[1, :2])))
-        go = advance if self.relaxation is None else _lagging(self.relaxation, state)
-        go = go if self.engine is None else self.engine.advance
-        with _kept(rows, reports, self.coordinates):
-            while status != AT_REST and time < duration - 1e-9:
-                braked = time >= self.switch - 1e-9
-                known = math.hypot(state[1, 0], state[1, 1]) if self.speed_given else math.nan
-                supply = float(air.supply[0])
-                asked = Sample(number, round(time * 1e9), turning * self.plane.radius, braked, supply, known)
-                command = ask(controller, asked)
-                if command.pressures is None:
-                    valves = command.valves if braked else released
-                    by_valves(valves, self.sample, air, self.chambers, self.brakes, torques)
-                else:
-                    by_pressures(command.pressures, air, self.brakes, torques)
-                steer = self.steer if self.steering is None else self.steering(time + 0.5 * self.sample)
-                status, used = go(state, turning, torques, step, steer, self.slope, self.plane, self.kind,
-                                       self.road, self.tables.packed, found, report)  # fmt: skip
-                time, number = time + used, number + 1
+        given, wheels = start if isinstance(start, Start) else self.rolling(start), self.plane.wheels
+        check_way(self.road, self.sample / self.substeps * float(np.hypot(*given.state[1, :2])))
+        now = row(given.state.shape[1], wheels)
+        now.state[:], now.turning[:] = given.state, given.turning
+        told = Told(np.full(wheels, RELEASE), np.full(wheels, math.nan), self.steer.copy())
+        rows, status, number = list[np.ndarray](), FINE, 0
+        with _kept(rows, now, self.coordinates):
+            for status, time, speed, supply in self._moving(told, now):
                 if status in (NOT_FOUND, LIFTED):
                     raise RunFailed("braking", "a wheel lifts off" if status == LIFTED else "no loads were found", time)
-                rows.append((time, state.copy(), turning.copy(), air.pressure.copy(), air.torque.copy()))
-                reports.append(report.copy())
-        return _path(rows, reports, status == AT_REST, self.coordinates)
+                now.time[0] = time
+                rows.append(now.whole.copy())
+                if status == AT_REST or time >= duration - 1e-9:
+                    break
+                braked = time >= self.switch - 1e-9
+                known = speed if self.speed_given else math.nan
+                asked = Sample(number, round(time * 1e9), now.turning * self.plane.radius, braked, supply, known)
+                number += 1
+                _tell(told, ask(controller, asked), braked)
+                if self.steering is not None:
+                    told.steer[:] = self.steering(time + 0.5 * self.sample)
+        return _path(rows, now, status == AT_REST, self.coordinates)
+
+    def _moving(self, told: Told, now: Row) -> Iterator[tuple[int, float, float, float]]:
+        """The vehicle as it is ``now``, moved on sample by sample; see ``samples``."""
+        air = still(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
+        torques, found = np.zeros((self.substeps + 1, self.plane.wheels)), np.zeros(2 + self.plane.masses.size)
+        given = (told, self.sample, Braking(air, self.chambers, self.brakes, torques), now.state, now.turning,
+                 self.slope, self.plane, self.kind, self.road, self.tables.packed, found, now.report)  # fmt: skip
+        if self.engine is not None:
+            return moved(self.engine.advance)(*given)
+        if self.relaxation is None:
+            return by_steps(*given)
+        from models.braking.relaxation import by_lagging_steps
+
+        # straight ahead tyres begin without slip angles, whatever the wheels are steered, in a turn as in a steady one
+        lag = np.full(self.plane.wheels, np.nan if now.state[1, 1:].any() else 0.0)
+        return by_lagging_steps(*given, self.relaxation, lag)
 
 
-def _lagging(lengths: np.ndarray, state: np.ndarray) -> Callable[..., Any]:
-    """``advance`` with tyres of relaxation lengths (W,) in m: straight ahead they begin without slip angles, whatever
-    the wheels are steered then, and in a turn as in a steady one."""
-    from models.braking.relaxation import advance_lagging
-
-    lag = np.full(lengths.size, np.nan if state[1, 1:].any() else 0.0)
-    return lambda *given: advance_lagging(*given, lengths, lag)
+def _tell(told: Told, command: Command, braked: bool) -> None:
+    """What a command means for the next sample."""
+    if command.pressures is not None:
+        told.pressures[:] = command.pressures
+    else:
+        told.valves[:] = command.valves if braked else RELEASE
+        told.pressures[0] = math.nan
 
 
 @contextmanager
-def _kept(rows: list[Any], reports: list[Any], names: tuple[str, ...]) -> Iterator[None]:
+def _kept(rows: list[np.ndarray], now: Row, names: tuple[str, ...]) -> Iterator[None]:
     """Gives a failed run the path until then."""
     try:
         yield
     except RunFailed as error:
-        error.partial = _path(rows, reports, False, names)
+        error.partial = _path(rows, now, False, names)
         raise
 
 
-def _path(rows: list[Any], reports: list[Any], stands: bool, names: tuple[str, ...]) -> Path:
-    times, states, turning, pressures, torques = (np.array(column) for column in zip(*rows, strict=True))
-    return Path(times, states, turning, pressures, torques,
-                np.array(reports).reshape(-1, turning.shape[1], REPORTED), stands, names)  # fmt: skip
+def _path(rows: list[np.ndarray], now: Row, stands: bool, names: tuple[str, ...]) -> Path:
+    times, states, turning, pressures, torques, reports = parts(rows, now)
+    return Path(times[:, 0], states, turning, pressures, torques, reports[1:], stands, names)

@@ -1,0 +1,65 @@
+"""A braked vehicle moved on sample by sample, to whatever its valves, chambers and steering are told in between.
+
+All of it is one generator, which as compiled code goes on within a microsecond: what it works on is given to it once
+and not in every sample.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from models.braking.advance import FINE, advance
+from models.braking.brake import Brakes
+from models.braking.pressure import Air, Chambers, by_pressures, by_valves
+from models.compiled import named, njit
+
+
+class Told(NamedTuple):
+    """What holds for the next sample: states of the valves (W,), pressures (W,) in bar, of which the first is not a
+    number where valves hold, and steer angles (W,) in rad."""
+
+    valves: np.ndarray
+    pressures: np.ndarray
+    steer: np.ndarray
+
+
+class Braking(NamedTuple):
+    """Brakes and their pressures; torques (n + 1, W) in N m: at the ends of the n steps of a sample."""
+
+    air: Air
+    chambers: Chambers
+    brakes: Brakes
+    torques: np.ndarray
+
+
+def moved(go: Callable[..., Any]) -> Callable[..., Iterator[tuple[int, float, float, float]]]:
+    """Generator of a vehicle that ``go``, which is ``advance`` or stands in for it, moves on by one sample at a time.
+
+    Each time, and first at the start, it gives how the sample ended, the time (s), the speed of the first unit (m/s)
+    and the supply (bar).
+    """
+
+    def samples(told, sample, braking, state, turning, *others):
+        air, chambers, brakes, torques = braking
+        status, time, step = FINE, 0.0, sample / (torques.shape[0] - 1)
+        while True:
+            yield status, time, math.hypot(state[1, 0], state[1, 1]), air.supply[0]
+            if math.isnan(told.pressures[0]):
+                by_valves(told.valves, sample, air, chambers, brakes, torques)
+            else:
+                by_pressures(told.pressures, air, brakes, torques)
+            status, used = go(state, turning, torques, step, told.steer, *others)
+            time += used
+
+    return samples
+
+
+def compiled(go: Callable[..., Any], name: str) -> Callable[..., Iterator[tuple[int, float, float, float]]]:
+    """``moved`` by a compiled function, compiled."""
+    return njit(cache=True, error_model="numpy")(named(moved(go), name))
+
+
+by_steps = compiled(advance, "by_steps")
+"""The vehicle moved by its own steps."""
