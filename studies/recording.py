@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from models.drift.trust import ANGLE
 from models.errors import RunFailed
 from models.hub_forces.cut_vehicle import CutVehicle
 from models.measured import plan
 from models.measured.checks import check as findings_of
-from models.measured.checks.noise import noise
+from models.measured.checks.noise_floor import noise
 from models.measured.checks.place import Place
 from models.measured.clock import record
 from models.measured.counting import Counted, count
@@ -22,8 +23,9 @@ from models.measured.recording import Recording
 from models.measured.scene import MeasuredScene
 from models.measured.section_run import Hold, Outcome, SectionRun
 from models.measured.section_run import run as march
-from models.measured.sections import Answer, Point, Sections
+from models.measured.sections import Answer, Sections, points
 from models.measured.signal import Quantity
+from models.measured.trust import Drift, Level, drift
 from models.measured.virtual import VirtualMeasurement, virtual_measurement
 from models.strict import Strict, read
 from models.systems import load
@@ -51,6 +53,7 @@ class Found:
     recording: Recording
     virtual: VirtualMeasurement | None = None
     findings: tuple[Finding, ...] = ()
+    drift: Drift | None = None
     runs: dict[str, Outcome] = field(default_factory=dict)
     failed: dict[str, str] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -103,6 +106,7 @@ def compute(scene: MeasuredScene, engine: str, folder: Path, progress: Progress 
     found.findings = findings_of(recording, vehicle, _places(scene), _claimed(scene, recording))
     watch.lap("checks")
     if not found.stopped:
+        found.drift = _predicted(found)
         _run(found, work, progress)
         watch.lap("runs")
     return found
@@ -145,10 +149,26 @@ def _noise(found: Found) -> dict[str, float]:
     return out
 
 
+def _predicted(found: Found) -> Drift:
+    """Drift of the free run, which begins level and at rest, from the noise and from how the vehicle really began."""
+    own, noise, chassis = found.recording, _noise(found), found.vehicle.chassis
+    tilt, rate = ((_began(own, what, "roll", chassis), _began(own, what, "pitch", chassis))
+                  for what in ("angle", "angular rate"))  # fmt: skip
+    frame = next(s.frame for s in own.signals if s.at in found.vehicle.hubs)
+    level = Level(noise["force"], noise["moment"], None, tilt, rate)
+    return drift(found.vehicle, level, own.period, own.duration, frame)
+
+
+def _began(own: Recording, what: str, axis: str, chassis: str) -> float:
+    """Mean (rad, rad/s) of the first tenth of a second of an angle or a rate; 0 where it is not measured."""
+    values = [own.columns.read(s.name, 0, max(round(0.1 / own.period), 1)) for s in own.find(what, chassis, axis)[:1]]
+    return float(np.nanmean(values[0])) if values and np.isfinite(values[0]).any() else 0.0
+
+
 def _run(found: Found, work: Path, progress: Progress) -> None:
     """Free, and with the stabiliser that the scene names; a run that fails keeps what it has."""
     scene, own = found.scene, found.scene.stabilise
-    sections = Sections(found.vehicle, points=tuple(Point(name, *place) for name, place in _places(scene).items()))
+    sections = Sections(found.vehicle, points=points(found.vehicle, found.recording.signals, _places(scene)))
     hold = Hold(own.method, own.bandwidth, own.model, own.smoothing, **_noise(found))
     holds = {FREE: Hold("none")} | ({own.method: hold} if own.method != "none" else {})
     for i, (name, hold) in enumerate(holds.items()):
@@ -200,6 +220,9 @@ def _told(found: Found) -> list[str]:
     lines = [f"  {finding.weight}: {finding.text}" for finding in found.findings if finding.weight != "note"]
     notes = sum(finding.weight == "note" for finding in found.findings)
     lines.append(f"  {notes} things were looked at and found good: see the page")
+    if found.drift is not None:
+        lines.append(f"  section forces of the free run: {found.drift.trust()}")
+        lines.append(f"  its motion: {found.drift.trust(ANGLE)}")
     for name, outcome in found.runs.items():
         end = found.failed.get(name, "to the end")
         lines.append(f"  {name} run: {outcome.done * outcome.period:.6g} s, {end}")
