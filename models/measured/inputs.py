@@ -120,7 +120,7 @@ class Inputs:
         return self._block(self.hubs, first, count, 0.0)
 
     def around(self, first: int, count: int) -> np.ndarray:
-        """``wrenches`` with one sample before and two after; beyond its ends the recording goes on point-symmetrically."""
+        """``wrenches`` with one sample before and two after; beyond its ends a recording is mirrored in a point."""
         before, after = max(1 - first, 0), max(first + count + 2 - self.recording.count, 0)
         known = self.wrenches(first - 1 + before, count + 3 - before)
         return np.pad(known, ((before, after), (0, 0)), mode="reflect", reflect_type="odd")
