@@ -1,4 +1,4 @@
-"""A recording of any length with 60 channels: a virtual measurement, repeated with soft seams, its noise never twice."""
+"""A recording of any length with 60 channels: a virtual measurement repeated with soft seams, noise never twice."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -17,7 +17,8 @@ from validation.cases.hub_forces import r19
 
 PERIOD, SEAM, BLOCK = 1e-3, 1000, 60_000
 """s; samples over which a repetition fades into the next; samples made at once."""
-PLACES = {"acc fl": (1.2, 0.6, 0.6), "acc fr": (1.2, -0.6, 0.6), "acc rear": (-1.3, 0.0, 0.6), "acc roof": (0.0, 0.0, 1.4)}
+PLACES = {"acc fl": (1.2, 0.6, 0.6), "acc fr": (1.2, -0.6, 0.6), "acc rear": (-1.3, 0.0, 0.6),
+          "acc roof": (0.0, 0.0, 1.4)}  # fmt: skip
 NOISE = {"force": 8.0, "moment": 1.0, "angle": 1.75e-3, "angular rate": 5e-3, "acceleration": 0.01, "travel": 1e-5}
 """Standard deviations on every sample, SI."""
 SEED = 81
