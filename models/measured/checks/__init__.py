@@ -20,8 +20,9 @@ CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
 )  # fmt: skip
 """In this order: what an earlier one has named, a later one does not name again."""
 FAMILIES = defaultdict(frozenset[str], {
-    **dict.fromkeys(("sign", "unit", "gain", "weight", "gravity"), frozenset({"size"})),
-    "noise": frozenset({"size", "value"}), "shift": frozenset({"time"}), "rigid": frozenset({"size", "time", "value"}), "clipped": frozenset({"value"}),
+    **dict.fromkeys(("sign", "unit", "gain", "weight", "gravity"), frozenset({"size"})), "shift": frozenset({"time"}),
+    "clipped": frozenset({"value"}), "noise": frozenset({"size", "value"}),
+    "rigid": frozenset({"size", "time", "value"}),
 })  # fmt: skip
 """What the findings of a check are about: two of one kind about one channel say the same thing twice."""
 ORDER: tuple[Weight, ...] = ("error", "doubt", "note")

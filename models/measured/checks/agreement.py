@@ -28,6 +28,7 @@ SMALL_DELAY, SMALL_FACTOR = 5e-4, 0.01
 """s and a share: what is smaller does no harm, and no vehicle file is good enough to tell."""
 FAULTS = 8
 """Faults looked for at the most."""
+TINY = float(np.finfo(float).tiny)
 SMOOTHED = 9
 """Lines over which the unexplained spectrum is averaged."""
 
@@ -63,7 +64,8 @@ class Agreement:
     """Cross spectra and the vehicle between them, at frequencies (f,) in Hz.
 
     between (f, k, c) : mean of reading times conj(force); forces (f, c, c); readings (f, k) : powers. response
-    (f, k, c) : of the vehicle, with every correction so far. averages : independent ones in each mean.
+    (f, k, c) : of the vehicle, with every correction so far. averages : independent ones in each mean. noise
+    (k,) : power of the readings' white noise in every line.
     """
 
     frequencies: np.ndarray
@@ -74,6 +76,7 @@ class Agreement:
     readings: np.ndarray
     response: np.ndarray
     averages: float
+    noise: np.ndarray
 
     @cached_property
     def expected(self) -> np.ndarray:
@@ -88,8 +91,10 @@ class Agreement:
 
     @property
     def unexplained(self) -> np.ndarray:
-        """Root of the unexplained share (k,) of every reading's power."""
-        return np.sqrt(self.left.sum(axis=0) / self.readings.sum(axis=0))
+        """Root of the share (k,) of every reading's power that neither forces nor noise explain."""
+        noise = len(self.frequencies) * self.noise
+        share = (self.left.sum(axis=0) - noise) / np.maximum(self.readings.sum(axis=0) - noise, noise + TINY)
+        return np.sqrt(np.maximum(share, 0.0))
 
     @property
     def weights(self) -> np.ndarray:
@@ -98,7 +103,7 @@ class Agreement:
         known = KNOWN**2 * np.maximum(self.expected, 1e-3 * self.expected.mean(axis=0))
         padded = np.pad(self.left + known, ((SMOOTHED // 2, SMOOTHED // 2), (0, 0)), mode="edge")
         smooth = [np.convolve(row, kernel, "valid") for row in padded.T]
-        return self.averages / np.maximum(np.stack(smooth, axis=1), np.finfo(float).tiny)
+        return self.averages / np.maximum(np.stack(smooth, axis=1), TINY)
 
     def search(self) -> tuple["Agreement", tuple[Fault, ...]]:
         """All faults, the worst first, and what is left without them."""

@@ -9,6 +9,7 @@ import numpy as np
 from models.hub_forces.cut_vehicle import GRAVITY, CutVehicle
 from models.measured.checks.agreement import Agreement, Fault
 from models.measured.checks.means import mean
+from models.measured.checks.noise_floor import noise
 from models.measured.checks.place import Place
 from models.measured.checks.ratios import wrong
 from models.measured.checks.response import AXES, Response
@@ -111,7 +112,13 @@ class Evidence:
         forces, felt = (np.array([self.coarse.get(s, 1.0) for s in each]) for each in (self.forces, self.inertial))
         response = response[:, :, hubs] / forces * felt[:, None]
         return Agreement(found.frequencies, self.forces, self.inertial, found.cross[:, :c, :c],
-                         found.cross[:, c:, :c], readings, response, found.averages)  # fmt: skip
+                         found.cross[:, c:, :c], readings, response, found.averages, self._noise)  # fmt: skip
+
+    @property
+    def _noise(self) -> np.ndarray:
+        """Power of the inertial signals' noise in every line of their spectra."""
+        assert self._spectra is not None
+        return self._spectra.white * np.square([noise(self.recording, s) for s in self.inertial])
 
     @property
     def _places(self) -> tuple[Place, ...]:

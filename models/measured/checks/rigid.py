@@ -6,7 +6,7 @@ import numpy as np
 
 from models.errors import InputError
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.noise import noise
+from models.measured.checks.noise_floor import noise
 from models.measured.checks.place import Place
 from models.measured.finding import Finding
 from models.measured.signal import Signal

@@ -21,12 +21,14 @@ OVERLAPPING = 0.75
 class Spectra:
     """Means over segments: cross (f, n, n) = mean of X_i conj(X_j) at frequencies (f,) in Hz.
 
-    averages : how many independent ones, by line; segments with a sample that is missing are left out.
+    averages : how many independent ones; segments with a sample that is missing are left out. white : power in every
+    line of white noise of variance 1.
     """
 
     frequencies: np.ndarray
     cross: np.ndarray
     averages: float
+    white: float
 
 
 def spectra(recording: Recording, signals: tuple[Signal, ...], band: tuple[float, float]) -> Spectra | None:
@@ -45,4 +47,4 @@ def spectra(recording: Recording, signals: tuple[Signal, ...], band: tuple[float
             found += 1
     if found < LEAST:
         return None
-    return Spectra(frequencies[own], cross / found, max(1.0, OVERLAPPING * found))
+    return Spectra(frequencies[own], cross / found, max(1.0, OVERLAPPING * found), float(np.sum(window**2)))

@@ -6,7 +6,6 @@ from models.measured.checks.evidence import Evidence
 from models.measured.checks.ratios import sentence
 from models.measured.checks.spectra import Spectra, spectra
 from models.measured.finding import Finding
-from models.measured.recording import Recording
 from models.measured.signal import Signal
 
 NAME = "turning"
@@ -14,8 +13,8 @@ BAND = 0.5, 12.0
 """Hz."""
 COHERENT = 0.8
 """Squared coherence of lines that are used; below it noise speaks."""
-LATE = 1e-3
-"""s: smaller shifts are not named."""
+LATE, LINES = 1e-3, 8
+"""s, and coherent lines: smaller shifts, or shifts by fewer, are not named; nor any where hub forces tell better."""
 
 
 def check(evidence: Evidence) -> list[Finding]:
@@ -26,7 +25,7 @@ def check(evidence: Evidence) -> list[Finding]:
              and _body(evidence, rate) == _body(evidence, angle)]  # fmt: skip
     if not pairs:
         return [Finding(NAME, "note", "", "Angles were not compared with rates: no body has both of one axis.")]
-    return [finding for pair in pairs for finding in _pair(own, *pair)]
+    return [finding for pair in pairs for finding in _pair(evidence, *pair)]
 
 
 def _body(evidence: Evidence, signal: Signal) -> str:
@@ -34,7 +33,8 @@ def _body(evidence: Evidence, signal: Signal) -> str:
     return place.body if place else signal.at
 
 
-def _pair(recording: Recording, angle: Signal, rate: Signal) -> list[Finding]:
+def _pair(evidence: Evidence, angle: Signal, rate: Signal) -> list[Finding]:
+    recording = evidence.recording
     found = spectra(recording, (angle, rate), (BAND[0], min(BAND[1], 0.4 / recording.period)))
     names = f"{rate.name} and {angle.name}"
     own = _coherent(found) if found else np.zeros(0, bool)
@@ -49,10 +49,10 @@ def _pair(recording: Recording, angle: Signal, rate: Signal) -> list[Finding]:
     if wrong in ("sign", "unit"):
         return [Finding(wrong, "error", names, f"{text} Or {angle.name} is the one that is wrong.", ratio, "1",
                         (rate.name, angle.name))]  # fmt: skip
-    if abs(late) > max(LATE, 5 * error):
+    if evidence.agreement is None and np.count_nonzero(own) >= LINES and abs(late) > max(LATE, 5 * error):
         way = "late" if late > 0 else "early"
-        text = (f"{rate.name} is {1e3 * abs(late):.2f} ms {way} (+-{2e3 * error:.2g} ms at 95 %) against the derivative "
-                f"of {angle.name}: take the delay of one of them off.")  # fmt: skip
+        text = (f"{rate.name} is {1e3 * abs(late):.2f} ms {way} (+-{2e3 * error:.2g} ms at 95 %) against the "
+                f"derivative of {angle.name}: take the delay of one of them off.")  # fmt: skip
         return [Finding("shift", "doubt", names, text, late, "s", (rate.name, angle.name))]
     text = (f"{rate.name} is {ratio:.3g} times the derivative of {angle.name}, and not shifted by more than "
             f"{5e3 * error:.2g} ms.")  # fmt: skip
