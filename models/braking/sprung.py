@@ -13,7 +13,7 @@ from models.braking.plane_vehicle import Axle, Truck
 from models.errors import InputError
 from models.handling.numbers import Handling, Tyres
 from models.vehicles.free_vehicle import CARRIER, SWAY, chassis_of
-from models.vehicles.spatial import Body, Freedom, SpatialVehicle, Vector
+from models.vehicles.spatial import Freedom, SpatialVehicle, Vector
 
 ROLL, PITCH = 4, 5
 """Places of the chassis' roll and pitch among the coordinates."""
@@ -44,32 +44,26 @@ def sprung(vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5) -> 
     """A vehicle of two axles with two wheels each; spin_inertia (kg m^2): of a wheel.
 
     front : share of the front axle in the plane vehicle's load transfer by lateral acceleration, which springs know
-    here. Raises InputError for a vehicle of other axles, that cannot be steered, or whose wheels do not push it.
+    here. Raises InputError for a vehicle of other axles, or that cannot be steered.
     """
     tyres = sorted(vehicle.tyres, key=lambda tyre: (tyre.axle, -tyre.point[1]))
     if [tyre.axle for tyre in tyres] != [0, 0, 1, 1] or any(
             left.point[1] <= right.point[1] for left, right in (tyres[:2], tyres[2:])):  # fmt: skip
         raise InputError(vehicle.name, "tyres", [tyre.name for tyre in tyres], "must be two of each of two axles")
-    for tyre in tyres:
-        _check_pushes(vehicle, vehicle.body(tyre.body))
-    centred = _moved(replace(vehicle, tyres=tuple(tyres)), -centre(vehicle))
+    centred = _moved(_guided(replace(vehicle, tyres=tuple(tyres))), -centre(vehicle))
     handling = Handling(centred, Tyres(spin_inertia=0.0))
     if handling.vehicle.coordinates()[: len(LEADING)] != LEADING:
         raise ValueError("the carrier and the sway are not the first bodies")
     return Sprung(handling, _plane(centred, spin_inertia, front))
 
 
-def _check_pushes(vehicle: SpatialVehicle, wheel: Body) -> None:
-    """Refuse a wheel that only rides along: what pushes it along x would not reach the chassis at the wheel's height.
-
-    A spring along x pushes the chassis, and a wheel that rides on it does.
-    """
-    body, chassis = wheel, chassis_of(vehicle).name
-    while body.name != chassis and "x" not in body.freedoms:
-        if body.parent is None:
-            allowed = f"a braked wheel needs the freedom x, and a spring along it, or the parent {chassis!r}"
-            raise InputError(vehicle.name, f"bodies[{wheel.name}].freedoms", list(wheel.freedoms), allowed)
-        body = vehicle.body(body.parent)
+def _guided(vehicle: SpatialVehicle) -> SpatialVehicle:
+    """The vehicle with all that had no parent on its chassis, which guides it: so its wheels push the chassis where
+    they are, and the weight of the occupants leans on it, and loads balance the inertia of the whole vehicle."""
+    chassis = chassis_of(vehicle).name
+    bodies = tuple(replace(body, parent=body.parent or chassis) if body.name != chassis else body
+                   for body in vehicle.bodies)  # fmt: skip
+    return replace(vehicle, bodies=bodies)
 
 
 def centre(vehicle: SpatialVehicle) -> np.ndarray:

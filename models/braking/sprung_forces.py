@@ -32,7 +32,6 @@ from models.handling.forces import (
     COUNT,
     HEADER,
     JOINTS,
-    KNUCKLE,
     LEDGER,
     OF_TYRES,
     PER_TYRE,
@@ -41,7 +40,6 @@ from models.handling.forces import (
     SLIP_Y,
     TYRES,
     _creep,
-    _hold,
     _touch,
     enter,
     leave,
@@ -66,7 +64,8 @@ def held_forces(numbers, q, v, f, motion):
         motion[i, 0], motion[i, 1], motion[i, 2] = sum_of(way[7], way[2]), report[SLIP_Y], report[PRESS]
         found[0], found[1] = row[HELD_X], row[HELD_Y]
         _creep(own, found, way, chassis, f, tree, pushed, twisted, report)
-        _hold(-row[SPUN], way[5], int(own[KNUCKLE]), chassis, twisted)
+        for k in range(3):
+            twisted[chassis, k] -= row[SPUN] * way[5, k]
     leave(numbers, frame, tree, pushed, twisted, f, ledger)
 
 

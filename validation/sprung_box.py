@@ -1,0 +1,108 @@
+"""A box on four springs that is braked: what its loads and its pitch must be by closed forms, and runs of it."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from models.braking.brake import Brake, of_wheels
+from models.braking.controller import Command, Sample
+from models.braking.plane_vehicle import GRAVITY, truck
+from models.braking.pressure import Chambers
+from models.braking.run import Braked, Path
+from models.braking.sprung import Sprung, sprung
+from models.braking.surfaces import Stretch, road
+from models.braking.tyre_table import TyreTable, stacked
+from models.engines.braking_sprung import OnSprings
+from models.vehicles.spatial import FREEDOMS, Body, SideForce, SpatialVehicle, SpringDamper, Tyre, Vector
+from models.vehicles.vehicle_file import load_vehicle
+
+HALF, SIDE, RADIUS = 1.3, 0.7, 0.3
+SPRING, TYRE, DAMPER = 3e4, 2e5, 2e3
+SPIN = 1.7
+TENSOR = ((400.0, 0.0, 0.0), (0.0, 1500.0, 0.0), (0.0, 0.0, 1700.0))
+LOCKS = 1e5
+"""Torque (N m) that locks a wheel at once."""
+
+
+@cache
+def box(stiffer: float = 1.0, spin_inertia: float = SPIN) -> Sprung:
+    """1000 kg on four wheels of 30 kg, springs and tyres so many times as stiff, damped alike."""
+    wheels = {f"{x}{y}": (u * HALF, v * SIDE, RADIUS) for x, u in (("f", 1.0), ("r", -1.0))
+              for y, v in (("l", 1.0), ("r", -1.0))}  # fmt: skip
+    up: Vector = (0.0, 0.0, 1.0)
+    return sprung(SpatialVehicle(
+        "box",
+        (Body("chassis", 1000.0, (0.0, 0.0, 0.55), FREEDOMS, TENSOR),
+         *(Body(name, 30.0, at, ("z",)) for name, at in wheels.items())),
+        tuple(SpringDamper(name, "chassis", name, at, at, up, SPRING * stiffer, DAMPER * stiffer**0.5)
+              for name, at in wheels.items()),
+        tuple(Tyre(name, name, at, "fr".index(name[0]), TYRE * stiffer) for name, at in wheels.items()),
+        (HALF, -HALF),
+        side_forces=tuple(SideForce(name, "chassis", (x, y, 0.0), "chassis", 5e4)
+                          for name, (x, y, _) in wheels.items()),
+    ), spin_inertia)  # fmt: skip
+
+
+@cache
+def car() -> Sprung:
+    """The car of 19 freedoms, without drag."""
+    return sprung(replace(load_vehicle("r19_free"), drags=()), SPIN)
+
+
+def pitch_and_transfer(deceleration: float) -> tuple[float, float]:
+    """Pitch (rad, nose down) of the box in steady braking, and what its front axle bears more than at rest (N).
+
+    About the ground, m a h + m g (h - r) theta = K theta: the contacts go forwards with their wheels. Each axle bears
+    K theta / L of it. To first order in theta.
+    """
+    own = box().plane
+    stiffness = 4.0 * HALF**2 / (1.0 / SPRING + 1.0 / TYRE)
+    pitch = own.mass * deceleration * own.height / (stiffness - own.mass * GRAVITY * (own.height - RADIUS))
+    return pitch, stiffness * pitch / own.wheelbase
+
+
+def constant(mu: float) -> TyreTable:
+    """Friction that a locked wheel has in every direction, and none before it slides."""
+    slips, angles = np.array([0.0, 0.01, 1.0]), np.array([0.0, 0.01, np.pi / 2.0])
+    ahead, aside = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.01, 1.0])
+    x = mu * ahead[:, None, None] * np.array([0.0, 1.0, 1.0])
+    return TyreTable(angles, slips, np.array([1e3]), x, np.ones((3, 3)), mu * aside[:, None])
+
+
+class Torques:
+    """Torques (4,) in N m of the brakes of ``braked``, which stay."""
+
+    def __init__(self, *torques: float) -> None:
+        self.torques = np.array(torques)
+
+    def sample(self, given: Sample) -> Command:
+        """Always the same."""
+        return Command(pressures=self.torques)
+
+
+def braked(own: Sprung, tyre: TyreTable, engine: str | None = "mujoco", steer: float = 0.0, step: float = 5.5e-3,
+           substeps: int = 1, supply: float = 6.0, gradient: float = 1.0) -> Braked:  # fmt: skip
+    """The vehicle on one surface, brakes of 1 N m/bar that follow at once; without an engine the plane one.
+
+    steer : rad, of the front wheels; supply : bar, and gradient : N m/bar, for a controller of valves.
+    """
+    brake, none = Brake(push_out=0.0, release=0.0, rising=gradient, falling=gradient), np.zeros(4)
+    return Braked(
+        truck(own.plane), none.astype(int), stacked([tyre]), tyre.cornering, road([Stretch(0.0, 0, 0)]),
+        of_wheels(brake, brake, brake, brake), Chambers(none + 0.03, none + 0.02, supply),
+        np.array([steer, steer, 0.0, 0.0]), substeps=substeps, sample=step,
+        engine=None if engine is None else OnSprings(engine, own), sprung=None if engine is None else own,
+    )  # fmt: skip
+
+
+def stays(vehicle: Braked, path: Path, duration: float = 2.0) -> float:
+    """Largest speed (m/s) over ground in a time (s) after a stop, the wheels' turning included."""
+    state, turning, found = path.states[-1].copy(), path.turning[-1].copy(), np.zeros(3)
+    report, largest = np.zeros((4, path.reports.shape[2])), 0.0
+    torques = np.tile(path.torques[-1], (2, 1))
+    for _ in range(round(duration / vehicle.sample)):
+        vehicle.engine.advance(state, turning, torques, vehicle.sample, vehicle.steer, vehicle.slope, vehicle.plane,
+                               vehicle.kind, vehicle.road, vehicle.tables.packed, found, report)  # fmt: skip
+        largest = max(largest, float(np.hypot(*state[1, :2])), float(np.abs(turning * vehicle.plane.radius).max()))
+    return largest
