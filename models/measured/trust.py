@@ -74,6 +74,12 @@ class Drift:
         """Error (rad) from which on the section forces of a free run are not trusted."""
         return ANGLE if self.frame == "inertial" else UPRIGHT
 
+    @property
+    def trusted(self) -> float:
+        """Time (s) until which the section forces of a free run are trusted; at most that of the run."""
+        passed = self.passes(self.angle)
+        return float(self.times[-1]) if passed is None else passed
+
     def trust(self, angle: float | None = None) -> Trust:
         """Times by source; ``angle`` (rad) other than that of the section forces: 0.05 rad for the motion itself."""
         limit = self.angle if angle is None else angle

@@ -21,6 +21,9 @@ from models.measured.comparison import Compared
 from models.measured.section_run import DAMPING, Hold, Outcome
 from models.measured.virtual import VirtualMeasurement
 
+LIMITS = Limits(artificial_share=0.1)
+"""From where on a run is not good enough. A pull of 5 Hz, whose moment is 12 % of what turns the chassis, takes 5 % off
+the damage of engine mounts on a rough road; one of 0.7 Hz 2 % of it and 1 %."""
 DISAGREES = 0.15
 """Rms of the error of a check channel by its own, both without means and without what is known to be noise: a gain
 wrong by 5 % and a delay of 2 ms at 10 Hz together stay below it."""
@@ -30,7 +33,7 @@ EFFECTS = {"kalman": {"kalman_filter"}, "prescribed": {"prescribed_pitch"}, "non
 """Methods of holding a run, by the names that ``score`` has for them."""
 
 
-def judge(run: Outcome, vehicle: CutVehicle, hold: Hold, sampled: float, limits: Limits | None = None,
+def judge(run: Outcome, vehicle: CutVehicle, hold: Hold, sampled: float, limits: Limits = LIMITS,
           trusted: float | None = None, compared: Sequence[Compared] = (),
           noise: Mapping[str, float] | None = None) -> Verdict:  # fmt: skip
     """The verdict of an engineer, who has no true run.
@@ -38,7 +41,6 @@ def judge(run: Outcome, vehicle: CutVehicle, hold: Hold, sampled: float, limits:
     sampled : s, sampling period of the recording. trusted : s, predicted for a free run (``trust``), None if not known.
     compared : check channels beside the run; noise : name -> standard deviation of the white noise of each, in SI.
     """
-    limits = limits or Limits()
     shares = {own.signal.name: disagreement(own, (noise or {}).get(own.signal.name, 0.0)) for own in compared}
     off = {name: share for name, share in shares.items() if not share <= DISAGREES}
     found = score.blind_verdict(own_figures(run, vehicle), EFFECTS[hold.method], run.period * (run.done - 1), limits,
@@ -49,11 +51,11 @@ def judge(run: Outcome, vehicle: CutVehicle, hold: Hold, sampled: float, limits:
     return Verdict("rejected", f"channels that were not put in disagree (at most {DISAGREES:.0%}): {told}")
 
 
-def judge_beside_truth(run: Outcome, true: VirtualMeasurement, hold: Hold, limits: Limits | None = None,
+def judge_beside_truth(run: Outcome, true: VirtualMeasurement, hold: Hold, limits: Limits = LIMITS,
                        slope: float = SLOPE) -> Verdict:  # fmt: skip
     """The verdict on a run of a virtual measurement, beside the true one."""
     found = errors(run, true, slope)
-    return score.verdict(own_figures(run, true.vehicle), found, EFFECTS[hold.method], limits or Limits())
+    return score.verdict(own_figures(run, true.vehicle), found, EFFECTS[hold.method], limits)
 
 
 def own_figures(run: Outcome, vehicle: CutVehicle) -> Own:

@@ -175,9 +175,9 @@ def travels(vehicle: CutVehicle, run: HubRun, drive: Drive) -> np.ndarray:
     return model.reported(run.times, run.states).elements
 
 
-def map_lines(signals: tuple[Signal, ...], file: str) -> str:
-    """The scene's table of a file that holds these channels, as TOML."""
-    lines = ["[[files]]", f'file = "{file}"', "channels = ["]
+def map_lines(signals: tuple[Signal, ...], file: str, offset: float = 0.0) -> str:
+    """The scene's table of a file that holds these channels, as TOML; ``offset`` (s) is added to its clock."""
+    lines = ["[[files]]", f'file = "{file}"', *([f"offset = {offset}"] if offset else []), "channels = ["]
     for signal in signals:
         entry = {"channel": signal.channel, "quantity": signal.quantity, "at": signal.at, "component": signal.component,
                  "frame": signal.frame}  # fmt: skip
