@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from models.drift.score import Verdict
 from models.drift.trust import ANGLE
 from models.errors import RunFailed
 from models.hub_forces.cut_vehicle import CutVehicle
@@ -16,8 +17,10 @@ from models.measured.checks import check as findings_of
 from models.measured.checks.noise_floor import noise
 from models.measured.checks.place import Place
 from models.measured.clock import record
+from models.measured.comparison import Compared, checks, compare
 from models.measured.counting import Counted, count
 from models.measured.finding import Finding
+from models.measured.hand_on import NAME, forces, hand_on
 from models.measured.pattern import write_pattern
 from models.measured.recording import Recording
 from models.measured.scene import MeasuredScene
@@ -26,6 +29,7 @@ from models.measured.section_run import run as march
 from models.measured.sections import Answer, Sections, points
 from models.measured.signal import Quantity
 from models.measured.trust import Drift, Level, drift
+from models.measured.verdict import judge
 from models.measured.virtual import VirtualMeasurement, virtual_measurement
 from models.strict import Strict, read
 from models.systems import load
@@ -54,7 +58,11 @@ class Found:
     virtual: VirtualMeasurement | None = None
     findings: tuple[Finding, ...] = ()
     drift: Drift | None = None
+    holds: dict[str, Hold] = field(default_factory=dict)
     runs: dict[str, Outcome] = field(default_factory=dict)
+    verdicts: dict[str, Verdict] = field(default_factory=dict)
+    compared: tuple[Compared, ...] = ()
+    handed: tuple[Path, ...] = ()
     failed: dict[str, str] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
 
@@ -64,9 +72,14 @@ class Found:
         return any(finding.weight == "error" for finding in self.findings)
 
     @property
-    def held(self) -> Outcome | None:
+    def chosen(self) -> str:
         """The run that is handed on: with the stabiliser, or free where the scene names none."""
-        return self.runs.get(self.scene.stabilise.method, self.runs.get(FREE))
+        return FREE if self.scene.stabilise.method == "none" else self.scene.stabilise.method
+
+    @property
+    def held(self) -> Outcome | None:
+        """The same; None where none was made."""
+        return self.runs.get(self.chosen)
 
     def counted(self, run: Outcome, answer: Answer) -> Counted:
         """Damage, level crossings and range pairs of one answer of a run."""
@@ -109,6 +122,11 @@ def compute(scene: MeasuredScene, engine: str, folder: Path, progress: Progress 
         found.drift = _predicted(found)
         _run(found, work, progress)
         watch.lap("runs")
+        if found.held is not None:
+            _judged(found)
+            progress("files", 0.95)
+            _handed(found, folder)
+            watch.lap("files")
     return found
 
 
@@ -167,19 +185,54 @@ def _began(own: Recording, what: str, axis: str, chassis: str) -> float:
 
 def _run(found: Found, work: Path, progress: Progress) -> None:
     """Free, and with the stabiliser that the scene names; a run that fails keeps what it has."""
-    scene, own = found.scene, found.scene.stabilise
-    sections = Sections(found.vehicle, points=points(found.vehicle, found.recording.signals, _places(scene)))
-    hold = Hold(own.method, own.bandwidth, own.model, own.smoothing, **_noise(found))
-    holds = {FREE: Hold("none")} | ({own.method: hold} if own.method != "none" else {})
-    for i, (name, hold) in enumerate(holds.items()):
-        job = SectionRun(found.vehicle, found.recording, sections, found.engine, hold, scene.run.step, scene.file)
-        told = _left(f"{name} run", progress, 0.2 + 0.7 * i / len(holds), 0.7 / len(holds))
+    own, noise = found.scene.stabilise, _noise(found)
+    found.holds = {FREE: Hold("none", **noise)}
+    if own.method != "none":
+        found.holds[own.method] = Hold(own.method, own.bandwidth, own.model, own.smoothing, **noise)
+    for i, name in enumerate(found.holds):
+        told = _left(f"{name} run", progress, 0.2 + 0.7 * i / len(found.holds), 0.7 / len(found.holds))
         try:
-            found.runs[name] = march(job, work / name, told)
+            found.runs[name] = march(_job(found, name), work / name, told)
         except RunFailed as error:
             found.failed[name] = str(error)
             if isinstance(error.partial, Outcome):
                 found.runs[name] = error.partial
+
+
+def _job(found: Found, name: str) -> SectionRun:
+    """A run to be made; answers at the sections of the scene, in the chassis' axes, and at accelerometers."""
+    own = found.recording
+    sections = Sections(found.vehicle, points=points(found.vehicle, own.signals, _places(found.scene)))
+    return SectionRun(found.vehicle, own, sections, found.engine, found.holds[name], found.scene.run.step,
+                      found.scene.file)  # fmt: skip
+
+
+def _judged(found: Found) -> None:
+    """Check channels beside the run that is handed on, and the verdict on every run."""
+    assert found.drift is not None and found.held is not None
+    slopes, own = tuple(found.scene.hand_on.slopes), found.recording
+    for name, run in found.runs.items():
+        beside = tuple(compare(own, run, *pair, slopes) for pair in checks(_job(found, name)))
+        found.verdicts[name] = judge(run, found.vehicle, found.holds[name], own.period, found.scene.limits,
+                                     found.drift.passes(found.drift.angle) or own.duration,
+                                     [one for one in beside if one.signal.check])  # fmt: skip
+        if name == found.chosen:
+            found.compared = beside
+
+
+def _handed(found: Found, folder: Path) -> None:
+    """Section forces into files, in every format that the scene names; those of a killed run are left."""
+    assert found.held is not None
+    formats = [each for each in found.scene.hand_on.formats if not (folder / f"{NAME}.{each}").exists()]
+    comment = f"{found.scene.title}; computed from wheel forces, {found.chosen} run, {found.engine}"
+    hand_on(found.held, folder, formats, handed_on(found, found.held), found.recording.start, comment)
+    found.handed = tuple(folder / f"{NAME}.{each}" for each in found.scene.hand_on.formats)
+
+
+def handed_on(found: Found, run: Outcome) -> list[Answer]:
+    """Forces and moments of the sections that the scene names, all if none."""
+    wanted = found.scene.hand_on.sections
+    return [answer for answer in forces(run.answers) if wanted is None or answer.section in wanted]
 
 
 def _left(name: str, progress: Progress, begin: float, share: float) -> Callable[[float, float], None]:
@@ -225,7 +278,8 @@ def _told(found: Found) -> list[str]:
         lines.append(f"  its motion: {found.drift.trust(ANGLE)}")
     for name, outcome in found.runs.items():
         end = found.failed.get(name, "to the end")
-        lines.append(f"  {name} run: {outcome.done * outcome.period:.6g} s, {end}")
+        lines.append(f"  {name} run: {outcome.period * (outcome.done - 1):.6g} s, {end}")
+    lines += [f"  verdict on the {name} run: {own.word} ({own.reason})" for name, own in found.verdicts.items()]
     return lines
 
 

@@ -1,6 +1,7 @@
 """The page of a recording: one HTML file with everything in it, to be mailed."""
 
 import base64
+import math
 import os
 import platform
 import sys
@@ -10,24 +11,34 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from models.damage import SLOPE
+from models.drift.trust import ANGLE, Trust
+from models.measured.comparison import Band
 from models.measured.counting import Counted
 from models.measured.finding import Finding
 from models.measured.section_run import Outcome
 from models.measured.sections import Answer
-from studies.recording import FREE, Found
+from models.measured.trust import Drift
+from models.measured.verdict import DISAGREES, errors
+from studies import recording_runs as draw
+from studies.recording import FREE, Found, handed_on
 
 TEMPLATE = "recording.html.jinja"
+NAMES = {FREE: "free run", "kalman": "run held by the Kalman filter", "prescribed": "run held to measured angles"}
+STILL = 1e-6
+"""N, N m: what changes by less is rounding."""
 DRAWN = 6
 """Section forces drawn at the most; all of them are in the table and in the files."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """Heads, and rows of text; ``numbers`` if all but the first column are."""
+    """Heads, and rows of text; ``numbers`` if all but the first column are; ``folded`` behind this summary if any."""
 
     heads: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     numbers: bool = True
+    folded: str = ""
 
 
 @dataclass(frozen=True)
@@ -88,7 +99,21 @@ def _verdict(found: Found) -> dict[str, str]:
         return {"kind": "bad", "threshold": "Threshold: no error in the recording.", "word": "Stopped: nothing was run",
                 "why": f"{errors} error(s) were found in the recording. Correct them in the file or in the channel "
                        "map, and run again."}  # fmt: skip
-    return {"kind": "idle", "threshold": "", "word": "", "why": ""}
+    if found.held is None:
+        return {"kind": "bad", "threshold": "Threshold: a run.", "word": "Failed", "why": _ended(found, found.chosen)}
+    own, limits = found.verdicts[found.chosen], found.scene.limits
+    free = "" if found.chosen == FREE else f" The free run: {found.verdicts[FREE].word} ({found.verdicts[FREE].reason})."
+    return {"kind": {"accepted": "good", "rejected": "bad"}.get(own.word, "idle"), "word": own.word.capitalize(),
+            "why": f"{NAMES[found.chosen].capitalize()}: {own.reason}.{free}",
+            "threshold": f"Threshold: held to measured angles with an artificial moment of at most "
+                         f"{limits.artificial_share:.0%} of what turns the {found.vehicle.chassis} (up to 15 Hz), "
+                         f"angles known to {limits.pitch_error:g} rad, and no check channel off by more than "
+                         f"{DISAGREES:.0%}; or free, and shorter than it can be trusted."}  # fmt: skip
+
+
+def _ended(found: Found, name: str) -> str:
+    """How a run ended."""
+    return f"{NAMES[name].capitalize()}: " + found.failed.get(name, "went to the end") + "."
 
 
 def _tiles(found: Found) -> list[dict[str, str]]:
@@ -107,56 +132,89 @@ def _finding(found: Found, one: Finding, folder: Path, i: int) -> dict[str, Any]
 
 def _parts(found: Found, folder: Path) -> list[Part]:
     """Chapters, as far as the recording was brought."""
-    from studies import recording_runs as draw
-
     inputs = draw.inputs_figure(found, folder / "inputs.png")
     parts = [Part("What drives the vehicle", figures=(_figure(inputs, "Forces on the hubs as they are put in."),))]
+    if found.drift is not None:
+        parts.append(_drift(found, found.drift, folder))
     if found.held is not None:
-        parts += [_drift(found, folder), _forces(found, found.held, folder)]
+        parts.append(_forces(found, found.held, folder))
+        parts += [_checks(found, folder)] if found.compared else []
     return [*parts, _map(found)]
 
 
-def _drift(found: Found, folder: Path) -> Part:
-    from studies.recording_runs import drift_figure
+def _drift(found: Found, drift: Drift, folder: Path) -> Part:
+    motion, section = drift.trust(ANGLE), drift.trust()
+    texts = (f"Before the run: the section forces of a free run are {_until(section)}, its motion is {_until(motion)}.",
+             *(_ended(found, name) for name in found.runs))  # fmt: skip
+    drawn = draw.drift_figure(found, folder / "drift.png")
+    return Part("Predicted and run", texts, figures=(_figure(drawn, "Roll and pitch of every run."),))
 
-    texts = [f"The run {'driven by the forces alone' if name == FREE else f'with the stabiliser {name!r}'} "
-             + (f"ended early: {found.failed[name]}." if name in found.failed else "went to the end.")
-             for name in found.runs]  # fmt: skip
-    drawn = drift_figure(found, folder / "drift.png")
-    return Part("How the runs went", tuple(texts), figures=(_figure(drawn, "Roll and pitch of every run."),))
+
+def _until(trust: Trust) -> str:
+    """How far a free run can be trusted, and what ends that."""
+    if trust.until is None:
+        return f"not limited by what is known (to {trust.angle:g} rad; looked at: {', '.join(trust.times)})"
+    name, time = trust.until
+    return f"trusted until {time:.3g} s (to {trust.angle:g} rad, by {name})"
 
 
 def _forces(found: Found, run: Outcome, folder: Path) -> Part:
-    from studies.recording_runs import counting_figure, forces_figure
-
-    answers = handed_on(found, run)
-    name = found.scene.stabilise.method if found.scene.stabilise.method in found.runs else FREE
-    counted = {answer: found.counted(run, answer) for answer in answers}
-    first = answers[:DRAWN]
-    figures = (_figure(forces_figure(run, first, folder / "forces.png", name),
-                       f"The first {len(first)} of {len(answers)} section forces and moments."),
-               _figure(counting_figure({a: counted[a] for a in first}, folder / "counting.png"),
+    counted = {answer: found.counted(run, answer) for answer in handed_on(found, run)}
+    moving = {answer: own for answer, own in counted.items() if own.greatest - own.least > STILL}
+    first = list(moving)[:DRAWN]
+    figures = (_figure(draw.forces_figure(run, first, folder / "forces.png", found.chosen),
+                       f"The first {len(first)} of {len(moving)} section forces and moments that change."),
+               _figure(draw.counting_figure({a: moving[a] for a in first}, folder / "counting.png"),
                        "Level crossings (how often the load rises through a level) and range pairs (rainflow cycles "
                        "of at least a range) of the same."))  # fmt: skip
-    return Part("Section forces and moments", (DAMAGE_NOTE,), (_damages(found, counted),), figures)
+    files = f"Handed on as {', '.join(path.name for path in found.handed)}."
+    still = len(counted) - len(moving)
+    none = f" {still} more are handed on that stay the same throughout." if still else ""
+    return Part("Section forces and moments", (files + none, DAMAGE_NOTE), _damages(found, run, moving), figures)
 
 
 DAMAGE_NOTE = ("Pseudo-damage is the sum over rainflow cycles (ASTM E1049-85, the residue as half cycles) of the range "
                "to the slope; compare it only with figures counted alike.")  # fmt: skip
 
 
-def handed_on(found: Found, run: Outcome) -> list[Answer]:
-    """Forces and moments of the sections that the scene names."""
-    wanted = found.scene.hand_on.sections
-    return [a for a in run.answers if a.section and a.unit in ("N", "N m") and (wanted is None or a.section in wanted)]
-
-
-def _damages(found: Found, counted: dict[Answer, Counted]) -> Table:
+def _damages(found: Found, run: Outcome, counted: dict[Answer, Counted]) -> tuple[Table, ...]:
+    """Springs, mounts and bars, and folded away guides and hubs."""
     slopes = tuple(found.scene.hand_on.slopes)
-    heads = ("section", "unit", "least", "greatest", "mean", *(f"damage, slope {slope:g}" for slope in slopes))
-    rows = [(answer.name, answer.unit, *(f"{v:.4g}" for v in (own.least, own.greatest, own.mean)),
-             *(f"{own.damage[slope]:.3e}" for slope in slopes)) for answer, own in counted.items()]  # fmt: skip
-    return Table(heads, tuple(rows))
+    names = {element.name for element in found.vehicle.elements}
+    true = errors(run, found.virtual, SLOPE).damage if found.virtual is not None else {}
+    heads = ("section", "unit", "least", "greatest", "mean", *(f"damage, slope {slope:g}" for slope in slopes),
+             *((f"damage by true one, slope {SLOPE:g}",) if true else ()))  # fmt: skip
+    rows = {answer: (answer.name, answer.unit, *(f"{v:.4g}" for v in (own.least, own.greatest, own.mean)),
+                     *(f"{own.damage[slope]:.3e}" for slope in slopes),
+                     *((f"{true[answer.section]:.3f}" if answer.section in true else "–",) if true else ()))
+            for answer, own in counted.items()}  # fmt: skip
+    inside = tuple(row for answer, row in rows.items() if answer.section in names)
+    outside = tuple(row for answer, row in rows.items() if answer.section not in names)
+    both = Table(heads, inside), Table(heads, outside, folded=f"{len(outside)} forces and moments of guides and hubs")
+    return tuple(table for table in both if table.rows)
+
+
+def _checks(found: Found, folder: Path) -> Part:
+    """Channels that were not put in, beside the run."""
+    bands = next((one.bands for one in found.compared if one.bands), ())
+    heads = ("channel", "unit", "explained", "offset", *(f"error {_band(band)}" for band in bands),
+             *(f"damage ratio, slope {slope:g}" for slope in found.scene.hand_on.slopes), "trusted")  # fmt: skip
+    rows = [(one.signal.name, one.answer.unit, f"{one.explained:.2%}", f"{one.offset:.3g}",
+             *(f"{band.error / band.measured:.1%}" if band.measured > 0 else "–" for band in one.bands),
+             *(f"{ratio:.3g}" for ratio in one.damage.values()),
+             "throughout" if one.trusted == math.inf else f"{one.trusted:g} s") for one in found.compared]  # fmt: skip
+    named = [one for one in found.compared if one.signal.check] or list(found.compared)
+    drawn = draw.overlay_figure(found, named[:DRAWN], folder / "checks.png")
+    return Part("Channels that were not put in, beside the run", (CHECKS_NOTE,), (Table(heads, tuple(rows)),),
+                (_figure(drawn, "Measured and computed."),))  # fmt: skip
+
+
+CHECKS_NOTE = ("Explained is the part of the measured variance that the run gives; errors by band are by what was "
+               "measured in that band; trusted until the error of one second exceeds half of the channel's own size.")
+
+
+def _band(band: Band) -> str:
+    return f"{band.low:g}–{band.high:g} Hz"
 
 
 def _map(found: Found) -> Part:

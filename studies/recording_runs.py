@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from models.measured.comparison import Compared, overlay
 from models.measured.counting import Counted
 from models.measured.section_run import Outcome
 from models.measured.sections import Answer
@@ -58,12 +59,25 @@ def drift_figure(found: Found, path: Path) -> Path:
     for panel, angle in zip(panels, ("roll", "pitch"), strict=True):
         for name, times, values in _angles(found, angle):
             panel.plot(*thinned(times, np.degrees(values)), color=LINES[name], label=NAMES[name], lw=1.0)
+        _expected(found, panel, angle)
         panel.set_title(f"{angle} of the {found.vehicle.chassis} [degrees]")
         _bounded(panel)
     panels[-1].set_xlabel("time [s]")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
+    figure.legend(handles, labels, loc="outside upper right", ncols=3)
     return save(figure, path)
+
+
+def _expected(found: Found, panel: Any, angle: str) -> None:
+    """Standard deviation of the free run, as predicted, about the run that is held."""
+    if found.drift is None or found.chosen == FREE or found.chosen not in found.runs:
+        return
+    times, values = next((t, v) for name, t, v in _angles(found, angle) if name == found.chosen)
+    slow = np.interp(found.drift.times, times, values)
+    spread = found.drift.deviations[:, ("roll", "pitch").index(angle)]
+    low, high = np.degrees(slow - spread), np.degrees(slow + spread)
+    panel.fill_between(found.drift.times, low, high, color=LINES[FREE], alpha=0.15, lw=0,
+                       label="free run as predicted, 1 standard deviation")  # fmt: skip
 
 
 def _angles(found: Found, angle: str) -> list[tuple[str, np.ndarray, np.ndarray]]:
@@ -126,4 +140,26 @@ def counting_figure(counted: dict[Answer, Counted], path: Path) -> Path:
     left.set_ylabel("level [kN, kN m]")
     right.set_ylabel("range [kN, kN m]")
     figure.legend(loc="outside upper right", ncols=3)
+    return save(figure, path)
+
+
+def overlay_figure(found: Found, compared: Sequence[Compared], path: Path) -> Path:
+    """Channels that were not put in beside the run: the whole, and two seconds where the error is largest."""
+    from studies.figures import plt, save
+
+    assert found.held is not None
+    figure, panels = plt.subplots(len(compared), 2, figsize=(9.5, 1.5 * len(compared) + 0.7), squeeze=False,
+                                  width_ratios=(2.4, 1))  # fmt: skip
+    for (left, right), one in zip(panels, compared, strict=True):
+        times, measured, computed = overlay(found.recording, found.held, one.signal, one.answer)
+        peak = times[int(np.nanargmax(np.abs(computed - measured)))]
+        near = np.abs(times - peak) <= 1.0
+        for values, name, label in ((measured, "measured", "measured"), (computed, found.chosen, "computed")):
+            left.plot(*thinned(times, values), color=LINES[name], lw=0.8, label=label)
+            right.plot(times[near], values[near], color=LINES[name])
+        left.set_title(f"{one.signal.name} [{one.answer.unit}]")
+        right.set_title("two seconds about the largest error", color="#555555")
+    for panel in panels[-1]:
+        panel.set_xlabel("time [s]")
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
     return save(figure, path)

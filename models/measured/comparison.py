@@ -49,9 +49,12 @@ class Compared:
 
 
 def checks(own: SectionRun) -> tuple[tuple[Signal, Answer], ...]:
-    """Every check channel that the run answers, with its answer; strains and sensors of unknown place have none."""
-    pairs = [(s, a) for s in own.recording.signals if s.check for a in own.sections.answers if _same(own, s, a)]
-    return tuple(pairs)
+    """Every channel that is not put in and that the run answers, with its answer: named as checks, and accelerations.
+
+    Strains and sensors of unknown place have none.
+    """
+    outside = [s for s in own.recording.signals if s.check or s.quantity == "acceleration"]
+    return tuple((s, a) for s in outside for a in own.sections.answers if _same(own, s, a))
 
 
 def _same(own: SectionRun, signal: Signal, answer: Answer) -> bool:

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from models.drift.score import Limits
 from models.errors import InputError
 from models.hub_forces.cut_vehicle import CutVehicle, cut
 from models.measured.signal import Frame, Quantity
@@ -108,6 +109,7 @@ class MeasuredScene(SceneFile):
     noise: Deviations = Deviations()
     stabilise: Stabilise = Stabilise()
     run: Run = Run()
+    limits: Limits = Field(default=Limits(), description="of the verdict")
     hand_on: HandOn = HandOn()
 
     def cut_vehicle(self) -> CutVehicle:
