@@ -117,7 +117,7 @@ def engineers(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
     used = utilisation(scene, surface)
     return {"z_AL": used.z, "k front": used.k.front, "k rear": used.k.rear, "k of all": used.k_vehicle,
             "adhesion utilisation epsilon": used.epsilon,
-            **({} if used.k.trailer is None else {"k trailer": used.k.trailer})}  # fmt: skip
+            **dict(zip(("k trailer front", "k trailer rear"), used.k.trailer, strict=False))}  # fmt: skip
 
 
 def compared(paths: dict[str, Path], seconds: dict[str, float]) -> list[str]:

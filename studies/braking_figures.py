@@ -5,6 +5,7 @@ from pathlib import Path as File
 import matplotlib.pyplot as plt
 import numpy as np
 
+from models.braking.hitch import hitch, on_ground, outlines
 from models.braking.measured_pressures import MeasuredPressures
 from models.braking.of_scene import plane_of, sides
 from models.braking.plan import behind
@@ -33,7 +34,7 @@ def stop_figure(scene: BrakingScene, name: str, stop: Stop, file: File,
     slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports[:, :, SLIP], np.nan)
     _wheels(axes[0, 1], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
     _wheels(axes[0, 2], stop.times, stop.path.pressures, "Pressure in each chamber", "pressure [bar]")
-    _motion(axes[1, 0], stop)
+    _motion(axes[1, 0], stop, scene.trailer is not None)
     _wheels(axes[1, 1], stop.times, stop.path.torques / 1e3, "Torque of each brake", "torque [kN m]")
     road(axes[1, 2], scene, name, stop)
     axes[0, 1].legend(ncols=2, fontsize=8)
@@ -57,11 +58,13 @@ def _wheels(axis: plt.Axes, times: np.ndarray, values: np.ndarray, title: str, l
     axis.set(xlabel="time [s]", ylabel=label, title=title)
 
 
-def _motion(axis: plt.Axes, stop: Stop) -> None:
-    """Yaw, side slip in degrees and lateral acceleration."""
+def _motion(axis: plt.Axes, stop: Stop, trailer: bool) -> None:
+    """Yaw, side slip and, of a train, the hitch in degrees; lateral acceleration."""
     axis.plot(stop.times, np.degrees(stop.path.states[:, 0, 2]), color="#0072b2", label="yaw angle [deg]")
     slip = np.where(stop.speed > SLOWEST, np.degrees(stop.side_slip), np.nan)
     axis.plot(stop.times, slip, color="#d55e00", label="side slip [deg]")
+    if trailer:
+        axis.plot(stop.times, np.degrees(hitch(stop)), color="#cc79a7", label="hitch angle [deg]")
     axis.plot(stop.times[1:], stop.across, color="#009e73", lw=0.8, label="lateral acceleration [m/s²]")
     axis.set(xlabel="time [s]", ylabel="see legend", title="Motion beside the direction of travel")
     low, high = axis.get_ylim()
@@ -71,9 +74,10 @@ def _motion(axis: plt.Axes, stop: Stop) -> None:
 
 def road(axis: plt.Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
     """The path from above with the vehicle's outline now and then, on its surfaces."""
-    x, y, yaw = stop.path.states[:, 0, 0], stop.path.states[:, 0, 1], stop.path.states[:, 0, 2]
+    x, y = stop.path.states[:, 0, :2].T
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0
-    first, last = x.min() - 6.0, x.max() + 6.0
+    behind_it = 0.0 if scene.trailer is None else scene.trailer.drawbar - scene.trailer.hook
+    first, last = x.min() - 6.0 - behind_it, x.max() + 6.0
     lacking = max(0.7 * (last - first) - (high - low), 0.0) / 2.0  # one scale both ways, in an axis of the usual shape
     low, high = low - lacking, high + lacking
     told = set[str]()
@@ -85,10 +89,10 @@ def road(axis: plt.Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
                               label=None if surface in told else surface)  # fmt: skip
             told.add(surface)
     axis.plot(x, y, color="#222222", label="centre of mass")
-    for i in np.searchsorted(stop.way, np.linspace(0.0, stop.way[-1], 6)).clip(0, len(x) - 1):
-        corners = np.array([[3.0, 1.1], [3.0, -1.1], [-3.0, -1.1], [-3.0, 1.1], [3.0, 1.1]])
-        turned = corners @ np.array([[np.cos(yaw[i]), np.sin(yaw[i])], [-np.sin(yaw[i]), np.cos(yaw[i])]])
-        axis.plot(x[i] + turned[:, 0], y[i] + turned[:, 1], color="#222222", lw=0.7)
+    plane, drawn = plane_of(scene), outlines(scene)
+    for i in np.searchsorted(stop.way, np.linspace(0.0, stop.way[-1], 6 - len(drawn) // 2)).clip(0, len(x) - 1):
+        for unit, corners in drawn:
+            axis.plot(*on_ground(unit, corners, stop.path.states[i, 0], plane).T, color="#222222", lw=0.7)
     axis.set(xlabel="x [m]", ylabel="y [m]", title="Path on the road, from above", xlim=(first, last), ylim=(low, high),
              aspect="equal")  # fmt: skip
     axis.grid(False)

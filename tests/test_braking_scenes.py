@@ -195,8 +195,8 @@ def test_what_is_wrong_behind_the_port_is_told_by_the_scene_s_key(tmp_path, port
 
 
 def test_adhesion_of_an_axle_that_does_not_lock_is_not_told():
-    weak = scene(controller={"kind": "slip_bang_bang"}, brakes={"supply": 0.5}, road={"stretches": [{"left": "dry"}]})
-    with pytest.raises(NoAdhesion, match=r"front axle does not lock at the supply's 0.5 bar"):
+    weak = scene(controller={"kind": "slip_bang_bang"}, brakes={"supply": 2.0}, road={"stretches": [{"left": "dry"}]})
+    with pytest.raises(NoAdhesion, match=r"front axle does not lock at the supply's 2 bar"):
         utilisation(weak, "dry")
 
 

@@ -4,7 +4,8 @@ The procedure of UN R13, Annex 13, appendix 2, in a simulation that repeats exac
 regulation.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from models.braking.figures_of_merit import (
     adhesion_front,
     adhesion_of_vehicle,
     adhesion_rear,
+    adhesion_trailer,
     braking_rate,
     crossing,
     mean_of_fastest,
@@ -29,7 +31,7 @@ from models.braking.scene import BrakingScene, Procedure, RoadTable, Stretch
 from models.braking.stop_report import Stop
 from models.errors import RunFailed
 
-AXLES = ("front", "rear")
+AXLES = ("front axle", "rear axle", "trailer's front axle", "trailer's rear axle")
 HALVINGS = 9
 """Of the interval in which the pressure lies at which an axle locks: 1/500 of the supply pressure."""
 LONGEST = 120.0
@@ -47,15 +49,19 @@ class NoAdhesion(RunFailed):
 
 @dataclass(frozen=True)
 class Adhesion:
-    """k of the front and of the rear axle on one surface."""
+    """k of the front and of the rear axle on one surface, and of both axles of the trailer if there is one."""
 
     front: float
     rear: float
+    trailer: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
 class Utilised:
-    """Braking rate z with the system on, k_M of the vehicle, and how much of it is used, epsilon = z / k_M."""
+    """Braking rate z with the system on, k_M of the vehicle, and how much of it is used, epsilon = z / k_M.
+
+    With a trailer all three are those of the train.
+    """
 
     z: float
     k: Adhesion
@@ -86,16 +92,28 @@ def axles(scene: BrakingScene) -> Axles:
     return Axles(front, weight - front, own.wheelbase, own.height)
 
 
-def alone(scene: BrakingScene, surface: str) -> Braked:
-    """The scene's vehicle without trailer, on one surface everywhere."""
-    plain = scene.model_copy(update={"trailer": None, "road": RoadTable(stretches=[Stretch(left=surface)])})
-    return braked(plain, Procedure())
+def behind(vehicle: Braked, z: float) -> np.ndarray:
+    """Loads (2,) in N of the trailer's axles at a deceleration z g; (0,) without one."""
+    loads = vehicle.plane.static - vehicle.plane.by_x * z * GRAVITY
+    return loads[4:].reshape(-1, 2).sum(axis=1)
+
+
+def on_one(scene: BrakingScene, surface: str, **changes: Any) -> Braked:
+    """The scene's vehicle with its trailer, if no change takes that away, on one surface everywhere."""
+    road = RoadTable(stretches=[Stretch(left=surface)])
+    return braked(scene.model_copy(update={"road": road, **changes}), Procedure())
 
 
 def adhesion(scene: BrakingScene, surface: str) -> Adhesion:
     """k of both axles of a surface, each braked alone from 50 km/h without locking; raises NoAdhesion."""
-    vehicle, own = alone(scene, surface), axles(scene)
-    return Adhesion(adhesion_front(_rate(scene, vehicle, 0), own), adhesion_rear(_rate(scene, vehicle, 1), own))
+    vehicle, own = on_one(scene, surface, trailer=None), axles(scene)
+    found = Adhesion(adhesion_front(_rate(scene, vehicle, 0), own), adhesion_rear(_rate(scene, vehicle, 1), own))
+    if scene.trailer is None:
+        return found
+    train = on_one(scene, surface)
+    rates, weight = [_rate(scene, train, axle) for axle in (2, 3)], float(train.plane.static.sum())
+    return replace(found, trailer=tuple(
+        adhesion_trailer(z, weight, float(behind(train, z)[i])) for i, z in enumerate(rates)))  # fmt: skip
 
 
 def _held_by_system(scene: BrakingScene, name: str, vehicle: Braked, speed: float) -> Path:
@@ -114,13 +132,13 @@ def _rate(scene: BrakingScene, vehicle: Braked, axle: int) -> float:
 
     low, high = 0.0, scene.brakes.supply
     if not _locks(run(high)):
-        raise NoAdhesion(f"the {AXLES[axle]} axle does not lock at the supply's {high:g} bar")
+        raise NoAdhesion(f"the {AXLES[axle]} does not lock at the supply's {high:g} bar")
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if _locks(run(middle)) else (middle, high)
     times = [_between(run(share * low), 40.0, 20.0) for share in BELOW_LOCK]
     if not np.isfinite(times).any():
-        raise NoAdhesion(f"the {AXLES[axle]} axle alone does not slow the vehicle down to 20 km/h")
+        raise NoAdhesion(f"the {AXLES[axle]} alone does not slow the vehicle down to 20 km/h")
     return braking_rate(40.0 * KMH, 20.0 * KMH, mean_of_fastest(np.array(times)))
 
 
@@ -140,9 +158,12 @@ def utilisation(scene: BrakingScene, surface: str, k: Adhesion | None = None, na
     """epsilon of the scene's system on a surface: z from 45 to 15 km/h, braked from 55 km/h; the port knows the run by
     its name."""
     own, found = axles(scene), k or adhesion(scene, surface)
-    path = _held_by_system(scene, name, alone(scene, surface), 55.0)
+    train = on_one(scene, surface)
+    path = _held_by_system(scene, name, train, 55.0)
     z = braking_rate(45.0 * KMH, 15.0 * KMH, _between(path, 45.0, 15.0))
-    return Utilised(z, found, adhesion_of_vehicle(z, found.front, found.rear, own))
+    loads = np.concatenate(([own.weight], behind(train, z)))
+    each = np.array([adhesion_of_vehicle(z, found.front, found.rear, own), *found.trailer])
+    return Utilised(z, found, float(each @ loads / loads.sum()))
 
 
 @dataclass(frozen=True)
@@ -162,9 +183,9 @@ class Split:
 def split(scene: BrakingScene, name: str) -> Split:
     """z of a split procedure from 50 km/h, between 40 and 20 km/h, and k_M of both surfaces of its first stretch."""
     own, first = scene.procedures[name], scene.road.stretches[0]
-    both = [adhesion(scene, surface) for surface in (first.left, own.right or first.right or first.left)]
-    vehicle = braked(scene.model_copy(update={"trailer": None}), own)
-    path = _held_by_system(scene, name, vehicle, 50.0)
+    alone = scene.model_copy(update={"trailer": None})
+    both = [adhesion(alone, surface) for surface in (first.left, own.right or first.right or first.left)]
+    path = _held_by_system(alone, name, braked(alone, own), 50.0)
     z = braking_rate(40.0 * KMH, 20.0 * KMH, _between(path, 40.0, 20.0))
     k = sorted(adhesion_of_vehicle(z, one.front, one.rear, axles(scene)) for one in both)
     return Split(z, k[0], k[1])

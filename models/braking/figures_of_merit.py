@@ -114,6 +114,15 @@ def adhesion_rear(z: float, axles: Axles) -> float:
     return round((z * axles.weight - ROLLING_FREE * axles.front) / axles.dynamic(z)[1], 3)
 
 
+def adhesion_trailer(z: float, weight: float, load: float) -> float:
+    """k of one axle of a trailer from the braking rate of the train (weight in N) with it alone braked: z P g / F_dyn.
+
+    load: F_dyn, N. Ours; nothing is taken off for wheels that roll, as none has rolling resistance here, and a whole
+    train's would be a third of what one axle does on ice.
+    """
+    return round(z * weight / load, 3)
+
+
 def adhesion_of_vehicle(z: float, k_front: float, k_rear: float, axles: Axles) -> float:
     """k_M = (k_f F_fdyn + k_r F_rdyn) / (P g) with the loads at the braking rate z of the anti-lock system.
 
