@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import model_validator
 
-from models.compiled import njit
+from models.compiled import lean
 from models.strict import Strict, quantity
 
 
@@ -47,7 +47,7 @@ def of_wheels(*brakes: Brake) -> Brakes:
     return Brakes(*(np.array([getattr(brake, name) for brake in brakes]) for name in Brakes._fields))
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def torque(i, pressure, before, brakes):
     """Torque (N m) of brake i at a pressure (bar) that was reached without turning back since the torque ``before``."""
     up = brakes.rising[i] * max(0.0, pressure - brakes.push_out[i])

@@ -1,7 +1,7 @@
 """What stands at the port: a controller is asked once per sample, and answers with what its valves do."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -9,8 +9,7 @@ SAMPLE = 0.0055
 """Time between two samples (s): the paper's, 182 a second."""
 
 
-@dataclass(frozen=True)
-class Sample:
+class Sample(NamedTuple):
     """What goes to the controller.
 
     number : of the sample, from 0; time : ns since the start; wheels (W,) : wheel-speed signals times the wheel's
@@ -26,8 +25,7 @@ class Sample:
     speed: float
 
 
-@dataclass(frozen=True)
-class Command:
+class Command(NamedTuple):
     """What comes back: states (W,) of the valves, or pressures (W,) in bar instead."""
 
     valves: np.ndarray | None = None

@@ -16,8 +16,8 @@ from models.braking.tyre_table import across, place
 from models.braking.wheel_step import wheel_step
 from models.compiled import lean, njit
 
-CLOSE = 1e-8
-"""Change of the accelerations (m/s^2, and rad/s^2 times 1 m) at which the loads are taken to be found."""
+CLOSE = 1e-7
+"""What is left of the accelerations' error (m/s^2, and rad/s^2 times 1 m) when the loads are taken to be found."""
 HALF_ROUNDS, PATIENCE, MOST_ROUNDS = 1, 12, 200
 """Rounds of a half step, to whose loads those of the step before are close enough for order two; rounds after which
 Anderson's method gives way to a damped one; rounds after which there is no answer."""
@@ -146,10 +146,10 @@ def respond(found, torque0, torque1, step, tables, frame, out, report):
 def stage(torque0, torque1, step, most, tables, frame, found, report):
     """Mean accelerations over a step, into ``found`` (n,): what stands there is where the search begins.
 
-    Anderson's method of depth one, damped where that does not settle, for at most so many rounds. Returns the last
-    change.
+    Anderson's method of depth one, damped where that does not settle, for at most so many rounds. Returns what is left
+    of the error: the last change, which the round has made smaller as it did the change before.
     """
-    change, out, out0, off0 = math.inf, frame.tried[0], frame.tried[1], frame.tried[2]
+    left, before, out, out0, off0 = math.inf, 0.0, frame.tried[0], frame.tried[1], frame.tried[2]
     for rounds in range(most):
         respond(found, torque0, torque1, step, tables, frame, out, report)
         change, product, square = 0.0, 0.0, 0.0
@@ -158,7 +158,8 @@ def stage(torque0, torque1, step, most, tables, frame, found, report):
             change = max(change, abs(off))
             product += off * (off - off0[a])
             square += (off - off0[a]) ** 2
-        done = not change > CLOSE or rounds == most - 1
+        left = change * min(change / before, 1.0) if before > 0.0 else change
+        done, before = not left > CLOSE or rounds == most - 1, change
         mix = min(max(product / square, -2.0), 0.75) if rounds > 0 and square > 0.0 and not done else 0.0
         for a in range(found.size):
             off0[a] = out[a] - found[a]
@@ -166,7 +167,7 @@ def stage(torque0, torque1, step, most, tables, frame, found, report):
             out0[a] = out[a]
         if done:
             break
-    return change
+    return left
 
 
 @lean

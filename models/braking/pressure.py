@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.braking.brake import torque
-from models.compiled import njit
+from models.compiled import lean, njit
 from models.errors import InputError
 
 RELEASE, HOLD, APPLY = -1, 0, 1
@@ -58,7 +58,7 @@ def still(chambers: Chambers, sample: float) -> Air:
                np.full((rows, wheels), RELEASE, dtype=np.int64))  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def chamber(pressure, valve, time, fill, empty, supply):
     """Pressure (bar) of a chamber after a time (s) with its valve in a state."""
     if valve == APPLY:
@@ -66,7 +66,7 @@ def chamber(pressure, valve, time, fill, empty, supply):
     return pressure * math.exp(-time / empty) if valve == RELEASE else pressure
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def press(valves, time, air, chambers, brakes):
     """Go on for a time (s) with valves (W,) as they are: no pressure turns back, so the torque law holds."""
     taken = 0.0

@@ -51,5 +51,4 @@ class SpeedEstimate:
 
 def speed_of(given: float, wheels: Sequence[float], estimate: SpeedEstimate) -> float:
     """The speed (m/s) that the scene gives, or the estimate if that is not a number."""
-    guess = estimate.after(wheels)
-    return guess if given != given else given
+    return estimate.after(wheels) if given != given else given

@@ -53,8 +53,8 @@ class PerWheel:
         for axle in common.select_low:
             if not (isinstance(axle, int) and 0 <= 2 * axle + 1 < wheels):
                 raise InputError("", "controller.parameters.select_low", axle, f"must be axles 0 to {wheels // 2 - 1}")
-        shared: list[tuple[int, ...]] = [(2 * axle, 2 * axle + 1) for axle in common.select_low]
-        alone: list[tuple[int, ...]] = [(i,) for i in range(wheels) if i // 2 not in common.select_low]
+        shared = [(2 * axle, 2 * axle + 1) for axle in common.select_low]
+        alone = [(i, i) for i in range(wheels) if i // 2 not in common.select_low]
         self._groups = sorted(shared + alone)
         self._logics = [logic() for _ in self._groups]
         self._common, self._pressures, self._wheels = common, pressures, wheels
@@ -69,15 +69,14 @@ class PerWheel:
         if not given.brake:
             return self._all(0.0 if self._pressures else RELEASE)
         out = [0.0] * self._wheels
-        for k, group in enumerate(self._groups):
-            wheel = min(wheels[i] for i in group)
+        for k, (first, last) in enumerate(self._groups):
+            wheel = min(wheels[first], wheels[last])
             before = self._before[k]
             gains = (wheel - before) / self._common.period - slowing if before == before else 0.0
             self._before[k] = wheel
             if speed > 0.0:
                 answer = self._logics[k].decide(1.0 - wheel / speed, gains, speed, given.supply)
-                for i in group:
-                    out[i] = answer
+                out[first] = out[last] = answer
         if speed < self._common.cut_off:
             return self._all(given.supply if self._pressures else APPLY)
         return self._said(out)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.braking.controller import Command, Controller, Sample
+from models.braking.pressure import APPLY, HOLD, RELEASE
 from models.errors import RunFailed
 
 NAMES = ("crash", "silence", "wrong length", "wrong frame", "wrong number", "not a number", "no state of a valve",
@@ -13,6 +14,8 @@ NAMES = ("crash", "silence", "wrong length", "wrong frame", "wrong number", "not
 """What a controller can do wrong: it raised, died or closed; did not answer in time; answered with too little or too
 much; what is no answer frame; to another sample; with what is no finite number; with a valve in none of
 -1, 0, 1; with a pressure below none."""
+
+STATES = frozenset((RELEASE, HOLD, APPLY))
 
 
 class ControllerFailed(RunFailed):
@@ -51,7 +54,7 @@ def checked(command: Command, given: Sample) -> Command:
         raise ControllerFailed(given, "wrong frame", "needs either valves or pressures")
     valves = command.valves
     whole = valves if isinstance(valves, np.ndarray) and valves.dtype == np.int64 else None
-    if whole is not None and whole.shape == given.wheels.shape and all(-1 <= one <= 1 for one in whole.tolist()):
+    if whole is not None and whole.shape == given.wheels.shape and STATES.issuperset(whole.tolist()):
         return command
     values = _array(command.pressures if command.valves is None else command.valves, given)
     for value in values.tolist():
@@ -59,7 +62,7 @@ def checked(command: Command, given: Sample) -> Command:
             raise ControllerFailed(given, "not a number", f"{value:g} for a wheel")
         if command.pressures is not None and value < 0.0:
             raise ControllerFailed(given, "below zero", f"a pressure of {value:g} bar")
-        if command.valves is not None and value not in (-1, 0, 1):
+        if command.valves is not None and value not in STATES:
             raise ControllerFailed(given, "no state of a valve", f"{value:g} is none of -1, 0, 1")
     return Command(pressures=values) if command.valves is None else Command(valves=values.astype(np.int64))
 

@@ -1,7 +1,7 @@
 """Faults on demand, each within a window of time: samples lost or delayed, valves stuck, teeth missing."""
 
 from collections import deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -62,7 +62,7 @@ class Faulty:
         """Its answer to signals with faults, with faults."""
         time = 1e-9 * given.time
         here = [one for one in self.faults if one.holds(time)]
-        command = self.inner.sample(replace(given, wheels=self._signals(given.wheels, here)))
+        command = self.inner.sample(given._replace(wheels=self._signals(given.wheels, here)))
         return command if command.valves is None else Command(valves=self._stuck(np.array(command.valves), here))
 
     def _signals(self, wheels: np.ndarray, here: list[Fault]) -> np.ndarray:

@@ -4,7 +4,7 @@ A signal x arrives as ``gain x + offset + noise``, and with ``bits`` it is conve
 to one of the 2^bits codes, of which the last is ``range``. Nothing named, nothing changes, not by a bit.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -77,7 +77,7 @@ class Sensed:
     def sample(self, given: Sample) -> Command:
         """Its answer to what it sees, as it arrives; a pressure that arrives as one below none is none."""
         seen = given.wheels if self.teeth is None else self.teeth(given)
-        command = self.inner.sample(replace(given, wheels=self.wheels(given.number, seen)))
+        command = self.inner.sample(given._replace(wheels=self.wheels(given.number, seen)))
         if command.pressures is None:
             return command
         return Command(pressures=np.maximum(self.pressures(given.number, np.asarray(command.pressures)), 0.0))
