@@ -29,9 +29,10 @@ from validation.hard_cases import (
 )
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, judge
 
+JUDGED = [pytest.param(case, name, id=f"{case.name}-{name}") for case in all_cases() for name in case.judged()]
 
-@pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
-@pytest.mark.parametrize("case", all_cases(), ids=lambda case: case.name)
+
+@pytest.mark.parametrize(("case", "implementation"), JUDGED)
 def test_outcome(case, implementation, tmp_path):
     outcome = judge(case, implementation, tmp_path)
     assert outcome.word == case.wanted(implementation), (outcome.error, case.tolerance, outcome.message)

@@ -4,7 +4,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 System = Literal[
-    "pitch-plane", "drift", "contact", "ride", "rolling-vehicle", "anti-lock", "hard-cases", "cost", "effects"
+    "pitch-plane", "drift", "contact", "ride", "rolling-vehicle", "anti-lock", "measured", "hard-cases", "cost",
+    "effects",
 ]
 Independence = Literal["native", "shared kernel", "closed form", "published", "none"]
 """How far the two sides are apart: separate force laws, the same force code, an exact answer, a published

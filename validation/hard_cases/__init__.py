@@ -11,7 +11,7 @@ from validation.hard_cases.case import Case
 
 FAMILIES = ("stepping", "sampled_input", "contact_points", "prescribed_pitch", "stabilisers", "invariants", "extremes",
             "accelerometers", "drift", "kalman", "covariance", "contact", "ride", "rolling",
-            "rolling_contacts", "braking")  # fmt: skip
+            "rolling_contacts", "braking", "measured_files")  # fmt: skip
 
 
 def all_cases() -> tuple[Case, ...]:

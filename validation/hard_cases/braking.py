@@ -11,13 +11,18 @@ import numpy as np
 
 from models.braking.advance import AT_REST, FINE, LIFTED, NOT_FOUND, advance
 from models.braking.brake import PAPER_FRONT, Brake, of_wheels, torque
-from models.braking.controller import Command, Sample
+from models.braking.controller import AllApplied, Command, Sample
 from models.braking.magic_formula import surface
+from models.braking.plane_chain import inertia
 from models.braking.plane_step import REPORTED
 from models.braking.plane_vehicle import GRAVITY, PAPER, Plane, truck
 from models.braking.port.ask import checked
+from models.braking.procedures import check_engine, drive, ready
 from models.braking.quarter import Quarter, braked
+from models.braking.run import Start
+from models.braking.scene import BrakingScene, build
 from models.braking.surfaces import Road, Stretch, check_way, road
+from models.braking.trailer import CHOSEN, train
 from models.braking.tyre_table import Tables, TyreTable, stacked
 from models.engines.braking import Carried
 from models.errors import InputError, RunFailed
@@ -201,6 +206,74 @@ def lifting(implementation: str, folder: Path) -> float:
     return np.inf
 
 
+def jackknifed(implementation: str, folder: Path) -> float:
+    """A train folded by 100 degrees, all wheels locked on dry road: largest gain of energy over 0.4 s, by the first."""
+    plane = train(PAPER, CHOSEN, transfer=False)
+    state, spin = start(plane)[0], np.zeros(plane.wheels)
+    state[0, 3:] = np.radians(-100.0)
+
+    def energy() -> float:
+        mass, rest = np.zeros((5, 5)), np.zeros(5)
+        inertia(state[0], state[1], plane.masses, plane.inertias, plane.reach, mass, rest, rest.copy(), rest.copy())
+        return float(0.5 * state[1] @ mass @ state[1])
+
+    levels = [energy()]
+    for _ in range(20):
+        motion(implementation, plane, stacked([DRY]), EVEN, np.full((5, plane.wheels), 2e4), 5e-3, state, spin)
+        levels.append(energy())
+    found = np.diff(levels)
+    return float(max(found.max(), 0.0) / levels[0]) if levels[-1] < 0.8 * levels[0] else np.inf
+
+
+def lagging_at_rest(implementation: str, folder: Path) -> float:
+    """Braked to a stop in a slide on tyres that lag, then watched for 1 s: way and speed since it rests (m, m/s)."""
+    scene = braking_scene(relaxation={"front": 0.5, "rear": 0.5}, run={"duration": 3.0})
+    check_engine(scene, implementation)
+    vehicle, begun = ready(scene, "stop")
+    begun.state[1, 1] = 0.2
+    path = vehicle.run(AllApplied(4), begun, 3.0)
+    rest = Start(path.states[-1].copy(), path.turning[-1].copy())
+    after = vehicle.run(AllApplied(4), rest, 1.0)
+    moved = np.abs(after.states[:, 0] - rest.state[0]).max() + np.abs(after.states[:, 1]).max()
+    return float(moved) if path.stands else np.inf
+
+
+def on_the_line(implementation: str, folder: Path) -> float:
+    """A wheel exactly on the line between dry and ice: way against that on the left surface alone (m)."""
+    both = stopping(implementation, DRY, 2e3, own=road([Stretch(0.0, 0, 1)]), more=(ICE,))
+    return abs(both - stopping(implementation, DRY, 2e3))
+
+
+def no_friction_on_one_side(implementation: str, folder: Path) -> float:
+    """The truck locked, none on the left, 0.8 on the right, for 5 ms: speed lost against mu g t / 2, relative."""
+    plane = truck(PAPER, transfer=False)
+    state, _ = start(plane)
+    tyres = stacked([bent((0.0, 0.0), (1.0, 0.0)), bent((0.0, 0.0), (1.0, 0.8))])
+    motion(implementation, plane, tyres, road([Stretch(0.0, 0, 1)]), np.full((6, 4), 2e4), 1e-3, state, np.zeros(4))
+    return abs((SPEED - state[1, 0]) / (0.4 * GRAVITY * 5e-3) - 1.0) if state[1, 2] < 0.0 else np.inf
+
+
+def slope_changes(implementation: str, folder: Path) -> float:
+    """From dry on to wet within a step of 20 ms, lightly braked: way against that of the same force, relative."""
+    force = LOAD * float(np.interp(0.004, DRY.slips, DRY.mu_x[0, 0]))
+    own = road([Stretch(0.0, 0, 0), Stretch(5.03, 1, 1)])
+    way = stopping(implementation, DRY, ONE.steady_torque(0.004, force), step=2e-2, turning=0.996 * SPEED / ONE.radius,
+                   own=own, more=(surface("wet"),))  # fmt: skip
+    return abs(way / (ONE.mass * SPEED**2 / (2.0 * force)) - 1.0)
+
+
+def all_open(implementation: str, folder: Path) -> float:
+    """Valves that stay open, on ice: speeds that are left of the vehicle and of its wheels (m/s, rad/s)."""
+    path = drive(braking_scene(run={"duration": 10.0}), "stop", implementation)
+    return float(np.abs(path.states[-1, 1]).max() + np.abs(path.turning[-1]).max()) if path.stands else np.inf
+
+
+def braking_scene(**tables: Any) -> BrakingScene:
+    """The truck from 3 m/s on ice without anti-lock system."""
+    plain = {"title": "hard", "system": "braking", "procedures": {"stop": {"speed": 3.0}}, "pressure": {}}
+    return build({**plain, **tables})
+
+
 def below_push_out(implementation: str, folder: Path) -> float:
     """Torque (N m) of a brake below its push-out pressure."""
     return float(torque(0, 0.99 * PAPER_FRONT.push_out, 0.0, of_wheels(PAPER_FRONT)))
@@ -271,6 +344,16 @@ CASES = (
     Case("truck on even friction", "rounding left and right", "does not yaw", "m, rad, rad/s", 0.0, "exact", even),
     Case("truck on split friction in a mirror", "sides exchanged", "mirror image", "m, rad", 1e-12, "rounding",
          mirrored),
+    Case("train that jackknifes, locked", "the drawbar folded under it", "gains no energy", "", 1e-12, "rounding",
+         jackknifed),
+    Case("tyres that lag, at standstill", "the tyre is a spring there", "stays at rest", "m, m/s", 0.0, "exact",
+         lagging_at_rest, {"exudyn": "refused", "mujoco": "refused"}),
+    Case("wheel exactly on the line", "of split friction", "as on the left surface", "m", 0.0, "exact", on_the_line),
+    Case("no friction on one side", "wheels without any force", "mu g t / 2", "", 1e-4, "it has begun to yaw",
+         no_friction_on_one_side),
+    Case("slope of friction changes within a step", "from dry on to wet, 20 ms", "m v^2 / (2 F)", "", 1e-4,
+         "the wheel takes up another slip", slope_changes),
+    Case("valves open for ever", "all wheels lock", "comes to rest", "m/s, rad/s", 0.0, "exact", all_open),
     Case("pressure below push-out", "hysteresis would pull it below 0", "no torque", "N m", 0.0, "exact",
          below_push_out),
     Case("truck that lifts its rear wheels", "the plane has no lift-off", "fails, and says when", "", 0.0, "exact",

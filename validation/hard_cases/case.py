@@ -24,6 +24,7 @@ class Case:
     expected : the outcome where it is not "right"
     against : how far the answer it is judged by is from the implementations
     naive : measures what an obvious build without the guard or rule does, as a phrase; None if nothing is shown
+    once : whether no implementation has a part in it, so that it is judged once for all of them
     """
 
     name: str
@@ -36,10 +37,15 @@ class Case:
     expected: Mapping[str, Word] = field(default_factory=dict)
     naive: Callable[[Path], str] | None = None
     against: Independence = "closed form"
+    once: bool = False
 
     def wanted(self, implementation: str) -> Word:
         """The outcome that this case must have in one implementation."""
         return self.expected.get(implementation, "right")
+
+    def judged(self) -> tuple[str, ...]:
+        """The implementations in which it is judged."""
+        return IMPLEMENTATIONS[:1] if self.once else IMPLEMENTATIONS
 
     def independence(self, implementation: str) -> Independence:
         """The tight solution has the equations of the reference: to it alone they are shared."""

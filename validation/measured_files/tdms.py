@@ -154,7 +154,7 @@ FILES = (
     Odd("TDMS of no samples", "channels that were never written to", channels(one("Fz", FZ[:0])), "refused",
         "no samples"),
     Odd("TDMS with texts", "remarks of the driver in a channel", channels(one("Fz", FZ), one("remark",
-        ["a"] * COUNT)), "right", truth=prefix(Fz=FZ)),
+        ["a"] * COUNT)), "named", "no numbers: 'remark'", prefix(Fz=FZ)),
     Odd("TDMS of whole numbers", "16 bits of a converter", channels(one("Fz",
         (1000 + np.arange(COUNT)).astype("i2"))), "right", truth=prefix(Fz=1000.0 + np.arange(COUNT))),
     Odd("TDMS with the same name twice", "one in each group", channels(("a", "Fz", FZ, CLOCK), ("b", "Fz", FX,

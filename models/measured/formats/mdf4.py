@@ -30,6 +30,8 @@ from models.measured.formats.opened import Opened, Span, notice, readable, told_
 
 SECONDS = 1
 """Synchronisation type of a master channel that counts seconds (MDF 4; that of MDF 3 always does)."""
+ALL_INVALID = 1
+"""Flag of a channel of MDF 4 that was never measured."""
 LOCAL, OFFSET = 1, 2
 """Flags of the start in MDF 4: local time of an unknown zone, offset to UTC is valid."""
 PLAIN = {3: {0, 1, 2, 3, 9, 10, 11, 12, 13, 14, 15, 16}, 4: {0, 1, 2, 3, 4, 5}}
@@ -92,6 +94,7 @@ def unheard() -> Iterator[None]:
 
 def _block(mdf: Any, group: int, indices: list[int], first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Times and values of some records, loaded once: the public calls load them, or the file, anew for each channel."""
+    getattr(mdf._mdf, "_invalidation_cache", {}).clear()  # it knows a block by its length, and takes the one before
     parts = list(mdf._mdf._load_data(mdf.groups[group], record_offset=first, record_count=count))
     times = np.concatenate([mdf.get_master(group, data=part) for part in parts])
     values = [np.concatenate([_values(mdf, group, i, part) for part in parts]) for i in indices]
@@ -99,8 +102,11 @@ def _block(mdf: Any, group: int, indices: list[int], first: int, count: int) -> 
 
 
 def _values(mdf: Any, group: int, index: int, part: Any) -> np.ndarray:
-    """Physical values (n,) of one channel in some records, NaN where they are marked as invalid."""
-    samples, invalid = mdf.get(group=group, index=index, data=part, samples_only=True)
+    """Physical values (n,) of one channel in some records, NaN where they are marked as invalid.
+
+    What the library calls to ignore the marks is to hand them over; it would leave out the samples otherwise.
+    """
+    samples, invalid = mdf.get(group=group, index=index, data=part, samples_only=True, ignore_invalidation_bits=True)
     values = np.asarray(samples, float)
     return values if invalid is None else np.where(np.asarray(invalid, bool), np.nan, values)
 
@@ -134,11 +140,12 @@ def _listed(path: Path, mdf: Any, version: int, found: list[Finding]) -> MdfFile
         for i, channel in enumerate(group.channels):
             if i == mdf.masters_db.get(g):
                 continue
-            if _numeric(group, i, version):
+            why = _unusable(group, i, version)
+            if why:
+                left.add(why, repr(channel.name))
+            else:
                 places.append((g, i))
                 channels.append(channel)
-            else:
-                left.add("no numbers", repr(channel.name))
     found = found + left.findings(path)
     if not places:
         raise InputError(path, "channels", None, "; ".join(["no channel of numbers over time is in the file",
@@ -165,12 +172,15 @@ def _useless(mdf: Any, g: int, version: int) -> str:
     return ""
 
 
-def _numeric(group: Any, i: int, version: int) -> bool:
-    """Whether a channel holds one number per sample."""
+def _unusable(group: Any, i: int, version: int) -> str:
+    """Why a channel is no number per sample; empty where it is."""
     channel = group.channels[i]
     conversion = 0 if channel.conversion is None else channel.conversion.conversion_type
-    return (channel.channel_type == 0 and channel.data_type in PLAIN[version] and conversion in CONVERSIONS[version]
-            and not group.channel_dependencies[i])  # fmt: skip
+    if version == 4 and channel.flags & ALL_INVALID:
+        return "marked as invalid by the recorder"
+    numbers = (channel.channel_type == 0 and channel.data_type in PLAIN[version]
+               and conversion in CONVERSIONS[version] and not group.channel_dependencies[i])  # fmt: skip
+    return "" if numbers else "no numbers"
 
 
 def _resolution(channel: Any, version: int) -> float:

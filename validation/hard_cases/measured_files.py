@@ -1,0 +1,76 @@
+"""Measurement files that are damaged or odd: read right, read as far as they go and said, or refused; never silent."""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from models.measured.formats.mdf4 import opened as mdf4_opened
+from models.measured.formats.tdms import Bounded, opened
+from validation.hard_cases.case import IMPLEMENTATIONS, Case
+from validation.measured_files import csv, mdf4, rpc3, tdms
+from validation.measured_files.odd import FX, FZ, TOLERANCE, Odd, Sweep, cut
+
+CHECKS = {
+    "right": "times, values and names as they were written",
+    "named": "times, values and names as far as they go, and the doubt is named",
+    "refused": "refused with file and place; nothing is written",
+}
+
+
+def cut_number(folder: Path) -> str:
+    """What numpy makes of a number that was cut off."""
+    path = cut(csv.text()(folder), len(csv.plain()) - 3)
+    last = np.genfromtxt(path, delimiter=",", skip_header=1)[-1, 2]
+    return f"numpy reads the last value as {last:g}, which was {FX[-1]:g}"
+
+
+def invalid_samples(folder: Path) -> str:
+    """What asammdf makes of samples marked as invalid."""
+    path = next(one for one in mdf4.FILES if one.name == "MDF 4 with invalid samples").make(folder)
+    with mdf4_opened(path) as file:
+        samples = file.get(group=0, index=1, samples_only=True, data=next(file._mdf._load_data(file.groups[0])))[0]
+    return f"asammdf hands over {len(samples)} of {len(FZ)} samples of a block, those after a gap moved up"
+
+
+def cut_segment(folder: Path) -> str:
+    """What npTDMS makes of a file that was cut off."""
+    with Bounded(tdms.cut_by(100)(folder)) as file:
+        lengths = [len(channel) for group in opened(folder, file).groups() for channel in group.channels()]
+    return f"npTDMS hands over channels of {' and '.join(map(str, lengths))} samples"
+
+
+NAIVE = {"CSV cut within a number": cut_number, "MDF 4 with invalid samples": invalid_samples,
+         "TDMS cut in its samples": cut_segment}  # fmt: skip
+
+
+def of_file(odd: Odd) -> Case:
+    """The hard case of one file."""
+    return Case(
+        name=odd.name, hard=odd.hard, check=CHECKS[odd.wanted], unit="s or N", tolerance=TOLERANCE,
+        why="values have bits that every format keeps; CSV writes times with 15 digits",
+        error=lambda _, folder: odd.error(folder / "odd"),
+        expected=dict.fromkeys(IMPLEMENTATIONS, "refused") if odd.wanted == "refused" else {},
+        naive=NAIVE.get(odd.name), once=True,
+    )  # fmt: skip
+
+
+def _silent(sweep: Sweep, _: str, folder: Path) -> float:
+    return sweep.silent(folder / "cut")
+
+
+def of_sweep(sweep: Sweep) -> Case:
+    """The hard case of a file that is cut off at many places."""
+    return Case(
+        name=f"{sweep.extension} cut off at {sweep.cuts} places",
+        hard="a library reads what is left, or what is not there",
+        check="every cut is refused, or what is left is right and the cut named",
+        unit="silent cuts", tolerance=0.0, why="no file that was cut off may be used without a word",
+        error=partial(_silent, sweep), once=True,
+    )  # fmt: skip
+
+
+CASES = (
+    *(of_file(odd) for module in (csv, mdf4, rpc3, tdms) for odd in module.FILES),
+    *(of_sweep(Sweep(extension)) for extension in (".csv", ".mf4", ".rsp", ".tdms")),
+)
