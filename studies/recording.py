@@ -27,7 +27,7 @@ from models.measured.scene import MeasuredScene
 from models.measured.section_run import Hold, Outcome, SectionRun
 from models.measured.section_run import run as march
 from models.measured.sections import Answer, Sections, points
-from models.measured.signal import Quantity
+from models.measured.signal import Quantity, Signal
 from models.measured.trust import Drift, Level, drift
 from models.measured.verdict import judge
 from models.measured.virtual import VirtualMeasurement, virtual_measurement
@@ -80,6 +80,11 @@ class Found:
     def held(self) -> Outcome | None:
         """The same; None where none was made."""
         return self.runs.get(self.chosen)
+
+    def put_in(self, signal: Signal) -> bool:
+        """Whether a signal drives or holds the vehicle; all others are compared with."""
+        moving = signal.at == self.vehicle.chassis and signal.quantity in ("angle", "angular rate")
+        return not signal.check and (signal.at in self.vehicle.hubs or (moving and self.chosen != FREE))
 
     def counted(self, run: Outcome, answer: Answer) -> Counted:
         """Damage, level crossings and range pairs of one answer of a run."""

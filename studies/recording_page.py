@@ -24,7 +24,7 @@ from studies import recording_runs as draw
 from studies.recording import FREE, Found, handed_on
 
 TEMPLATE = "recording.html.jinja"
-NAMES = {FREE: "free run", "kalman": "run held by the Kalman filter", "prescribed": "run held to measured angles"}
+NAMES = {FREE: "Free run", "kalman": "Run held by the Kalman filter", "prescribed": "Run held to measured angles"}
 STILL = 1e-6
 """N, N m: what changes by less is rounding."""
 DRAWN = 6
@@ -102,9 +102,10 @@ def _verdict(found: Found) -> dict[str, str]:
     if found.held is None:
         return {"kind": "bad", "threshold": "Threshold: a run.", "word": "Failed", "why": _ended(found, found.chosen)}
     own, limits = found.verdicts[found.chosen], found.scene.limits
-    free = "" if found.chosen == FREE else f" The free run: {found.verdicts[FREE].word} ({found.verdicts[FREE].reason})."
+    other = found.verdicts.get(FREE) if found.chosen != FREE else None
+    free = f" The free run: {other.word} ({other.reason})." if other else ""
     return {"kind": {"accepted": "good", "rejected": "bad"}.get(own.word, "idle"), "word": own.word.capitalize(),
-            "why": f"{NAMES[found.chosen].capitalize()}: {own.reason}.{free}",
+            "why": f"{NAMES[found.chosen]}: {own.reason}.{free}",
             "threshold": f"Threshold: held to measured angles with an artificial moment of at most "
                          f"{limits.artificial_share:.0%} of what turns the {found.vehicle.chassis} (up to 15 Hz), "
                          f"angles known to {limits.pitch_error:g} rad, and no check channel off by more than "
@@ -113,15 +114,15 @@ def _verdict(found: Found) -> dict[str, str]:
 
 def _ended(found: Found, name: str) -> str:
     """How a run ended."""
-    return f"{NAMES[name].capitalize()}: " + found.failed.get(name, "went to the end") + "."
+    return f"{NAMES[name]}: " + found.failed.get(name, "went to the end") + "."
 
 
 def _tiles(found: Found) -> list[dict[str, str]]:
     weights = [finding.weight for finding in found.findings]
     own = found.recording
     return [{"value": f"{own.duration:.4g} s", "name": "of recording"},
-            {"value": str(sum(not s.check for s in own.signals)), "name": "channels put in"},
-            {"value": str(sum(s.check for s in own.signals)), "name": "channels compared with"},
+            {"value": str(sum(found.put_in(s) for s in own.signals)), "name": "channels put in"},
+            {"value": str(sum(not found.put_in(s) for s in own.signals)), "name": "compared with"},
             {"value": str(weights.count("error")), "name": "errors"},
             {"value": str(weights.count("doubt")), "name": "doubts"}]  # fmt: skip
 
@@ -198,19 +199,21 @@ def _checks(found: Found, folder: Path) -> Part:
     """Channels that were not put in, beside the run."""
     bands = next((one.bands for one in found.compared if one.bands), ())
     heads = ("channel", "unit", "explained", "offset", *(f"error {_band(band)}" for band in bands),
-             *(f"damage ratio, slope {slope:g}" for slope in found.scene.hand_on.slopes), "trusted")  # fmt: skip
+             *(f"damage ratio, slope {slope:g}" for slope in found.scene.hand_on.slopes), "trusted for")  # fmt: skip
+    sizes = [math.sqrt(sum(band.measured**2 for band in one.bands)) or math.inf for one in found.compared]
     rows = [(one.signal.name, one.answer.unit, f"{one.explained:.2%}", f"{one.offset:.3g}",
-             *(f"{band.error / band.measured:.1%}" if band.measured > 0 else "–" for band in one.bands),
+             *(f"{band.error / size:.2%}" for band in one.bands),
              *(f"{ratio:.3g}" for ratio in one.damage.values()),
-             "throughout" if one.trusted == math.inf else f"{one.trusted:g} s") for one in found.compared]  # fmt: skip
+             "all of it" if one.trusted == math.inf else f"{one.trusted:g} s")
+            for one, size in zip(found.compared, sizes, strict=True)]  # fmt: skip
     named = [one for one in found.compared if one.signal.check] or list(found.compared)
     drawn = draw.overlay_figure(found, named[:DRAWN], folder / "checks.png")
     return Part("Channels that were not put in, beside the run", (CHECKS_NOTE,), (Table(heads, tuple(rows)),),
                 (_figure(drawn, "Measured and computed."),))  # fmt: skip
 
 
-CHECKS_NOTE = ("Explained is the part of the measured variance that the run gives; errors by band are by what was "
-               "measured in that band; trusted until the error of one second exceeds half of the channel's own size.")
+CHECKS_NOTE = ("Explained is the part of the measured variance that the run gives; errors by band are by the size (rms) "
+               "of the channel; a channel is trusted until the error of one second exceeds half of that.")
 
 
 def _band(band: Band) -> str:
@@ -220,7 +223,7 @@ def _band(band: Band) -> str:
 def _map(found: Found) -> Part:
     heads = ("channel", "file", "quantity", "at", "component", "axes", "unit in the file", "to SI", "use")
     rows = [(s.channel, s.file, s.quantity, s.at, s.component or "–", s.frame, s.unit or "–",
-             f"{s.sign * s.factor:g}", "compared with" if s.check else "put in")
+             f"{s.sign * s.factor:g}", "put in" if found.put_in(s) else "compared with")
             for s in found.recording.signals]  # fmt: skip
     return Part("Channel map", tables=(Table(heads, tuple(rows), numbers=False),))
 

@@ -14,7 +14,7 @@ from studies.recording import FREE, Found
 
 POINTS = 1200
 """Columns of a curve: of each the least and the greatest value are drawn, so that no peak is lost."""
-LINES = {"measured": "#999999", "truth": "#222222", FREE: "#d55e00", "kalman": "#0072b2", "prescribed": "#0072b2"}
+LINES = {"measured": "#b5b5b5", "truth": "#222222", FREE: "#d55e00", "kalman": "#0072b2", "prescribed": "#0072b2"}
 NAMES = {"measured": "measured", "truth": "truth", FREE: "free run", "kalman": "held by the Kalman filter",
          "prescribed": "held to the measured angles"}  # fmt: skip
 WHEELS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
@@ -155,10 +155,11 @@ def overlay_figure(found: Found, compared: Sequence[Compared], path: Path) -> Pa
         peak = times[int(np.nanargmax(np.abs(computed - measured)))]
         near = np.abs(times - peak) <= 1.0
         for values, name, label in ((measured, "measured", "measured"), (computed, found.chosen, "computed")):
-            left.plot(*thinned(times, values), color=LINES[name], lw=0.8, label=label)
-            right.plot(times[near], values[near], color=LINES[name])
+            width = 2.6 if name == "measured" else 0.8
+            left.plot(*thinned(times, values), color=LINES[name], lw=width, label=label)
+            right.plot(times[near], values[near], color=LINES[name], lw=width)
         left.set_title(f"{one.signal.name} [{one.answer.unit}]")
-        right.set_title("two seconds about the largest error", color="#555555")
+        right.set_title("about the largest error", color="#555555")
     for panel in panels[-1]:
         panel.set_xlabel("time [s]")
     figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
