@@ -1,16 +1,25 @@
 """What guides transmit, by the engines' own joint forces: MuJoCo's force sensors, Exudyn's constraints.
 
-Here springs, mounts, bars and hubs are loads at their points, worked out from where the engine says that these are;
-the chassis takes what they leave, so that they are forces inside.
+Here springs, mounts, bars and hubs are loads at their points, worked out from where MuJoCo says that these are; the
+chassis takes what they leave, so that they are forces inside. In Exudyn the bodies are free and their guides are
+constraints, which no tree of joints has.
 """
+
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from models.engines.mujoco_quiet import quiet
 from models.engines.spatial_mujoco import Numbers, _spec, _weigh
-from models.hub_forces.cut_vehicle import CutVehicle
+from models.hub_forces.cut_vehicle import GRAVITY, CutVehicle
 from models.measured.sections import guided
+from models.vehicles.spatial import FREEDOMS
+
+STEP, STEPS = 3e-5, 4
+"""Of Exudyn (s): rounding of positions by the square of a step, and motion in it, cost a millionth each."""
+SIGNS = np.array([-1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
+"""Exudyn's multipliers of a generic joint, as forces and moments on its second body."""
 
 
 def mujoco_guides(vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
@@ -18,38 +27,69 @@ def mujoco_guides(vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: n
 
     wrenches (h, 6) : at the hubs, in the axes of what they carry.
     """
-    spec = _spec(vehicle.tree, 1e-3)
-    names = {body.name: str(i) for i, body in enumerate(vehicle.tree.bodies)}
-    for name in guided(vehicle):
-        spec.body(names[name]).add_site(name=names[name])
-        for kind in ("force", "torque"):
-            sensor = getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}")
-            spec.add_sensor(name=f"{kind} {names[name]}", type=sensor, objtype=mujoco.mjtObj.mjOBJ_SITE,
-                            objname=names[name])  # fmt: skip
-    with quiet():
-        model = spec.compile()
-        _weigh(model, Numbers(vehicle.tree, model), vehicle.tree.bodies)
-        data = mujoco.MjData(model)
-        data.qpos[:], data.qvel[:] = q, v
-        mujoco.mj_forward(model, data)
-        loads = _Loads(vehicle, model, data, names)
-        for i, tyre in enumerate(vehicle.whole.tyres):
-            turn = data.xmat[loads.ids[tyre.body]].reshape(3, 3)
-            place, _ = loads.point(tyre.body, np.array(tyre.point))
-            loads.add(tyre.body, place, turn @ wrenches[i, :3], turn @ wrenches[i, 3:])
-        loads.add_elements()
-        mujoco.mj_forward(model, data)
-    return data.sensordata.reshape(-1, 6).copy()
+    return _Loaded(vehicle, q, v, wrenches).data.sensordata.reshape(-1, 6).copy()
 
 
-class _Loads:
-    """Loads on bodies of a MuJoCo model at their centres."""
+def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
+    """The same (guides, 6) in the axes of what carries each body, at rest; exact where at most one angle is free."""
+    import exudyn as exu
+    import exudyn.itemInterface as items
+    from exudyn.rigidBodyUtilities import RotationMatrix2EulerParameters
 
-    def __init__(self, vehicle: CutVehicle, model: mujoco.MjModel, data: mujoco.MjData, names: dict[str, str]) -> None:
-        self.vehicle, self.model, self.data = vehicle, model, data
-        self.ids = {name: int(model.body(number).id) for name, number in names.items()}
+    exu.config.printToConsole = False
+    loaded, container = _Loaded(vehicle, q, 0 * q, wrenches), exu.SystemContainer()
+    mbs: Any = container.AddSystem()
+    objects, centres, sensors = dict[str, Any](), dict[str, Any](), list[Any]()
+    for body in vehicle.whole.bodies:
+        i, (a, b, c) = loaded.ids[body.name], np.array(body.inertia, float) + 1e-6 * np.eye(3)
+        place = [*loaded.data.xpos[i], *RotationMatrix2EulerParameters(loaded.data.xmat[i].reshape(3, 3))]
+        node = mbs.AddNode(items.NodeRigidBodyEP(referenceCoordinates=place))
+        objects[body.name] = mbs.AddObject(items.ObjectRigidBody(
+            mass=body.mass, inertia=[a[0], b[1], c[2], b[2], a[2], a[1]], nodeNumber=node))  # fmt: skip
+        centres[body.name] = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=objects[body.name]))
+        force, moment = np.split(loaded.data.xfrc_applied[i] - GRAVITY * body.mass * np.eye(6)[2], 2)
+        mbs.AddLoad(items.LoadForceVector(markerNumber=centres[body.name], loadVector=force.tolist()))
+        mbs.AddLoad(items.LoadTorqueVector(markerNumber=centres[body.name], loadVector=moment.tolist()))
+    for body in (vehicle.whole.body(name) for name in guided(vehicle)):
+        assert body.parent is not None
+        arm = np.subtract(body.position, vehicle.whole.body(body.parent).position)
+        seat = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=objects[body.parent], localPosition=arm.tolist()))
+        joint = mbs.AddObject(items.ObjectJointGeneric(
+            markerNumbers=[seat, centres[body.name]], constrainedAxes=[int(f not in body.freedoms) for f in FREEDOMS]))
+        sensors += [mbs.AddSensor(items.SensorObject(objectNumber=joint, storeInternal=True, writeToFile=False,
+                                                     outputVariableType=kind))
+                    for kind in (exu.OutputVariableType.ForceLocal, exu.OutputVariableType.TorqueLocal)]  # fmt: skip
+    mbs.Assemble()
+    options = exu.SimulationSettings()
+    options.solution.file.write, options.solution.sensors.writePeriod = False, STEP
+    ti = options.timeIntegration
+    ti.numberOfSteps, ti.endTime, ti.verboseMode, ti.generalizedAlpha.spectralRadius = STEPS, STEPS * STEP, 0, 0.0
+    mbs.SolveDynamic(options)
+    return np.hstack([mbs.GetSensorStoredData(sensor)[-1, 1:] for sensor in sensors]).reshape(-1, 6) * SIGNS
 
-    def point(self, body: str, design: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+
+class _Loaded:
+    """A MuJoCo model of a cut vehicle with loads on its bodies, at a state."""
+
+    def __init__(self, vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: np.ndarray) -> None:
+        self.vehicle, spec = vehicle, _spec(vehicle.tree, 1e-3)
+        names = {body.name: str(i) for i, body in enumerate(vehicle.tree.bodies)}
+        for number in (names[name] for name in guided(vehicle)):
+            spec.body(number).add_site(name=number)
+            for kind in (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE):
+                spec.add_sensor(name=f"{kind} {number}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=number)
+        with quiet():
+            self.model = spec.compile()
+            _weigh(self.model, Numbers(vehicle.tree, self.model), vehicle.tree.bodies)
+            self.data = mujoco.MjData(self.model)
+            self.ids = {name: int(self.model.body(number).id) for name, number in names.items()}
+            self.data.qpos[:], self.data.qvel[:] = q, v
+            mujoco.mj_forward(self.model, self.data)
+            self._load_hubs(wrenches)
+            self._load_elements()
+            mujoco.mj_forward(self.model, self.data)
+
+    def _point(self, body: str, design: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Place and velocity of a point of a body."""
         number, jacobian = self.ids[body], np.zeros((3, self.model.nv))
         arm = design - np.array(self.vehicle.tree.body(body).position)
@@ -57,24 +97,30 @@ class _Loads:
         mujoco.mj_jac(self.model, self.data, jacobian, None, place, number)
         return place, jacobian @ self.data.qvel
 
-    def add(self, body: str, place: np.ndarray, force: np.ndarray, moment: np.ndarray) -> None:
+    def _add(self, body: str, place: np.ndarray, force: np.ndarray, moment: np.ndarray | float = 0.0) -> None:
         """A force at a place and a moment, in space."""
         number = self.ids[body]
         self.data.xfrc_applied[number, :3] += force
         self.data.xfrc_applied[number, 3:] += moment + np.cross(place - self.data.xpos[number], force)
 
-    def add_elements(self) -> None:
+    def _load_hubs(self, wrenches: np.ndarray) -> None:
+        for tyre, wrench in zip(self.vehicle.whole.tyres, wrenches, strict=True):
+            turn = self.data.xmat[self.ids[tyre.body]].reshape(3, 3)
+            place, _ = self._point(tyre.body, np.array(tyre.point))
+            self._add(tyre.body, place, turn @ wrench[:3], turn @ wrench[3:])
+
+    def _load_elements(self) -> None:
         """Springs, mounts and bars; d' is beside the turning chassis."""
-        chassis = self.ids[self.vehicle.chassis]
-        turn, spin = self.data.xmat[chassis].reshape(3, 3), np.zeros(6)
+        chassis, spin = self.ids[self.vehicle.chassis], np.zeros(6)
+        turn = self.data.xmat[chassis].reshape(3, 3)
         mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, chassis, spin, 0)
         for e in self.vehicle.elements:
             axis = turn @ e.axis
-            (one, fast_one), (two, fast_two) = self.point(e.one, e.point_one), self.point(e.two, e.point_two)
+            (one, fast_one), (two, fast_two) = self._point(e.one, e.point_one), self._point(e.two, e.point_two)
             travel = axis @ (two - one) - e.axis @ (e.point_two - e.point_one)
             rate = axis @ (fast_two - fast_one - np.cross(spin[:3], two - one))
             force = (e.held + e.stiffness * travel + e.damping * rate) * axis
             for body, place, part in ((e.one, one, force), (e.two, two, -force)):
                 if body != self.vehicle.chassis:
-                    self.add(body, place, part, np.zeros(3))
-                    self.add(self.vehicle.chassis, place, -part, np.zeros(3))
+                    self._add(body, place, part)
+                    self._add(self.vehicle.chassis, place, -part)

@@ -1,5 +1,9 @@
 """A recording of any length with 60 channels: a virtual measurement repeated with soft seams, noise never twice."""
 
+import resource
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -9,6 +13,7 @@ import numpy as np
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults
 from models.measured.recording import Recording
+from models.measured.section_run import Hold, SectionRun, run
 from models.measured.sections import Point, Sections
 from models.measured.signal import Signal
 from models.measured.virtual import VirtualTable, virtual_measurement
@@ -64,3 +69,57 @@ def recorded(seconds: float, path: Path, repeated: float = 20.0) -> Recording:
 def sections() -> Sections:
     """All sections, and where the accelerometers sit."""
     return Sections(r19(), points=tuple(Point(name, "body", place) for name, place in PLACES.items()))
+
+
+def run_of(folder: Path, seconds: float, repeated: float = 20.0, engine: str = "mujoco",
+           hold: Hold | None = None, step: float | None = None) -> SectionRun:  # fmt: skip
+    """A run of a recording in this folder, which is made unless it is there."""
+    path, (signals, _) = folder / "recording.f64", pattern(repeated)
+    if path.with_suffix(".json").is_file():
+        columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / PERIOD) + 1)
+        assert columns.done == columns.count
+        found = Recording(signals, columns, PERIOD)
+    else:
+        found = recorded(seconds, path, repeated)
+    return SectionRun(r19(), found, sections(), engine, hold or Hold(), step)
+
+
+def answers_of(folder: Path, name: str = "run") -> bytes:
+    """All bits of the answers of a run."""
+    return (folder / name / "run.f64").read_bytes()
+
+
+def killed(folder: Path, seconds: float, repeated: float, block: float, times: int, seed: int = SEED) -> int:
+    """Run in a process of its own, killed (signal 9) so many times at random moments, until it ends; how often it ran.
+
+    Moments are drawn from the whole time that the answers take, and counted from the first line of progress.
+    """
+    rng, lasting, kills, runs = np.random.default_rng(seed), 1.0, 0, 0
+    command = [sys.executable, "-m", "validation.long_recording", str(folder), str(seconds), str(repeated), str(block)]
+    while True:
+        runs += 1
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            process.stdout.readline()
+            if kills < times:
+                time.sleep(float(rng.uniform(0.0, lasting)))
+                process.kill()
+                kills += 1
+            elif process.wait() == 0:
+                return runs
+            else:
+                raise RuntimeError(f"the run ended with {process.returncode}")
+
+
+def _main(folder: str, seconds: str, repeated: str, block: str, step: str = "") -> None:
+    """Run or go on; a line per block has seconds done, the largest memory (bytes) and seconds of processor."""
+
+    def told(done: float, of: float) -> None:
+        print(done, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, time.process_time(), flush=True)
+
+    own = run_of(Path(folder), float(seconds), float(repeated), step=float(step) if step else None)
+    run(own, Path(folder) / "run", told, float(block))
+
+
+if __name__ == "__main__":
+    _main(*sys.argv[1:])

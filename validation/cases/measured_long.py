@@ -1,0 +1,186 @@
+"""Long recordings: bits of a run in blocks and of a killed one, memory, section forces by the engines, counting."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.engines.hub_forces import build
+from models.hub_forces.cut_vehicle import cut
+from models.measured.comparison import checks, compare
+from models.measured.counting import count, level_crossings, range_pairs
+from models.measured.formats import open_source
+from models.measured.hand_on import hand_on
+from models.measured.section_run import Hold, run
+from models.measured.sections import Sections, guided
+from models.rainflow_cycles import cycles
+from validation.cases.hub_forces import _anywhere, _shaken, twin
+from validation.joint_forces import exudyn_guides, mujoco_guides
+from validation.long_recording import SEED, answers_of, killed, run_of
+from validation.rows import Row, System, Table, at_most, behaves, finding, within
+
+TITLE = "Long recordings, section forces, what is handed on"
+SYSTEM: System = "measured"
+ASTM = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
+"""The load of figure 6 of ASTM E1049-85, with the counts that it prints for ranges 3, 4, 6, 8 and 9."""
+COUNTED = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
+REPEATED = 2.5
+"""s, of the pattern."""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Section forces, counting, blocks in MuJoCo; in full all engines, a killed run, memory and files."""
+    rows = [*_guides(quick), *_counting()]
+    if quick:
+        return [*rows, _blocks(folder, "mujoco", "kalman", 0.3)], {}
+    lasting = {"mujoco": 1.0, "exudyn": 0.5, "reference": 0.2}
+    rows += [_blocks(folder, engine, method, seconds) for engine, seconds in lasting.items()
+             for method in ("none", "kalman", "prescribed")]  # fmt: skip
+    return [*rows, _killed(folder), *_memory(folder), *_handed_on(folder)], {}
+
+
+def _guides(quick: bool) -> list[Row]:
+    """A car without any symmetry, turned and shaken: the guides' forces and moments by the engines themselves."""
+    car, worst = cut(twin(), "body"), 0.0
+    sections = Sections(car, "hub")
+    drive = _shaken(car, "hub", guide=False)
+    numbers, wrenches = build("reference", car, drive, 1e-3, 1e-3).numbers, drive.hubs[0].reshape(-1, 6)
+    for seed in range(1 if quick else 5):
+        q, v = _anywhere(car, seed)
+        found, other = _transmitted(sections, numbers, q, v), mujoco_guides(car, q, v, wrenches)
+        worst = max(worst, float(np.abs(found - other).max() / np.abs(other).max()))
+    rows = [at_most("measured_long.guides_mujoco", SYSTEM, "forces and moments that guides transmit, of a car without "
+                    "symmetry that turns, beside MuJoCo's force and torque sensors, relative", worst, "1", 1e-11,
+                    "Newton and Euler along the run; the sensors know nothing of the kernel", "native")]  # fmt: skip
+    if quick:
+        return rows
+    q, v = _anywhere(car, 0)
+    for i, (body, freedom) in enumerate(car.tree.coordinates()):
+        q[i] = 0.0 if body == "engine" and freedom.startswith("r") else q[i]
+    found, other = _transmitted(sections, numbers, q, 0 * v), exudyn_guides(car, q, wrenches)
+    off = float(np.abs(found - other).max() / np.abs(other).max())
+    return [*rows, at_most("measured_long.guides_exudyn", SYSTEM, "the same at rest beside the constraints of free "
+                           "bodies in Exudyn, relative", off, "1", 1e-5,
+                           "positions rounded to 1e-16 m over the square of a step of 3e-5 s", "native")]  # fmt: skip
+
+
+def _transmitted(sections: Sections, numbers: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Forces and moments (guides, 6); components along which a body slides are nought."""
+    values = dict(zip((answer.name for answer in sections.answers),
+                      sections.read(numbers, np.concatenate((q, v))[None], 2)[0], strict=True))  # fmt: skip
+    axes = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+    return np.array([[values.get(f"{name} guide {axis}", 0.0) for axis in axes] for name in guided(sections.vehicle)])
+
+
+def _counting() -> list[Row]:
+    """The example of the standard, and a sine of which all is known."""
+    spans, _, counts = cycles(ASTM)
+    found = {float(span): float(counts[spans == span].sum()) for span in np.unique(spans)}
+    sine = np.sin(2 * np.pi * np.arange(100 * 64 + 1) / 64)  # 100 periods from 0: half cycles of 1, whole ones of 2
+    counted = count(sine, (5.0,))
+    levels = level_crossings(sine, np.array([-1.1, -0.5, 0.5, 1.1])).tolist()
+    spans, _, counts = cycles(sine[np.r_[0, 16:6400:32, 6400]])
+    pairs = range_pairs(spans, counts, np.array([0.5, 1.5])).tolist()
+    return [
+        behaves("measured_long.astm", SYSTEM, "rainflow counts of the example of ASTM E1049-85", str(found),
+                str(COUNTED), "the standard's own table", "published"),
+        within("measured_long.sine_damage", SYSTEM, "pseudo-damage, slope 5, of 100 periods of a sine of amplitude 1",
+               counted.damage[5.0], "1", 99.5 * 2**5 + 2 * 0.5, 1e-9, "199 half cycles of 2 and two of 1 at the ends",
+               "closed form"),
+        behaves("measured_long.levels", SYSTEM, "level crossings of the sine at -1.1, -0.5, 0.5, 1.1, and range "
+                "pairs of at least 0.5 and 1.5", f"{levels} {pairs}", "[0, 100, 100, 0] [100.5, 99.5]",
+                "a hundred rises; 199 halves of range 2 and two of range 1", "closed form"),
+    ]  # fmt: skip
+
+
+def _blocks(folder: Path, engine: str, method: str, seconds: float) -> Row:
+    """Samples that differ between a run in one piece and one in uneven blocks."""
+    place = folder / f"blocks {seconds}"
+    place.mkdir(exist_ok=True)
+    own = run_of(place, seconds, REPEATED, engine, Hold(method))  # type: ignore[arg-type]
+    bits = []
+    for block in (60.0, 0.073):
+        name = f"{engine} {method} {block}"
+        run(own, place / name, block=block)
+        bits.append(np.frombuffer(answers_of(place, name), np.int64))
+    changed = float(np.sum(bits[0] != bits[1]))
+    return at_most(f"measured_long.blocks_{engine}_{method}", SYSTEM, f"answers in {engine}, stabiliser {method}, of "
+                   f"which bits change when {seconds:g} s are run in blocks of 0.073 s", changed, "1", 0.0,
+                   "state, filter and inputs go from block to block as they are", "closed form")  # fmt: skip
+
+
+def _killed(folder: Path) -> Row:
+    """A run killed twice, beside one that was left alone."""
+    seconds, bits = 5.0, list[np.ndarray]()
+    for times in (0, 2):
+        place = folder / f"killed {times}"
+        place.mkdir()
+        own = run_of(place, seconds, REPEATED)
+        if times:
+            killed(place, seconds, REPEATED, 0.4, times)
+        else:
+            run(own, place / "run")
+        bits.append(np.frombuffer(answers_of(place), np.int64))
+    changed = float(np.sum(bits[0] != bits[1]))
+    return at_most("measured_long.killed", SYSTEM, "answers of which bits change when a run of 5 s in blocks of 0.4 s "
+                   f"is killed twice at moments drawn from seed {SEED}, and goes on", changed, "1", 0.0,
+                   "a checkpoint is written whole or not at all", "closed form")  # fmt: skip
+
+
+def _memory(folder: Path) -> list[Row]:
+    """Memory that a longer recording takes, and what an hour of it would; how fast it goes."""
+    run_of(folder, 50.0, REPEATED)
+    command = [sys.executable, "-m", "validation.long_recording", str(folder), "50", str(REPEATED), "5", "2e-3"]
+    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    lines = np.array([line.split() for line in told], float)  # of every block: seconds, memory, processor
+    half, last = lines[len(lines) // 2], lines[-1]
+    growth = (last[1] - half[1]) / (last[0] - half[0])
+    return [
+        at_most("measured_long.memory", SYSTEM, "memory for 60 channels at 1 kHz: the largest over 50 s in blocks of 5 s, "
+                "and an hour of its growth over the second half", float(last[1] + growth * 3600.0), "B", 2e9,
+                "only a block is in memory", "closed form"),
+        finding("measured_long.speed", SYSTEM, "seconds of recording per second of processor, MuJoCo, step 2 ms, all "
+                "sections", float((last[0] - lines[1, 0]) / (last[2] - lines[1, 2])), "1", "above 1",
+                "how long an hour takes", "none"),
+    ]  # fmt: skip
+
+
+def _handed_on(folder: Path) -> list[Row]:
+    """Section forces in every format, read back; and check channels beside the run."""
+    place = folder / "handed on"
+    place.mkdir()
+    own = run_of(place, 2.0, REPEATED)
+    found = run(own, place / "run")
+    wanted = found.answers[:6]
+    values = np.column_stack([found.samples(answer) for answer in wanted])
+    worst, said = 0.0, set()
+    for path in hand_on(found, place, ("csv", "mf4", "rsp", "tdms"), wanted, comment="Monday"):
+        source = open_source(path)
+        names = [channel.name for channel in source.channels if channel.name in {answer.name for answer in wanted}]
+        read = np.vstack([block.values for block in source.blocks(names)])
+        worst = max(worst, float(np.abs(read - values).max() / np.abs(values).max()))
+        said |= {(channel.name, channel.unit, channel.comment) for channel in source.channels if channel.name in names}
+    kept = said == {(answer.name, answer.unit, answer.comment) for answer in wanted}
+    compared = [compare(own.recording, found, *pair) for pair in checks(own)]
+    force = next(each for each in compared if each.signal.name == "front left_force")
+    return [
+        at_most("measured_long.handed_on", SYSTEM, "section forces written as CSV, MDF, RPC III and TDMS and read "
+                "back, relative", worst, "1", 2.0**-24, "RPC III keeps singles, the others every bit", "native"),
+        behaves("measured_long.handed_on_names", SYSTEM, "names, units and comments of these", str(kept), "True",
+                "they say axes and signs"),
+        at_most("measured_long.check_channel", SYSTEM, "part of the variance of a measured spring force that the "
+                "stabilised run does not give", 1.0 - force.explained, "1", 0.01,
+                "noise of 8 N on 100 N, and what the filter adds", "native"),
+    ]  # fmt: skip
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """None: the rows say it all."""
+    return []
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """None."""
+    return []
