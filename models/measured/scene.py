@@ -10,6 +10,7 @@ from models.drift.score import Limits
 from models.errors import InputError
 from models.hub_forces.cut_vehicle import CutVehicle, cut
 from models.measured.signal import Frame, Quantity
+from models.measured.verdict import LIMITS
 from models.measured.virtual import VirtualTable
 from models.scene_file import SceneFile, checked
 from models.strict import Strict, quantity
@@ -109,7 +110,7 @@ class MeasuredScene(SceneFile):
     noise: Deviations = Deviations()
     stabilise: Stabilise = Stabilise()
     run: Run = Run()
-    limits: Limits = Field(default=Limits(), description="of the verdict")
+    limits: Limits = Field(default=LIMITS, description="of the verdict")
     hand_on: HandOn = HandOn()
 
     def cut_vehicle(self) -> CutVehicle:
