@@ -1,0 +1,189 @@
+"""Measurement files in four formats: what is written comes back, in each format's own library too, and by block."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from models.damage import pseudo_damage
+from models.measured.channel import Source
+from models.measured.formats import open_source, write
+from models.measured.formats.writing import Group
+from models.noise import normal
+from validation.measured_files.odd import read
+from validation.measured_files.own_libraries import LIBRARIES
+from validation.rows import Row, System, Table, at_most, behaves, finding, not_run
+
+TITLE = "Measurement files"
+SYSTEM: System = "measured"
+SEED = 41
+FLOAT = 2.0**-24
+"""Of a value: what floating-point numbers of 32 bits keep."""
+RESOLUTION = {".csv": 0.0, ".mf4": 0.0, ".rsp": FLOAT, ".tdms": 0.0}
+"""Of a value, by format."""
+FORMATS = {".csv": "CSV", ".mf4": "MDF 4", ".rsp": "RPC III", ".tdms": "TDMS"}
+START = datetime(2026, 11, 21, 8, 0, 0, 123456, tzinfo=timezone(timedelta(hours=1)))
+COMMENT = "Prüfgelände, Runde 3 <nass>\nFahrer & Beifahrer"
+NAMES = ("Kraft vorn links, Fz", "Größe µ", "a [x]")
+UNITS = ("kN", "°", "m/s^2")
+COMMENTS = ("Rad 1: \"neu\"", "", "zweite Zeile\nfolgt")
+COUNT, PERIOD, LENGTH = 5000, 1e-3, 1234
+"""Samples, s between them, samples of a block that is read."""
+
+
+def samples() -> np.ndarray:
+    """Values (count, 3) of many sizes, with a gap."""
+    values = normal(SEED, 0, COUNT, 3) * np.array([1e3, 1e-6, 1.0])
+    values[100:200, 1] = np.nan
+    return values
+
+
+def written(path: Path, values: np.ndarray) -> Path:
+    """Write the values in blocks of 700."""
+    blocks = (values[i : i + 700] for i in range(0, len(values), 700))
+    return write(path, [Group(NAMES, UNITS, COMMENTS, PERIOD, len(values), blocks)], START, COMMENT)
+
+
+def apart(found: np.ndarray, truth: np.ndarray) -> float:
+    """Largest difference by the size of the value; inf where gaps differ."""
+    if not np.array_equal(np.isnan(found), np.isnan(truth)):
+        return float("inf")
+    return float(np.nanmax(np.abs(found - truth) / np.abs(truth)))
+
+
+def kept(source: Source) -> dict[str, bool]:
+    """Whether names, units, comments and start come back as they were given."""
+    return {
+        "names": tuple(one.name for one in source.channels) == NAMES,
+        "units": tuple(one.unit for one in source.channels) == UNITS,
+        "comments": tuple(one.comment for one in source.channels) == COMMENTS and source.comment == COMMENT,
+        "start": source.start == START,
+        "quiet": source.noticed == (),
+    }  # fmt: skip
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Round trips through each format, mixed rates, the choice of resolution; the full share watches memory, too."""
+    rows: list[Row] = []
+    lines: list[dict[str, Any]] = []
+    with TemporaryDirectory() as name:
+        for extension in FORMATS:
+            own, line = round_trip(Path(name) / f"trip{extension}", extension)
+            rows += own
+            lines.append(line)
+        rows += [two_rates(Path(name) / f"rates{extension}", extension) for extension in (".mf4", ".tdms")]
+        rows += resolution(Path(name))
+        if not quick:
+            rows += [memory(Path(name) / f"long{extension}", extension) for extension in (".mf4", ".rsp", ".tdms")]
+    return rows, {"formats": lines}
+
+
+def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
+    """One file written, read back by block, and opened by the format's own library."""
+    truth, form = samples(), FORMATS[extension]
+    began = time.perf_counter()
+    source = open_source(written(path, truth))
+    blocks = list(source.blocks(NAMES, LENGTH))
+    seconds = time.perf_counter() - began
+    values, times = (np.concatenate([getattr(one, key) for one in blocks]) for key in ("values", "times"))
+    library, reading = LIBRARIES[extension]
+    foreign = reading(path)
+    same = [foreign.get(name, (None, ""))[1] for name in NAMES] == list(UNITS)
+    there = np.column_stack([foreign[name][0] for name in NAMES]) if same else np.full_like(truth, np.inf)
+    error, off, own = apart(values, truth), float(np.abs(times - PERIOD * np.arange(COUNT)).max()), apart(there, truth)
+    lost = ", ".join(what for what, good in kept(source).items() if not good)
+    key, why = f"measured_formats.{extension[1:]}", "what the format can hold; every bit where it is 0"
+    return [
+        at_most(f"{key}.values", SYSTEM, f"{form}: values there and back, by block", error, "of the value",
+                RESOLUTION[extension], why, "closed form"),
+        at_most(f"{key}.times", SYSTEM, f"{form}: times there and back", off, "s", 1e-12,
+                "a thousand millionth of a period; CSV writes times with 15 digits", "closed form"),
+        behaves(f"{key}.texts", SYSTEM, f"{form}: names with umlauts, units, comments of two lines, start",
+                f"lost: {lost}" if lost else "kept", "kept", "a file without them cannot be mapped by anybody else"),
+        at_most(f"{key}.library", SYSTEM, f"{form}: values as {library} reads the file", own, "of the value",
+                RESOLUTION[extension], f"{why}; names and units are compared, too", "native"),
+    ], {"format": form, "library": library, "size": path.stat().st_size, "values": error, "times": off, "own": own,
+        "rate": COUNT * len(NAMES) / seconds}  # fmt: skip
+
+
+def two_rates(path: Path, extension: str) -> Row:
+    """Two groups of different rates in one file."""
+    values = {("fast",): (1e-3, np.arange(4000.0)), ("slow",): (2e-2, np.arange(200.0) ** 2)}
+    write(path, [Group(names, ("N",), ("",), period, len(own), [own[:, None]])
+                 for names, (period, own) in values.items()])  # fmt: skip
+    found = read(open_source(path))
+    errors = [np.abs(found[name][k] - truth).max() for (name,), (period, own) in values.items()
+              for k, truth in ((0, period * np.arange(len(own))), (1, own))]  # fmt: skip
+    return at_most(f"measured_formats.{extension[1:]}.rates", SYSTEM,
+    f"{FORMATS[extension]}: two groups of 1 kHz and 50 Hz, "
+                   "times and values there and back", max(errors), "s or N", 1e-12, "each group has a clock of its own",
+                   "closed form")  # fmt: skip
+
+
+def wheel_force() -> np.ndarray:
+    """A wheel force (N) of ten seconds at 1 kHz, with one pothole that is forty times as large as the rest."""
+    load = np.convolve(normal(SEED, 1, 10_000, 1)[:, 0], np.ones(20) / 20.0, mode="same") * 450.0
+    load[5000:5020] += 8e4 * np.sin(np.linspace(0.0, np.pi, 20)) / 2
+    return load
+
+
+def resolution(folder: Path) -> list[Row]:
+    """Why RPC III is written with floating-point samples: damage of the road beside one pothole, in both."""
+    load = wheel_force()
+    path = write(folder / "choice.rsp", [Group(("Fz",), ("N",), ("",), 1e-3, len(load), [load[:, None]])])
+    floating = read(open_source(path))["Fz"][1]
+    step = np.abs(load).max() / 32752
+    whole = step * np.round(load / step)
+    errors = [abs(pseudo_damage(own[:4500]) / pseudo_damage(load[:4500]) - 1.0) for own in (floating, whole)]
+    why = "slope 5, of the smooth road before a pothole that sets the scale of the whole numbers"
+    return [
+        at_most("measured_formats.rsp.damage", SYSTEM, "RPC III as it is written, 32-bit floating point: damage",
+        errors[0],
+                "relative", 1e-5, why, "closed form"),
+        finding("measured_formats.rsp.whole", SYSTEM, "RPC III with 16-bit whole numbers instead: damage", errors[1],
+                "relative", "not written; read where others have", why, "closed form"),
+    ]  # fmt: skip
+
+
+STATUS = Path("/proc/self/status")
+WATCHED = f"""
+import sys
+from models.measured.formats import open_source
+source = open_source(sys.argv[1])
+count = sum(len(block.times) for block in source.blocks([one.name for one in source.channels]))
+print(count, next(line for line in open("{STATUS}") if line.startswith("VmHWM")).split()[1])
+"""
+
+
+def memory(path: Path, extension: str) -> Row:
+    """Peak memory of a fresh process that reads five minutes of sixty channels by block."""
+    key, form = f"measured_formats.{extension[1:]}.memory", FORMATS[extension]
+    if not STATUS.exists():
+        return not_run(key, SYSTEM, f"{form}: peak memory", "this system does not tell the peak of a process")
+    count, base = 300_000, 1e3 * normal(SEED, 2, 60_000, 60)
+    blocks: Iterator[np.ndarray] = (base + i for i in range(count // len(base)))
+    write(path, [Group(tuple(f"ch{i}" for i in range(60)), ("N",) * 60, ("",) * 60, 1e-3, count, blocks)])
+    out = subprocess.run([sys.executable, "-c", WATCHED, str(path)], capture_output=True, text=True, check=True).stdout
+    found, peak = (int(word) for word in out.split())
+    size = path.stat().st_size / 1e6
+    path.unlink()
+    return at_most(key, SYSTEM, f"{form}: peak memory of a process that reads 60 channels of {size:.0f} MB by block",
+                   peak / 1e3 if found == count else float("inf"), "MB", 350.0,
+                   "libraries included; blocks of 29 MB, the same for a file of an hour", "none")  # fmt: skip
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """What each format keeps."""
+    note = (f"{COUNT:,} samples of three channels, values from 1e-6 to 1e3, written and read by block. Errors of "
+            "values are by the size of each value; the format's own library opens the same file. CSV and RPC III "
+            "have one sampling rate, MDF 4 and TDMS one per group.")
+    rows = tuple((one["format"], f"{one['values']:.1e}", f"{one['times']:.1e}", f"{one['library']}: {one['own']:.1e}",
+                  f"{one['size'] / 1e3:.0f}", f"{one['rate'] / 1e6:.1f}") for one in data["formats"])  # fmt: skip
+    headings = ("format", "values", "times, s", "own library", "kB", "million values per s, there and back")
+    return [Table(TITLE, note, headings, rows)]

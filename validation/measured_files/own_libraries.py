@@ -1,0 +1,49 @@
+"""What each format's own library, or numpy, reads of a file: channel -> values and unit, in the file's own words."""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+Read = dict[str, tuple[np.ndarray, str]]
+
+
+def by_numpy(path: Path) -> Read:
+    """CSV."""
+    with path.open(encoding="utf-8") as file:
+        headings = next(csv.reader(line for line in file if not line.startswith("#")))
+        table = np.genfromtxt(file, delimiter=",")
+    names = [heading.rstrip("]").rpartition(" [") for heading in headings]
+    return {name: (table[:, i], unit) for i, (name, _, unit) in enumerate(names) if name != "time"}
+
+
+def by_asammdf(path: Path) -> Read:
+    """MDF 4."""
+    from asammdf import MDF
+
+    with MDF(path) as file:
+        return {signal.name: (signal.samples, signal.unit) for signal in file.iter_channels()}
+
+
+def by_rpc3(path: Path) -> Read:
+    """RPC III."""
+    import rpc3
+
+    rpc3.rpc3.progressbar = False
+    return {one.name: (np.asarray(one.data), one.unit) for one in rpc3.read(str(path))[0]}
+
+
+def by_nptdms(path: Path) -> Read:
+    """TDMS."""
+    from nptdms import TdmsFile
+
+    channels = [channel for group in TdmsFile.read(path).groups() for channel in group.channels()]
+    return {channel.name: (channel[:], channel.properties["unit_string"]) for channel in channels}
+
+
+LIBRARIES: dict[str, tuple[str, Callable[[Path], Read]]] = {
+    ".csv": ("numpy", by_numpy), ".mf4": ("asammdf", by_asammdf), ".rsp": ("rpc3-file", by_rpc3),
+    ".tdms": ("npTDMS", by_nptdms),
+}  # fmt: skip
+"""Extension -> name of the library and its reading."""
