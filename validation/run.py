@@ -23,7 +23,7 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "contact_simplified", "contact_profiles", "manchester", "ride_road", "ride_covariance", "ride_engines",
          "ride_varying_speed", "ride_nonlinear", "ride_faults", "hub_forces", "contact_price", "fastsim", "wheelset",
          "rolling_faults", "contact_bridges", "handling", "braking_stop", "braking_faults", "braking_port",
-         "braking_controllers", "braking_engines", "measured_formats")  # fmt: skip
+         "braking_controllers", "braking_engines", "measured_formats", "measured_virtual")  # fmt: skip
 """Case modules in the order of the report."""
 
 
@@ -111,6 +111,7 @@ def seeds() -> dict[str, int]:
         inertial_unit,
         kalman,
         measured_formats,
+        measured_virtual,
         motion,
         point_mass,
         ride_covariance,
@@ -135,7 +136,8 @@ def seeds() -> dict[str, int]:
             "states of ride": ride_engines.SEED, "twins of ride": ride_covariance.SEED,
             "copies of ride": ride_varying_speed.SEED, "nonlinear ride": ride_nonlinear.SEED,
             "drawn wheelsets": wheelset.SEED, "rough road of handling": handling.SEED,
-            "speeds on ice": braking_controllers.SEED, "measurement files": measured_formats.SEED}  # fmt: skip
+            "speeds on ice": braking_controllers.SEED, "measurement files": measured_formats.SEED,
+            "virtual measurements": measured_virtual.SEED}  # fmt: skip
 
 
 def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:
