@@ -26,6 +26,10 @@ CERTAIN = 40.0
 """Fall of chi square that one more parameter must bring: chance does so once in 10^9."""
 SMALL_DELAY, SMALL_FACTOR = 5e-4, 0.01
 """s and a share: what is smaller does no harm, and no vehicle file is good enough to tell."""
+WORTH = 0.35
+"""Part of what is unexplained in some reading that a delay or factor must explain: springs that are 20 % stiffer than
+in the vehicle file, or dampers 30 % weaker, leave a sixth of the readings unexplained, and wrong delays explain up to
+a third of that."""
 FAULTS = 8
 """Faults looked for at the most."""
 TINY = float(np.finfo(float).tiny)
@@ -120,17 +124,18 @@ class Agreement:
         """Every single fault that would explain more and is large enough to be named."""
         weights = self.weights
         for group in self.groups():
-            yield from self._late(group, weights)
-            yield from self._wrong(group, weights)
+            for offer in (*self._late(group, weights), *self._wrong(group, weights)):
+                if self._worth(offer[1], weights):
+                    yield offer
         yield from self._swapped(weights)
 
     def groups(self) -> Iterator[Group]:
         """Every signal alone, those of one hub or sensor, of one file, and all readings: the fewer the earlier."""
         for forces, signals in ((True, self.inputs), (False, self.outputs)):
-            keys = [[s.name for s in signals], [f"all channels of {s.at}" for s in signals],
-                    [f"all channels of {s.file}" for s in signals]]
+            keys = [[s.name for s in signals], [f"all channels of {s.at}" for s in signals]]
             if not forces:
                 keys += [[f"all {s.quantity} channels" for s in signals], ["all inertial channels"] * len(signals)]
+            keys.append([f"all channels of {s.file}" for s in signals])
             seen = set[tuple[int, ...]]()
             for names in keys:
                 for name in dict.fromkeys(names):
@@ -211,15 +216,24 @@ class Agreement:
         """Share of the readings that stays unexplained, the median over them."""
         return float(np.median(self.unexplained))
 
-    def errors(self) -> dict[str, tuple[float, float]]:
-        """Standard errors of delay (s) and factor of every signal alone, by name; infinite if it does nothing."""
+    def seen(self) -> dict[str, tuple[float, float]]:
+        """Smallest delay (s) and error of the factor of every signal alone that would be named, by name."""
         weights, square = self.weights, (2 * np.pi * self.frequencies) ** 2
-        found = {}
-        for group in (group for group in self.groups() if len(group.own) == 1):
-            line = 2 * (weights * self._share(group)[1]).sum(axis=1)
-            with np.errstate(divide="ignore"):
-                found[group.name] = float((square @ line) ** -0.5), float(line.sum() ** -0.5)
+        rest, found = WORTH * self._rest(weights), {}
+        with np.errstate(divide="ignore", invalid="ignore"):
+            for group in (group for group in self.groups() if len(group.own) == 1):
+                power = weights * self._share(group)[1]
+                late, wrong = square @ power, power.sum(axis=0)
+                found[group.name] = _least(late, rest, SMALL_DELAY), _least(wrong, rest, SMALL_FACTOR)
         return found
+
+    def _rest(self, weights: np.ndarray) -> np.ndarray:
+        """Weighted power (k,) of every reading that neither forces nor noise explain."""
+        return np.maximum((weights * (self.left - self.noise)).sum(axis=0), 0.0)
+
+    def _worth(self, other: "Agreement", weights: np.ndarray) -> bool:
+        """Whether a correction takes a good part of what is unexplained out of some reading, not a little of all."""
+        return bool(np.any(((self.left - other.left) * weights).sum(axis=0) > WORTH * self._rest(weights)))
 
     def _signals(self, group: Group) -> tuple[Signal, ...]:
         return tuple((self.inputs if group.forces else self.outputs)[i] for i in group.own)
@@ -237,6 +251,13 @@ def _exchange(now: Agreement, other: Agreement, exchanged: tuple[tuple[str, str]
     share, rest = (float(np.sqrt(np.mean(each.unexplained**2))) for each in (now, other))
     both = tuple(way for a, b in exchanged for way in ((a, b), (b, a)))
     return Fault("swapped", " and ".join(f"{a} with {b}" for a, b in exchanged), signals, share, rest, fall, both)
+
+
+def _least(power: np.ndarray, rest: np.ndarray, small: float) -> float:
+    """Smallest size that is certain and worth its name, where (k,) power times its square falls on (k,) readings."""
+    if not power.sum() > 0:
+        return float("inf")
+    return max(small, float((CERTAIN / power.sum()) ** 0.5), float(np.nanmin((rest / power) ** 0.5)))
 
 
 def _power(response: np.ndarray, forces: np.ndarray) -> np.ndarray:

@@ -20,9 +20,9 @@ def check(evidence: Evidence) -> list[Finding]:
 def _told(evidence: Evidence) -> Finding:
     """Which channels move the vehicle enough to tell."""
     assert evidence.searched is not None
-    errors = [4 * factor for _, factor in evidence.searched[0].errors().values()]
-    parts = [f"by {100 * size:.0f} % in {sum(error < size for error in errors)}" for size in TOLD]
-    text = f"A factor that is wrong {' and '.join(parts)} of {len(errors)} channels would be seen by the motion."
+    least = [wrong for _, wrong in evidence.searched[0].seen().values()]
+    parts = [f"by {100 * size:.0f} % in {sum(wrong < size for wrong in least)}" for size in TOLD]
+    text = f"A factor that is wrong {' and '.join(parts)} of {len(least)} channels would be seen by the motion."
     return Finding("gain", "note", "", text)
 
 

@@ -8,7 +8,7 @@ from models.measured.signal import Quantity, Signal
 
 NAMES: dict[Quantity, dict[str, float]] = {
     "force": {"N": 1.0, "daN": 10.0, "kN": 1e3, "lbf": 4.4482216, "kip": 4448.2216},
-    "moment": {"N m": 1.0, "kN m": 1e3, "lbf ft": 1.3558},
+    "moment": {"N m": 1.0, "kN m": 1e3},
     "acceleration": {"m/s^2": 1.0, "g": 9.80665, "mm/s^2": 1e-3, "ft/s^2": 0.3048},
     "angular rate": {"rad/s": 1.0, "deg/s": np.pi / 180, "mrad/s": 1e-3},
     "angle": {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3},
