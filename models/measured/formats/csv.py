@@ -116,9 +116,9 @@ def open_csv(path: Path) -> CsvFile:
         start, notes = zoned(path, header.start) if header.start else (None, [])
         clock, factor = _clock(path, layout)
         columns = tuple(i for i in range(len(layout.names)) if i != clock)
-        names, repeated = told_apart(path, [_heading(layout.names[i])[0] for i in columns])
+        names, repeated = told_apart(path, [heading(layout.names[i])[0] for i in columns])
         channels = tuple(
-            Channel(name, _heading(layout.names[i])[1], "\n".join(header.of_channels.get(name, [])), 0, count, None)
+            Channel(name, heading(layout.names[i])[1], "\n".join(header.of_channels.get(name, [])), 0, count, None)
             for name, i in zip(names, columns, strict=True)
         )
         return CsvFile(path, channels, start, "\n".join(header.comments), tuple(found + notes + repeated), layout, rows,
@@ -166,7 +166,7 @@ def _text(path: Path, line: int, quoted: str) -> str:
 def find_layout(path: Path, header: Header) -> tuple[Layout, list[Finding]]:
     """Separator from the header, decimal sign from the first rows; InputError where either is in doubt."""
     place = f"line {header.line} (header)"
-    found = [sign for sign in SIGNS if sign in header.headings]
+    found = [sign for sign in SIGNS if sign in re.sub('"[^"]*"', "", header.headings)]
     if len(found) != 1:
         what = "no separator" if not found else " and ".join(SIGNS[sign] for sign in found)
         raise InputError(path, place, header.headings, f"commas alone (or semicolons, or tabs) must part the columns, "
@@ -233,18 +233,18 @@ def _ends(path: Path, header: Header, count: int, left: int) -> list[Finding]:
 def _clock(path: Path, layout: Layout) -> tuple[int, float]:
     """Column of time, and its factor to seconds."""
     place = f"line {layout.line} (header)"
-    clocks = [i for i, name in enumerate(layout.names) if _heading(name)[0].casefold() in CLOCKS]
+    clocks = [i for i, name in enumerate(layout.names) if heading(name)[0].casefold() in CLOCKS]
     if len(clocks) != 1:
         raise InputError(path, place, ", ".join(layout.names), f"one column time [s] is needed, found {len(clocks)}")
-    name, unit = _heading(layout.names[clocks[0]])
+    name, unit = heading(layout.names[clocks[0]])
     if unit not in SECONDS:
         raise InputError(path, f"{place}, column {name!r}, unit", unit, f"write {name} [s]", tuple(SECONDS))
-    if len(layout.names) < 2 or not all(_heading(name)[0] for name in layout.names):
+    if len(layout.names) < 2 or not all(heading(name)[0] for name in layout.names):
         raise InputError(path, place, ", ".join(layout.names), "every column needs a name, and one beside time")
     return clocks[0], SECONDS[unit]
 
 
-def _heading(text: str) -> tuple[str, str]:
+def heading(text: str) -> tuple[str, str]:
     """Name and unit of one heading; the unit is the last pair of brackets, empty where there is none."""
     found = _HEADING.fullmatch(text)
     name, unit = found.groups() if found else (text, "")

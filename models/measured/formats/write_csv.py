@@ -10,16 +10,18 @@ from pathlib import Path
 import numpy as np
 
 from models.errors import InputError
-from models.measured.formats.csv import CLOCKS
+from models.measured.formats.csv import CLOCKS, heading
 from models.measured.formats.writing import Group, one_group
 
 
 def write_csv(path: Path, part: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
     """Write the header to the file ``part``, then rows of shortest numbers, block by block."""
     group = one_group(path, groups, "CSV")
-    for name in group.names:
+    for name, unit in zip(group.names, group.units, strict=True):
         if name.casefold() in CLOCKS:
             raise InputError(path, "channel", name, "a CSV file has one column of times: give the channel another name")
+        if heading(f"{name} [{unit}]") != (name, unit) or not unit.isprintable():
+            raise InputError(path, f"channel {name!r}, unit", unit, "a unit in CSV has no brackets and no line ends")
     with part.open("w", encoding="utf-8", newline="\n") as file:
         file.write(header(group, start, comment))
         for first, values in group.rows(path):
@@ -36,5 +38,6 @@ def header(group: Group, start: datetime | None, comment: str) -> str:
         lines += [f"channel {json.dumps(name, ensure_ascii=False)}: {line}" for line in text.splitlines()]
     headings = io.StringIO()
     names = [f"{name} [{unit}]" for name, unit in zip(group.names, group.units, strict=True)]
-    csv.writer(headings, lineterminator="\n").writerow(["time [s]", *names])
+    quoting = csv.QUOTE_ALL if ";" in "".join(names) else csv.QUOTE_MINIMAL  # or it would look like a separator
+    csv.writer(headings, lineterminator="\n", quoting=quoting).writerow(["time [s]", *names])
     return "".join(f"# {line}\n" for line in lines) + headings.getvalue()

@@ -78,6 +78,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     part = path.with_name(f".{path.stem}.part{path.suffix}")
     if path.exists():
         raise _exists(path)
+    if not path.parent.is_dir():
+        raise InputError(path, "", None, "the file cannot be written: its folder does not exist")
     try:
         part.unlink(missing_ok=True)
         yield part
