@@ -89,12 +89,12 @@ def answers_of(folder: Path, name: str = "run") -> bytes:
     return (folder / name / "run.f64").read_bytes()
 
 
-def killed(folder: Path, seconds: float, repeated: float, block: float, times: int, seed: int = SEED) -> int:
+def killed(folder: Path, seconds: float, repeated: float, block: float, times: int, lasting: float = 1.0) -> int:
     """Run in a process of its own, killed (signal 9) so many times at random moments, until it ends; how often it ran.
 
-    Moments are drawn from the whole time that the answers take, and counted from the first line of progress.
+    Moments are drawn from the ``lasting`` s after the first line of progress.
     """
-    rng, lasting, kills, runs = np.random.default_rng(seed), 1.0, 0, 0
+    rng, kills, runs = np.random.default_rng(SEED), 0, 0
     command = [sys.executable, "-m", "validation.long_recording", str(folder), str(seconds), str(repeated), str(block)]
     while True:
         runs += 1

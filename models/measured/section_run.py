@@ -7,7 +7,6 @@ read alike whatever the block: a run in blocks, or resumed after any interruptio
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
@@ -235,11 +234,12 @@ class _March:
 def _inputs_of(own: SectionRun, inputs: Inputs) -> dict[str, str]:
     """What decides the bits of a run, by names that a user understands."""
     library = {"reference": "numpy"}.get(own.engine, own.engine)
-    kernels, idle = Path(import_module("models.hub_forces").__file__ or "").parent, np.zeros((1, 6 * len(inputs.hubs)))
+    sources = [checksum(Path(__file__).parents[1] / folder) for folder in ("hub_forces", "measured")]
+    idle = np.zeros((1, 6 * len(inputs.hubs)))
     vehicle = digest(table(own.vehicle, Drive(idle), own.grid.step), own.vehicle.tree.coordinates())
     return {
         "vehicle": vehicle, "recording": digest_of(own.recording, inputs.used), "stabiliser": repr(own.hold),
         "engine": f"{own.engine} {version(library)}", "step": repr(own.grid.step),
         "list of sections": digest(own.sections.answers, own.sections.frame),
-        "version": f"{version('twinrig')} {checksum(kernels)}",
+        "version": f"{version('twinrig')} {sources}",
     }  # fmt: skip

@@ -138,8 +138,8 @@ def _memory(folder: Path) -> list[Row]:
     half, last = lines[len(lines) // 2], lines[-1]
     growth = (last[1] - half[1]) / (last[0] - half[0])
     return [
-        at_most("measured_long.memory", SYSTEM, "memory for 60 channels at 1 kHz: the largest over 50 s in blocks of 5 s, "
-                "and an hour of its growth over the second half", float(last[1] + growth * 3600.0), "B", 2e9,
+        at_most("measured_long.memory", SYSTEM, "memory for 60 channels at 1 kHz: the largest over 50 s in blocks of 5 "
+                "s, and an hour of its growth over the second half", float(last[1] + growth * 3600.0), "B", 2e9,
                 "only a block is in memory", "closed form"),
         finding("measured_long.speed", SYSTEM, "seconds of recording per second of processor, MuJoCo, step 2 ms, all "
                 "sections", float((last[0] - lines[1, 0]) / (last[2] - lines[1, 2])), "1", "above 1",
