@@ -6,6 +6,7 @@ signals; and the force of the start of a step by the scheme that is written so.
 
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,13 @@ from models.braking import brake, plane_vehicle, tyre_table
 from models.braking.advance import advance
 from models.braking.plane_step import FORCE_X, FORCE_Y, LOAD, REPORTED
 from models.braking.plane_vehicle import GRAVITY, PAPER, Plane
+from models.braking.port import sensors
 from models.braking.surfaces import Stretch, road
 from validation.braking_schemes import LITERAL, stopped
 from validation.cases import braking_stop as stops
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
+from validation.hard_cases import braking as hard
 
 EVEN, SPLIT = road([Stretch(0.0, 0, 0)]), road([Stretch(0.0, 1, 0)])
 STEP = 5.5e-3
@@ -110,8 +113,22 @@ def _nodes() -> float:
     return float(np.abs(np.interp(own.slips, tables.slips, tables.mu_x[0, 0, 0]) - own.mu_x[0, 0]).max())
 
 
+def _settled() -> float:
+    """Quarter vehicle at a slip that stays: way against m v^2 / (2 F), as in the hard case of that name."""
+    return float(hard.steady(hard.DRY, 0.02)("reference", Path()))
+
+
+def _code() -> float:
+    """Largest error of a ramp converted to 12 bits against half of a code, by that."""
+    ramp = np.linspace(0.0, 30.0, 100_001)
+    own = sensors.Channels(sensors.Conversion(bits=12, range=30.0), ramp.size, 0)
+    return float(abs(np.abs(own(0, ramp) - ramp).max() / (0.5 * 30.0 / (2**12 - 1)) - 1.0))
+
+
 CHECKS = {
     "light stop": Check("stopping distance, light braking, exact", "relative", 5e-4, _light),
+    "slip that stays": Check("stopping distance at a slip that stays, closed form", "relative", 1e-6, _settled),
+    "code": Check("largest error of converted signals, half a code", "relative", 1e-3, _code),
     "transfer": Check("front loads of the locked truck, closed form", "relative", 1e-6, _transfer),
     "split": Check("yaw acceleration on split friction by its moment", "relative", 1e-6, _split),
     "turns left": Check("sign of yaw and roll in a left turn", "", 0.5, _turns_left),
@@ -153,6 +170,25 @@ def _tables(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
         lambda found: replace(found, mu_x=np.ascontiguousarray(change(found.mu_x))))(real(tables)))  # fmt: skip
 
 
+def _mirrored(real: Any) -> Any:
+    """Steer angles, and by them the slip angles of the steered wheels, with the other sign."""
+    return lambda state, turning, torques, step, steer, *rest: real(state, turning, torques, step, -steer, *rest)
+
+
+def _spin(factor: float) -> Patch:
+    """Spin inertia of the quarter vehicle's wheel in the step, not in the closed form."""
+
+    def change(real: Any) -> Any:
+        return property(lambda own: _changed(real.fget(own), {"spin": lambda spin: factor * spin}))
+
+    return attribute("models.braking.quarter:Quarter.plane", change)
+
+
+def _one_bit_less(real: Any) -> Any:
+    """Converts with a bit less than it is told."""
+    return lambda own, *rest: real(own.model_copy(update={"bits": own.bits - 1}), *rest)
+
+
 FAULTS = (
     Fault("force of the start of the step", "step", attribute("validation.cases.braking_stop:stop", _literal)),
     Fault("load transfer with the other sign", "vehicle", _truck(by_x=np.negative)),
@@ -162,6 +198,9 @@ FAULTS = (
     Fault("yaw inertia 1 % too large", "vehicle", _truck(inertias=lambda own: 1.01 * own)),
     Fault("height of the centre of mass 1 % too large", "vehicle",
           _truck(by_x=lambda own: 1.01 * own, by_y=lambda own: 1.01 * own)),
+    Fault("spin inertia 1 % too large", "wheel", _spin(1.01)),
+    Fault("slip angle with the other sign", "tyre", attribute("validation.faults.braking:advance", _mirrored)),
+    Fault("conversion with a bit less", "port", attribute("models.braking.port.sensors:Channels", _one_bit_less)),
     Fault("front and rear swapped", "vehicle", _truck(place=lambda p: p * np.array([-1.0, 1.0]))),
     Fault("hysteresis without a width", "brake", _brakes(lambda own: own._replace(release=own.push_out))),
     Fault("hysteresis reversed", "brake",

@@ -227,11 +227,11 @@ def jackknifed(implementation: str, folder: Path) -> float:
 
 def lagging_at_rest(implementation: str, folder: Path) -> float:
     """Braked to a stop in a slide on tyres that lag, then watched for 1 s: way and speed since it rests (m, m/s)."""
-    scene = braking_scene(relaxation={"front": 0.5, "rear": 0.5}, run={"duration": 3.0})
+    scene = braking_scene(relaxation={"front": 0.5, "rear": 0.5})
     check_engine(scene, implementation)
     vehicle, begun = ready(scene, "stop")
     begun.state[1, 1] = 0.2
-    path = vehicle.run(AllApplied(4), begun, 3.0)
+    path = vehicle.run(AllApplied(4), begun, 10.0)
     rest = Start(path.states[-1].copy(), path.turning[-1].copy())
     after = vehicle.run(AllApplied(4), rest, 1.0)
     moved = np.abs(after.states[:, 0] - rest.state[0]).max() + np.abs(after.states[:, 1]).max()
@@ -269,8 +269,8 @@ def all_open(implementation: str, folder: Path) -> float:
 
 
 def braking_scene(**tables: Any) -> BrakingScene:
-    """The truck from 3 m/s on ice without anti-lock system."""
-    plain = {"title": "hard", "system": "braking", "procedures": {"stop": {"speed": 3.0}}, "pressure": {}}
+    """The truck from 1.5 m/s on ice without anti-lock system."""
+    plain = {"title": "hard", "system": "braking", "procedures": {"stop": {"speed": 1.5}}, "pressure": {}}
     return build({**plain, **tables})
 
 
