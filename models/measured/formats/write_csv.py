@@ -38,6 +38,8 @@ def header(group: Group, start: datetime | None, comment: str) -> str:
         lines += [f"channel {json.dumps(name, ensure_ascii=False)}: {line}" for line in text.splitlines()]
     headings = io.StringIO()
     names = [f"{name} [{unit}]" for name, unit in zip(group.names, group.units, strict=True)]
-    quoting = csv.QUOTE_ALL if ";" in "".join(names) else csv.QUOTE_MINIMAL  # or it would look like a separator
-    csv.writer(headings, lineterminator="\n", quoting=quoting).writerow(["time [s]", *names])
+    if ";" in "".join(names):  # it would look like a separator
+        csv.writer(headings, lineterminator="\n", quoting=csv.QUOTE_ALL).writerow(["time [s]", *names])
+    else:
+        csv.writer(headings, lineterminator="\n").writerow(["time [s]", *names])
     return "".join(f"# {line}\n" for line in lines) + headings.getvalue()

@@ -1,4 +1,7 @@
-"""Writes ASAM MDF 4.10 by asammdf: one channel group per clock, records appended block by block."""
+"""Writes ASAM MDF 4.10 by asammdf: one channel group per clock, records appended block by block.
+
+asammdf takes spaces away from the ends of the lines of a file's comment; all else comes back as it was given.
+"""
 
 from collections.abc import Sequence
 from datetime import datetime
