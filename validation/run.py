@@ -23,7 +23,8 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "contact_simplified", "contact_profiles", "manchester", "ride_road", "ride_covariance", "ride_engines",
          "ride_varying_speed", "ride_nonlinear", "ride_faults", "hub_forces", "contact_price", "fastsim", "wheelset",
          "rolling_faults", "contact_bridges", "handling", "braking_stop", "braking_faults", "braking_port",
-         "braking_controllers", "braking_engines", "measured_formats", "measured_virtual")  # fmt: skip
+         "braking_controllers", "braking_engines", "measured_formats", "measured_virtual",
+         "measured_long")  # fmt: skip
 """Case modules in the order of the report."""
 
 
@@ -95,7 +96,7 @@ def _broken(name: str, error: BaseException) -> Row:
 def seeds() -> dict[str, int]:
     """Every seed that the rows depend on; with them and the versions all counts and states repeat exactly."""
     from studies.six_runs import Options
-    from validation import checks, contact_set, fitted_roads, timing
+    from validation import checks, contact_set, fitted_roads, long_recording, timing
     from validation.cases import (
         braking_controllers,
         contact_price,
@@ -137,7 +138,8 @@ def seeds() -> dict[str, int]:
             "copies of ride": ride_varying_speed.SEED, "nonlinear ride": ride_nonlinear.SEED,
             "drawn wheelsets": wheelset.SEED, "rough road of handling": handling.SEED,
             "speeds on ice": braking_controllers.SEED, "measurement files": measured_formats.SEED,
-            "virtual measurements": measured_virtual.SEED}  # fmt: skip
+            "virtual measurements": measured_virtual.SEED,
+            "long recordings": long_recording.SEED}  # fmt: skip
 
 
 def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:
