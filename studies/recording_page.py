@@ -212,8 +212,8 @@ def _checks(found: Found, folder: Path) -> Part:
                 (_figure(drawn, "Measured and computed."),))  # fmt: skip
 
 
-CHECKS_NOTE = ("Explained is the part of the measured variance that the run gives; errors by band are by the rms of the "
-               "channel; a channel is trusted until the error of one second exceeds half of that.")
+CHECKS_NOTE = ("Explained is the part of the measured variance that the run gives; errors by band are by the rms of "
+               "the channel; a channel is trusted until the error of one second exceeds half of that.")  # fmt: skip
 
 
 def _band(band: Band) -> str:

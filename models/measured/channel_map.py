@@ -41,34 +41,34 @@ def signals(scene: MeasuredScene, sources: Sequence[Source], places: Places) -> 
     What is measured at a connector, and any strain, is only compared with. Raises InputError at the first channel that
     is not in its file, is there or in the map twice, or whose unit, place, component or frame makes no sense.
     """
-    rows = [(f"files.{i}.channels.{k}", row, source) for i, (file, source) in
-            enumerate(zip(scene.files, sources, strict=True)) for k, row in enumerate(file.channels)]  # fmt: skip
+    rows = [(f"files, {file.file}, {row.channel!r}", row, source)
+            for file, source in zip(scene.files, sources, strict=True) for row in file.channels]  # fmt: skip
     names = [row.channel for _, row, _ in rows]
     found = list[Signal]()
     for place, row, source in rows:
         name = row.channel if names.count(row.channel) == 1 else f"{row.channel} ({source.path.name})"
         signal = _signal(scene.file, place, row, source, places, name)
-        _check_new(scene.file, f"{place}.channel", signal, found)
+        _check_new(scene.file, f"{place}, channel", signal, found)
         found.append(signal)
     _check_frames(scene.file, found, places)
     return tuple(found)
 
 
 def _signal(file: str, place: str, row: MappedChannel, source: Source, places: Places, name: str) -> Signal:
-    channel = find(source, row.channel, file, f"{place}.channel")
-    unit, where = row.unit, (file, f"{place}.unit")
+    channel = find(source, row.channel, file, f"{place}, channel")
+    unit, where = row.unit, (file, f"{place}, unit")
     if unit is None:
         unit, where = channel.unit.strip(), (source.path.name, f"unit of {row.channel!r}")
         if not unit and row.quantity != "strain":
             allowed = f"is missing: {source.path.name} names none of {row.channel!r}"
-            raise InputError(file, f"{place}.unit", None, allowed)
+            raise InputError(file, f"{place}, unit", None, allowed)
     factor = conversion(unit, row.quantity, *where)
     _check_place(file, place, row, places)
     usual: Frame = "hub" if row.at in places.hubs else "inertial" if row.quantity == "angle" else "body"
     frame = row.frame or usual
     frames = ("hub", "body", "inertial") if row.at in places.hubs else ("body", "inertial", "sensor")
     if frame not in frames:
-        raise InputError(file, f"{place}.frame", frame, f"is no frame of a {row.quantity} at {row.at!r}", frames)
+        raise InputError(file, f"{place}, frame", frame, f"is no frame of {row.quantity} at {row.at!r}", frames)
     check = row.check or row.quantity == "strain" or row.at in places.connectors
     return Signal(name, source.path.name, row.channel, row.quantity, row.at, row.component, frame, row.sign, unit,
                   factor, gravity=row.gravity, check=check)  # fmt: skip
@@ -100,14 +100,14 @@ def _check_place(file: str, place: str, row: MappedChannel, places: Places) -> N
     if kinds and not any(row.at in names for names in kinds.values()):
         known = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds.items() if names)
         every = tuple(name for names in kinds.values() for name in names)
-        raise InputError(file, f"{place}.at", row.at, f"the vehicle has no such place of a {row.quantity} ({known})"
+        raise InputError(file, f"{place}, at", row.at, f"the vehicle has no such place for {row.quantity} ({known})"
                          f"{suggestion(row.at, every)}")  # fmt: skip
     along = row.at in places.connectors and row.quantity in ("force", "moment")
     axes = () if along else AXES[row.quantity]
     if row.component not in (axes or ("",)):
-        allowed = f"must be {', '.join(axes)}" if axes else "has a direction of its own: leave component out"
-        raise InputError(file, f"{place}.component", row.component or None,
-                         f"{allowed} (a {row.quantity} at {row.at!r})")  # fmt: skip
+        allowed = f"must be {', '.join(axes[:-1])} or {axes[-1]}" if axes else "has a direction of its own: leave component out"
+        raise InputError(file, f"{place}, component", row.component or None,
+                         f"{allowed} ({row.quantity} at {row.at!r})")  # fmt: skip
 
 
 def _check_new(file: str, place: str, signal: Signal, found: list[Signal]) -> None:

@@ -66,6 +66,7 @@ def _check_names(scene: MeasuredScene, vehicle: CutVehicle) -> None:
 def describe(scene: MeasuredScene) -> str:
     """The scene's plan as text."""
     vehicle = scene.cut_vehicle()
+    _check_names(scene, vehicle)
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"),
              _line("vehicle", f"{vehicle.tree.name}: {vehicle.size} freedoms, cut at {', '.join(vehicle.hubs)}")]
     lines += _virtual(scene) if scene.virtual is not None else _files(scene, vehicle)

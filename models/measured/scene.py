@@ -33,7 +33,7 @@ class MappedChannel(Strict):
     channel: str = Field(description="name in the file")
     quantity: Quantity = Field(description="what it measures")
     at: str = Field(min_length=1, description="hub, body, connector or sensor that it belongs to")
-    component: Literal["x", "y", "z", "roll", "pitch", "yaw", ""] = Field(default="", description="axis")
+    component: str = Field(default="", description="x, y, z; roll, pitch, yaw of angles and rates; none of a travel")
     frame: Frame | None = Field(default=None, description="whose axes")
     sign: Literal[1, -1] = Field(default=1, description="-1 where the file counts the other way")
     unit: str | None = Field(default=None, description="where the file names none, or another than it means")
