@@ -23,7 +23,7 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "contact_simplified", "contact_profiles", "manchester", "ride_road", "ride_covariance", "ride_engines",
          "ride_varying_speed", "ride_nonlinear", "ride_faults", "hub_forces", "contact_price", "fastsim", "wheelset",
          "rolling_faults", "contact_bridges", "handling", "braking_stop", "braking_faults", "braking_port",
-         "braking_controllers", "braking_engines", "measured_formats", "measured_virtual",
+         "braking_controllers", "braking_engines", "braking_suspension", "measured_formats", "measured_virtual",
          "measured_long")  # fmt: skip
 """Case modules in the order of the report."""
 

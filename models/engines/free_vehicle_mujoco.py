@@ -12,6 +12,7 @@ from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.mujoco_callback import _array_at, _double_at, installed
 from models.engines.mujoco_layout import check, offset
 from models.engines.spatial_mujoco import Numbers, _spec, _weigh
+from models.errors import RunFailed
 
 
 @cache
@@ -59,5 +60,18 @@ class FreeMujoco(FreeModel):
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
         """Positions and rates (steps + 1, 2 n) by MuJoCo's RK4; RunFailed where it gives up."""
         self.model.opt.timestep, start = step, np.concatenate((q, v))
+        if steps == 1:
+            return np.vstack((start, self._stepped(q, v, step)))
         with installed(self.law):
             return np.vstack((start, self._marcher.run(start[None], steps)[0]))
+
+    def _stepped(self, q: np.ndarray, v: np.ndarray, step: float) -> np.ndarray:
+        """One step without the costs of a loop; RunFailed where MuJoCo starts again at time zero."""
+        data = self.data
+        data.time, data.qpos[:], data.qvel[:] = 0.0, q, v
+        with installed(self.law):
+            mujoco.mj_step(self.model, data)
+        after = np.concatenate((data.qpos, data.qvel))
+        if data.time < 0.5 * step or not np.isfinite(after).all():
+            raise RunFailed("mujoco", "the engine gave up", data.time)
+        return after
