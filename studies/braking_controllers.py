@@ -22,6 +22,10 @@ SHOWN = {"distance [m]": "stopping distance [m]", "v0^2/2d [m/s^2]": "v0^2/2d [m
          "yaw [deg]": "final yaw [deg]", "side slip [deg]": "largest side slip [deg]"}  # fmt: skip
 
 
+ESTIMATED = ("  true_speed = false: the speed is estimated from the wheels, which tell the vehicle's only when they "
+             "come back to it; slip_pi holds them at a slip, and may lock them for seconds on ice")  # fmt: skip
+
+
 class Options(Strict):
     """[options] of this study."""
 
@@ -101,7 +105,8 @@ def table(found: list[tuple[Case, dict[str, float]]]) -> list[str]:
         name = case.procedure.replace("_", " ")
         lines.append(f"  {case.surface:<10}{name:<12}{case.controller:<32}"
                      + "".join(f"{values[head]:>17.2f}" for head in heads))  # fmt: skip
-    return [*lines, "  locked: longest of the wheels, above 15 km/h"]
+    lines += ["  locked: longest of the wheels, above 15 km/h"]
+    return lines + [ESTIMATED] * any(not case.scene.controller.true_speed for case, _ in found)
 
 
 def _save(found: list[tuple[Case, dict[str, float]]], file: Path) -> None:

@@ -72,6 +72,13 @@ def test_slip_pi_does_not_wind_up():
     assert most == 6.0 and after[-1] == 0.0
 
 
+def test_estimate_does_not_go_down_with_wheels_that_lock_at_once():
+    """Nothing is learnt yet: it falls by 6 m/s^2, where no vehicle exceeds 10."""
+    estimate = SpeedEstimate(SAMPLE)
+    found = [estimate.after([speed] * 4) for speed in np.maximum(15.0 - 60.0 * SAMPLE * np.arange(101), 0.0)]
+    assert found[-1] == pytest.approx(15.0 - 6.0 * 100 * SAMPLE)
+
+
 def test_estimate_is_the_fastest_rolling_wheel_and_learns_the_slope():
     """All wheels dip together every 0.3 s on a vehicle that slows by 2 m/s^2: within 2 % from the third dip on."""
     estimate, worst = SpeedEstimate(SAMPLE), 0.0
