@@ -24,7 +24,7 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "ride_varying_speed", "ride_nonlinear", "ride_faults", "hub_forces", "contact_price", "fastsim", "wheelset",
          "rolling_faults", "contact_bridges", "handling", "braking_stop", "braking_faults", "braking_port",
          "braking_controllers", "braking_engines", "braking_suspension", "measured_formats", "measured_virtual",
-         "measured_long")  # fmt: skip
+         "measured_long", "measured_checks")  # fmt: skip
 """Case modules in the order of the report."""
 
 
@@ -111,6 +111,7 @@ def seeds() -> dict[str, int]:
         index_reduction,
         inertial_unit,
         kalman,
+        measured_checks,
         measured_formats,
         measured_virtual,
         motion,
@@ -138,7 +139,7 @@ def seeds() -> dict[str, int]:
             "copies of ride": ride_varying_speed.SEED, "nonlinear ride": ride_nonlinear.SEED,
             "drawn wheelsets": wheelset.SEED, "rough road of handling": handling.SEED,
             "speeds on ice": braking_controllers.SEED, "measurement files": measured_formats.SEED,
-            "virtual measurements": measured_virtual.SEED,
+            "virtual measurements": measured_virtual.SEED, "checks of recordings": measured_checks.SEED,
             "long recordings": long_recording.SEED}  # fmt: skip
 
 

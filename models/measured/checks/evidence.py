@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -91,7 +91,7 @@ class Evidence:
 
     def mean(self, signal: Signal) -> float:
         """Of all samples, under a window."""
-        return float(mean(self.recording.samples(signal)[:, None])[0][0])
+        return float(mean([partial(self.recording.samples, signal)])[0][0])
 
     @cached_property
     def _spectra(self) -> Spectra | None:

@@ -33,7 +33,8 @@ def wrong(ratio: float, signal: Signal) -> tuple[Wrong, str]:
         return "gain", ""
     own = NAMES[signal.quantity]
     far = {(own[taken] != signal.factor, abs(np.log(ratio * own[true] / own[taken]))): f"{true} taken for {taken}"
-           for true in own for taken in own if true != taken}  # fmt: skip
+           for true in own for taken in own
+           if true != taken and {1.0, signal.factor} & {own[true], own[taken]}}  # fmt: skip
     near = [pair for pair in far if pair[1] <= NEAR]
     return ("unit", far[min(near)]) if near else ("size", "")
 

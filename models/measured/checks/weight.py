@@ -1,6 +1,7 @@
 """Mean vertical forces against the static load of every hub and against the weight: sign, unit and calibration."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.linalg import null_space
@@ -49,8 +50,8 @@ def check(evidence: Evidence) -> list[Finding]:
         text = "Not compared with the weight: this needs a vehicle in space and the vertical force of every hub."
         return [Finding(NAME, "note", "", text)]
     signals = tuple(own[hub] for hub in vehicle.hubs)
-    numbers, samples = _samples(evidence, vehicle)
-    centre, spread = mean(samples)
+    numbers = _numbers(evidence, vehicle)
+    centre, spread = mean([partial(evidence.recording.samples, s) for s in evidence.forces])
     loads, at = centre[[numbers.index(WRENCH * i + 2) for i in range(len(signals))]], vehicle.loads
     coarse = [_coarse(s, load, static) for s, load, static in zip(signals, loads, at, strict=True)]
     if any(coarse):
@@ -58,11 +59,10 @@ def check(evidence: Evidence) -> list[Finding]:
     return _fine(_balance(vehicle, numbers, centre, spread), signals, at)
 
 
-def _samples(evidence: Evidence, vehicle: CutVehicle) -> tuple[list[int], np.ndarray]:
-    """Numbers (k,) of the components among all hubs', and their samples (n, k)."""
-    numbers = [WRENCH * vehicle.hubs.index(evidence.hub(s)) + 3 * (s.quantity == "moment") + AXES[s.component]
-               for s in evidence.forces]  # fmt: skip
-    return numbers, np.column_stack([evidence.recording.samples(s) for s in evidence.forces])
+def _numbers(evidence: Evidence, vehicle: CutVehicle) -> list[int]:
+    """Numbers (k,) of the components among all hubs'."""
+    return [WRENCH * vehicle.hubs.index(evidence.hub(s)) + 3 * (s.quantity == "moment") + AXES[s.component]
+            for s in evidence.forces]  # fmt: skip
 
 
 def _coarse(signal: Signal, load: float, static: float) -> Finding | None:

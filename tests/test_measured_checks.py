@@ -1,0 +1,177 @@
+"""Checks of a recording: what is planted is named with place and size, and what is not there is not."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.measured.checks import check, clipped, gaps, gravity, noise, turning
+from models.measured.checks.evidence import Evidence
+from models.measured.checks.means import mean
+from models.measured.checks.ratios import wrong
+from models.measured.checks.response import Response
+from models.measured.columns import Columns
+from models.measured.faults_of_measurement import Faults
+from models.measured.finding import Finding
+from models.measured.recording import Recording
+from models.measured.signal import Quantity, Signal
+from models.measured.virtual import VirtualMeasurement
+from validation.cases import measured_checks as case
+from validation.cases.hub_forces import r19
+
+PERIOD = 2e-3
+
+
+@pytest.fixture(scope="module")
+def ridden() -> VirtualMeasurement:
+    """Five seconds of a car on a road."""
+    return case.measurement(road=("C", 1, 20.0, 5.0))
+
+
+def made(folder: Path, **columns: np.ndarray) -> Recording:
+    """A recording of nothing but these columns, named quantity_component."""
+    kinds: dict[str, Quantity] = {"acc": "acceleration", "angle": "angle", "rate": "angular rate", "force": "force"}
+    signals = tuple(Signal(name, "", name, kinds[name.split("_")[0]], "body", name.split("_")[1], "body", 1, "", 1.0)
+                    for name in columns)  # fmt: skip
+    values = np.column_stack(list(columns.values()))
+    own = Columns(folder / "made.columns", tuple(columns), len(values))
+    own.write(0, values)
+    return Recording(signals, own, PERIOD)
+
+
+def said(check_one, recording: Recording, **claimed: float) -> list[Finding]:
+    """What one check finds without a vehicle, notes left out."""
+    return [one for one in check_one(Evidence(recording, None, {}, claimed)) if one.weight != "note"]
+
+
+def white(count: int = 5000, seed: int = 3) -> np.ndarray:
+    """Noise of deviation 1."""
+    return np.random.default_rng(seed).normal(size=count)
+
+
+@pytest.mark.parametrize("fault", case.QUICK, ids=lambda fault: fault.name)
+def test_a_planted_fault_is_named_with_its_size(fault, ridden, tmp_path):
+    assert all(row.status == "passed" for row in case._rows(fault, case.planted(fault, ridden, tmp_path)))
+
+
+def test_a_clean_recording_of_five_seconds_raises_nothing(ridden, tmp_path):
+    assert not case.findings(ridden, ridden.samples(Faults(noise=case.NOISE), 5), tmp_path)
+
+
+def test_hub_forces_explain_the_motion_through_the_vehicle_and_only_with_their_signs(ridden, tmp_path):
+    clean = ridden.samples(Faults(), 1)
+    share = {}
+    for sign in (1, -1):
+        clean[:, case._columns(ridden, "fl_fy", "fr_fy", "rl_fy", "rr_fy")] *= sign
+        own = case.recording(ridden, clean, tmp_path / f"{sign}.columns")
+        agreement = Evidence(own, ridden.vehicle).agreement
+        assert agreement is not None
+        share[sign] = agreement.typical()
+    assert share[1] < 0.15 < 0.5 < share[-1]  # what is left: windows cut the spectra, and the vehicle is not linear
+
+
+def test_static_response_of_a_free_vehicle_is_force_by_mass():
+    # at 0.01 Hz nothing inside the car moves: 1 N shared out as the loads are acts at the centre and lifts it by 1 / m
+    car = r19()
+    vertical = Signal("az", "", "az", "acceleration", "body", "z", "body", 1, "m/s^2", 1.0)
+    place = Evidence(None, car).place(vertical)  # type: ignore[arg-type]
+    assert place is not None
+    lifted = Response(car, "hub").at(np.array([1e-2]), (vertical,), (place,))[0, 0, 2::6]
+    mass = sum(body.mass for body in car.whole.bodies)
+    assert (lifted @ car.loads / car.loads.sum()).real == pytest.approx(1 / mass, rel=5e-4)
+
+
+def test_gaps_are_named_with_begin_and_length(tmp_path):
+    lost = white()
+    lost[1000:1250] = np.nan
+    (found,) = said(gaps.check, made(tmp_path, force_x=lost, force_y=white()))
+    assert (found.weight, found.place, found.times) == ("error", "force_x", (2.0, 2.5))
+    assert found.size == pytest.approx(0.5)
+
+
+def test_a_short_gap_or_one_of_an_angle_is_a_doubt(tmp_path):
+    short, angle = white(), white()
+    short[100:110], angle[100:600] = np.nan, np.nan
+    found = said(gaps.check, made(tmp_path, force_x=short, angle_roll=angle))
+    assert [one.weight for one in found] == ["doubt", "doubt"]
+
+
+def test_clipping_is_told_from_a_rounded_channel(tmp_path):
+    cut, rounded = np.minimum(white(), 2.0), np.round(white(seed=4), 1)
+    (found,) = said(clipped.check, made(tmp_path, force_x=cut, force_y=rounded))
+    assert found.place == "force_x"
+    assert found.size == pytest.approx(100 * np.mean(cut == 2.0))
+
+
+def test_a_held_value_and_a_dead_channel_are_named(tmp_path):
+    held = white()
+    held[1000:1100] = held[1000]
+    stuck, dead = said(clipped.check, made(tmp_path, force_x=held, force_y=np.full(5000, 3.0)))
+    assert stuck.size == pytest.approx(0.2, abs=2 * PERIOD)
+    assert dead.weight == stuck.weight == "error"
+
+
+@pytest.mark.parametrize(("level", "kind", "size"), [(0.0, "gravity", 9.81), (-9.81, "sign", -1.0),
+                         (1.0, "unit", 0.102), (8.9, "gravity", -0.91), (9.7, "", 0.0)])  # fmt: skip
+def test_a_vertical_accelerometer_feels_gravity(level, kind, size, tmp_path):
+    found = said(gravity.check, made(tmp_path, acc_z=level + 0.3 * white()))
+    assert [one.check for one in found] == ([kind] if kind else [])
+    assert not kind or found[0].size == pytest.approx(size, abs=0.03)
+
+
+def test_gravity_along_another_axis_means_that_axes_are_exchanged(tmp_path):
+    (found,) = said(gravity.check, made(tmp_path, acc_y=9.81 + white()))
+    assert (found.weight, found.place) == ("error", "acc_y")
+
+
+@pytest.mark.parametrize(("factor", "late", "kind", "size"), [(1.0, 0.0, "", 0.0), (-1.0, 0.0, "sign", -1.0),
+                         (57.3, 0.0, "unit", 57.3), (1.0, 4e-3, "shift", 4e-3)])  # fmt: skip
+def test_a_rate_is_the_derivative_of_its_angle(factor, late, kind, size, tmp_path):
+    times, waves = PERIOD * np.arange(10_000), np.random.default_rng(1).uniform(0.5, 6.0, (40, 2))
+    phase = np.pi * waves[:, 1]
+    angle = np.sin(2 * np.pi * np.outer(times, waves[:, 0]) + phase).sum(axis=1)
+    rate = (np.cos(2 * np.pi * np.outer(times - late, waves[:, 0]) + phase) * 2 * np.pi * waves[:, 0]).sum(axis=1)
+    own = made(tmp_path, angle_roll=angle + 0.01 * white(10_000), rate_roll=factor * rate + 0.01 * white(10_000, 4))
+    found = said(turning.check, own)
+    assert [one.check for one in found] == ([kind] if kind else [])
+    assert not kind or found[0].size == pytest.approx(size, rel=0.1)
+
+
+def test_noise_is_estimated_beside_motion_and_compared_with_what_is_stated(tmp_path):
+    motion = 50 * np.sin(2 * np.pi * 3 * PERIOD * np.arange(20_000))
+    own = made(tmp_path, force_x=motion + 2.0 * white(20_000))
+    (found,) = said(noise.check, own, force_x=8.0)
+    assert found.size == pytest.approx(2.0, rel=0.05)  # 40 segments of 128 lines: 2 %
+    assert not said(noise.check, own, force_x=2.2)
+
+
+def test_the_mean_of_a_windowed_record_is_as_good_as_it_says():
+    rng, off = np.random.default_rng(2), []
+    for _ in range(200):
+        values = rng.normal(size=500)
+        centre, spread = mean([lambda values=values: values])
+        off.append(float(centre[0] ** 2 / spread[0, 0]))
+    assert 0.7 < np.mean(off) < 2.0  # F(1, 6) has the mean 1.5; three neighbouring lines are not quite independent
+
+
+@pytest.mark.parametrize(("ratio", "kind"), [(1.02, "gain"), (1e3, "unit"), (-1.0, "sign"), (0.5, "size")])
+def test_a_ratio_says_what_is_wrong(ratio, kind):
+    own = Signal("fz", "", "fz", "force", "fl", "z", "hub", 1, "kN", 1e3)
+    assert wrong(ratio, own)[0] == kind
+    assert kind != "unit" or wrong(ratio, own)[1] == "N taken for kN"
+
+
+def test_without_a_vehicle_every_check_says_what_it_would_need(tmp_path):
+    found = check(made(tmp_path, force_z=1000 + white()), None)
+    assert {one.weight for one in found} == {"note"}
+    assert any("a vehicle in space" in one.text for one in found)
+
+
+def test_what_was_noticed_while_reading_is_carried_and_errors_come_first(ridden, tmp_path):
+    noticed = Finding("clock", "doubt", "b.csv", "The clock of b.csv runs fast.")
+    lost = white()
+    lost[10:1000] = np.nan
+    found = check(replace(made(tmp_path, force_z=lost), noticed=(noticed,)), None)
+    assert [one.weight for one in found[:2]] == ["error", "doubt"]
+    assert found[1] is noticed
