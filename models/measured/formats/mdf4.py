@@ -30,8 +30,8 @@ from models.measured.formats.opened import Opened, Span, notice, readable, told_
 
 SECONDS = 1
 """Synchronisation type of a master channel that counts seconds (MDF 4; that of MDF 3 always does)."""
-ALL_INVALID = 1
-"""Flag of a channel of MDF 4 that was never measured."""
+ALL_INVALID, INVALIDATION, VIRTUAL_MASTER = 1, 2, 3
+"""Flags of a channel of MDF 4 that was never measured, and of one with marks; kind of a clock without samples."""
 LOCAL, OFFSET = 1, 2
 """Flags of the start in MDF 4: local time of an unknown zone, offset to UTC is valid."""
 PLAIN = {3: {0, 1, 2, 3, 9, 10, 11, 12, 13, 14, 15, 16}, 4: {0, 1, 2, 3, 4, 5}}
@@ -169,7 +169,7 @@ def _useless(mdf: Any, g: int, version: int) -> str:
         return "no clock"
     if version == 4 and group.channels[master].sync_type != SECONDS:
         return "its clock does not count seconds"
-    return ""
+    return "" if _inside(group, group.channels[master], version) else "its clock lies outside the records"
 
 
 def _unusable(group: Any, i: int, version: int) -> str:
@@ -180,7 +180,24 @@ def _unusable(group: Any, i: int, version: int) -> str:
         return "marked as invalid by the recorder"
     numbers = (channel.channel_type == 0 and channel.data_type in PLAIN[version]
                and conversion in CONVERSIONS[version] and not group.channel_dependencies[i])  # fmt: skip
-    return "" if numbers else "no numbers"
+    if not numbers:
+        return "no numbers"
+    return "" if _inside(group, channel, version) else "bits outside the records (a damaged file has such)"
+
+
+def _inside(group: Any, channel: Any, version: int) -> bool:
+    """Whether a channel's bits are within its records: the library copies unchecked, and may take the process down."""
+    own, whole = group.channel_group, channel.data_type in WHOLE[version]
+    if version == 4 and channel.channel_type == VIRTUAL_MASTER:
+        return True
+    begin = 8 * channel.byte_offset + channel.bit_offset if version == 4 else (
+        channel.start_offset + 8 * getattr(channel, "additional_byte_offset", 0))  # fmt: skip
+    marked = version == 4 and channel.flags & INVALIDATION
+    return (
+        0 <= begin <= begin + channel.bit_count <= 8 * own.samples_byte_nr
+        and (0 < channel.bit_count <= 64 if whole else begin % 8 == 0 and channel.bit_count in (16, 32, 64))
+        and (not marked or channel.pos_invalidation_bit < 8 * own.invalidation_bytes_nr)
+    )
 
 
 def _resolution(channel: Any, version: int) -> float:
