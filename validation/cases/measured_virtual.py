@@ -42,7 +42,7 @@ NOISE = {"force": 8.0, "moment": 1.0, "angle": np.radians(0.1), "angular rate": 
 LATE = 0.003
 """s, by which the inertial unit's recorder is late, which the scene states."""
 DAMAGE = 0.03
-RATE, DURATION = 500.0, 6.0
+RATE, DURATION = 500.0, 5.0
 """Hz, s, of the proofs."""
 COPIES = 16
 """Paths of the ensembles beside a predicted time of trust."""

@@ -1,0 +1,200 @@
+"""Virtual measurements, their faults, bridged gaps, times of trust, verdicts, and recordings on the pitch plane."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from models.errors import InputError
+from models.hub_forces.cut_vehicle import CutVehicle, cut
+from models.hub_forces.rigid import rigid
+from models.measured.columns import Columns
+from models.measured.faults_of_measurement import Faults, check, measured
+from models.measured.gaps import filled
+from models.measured.inputs import Grid, Inputs
+from models.measured.pitch_plane import PlaneJob
+from models.measured.pitch_plane import run as plane_run
+from models.measured.recording import Recording
+from models.measured.section_run import DAMPING, Hold
+from models.measured.signal import Quantity, Signal
+from models.measured.trust import Level, drift, position
+from models.measured.verdict import uncertainty
+from models.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
+from models.simulate import simulate
+from models.strict import read
+from models.vehicles.vehicle_file import load_vehicle
+from validation.scenes import road_scene
+
+PERIOD = 2e-3
+
+
+@pytest.fixture(scope="module")
+def car() -> CutVehicle:
+    return cut(load_vehicle("r19_free"), "body")
+
+
+@pytest.fixture(scope="module")
+def driven(car: CutVehicle) -> VirtualMeasurement:
+    table = {"duration": 0.5, "sampling_rate": 500.0, "accelerometers": {"origin": [-0.17469426452848785, 0.0,
+             0.6254492741749169], "roof": [0.3, 0.2, 1.4]}, "travels": ["front left", "front bar"],
+             "sections": ["front left"]}  # fmt: skip
+    return virtual_measurement(car, read(VirtualTable, table, ""), "mujoco")
+
+
+def _signal(channel: str, what: Quantity = "force", at: str = "fl", component: str = "z") -> Signal:
+    return Signal(channel, "", channel, what, at, component, "inertial", 1, "N", 1.0)
+
+
+def _faulty(faults: dict[str, object], signals: tuple[Signal, ...], truth: np.ndarray, path: int = 0) -> np.ndarray:
+    return measured(read(Faults, faults, ""), signals, truth, 1e-3, 2, 7, path)
+
+
+WAVE = np.sin(2 * np.pi * 3.0 * 1e-3 * np.arange(8001))
+TWO = (_signal("a"), _signal("b", at="fr"))
+
+
+@pytest.mark.parametrize(("faults", "expected"), [
+    ({}, WAVE[::2]), ({"gain": {"fl": 0.02}}, 1.02 * WAVE[::2]), ({"bias": {"a": 3.0, "force": 9.0}}, WAVE[::2] + 3.0),
+    ({"delay": {"force": 0.0035}}, np.sin(2 * np.pi * 3.0 * np.maximum(2e-3 * np.arange(4001) - 0.0035, 0.0))),
+])  # fmt: skip
+def test_a_fault_does_what_it_says_and_nothing_else(faults: dict[str, object], expected: np.ndarray) -> None:
+    found = _faulty(faults, TWO, np.column_stack([WAVE, WAVE]))
+    assert np.abs(found[:, 0] - expected).max() < 1e-9  # the spline of a delay errs by (w h)^4 / 384
+
+
+def test_noise_belongs_to_its_channel() -> None:
+    still = np.zeros((80_001, 2))
+    both = _faulty({"noise": {"force": 2.0}}, TWO, still)
+    alone = _faulty({"noise": {"force": 2.0}}, TWO[1:], still[:, 1:])
+    assert (both[:, 1] == alone[:, 0]).all()
+    assert abs(both.std() - 2.0) < 4 * 2.0 / np.sqrt(2 * both.size)  # four deviations of a standard deviation
+    assert abs(np.corrcoef(both.T)[0, 1]) < 4 / np.sqrt(len(both))
+    assert (both != _faulty({"noise": {"force": 2.0}}, TWO, still, path=1)).mean() > 0.99
+
+
+def test_a_converter_rounds_and_a_silent_transducer_loses_all_its_channels() -> None:
+    signals = (_signal("a"), _signal("b", component="x"), _signal("c", at="fr"))
+    truth = np.column_stack([WAVE, 2 * WAVE, WAVE])
+    found = _faulty({"quantisation": {"bits": 8, "channels": ["a"]}, "dropouts": {"rate": 1.0, "length": 0.02}},
+                    signals, truth)  # fmt: skip
+    lost = np.isnan(found)
+    assert (lost[:, 0] == lost[:, 1]).all() and (lost[:, 0] != lost[:, 2]).any()
+    assert 1 <= lost[:, 0].sum() / 10 <= 20  # of 8 expected gaps of 10 samples; 5 deviations of a Poisson number are 14
+    steps = found[:, 0] / (2 * 1.25 / 2**8)
+    assert np.nanmax(np.abs(steps - np.rint(steps))) < 1e-9 and len(np.unique(steps[~lost[:, 0]])) > 100
+
+
+def test_names_that_no_signal_has_are_refused() -> None:
+    with pytest.raises(InputError, match="did you mean 'force'"):
+        check(read(Faults, {"noise": {"forse": 1.0}}, ""), TWO)
+    with pytest.raises(InputError, match="must be 0 or more"):
+        check(read(Faults, {"delay": {"a": -1e-3}}, ""), TWO)
+
+
+def test_gaps_are_filled_far_better_than_by_a_line_and_say_how_well() -> None:
+    rng = np.random.default_rng(3)
+    hop = lfilter([1.0], [1.0, -1.96, 0.978], rng.normal(size=20_000))  # 12 Hz at 500 Hz, well damped
+    lost = hop.copy()
+    for first in range(500, 19_500, 700):
+        lost[first : first + 8] = np.nan
+    found, said = filled(lost, PERIOD, 0.03)
+    gone, at = np.isnan(lost), np.arange(len(hop))
+    line = np.interp(at[gone], at[~gone], hop[~gone])
+    error = np.std((found - hop)[gone])
+    assert error < 0.5 * np.std(line - hop[gone])
+    assert 0.5 * error < np.mean([gap.doubt for gap in said]) < 3 * error  # the largest in a gap, not the mean one
+    assert (found[~gone] == hop[~gone]).all()
+    kept, (gap,) = filled(np.where((at > 99) & (at < 200), np.nan, hop), PERIOD, 0.03)
+    assert np.isnan(kept[100:200]).all() and np.isnan(gap.doubt)
+
+
+def test_half_steps_follow_cubics(car: CutVehicle, driven: VirtualMeasurement, tmp_path: Path) -> None:
+    t = np.arange(-1.0, 12.0)[:, None]
+    samples = 2.0 - t + 0.3 * t**2 - 0.05 * t**3
+    rows = Grid(1e-3, 2e-3).cubic(samples, 30)[:, 0]
+    fine = np.arange(30) / 4
+    assert np.abs(rows - (2.0 - fine + 0.3 * fine**2 - 0.05 * fine**3)).max() < 1e-13
+    inputs = Inputs(recording(driven, driven.samples(Faults(), 1), tmp_path / "c.bin"), car)
+    start, end = inputs.around(0, 4), inputs.around(inputs.recording.count - 4, 4)
+    assert (inputs.around(5, 4) == inputs.wrenches(4, 7)).all()
+    assert np.allclose(start[0], 2 * start[1] - start[2]) and len(start) == len(end) == 7
+
+
+def test_transducers_agree_with_one_another(car: CutVehicle, driven: VirtualMeasurement) -> None:
+    value = {signal.channel: column for signal, column in zip(driven.signals, driven.values.T, strict=True)}
+    assert abs(value["origin_az"][0] - 9.81) < 1e-3  # at rest on its tyres, reading upwards
+    fall = np.gradient(driven.run.states[:, car.size + 2], driven.step, edge_order=2)
+    assert np.abs(value["origin_az"] - 9.81 - fall)[5:-5].max() < 0.05 * np.abs(fall).max()  # tilts of some mrad
+    lever = (value["roof_ay"] - value["origin_ay"]) / (1.4 - 0.6254492741749169)
+    roll = np.gradient(value["roll_rate"], driven.step)
+    assert np.abs(lever + roll)[5:-5].max() < 0.1 * np.abs(roll).max()  # about x, upwards is leftwards turned round
+    spring = car.elements[[element.name for element in car.elements].index("front left")]
+    law = spring.held + spring.stiffness * value["front left_travel"] \
+        + spring.damping * np.gradient(value["front left_travel"], driven.step)  # fmt: skip
+    assert np.abs(law - value["front left_force"])[5:-5].max() < 0.02 * np.ptp(value["front left_force"])
+
+
+def test_drift_by_its_closed_laws(car: CutVehicle) -> None:
+    own, deviation = rigid(car), np.tile([8.0] * 3 + [1.0] * 3, 4)
+    bias = np.zeros(24)
+    bias[2] = 5.0
+    level = Level(8.0, 1.0, bias, tilt=(0.01, 0.0), rate=(0.0, 0.02))
+    hub = drift(car, level, PERIOD, 8.0, "hub")
+    law = own.angle_variance(deviation, PERIOD, hub.times[1:])
+    assert np.abs(hub.deviations[200:] / np.sqrt(law[199:]) - 1).max() < 1e-3
+    turning = np.linalg.solve(own.inertia, own.moments(bias[None])[0])
+    assert np.allclose(hub.means["bias"][-1], turning * 32.0)
+    assert np.allclose(hub.means["tilt at the start"][-1], [0.01, 0.0, 0.0])
+    space = drift(car, level, PERIOD, 2.0, "inertial")
+    late = space.means["tilt at the start"][[1000, 2000], 0]
+    assert abs(np.log(late[1] / late[0]) / own.toppling()[0] - 1) < 0.01  # cosh has become exp, products are small
+    assert hub.passes(0.02, "rate at the start") == pytest.approx(1.0, abs=0.01)
+    assert hub.angle > space.angle and space.trusted < hub.trusted == 8.0
+    off = position(car, Level(0.0, 0.0, tilt=(0.01, 0.0)), PERIOD, np.array([2.0]), "hub")[0]
+    assert np.allclose(off, [0.0, 9.81 * 0.01 * 2.0, 0.0])
+
+
+def test_uncertainty_of_a_held_angle_is_what_its_pull_lets_through(car: CutVehicle) -> None:
+    hold = Hold(force=1e-9, moment=1e-9, angle=2e-3, rate=5e-3)
+    corner, h = 2 * np.pi * hold.bandwidth, PERIOD
+    noise = np.random.default_rng(1).normal(size=(2, 400_000)) * np.array([[hold.angle], [hold.rate]])
+    pushed = corner**2 * noise[0] + 2 * DAMPING * corner * noise[1]
+    # x'' + 2 z w x' + w^2 x = pushed, by semi-implicit Euler
+    c = 2 * DAMPING * corner * h
+    angle = lfilter([h * h], [1.0, corner**2 * h * h + c - 2.0, 1.0 - c], pushed)
+    assert 2 * angle.std() / uncertainty(car, hold, h) == pytest.approx(1.0, abs=0.05)  # some hundred correlation times
+    assert uncertainty(car, replace(hold, method="none"), h) == 0.0
+
+
+@pytest.fixture(scope="module")
+def planar(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    true = simulate(road_scene(duration=1.5, step=1e-3), "reference")
+    pairs = [(_signal(f"{at}{side}", at=f"{at} {side}"), share * true[force]) for at, force in (("front", "f1"),
+             ("rear", "f2")) for side, share in (("left", 0.55), ("right", 0.45))]  # fmt: skip
+    pairs += [(_signal("pitch", "angle", "chassis", "pitch"), -true["pitch"]),
+              (_signal("rate", "angular rate", "chassis", "pitch"), -true["pitch_rate"])]  # fmt: skip
+    columns = Columns(tmp_path_factory.mktemp("plane") / "c.bin", tuple(s.name for s, _ in pairs), len(true.times))
+    columns.write(0, np.column_stack([values for _, values in pairs]))
+    return Recording(tuple(s for s, _ in pairs), columns, 1e-3)
+
+
+def test_a_recording_on_the_pitch_plane_gives_its_pitch_back(planar: Recording, tmp_path: Path) -> None:
+    found = plane_run(PlaneJob(planar, "itwm_drift", hold=Hold(force=10.0)), tmp_path / "run")
+    pitch = found.outcome.columns.read("chassis pitch")
+    assert np.abs(pitch - planar.samples(planar.find("angle")[0])).max() < 1e-4
+    assert found.verdict.word == "accepted" and found.outcome.surprise < 1.0  # nothing but the stated noise is missing
+    free = plane_run(PlaneJob(planar, "itwm_drift", hold=Hold("none", force=2000.0)), tmp_path / "free")
+    assert free.verdict.word == "stabilise" and free.trust is not None and free.trust.until is not None
+
+
+def test_another_vehicle_or_a_missing_wheel_is_refused(planar: Recording, tmp_path: Path) -> None:
+    names = planar.columns.names
+    light = Columns(tmp_path / "light.bin", names, planar.count)
+    light.write(0, 0.8 * planar.columns.block(names, 0, planar.count))
+    with pytest.raises(InputError, match="another vehicle, or another unit"):
+        plane_run(PlaneJob(replace(planar, columns=light), "itwm_drift", hold=Hold("none")), tmp_path / "light")
+    fewer = replace(planar, signals=planar.signals[1:])
+    with pytest.raises(InputError, match="both 'front left' and 'front right'"):
+        plane_run(PlaneJob(fewer, "itwm_drift", hold=Hold("none")), tmp_path / "fewer")
