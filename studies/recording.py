@@ -1,5 +1,6 @@
 """From an engineer's measurement files to section forces: read, checked, predicted, run, judged, handed on, a page."""
 
+import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from models.drift.score import Verdict
-from models.drift.trust import ANGLE
+from models.drift.trust import ANGLE, Trust
 from models.errors import RunFailed
 from models.hub_forces.cut_vehicle import CutVehicle
 from models.measured import plan
@@ -23,6 +24,7 @@ from models.measured.finding import Finding
 from models.measured.hand_on import NAME, forces, hand_on
 from models.measured.pattern import write_pattern
 from models.measured.recording import Recording
+from models.measured.rig import Rig
 from models.measured.scene import MeasuredScene
 from models.measured.section_run import Hold, Outcome, SectionRun
 from models.measured.section_run import run as march
@@ -52,13 +54,13 @@ class Found:
     """What there is of a recording, in the order in which it was found; what was not reached is empty."""
 
     scene: MeasuredScene
-    vehicle: CutVehicle
+    rig: Rig
     engine: str
     recording: Recording
     virtual: VirtualMeasurement | None = None
     findings: tuple[Finding, ...] = ()
     drift: Drift | None = None
-    holds: dict[str, Hold] = field(default_factory=dict)
+    trust: tuple[tuple[str, Trust], ...] = ()
     runs: dict[str, Outcome] = field(default_factory=dict)
     verdicts: dict[str, Verdict] = field(default_factory=dict)
     compared: tuple[Compared, ...] = ()
@@ -83,8 +85,8 @@ class Found:
 
     def put_in(self, signal: Signal) -> bool:
         """Whether a signal drives or holds the vehicle; all others are compared with."""
-        moving = signal.at == self.vehicle.chassis and signal.quantity in ("angle", "angular rate")
-        return not signal.check and (signal.at in self.vehicle.hubs or (moving and self.chosen != FREE))
+        moving = signal.at == self.rig.chassis and signal.quantity in ("angle", "angular rate")
+        return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen != FREE))
 
     def counted(self, run: Outcome, answer: Answer) -> Counted:
         """Damage, level crossings and range pairs of one answer of a run."""
@@ -108,31 +110,61 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
 
 def compute(scene: MeasuredScene, engine: str, folder: Path, progress: Progress = lambda text, part: None) -> Found:
     """All but the page; raises InputError for files that cannot be read."""
-    work, vehicle = folder / BLOCKS, scene.cut_vehicle()
+    work, rig, watch, virtual = folder / BLOCKS, scene.rig(), _Watch(), None
     work.mkdir(parents=True, exist_ok=True)
-    watch = _Watch()
-    virtual = None
-    if scene.virtual is not None:
+    if scene.virtual is not None and rig.vehicle is not None:
         progress("virtual measurement", 0.0)
-        virtual = virtual_measurement(vehicle, scene.virtual, engine, scene.file)
+        virtual = virtual_measurement(rig.vehicle, scene.virtual, engine, scene.file)
         scene = _written(scene, virtual, folder)
         watch.lap("virtual measurement")
-    recording = _read(scene, vehicle, work, progress)
+    recording = _read(scene, scene.rig(), work, progress)
     watch.lap("reading")
-    found = Found(scene, vehicle, engine, recording, virtual, seconds=watch.seconds)
+    found = Found(scene, rig, engine, recording, virtual, seconds=watch.seconds)
     progress("checks", 0.2)
-    found.findings = findings_of(recording, vehicle, _places(scene), _claimed(scene, recording))
+    found.findings = findings_of(recording, rig.vehicle, _places(scene), _claimed(scene, recording))
     watch.lap("checks")
     if not found.stopped:
-        found.drift = _predicted(found)
-        _run(found, work, progress)
+        (_in_space if rig.vehicle else _in_plane)(found, work, progress)
         watch.lap("runs")
         if found.held is not None:
-            _judged(found)
             progress("files", 0.95)
             _handed(found, folder)
             watch.lap("files")
     return found
+
+
+def _in_space(found: Found, work: Path, progress: Progress) -> None:
+    """Predict, run and judge a vehicle in space."""
+    found.drift = _predicted(found)
+    found.trust = ("section forces", found.drift.trust()), ("motion", found.drift.trust(ANGLE))
+    _run(found, work, progress)
+    _judged(found)
+
+
+def _in_plane(found: Found, work: Path, progress: Progress) -> None:
+    """Predict, run and judge the pitch plane."""
+    from models.measured.pitch_plane import PlaneJob
+    from models.measured.pitch_plane import run as run_plane
+
+    assert found.scene.vehicle.parameters is not None
+    for i, (name, hold) in enumerate(_holds(found).items()):
+        progress(f"{name} run", 0.2 + 0.35 * i)
+        job = PlaneJob(found.recording, found.scene.vehicle.parameters, found.engine, hold, found.scene.run.step,
+                       found.scene.file)  # fmt: skip
+        try:
+            own = run_plane(job, _fresh(work / name), found.scene.limits)
+        except RunFailed as error:
+            found.failed[name] = str(error)
+            continue
+        found.runs[name], found.verdicts[name] = own.outcome, own.verdict
+        if name == FREE and own.trust is not None:
+            found.trust = (("pitch", own.trust),)
+
+
+def _fresh(folder: Path) -> Path:
+    """A run of the pitch plane takes seconds: what a killed one has left is made anew."""
+    shutil.rmtree(folder, ignore_errors=True)
+    return folder
 
 
 def _written(scene: MeasuredScene, virtual: VirtualMeasurement, folder: Path) -> MeasuredScene:
@@ -144,10 +176,10 @@ def _written(scene: MeasuredScene, virtual: VirtualMeasurement, folder: Path) ->
     return load(path)
 
 
-def _read(scene: MeasuredScene, vehicle: CutVehicle, work: Path, progress: Progress) -> Recording:
+def _read(scene: MeasuredScene, rig: Rig, work: Path, progress: Progress) -> Recording:
     sources = plan.opened(scene)
-    signals = plan.mapped(scene, sources, vehicle)
-    return record(scene, sources, signals, vehicle.hubs, work, lambda text, part: progress(text, 0.2 * part))
+    signals = plan.mapped(scene, sources, rig)
+    return record(scene, sources, signals, rig.hubs, work, lambda text, part: progress(text, 0.2 * part))
 
 
 def _places(scene: MeasuredScene) -> dict[str, Place]:
@@ -174,12 +206,12 @@ def _noise(found: Found) -> dict[str, float]:
 
 def _predicted(found: Found) -> Drift:
     """Drift of the free run, which begins level and at rest, from the noise and from how the vehicle really began."""
-    own, noise, chassis = found.recording, _noise(found), found.vehicle.chassis
+    own, noise, chassis, vehicle = found.recording, _noise(found), found.rig.chassis, _vehicle(found)
     tilt, rate = ((_began(own, what, "roll", chassis), _began(own, what, "pitch", chassis))
                   for what in ("angle", "angular rate"))  # fmt: skip
-    frame = next(s.frame for s in own.signals if s.at in found.vehicle.hubs)
+    frame = next(s.frame for s in own.signals if s.at in vehicle.hubs)
     level = Level(noise["force"], noise["moment"], None, tilt, rate)
-    return drift(found.vehicle, level, own.period, own.duration, frame)
+    return drift(vehicle, level, own.period, own.duration, frame)
 
 
 def _began(own: Recording, what: str, axis: str, chassis: str) -> float:
@@ -190,12 +222,9 @@ def _began(own: Recording, what: str, axis: str, chassis: str) -> float:
 
 def _run(found: Found, work: Path, progress: Progress) -> None:
     """Free, and with the stabiliser that the scene names; a run that fails keeps what it has."""
-    own, noise = found.scene.stabilise, _noise(found)
-    found.holds = {FREE: Hold("none", **noise)}
-    if own.method != "none":
-        found.holds[own.method] = Hold(own.method, own.bandwidth, own.model, own.smoothing, **noise)
-    for i, name in enumerate(found.holds):
-        told = _left(f"{name} run", progress, 0.2 + 0.7 * i / len(found.holds), 0.7 / len(found.holds))
+    holds = _holds(found)
+    for i, name in enumerate(holds):
+        told = _left(f"{name} run", progress, 0.2 + 0.7 * i / len(holds), 0.7 / len(holds))
         try:
             found.runs[name] = march(_job(found, name), work / name, told)
         except RunFailed as error:
@@ -204,21 +233,35 @@ def _run(found: Found, work: Path, progress: Progress) -> None:
                 found.runs[name] = error.partial
 
 
+def _holds(found: Found) -> dict[str, Hold]:
+    """How each run is held."""
+    own, noise = found.scene.stabilise, _noise(found)
+    holds = {FREE: Hold("none", **noise)}
+    if own.method != "none":
+        holds[own.method] = Hold(own.method, own.bandwidth, own.model, own.smoothing, **noise)
+    return holds
+
+
+def _vehicle(found: Found) -> CutVehicle:
+    assert found.rig.vehicle is not None
+    return found.rig.vehicle
+
+
 def _job(found: Found, name: str) -> SectionRun:
     """A run to be made; answers at the sections of the scene, in the chassis' axes, and at accelerometers."""
-    own = found.recording
-    sections = Sections(found.vehicle, points=points(found.vehicle, own.signals, _places(found.scene)))
-    return SectionRun(found.vehicle, own, sections, found.engine, found.holds[name], found.scene.run.step,
+    own, vehicle = found.recording, _vehicle(found)
+    sections = Sections(vehicle, points=points(vehicle, own.signals, _places(found.scene)))
+    return SectionRun(vehicle, own, sections, found.engine, _holds(found)[name], found.scene.run.step,
                       found.scene.file)  # fmt: skip
 
 
 def _judged(found: Found) -> None:
     """Check channels beside the run that is handed on, and the verdict on every run."""
-    assert found.drift is not None and found.held is not None
+    assert found.drift is not None
     slopes, own = tuple(found.scene.hand_on.slopes), found.recording
     for name, run in found.runs.items():
         beside = tuple(compare(own, run, *pair, slopes) for pair in checks(_job(found, name)))
-        found.verdicts[name] = judge(run, found.vehicle, found.holds[name], own.period, found.scene.limits,
+        found.verdicts[name] = judge(run, _vehicle(found), _holds(found)[name], own.period, found.scene.limits,
                                      found.drift.passes(found.drift.angle) or own.duration,
                                      [one for one in beside if one.signal.check])  # fmt: skip
         if name == found.chosen:
@@ -278,9 +321,7 @@ def _told(found: Found) -> list[str]:
     lines = [f"  {finding.weight}: {finding.text}" for finding in found.findings if finding.weight != "note"]
     notes = sum(finding.weight == "note" for finding in found.findings)
     lines.append(f"  {notes} things were looked at and found good: see the page")
-    if found.drift is not None:
-        lines.append(f"  section forces of the free run: {found.drift.trust()}")
-        lines.append(f"  its motion: {found.drift.trust(ANGLE)}")
+    lines += [f"  {what} of the free run: {own}" for what, own in found.trust]
     for name, outcome in found.runs.items():
         end = found.failed.get(name, "to the end")
         lines.append(f"  {name} run: {outcome.period * (outcome.done - 1):.6g} s, {end}")

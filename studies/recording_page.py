@@ -12,13 +12,12 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from models.damage import SLOPE
-from models.drift.trust import ANGLE, Trust
+from models.drift.trust import Trust
 from models.measured.comparison import Band
 from models.measured.counting import Counted
 from models.measured.finding import Finding
 from models.measured.section_run import Outcome
 from models.measured.sections import Answer
-from models.measured.trust import Drift
 from models.measured.verdict import DISAGREES, errors
 from studies import recording_runs as draw
 from studies.recording import FREE, Found, handed_on
@@ -89,7 +88,7 @@ def _subtitle(found: Found) -> str:
     began = f"recorded {own.start:%Y-%m-%d %H:%M:%S %Z}, " if own.start else ""
     kind = "a virtual measurement, with the truth beside it; " if found.virtual is not None else ""
     return f"{kind}{began}{own.duration:.6g} s at {1 / own.period:.6g} Hz, {len(own.signals)} channels, vehicle " \
-           f"{found.vehicle.tree.name}"  # fmt: skip
+           f"{found.rig.name}"  # fmt: skip
 
 
 def _verdict(found: Found) -> dict[str, str]:
@@ -107,7 +106,7 @@ def _verdict(found: Found) -> dict[str, str]:
     return {"kind": {"accepted": "good", "rejected": "bad"}.get(own.word, "idle"), "word": own.word.capitalize(),
             "why": f"{NAMES[found.chosen]}: {own.reason}.{free}",
             "threshold": f"Threshold: held to measured angles with an artificial moment of at most "
-                         f"{limits.artificial_share:.0%} of what turns the {found.vehicle.chassis} (up to 15 Hz), "
+                         f"{limits.artificial_share:.0%} of what turns the {found.rig.chassis} (up to 15 Hz), "
                          f"angles known to {limits.pitch_error:g} rad, and no check channel off by more than "
                          f"{DISAGREES:.0%}; or free, and shorter than it can be trusted."}  # fmt: skip
 
@@ -135,18 +134,17 @@ def _parts(found: Found, folder: Path) -> list[Part]:
     """Chapters, as far as the recording was brought."""
     inputs = draw.inputs_figure(found, folder / "inputs.png")
     parts = [Part("What drives the vehicle", figures=(_figure(inputs, "Forces on the hubs as they are put in."),))]
-    if found.drift is not None:
-        parts.append(_drift(found, found.drift, folder))
+    if found.runs:
+        parts.append(_drift(found, folder))
     if found.held is not None:
         parts.append(_forces(found, found.held, folder))
         parts += [_checks(found, folder)] if found.compared else []
     return [*parts, _map(found)]
 
 
-def _drift(found: Found, drift: Drift, folder: Path) -> Part:
-    motion, section = drift.trust(ANGLE), drift.trust()
-    texts = (f"Before the run: the section forces of a free run are {_until(section)}, its motion is {_until(motion)}.",
-             *(_ended(found, name) for name in found.runs))  # fmt: skip
+def _drift(found: Found, folder: Path) -> Part:
+    said = "; ".join(f"{what}: {_until(own)}" for what, own in found.trust)
+    texts = (f"Predicted of the free run, before it is made: {said}.", *(_ended(found, name) for name in found.runs))
     drawn = draw.drift_figure(found, folder / "drift.png")
     return Part("Predicted and run", texts, figures=(_figure(drawn, "Roll and pitch of every run."),))
 
@@ -181,7 +179,7 @@ DAMAGE_NOTE = ("Pseudo-damage is the sum over rainflow cycles (ASTM E1049-85, th
 def _damages(found: Found, run: Outcome, counted: dict[Answer, Counted]) -> tuple[Table, ...]:
     """Springs, mounts and bars, and folded away guides and hubs."""
     slopes = tuple(found.scene.hand_on.slopes)
-    names = {element.name for element in found.vehicle.elements}
+    names = set(found.rig.places.connectors)
     true = errors(run, found.virtual, SLOPE).damage if found.virtual is not None else {}
     heads = ("section", "unit", "least", "greatest", "mean", *(f"damage, slope {slope:g}" for slope in slopes),
              *((f"damage by true one, slope {SLOPE:g}",) if true else ()))  # fmt: skip

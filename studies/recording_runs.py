@@ -42,12 +42,12 @@ def inputs_figure(found: Found, path: Path) -> Path:
     figure, panels = plt.subplots(len(axes), 1, figsize=(9.5, 1.9 * len(axes) + 0.5), sharex=True, squeeze=False)
     times = own.period * np.arange(own.count)
     for panel, axis in zip(panels[:, 0], axes, strict=True):
-        for i, hub in enumerate(found.vehicle.hubs):
+        for i, hub in enumerate(found.rig.hubs):
             for signal in (s for s in own.find("force", hub, axis) if not s.check):
                 panel.plot(*thinned(times, own.samples(signal) / 1e3), color=WHEELS[i % len(WHEELS)], label=hub, lw=0.7)
         panel.set_title(f"force on the hub along {axis} [kN]")
     panels[-1, 0].set_xlabel("time [s]")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=len(found.vehicle.hubs))
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=len(found.rig.hubs))
     return save(figure, path)
 
 
@@ -55,15 +55,16 @@ def drift_figure(found: Found, path: Path) -> Path:
     """Roll and pitch of every run, beside what was measured and, of a virtual measurement, the truth."""
     from studies.figures import plt, save
 
-    figure, panels = plt.subplots(2, 1, figsize=(9.5, 4.6), sharex=True)
-    for panel, angle in zip(panels, ("roll", "pitch"), strict=True):
+    angles = found.rig.angles
+    figure, panels = plt.subplots(len(angles), 1, figsize=(9.5, 2.0 * len(angles) + 0.6), sharex=True, squeeze=False)
+    for panel, angle in zip(panels[:, 0], angles, strict=True):
         for name, times, values in _angles(found, angle):
             panel.plot(*thinned(times, np.degrees(values)), color=LINES[name], label=NAMES[name], lw=1.0)
         _expected(found, panel, angle)
-        panel.set_title(f"{angle} of the {found.vehicle.chassis} [degrees]")
+        panel.set_title(f"{angle} of the {found.rig.chassis} [degrees]")
         _bounded(panel)
-    panels[-1].set_xlabel("time [s]")
-    handles, labels = panels[0].get_legend_handles_labels()
+    panels[-1, 0].set_xlabel("time [s]")
+    handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=3)
     return save(figure, path)
 
@@ -82,10 +83,10 @@ def _expected(found: Found, panel: Any, angle: str) -> None:
 
 def _angles(found: Found, angle: str) -> list[tuple[str, np.ndarray, np.ndarray]]:
     own, out = found.recording, list[tuple[str, np.ndarray, np.ndarray]]()
-    for signal in own.find("angle", found.vehicle.chassis, angle)[:1]:
+    for signal in own.find("angle", found.rig.chassis, angle)[:1]:
         out.append(("measured", own.period * np.arange(own.count), own.samples(signal)))
     for name, run in found.runs.items():
-        answer = next(a for a in run.answers if a.name == f"{found.vehicle.chassis} {angle}")
+        answer = next(a for a in run.answers if a.name == f"{found.rig.chassis} {angle}")
         out.append((name, run.period * np.arange(run.done), run.samples(answer)))
     if found.virtual is not None:
         from models.hub_forces.cut_vehicle import ANGLES

@@ -1,11 +1,11 @@
 """The channel map of a scene: each channel named in it, found in its file, with its factor to SI and its place."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from difflib import get_close_matches
 
 from models.errors import InputError, suggestion
 from models.measured.channel import Channel, Source
+from models.measured.places import Places
 from models.measured.scene import MappedChannel, MeasuredScene
 from models.measured.signal import Frame, Quantity, Signal
 from models.measured.units import conversion
@@ -15,24 +15,6 @@ AXES: dict[Quantity, tuple[str, ...]] = {
     "angular rate": ("roll", "pitch", "yaw"), "angle": ("roll", "pitch", "yaw"), "travel": (), "strain": (),
 }  # fmt: skip
 """Components that a quantity can have; none along a connector, which has its own direction."""
-
-
-@dataclass(frozen=True)
-class Places:
-    """Names of a vehicle that a channel can be at: hubs, bodies, connectors (springs, mounts, bars), sensors."""
-
-    hubs: tuple[str, ...]
-    bodies: tuple[str, ...]
-    connectors: tuple[str, ...]
-    sensors: tuple[str, ...] = ()
-
-    def of(self, quantity: Quantity) -> Mapping[str, tuple[str, ...]]:
-        """Kinds of places at which a quantity is measured, with their names; none if anywhere."""
-        connectors = {"springs, mounts and bars": self.connectors}
-        if quantity in ("force", "moment"):
-            return {"hubs": self.hubs, **connectors}
-        moving = {"bodies": self.bodies, "sensors": self.sensors}
-        return {"travel": connectors, "strain": {}}.get(quantity, moving)
 
 
 def signals(scene: MeasuredScene, sources: Sequence[Source], places: Places) -> tuple[Signal, ...]:
@@ -48,14 +30,14 @@ def signals(scene: MeasuredScene, sources: Sequence[Source], places: Places) -> 
     for place, row, source in rows:
         name = row.channel if names.count(row.channel) == 1 else f"{row.channel} ({source.path.name})"
         signal = _signal(scene.file, place, row, source, places, name)
-        _check_new(scene.file, f"{place}, channel", signal, found)
+        _check_new(scene.file, f"{place}", signal, found)
         found.append(signal)
     _check_frames(scene.file, found, places)
     return tuple(found)
 
 
 def _signal(file: str, place: str, row: MappedChannel, source: Source, places: Places, name: str) -> Signal:
-    channel = find(source, row.channel, file, f"{place}, channel")
+    channel = find(source, row.channel, file, f"{place}")
     unit, where = row.unit, (file, f"{place}, unit")
     if unit is None:
         unit, where = channel.unit.strip(), (source.path.name, f"unit of {row.channel!r}")
@@ -105,7 +87,8 @@ def _check_place(file: str, place: str, row: MappedChannel, places: Places) -> N
     along = row.at in places.connectors and row.quantity in ("force", "moment")
     axes = () if along else AXES[row.quantity]
     if row.component not in (axes or ("",)):
-        allowed = f"must be {', '.join(axes[:-1])} or {axes[-1]}" if axes else "has a direction of its own: leave component out"
+        own = "has a direction of its own: leave component out"
+        allowed = f"must be {', '.join(axes[:-1])} or {axes[-1]}" if axes else own
         raise InputError(file, f"{place}, component", row.component or None,
                          f"{allowed} ({row.quantity} at {row.at!r})")  # fmt: skip
 

@@ -145,8 +145,8 @@ def _grid(scene: MeasuredScene, leading: list[Group]) -> Grid:
     fastest = min(leading, key=lambda group: group.timing.period)
     period = 1.0 / own.rate if own.rate else fastest.timing.period
     if period < fastest.timing.period * (1 - SAME):
-        raise InputError(scene.file, "clock.rate", own.rate, f"is faster than the wheel forces, {fastest.timing.rate:g} "
-                         "Hz, which adds nothing")  # fmt: skip
+        raise InputError(scene.file, "clock.rate", own.rate, "is faster than the wheel forces, "
+                         f"{fastest.timing.rate:g} Hz, which adds nothing")  # fmt: skip
     first, last = max(g.timing.times[0] for g in leading), min(g.timing.times[-1] for g in leading)
     if first >= last:
         spans = "; ".join(f"{g.source.path.name}: {g.timing.times[0]:.6g} to {g.timing.end:.6g} s" for g in leading)

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from models.errors import InputError
-from models.hub_forces.cut_vehicle import CutVehicle
 from models.measured.channel import Source
-from models.measured.channel_map import Places, signals
+from models.measured.channel_map import signals
 from models.measured.formats import open_source
+from models.measured.rig import Rig
 from models.measured.scene import MeasuredScene
 from models.measured.signal import Signal
 
@@ -17,10 +17,10 @@ def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
     if len(engines) != 1:
         raise InputError("--engine", "", "all", "a recording is run in one engine: name one, or leave it out")
-    vehicle = scene.cut_vehicle()
-    _check_names(scene, vehicle)
+    rig = scene.rig()
+    _check_names(scene, rig)
     if scene.virtual is None:
-        mapped(scene, opened(scene), vehicle)
+        mapped(scene, opened(scene), rig)
 
 
 def opened(scene: MeasuredScene) -> tuple[Source, ...]:
@@ -28,48 +28,40 @@ def opened(scene: MeasuredScene) -> tuple[Source, ...]:
     return tuple(open_source(scene.path(file.file, f"files.{i}.file")) for i, file in enumerate(scene.files))
 
 
-def mapped(scene: MeasuredScene, sources: Sequence[Source], vehicle: CutVehicle) -> tuple[Signal, ...]:
+def mapped(scene: MeasuredScene, sources: Sequence[Source], rig: Rig) -> tuple[Signal, ...]:
     """Signals of all files; raises InputError, also where a wheel has no vertical force or the stabiliser no angles."""
-    found = signals(scene, sources, places(scene, vehicle))
+    found = signals(scene, sources, rig.places)
     driving = {(s.quantity, s.at, s.component) for s in found if not s.check}
-    for hub in vehicle.hubs:
+    for hub in rig.hubs if rig.vehicle else ():
         if ("force", hub, "z") not in driving:
             raise InputError(scene.file, "files", None, MISSING.format(repr(hub)))
-    wanted = [("angle", axis) for axis in ("roll", "pitch")] if scene.stabilise.method != "none" else []
-    wanted += [("angular rate", axis) for axis in ("roll", "pitch")] if scene.stabilise.method == "kalman" else []
+    wanted = [("angle", axis) for axis in rig.angles] if scene.stabilise.method != "none" else []
+    wanted += [("angular rate", axis) for axis in rig.angles] if scene.stabilise.method == "kalman" else []
     for quantity, axis in wanted:
-        if (quantity, vehicle.chassis, axis) not in driving:
+        if (quantity, rig.chassis, axis) not in driving:
             raise InputError(scene.file, "stabilise.method", scene.stabilise.method, f"needs the {quantity} "
-                             f"{axis!r} of {vehicle.chassis!r}, which no channel is mapped to: map it, or say 'none'")
+                             f"{axis!r} of {rig.chassis!r}, which no channel is mapped to: map it, or say 'none'")
     return found
 
 
-def places(scene: MeasuredScene, vehicle: CutVehicle) -> Places:
-    """Where a channel of this vehicle can be."""
-    connectors = tuple(element.name for element in vehicle.elements)
-    return Places(vehicle.hubs, tuple(body.name for body in vehicle.whole.bodies), connectors, tuple(scene.sensors))
-
-
-def _check_names(scene: MeasuredScene, vehicle: CutVehicle) -> None:
-    from models.measured.sections import names
-
-    bodies = tuple(body.name for body in vehicle.whole.bodies)
+def _check_names(scene: MeasuredScene, rig: Rig) -> None:
     for name, sensor in scene.sensors.items():
-        if sensor.body not in bodies:
-            raise InputError(scene.file, f"sensors.{name}.body", sensor.body, "the vehicle has no such body", bodies)
-    known = names(vehicle)
+        if sensor.body not in rig.places.bodies:
+            raise InputError(scene.file, f"sensors.{name}.body", sensor.body, "the vehicle has no such body",
+                             rig.places.bodies)  # fmt: skip
     for name in scene.hand_on.sections or ():
-        if name not in known:
-            raise InputError(scene.file, "hand_on.sections", name, "the vehicle has no such section", known)
+        if name not in rig.sections:
+            raise InputError(scene.file, "hand_on.sections", name, "the vehicle has no such section", rig.sections)
 
 
 def describe(scene: MeasuredScene) -> str:
     """The scene's plan as text."""
-    vehicle = scene.cut_vehicle()
-    _check_names(scene, vehicle)
+    rig = scene.rig()
+    _check_names(scene, rig)
+    size = f"{rig.vehicle.size} freedoms, cut at {', '.join(rig.hubs)}" if rig.vehicle else "the pitch plane"
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"),
-             _line("vehicle", f"{vehicle.tree.name}: {vehicle.size} freedoms, cut at {', '.join(vehicle.hubs)}")]
-    lines += _virtual(scene) if scene.virtual is not None else _files(scene, vehicle)
+             _line("vehicle", f"{rig.name}: {size}")]
+    lines += _virtual(scene) if scene.virtual is not None else _files(scene, rig)
     own = scene.stabilise
     how = {"kalman": f"Kalman filter of roll and pitch, a moment towards it of {own.bandwidth:g} Hz",
            "prescribed": f"measured roll and pitch enforced, smoothed at {own.smoothing:g} Hz",
@@ -88,10 +80,10 @@ def _virtual(scene: MeasuredScene) -> list[str]:
                               f"{own.road.speed:g} m/s, {own.sampling_rate:g} Hz, as {own.format} and back")]
 
 
-def _files(scene: MeasuredScene, vehicle: CutVehicle) -> list[str]:
+def _files(scene: MeasuredScene, rig: Rig) -> list[str]:
     """Every file with its channels as they will be read."""
     sources, lines = opened(scene), list[str]()
-    found = mapped(scene, sources, vehicle)
+    found = mapped(scene, sources, rig)
     for source in sources:
         began = f", began {source.start.isoformat(sep=' ')}" if source.start else ""
         lines.append(_line("file", f"{source.path.name}: {len(source.channels)} channels{began}"))

@@ -8,7 +8,8 @@ from pydantic import Field
 
 from models.drift.score import Limits
 from models.errors import InputError
-from models.hub_forces.cut_vehicle import CutVehicle, cut
+from models.hub_forces.cut_vehicle import cut
+from models.measured.rig import Rig, in_plane, in_space
 from models.measured.signal import Frame, Quantity
 from models.measured.verdict import LIMITS
 from models.measured.virtual import VirtualTable
@@ -113,10 +114,14 @@ class MeasuredScene(SceneFile):
     limits: Limits = Field(default=LIMITS, description="of the verdict")
     hand_on: HandOn = HandOn()
 
-    def cut_vehicle(self) -> CutVehicle:
-        """The vehicle without its tyres; raises InputError."""
-        assert self.vehicle.file is not None
-        return cut(load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file"), self.vehicle.chassis)
+    def rig(self) -> Rig:
+        """The vehicle that is driven; raises InputError."""
+        own = self.vehicle
+        if own.file is None:
+            assert own.parameters is not None
+            return in_plane(own.parameters)
+        return in_space(cut(load_vehicle(own.file, self.folder, self.file, "vehicle.file"), own.chassis),
+                        tuple(self.sensors))  # fmt: skip
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> MeasuredScene:
@@ -139,3 +144,5 @@ def _check_vehicle(scene: MeasuredScene) -> None:
                          "pitch-plane vehicle")  # fmt: skip
     if own.parameters is not None and "chassis" in own.model_fields_set:
         raise InputError(scene.file, "vehicle.chassis", own.chassis, "belongs to a vehicle file: drop it")
+    if own.parameters is not None and scene.virtual is not None:
+        raise InputError(scene.file, "virtual", None, "is of a vehicle file: the pitch plane needs [[files]]")
