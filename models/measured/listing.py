@@ -15,6 +15,8 @@ LOOKED_AT = 20
 def describe(path: Path) -> str:
     """Channels with unit, rate, samples, times and range; what the reader noticed; a scene with a guessed map.
 
+    All but the scene is in comments: the whole is a scene file.
+
     Raises InputError for what is no measurement file.
     """
     source = open_source(path)
@@ -27,8 +29,8 @@ def describe(path: Path) -> str:
     ranges = {name: text for group in _groups(source) for name, text in _ranges(source, group).items()}
     lines += [f"  {c.name:<{width}} {c.unit:<9}{ranges[c.name]}" for c in source.channels]
     lines += [f"  {finding.weight}: {finding.text}" for finding in source.noticed]
-    return "\n".join([*lines, "", "A scene to begin with, its map guessed from names and units; check every line:", "",
-                      scene_text(source)])  # fmt: skip
+    lines += ["", "A scene to begin with, its map guessed from names and units; check every line."]
+    return "\n".join([*(f"# {line}".rstrip() for line in lines), "", scene_text(source)])
 
 
 def _groups(source: Source) -> list[list[str]]:
