@@ -19,6 +19,7 @@ from models.braking.sprung_forces import ROW, STEER, fill, held, held_forces, ho
 from models.braking.surfaces import under_wheels
 from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.errors import RunFailed
+from models.vehicles.spatial_linear import mass
 
 BLINK = 1e-5
 """s: time over which wheels that only roll are looked at."""
@@ -37,6 +38,21 @@ class OnSprings:
         self._rates, self._known = np.zeros(wheels), np.empty((wheels, KNOWN))
 
     @cached_property
+    def _liveliness(self) -> float:
+        """Largest rate (m/s^2) at which side forces of slope 1 at a speed of 1 m/s damp a motion; g of a point mass.
+
+        A body that rolls lets its contacts go sideways more easily than its mass would.
+        """
+        own, size = self.vehicle.handling, self.size
+        motion, across = np.empty((len(self._known), 3)), np.empty((len(self._known), size))
+        for j, rate in enumerate(np.eye(size)):
+            held_forces(self.numbers, np.zeros(size), rate, np.zeros(size), motion)
+            across[:, j] = motion[:, 1]
+        loads = np.array([own.held.tyres[tyre.name] for tyre in own.vehicle.tyres])
+        damping = np.linalg.solve(mass(own.vehicle), across.T @ (loads[:, None] * across))
+        return float(np.linalg.eigvals(damping).real.max())
+
+    @cached_property
     def _model(self) -> FreeModel:
         """Built with the first step."""
         own, table = self.vehicle.handling, self.numbers
@@ -50,14 +66,14 @@ class OnSprings:
 
         A run begins with zeros in ``found``.
         """
-        surface, time = np.empty((turning.size, 3)), 0.0
+        surface, time, regular = np.empty((turning.size, 3)), 0.0, slope * self._liveliness * step
         if not found.any():
             self._rates[:] = 0.0
         self._rows[:, STEER] = steer
         for before, after in pairwise(torques):
             under_wheels(state, step, plane, kind, road, surface)
             begin(turning, surface, plane, self._known)
-            used = self._step(state, turning, before, after, step, slope * 9.81 * step, plane, tables, found, report)
+            used = self._step(state, turning, before, after, step, regular, plane, tables, found, report)
             time += used
             if used < step:
                 return AT_REST, time

@@ -1,0 +1,103 @@
+"""A braked vehicle on its suspension: closed forms, symmetry, engines, scenes that name a vehicle file."""
+
+import numpy as np
+import pytest
+
+from models.braking.magic_formula import surface
+from models.braking.plan import check, describe
+from models.braking.plane_step import LOAD
+from models.braking.plane_vehicle import GRAVITY, truck
+from models.braking.procedures import drive, engines_of, ready
+from models.braking.scene import build
+from models.braking.sprung import PITCH, ROLL, sprung
+from models.braking.stop_report import Stop
+from models.errors import InputError, Refused, RunFailed
+from models.vehicles.vehicle_file import load_vehicle
+from validation.sprung_box import LOCKS, Torques, box, braked, car, constant, pitch_and_transfer, stays
+
+TORQUES = Torques(600.0, 600.0, 200.0, 200.0)
+
+
+def scene(**tables):
+    """The car on wet road, with what ``tables`` change."""
+    return build({
+        "title": "car", "system": "braking", "vehicle": {"file": "r19_free", "spin_inertia": 1.7},
+        "road": {"stretches": [{"left": "wet"}]},
+        "brakes": {"front": {"gradient": 300.0}, "rear": {"gradient": 100.0}, "supply": 2.0},
+        "procedures": {"straight": {"speed": 3.0}, "turn": {"kind": "turn", "speed": 6.0, "radius": 40.0}}, **tables,
+    }, "scene.toml")  # fmt: skip
+
+
+def test_locked_wheels_pitch_and_load_the_box_as_springs_in_series_do():
+    mu, speed = 0.05, 1.5
+    vehicle = braked(box(), constant(mu))
+    path = vehicle.run(Torques(*4 * (LOCKS,)), speed)
+    pitch, transfer = pitch_and_transfer(mu * GRAVITY)
+    late = -len(path.times) // 8
+    assert path.states[late, 0, PITCH] == pytest.approx(pitch, rel=2e-3)  # to first order in 1.6 mrad
+    gained = path.reports[late, :2, LOAD].sum() - path.reports[0, :2, LOAD].sum()
+    assert gained == pytest.approx(transfer, rel=2e-3)
+    # wheels lock within v / r in J v / (r T) and less, the centre of mass leans ahead by 0.9 mm
+    assert path.states[-1, 0, 0] == pytest.approx(speed**2 / (2.0 * mu * GRAVITY), rel=1e-3)
+    assert path.stands and stays(vehicle, path) == 0.0
+
+
+def test_static_loads_are_those_of_levers():
+    for own in (box(), car()):
+        path = braked(own, constant(0.1)).run(Torques(0.0, 0.0, 0.0, 0.0), 2.0, 0.05)
+        assert path.reports[-1, :, LOAD] == pytest.approx(truck(own.plane).static, rel=1e-9)  # no drag, no brakes
+
+
+def test_mirrored_steering_gives_a_mirrored_stop_and_none_gives_no_yaw():
+    wet = surface("wet")
+    left, right, none = (braked(car(), wet, steer=steer).run(TORQUES, 4.0).states[-1, 0] for steer in (0.1, -0.1, 0.0))
+    assert left[1] > 0.05 and left[:6] == pytest.approx(right[:6] * [1, -1, -1, 1, -1, 1], abs=1e-9)
+    assert np.abs(none[[1, 2, ROLL]]).max() < 1e-12
+
+
+def test_engines_agree():
+    ends = [braked(car(), surface("wet"), engine, 0.05, 1e-3).run(TORQUES, 4.0, 0.2).states[-1]
+            for engine in ("mujoco", "exudyn")]  # fmt: skip
+    assert ends[0] == pytest.approx(ends[1], abs=1e-9)  # the same forces and Runge-Kutta method
+
+
+def test_a_run_repeats_to_the_last_bit():
+    vehicle = braked(car(), surface("wet"), steer=0.05)
+    one, two = (vehicle.run(TORQUES, 3.0, 0.2) for _ in range(2))
+    assert np.array_equal(one.states, two.states)
+
+
+def test_a_car_that_turns_over_is_told():
+    grip = surface("dry").scaled(2.0)
+    with pytest.raises(RunFailed, match="turns over") as told:
+        braked(car(), grip, steer=0.3).run(Torques(0.0, 0.0, 0.0, 0.0), 25.0, 5.0)
+    assert len(told.value.partial.times) > 10
+
+
+def test_a_scene_is_marched_by_an_engine_with_its_steady_turn_and_reports_the_body():
+    own = scene()
+    vehicle, start = ready(own, "turn")
+    path = vehicle.run(Torques(0.0, 0.0, 0.0, 0.0), start, 0.1)
+    assert np.abs(path.states[-1, 0, 3:] - start.state[0, 3:]).max() < 1e-5  # springs are settled; drag slows it down
+    assert start.state[0, ROLL] > 5e-3
+    stop = Stop(drive(own, "straight"))
+    assert stop.path.stands and stop.of_vehicle()["largest pitch [deg]"] > 0.5
+    assert "suspension, roll and pitch" in describe(own)
+    check(own, ("reference", "exudyn", "mujoco"))
+    assert engines_of(own, ("reference", "exudyn")) == ("exudyn",)
+
+
+def test_what_a_vehicle_file_has_no_place_for_is_refused():
+    for place, tables in (("load_transfer", {"load_transfer": {}}),
+                          ("relaxation", {"relaxation": {"front": 1.0, "rear": 1.0}}),
+                          ("vehicle.spin_inertia", {"vehicle": {"file": "r19_free"}}),
+                          ("vehicle.override", {"vehicle": {"file": "r19_free", "spin_inertia": 1.0,
+                                                            "override": {"mass": 1.0}}}),
+                          ("vehicle.spin_inertia", {"vehicle": {"spin_inertia": 1.0}})):  # fmt: skip
+        with pytest.raises(InputError) as told:
+            scene(**tables)
+        assert told.value.place == place
+    with pytest.raises(Refused, match="suspension"):
+        check(scene(), ("reference",))
+    with pytest.raises(InputError, match="two of each of two axles"):
+        sprung(load_vehicle("three_axle_truck"), 1.0)
