@@ -1,7 +1,6 @@
 """Checks of a recording: what is planted is named with place and size, and what is not there is not."""
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
