@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from models.braking.quarter import Stop
+from models.braking.relaxation import by_lagging_steps
+from models.braking.samples import by_steps
 from models.errors import InputError
 from validation.braking_schemes import LITERAL, exact, stopped
 from validation.cases import braking_faults
@@ -51,3 +53,9 @@ def test_every_planted_fault_is_caught_and_nothing_else(tmp_path):
     rows, _ = braking_faults.measure(True, tmp_path)
     assert [row.reason for row in rows if row.status != "passed"] == []
     assert len(FAULTS) >= 10
+
+
+def test_compiled_samples_are_kept_on_disk_for_other_processes():
+    """Numba knows a function by the cells of its closure too, and those of compiled functions differ by process."""
+    assert by_steps.py_func.__closure__ is None is by_lagging_steps.py_func.__closure__
+    assert by_steps.py_func.__qualname__ != by_lagging_steps.py_func.__qualname__

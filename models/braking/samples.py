@@ -6,6 +6,7 @@ and not in every sample.
 
 import math
 from collections.abc import Callable, Iterator
+from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,26 +35,32 @@ class Braking(NamedTuple):
     torques: np.ndarray
 
 
-def moved(go: Callable[..., Any]) -> Callable[..., Iterator[tuple[int, float, float, float]]]:
+go: Callable[..., Any] = advance
+"""Stands here for what ``moved`` puts in its place."""
+
+
+def samples(told, sample, braking, state, turning, *others):
     """Generator of a vehicle that ``go``, which is ``advance`` or stands in for it, moves on by one sample at a time.
 
     Each time, and first at the start, it gives how the sample ended, the time (s), the speed of the first unit (m/s)
     and the supply (bar).
     """
+    air, chambers, brakes, torques = braking
+    status, time, step = FINE, 0.0, sample / (torques.shape[0] - 1)
+    while True:
+        yield status, time, math.hypot(state[1, 0], state[1, 1]), air.supply[0]
+        if math.isnan(told.pressures[0]):
+            by_valves(told.valves, sample, air, chambers, brakes, torques)
+        else:
+            by_pressures(told.pressures, air, brakes, torques)
+        status, used = go(state, turning, torques, step, told.steer, *others)
+        time += used
 
-    def samples(told, sample, braking, state, turning, *others):
-        air, chambers, brakes, torques = braking
-        status, time, step = FINE, 0.0, sample / (torques.shape[0] - 1)
-        while True:
-            yield status, time, math.hypot(state[1, 0], state[1, 1]), air.supply[0]
-            if math.isnan(told.pressures[0]):
-                by_valves(told.valves, sample, air, chambers, brakes, torques)
-            else:
-                by_pressures(told.pressures, air, brakes, torques)
-            status, used = go(state, turning, torques, step, told.steer, *others)
-            time += used
 
-    return samples
+def moved(go: Callable[..., Any]) -> Callable[..., Iterator[tuple[int, float, float, float]]]:
+    """``samples`` by one ``go``: a global of the function and no cell of a closure, by whose contents numba would know
+    it, and which are others in every process if they are compiled."""
+    return FunctionType(samples.__code__, globals() | {"go": go}, "samples")
 
 
 def compiled(go: Callable[..., Any], name: str) -> Callable[..., Iterator[tuple[int, float, float, float]]]:
