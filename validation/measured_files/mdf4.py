@@ -101,6 +101,23 @@ def over(kind: int) -> Callable[[Path], Path]:
     return make
 
 
+def mdf3_of_records(count: int) -> Callable[[Path], Path]:
+    """Make a file of version 3 that claims a number of records."""
+
+    def make(folder: Path) -> Path:
+        path = signals(usual_samples(), version="3.30")(folder)
+        data = path.read_bytes()
+        return patched(path, data.index(b"CG") + 22, struct.pack("<L", count))
+
+    return make
+
+
+def unknown_lengths(folder: Path) -> Path:
+    """Make the usual file with records whose lengths are said to differ, and a huge number of them."""
+    path = inside(usual_file(folder), b"##CG", 8, struct.pack("<Q", 2**50))
+    return inside(path, b"##CG", 16, b"\1")
+
+
 def huge_packed(folder: Path) -> Path:
     """Make a packed file that claims to be of a terabyte when unpacked."""
     path = signals(usual_samples(), compression=2)(folder)
@@ -161,6 +178,12 @@ FILES = (
         2**40), link=True), "refused", "links", greedy=True),
     Odd("MDF 4 of a huge number of records", "a reader makes room for them", changed(b"##CG", 8, struct.pack("<Q",
         2**50)), "refused", "records", greedy=True),
+    Odd("MDF 3 of a huge number of records", "a reader makes room for them", mdf3_of_records(2**32 - 1), "refused",
+        "too short", greedy=True),
+    Odd("MDF 4 of a huge number of records of unknown length", "no length tells how many there are", unknown_lengths,
+        "refused", "lengths of their own", greedy=True),
+    Odd("MDF 4 with a channel outside its records", "a library copies what lies behind them",
+        changed(b"##CN", 4, struct.pack("<L", 2**24)), "refused", "outside the records"),
     Odd("MDF 4 of one record more than there is", "the last one is made up", changed(b"##CG", 8, struct.pack("<Q",
         COUNT + 1)), "refused", "records"),
     Odd("MDF 4 of fewer records than there are", "counters of a recorder that stopped early", changed(b"##CG", 8,

@@ -12,7 +12,7 @@ import csv
 import io
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -87,7 +87,7 @@ class CsvFile(Opened):
     factor: float
     columns: tuple[int, ...]
 
-    def pieces(self, chosen: list[int], spans: list[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Read the rows of each span and part its columns."""
         columns = [self.columns[i] for i in chosen]
         with self.path.open("rb") as file:

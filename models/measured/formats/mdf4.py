@@ -11,7 +11,7 @@ import logging
 import re
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, timezone
@@ -25,7 +25,7 @@ from models.errors import InputError
 from models.measured.channel import Channel
 from models.measured.finding import Finding
 from models.measured.formats.left_out import LeftOut
-from models.measured.formats.mdf4_blocks import check_blocks
+from models.measured.formats.mdf4_blocks import VLSD, check_blocks
 from models.measured.formats.opened import Opened, Span, notice, readable, told_apart
 
 SECONDS = 1
@@ -47,7 +47,7 @@ class MdfFile(Opened):
 
     places: tuple[tuple[int, int], ...]
 
-    def pieces(self, chosen: list[int], spans: list[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Load the records of each span once, and take every channel from them."""
         with opened(self.path) as mdf:
             group = self.places[chosen[0]][0]
@@ -133,6 +133,9 @@ def _listed(path: Path, mdf: Any, version: int, found: list[Finding]) -> MdfFile
     """Channels that hold numbers over time."""
     left, places, channels = LeftOut(), [], []
     for g, group in enumerate(mdf.groups):
+        own = group.channel_group
+        if version == 3 and own.cycles_nr * own.samples_byte_nr > path.stat().st_size:
+            raise InputError(path, f"group {g + 1}", own.cycles_nr, "the file is too short for what its records need")
         why = _useless(mdf, g, version)
         if why:
             left.add(why, f"group {g + 1}")
@@ -165,6 +168,8 @@ def _useless(mdf: Any, g: int, version: int) -> str:
     group, master = mdf.groups[g], mdf.masters_db.get(g)
     if group.channel_group.cycles_nr == 0:
         return "no samples"
+    if version == 4 and group.channel_group.flags & VLSD:
+        return "records with lengths of their own"
     if master is None:
         return "no clock"
     if version == 4 and group.channels[master].sync_type != SECONDS:

@@ -1,7 +1,7 @@
 """What the readers of all formats share: channels chosen by name, blocks cut and checked, one kind of error."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
@@ -18,6 +18,19 @@ Span = tuple[int, int]
 
 
 @dataclass(frozen=True)
+class Spans:
+    """Blocks from sample ``first`` to ``count``, made as they are asked for: a damaged file may claim billions."""
+
+    first: int
+    count: int
+    length: int
+
+    def __iter__(self) -> Iterator[Span]:
+        """Every block in turn, from the beginning each time."""
+        return ((i, min(self.length, self.count - i)) for i in range(self.first, self.count, self.length))
+
+
+@dataclass(frozen=True)
 class Opened:
     """A file whose channels are known; its samples are read when asked for, and no handle stays open between."""
 
@@ -31,9 +44,9 @@ class Opened:
         """Blocks of channels of one group, as ``models.measured.channel.Source`` says."""
         chosen = self._chosen(names)
         count = self.channels[chosen[0]].count
-        return self._checked(chosen, [(i, min(length, count - i)) for i in range(first, count, length)])
+        return self._checked(chosen, Spans(first, count, length))
 
-    def pieces(self, chosen: list[int], spans: list[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times (n,) in s and values (n, chosen) of each span, by the format; fewer where the file ends."""
         raise NotImplementedError
 
@@ -48,7 +61,7 @@ class Opened:
             raise InputError(self.path, "channels", list(names), "one or more channels of one sampling rate are needed")
         return chosen
 
-    def _checked(self, chosen: list[int], spans: list[Span]) -> Iterator[Block]:
+    def _checked(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[Block]:
         """Blocks that are complete, with times and values that are numbers or NaN."""
         with readable(self.path):
             for (first, count), (times, values) in zip(spans, self.pieces(chosen, spans), strict=True):

@@ -8,7 +8,7 @@ which is said. The public reader loads a file whole, therefore this one.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,7 +45,7 @@ class RpcFile(Opened):
 
     layout: Layout
 
-    def pieces(self, chosen: list[int], spans: list[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Read the groups that hold each span."""
         own = self.layout
         size = own.points * own.width * own.dtype.itemsize

@@ -8,7 +8,7 @@ An index file beside the file is not read: it may be older than the data.
 import io
 import logging
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -48,7 +48,7 @@ class TdmsData(Opened):
 
     places: tuple[Place, ...]
 
-    def pieces(self, chosen: list[int], spans: list[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Read each channel's own part of each span."""
         places = [self.places[i] for i in chosen]
         with Bounded(self.path) as file:
