@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from models.engines.hub_forces import ENGINES
 from models.errors import RunFailed
@@ -16,6 +17,8 @@ from models.hub_forces.rigid import rigid
 from models.measured import plan
 from models.measured.channel import BLOCK
 from models.measured.checkpoint import digest
+from models.measured.checks import check as check_recording
+from models.measured.checks.place import Place
 from models.measured.clock import record
 from models.measured.faults_of_measurement import Faults
 from models.measured.formats import write
@@ -31,7 +34,8 @@ from models.measured.virtual import VirtualMeasurement, VirtualTable, map_lines,
 from models.strict import read
 from models.systems import load
 from models.vehicles.vehicle_file import SHIPPED, load_vehicle
-from validation.rows import Row, System, Table, at_most, behaves, finding, within
+from validation import recording as moving_car
+from validation.rows import Row, System, Table, at_most, behaves, finding, not_run, within
 
 TITLE = "Measurement files against the truth"
 SYSTEM: System = "drift"
@@ -75,7 +79,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         found, ratios = _proved(proof, folder / proof.name)
         rows += found
         data[proof.name] = ratios
-    return [*rows, *_trusted()], data
+    return [*rows, *_trusted(), *_moving(folder / "moving")], data
 
 
 def own_vehicle(folder: Path) -> str:
@@ -117,8 +121,8 @@ def recorded(found: VirtualMeasurement, samples: np.ndarray, vehicle: str, form:
     if (own := folder.parent / vehicle).is_file():
         (folder / vehicle).write_bytes(own.read_bytes())
     scene = load(folder / "scene.toml")
-    sources, cut_vehicle = plan.opened(scene), found.vehicle
-    return record(scene, sources, plan.mapped(scene, sources, cut_vehicle), cut_vehicle.hubs, folder)
+    sources, rig = plan.opened(scene), scene.rig()
+    return record(scene, sources, plan.mapped(scene, sources, rig), rig.hubs, folder)
 
 
 def _group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> Group:
@@ -250,6 +254,79 @@ def _drift_off(vehicle: CutVehicle, true: VirtualMeasurement, level: Level, path
 def true_frame(true: VirtualMeasurement) -> str:
     """Frame of the hub forces of a virtual measurement."""
     return next(signal.frame for signal in true.signals if signal.at in true.vehicle.hubs)
+
+
+def _moving(folder: Path) -> list[Row]:
+    """A real car: a telephone's gyro and accelerometers, and its camera's angles, in two files of two clocks.
+
+    Nobody publishes wheel forces: at the hubs stands the static load, so that nothing here judges a run.
+    """
+    path, what = moving_car.find(), "telephone and camera of a moving car, two files on one clock:"
+    if path is None:
+        return [not_run("measured_virtual.moving_gyro", SYSTEM, f"{what} gyro by the camera's angles",
+                        f"TWINRIG_DATA does not lead to {moving_car.FILE}")]  # fmt: skip
+    recording = _of_the_road(path, cut(load_vehicle("r19_free"), "body"), folder)
+    said = check_recording(recording, None, {"phone": Place("body", (0.0, 0.0, 1.0))}, {})
+    ratio = next((f.size for f in said if f.check == "turning" and "pitch_rate" in f.place), None)
+    shift = next((f.size for f in said if f.check == "shift" and "roll_rate" in f.place), None)
+    up = [recording.samples(recording.find("acceleration", "phone", axis)[0]).mean() for axis in "xyz"]
+    return [
+        within("measured_virtual.moving_gyro", SYSTEM, f"{what} pitch rate of the gyro by the derivative of the camera's "
+               "angle, as the check finds it", ratio or 0.0, "1", 1.0, 0.1, "two devices, each as it was mounted", "none"),
+        finding("measured_virtual.moving_shift", SYSTEM, f"{what} time by which the gyro's roll rate is late against the "
+                "camera, as the check finds it", shift or 0.0, "s", "", "two clocks"),
+        within("measured_virtual.moving_gravity", SYSTEM, f"{what} mean of the accelerations", float(np.linalg.norm(up)),
+               "m/s^2", 9.81, 0.2, "a telephone's accelerometers are off by one or two per cent", "none"),
+    ]  # fmt: skip
+
+
+def _of_the_road(path: Path, vehicle: CutVehicle, folder: Path) -> Recording:
+    """The public recording as files with a map that turns x forward, y right, z down into the axes of ISO 8855."""
+    folder.mkdir(parents=True)
+    with np.load(path) as data:
+        kept = {name: data[name] for name in ("acc_t", "acc", "gyro", "gyro_bias", "frame_t", "frame_q", "frame_p")}
+    start, camera = kept["acc_t"][0], Rotation.from_quat(kept["frame_q"], scalar_first=True).as_matrix()
+    down = -kept["frame_p"] / np.linalg.norm(kept["frame_p"], axis=1, keepdims=True)
+    forward, right, below = np.einsum("nij,ni->jn", camera, down)
+    angles = {"roll": np.arctan2(right, below), "pitch": -np.arcsin(forward)}
+    _csv(folder / "camera.csv", kept["frame_t"] - start, {f"{name} [rad]": angles[name] for name in angles})
+    rates = kept["gyro"] - kept["gyro_bias"]
+    named = {f"{axis}_rate [rad/s]": rates[:, i] for i, axis in enumerate(("roll", "pitch", "yaw"))}
+    named |= {f"a{axis} [m/s^2]": kept["acc"][:, i] for i, axis in enumerate("xyz")}
+    _csv(folder / "phone.csv", kept["acc_t"] - start, named)
+    count = int((kept["acc_t"][-1] - start) * 100)
+    loads = {f"{hub}_fz [N]": np.full(count, load) for hub, load in zip(vehicle.hubs, vehicle.loads, strict=True)}
+    _csv(folder / "hubs.csv", np.arange(count) / 100, loads)
+    (folder / "scene.toml").write_text(_moving_scene(vehicle))
+    scene = load(folder / "scene.toml")
+    sources, rig = plan.opened(scene), scene.rig()
+    return record(scene, sources, plan.mapped(scene, sources, rig), rig.hubs, folder)
+
+
+def _csv(path: Path, times: np.ndarray, columns: dict[str, np.ndarray]) -> None:
+    """As a logger writes it, whatever its clock does."""
+    header = ",".join(("time [s]", *columns))
+    np.savetxt(path, np.column_stack([times, *columns.values()]), "%.9g", ",", header=header, comments="")
+
+
+def _moving_scene(vehicle: CutVehicle) -> str:
+    """Signs: y and z of the telephone point the other way."""
+
+    def entry(channel: str, what: str, at: str, component: str, frame: str, sign: int) -> str:
+        return (f'  {{ channel = "{channel}", quantity = "{what}", at = "{at}", component = "{component}", '
+                f'frame = "{frame}", sign = {sign} }},')  # fmt: skip
+
+    hubs = [entry(f"{hub}_fz", "force", hub, "z", "hub", 1) for hub in vehicle.hubs]
+    camera = [entry(axis, "angle", "phone", axis, "inertial", sign) for axis, sign in (("roll", 1), ("pitch", -1))]
+    phone = [entry(f"{axis}_rate", "angular rate", "phone", axis, "body", sign)
+             for axis, sign in (("roll", 1), ("pitch", -1), ("yaw", -1))]  # fmt: skip
+    phone += [entry(f"a{axis}", "acceleration", "phone", axis, "body", sign)
+              for axis, sign in zip("xyz", (1, -1, -1), strict=True)]  # fmt: skip
+    files = [f'[[files]]\nfile = "{name}.csv"\nchannels = [\n' + "\n".join(lines) + "\n]"
+             for name, lines in (("hubs", hubs), ("camera", camera), ("phone", phone))]  # fmt: skip
+    head = ['title = "moving car"', 'system = "measured"', "[vehicle]", 'file = "r19_free"', "[stabilise]",
+            'method = "none"', "[sensors.phone]", 'body = "body"', "position = [0.0, 0.0, 1.0]"]
+    return "\n".join([*head, *files, ""])
 
 
 def _quick(folder: Path) -> list[Row]:
