@@ -127,6 +127,8 @@ def compute(scene: MeasuredScene, engine: str, folder: Path, progress: Progress 
         (_in_space if rig.vehicle else _in_plane)(found, work, progress)
         watch.lap("runs")
         if found.held is not None:
+            said = {(finding.check, finding.signals, finding.place) for finding in found.findings}
+            found.findings += tuple(f for f in found.held.findings if (f.check, f.signals, f.place) not in said)
             progress("files", 0.95)
             _handed(found, folder)
             watch.lap("files")

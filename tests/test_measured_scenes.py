@@ -1,0 +1,184 @@
+"""Scenes of measurements: units, the channel map, one clock, guesses, and what a user's mistake is answered with."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.errors import InputError
+from models.measured.channel import Channel
+from models.measured.channel_map import signals
+from models.measured.clock import record
+from models.measured.formats import open_source
+from models.measured.guess import guess
+from models.measured.listing import describe
+from models.measured.places import Places
+from models.measured.plan import check
+from models.measured.resampling import onto
+from models.measured.scene import build
+from models.measured.timing import timing
+from models.measured.units import conversion
+
+HUBS = ("fl", "fr")
+PLACES = Places(HUBS, ("body",), ("front left",), ("dash",))
+
+
+@pytest.mark.parametrize("unit, quantity, factor", [
+    ("kN", "force", 1e3), ("lbf", "force", 4.4482216152605), ("kp", "force", 9.80665), ("[N]", "force", 1.0),
+    ("Nm", "moment", 1.0), ("kNm", "moment", 1e3), ("N-m", "moment", 1.0), ("lbf ft", "moment", 1.3558179483314),
+    ("g", "acceleration", 9.80665), ("m/s2", "acceleration", 1.0), ("m/s²", "acceleration", 1.0),
+    ("°/s", "angular rate", np.pi / 180), ("U/min", "angular rate", np.pi / 30), ("Grad", "angle", np.pi / 180),
+    ("mm", "travel", 1e-3), ("µm/m", "strain", 1e-6), ("%", "strain", 1e-2), ("mm/m", "strain", 1e-3),
+    ("", "strain", 1.0),
+])  # fmt: skip
+def test_units_as_they_are_spelt(unit, quantity, factor):
+    assert conversion(unit, quantity, "", "") == pytest.approx(factor, rel=1e-12)
+
+
+@pytest.mark.parametrize("unit, quantity, said", [
+    ("kn", "force", "did you mean 'kN'"), ("Nm", "force", "unit of moment"), ("degC", "force", "degree_Celsius"),
+    ("mV/V", "force", "calibration"), ("wibbles", "travel", "no such unit"), ("1/s", "angular rate", "does not say"),
+    ("Hz", "angular rate", "does not say"), ("%", "angle", "does not say"), ("deg", "strain", "unit of angle"),
+    ("grad", "angle", "no such unit"), ("", "force", "pure number"), ("10 kN", "force", "no such unit"),
+])  # fmt: skip
+def test_units_that_mean_something_else_are_refused(unit, quantity, said):
+    with pytest.raises(InputError, match=said.replace("'", ".")):
+        conversion(unit, quantity, "scene.toml", "unit")
+
+
+def write_csv(path: Path, times: np.ndarray, **columns: np.ndarray) -> str:
+    names = ",".join(f"{name.replace('__', ' [')}]" for name in columns)
+    rows = "\n".join(",".join(f"{v:.9g}" for v in row) for row in np.column_stack([times, *columns.values()]))
+    path.write_text(f"time [s],{names}\n{rows}\n")
+    return path.name
+
+
+def scene(folder: Path, *files: dict, **tables: object):
+    table = {"title": "t", "system": "measured", "vehicle": {"file": "r19_free"}, "files": list(files), **tables}
+    return build(table, "scene.toml", folder)
+
+
+def force(channel: str, at: str, **more: object) -> dict:
+    return {"channel": channel, "quantity": "force", "at": at, "component": "z", **more}
+
+
+def recorded(own, folder: Path):
+    sources = [open_source(own.path(file.file)) for file in own.files]
+    (folder / "work").mkdir()
+    return record(own, sources, signals(own, sources, PLACES), HUBS, folder / "work")
+
+
+def test_all_channels_on_the_clock_of_the_wheel_forces(tmp_path):
+    t, fast, slow = np.arange(1001) * 2e-3, np.arange(-100, 5001) * 5e-4, np.arange(101) * 2e-2
+    a = write_csv(tmp_path / "a.csv", t, fl__kN=np.sin(t), fr__N=np.cos(t))
+    b = write_csv(tmp_path / "b.csv", fast, az__g=np.sin(2 * np.pi * 20 * fast) + np.sin(2 * np.pi * 700 * fast))
+    c = write_csv(tmp_path / "c.csv", slow + 0.5, roll__deg=slow)
+    own = scene(tmp_path, {"file": a, "channels": [force("fl", "fl"), force("fr", "fr", sign=-1)]},
+                {"file": b, "channels": [
+                    {"channel": "az", "quantity": "acceleration", "at": "dash", "component": "z"}]},
+                {"file": c, "offset": -0.5, "channels": [
+                    {"channel": "roll", "quantity": "angle", "at": "body", "component": "roll"}]})  # fmt: skip
+    found = recorded(own, tmp_path)
+    fl, fr, az, roll = (found.samples(signal) for signal in found.signals)
+    assert (found.period, found.count) == (pytest.approx(2e-3), 1001)
+    assert fl == pytest.approx(1e3 * np.sin(t), abs=1e-4)  # the file has nine digits
+    assert fr == pytest.approx(-np.cos(t), abs=1e-8)
+    # 20 Hz kept within 0.1 %, which is what a Kaiser window of 60 dB promises; 700 Hz, an alias of 200 Hz, is gone
+    assert az[50:-50] / 9.80665 == pytest.approx(np.sin(2 * np.pi * 20 * t[50:-50]), abs=2e-3)
+    assert roll == pytest.approx(np.radians(t), abs=1e-8)
+
+
+def test_files_are_placed_by_their_start_times_and_must_overlap(tmp_path):
+    t = np.arange(200) * 1e-2
+    a = write_csv(tmp_path / "a.csv", t, fl__N=t)
+    b = write_csv(tmp_path / "b.csv", t, fr__N=t)
+    files = {"file": a, "channels": [force("fl", "fl")]}, {"file": b, "offset": 0.5, "channels": [force("fr", "fr")]}
+    found = recorded(scene(tmp_path, *files), tmp_path)
+    assert found.count == 150 and found.samples(found.signals[1])[0] == pytest.approx(0.0, abs=1e-9)
+    apart = scene(tmp_path, files[0], {**files[1], "offset": 5.0})
+    (tmp_path / "other").mkdir()
+    with pytest.raises(InputError, match="do not overlap"):
+        recorded(apart, tmp_path / "other")
+
+
+def test_gaps_are_not_measured_and_all_else_is(tmp_path):
+    t = np.delete(np.arange(1000) * 1e-3, np.arange(400, 600))
+    own = scene(tmp_path, {"file": write_csv(tmp_path / "a.csv", t, fl__N=t), "channels": [force("fl", "fl")]})
+    found = recorded(own, tmp_path)
+    values = found.samples(found.signals[0])
+    assert np.flatnonzero(np.isnan(values)).tolist() == list(range(400, 600))
+    assert values[600:] == pytest.approx(np.arange(600, 1000) * 1e-3)
+    assert any(finding.check == "clock gaps" and finding.size == pytest.approx(0.201) for finding in found.noticed)
+
+
+def test_times_that_are_late_repeated_or_go_back(tmp_path):
+    t = np.arange(100) * 1e-3
+    late = t.copy()
+    late[[40, 41]] = late[[41, 40]]
+    sorted_out = timing(late, "a.csv")
+    assert sorted_out.times == pytest.approx(t) and sorted_out.order[40:42].tolist() == [41, 40]
+    assert [f.weight for f in sorted_out.findings if f.check == "time"] == ["doubt"]
+    twice = timing(np.insert(t, 50, t[50]), "a.csv")
+    assert twice.times == pytest.approx(t) and "more than once" in twice.findings[0].text
+    again = timing(np.concatenate((t, t)), "a.csv")
+    assert len(again.times) == 100 and again.findings[0].weight == "error" and again.findings[0].size == t[-1]
+    with pytest.raises(InputError, match="two samples or more"):
+        timing(np.zeros(3), "a.csv")
+
+
+def test_jitter_is_measured(tmp_path):
+    # 5 % of a period as sd of every time makes sqrt(2) times as much of every step; 4 standard errors of 2000 are 7 %
+    times = (np.arange(2000) + 0.05 * np.random.default_rng(1).standard_normal(2000)) * 1e-2
+    found = next(finding for finding in timing(times, "a.csv").findings if finding.check == "jitter")
+    assert found.size == pytest.approx(0.05 * np.sqrt(2) * 1e-2, rel=0.07)
+
+
+def test_resampling_knows_nothing_outside():
+    t = np.arange(50) * 0.1
+    out = onto(t, t, 0.1, np.arange(-10, 60) * 0.1)
+    assert np.isnan(out[:10]).all() and np.isnan(out[60:]).all() and np.isfinite(out[10:60]).all()
+
+
+@pytest.mark.parametrize("change, said", [
+    ({"channel": "FL"}, "did you mean 'fl'"), ({"channel": "wheel"}, "which has 2: fl, fr"),
+    ({"at": "lf"}, "no such place"), ({"component": "w"}, "must be x, y or z"), ({"component": ""}, "x, y or z"),
+    ({"frame": "sensor"}, "no frame"), ({"unit": "mm"}, "unit of travel"), ({"quantity": "thrust"}, "must be force"),
+    ({"sign": 0}, "must be 1 or -1"), ({"at": "front left"}, "leave component out"), ({"channel": "fr"}, "twice"),
+])  # fmt: skip
+def test_mistakes_in_the_map_are_told_in_one_sentence(tmp_path, change, said):
+    t = np.arange(200) * 1e-2
+    name = write_csv(tmp_path / "a.csv", t, fl__N=t, fr__N=t)
+    rows = [{**force("fl", "fl"), **change}, force("fr", "fr")]
+    with pytest.raises(InputError, match=said.replace("'", ".")) as error:
+        own = scene(tmp_path, {"file": name, "channels": rows})
+        signals(own, [open_source(tmp_path / name)], PLACES)
+    assert "\n" not in str(error.value) and "Traceback" not in str(error.value)
+
+
+def test_a_missing_wheel_or_angle_is_refused_before_anything_runs(tmp_path):
+    t = np.arange(200) * 1e-2
+    name = write_csv(tmp_path / "a.csv", t, fl__N=t)
+    with pytest.raises(InputError, match="no vertical force is mapped at 'fr'"):
+        check(scene(tmp_path, {"file": name, "channels": [force("fl", "fl")]}), ("mujoco",))
+    with pytest.raises(InputError, match=r"either \[\[files\]\]"):
+        scene(tmp_path)
+
+
+@pytest.mark.parametrize("name, unit, found", [
+    ("FL_Fx", "kN", ("force", "fl", "x")), ("WFT_RR_MZ", "N m", ("moment", "rr", "z")),
+    ("Radkraft vorne links", "kN", ("force", "fl", "z")), ("Nickrate", "°/s", ("angular rate", "body", "pitch")),
+    ("FzFrontRight", "N", ("force", "fr", "z")), ("Federweg HL", "mm", ("travel", "rear left", "")),
+    ("Fx_rr", "", ("force", "rr", "x")), ("Vehicle speed", "km/h", None),
+])  # fmt: skip
+def test_guesses(name, unit, found):
+    own = guess(Channel(name, unit, "", 0, 10, None))
+    assert (own and (own.quantity, own.at, own.component)) == found
+
+
+def test_what_show_prints_is_a_scene(tmp_path):
+    t = np.arange(200) * 1e-2
+    write_csv(tmp_path / "monday.csv", t, **{"FL_Fz__kN": t, "speed__km/h": t})
+    table = tomllib.loads(describe(tmp_path / "monday.csv"))
+    own = build(table, "monday.toml", tmp_path)
+    assert [(row.channel, row.at) for row in own.files[0].channels] == [("FL_Fz", "fl")]
