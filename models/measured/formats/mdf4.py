@@ -6,6 +6,7 @@ of text, bytes, arrays and structures are left out. Records are loaded block by 
 whole channel is ever made.
 """
 
+import gc
 import io
 import logging
 import re
@@ -73,6 +74,8 @@ def opened(path: Path) -> Iterator[Any]:
             except Exception as error:
                 why = f"{type(error).__name__}: {error}".splitlines()[0]
                 traceback.clear_frames(error.__traceback__)
+            if mdf is None:
+                gc.collect()  # what it left in circles would complain later
         if mdf is None:
             raise InputError(path, "", None, f"the file is damaged and cannot be read ({why})")
         try:
