@@ -14,7 +14,8 @@ from models.braking.procedures import drive
 from models.braking.scene import BrakingScene
 from models.braking.stop_report import Stop
 from models.braking.stops import Scatter, Stops, scatter
-from models.ensemble.runner import processes, run_paths
+from models.ensemble.runner import run_paths
+from models.ensemble.workers import processes
 from models.errors import InputError, RunFailed
 from models.strict import Strict, quantity, read
 

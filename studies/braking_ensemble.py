@@ -13,7 +13,8 @@ from models.braking.procedures import drive
 from models.braking.scene import BrakingScene, build
 from models.braking.stops import Scatter, Stops, Welch, scatter, welch
 from models.ensemble.runner import Progress as Done
-from models.ensemble.runner import processes, run_paths
+from models.ensemble.runner import run_paths
+from models.ensemble.workers import processes
 from models.errors import InputError
 from models.strict import Strict, quantity, read
 from models.tables import write_table

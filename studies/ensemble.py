@@ -20,9 +20,10 @@ from models.engines.catalogue import CATALOGUE
 from models.ensemble.engines import gap, mujoco_threads
 from models.ensemble.paths import NoisePaths, noise_paths
 from models.ensemble.runner import Progress as Done
-from models.ensemble.runner import cluster, processes, run_paths
+from models.ensemble.runner import run_paths
 from models.ensemble.statistics import deviation, quantile
 from models.ensemble.store import Arrays
+from models.ensemble.workers import cluster, processes
 from models.errors import InputError
 from models.result import Result, provenance
 from models.scene import Scene

@@ -1,5 +1,6 @@
 """Ensembles: the same bits on any executor and after any interruption, folders that know whose they are."""
 
+import errno
 import math
 import os
 import signal
@@ -18,8 +19,9 @@ from models.engines import protocol
 from models.ensemble import store
 from models.ensemble.engines import gap, mujoco_threads
 from models.ensemble.paths import NoisePaths, noise_paths
-from models.ensemble.runner import PathFailed, cluster, processes, run_paths
+from models.ensemble.runner import PathFailed, run_paths
 from models.ensemble.statistics import deviation, quantile
+from models.ensemble.workers import cluster, processes
 from models.errors import InputError, RunFailed
 from models.noise import normal
 from models.simulate import simulate
@@ -203,12 +205,36 @@ def test_an_interrupt_while_workers_start_reaches_none_of_them():
         assert pool.submit(abs, -1).result(timeout=60) == 1
 
 
-def test_a_block_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
-    """A disk that is full half-way leaves no block that looks finished."""
-    monkeypatch.setattr(store.os, "fsync", lambda number: (_ for _ in ()).throw(OSError("no space left")))
-    with pytest.raises(OSError, match="no space"):
-        store.Store(tmp_path).save(0, {"x": np.zeros(3)})
-    assert not store.Store(tmp_path).has(0)
+def test_a_full_disk_ends_the_run_at_once_and_keeps_what_is_finished(folder, expected, tmp_path, monkeypatch):
+    """What was half written is not there; with room again, the run goes on."""
+    monkeypatch.setattr(store.os, "fsync", _full_after(3))  # the note and two blocks
+    with pytest.raises(RunFailed, match="the disk is full.*finished blocks are kept.*make room and resume"):
+        run_paths(job(folder), PATHS, tmp_path, block=BLOCK)
+    monkeypatch.undo()
+    kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
+    assert {*kept} == {"job.json", ".lock", "block 000000.npz", "block 000001.npz"}
+    assert same(run_paths(job(folder), PATHS, tmp_path, block=BLOCK), expected)
+    assert all((tmp_path / name).stat().st_mtime_ns == when for name, when in kept.items() if name != ".lock")
+
+
+def _full_after(writes):
+    left, sync = [writes], os.fsync
+
+    def full(number):
+        left[0] -= 1
+        if left[0] < 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        sync(number)
+
+    return full
+
+
+def test_two_processes_never_work_in_one_folder(folder, tmp_path):
+    with store.locked(tmp_path), pytest.raises(InputError, match="another process is at work"):
+        run_paths(job(folder), 2, tmp_path)
+    (tmp_path / store.PART.format("block 000000.npz", 1)).touch()  # of a process that was killed
+    run_paths(job(folder), 2, tmp_path)
+    assert not list(tmp_path.glob("*.part")) and not list(tmp_path.glob(".*.part"))
 
 
 @pytest.mark.parametrize(("change", "place"), [
@@ -264,26 +290,6 @@ def test_a_failure_names_path_and_block_and_loses_no_other(folder, expected, tmp
     assert len(list(tmp_path.glob("block*.npz"))) == 3
     Broken.broken = False
     assert same(run_paths(faulty, PATHS, tmp_path, block=BLOCK), expected)
-
-
-class Suicide:
-    """A job whose worker dies, as one that is out of memory does."""
-
-    def __call__(self, paths):
-        import os
-
-        if paths[0] == 0:
-            time.sleep(1.0)  # let the others finish
-            os.kill(os.getpid(), signal.SIGKILL)
-        return {"x": np.arange(paths[0], paths[-1] + 1)}
-
-    def facts(self):
-        return {}
-
-
-def test_a_worker_that_dies_is_a_failure_with_a_name():
-    with processes(2) as executor, pytest.raises(RunFailed, match=r"block 0 \(paths 0 to 2\): its worker died"):
-        run_paths(Suicide(), 9, executor=executor, block=3)
 
 
 def test_path_failures_survive_the_way_between_processes():

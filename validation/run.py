@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from models.ensemble.runner import one_thread_each
+from models.ensemble.workers import one_thread_each
 from models.result import provenance
 from validation.rows import REPORTED, Row
 

@@ -6,24 +6,21 @@ cut into blocks of fixed size; each finished block is saved whole, and all of th
 their numbers.
 """
 
-import ctypes
+import errno
 import math
-import os
-import signal
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import closing, contextmanager
+from collections import Counter, deque
+from collections.abc import Callable, Generator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import closing, nullcontext
 from dataclasses import dataclass, field
-from itertools import islice
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 from models.ensemble.store import Arrays, Store
-from models.errors import InputError, RunFailed
+from models.errors import RunFailed
 
 BLOCK = 50
 """Paths per block: half a second of work of the pitch plane over 60 s, which a killed run may lose."""
@@ -31,11 +28,10 @@ AHEAD = 64
 """Blocks under way at once, so that the memory for results on their way stays bounded."""
 TOLD = 5
 """Failed blocks that a message names."""
-
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
-"""Options of glibc's mallopt, from its malloc.h."""
-KEPT_MEMORY = 1 << 28
-"""Bytes that a worker keeps for its next array."""
+LIVES = 3
+"""Times that a block may lose its worker: among others, again among others, and alone, where it is to blame."""
+FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
+"""What a disk says that takes no more."""
 
 
 class Job(Protocol):
@@ -79,6 +75,7 @@ class _Failure:
     """What a worker says instead of an answer: many exceptions do not survive the way between processes."""
 
     reason: str
+    full: bool = False
 
 
 @dataclass
@@ -104,19 +101,19 @@ def run_paths(job: Job, paths: int, folder: Path | None = None, executor: Execut
     folder : keeps every finished block; one that holds blocks of the same job is resumed, one of another job is
     an InputError that names the difference; None keeps them in memory. executor : a process pool
     (``processes``), a Dask cluster (``cluster``), a thread pool; None computes here. A block that fails does
-    not stop the others: RunFailed then names the blocks and paths, and what is finished is kept.
+    not stop the others, and one that loses its worker is computed again: RunFailed then names the blocks and paths
+    that are left, and what is finished is kept. A full disk ends it at once, with RunFailed.
     """
-    store: Store | _Memory = _Memory()
-    if folder is not None:
-        store = Store(folder)
-        store.claim({"paths": paths, "paths per block": block, **job.facts()})
+    facts = {"paths": paths, "paths per block": block, **job.facts()}
     cut = [range(first, min(first + block, paths)) for first in range(0, paths, block)]
-    failed = _compute(job, cut, store, executor, progress)
-    if failed:
-        kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
-        more = f"; {len(failed) - TOLD} more blocks" if len(failed) > TOLD else ""
-        raise RunFailed("ensemble", "; ".join(failed[:TOLD]) + more + kept)
-    return _together([store.load(i) for i in range(len(cut))])
+    store = _Memory() if folder is None else Store(folder)
+    with nullcontext() if isinstance(store, _Memory) else store.claimed(facts):
+        failed = _compute(job, cut, store, executor, progress)
+        if failed:
+            kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
+            more = f"; {len(failed) - TOLD} more blocks" if len(failed) > TOLD else ""
+            raise RunFailed("ensemble", "; ".join(failed[:TOLD]) + more + kept)
+        return _together([store.load(i) for i in range(len(cut))])
 
 
 def _compute(job: Job, cut: list[range], store: Store | _Memory, executor: Executor | None,
@@ -129,10 +126,12 @@ def _compute(job: Job, cut: list[range], store: Store | _Memory, executor: Execu
     progress(Progress(done, paths, 0.0, math.inf if missing else 0.0))
     with closing(_answers(job, cut, missing, executor)) as answers:  # an interrupt drops at once what waits
         for i, answer in answers:
+            if isinstance(answer, _Failure) and answer.full:
+                raise _full(answer.reason, store)
             if isinstance(answer, _Failure):
                 failed.append(f"block {i} (paths {cut[i][0]} to {cut[i][-1]}): {answer.reason}")
                 continue
-            store.save(i, answer)
+            _keep(store, i, answer)
             done += len(cut[i])
             rate = (done - before) / (time.perf_counter() - start)
             progress(Progress(done, paths, rate, (paths - done) / rate))
@@ -145,22 +144,37 @@ def _answers(job: Job, cut: list[range], missing: list[int],
     if executor is None:
         yield from ((i, _attempt(job, cut[i])) for i in missing)
         return
-    queue, waiting = iter(missing), dict[Future, int]()
-
-    def submit(blocks: Iterable[int]) -> None:
-        for i in blocks:
-            waiting[_submitted(executor, job, cut[i])] = i
-
-    submit(islice(queue, AHEAD))
+    queue, alone, lost, waiting = deque(missing), deque[int](), Counter[int](), dict[Future, int]()
     try:
-        while waiting:
+        while queue or alone or waiting:
+            while (queue and len(waiting) < AHEAD) or (alone and not waiting):
+                i = (queue or alone).popleft()
+                waiting[_submitted(executor, job, cut[i])] = i
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                error = future.exception()
-                yield waiting.pop(future), future.result() if error is None else _said(error)
-                submit(islice(queue, 1))
+                error, i = future.exception(), waiting.pop(future)
+                lost[i] += isinstance(error, BrokenExecutor)
+                if isinstance(error, BrokenExecutor) and lost[i] < LIVES:
+                    (alone if lost[i] == LIVES - 1 else queue).append(i)
+                else:
+                    yield i, future.result() if error is None else _said(error)
     finally:
         for future in waiting:
             future.cancel()
+
+
+def _keep(store: Store | _Memory, block: int, arrays: Arrays) -> None:
+    """Save a block; RunFailed where the disk is full, which no other block would change."""
+    try:
+        store.save(block, arrays)
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        raise _full(str(error), store) from None
+
+
+def _full(reason: str, store: Store | _Memory) -> RunFailed:
+    kept = f"; the finished blocks are kept in {store.folder}: make room and resume" if isinstance(store, Store) else ""
+    return RunFailed("ensemble", f"the disk is full: {reason}{kept}")
 
 
 def _submitted(executor: Executor, job: Job, paths: range) -> Future:
@@ -186,85 +200,10 @@ def _attempt(job: Job, paths: range) -> Arrays | _Failure:
 def _said(error: BaseException) -> _Failure:
     if isinstance(error, BrokenExecutor):
         return _Failure("its worker died: killed, or out of memory")
-    return _Failure(str(error) if isinstance(error, PathFailed | RunFailed) else f"{type(error).__name__}: {error}")
+    full = isinstance(error, OSError) and error.errno in FULL
+    said = str(error) if full or isinstance(error, PathFailed | RunFailed) else f"{type(error).__name__}: {error}"
+    return _Failure(said, full)
 
 
 def _together(blocks: list[Arrays]) -> Arrays:
     return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
-
-
-THREADS = "OPENBLAS_NUM_THREADS"
-"""How many threads numpy takes in a process, read when it is first imported there."""
-
-
-def processes(workers: int) -> ProcessPoolExecutor:
-    """A process pool whose workers start fresh: engines and compilers keep threads that no fork survives.
-
-    They start here, with Ctrl-C held back, which they inherit: one that struck a worker while it imports would break
-    the pool, and the process that keeps the blocks could wait for it for ever.
-    """
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_prepare_worker)
-    with _interrupts_held(), one_thread_each():
-        for _ in range(workers):
-            pool.submit(os.getpid)
-    return pool
-
-
-@contextmanager
-def one_thread_each() -> Iterator[None]:
-    """Processes that start within the block compute linear algebra in a thread of their own.
-
-    Threads of several processes that wait for one another on the same cores make small matrices ten times slower.
-    """
-    before = os.environ.get(THREADS)
-    os.environ[THREADS] = before or "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[THREADS]
-
-
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Keep Ctrl-C waiting until the end of the block, where the system can."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _prepare_worker() -> None:
-    """Leave Ctrl-C to the process that keeps the blocks, and keep freed memory.
-
-    The C library otherwise returns every array of some megabytes to the system and gets fresh pages for the next
-    one: a third of the time of a path of 60,000 steps. What a worker keeps is what one path needs, some 20 MB.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if os.name == "posix" else None
-    if mallopt is not None:
-        for option in (M_TRIM_THRESHOLD, M_MMAP_THRESHOLD):
-            mallopt(option, KEPT_MEMORY)
-
-
-@contextmanager
-def cluster(address: str) -> Iterator[Executor]:
-    """The workers of a Dask scheduler, such as ``tcp://host:8786``, where the same twinrig must be installed.
-
-    Raises InputError where the extra ``cluster`` is not installed or nobody answers.
-    """
-    try:
-        from distributed import Client
-    except ImportError:
-        raise InputError("", "cluster", address, "needs Dask: pip install 'twinrig[cluster]'") from None
-    try:
-        client = Client(address, timeout="10s", set_as_default=False)
-    except (OSError, ValueError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError("", "cluster", address, f"no Dask scheduler answers there: {reason}") from None
-    with client:
-        yield client.get_executor()

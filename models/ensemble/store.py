@@ -5,6 +5,8 @@ import io
 import json
 import os
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
@@ -19,6 +21,10 @@ from models.result import PACKAGES
 Arrays = dict[str, np.ndarray]
 JOB = "job.json"
 """What the blocks of a folder belong to."""
+LOCK = ".lock"
+"""File that the process at work in a folder holds."""
+PART = ".{}.{}.part"
+"""Name of a file while it is written, by its own name and that of the process."""
 
 
 @dataclass(frozen=True)
@@ -27,12 +33,24 @@ class Store:
 
     folder: Path
 
-    def claim(self, facts: dict[str, Any]) -> None:
-        """Note down whose blocks these are; raises InputError if the folder belongs to another job."""
-        own, file = fingerprint(facts), self.folder / JOB
+    @contextmanager
+    def claimed(self, facts: dict[str, Any]) -> Iterator[None]:
+        """Keep others out of the folder for as long as the block lasts.
+
+        Raises InputError if it belongs to another job, or if another process is at work in it.
+        """
         self.folder.mkdir(parents=True, exist_ok=True)
+        with locked(self.folder):
+            for part in self.folder.glob(PART.format("*", "*")):
+                part.unlink(missing_ok=True)  # of a process that was killed while it wrote
+            self._claim(fingerprint(facts))
+            yield
+
+    def _claim(self, own: dict[str, Any]) -> None:
+        """Note down whose blocks these are; raises InputError if the folder belongs to another job."""
+        file = self.folder / JOB
         if not file.exists():
-            _write(file, json.dumps(own, indent=1).encode())
+            write_whole(file, json.dumps(own, indent=1).encode())
             return
         kept = _read_note(file)
         for key in (*own, *kept):
@@ -52,7 +70,7 @@ class Store:
         """Keep a block: on the disk, under its name, or not there."""
         content = io.BytesIO()
         np.savez(content, allow_pickle=False, **arrays)
-        _write(self.path(block), content.getvalue())
+        write_whole(self.path(block), content.getvalue())
 
     def load(self, block: int) -> Arrays:
         """A finished block; raises InputError if its file is damaged (zip checks every byte)."""
@@ -63,14 +81,35 @@ class Store:
             raise InputError(self.path(block), "", None, f"is damaged ({error}): delete it and resume") from None
 
 
-def _write(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all, even if the machine stops."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    with part.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(part, path)
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all, even if the machine stops or the disk is full."""
+    part = path.with_name(PART.format(path.name, os.getpid()))
+    try:
+        with part.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Have a folder for oneself; InputError if another process has it. A process that is killed has it no longer."""
+    try:
+        from fcntl import LOCK_EX, LOCK_NB, flock
+    except ImportError:  # not a system that has such locks
+        yield
+        return
+    with (folder / LOCK).open("a") as file:
+        try:
+            flock(file, LOCK_EX | LOCK_NB)
+        except BlockingIOError:
+            allowed = "another process is at work in this folder: wait for it, or begin in a new one"
+            raise InputError(folder, "", None, allowed) from None
+        yield
 
 
 def _read_note(file: Path) -> dict[str, Any]:

@@ -12,9 +12,10 @@ import numpy as np
 
 from models.ensemble.engines import gap, mujoco_threads
 from models.ensemble.paths import NoisePaths, noise_paths
-from models.ensemble.runner import processes, run_paths
+from models.ensemble.runner import run_paths
 from models.ensemble.statistics import deviation, quantile
 from models.ensemble.store import Arrays
+from models.ensemble.workers import processes
 from models.scene import Scene
 from models.simulate import simulate
 from validation.rows import Row, System, Table, at_most, behaves, finding, not_run, within
