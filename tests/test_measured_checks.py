@@ -1,6 +1,7 @@
 """Checks of a recording: what is planted is named with place and size, and what is not there is not."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -150,7 +151,7 @@ def test_the_mean_of_a_windowed_record_is_as_good_as_it_says():
     rng, off = np.random.default_rng(2), []
     for _ in range(200):
         values = rng.normal(size=500)
-        centre, spread = mean([lambda values=values: values])
+        centre, spread = mean([partial(np.asarray, values)])
         off.append(float(centre[0] ** 2 / spread[0, 0]))
     assert 0.7 < np.mean(off) < 2.0  # F(1, 6) has the mean 1.5; three neighbouring lines are not quite independent
 

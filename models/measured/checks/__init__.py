@@ -35,8 +35,12 @@ def check(recording: Recording, vehicle: CutVehicle | None, places: Mapping[str,
     vehicle : None for one that is not in space; places : of accelerometers and gyros by name; claimed : white noise
     (SI) on every sample that is stated, by name of signal.
     """
-    evidence = Evidence(recording, vehicle, places or {}, claimed or {})
-    found = list(recording.noticed)
+    return findings(Evidence(recording, vehicle, places or {}, claimed or {}))
+
+
+def findings(evidence: Evidence) -> tuple[Finding, ...]:
+    """The same, of evidence that is then at hand for figures."""
+    found = list(evidence.recording.noticed)
     for each in CHECKS:
         found += [finding for finding in each(evidence) if not _named(finding, found)]
     return tuple(sorted(found, key=lambda finding: ORDER.index(finding.weight)))

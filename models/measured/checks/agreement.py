@@ -113,20 +113,32 @@ class Agreement:
         """All faults, the worst first, and what is left without them."""
         now, faults = self, list[Fault]()
         while len(faults) < FAULTS:
-            found = max(now._offers(), key=lambda offer: offer[0].fall, default=None)
-            if found is None:
+            worst = max(now._offers(), key=lambda fault: fault.fall, default=None)
+            if worst is None:
                 break
-            faults.append(found[0])
-            now = found[1]
+            faults.append(worst)
+            now = now.without(worst)
         return now, tuple(faults)
 
-    def _offers(self) -> Iterator[tuple[Fault, "Agreement"]]:
+    def without(self, fault: Fault) -> "Agreement":
+        """With a fault put right: true by recorded forces, or recorded by true readings, in the response."""
+        response = self.response.copy()
+        if fault.kind == "swapped":
+            return replace(self, response=response[:, :, self._order(dict(fault.exchanged))])
+        forces, turn = fault.signals[0] in self.inputs, 2j * np.pi * self.frequencies
+        wrong = np.exp(-turn * fault.size) if fault.kind == "late" else np.full(len(turn), fault.size, complex)
+        pick = [(self.inputs if forces else self.outputs).index(s) for s in fault.signals]
+        index = (slice(None), slice(None), pick) if forces else (slice(None), pick)
+        response[index] *= (1 / wrong if forces else wrong)[:, None, None]
+        return replace(self, response=response)
+
+    def _offers(self) -> Iterator[Fault]:
         """Every single fault that would explain more and is large enough to be named."""
         weights = self.weights
         for group in self.groups():
-            for offer in (*self._late(group, weights), *self._wrong(group, weights)):
-                if self._worth(offer[1], weights):
-                    yield offer
+            for fault in (*self._late(group, weights), *self._wrong(group, weights)):
+                if self._worth(self.without(fault), weights):
+                    yield fault
         yield from self._swapped(weights)
 
     def groups(self) -> Iterator[Group]:
@@ -154,7 +166,7 @@ class Agreement:
         """exp(i omega t) (t, f) of all delays."""
         return np.exp(2j * np.pi * np.outer(TIMES, self.frequencies))
 
-    def _share(self, group: Group) -> tuple[np.ndarray, np.ndarray]:
+    def share(self, group: Group) -> tuple[np.ndarray, np.ndarray]:
         """Cross power (f, k) of what is left without the group with what it accounts for, and the power of that."""
         pick = list(group.own)
         if group.forces:
@@ -167,8 +179,8 @@ class Agreement:
         power[:, pick] = np.einsum("fkc,fkc->fk", self._told[:, pick], own.conj())
         return cross, power.real
 
-    def _late(self, group: Group, weights: np.ndarray) -> Iterator[tuple[Fault, "Agreement"]]:
-        cross, power = self._share(group)
+    def _late(self, group: Group, weights: np.ndarray) -> Iterator[Fault]:
+        cross, power = self.share(group)
         line = (weights * (cross.conj() if group.forces else cross)).sum(axis=1)
         likely = (self._turns @ line).real
         best = int(np.argmax(likely[1:-1])) + 1
@@ -177,40 +189,45 @@ class Agreement:
         fall = 2 * float((np.exp(turn * late) @ line - line.sum()).real)
         steep = 2 * float((np.abs(turn) ** 2 @ (weights * power)).sum())
         if fall > CERTAIN and steep > 0 and abs(late) > max(SMALL_DELAY, 4 * steep**-0.5):
-            fault = Fault("late", group.name, self._signals(group), late, steep**-0.5, fall)
-            yield fault, self._corrected(group, np.exp(turn * late if group.forces else -turn * late))
+            yield Fault("late", group.name, self._signals(group), late, steep**-0.5, fall)
 
-    def _wrong(self, group: Group, weights: np.ndarray) -> Iterator[tuple[Fault, "Agreement"]]:
-        cross, power = ((weights * part).sum() for part in self._share(group))
+    def _wrong(self, group: Group, weights: np.ndarray) -> Iterator[Fault]:
+        cross, power = ((weights * part).sum() for part in self.share(group))
         if not power > 0:
             return
         ratio = float(cross.real / power)
         fall, error = float(power) * (ratio - 1) ** 2, float(2 * power) ** -0.5
         factor = 1 / ratio if group.forces and ratio else ratio
         if fall > CERTAIN and abs(ratio - 1) > max(SMALL_FACTOR, 4 * error):
-            fault = Fault("factor", group.name, self._signals(group), factor, error * abs(factor / ratio), fall)
-            yield fault, self._corrected(group, np.full(len(self.frequencies), ratio, complex))
+            yield Fault("factor", group.name, self._signals(group), factor, error * abs(factor / ratio), fall)
 
-    def _swapped(self, weights: np.ndarray) -> Iterator[tuple[Fault, "Agreement"]]:
+    def _swapped(self, weights: np.ndarray) -> Iterator[Fault]:
         """Two hubs as a whole, or two and two."""
         hubs = tuple(dict.fromkeys(s.at for s in self.inputs))
         pairs = list(combinations(hubs, 2))
         twice = [(a, b) for a, b in combinations(pairs, 2) if not set(a) & set(b)]
         before = float((weights * self.left).sum())
         for exchanged in (*((pair,) for pair in pairs), *twice):
-            order = self._order(exchanged)
-            if order is None:
-                continue
-            other = replace(self, response=self.response[:, :, order])
-            fall = before - float((weights * other.left).sum())
-            if fall > CERTAIN and other.left.sum() < self.left.sum():
-                yield _exchange(self, other, exchanged, fall), other
+            fault = self._exchange(exchanged)
+            if fault is not None:
+                other = self.without(fault)
+                fall = before - float((weights * other.left).sum())
+                if fall > CERTAIN and other.left.sum() < self.left.sum():
+                    share, rest = (float(np.sqrt(np.mean(each.unexplained**2))) for each in (self, other))
+                    yield replace(fault, size=share, error=rest, fall=fall)
 
-    def _order(self, exchanged: tuple[tuple[str, str], ...]) -> list[int] | None:
-        to = {a: b for one, two in exchanged for a, b in ((one, two), (two, one))}
+    def _exchange(self, exchanged: tuple[tuple[str, str], ...]) -> Fault | None:
+        """Of pairs of hubs; None where they do not have the same channels."""
+        both = tuple(way for a, b in exchanged for way in ((a, b), (b, a)))
+        signals = tuple(s for s in self.inputs if s.at in dict(both))
+        keys = {(s.at, s.quantity, s.component) for s in signals}
+        if {(dict(both)[at], quantity, component) for at, quantity, component in keys} != keys:
+            return None
+        return Fault("swapped", " and ".join(f"{a} with {b}" for a, b in exchanged), signals, 0.0, 0.0, 0.0, both)
+
+    def _order(self, to: dict[str, str]) -> list[int]:
         places = {(s.at, s.quantity, s.component): i for i, s in enumerate(self.inputs)}
-        keys = [(to.get(s.at, s.at), s.quantity, s.component) for s in self.inputs]
-        return [places[key] for key in keys] if all(key in places for key in keys) else None
+        return [places[to.get(s.at, s.at), s.quantity, s.component] for s in self.inputs]
 
     def typical(self) -> float:
         """Share of the readings that stays unexplained, the median over them."""
@@ -222,7 +239,7 @@ class Agreement:
         rest, found = WORTH * self._rest(weights), {}
         with np.errstate(divide="ignore", invalid="ignore"):
             for group in (group for group in self.groups() if len(group.own) == 1):
-                power = weights * self._share(group)[1]
+                power = weights * self.share(group)[1]
                 late, wrong = square @ power, power.sum(axis=0)
                 found[group.name] = _least(late, rest, SMALL_DELAY), _least(wrong, rest, SMALL_FACTOR)
         return found
@@ -237,20 +254,6 @@ class Agreement:
 
     def _signals(self, group: Group) -> tuple[Signal, ...]:
         return tuple((self.inputs if group.forces else self.outputs)[i] for i in group.own)
-
-    def _corrected(self, group: Group, by: np.ndarray) -> "Agreement":
-        """With true by recorded forces (f,), or recorded by true readings."""
-        response, pick = self.response.copy(), list(group.own)
-        index = (slice(None), slice(None), pick) if group.forces else (slice(None), pick)
-        response[index] *= by[:, None, None]
-        return replace(self, response=response)
-
-
-def _exchange(now: Agreement, other: Agreement, exchanged: tuple[tuple[str, str], ...], fall: float) -> Fault:
-    signals = tuple(s for pair in exchanged for s in now.inputs if s.at in pair)
-    share, rest = (float(np.sqrt(np.mean(each.unexplained**2))) for each in (now, other))
-    both = tuple(way for a, b in exchanged for way in ((a, b), (b, a)))
-    return Fault("swapped", " and ".join(f"{a} with {b}" for a, b in exchanged), signals, share, rest, fall, both)
 
 
 def _least(power: np.ndarray, rest: np.ndarray, small: float) -> float:
