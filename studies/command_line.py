@@ -221,9 +221,9 @@ def _study(scene: Any) -> Any:
 
 
 NOT_STUDIES = ("__init__", "braking_figures", "command_line", "contact_figures", "figures", "folders",
-               "handling_figures", "hub_forces_figures", "manchester_figure", "recording_page", "recording_runs",
-               "ride_figures", "ride_nonlinear_figures", "stabiliser_figures", "tyre_figure", "virtual_measurement",
-               "wheelset_figures")  # fmt: skip
+               "handling_figures", "hub_forces_figures", "manchester_figure", "recording_figures", "recording_page",
+               "recording_runs", "ride_figures", "ride_nonlinear_figures", "stabiliser_figures", "tyre_figure",
+               "virtual_measurement", "wheelset_figures")  # fmt: skip
 
 
 @contextmanager

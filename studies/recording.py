@@ -14,7 +14,8 @@ from models.drift.trust import ANGLE, Trust
 from models.errors import RunFailed
 from models.hub_forces.cut_vehicle import CutVehicle
 from models.measured import plan
-from models.measured.checks import check as findings_of
+from models.measured.checks import findings as findings_of
+from models.measured.checks.evidence import Evidence
 from models.measured.checks.noise_floor import noise
 from models.measured.checks.place import Place
 from models.measured.clock import record
@@ -57,6 +58,7 @@ class Found:
     rig: Rig
     engine: str
     recording: Recording
+    evidence: Evidence
     virtual: VirtualMeasurement | None = None
     findings: tuple[Finding, ...] = ()
     drift: Drift | None = None
@@ -119,9 +121,10 @@ def compute(scene: MeasuredScene, engine: str, folder: Path, progress: Progress 
         watch.lap("virtual measurement")
     recording = _read(scene, scene.rig(), work, progress)
     watch.lap("reading")
-    found = Found(scene, rig, engine, recording, virtual, seconds=watch.seconds)
+    evidence = Evidence(recording, rig.vehicle, _places(scene), _claimed(scene, recording))
+    found = Found(scene, rig, engine, recording, evidence, virtual, seconds=watch.seconds)
     progress("checks", 0.2)
-    found.findings = findings_of(recording, rig.vehicle, _places(scene), _claimed(scene, recording))
+    found.findings = findings_of(evidence)
     watch.lap("checks")
     if not found.stopped:
         (_in_space if rig.vehicle else _in_plane)(found, work, progress)

@@ -21,6 +21,7 @@ from models.measured.sections import Answer
 from models.measured.verdict import DISAGREES, errors
 from studies import recording_runs as draw
 from studies.recording import FREE, Found, handed_on
+from studies.recording_figures import figure
 
 TEMPLATE = "recording.html.jinja"
 NAMES = {FREE: "Free run", "kalman": "Run held by the Kalman filter", "prescribed": "Run held to measured angles"}
@@ -127,7 +128,9 @@ def _tiles(found: Found) -> list[dict[str, str]]:
 
 
 def _finding(found: Found, one: Finding, folder: Path, i: int) -> dict[str, Any]:
-    return {"weight": one.weight, "text": one.text, "figure": None}
+    """A finding and its figure, where there is anything to draw."""
+    drawn = figure(one, found.evidence, folder / f"finding_{i}.png")
+    return {"weight": one.weight, "text": one.text, "figure": _figure(drawn, "") if drawn else None}
 
 
 def _parts(found: Found, folder: Path) -> list[Part]:
