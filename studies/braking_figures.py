@@ -9,7 +9,7 @@ from models.braking.hitch import hitch, on_ground, outlines
 from models.braking.measured_pressures import MeasuredPressures
 from models.braking.of_scene import plane_of, sides
 from models.braking.plan import behind
-from models.braking.plane_step import SLIP
+from models.braking.plane_step import LOAD, SLIP
 from models.braking.scene import BrakingScene
 from models.braking.stop_report import SLOWEST, WHEELS, Stop
 from studies.figures import save
@@ -22,9 +22,12 @@ OTHER = "#e8dcc8"
 
 def stop_figure(scene: BrakingScene, name: str, stop: Stop, file: File,
                 measured: MeasuredPressures | None = None) -> File:  # fmt: skip
-    """Six panels: speeds, slips, pressures, motion, torques, path."""
+    """Six panels: speeds, slips, pressures, motion, torques, path; of a vehicle on its suspension also its body's
+    lean, and loads."""
     own = scene.procedures[name]
-    figure, axes = plt.subplots(2, 3, figsize=(14, 7.2))
+    lean = stop.lean
+    columns = 3 if lean is None else 4
+    figure, axes = plt.subplots(2, columns, figsize=(14 * columns / 3, 7.2))
     distance, time = stop.of_vehicle()["stopping distance [m]"], stop.times[-1]
     ended = f"stands after {distance:.2f} m and {time:.2f} s" if stop.path.stands else f"still moves at {time:.1f} s"
     figure.suptitle(f"{scene.title}: {name.replace('_', ' ')} from {own.speed:g} m/s, "
@@ -37,6 +40,9 @@ def stop_figure(scene: BrakingScene, name: str, stop: Stop, file: File,
     _motion(axes[1, 0], stop, scene.trailer is not None)
     _wheels(axes[1, 1], stop.times, stop.path.torques / 1e3, "Torque of each brake", "torque [kN m]")
     road(axes[1, 2], scene, name, stop)
+    if lean is not None:
+        _lean(axes[0, 3], stop.times, lean)
+        _wheels(axes[1, 3], stop.times[1:], stop.path.reports[:, :, LOAD] / 1e3, "Load of each wheel", "load [kN]")
     axes[0, 1].legend(ncols=2, fontsize=8)
     return save(figure, file)
 
@@ -56,6 +62,15 @@ def _wheels(axis: plt.Axes, times: np.ndarray, values: np.ndarray, title: str, l
     for i, row in enumerate(values.T):
         axis.plot(times, row, color=COLOURS[i], lw=0.8, label=WHEELS[i])
     axis.set(xlabel="time [s]", ylabel=label, title=title)
+
+
+def _lean(axis: plt.Axes, times: np.ndarray, lean: np.ndarray) -> None:
+    """Roll and pitch (n, 2) in rad of the body."""
+    for values, colour, label in zip(np.degrees(lean).T, COLOURS[::2], ("roll, to the right", "pitch, nose down"),
+                                     strict=False):  # fmt: skip
+        axis.plot(times, values, color=colour, label=label)
+    axis.set(xlabel="time [s]", ylabel="angle [deg]", title="Roll and pitch of the body")
+    axis.legend(fontsize=8)
 
 
 def _motion(axis: plt.Axes, stop: Stop, trailer: bool) -> None:
