@@ -1,8 +1,8 @@
 """Writes MTS RPC III with floating-point samples: 2^-24 of each value is kept, where 16 bits keep 2^-16 of the largest.
 
-The last group is filled up with the last values; SAMPLES, which is no part of the format but known to rpc3-file, says how
-many count. Comments are parameters of our own, COMMENT_1 ... and COMMENT.CHAN_1_1 ...; NaN is written as NaN. A name, a
-unit or a comment that the format cannot hold is refused, never cut.
+The last group is filled up with the last values; SAMPLES, which is no part of the format but known to rpc3-file, says
+how many count. Comments are parameters of our own, COMMENT_1 ... and COMMENT.CHAN_1_1 ...; NaN is written as NaN.
+A name, a unit or a comment that the format cannot hold is refused, never cut.
 """
 
 from collections.abc import Iterator, Sequence
