@@ -22,6 +22,7 @@ from models.measured.signal import Quantity, Signal
 from models.measured.trust import Level, drift, position
 from models.measured.verdict import uncertainty
 from models.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
+from models.measured.virtual import check as check_virtual
 from models.simulate import simulate
 from models.strict import read
 from models.vehicles.vehicle_file import load_vehicle
@@ -91,6 +92,16 @@ def test_names_that_no_signal_has_are_refused() -> None:
         check(read(Faults, {"noise": {"forse": 1.0}}, ""), TWO)
     with pytest.raises(InputError, match="must be 0 or more"):
         check(read(Faults, {"delay": {"a": -1e-3}}, ""), TWO)
+
+
+@pytest.mark.parametrize(("table", "message"), [
+    ({"faults": {"gain": {"fl_fy2": 0.1}}}, "did you mean 'fl_fy'"), ({"travels": ["strut"]}, "virtual.travels = 'strut'"),
+    ({"sampling_rate": 700.0}, "virtual.sampling_rate"), ({"duration": 1.00007}, "virtual.step"),
+])  # fmt: skip
+def test_a_measurement_that_cannot_be_is_refused_before_its_run(car: CutVehicle, table: dict[str, object],
+                                                                message: str) -> None:  # fmt: skip
+    with pytest.raises(InputError, match=message):
+        check_virtual(car, read(VirtualTable, table, ""))
 
 
 def test_gaps_are_filled_far_better_than_by_a_line_and_say_how_well() -> None:

@@ -15,6 +15,7 @@ from models.hub_forces.scene import Frame, Road
 from models.hub_forces.table import Drive
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults, measured
+from models.measured.faults_of_measurement import check as check_faults
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
 from models.road.iso8608 import iso8608_road
@@ -86,18 +87,17 @@ class VirtualMeasurement:
 
 def virtual_measurement(vehicle: CutVehicle, own: VirtualTable, engine: str, file: str = "") -> VirtualMeasurement:
     """Run the vehicle on its road in an engine and read all transducers; raises InputError, Refused, RunFailed."""
-    check(vehicle, own, file)
+    signals = check(vehicle, own, file)
     left, right = (iso8608_road(own.road.iso8608, own.road.seed + i) for i in range(2))
     drive = two_tracks(vehicle, left, right, own.road.speed, own.step, round(own.duration / own.step))
     run = truth(engine, vehicle, drive, own.frame, own.step, own.duration)
-    columns = {**_hubs(vehicle, run, own.frame), **_motion(vehicle, run, own.accelerometers),
-               **_checks(vehicle, run, drive, own)}  # fmt: skip
-    every = round(1.0 / (own.sampling_rate * own.step))
-    return VirtualMeasurement(vehicle, run, tuple(columns), np.column_stack(list(columns.values())), every)
+    hubs = run.wrenches.reshape(len(run.times), -1)
+    values = np.hstack([hubs, _motion(vehicle, run, own.accelerometers), _checks(vehicle, run, drive, own)])
+    return VirtualMeasurement(vehicle, run, signals, values, round(1.0 / (own.sampling_rate * own.step)))
 
 
-def check(vehicle: CutVehicle, own: VirtualTable, file: str = "") -> None:
-    """Raise InputError for steps that do not fit one another and for names that the vehicle has not."""
+def check(vehicle: CutVehicle, own: VirtualTable, file: str = "") -> tuple[Signal, ...]:
+    """Signals of all channels; InputError for steps that do not fit one another, and for names that nothing has."""
     period = 1.0 / own.sampling_rate
     if not divides(own.step, own.duration):
         raise InputError(file, "virtual.step", own.step, f"must divide virtual.duration = {own.duration:g} s, as "
@@ -109,9 +109,9 @@ def check(vehicle: CutVehicle, own: VirtualTable, file: str = "") -> None:
     for place, names in (("travels", own.travels), ("sections", own.sections)):
         for name in (name for name in names if name not in known):
             raise InputError(file, f"virtual.{place}", name, "the vehicle has no such spring, mount or bar", known)
-
-
-Values = dict[Signal, np.ndarray]
+    signals = _signals(vehicle, own)
+    check_faults(own.faults, signals, file)
+    return signals
 
 
 def _signal(channel: str, what: Quantity, at: str, component: str, frame: Frame, check: bool = False) -> Signal:
@@ -119,32 +119,34 @@ def _signal(channel: str, what: Quantity, at: str, component: str, frame: Frame,
     return Signal(channel, "", channel, what, at, component, frame, 1, unit, factor, check=check)
 
 
-def _hubs(vehicle: CutVehicle, run: HubRun, frame: Frame) -> Values:
-    """Six components per hub."""
-    return {_signal(f"{hub}_{name}", what, hub, component, frame): run.wrenches[:, i, k]
-            for i, hub in enumerate(vehicle.hubs) for k, (name, what, component) in enumerate(HUB)}  # fmt: skip
+def _signals(vehicle: CutVehicle, own: VirtualTable) -> tuple[Signal, ...]:
+    """Of hubs, motion and check channels, in the order of their columns."""
+    body, elements = vehicle.chassis, {element.name: element for element in vehicle.elements}
+    found = [_signal(f"{hub}_{name}", what, hub, axis, own.frame) for hub in vehicle.hubs for name, what, axis in HUB]
+    found += [_signal(name, "angle", body, name, "inertial") for name in ("roll", "pitch")]
+    found += [_signal(f"{name}_rate", "angular rate", body, name, "body") for name in ("roll", "pitch", "yaw")]
+    found += [_signal(f"{name}_a{axis}", "acceleration", name, axis, "body") for name in own.accelerometers
+              for axis in "xyz"]  # fmt: skip
+    found += [_signal(f"{name}_force", "force" if elements[name].unit == "N" else "moment", name, "", "body", True)
+              for name in own.sections]  # fmt: skip
+    return (*found, *(_signal(f"{name}_travel", "travel", name, "", "body", True) for name in own.travels))
 
 
-def _motion(vehicle: CutVehicle, run: HubRun, places: dict[str, list[float]]) -> Values:
-    """Roll and pitch, the rates about the chassis' own axes that gyros read, and accelerometers on the chassis."""
+def _motion(vehicle: CutVehicle, run: HubRun, places: dict[str, list[float]]) -> np.ndarray:
+    """Roll and pitch, the rates about the chassis' own axes that gyros read, and its accelerometers (n, m)."""
     from scipy.interpolate import make_interp_spline
 
-    n, body = vehicle.size, vehicle.chassis
-    angles = {name: run.states[:, i] for name, i in (("roll", ROLL), ("pitch", PITCH))}
-    rates = body_rates(run.states[:, [ROLL, PITCH]], run.states[:, [n + ROLL, n + PITCH, n + HEADING]])
-    found = {_signal(name, "angle", body, name, "inertial"): values for name, values in angles.items()}
-    found |= {_signal(f"{name}_rate", "angular rate", body, name, "body"): rates[:, i]
-              for i, name in enumerate(("roll", "pitch", "yaw"))}  # fmt: skip
+    n, angles = vehicle.size, run.states[:, [ROLL, PITCH]]
+    rates = body_rates(angles, run.states[:, [n + ROLL, n + PITCH, n + HEADING]])
     if not places:
-        return found
+        return np.hstack([angles, rates])
     slopes = make_interp_spline(run.times, np.hstack([run.states[:, [n + X, n + Y, n + Z]], rates]), k=5).derivative()
     felt, alpha = np.split(np.asarray(slopes(run.times)), 2, axis=1)
     felt[:, 2] += GRAVITY
-    turn = matrix(from_cardan(angles["roll"], angles["pitch"], run.states[:, HEADING]))
-    arms = np.array(list(places.values())) - np.array(vehicle.tree.body(body).position)
+    turn = matrix(from_cardan(angles[:, 0], angles[:, 1], run.states[:, HEADING]))
+    arms = np.array(list(places.values())) - np.array(vehicle.tree.body(vehicle.chassis).position)
     readings = in_space(arms, np.einsum("nji,nj->ni", turn, felt), rates, alpha)
-    return found | {_signal(f"{name}_a{axis}", "acceleration", name, axis, "body"): readings[:, i, k]
-                    for i, name in enumerate(places) for k, axis in enumerate("xyz")}  # fmt: skip
+    return np.hstack([angles, rates, readings.reshape(len(readings), -1)])
 
 
 def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
@@ -156,16 +158,13 @@ def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
                             -dpitch * np.sin(roll) + dheading * np.cos(roll) * np.cos(pitch)])  # fmt: skip
 
 
-def _checks(vehicle: CutVehicle, run: HubRun, drive: Drive, own: VirtualTable) -> Values:
-    """Travels and forces of springs, mounts and bars, only to be compared with."""
+def _checks(vehicle: CutVehicle, run: HubRun, drive: Drive, own: VirtualTable) -> np.ndarray:
+    """Forces and travels (n, m) of springs, mounts and bars, only to be compared with."""
     names = [element.name for element in vehicle.elements]
-    found = {_signal(f"{name}_force", "force" if vehicle.elements[names.index(name)].unit == "N" else "moment", name,
-                     "", "body", check=True): run.elements[:, names.index(name)] for name in own.sections}  # fmt: skip
-    if own.travels:
-        travel = travels(vehicle, run, drive)
-        found |= {_signal(f"{name}_travel", "travel", name, "", "body", check=True): travel[:, names.index(name)]
-                  for name in own.travels}  # fmt: skip
-    return found
+    forces = run.elements[:, [names.index(name) for name in own.sections]]
+    if not own.travels:
+        return forces
+    return np.hstack([forces, travels(vehicle, run, drive)[:, [names.index(name) for name in own.travels]]])
 
 
 def travels(vehicle: CutVehicle, run: HubRun, drive: Drive) -> np.ndarray:
