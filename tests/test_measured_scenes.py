@@ -19,6 +19,7 @@ from models.measured.resampling import onto
 from models.measured.scene import build
 from models.measured.timing import timing
 from models.measured.units import conversion
+from studies.recording import run
 
 HUBS = ("fl", "fr")
 PLACES = Places(HUBS, ("body",), ("front left",), ("dash",))
@@ -182,3 +183,34 @@ def test_what_show_prints_is_a_scene(tmp_path):
     table = tomllib.loads(describe(tmp_path / "monday.csv"))
     own = build(table, "monday.toml", tmp_path)
     assert [(row.channel, row.at) for row in own.files[0].channels] == [("FL_Fz", "fl")]
+
+
+@pytest.mark.full
+def test_from_the_road_to_the_page(tmp_path):
+    own = build({"title": "short", "system": "measured", "vehicle": {"file": "r19_free"},
+                 "virtual": {"duration": 0.6, "format": "csv", "sampling_rate": 500.0, "sections": ["front left"]},
+                 "hand_on": {"sections": ["front left", "fl hub"], "formats": ["csv"], "slopes": [5.0]}},
+                "s.toml")  # fmt: skip
+    summary = run(own, ("mujoco",), tmp_path, lambda text, part: None)
+    page = (tmp_path / "recording.html").read_text()
+    assert summary["failed"] == {} and "<b>Accepted</b>" in page and page.count("<img") >= 5
+    assert "http" not in page.replace("http-equiv", "")  # one file, that fetches nothing
+    handed = open_source(tmp_path / "section_forces.csv")
+    assert {channel.name for channel in handed.channels} == {"front left F", *(f"fl hub {axis}" for axis in AXES)}
+
+
+AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+
+
+def test_an_error_stops_the_run_and_the_page_says_so(tmp_path):
+    t = np.arange(1000) * 2e-3
+    loads = {"fl": 3228.0, "fr": 3228.0, "rl": 2723.2, "rr": 2723.2}
+    noise = np.random.default_rng(1).standard_normal((4, 1000))
+    columns = {f"{hub}__N": 1e-3 * load + 1e-3 * own for (hub, load), own in zip(loads.items(), noise, strict=True)}
+    name = write_csv(tmp_path / "a.csv", t, **columns)  # in kN, and the file says N
+    (tmp_path / "scene.toml").write_text("")
+    own = scene(tmp_path, {"file": name, "channels": [force(hub, hub) for hub in loads]}, stabilise={"method": "none"})
+    summary = run(own, ("mujoco",), tmp_path / "out", lambda text, part: None)
+    page = (tmp_path / "out" / "recording.html").read_text()
+    assert "checks" in summary["failed"] and "Stopped: nothing was run" in page and "kN" in page
+    assert not (tmp_path / "out" / "section_forces.csv").exists()
