@@ -17,8 +17,10 @@ from models.measured.finding import Finding
 from models.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
+from validation import measured_car
+from validation import recording as car
 from validation.cases.hub_forces import r19, twin
-from validation.rows import Row, System, Table, behaves, within
+from validation.rows import Row, System, Table, behaves, finding, not_run, within
 
 TITLE = "Checks of a recording"
 SYSTEM: System = "drift"
@@ -195,7 +197,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, {"said": said}
     return [*rows, *_clean(folder), *_strangers(folder), *_together(found, folder),
-            _spread(found, folder)], {"said": said}
+            _spread(found, folder), *_moving_car(folder)], {"said": said}
 
 
 def _rows(fault: Planted, own: tuple[Finding, ...]) -> list[Row]:
@@ -276,6 +278,33 @@ def _spread(found: VirtualMeasurement, folder: Path) -> Row:
     value = 1e3 * float(np.mean(sizes)) if len(sizes) == SAMPLES else float("nan")
     return within("measured_checks.spread", SYSTEM, f"3 ms late, one force: mean over {SAMPLES} samples of noise",
                   value, "ms", 3.0, 0.15, "5 %: the response is linear, the vehicle is not", "closed form")  # fmt: skip
+
+
+def _moving_car(folder: Path) -> list[Row]:
+    """Inertial checks of a real car's telephone, where the recording is there."""
+    path = car.find()
+    if path is None:
+        return [not_run("measured_checks.car", SYSTEM, "inertial checks of a moving car", "no recording here")]
+    own = measured_car.samples(path)
+    degrees, down = own.copy(), own.copy()
+    degrees[:, 4] *= 180 / np.pi
+    down[:, :6] *= np.tile(measured_car.TURNED, 2)
+    found = {name: check(measured_car.recording(values, folder / f"{name}.columns"), None)
+             for name, values in (("clean", own), ("degrees", degrees), ("down", down))}  # fmt: skip
+    errors = {name: {one.place: one for one in ones if one.weight == "error"} for name, ones in found.items()}
+    pitch = next(one for one in found["clean"] if one.check == "turning" and "pitch" in one.place)
+    turned = errors["degrees"].get("q and pitch")
+    return [
+        behaves("measured_checks.car.errors", SYSTEM, "moving car, accelerometers, gyros and pose: errors named",
+                ", ".join(errors["clean"]) or "none", "none", "signs and units are right"),
+        behaves("measured_checks.car.down", SYSTEM, "the same with axes right and down, taken for left and up: named",
+                ", ".join(sorted(errors["down"])), "az, q and pitch", "gravity and the turning of the pose tell"),
+        within("measured_checks.car.degrees", SYSTEM, "the same with degrees for radians in pitch: size", float("nan")
+               if turned is None or turned.size is None else turned.size, "1", 180 / np.pi, SHARE * 180 / np.pi,
+               "what was planted, 20 %", "closed form"),
+        finding("measured_checks.car.ratio", SYSTEM, "the same: pitch rate of the gyro by that of the camera's pose",
+                pitch.size or float("nan"), "1", 1.0, "a telephone beside a camera at 20 Hz"),
+    ]  # fmt: skip
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
