@@ -268,7 +268,8 @@ def _judged(found: Found) -> None:
         beside = tuple(compare(own, run, *pair, slopes) for pair in checks(_job(found, name)))
         found.verdicts[name] = judge(run, _vehicle(found), _holds(found)[name], own.period, found.scene.limits,
                                      found.drift.passes(found.drift.angle) or own.duration,
-                                     [one for one in beside if one.signal.check])  # fmt: skip
+                                     [one for one in beside if one.signal.check],
+                                     {s.name: noise(own, s) for s in own.signals if s.check})  # fmt: skip
         if name == found.chosen:
             found.compared = beside
 

@@ -11,6 +11,7 @@ from models.errors import InputError
 from models.hub_forces.cut_vehicle import CutVehicle, cut
 from models.hub_forces.rigid import rigid
 from models.measured.columns import Columns
+from models.measured.comparison import Band, Compared
 from models.measured.faults_of_measurement import Faults, check, measured
 from models.measured.gaps import filled
 from models.measured.inputs import Grid, Inputs
@@ -18,9 +19,10 @@ from models.measured.pitch_plane import PlaneJob
 from models.measured.pitch_plane import run as plane_run
 from models.measured.recording import Recording
 from models.measured.section_run import DAMPING, Hold
+from models.measured.sections import Answer
 from models.measured.signal import Quantity, Signal
 from models.measured.trust import Level, drift, position
-from models.measured.verdict import uncertainty
+from models.measured.verdict import disagreement, uncertainty
 from models.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
 from models.measured.virtual import check as check_virtual
 from models.simulate import simulate
@@ -95,7 +97,7 @@ def test_names_that_no_signal_has_are_refused() -> None:
 
 
 @pytest.mark.parametrize(("table", "message"), [
-    ({"faults": {"gain": {"fl_fy2": 0.1}}}, "did you mean 'fl_fy'"), ({"travels": ["strut"]}, "virtual.travels = 'strut'"),
+    ({"faults": {"gain": {"fl_fy2": 0.1}}}, "did you mean 'fl_fy'"), ({"travels": ["strut"]}, "travels = 'strut'"),
     ({"sampling_rate": 700.0}, "virtual.sampling_rate"), ({"duration": 1.00007}, "virtual.step"),
 ])  # fmt: skip
 def test_a_measurement_that_cannot_be_is_refused_before_its_run(car: CutVehicle, table: dict[str, object],
@@ -177,6 +179,14 @@ def test_uncertainty_of_a_held_angle_is_what_its_pull_lets_through(car: CutVehic
     angle = lfilter([h * h], [1.0, corner**2 * h * h + c - 2.0, 1.0 - c], pushed)
     assert 2 * angle.std() / uncertainty(car, hold, h) == pytest.approx(1.0, abs=0.05)  # some hundred correlation times
     assert uncertainty(car, replace(hold, method="none"), h) == 0.0
+
+
+def test_a_channel_that_disagrees_is_told_from_its_noise() -> None:
+    answer = Answer("a", "N", "")
+    band = Compared(_signal("a"), answer, 0.0, (Band(0.0, 9.0, 10.0, 3.0), Band(9.0, 99.0, 0.0, 4.0)), 0.0, {}, np.inf)
+    assert disagreement(band) == pytest.approx(0.5)  # 5 of 10
+    assert disagreement(band, 3.0) == pytest.approx(np.sqrt(16 / 91))
+    assert disagreement(band, np.nan) == disagreement(band) and disagreement(band, 5.0) == 0.0
 
 
 @pytest.fixture(scope="module")

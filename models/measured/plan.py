@@ -9,6 +9,7 @@ from models.measured.formats import open_source
 from models.measured.rig import Rig
 from models.measured.scene import MeasuredScene
 from models.measured.signal import Signal
+from models.measured.virtual import check as check_virtual
 
 MISSING = "no vertical force is mapped at {}: without it the vehicle falls"
 
@@ -21,6 +22,8 @@ def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
     _check_names(scene, rig)
     if scene.virtual is None:
         mapped(scene, opened(scene), rig)
+    elif rig.vehicle is not None:
+        check_virtual(rig.vehicle, scene.virtual, scene.file)
 
 
 def opened(scene: MeasuredScene) -> tuple[Source, ...]:

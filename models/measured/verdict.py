@@ -118,8 +118,9 @@ def errors(run: Outcome, true: VirtualMeasurement, slope: float = SLOPE) -> Erro
 def disagreement(own: Compared, noise: float = 0.0) -> float:
     """Rms of the error of a check channel by that of the channel, its noise (standard deviation) taken off both.
 
-    0 of a channel that is more than a third noise: it can contradict nothing.
+    0 of a channel that is more than a third noise: it can contradict nothing. Noise that is not known, NaN, is none.
     """
+    noise = 0.0 if math.isnan(noise) else noise
     error, whole = (sum(getattr(band, name) ** 2 for band in own.bands) for name in ("error", "measured"))
     if whole <= 0.0 or noise > LOUD * math.sqrt(whole):
         return 0.0
