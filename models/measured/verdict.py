@@ -29,6 +29,9 @@ DISAGREES = 0.15
 wrong by 5 % and a delay of 2 ms at 10 Hz together stay below it."""
 LOUD = 1 / 3
 """Part of a check channel that may be noise."""
+WORDS = {"I pitch''": "what turns the chassis", "the measured pitch": "measured roll and pitch",
+         "pitch wrong": "roll or pitch wrong", "pitch known": "roll or pitch known", "pitch of": "roll or pitch of"}
+"""What ``score`` says of the pitch plane, and what it means here."""
 EFFECTS = {"kalman": {"kalman_filter"}, "prescribed": {"prescribed_pitch"}, "none": set[str]()}
 """Methods of holding a run, by the names that ``score`` has for them."""
 
@@ -46,7 +49,7 @@ def judge(run: Outcome, vehicle: CutVehicle, hold: Hold, sampled: float, limits:
     found = score.blind_verdict(own_figures(run, vehicle), EFFECTS[hold.method], run.period * (run.done - 1), limits,
                                 trusted, uncertainty=uncertainty(vehicle, hold, sampled))  # fmt: skip
     if not off:
-        return found
+        return _in_space(found)
     told = ", ".join(f"{name} by {share:.0%}" for name, share in off.items())
     return Verdict("rejected", f"channels that were not put in disagree (at most {DISAGREES:.0%}): {told}")
 
@@ -55,7 +58,15 @@ def judge_beside_truth(run: Outcome, true: VirtualMeasurement, hold: Hold, limit
                        slope: float = SLOPE) -> Verdict:  # fmt: skip
     """The verdict on a run of a virtual measurement, beside the true one."""
     found = errors(run, true, slope)
-    return score.verdict(own_figures(run, true.vehicle), found, EFFECTS[hold.method], limits)
+    return _in_space(score.verdict(own_figures(run, true.vehicle), found, EFFECTS[hold.method], limits))
+
+
+def _in_space(found: Verdict) -> Verdict:
+    """A verdict in the words of a vehicle that rolls, too."""
+    reason = found.reason
+    for plane, space in WORDS.items():
+        reason = reason.replace(plane, space)
+    return replace(found, reason=reason)
 
 
 def own_figures(run: Outcome, vehicle: CutVehicle) -> Own:
