@@ -155,9 +155,9 @@ def _drift(found: Found, folder: Path) -> Part:
 def _until(trust: Trust) -> str:
     """How far a free run can be trusted, and what ends that."""
     if trust.until is None:
-        return f"not limited by what is known (to {trust.angle:g} rad; looked at: {', '.join(trust.times)})"
+        return f"trusted throughout (an angle wrong by {trust.angle:g} rad is not expected)"
     name, time = trust.until
-    return f"trusted until {time:.3g} s (to {trust.angle:g} rad, by {name})"
+    return f"trusted until {time:.3g} s, when {name} makes an angle wrong by {trust.angle:g} rad"
 
 
 def _forces(found: Found, run: Outcome, folder: Path) -> Part:
