@@ -1,0 +1,159 @@
+"""Which setting to take: the cheapest that meets a tolerance, timed beside the engines' defaults, and confirmed."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from models.errors import InputError
+from validation.price.own_scene import Ladder, OwnScene
+from validation.price.own_scene.search import Search, Tried
+from validation.price.own_scene.truth import Truth, truth
+from validation.timing import interleave
+
+SYSTEMS = {"pitch-plane": "validation.price.own_scene.pitch_plane"}
+"""Systems whose scenes have a price, and the modules that know them."""
+NEAR = 2.5
+"""Settings that took up to so many times the least seconds in one run are timed beside one another."""
+ROUNDS, LEAST = 5, 0.01
+"""Interleaved rounds of timing; a short run is repeated until its turn lasts this long (s)."""
+ATTEMPTS = 6
+"""Settings that are confirmed over the whole run, at most, for one recommendation."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A setting with the error that it has (in the quantity's unit), its force calls, and its seconds (median)."""
+
+    tried: Tried
+    error: float
+    calls: float
+    seconds: float
+    confirmed: bool
+
+
+@dataclass(frozen=True)
+class Default:
+    """An engine's default method: its error as it comes (None if it gave no answer, then ``reason``), and refined to
+    meet the tolerance; ``extrapolated`` by its declared order where no step tried was fine enough."""
+
+    as_it_is: Tried
+    refined: Choice | None
+    extrapolated: bool
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """Winners by engine and cost ("" for all engines), defaults by engine, all that was tried; the truth over the part
+    that was searched, and over the whole run."""
+
+    scene: OwnScene
+    tolerance: float
+    searched: Truth
+    truth: Truth
+    winners: dict[tuple[str, str], Choice]
+    defaults: dict[str, Default]
+    tried: tuple[Tried, ...]
+
+
+def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str, ...]) -> Recommendation:
+    """The cheapest settings of a scene; InputError for what cannot be asked, RunFailed where nothing is known."""
+    if not (np.isfinite(tolerance) and tolerance > 0.0):
+        raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in the quantity's unit")
+    if scene.system not in SYSTEMS:
+        raise InputError(scene.file, "system", scene.system, "has no price of accuracy in steps: its scenes can be "
+                         "asked", tuple(SYSTEMS))  # fmt: skip
+    return recommend(import_module(SYSTEMS[scene.system]).own(scene, quantity, engines), tolerance)
+
+
+def recommend(scene: OwnScene, tolerance: float) -> Recommendation:
+    """Search the first part of the run, time what is near the best, confirm it over the whole run."""
+    searched = known = truth(scene, tolerance, scene.first)
+    search = Search(scene, searched, tolerance, scene.first).everything()
+    timed = _timed(search)
+    winners = {(engine, kind): best for engine in ("", *dict.fromkeys(one.engine for one in scene.ladders()))
+               for kind in ("seconds", "calls") if (best := _cheapest(timed, engine, kind)) is not None}  # fmt: skip
+    if scene.whole > scene.first * (1 + 1e-9) and winners:
+        known, winners = _confirmed(search, timed, winners)
+    defaults = {ladder.engine: found for ladder in scene.ladders()
+                if ladder.default and (found := _default(search, ladder, timed)) is not None}  # fmt: skip
+    return Recommendation(scene, tolerance, searched, known, winners, defaults, tuple(search.tried))
+
+
+def _timed(search: Search) -> list[Choice]:
+    """The coarsest setting of every method that meets the tolerance; seconds in rounds of those that may win."""
+    curves: dict[str, Tried] = {}
+    for one in search.meeting():
+        held = curves.get(one.setting.curve)
+        if held is None or one.setting.value > held.setting.value:
+            curves[one.setting.curve] = one
+    found = list(curves.values())
+    if not found:
+        return []
+    least = {one.setting.engine: min(o.seconds for o in found if o.setting.engine == one.setting.engine)
+             for one in found}  # fmt: skip
+    near = [one for one in found if one.seconds <= NEAR * least[one.setting.engine]]
+    jobs = [partial(search.scene.solve, one.setting, search.duration) for one in near]
+    taken = dict(zip((id(one) for one in near), np.median(interleave(jobs, ROUNDS, LEAST), axis=1), strict=True))
+    longer = search.scene.whole / search.duration
+    return [Choice(one, one.error, longer * one.calls, longer * float(taken.get(id(one), one.seconds)), False)
+            for one in found]  # fmt: skip
+
+
+def _cheapest(timed: list[Choice], engine: str, kind: str) -> Choice | None:
+    able = [one for one in timed if one.tried.setting.engine.startswith(engine)]
+    return min(able, key=lambda one: getattr(one, kind)) if able else None
+
+
+def _confirmed(search: Search, timed: list[Choice],
+               winners: dict[tuple[str, str], Choice]) -> tuple[Truth, dict[tuple[str, str], Choice]]:  # fmt: skip
+    """The winners run over the whole scene, and refined until they meet the tolerance there."""
+    scene = search.scene
+    known = truth(scene, search.tolerance, scene.whole, max(0, search.truth.rung - 1), twice=False)
+    over = Search(scene, known, search.tolerance, scene.whole)
+    ladders = {f"{one.engine} {one.method}": one for one in scene.ladders()}
+    found = {one.tried.setting: _over_all(over, ladders[one.tried.setting.curve], one) for one in winners.values()}
+    search.tried += [one for one in over.tried if one.status != "ok"]
+    held = [one for one in found.values() if one is not None]
+    again = {key: _cheapest(held, *key) for key in winners}
+    return known, {key: one for key, one in again.items() if one is not None}
+
+
+def _over_all(over: Search, ladder: Ladder, one: Choice) -> Choice | None:
+    """A setting, or the next finer one of its method that meets the tolerance over the whole run."""
+    i, first = ladder.values.index(one.tried.setting.value), one.tried
+    for _ in range(ATTEMPTS):
+        now = over.attempt(ladder.setting(i))
+        if now.error <= over.tolerance:
+            ratio = 1.0 if ladder.adaptive else first.setting.value / now.setting.value
+            return Choice(now, now.error, now.calls, ratio * one.seconds, True)
+        finer = (now.error / over.tolerance) ** (1 / (ladder.order or 1)) if np.isfinite(now.error) else 2.0
+        wanted = ladder.values[i] / finer
+        i = next((k for k in range(i + 1, len(ladder.values)) if ladder.values[k] <= wanted * (1 + 1e-9)), -1)
+        if i < 0:
+            return None
+    return None
+
+
+def _default(search: Search, ladder: Ladder, timed: list[Choice]) -> Default | None:
+    """What the engine's default does as it comes, and what it takes to meet the tolerance."""
+    curve = f"{ladder.engine} {ladder.method}"
+    own = [one for one in search.tried if one.setting.curve == curve]
+    if not own:
+        return None
+    as_it_is = min(own, key=lambda one: abs(np.log(one.setting.value / ladder.default)))
+    met = next((one for one in timed if one.tried.setting.curve == curve), None)
+    if met is not None:
+        return Default(as_it_is, met, False)
+    clear = [one for one in own if one.status == "ok"]
+    if not clear:
+        return Default(as_it_is, None, False)
+    finest = min(clear, key=lambda one: one.setting.value)
+    finer = (finest.error / search.tolerance) ** (1 / ladder.order)
+    longer = finer * search.scene.whole / search.duration
+    setting = replace(finest.setting, value=finest.setting.value / finer)
+    guess = Tried(setting, "ok", "", search.tolerance, {}, 0.0)
+    refined = Choice(guess, search.tolerance, longer * finest.calls, longer * finest.seconds, False)
+    return Default(as_it_is, refined, True)

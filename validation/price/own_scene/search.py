@@ -1,0 +1,130 @@
+"""The coarsest setting of every method that meets a tolerance, found without running what cannot win."""
+
+import time
+from bisect import bisect_left
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+from models.errors import InputError, RunFailed
+from validation.price.own_scene import Ladder, OwnScene
+from validation.price.own_scene.truth import Truth
+from validation.price.problems import Setting
+from validation.price.runner import Status
+
+START = 2e-3
+"""s: the step that is tried first; an engine's default method begins with its default step."""
+LOOSE = 1e-3
+"""The tolerance that an adaptive method is tried with first."""
+WORTH = 3.0
+"""A method is given up once it takes this many times the seconds and the force calls of its engine's best."""
+PATIENCE = 0.5
+"""s: an engine's default method is refined for as long as a run takes no longer."""
+BEYOND = 10.0
+"""An error of so many times the quantity's own size is no answer any more."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One setting and what became of it: error in the quantity's unit, counts, seconds of one run."""
+
+    setting: Setting
+    status: Status
+    reason: str = ""
+    error: float = float("inf")
+    counts: dict[str, int] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    @property
+    def calls(self) -> int:
+        """Force calls of the run."""
+        return self.counts.get("force calls", 0)
+
+
+@dataclass
+class Search:
+    """Settings of a scene tried over ``duration`` (s) against its truth."""
+
+    scene: OwnScene
+    truth: Truth
+    tolerance: float
+    duration: float
+    tried: list[Tried] = field(default_factory=list)
+
+    def everything(self) -> "Search":
+        """Every ladder, those of high order first: what they cost tells when others are given up."""
+        for ladder in {one.engine: one for one in self.scene.ladders()}.values():
+            self._warm(ladder)
+        for ladder in sorted(self.scene.ladders(), key=lambda one: (one.adaptive, -one.order)):
+            self.climb(ladder)
+        return self
+
+    def attempt(self, setting: Setting) -> Tried:
+        """Try one setting, and keep what became of it."""
+        begun = time.perf_counter()
+        try:
+            solution = self.scene.solve(setting, self.duration)
+        except InputError as error:
+            found = Tried(setting, "refused", getattr(error, "why", "") or error.allowed)
+        except RunFailed as error:
+            found = Tried(setting, "raised", str(error))
+        else:
+            seconds, answer = time.perf_counter() - begun, self.scene.answer(solution)
+            error_of = self.truth.error(answer)
+            lies = not error_of <= BEYOND * max(self.truth.size, self.tolerance)
+            why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result" if lies else ""
+            found = Tried(setting, "SILENT" if lies else "ok", why, error_of, answer.counts, seconds)
+        self.tried.append(found)
+        return found
+
+    def _warm(self, ladder: Ladder) -> None:
+        """One run that is not timed: an engine's first one imports and compiles."""
+        with suppress(InputError, RunFailed):
+            self.scene.solve(ladder.setting(_next(ladder, 0, len(ladder.values), None, self.tolerance)), self.duration)
+
+    def climb(self, ladder: Ladder) -> None:
+        """Find a ladder's coarsest setting that meets the tolerance: each one tried halves what is left, at least
+        nearly always, and the declared order says where to try next."""
+        low, high, last = 0, len(ladder.values), None
+        while low < high:
+            i = _next(ladder, low, high, last, self.tolerance)
+            if ladder.default and last is not None:
+                i = min(i, self._affordable(ladder, last))
+            if i < low or self._hopeless(ladder, i, last):
+                return
+            last = self.attempt(ladder.setting(i))
+            if last.error <= self.tolerance:
+                high = i
+            else:
+                low = i + 1
+
+    def meeting(self, engine: str = "") -> list[Tried]:
+        """Those that meet the tolerance, of one engine or of all."""
+        return [one for one in self.tried if one.error <= self.tolerance and one.setting.engine.startswith(engine)]
+
+    def _affordable(self, ladder: Ladder, last: Tried) -> int:
+        """The finest rung whose run takes no longer than PATIENCE."""
+        least = last.setting.value * last.seconds / PATIENCE
+        return max(i for i, value in enumerate(ladder.values) if value >= least or i == 0)
+
+    def _hopeless(self, ladder: Ladder, i: int, last: Tried | None) -> bool:
+        """Whether a rung would cost far more than what its engine has that meets the tolerance."""
+        if last is None or not last.seconds:
+            return False
+        finer = 1.0 if ladder.adaptive else last.setting.value / ladder.values[i]
+        seconds, calls, best = finer * last.seconds, finer * last.calls, self.meeting(ladder.engine)
+        if ladder.default or not best:
+            return False
+        return (seconds > WORTH * min(one.seconds for one in best)
+                and calls > WORTH * min(one.calls for one in best))  # fmt: skip
+
+
+def _next(ladder: Ladder, low: int, high: int, last: Tried | None, tolerance: float) -> int:
+    """The rung to try: by the declared order from the last one, in the middle where that says nothing."""
+    if last is None:
+        wanted = LOOSE if ladder.adaptive else ladder.default or START
+    elif last.status == "ok" and last.error > 0.0:
+        wanted = last.setting.value * (tolerance / last.error) ** (1 / (1 if ladder.adaptive else ladder.order or 2))
+    else:
+        return (low + high) // 2
+    i = bisect_left(ladder.values, -wanted * (1 + 1e-9), key=lambda value: -value)
+    return min(max(i, low), high - 1)

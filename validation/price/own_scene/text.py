@@ -1,0 +1,127 @@
+"""A recommendation as a person reads it, and as JSON."""
+
+from collections import defaultdict
+from typing import Any
+
+from studies.figures import LABELS
+from validation.price.own_scene.recommendation import Choice, Recommendation
+from validation.price.own_scene.search import Tried
+from validation.price.problems import Setting
+
+HEAD = f"  {'':<24}{'setting':<36}{'error':>11}{'force calls':>14}{'seconds':>11}"
+
+
+def lines(found: Recommendation) -> list[str]:
+    """The table of cheapest settings, what the defaults lose, what failed, and what to write into the scene."""
+    own = found.scene
+    return [f"{own.title}: {own.quantity} within {found.tolerance:g} {own.unit} over {own.whole:g} s",
+            f"  truth: {found.truth.how} {found.truth.uncertainty:.1e} {own.unit}",
+            *([] if found.searched is found.truth else
+              [f"  over the first {own.first:g} s, where all methods are tried: {found.searched.how} "
+               f"{found.searched.uncertainty:.1e} {own.unit}"]),
+            *([f"  {own.note}"] if own.note else []), "",
+            *(_table(found) if found.winners else _none(found)), *_defaults(found), *_failures(found.tried),
+            *_into_the_scene(found)]  # fmt: skip
+
+
+def _table(found: Recommendation) -> list[str]:
+    rows, unit = [HEAD], found.scene.unit
+    for (engine, kinds), one in _merged(found.winners).items():
+        who = f"{LABELS.get(engine, engine) if engine else 'all'}, by {kinds}"
+        rows.append(f"  {who:<24}{_named(one.tried.setting, not engine):<36}{one.error:>9.2g} {unit}"
+                    f"{one.calls:>14,.0f}{one.seconds:>9.2g} s")  # fmt: skip
+    how = "measured over the whole run" if all(one.confirmed or found.scene.whole == found.scene.first
+                                               for one in found.winners.values()) else "measured"
+    return [*rows, f"  errors are {how}, against the truth; seconds are those of this machine, model built anew"]
+
+
+def _merged(winners: dict[tuple[str, str], Choice]) -> dict[tuple[str, str], Choice]:
+    """One row where the same setting is the cheapest by both costs."""
+    rows = dict[tuple[str, str], Choice]()
+    for (engine, kind), one in winners.items():
+        if (engine, "seconds") in rows and rows[engine, "seconds"] is one:
+            rows[engine, "both"] = rows.pop((engine, "seconds"))
+        else:
+            rows[engine, kind] = one
+    return rows
+
+
+def _none(found: Recommendation) -> list[str]:
+    able = [one for one in found.tried if one.status == "ok"]
+    if not able:
+        return ["  no setting gave an answer"]
+    best = min(able, key=lambda one: one.error)
+    return [f"  no setting tried meets the tolerance; the nearest is {_named(best.setting, True)} with "
+            f"{best.error:.2g} {found.scene.unit}"]  # fmt: skip
+
+
+def _named(setting: Setting, whole: bool) -> str:
+    engine = f"{LABELS.get(setting.engine, setting.engine)} " if whole else ""
+    return f"{engine}{setting.method}, {setting.label()}"
+
+
+def _defaults(found: Recommendation) -> list[str]:
+    rows = []
+    for engine, one in found.defaults.items():
+        tried, unit = one.as_it_is, found.scene.unit
+        as_it_is = f"{tried.error:.2g} {unit}" if tried.status == "ok" else f"{tried.status}"
+        rows.append(f"  {LABELS.get(engine, engine)}'s default, {_named(tried.setting, False)}: {as_it_is}"
+                    + _lost(found, engine, one.refined, one.extrapolated))  # fmt: skip
+    return ["", *rows] if rows else []
+
+
+def _lost(found: Recommendation, engine: str, refined: Choice | None, extrapolated: bool) -> str:
+    """What the default method costs beside the engine's cheapest and the cheapest of all, once refined."""
+    if refined is None:
+        return "; no step tried gives an answer"
+    parts = [f"{getattr(refined, kind) / max(getattr(best, kind), 1e-12):.3g} times the {kind} of {whose}"
+             for whose, key in ((f"{LABELS.get(engine, engine)}'s cheapest", engine), ("the cheapest of all", ""))
+             for kind in ("calls", "seconds") if (best := found.winners.get((key, kind))) is not None]  # fmt: skip
+    met = f"within the tolerance at {refined.tried.setting.label()}{' (extrapolated)' if extrapolated else ''}"
+    return f"; {met}" + (f": {', '.join(parts)}" if parts else "")
+
+
+def _failures(tried: tuple[Tried, ...]) -> list[str]:
+    """Settings without an answer, by method and reason."""
+    known: dict[tuple[str, str, str], list[str]] = defaultdict(list)
+    for one in tried:
+        if one.status != "ok":
+            key = (one.status, f"{LABELS.get(one.setting.engine, one.setting.engine)} {one.setting.method}", one.reason)
+            known[key].append(one.setting.label())
+    if not known:
+        return []
+    return ["", "  without an answer", *(f"    {status:<9}{method}, {', '.join(labels)}: {reason}"
+                                         for (status, method, reason), labels in known.items())]  # fmt: skip
+
+
+def _into_the_scene(found: Recommendation) -> list[str]:
+    """What to write into the scene to have the recommended setting."""
+    best = found.winners.get(("", "seconds"))
+    if best is None:
+        return []
+    return ["", "  in the scene", *(f"    {line}" for line in found.scene.lines(best.tried.setting))]
+
+
+def as_dict(found: Recommendation) -> dict[str, Any]:
+    """All of it as JSON keeps it."""
+    own = found.scene
+    return {
+        "scene": own.title, "quantity": own.quantity, "unit": own.unit, "tolerance": found.tolerance,
+        "duration": own.whole, "truth": found.truth.how, "uncertainty": found.truth.uncertainty,
+        "cheapest": [{"engine": engine or "all", "by": kind, **_choice(one)}
+                     for (engine, kind), one in found.winners.items()],
+        "defaults": {engine: {"as it is": _tried(one.as_it_is), "extrapolated": one.extrapolated,
+                              "refined": None if one.refined is None else _choice(one.refined)}
+                     for engine, one in found.defaults.items()},
+        "tried": [_tried(one) for one in found.tried],
+    }  # fmt: skip
+
+
+def _choice(one: Choice) -> dict[str, Any]:
+    return {**_tried(one.tried), "error": one.error, "calls": one.calls, "seconds": one.seconds}
+
+
+def _tried(one: Tried) -> dict[str, Any]:
+    error = one.error if one.status == "ok" else None
+    return {"engine": one.setting.engine, "method": one.setting.method, "value": one.setting.value,
+            "status": one.status, "reason": one.reason, "error": error, "seconds": one.seconds}  # fmt: skip

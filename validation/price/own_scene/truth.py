@@ -1,0 +1,102 @@
+"""What a scene's quantity really is: a reference refined until it no longer matters, and how well it is known."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.errors import InputError, RunFailed
+from validation.price.own_scene import Answer, Ladder, OwnScene
+from validation.price.problems import Setting
+
+SURE = 20.0
+"""Halving the step of the reference changes less than this part of the tolerance."""
+AGREED = 4.0
+"""A solver of another family differs by less than this part of the tolerance."""
+MOST_ROWS = 4_000_000
+"""Rows of a reference: beyond, it takes gigabytes."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """answer : of the reference; uncertainty : in the unit of the quantity; rung : of the reference's ladder."""
+
+    answer: Answer
+    uncertainty: float
+    how: str
+    rung: int
+
+    def error(self, other: Answer) -> float:
+        """Largest difference over the run, at the other's own instants; infinite for what is not finite."""
+        if not np.isfinite(other.values).all():
+            return float("inf")
+        return float(np.abs(other.values - at(self.answer, other.times)).max())
+
+    @property
+    def size(self) -> float:
+        """Largest magnitude of the quantity."""
+        return float(np.abs(self.answer.values).max())
+
+
+def at(answer: Answer, times: np.ndarray) -> np.ndarray:
+    """Values (m, k) at ``times`` (m,) in s: those of the rows where they lie on them, else cubic between four rows."""
+    if len(answer.times) < 5:
+        return answer.values
+    step = float(answer.times[-1]) / (len(answer.times) - 1)
+    place = times / step
+    index = np.rint(place).astype(int)
+    if np.abs(place - index).max() < 1e-6 * len(answer.times) and np.abs(place - index).max() < 1e-3:
+        return answer.values[np.minimum(index, len(answer.times) - 1)]
+    left = np.clip(np.floor(place).astype(int) - 1, 0, len(answer.times) - 4)
+    s = place - left
+    weights = (-(s - 1) * (s - 2) * (s - 3) / 6, s * (s - 2) * (s - 3) / 2, -s * (s - 1) * (s - 3) / 2,
+               s * (s - 1) * (s - 2) / 6)  # fmt: skip
+    return sum((w[:, None] * answer.values[left + i] for i, w in enumerate(weights)), np.zeros((1, 1)))
+
+
+def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twice: bool = True) -> Truth:
+    """The quantity over ``duration`` (s), known to a twentieth of ``tolerance``; ``twice`` : by a second family too.
+
+    InputError where that cannot be reached, RunFailed where two families of solvers differ or none ends.
+    """
+    ladder = scene.reference()
+    found, rung, change = _settled(scene, ladder, tolerance, duration, rung)
+    said = f"{ladder.engine} {ladder.method} at {ladder.setting(rung).label()}"
+    other = scene.second() if twice else None
+    if other is None:
+        return Truth(found, change, f"{said}; halving its step changes", rung)
+    differs = Truth(found, change, "", rung).error(scene.answer(scene.solve(other, duration)))
+    if differs > tolerance / AGREED:
+        raise RunFailed("reference", f"{said} and {_named(other)} differ by {differs:.3g} {scene.unit}: the tolerance "
+                        "cannot be judged")  # fmt: skip
+    return Truth(found, max(change, differs), f"{said} and {_named(other)}, which differ by", rung)
+
+
+def _named(setting: Setting) -> str:
+    return f"{setting.engine} {setting.method} at {setting.label()}"
+
+
+def _settled(scene: OwnScene, ladder: Ladder, tolerance: float, duration: float,
+             rung: int) -> tuple[Answer, int, float]:  # fmt: skip
+    """The first answer that halving the step has not changed by more than SURE of the tolerance; its rung; the change.
+    """
+    before: Answer | None = None
+    change, failure = float("inf"), ""
+    for i in range(rung, len(ladder.values)):
+        if duration / ladder.values[i] > MOST_ROWS:
+            break
+        try:
+            now = scene.answer(scene.solve(ladder.setting(i), duration))
+        except (InputError, RunFailed) as error:
+            before, failure = None, str(error)
+            continue
+        if before is not None:
+            last, change = change, Truth(now, 0.0, "", i).error(before)
+            if change <= tolerance / SURE:
+                return now, i, change
+            if change > 0.7 * last and change < 1e-6 * Truth(now, 0.0, "", i).size:
+                break  # rounding: finer steps no longer help
+        before = now
+    if before is None:
+        raise RunFailed("reference", failure or "no step is fine enough")
+    raise InputError("--tolerance", "", tolerance, f"is finer than the scene's own reference can be known here: "
+                     f"at least {SURE * change:.2g} {scene.unit}")  # fmt: skip
