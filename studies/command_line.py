@@ -1,10 +1,10 @@
-"""The command ``twinrig``: list, show, run, validate."""
+"""The command ``twinrig``: list, show, run, price, validate."""
 
 import json
-import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -12,7 +12,8 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.exceptions import TyperException
 
-SCENES = Path(__file__).parent / "scenes"
+from models.errors import InputError, RunFailed
+from studies.asked import SCENES, engines_of, load_scene, plan_of, ready
 
 MEASURED = (".csv", ".txt", ".mf4", ".mdf", ".dat", ".rsp", ".tdms")
 """Files that ``show`` takes for measurements."""
@@ -28,15 +29,17 @@ Changes = Annotated[
 ]
 Out = Annotated[Path | None, typer.Option(help="Folder for the results; it must be new or empty.")]
 Resume = Annotated[
-    Path | None, typer.Option(help="Folder of a killed run that keeps finished blocks (ensemble): go on with it.")
+    Path | None, typer.Option(help="Folder of a killed sweep, ensemble or recording: go on with what it kept.")
+]
+Sweep = Annotated[
+    str | None,
+    typer.Option(metavar="KEY=FROM:TO:N", help="Run the scene at N values of a key, or at those of KEY=a,b,c."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON and nothing else.")]
 
 
 def main() -> None:
     """Run the command; a user's mistake is one message and exit code 2, a failed run exit code 1."""
-    from models.errors import InputError, RunFailed
-
     try:
         sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0)
     except TyperException as error:  # what was typed does not fit the command's options
@@ -92,8 +95,8 @@ def show(scene: SceneName, changes: Changes = None) -> None:
         from models.measured.listing import describe
 
         return print(describe(Path(scene)))
-    loaded = _load(scene, changes)
-    print(_plan(loaded).describe(loaded))
+    loaded = load_scene(scene, changes)
+    print(plan_of(loaded).describe(loaded))
 
 
 @app.command()
@@ -102,13 +105,50 @@ def run(
     engine: Annotated[str | None, typer.Option(help="exudyn, mujoco, reference or all (which is the default)")] = None,
     out: Out = None,
     resume: Resume = None,
+    sweep: Sweep = None,
     changes: Changes = None,
     as_json: AsJson = False,
 ) -> None:
     """Run a scene and save its results and figures."""
-    loaded = _load(scene, changes)
-    engine = engine or getattr(getattr(loaded, "run", None), "engine", None)
-    _finish(loaded, _engines(engine, loaded.system), out, resume, as_json)
+    if sweep is not None:
+        return _sweep(sweep, scene, engine, changes, out, resume, as_json)
+    loaded = load_scene(scene, changes)
+    engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
+    module = ready(loaded, engines)
+    folder = _folder(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
+    _finish(lambda progress: module.run(loaded, engines, folder, progress), folder, as_json)
+
+
+def _sweep(text: str, scene: str, engine: str | None, changes: list[str] | None, out: Path | None, resume: Path | None,
+           as_json: bool) -> None:  # fmt: skip
+    """Run a scene at every value of a key."""
+    from studies import sweep
+
+    key, values = sweep.asked(text)
+    job = sweep.Points(scene, tuple(changes or ()), key, values, engine, Path())
+    job.check()
+    folder = _folder(f"{Path(scene).stem}-sweep", sweep.RECORDS, "", out, resume)
+    _finish(lambda progress: sweep.run(replace(job, folder=folder), progress), folder, as_json)
+
+
+@app.command()
+def price(
+    scene: SceneName,
+    tolerance: Annotated[float, typer.Option(help="Largest error that is allowed, in the unit of the quantity.")],
+    quantity: Annotated[str | None, typer.Option(help="Channels of the result, e.g. f1,f2, if not the usual.")] = None,
+    engine: Annotated[str | None, typer.Option(help="exudyn, mujoco, reference or all (which is the default)")] = None,
+    changes: Changes = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find the cheapest engine, integrator and step that hold a scene's quantity to a tolerance."""
+    from validation.price.own_scene.recommendation import price as price_of
+    from validation.price.own_scene.text import as_dict, lines
+
+    loaded = load_scene(scene, changes)
+    found = price_of(loaded, tolerance, quantity, engines_of(engine, loaded.system))
+    print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(lines(found)))
+    if not found.winners:
+        sys.exit(1)
 
 
 @app.command()
@@ -125,53 +165,13 @@ def validate(
     sys.exit(1 if failed else 0)
 
 
-def _load(name: str, changes: list[str] | None) -> Any:
-    """A scene that comes with twinrig by its name, or a file; a file's name ends in .toml."""
-    from models.errors import InputError
-    from models.systems import load
-
-    names = tuple(sorted(path.stem for path in SCENES.glob("*.toml")))
-    if name in names:
-        return load(SCENES / f"{name}.toml", changes or ())
-    if not name.endswith(".toml") and not os.path.lexists(name):
-        raise InputError("", "scene", name, "no such scene, and no such file", names)
-    return load(Path(name), changes or ())
-
-
-def _plan(scene: Any) -> Any:
-    """The module that describes and checks scenes of this one's system."""
-    from models.systems import SYSTEMS
-
-    return import_module(SYSTEMS[scene.system].plan)
-
-
-def _engines(name: str | None, system: str) -> tuple[str, ...]:
-    """The engines that were asked for; none for a system that no engine computes."""
-    from models.errors import InputError
-    from models.systems import SYSTEMS
-
-    engines = SYSTEMS[system].engines
-    if name is not None and not engines:
-        raise InputError("--engine", "", name, f"has no meaning for {system}, which no engine computes: leave it out")
-    if name is None or name == "all":
-        return engines
-    if name not in engines:
-        raise InputError("--engine", "", name, "no such engine", (*engines, "all"))
-    return (name,)
-
-
-def _finish(scene: Any, engines: tuple[str, ...], out: Path | None, resume: Path | None, as_json: bool) -> None:
-    """Check everything, then run the scene's study with a progress bar and print its summary."""
+def _finish(work: Callable[[Any], dict[str, Any]], folder: Path, as_json: bool) -> None:
+    """Do the work, whose results go into ``folder``, with a progress bar, and print its summary."""
     from studies.folders import drop_if_empty
 
-    module = _study(scene)
-    _plan(scene).check(scene, engines)
-    if hasattr(module, "check"):
-        module.check(scene, engines)
-    folder = _folder(module, scene, out, resume)
     try:
         with _progress(as_json) as progress:
-            summary = module.run(scene, engines, folder, progress)
+            summary = work(progress)
     except KeyboardInterrupt:
         _end(f"interrupted; finished results are kept in {folder}", 130)
     finally:
@@ -184,46 +184,17 @@ def _finish(scene: Any, engines: tuple[str, ...], out: Path | None, resume: Path
         sys.exit(1)
 
 
-def _folder(module: Any, scene: Any, out: Path | None, resume: Path | None) -> Path:
-    """Where the results go: a new folder, or that of a killed run whose study keeps finished blocks."""
-    from models.errors import InputError
+def _folder(name: str, blocks: str | None, study: str, out: Path | None, resume: Path | None) -> Path:
+    """Where the results go: a new folder, or that of a killed run which keeps finished work in ``blocks``."""
     from studies.folders import new_folder, resumed_folder
 
     if resume is None:
-        return new_folder(out, Path(scene.file).stem)
+        return new_folder(out, name)
     if out is not None:
         raise InputError("--resume", "", str(resume), "goes on in its own folder: leave out --out")
-    if not hasattr(module, "BLOCKS"):
-        raise InputError("--resume", "", str(resume), f"the study {scene.study!r} keeps nothing that can be resumed")
-    return resumed_folder(resume, module.BLOCKS)
-
-
-def _study(scene: Any) -> Any:
-    """The study's module, once the scene's options are known to be its own."""
-    from models.errors import InputError
-    from models.strict import read
-    from models.systems import DEFAULT
-
-    names = tuple(sorted(path.stem for path in SCENES.parent.glob("*.py") if path.stem not in NOT_STUDIES))
-    if scene.study not in names:
-        raise InputError(scene.file, "study", scene.study, "no such study", names)
-    module = import_module(f"studies.{scene.study}")
-    own = getattr(module, "SYSTEM", DEFAULT)
-    if own != scene.system:
-        allowed = f"is a study of system {own!r}; this scene's system is {scene.system!r}"
-        raise InputError(scene.file, "study", scene.study, allowed)
-    if hasattr(module, "Options"):
-        read(module.Options, scene.options, scene.file, "options")
-    elif scene.options:
-        place, value = next(iter(scene.options.items()))
-        raise InputError(scene.file, f"options.{place}", value, f"the study {scene.study!r} takes no options")
-    return module
-
-
-NOT_STUDIES = ("__init__", "braking_figures", "command_line", "contact_figures", "figures", "folders",
-               "handling_figures", "hub_forces_figures", "manchester_figure", "recording_figures", "recording_page",
-               "recording_runs", "ride_figures", "ride_nonlinear_figures", "stabiliser_figures", "tyre_figure",
-               "virtual_measurement", "wheelset_figures")  # fmt: skip
+    if blocks is None:
+        raise InputError("--resume", "", str(resume), f"the study {study!r} keeps nothing that can be resumed")
+    return resumed_folder(resume, blocks)
 
 
 @contextmanager

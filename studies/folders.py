@@ -35,8 +35,9 @@ def new_folder(wanted: Path | None, name: str) -> Path:
 
 
 def resumed_folder(wanted: Path, blocks: str) -> Path:
-    """The folder of an earlier run, which must hold finished work in its folder ``blocks``; else InputError."""
-    if not (wanted / blocks).is_dir():
+    """The folder of an earlier run, with finished work in its folder ``blocks`` or nothing yet; else InputError."""
+    begun = wanted.is_dir() and {path.name for path in wanted.iterdir()} <= {COMMAND}
+    if not begun and not (wanted / blocks).is_dir():
         allowed = f"holds no unfinished run: name a folder with {blocks!r} in it, or leave out --resume"
         raise InputError("--resume", "", str(wanted), allowed)
     return wanted

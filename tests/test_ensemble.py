@@ -208,7 +208,7 @@ def test_an_interrupt_while_workers_start_reaches_none_of_them():
 def test_a_full_disk_ends_the_run_at_once_and_keeps_what_is_finished(folder, expected, tmp_path, monkeypatch):
     """What was half written is not there; with room again, the run goes on."""
     monkeypatch.setattr(store.os, "fsync", _full_after(3))  # the note and two blocks
-    with pytest.raises(RunFailed, match="the disk is full.*finished blocks are kept.*make room and resume"):
+    with pytest.raises(RunFailed, match=r"the disk is full.*finished blocks are kept.*make room and resume"):
         run_paths(job(folder), PATHS, tmp_path, block=BLOCK)
     monkeypatch.undo()
     kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}

@@ -18,7 +18,7 @@ from models.noise import normal
 from models.plan import describe, trust_line
 from models.simulate import simulate
 from models.systems import load
-from studies.command_line import SCENES
+from studies.asked import SCENES
 from studies.trust import run as run_study
 from validation.scenes import VEHICLES, force_scene, road_scene, write_forces
 

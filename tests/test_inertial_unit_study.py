@@ -14,7 +14,7 @@ from models.simulate import simulate
 from models.strict import read
 from models.systems import load
 from studies import inertial_unit as study
-from studies.command_line import SCENES
+from studies.asked import SCENES
 
 SHORT = ["run.duration=10.0", "options.samples=100", "options.durations=[1.0, 5.0]", "options.sampling_rate=10"]
 

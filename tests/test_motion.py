@@ -5,7 +5,7 @@ import pytest
 
 from models.errors import InputError
 from models.systems import load
-from studies.command_line import SCENES
+from studies.asked import SCENES
 from studies.motion import run
 
 SHORT = ["run.duration=2.5", "effects.accelerometers.sampling_rate=200.0", "effects.gyro.sampling_rate=200.0",

@@ -12,7 +12,7 @@ from models.errors import InputError
 from models.rail.wheelset import CHOSEN
 from models.systems import load
 from studies import animation
-from studies.command_line import SCENES
+from studies.asked import SCENES
 from studies.pictures import video
 from studies.pictures.camera import Camera, picture
 from studies.pictures.drawing import lines, pose

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from studies.command_line import NOT_STUDIES
+from studies.asked import NOT_STUDIES
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()

@@ -4,7 +4,7 @@ import pytest
 
 from models.errors import InputError
 from models.systems import load
-from studies.command_line import SCENES
+from studies.asked import SCENES
 from studies.six_runs import run
 
 SHORT = ["run.duration=14.0", "options.noise_samples=2", "options.perturbed_models=1"]

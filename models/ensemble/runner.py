@@ -95,41 +95,44 @@ class _Memory:
 
 
 def run_paths(job: Job, paths: int, folder: Path | None = None, executor: Executor | None = None,
-              block: int = BLOCK, progress: Callable[[Progress], None] = lambda state: None) -> Arrays:  # fmt: skip
+              block: int = BLOCK, progress: Callable[[Progress], None] = lambda state: None,
+              lost: Callable[[range, str], Arrays] | None = None) -> Arrays:  # fmt: skip
     """Arrays of all paths 0 to ``paths`` - 1, the same bits on any executor, in any order and after any interruption.
 
     folder : keeps every finished block; one that holds blocks of the same job is resumed, one of another job is
     an InputError that names the difference; None keeps them in memory. executor : a process pool
     (``processes``), a Dask cluster (``cluster``), a thread pool; None computes here. A block that fails does
     not stop the others, and one that loses its worker is computed again: RunFailed then names the blocks and paths
-    that are left, and what is finished is kept. A full disk ends it at once, with RunFailed.
+    that are left, and what is finished is kept. A full disk ends it at once, with RunFailed. lost : (paths, reason)
+    -> what stands for a block that failed, in place of RunFailed; it is not kept, so that resuming tries again.
     """
     facts = {"paths": paths, "paths per block": block, **job.facts()}
     cut = [range(first, min(first + block, paths)) for first in range(0, paths, block)]
     store = _Memory() if folder is None else Store(folder)
     with nullcontext() if isinstance(store, _Memory) else store.claimed(facts):
         failed = _compute(job, cut, store, executor, progress)
-        if failed:
+        if failed and lost is None:
+            told = [f"block {i} (paths {cut[i][0]} to {cut[i][-1]}): {reason}" for i, reason in failed.items()]
             kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
             more = f"; {len(failed) - TOLD} more blocks" if len(failed) > TOLD else ""
-            raise RunFailed("ensemble", "; ".join(failed[:TOLD]) + more + kept)
-        return _together([store.load(i) for i in range(len(cut))])
+            raise RunFailed("ensemble", "; ".join(told[:TOLD]) + more + kept)
+        return _together([lost(cut[i], failed[i]) if lost and i in failed else store.load(i) for i in range(len(cut))])
 
 
 def _compute(job: Job, cut: list[range], store: Store | _Memory, executor: Executor | None,
-             progress: Callable[[Progress], None]) -> list[str]:  # fmt: skip
-    """Compute and save the missing blocks; returns what failed."""
+             progress: Callable[[Progress], None]) -> dict[int, str]:  # fmt: skip
+    """Compute and save the missing blocks; returns the reasons of those that failed."""
     missing = [i for i in range(len(cut)) if not store.has(i)]
     paths = sum(map(len, cut))
     done = before = paths - sum(len(cut[i]) for i in missing)
-    start, failed = time.perf_counter(), []
+    start, failed = time.perf_counter(), dict[int, str]()
     progress(Progress(done, paths, 0.0, math.inf if missing else 0.0))
     with closing(_answers(job, cut, missing, executor)) as answers:  # an interrupt drops at once what waits
         for i, answer in answers:
             if isinstance(answer, _Failure) and answer.full:
                 raise _full(answer.reason, store)
             if isinstance(answer, _Failure):
-                failed.append(f"block {i} (paths {cut[i][0]} to {cut[i][-1]}): {answer.reason}")
+                failed[i] = answer.reason
                 continue
             _keep(store, i, answer)
             done += len(cut[i])

@@ -140,9 +140,12 @@ def _flat(place: str, value: Any) -> list[tuple[str, Any]]:
 
 @cache
 def _code() -> str:
-    """Checksum of every source file of ``models``."""
-    root = Path(__file__).parents[1]
+    return code(Path(__file__).parents[1])
+
+
+def code(root: Path) -> str:
+    """Checksum of every file below a folder that a run can depend on: sources, parameters, tables."""
     digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
+    for path in sorted(path for path in root.rglob("*") if path.suffix in (".py", ".toml", ".csv", ".dat")):
         digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]

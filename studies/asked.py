@@ -1,0 +1,85 @@
+"""What the user asked for on the command line: a scene, its study and the engines that run it."""
+
+import os
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from models.errors import InputError
+
+SCENES = Path(__file__).parent / "scenes"
+
+NOT_STUDIES = ("__init__", "asked", "braking_figures", "command_line", "contact_figures", "figures", "folders",
+               "handling_figures", "hub_forces_figures", "manchester_figure", "recording_figures",
+               "recording_page", "recording_runs", "ride_figures", "ride_nonlinear_figures", "stabiliser_figures",
+               "summary_numbers", "sweep", "sweep_figure", "tyre_figure", "virtual_measurement",
+               "wheelset_figures")  # fmt: skip
+"""Modules beside the studies that are none."""
+
+
+def load_scene(name: str, changes: list[str] | None) -> Any:
+    """A scene that comes with twinrig by its name, or a file; a file's name ends in .toml."""
+    from models.systems import load
+
+    return load(scene_path(name), changes or ())
+
+
+def scene_path(name: str) -> Path:
+    """The file of a scene; InputError if there is none."""
+    names = tuple(sorted(path.stem for path in SCENES.glob("*.toml")))
+    if name in names:
+        return SCENES / f"{name}.toml"
+    if not name.endswith(".toml") and not os.path.lexists(name):
+        raise InputError("", "scene", name, "no such scene, and no such file", names)
+    return Path(name)
+
+
+def ready(scene: Any, engines: tuple[str, ...]) -> Any:
+    """The study's module, once everything that can be refused before a run has been checked."""
+    module = study_of(scene)
+    plan_of(scene).check(scene, engines)
+    if hasattr(module, "check"):
+        module.check(scene, engines)
+    return module
+
+
+def plan_of(scene: Any) -> Any:
+    """The module that describes and checks scenes of this one's system."""
+    from models.systems import SYSTEMS
+
+    return import_module(SYSTEMS[scene.system].plan)
+
+
+def engines_of(name: str | None, system: str) -> tuple[str, ...]:
+    """The engines that were asked for; none for a system that no engine computes."""
+    from models.systems import SYSTEMS
+
+    engines = SYSTEMS[system].engines
+    if name is not None and not engines:
+        raise InputError("--engine", "", name, f"has no meaning for {system}, which no engine computes: leave it out")
+    if name is None or name == "all":
+        return engines
+    if name not in engines:
+        raise InputError("--engine", "", name, "no such engine", (*engines, "all"))
+    return (name,)
+
+
+def study_of(scene: Any) -> Any:
+    """The study's module, once the scene's options are known to be its own."""
+    from models.strict import read
+    from models.systems import DEFAULT
+
+    names = tuple(sorted(path.stem for path in Path(__file__).parent.glob("*.py") if path.stem not in NOT_STUDIES))
+    if scene.study not in names:
+        raise InputError(scene.file, "study", scene.study, "no such study", names)
+    module = import_module(f"studies.{scene.study}")
+    own = getattr(module, "SYSTEM", DEFAULT)
+    if own != scene.system:
+        allowed = f"is a study of system {own!r}; this scene's system is {scene.system!r}"
+        raise InputError(scene.file, "study", scene.study, allowed)
+    if hasattr(module, "Options"):
+        read(module.Options, scene.options, scene.file, "options")
+    elif scene.options:
+        place, value = next(iter(scene.options.items()))
+        raise InputError(scene.file, f"options.{place}", value, f"the study {scene.study!r} takes no options")
+    return module

@@ -1,0 +1,68 @@
+"""The numbers that a study's summary gives, by names that say what they are."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+LONGEST = 8
+"""A list of more entries is a curve: of that, the largest magnitude and the rms are taken."""
+SKIPPED = ("seconds", "folder", "scene", "table", "failed")
+"""What is no answer: how long it took, and text."""
+FRAMES = ("answer", "runs", "rows", "channels")
+"""Keys that only say that what follows is the answer."""
+
+
+def numbers(summary: dict[str, Any]) -> dict[str, float]:
+    """Every scalar of a summary: names joined with ", ", the unit in [ ] at the end where the study gives one.
+
+    Lists of tables are named by the texts with which each table begins, if that tells them apart, or else counted.
+    What is not finite is left out.
+    """
+    return {name: value for name, value in _walk("", "", summary) if math.isfinite(value)}
+
+
+def _walk(name: str, unit: str, value: Any) -> Iterator[tuple[str, float]]:
+    if isinstance(value, dict):
+        unit = f" [{value['unit']}]" if isinstance(value.get("unit"), str) and value["unit"] else unit
+        for key, inner in value.items():
+            if key not in SKIPPED:
+                yield from _walk(name if key in FRAMES else _joined(name, str(key)), unit, inner)
+    elif isinstance(value, list):
+        yield from _list(name, unit, value)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield name + unit, float(value) if isinstance(value, float) else value
+
+
+def _list(name: str, unit: str, values: list[Any]) -> Iterator[tuple[str, float]]:
+    if len(values) > LONGEST and all(isinstance(value, dict) for value in values):
+        columns = {key: [one[key] for one in values if key in one] for key in values[0] if key not in SKIPPED}
+        yield from _walk(name, unit, {key: own for key, own in columns.items() if all(map(_number, own))})
+    elif len(values) > LONGEST:
+        own = [float(value) for value in values if _number(value)]
+        if own:
+            yield f"{_joined(name, 'largest')}{unit}", max(map(abs, own))
+            yield f"{_joined(name, 'rms')}{unit}", math.sqrt(math.fsum(value * value for value in own) / len(own))
+    else:
+        for label, value in zip(_labels(values), values, strict=True):
+            yield from _walk(_joined(name, label), unit, value)
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _labels(values: list[Any]) -> list[str]:
+    """A name for each entry: its leading texts, or its place counted from 1."""
+    told = [", ".join(_leading(value)) if isinstance(value, dict) else "" for value in values]
+    return told if len(set(told)) == len(told) and all(told) else [str(i + 1) for i in range(len(values))]
+
+
+def _leading(value: dict[str, Any]) -> Iterator[str]:
+    for inner in value.values():
+        if not isinstance(inner, str):
+            return
+        yield inner
+
+
+def _joined(name: str, key: str) -> str:
+    return f"{name}, {key}" if name else key

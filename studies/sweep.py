@@ -1,0 +1,224 @@
+"""A scene at many values of one key: every point a run of its own, kept as soon as it is finished.
+
+``twinrig run SCENE --sweep vehicle.override.k3=8e4:1.2e5:9`` leaves a folder ``runs/0003`` per point, as the run of
+that scene alone would, and ``sweep.csv``, ``sweep.json`` and figures of every number that its study gives. A sweep is
+an ensemble whose path i is point i: the records of finished points lie in ``points``, and ``--resume`` goes on there.
+"""
+
+import csv
+import hashlib
+import io
+import json
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.ensemble.runner import Progress as Done
+from models.ensemble.runner import run_paths
+from models.ensemble.store import Arrays, code, locked, write_whole
+from models.ensemble.workers import processes
+from models.errors import InputError, RunFailed
+from models.scene_file import changed
+from studies.asked import engines_of, load_scene, ready, scene_path
+from studies.summary_numbers import numbers
+
+RECORDS, RUNS = "points", "runs"
+"""Folders of the records of finished points, and of what each of them left."""
+MOST = 10_000
+"""Points of a sweep."""
+WORKERS = 2
+"""Processes, if there are so many cores; the results do not depend on it."""
+
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Points:
+    """Job (see ``models.ensemble.runner``): point i is the scene with the i-th value of the key."""
+
+    scene: str
+    changes: tuple[str, ...]
+    key: str
+    values: tuple[Any, ...]
+    engine: str | None
+    folder: Path
+
+    def __call__(self, paths: range) -> Arrays:
+        """``record`` (n,): the record of each point as JSON."""
+        return _array([self.record(i) for i in paths])
+
+    def ready(self, i: int) -> tuple[Any, tuple[str, ...], Any]:
+        """Scene, engines and study of a point; InputError if it cannot be run."""
+        scene = load_scene(self.scene, [*self.changes, f"{self.key}={json.dumps(self.values[i])}"])
+        engine = self.engine or getattr(getattr(scene, "run", None), "engine", None)
+        engines = engines_of(engine, scene.system)
+        return scene, engines, ready(scene, engines)
+
+    def check(self) -> None:
+        """Raise the InputError of the first point if every point is refused: then it is not one value that is wrong."""
+        reasons = []
+        for i in range(len(self.values)):
+            try:
+                self.ready(i)
+                return
+            except InputError as error:
+                reasons.append(error)
+        raise reasons[0]
+
+    def record(self, i: int) -> Record:
+        """Numbers of one point by their names, and what failed, by engine where the study told it."""
+        try:
+            scene, engines, study = self.ready(i)
+            with whole_folder(self.folder / RUNS / f"{i:04d}") as own:
+                summary = study.run(scene, engines, own, lambda text, part: None)
+        except (InputError, RunFailed) as error:
+            return _failed(str(error))
+        return {"numbers": numbers(summary), "failed": summary.get("failed", {})}
+
+    def facts(self) -> dict[str, Any]:
+        """Everything that the points depend on: the scene as written, the files that it names, the code."""
+        path = scene_path(self.scene)
+        table = changed(path, self.changes)
+        return {"sweep": self.key, "values": list(self.values), "engine": self.engine, "scene": table,
+                "files": dict(_files(table, path.parent)), "code of studies": code(Path(__file__).parent)}  # fmt: skip
+
+
+def _array(records: list[Record]) -> Arrays:
+    return {"record": np.array([json.dumps(record) for record in records])}
+
+
+def _failed(reason: str) -> Record:
+    return {"numbers": {}, "failed": {"": reason}}
+
+
+def _files(value: Any, folder: Path) -> Iterator[tuple[str, str]]:
+    """Files that a table names anywhere, beside the scene or where the command runs, with their checksums."""
+    if isinstance(value, dict | list):
+        for inner in value.values() if isinstance(value, dict) else value:
+            yield from _files(inner, folder)
+    elif isinstance(value, str) and value:
+        for path in (folder / value, Path(value)):
+            if os.path.isfile(path):
+                yield value, hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+                return
+
+
+@contextmanager
+def whole_folder(folder: Path) -> Iterator[Path]:
+    """A folder to write into that takes its name when all of it is there, in place of what may lie there."""
+    part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+    part.mkdir(parents=True)
+    try:
+        yield part
+        shutil.rmtree(folder, ignore_errors=True)
+        os.replace(part, folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+_RANGE = re.compile(r"([^:,]+):([^:,]+):([^:,]+)")
+
+
+def asked(text: str) -> tuple[str, tuple[Any, ...]]:
+    """Key and values of KEY=FROM:TO:N, evenly spaced, or of KEY=a,b,c; raises InputError."""
+    key, equals, rest = (part.strip() for part in text.partition("="))
+    if not equals or not key or not rest:
+        raise InputError("--sweep", "", text, "must read KEY=FROM:TO:N or KEY=a,b,c, for example run.step=1e-4,2e-4")
+    found = _RANGE.fullmatch(rest)
+    values = _spaced(text, *found.groups()) if found else _listed(rest)
+    if not 2 <= len(values) <= MOST:
+        raise InputError("--sweep", key, rest, f"gives {len(values)} value(s): 2 to {MOST:,} make a sweep")
+    if len({json.dumps(value) for value in values}) < len(values):
+        raise InputError("--sweep", key, rest, "gives a value twice")
+    return key, values
+
+
+def _spaced(text: str, first: str, last: str, count: str) -> tuple[Any, ...]:
+    """Evenly spaced values; whole numbers where both ends and the spacing are."""
+    try:
+        ends, n = (float(first), float(last)), int(count)
+    except ValueError:
+        raise InputError("--sweep", "", text, "FROM and TO must be numbers and N a whole number of points") from None
+    if not np.isfinite(ends).all() or not 2 <= n <= MOST:
+        raise InputError("--sweep", "", text, f"FROM and TO must be finite, N from 2 to {MOST:,}")
+    values = np.linspace(*ends, n).tolist()
+    whole = all(re.fullmatch(r"\s*[+-]?\d+\s*", end) for end in (first, last)) and all(v == int(v) for v in values)
+    return tuple(int(value) for value in values) if whole else tuple(values)
+
+
+def _listed(rest: str) -> tuple[Any, ...]:
+    """Values as a scene file would hold them, or texts without quotes."""
+    import tomllib
+
+    try:
+        return tuple(tomllib.loads(f"x = [{rest}]")["x"])
+    except ValueError:
+        return tuple(part.strip() for part in rest.split(","))
+
+
+def run(job: Points, progress: Callable[[str, float], None]) -> dict[str, Any]:
+    """All points that are not finished yet, then table and figures."""
+    from studies.sweep_figure import draw
+
+    with locked(job.folder):
+        for part in (job.folder / RUNS).glob(".*.part"):
+            shutil.rmtree(part, ignore_errors=True)  # of a process that was killed while it wrote
+        found = _records(job, progress)
+        quantities = list(dict.fromkeys(name for record in found for name in record["numbers"]))
+        columns = {name: [record["numbers"].get(name) for record in found] for name in quantities}
+        failures = [record["failed"] for record in found]
+        _save(job, columns, failures)
+        pages = draw(job, columns, failures)
+    reasons = {f"{job.key}={value}{f', {who}' if who else ''}": reason
+               for value, failed in zip(job.values, failures, strict=True)
+               for who, reason in failed.items()}  # fmt: skip
+    return {"scene": f"{scene_path(job.scene).stem} over {job.key}, {len(job.values)} points", "failed": reasons,
+            "folder": str(job.folder), "values": list(job.values), "numbers": columns,
+            "table": _table(columns, pages)}  # fmt: skip
+
+
+def _records(job: Points, progress: Callable[[str, float], None]) -> list[Record]:
+    """Records of all points; InputError if none of them has a number although none failed."""
+
+    def tell(done: Done) -> None:
+        progress(f"{done.done} of {done.paths} points", done.done / done.paths)
+
+    def lost(points: range, reason: str) -> Arrays:
+        return _array([_failed(reason) for _ in points])
+
+    with processes(min(WORKERS, os.cpu_count() or 1, len(job.values))) as pool:
+        found = run_paths(job, len(job.values), job.folder / RECORDS, pool, 1, tell, lost)["record"]
+    records = [json.loads(str(one)) for one in found]
+    if not any(record["numbers"] or record["failed"] for record in records):
+        raise InputError("--sweep", job.key, None, f"the study of {job.scene} gives no numbers to draw over it")
+    return records
+
+
+def _save(job: Points, columns: dict[str, list[Any]], failures: list[dict[str, str]]) -> None:
+    """``sweep.csv`` and ``sweep.json``: the same bytes from the same points."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([job.key, *columns, "failed"])
+    for i, value in enumerate(job.values):
+        told = "; ".join(f"{who}: {reason}" if who else reason for who, reason in failures[i].items())
+        writer.writerow([value, *(column[i] for column in columns.values()), told])
+    write_whole(job.folder / "sweep.csv", text.getvalue().encode())
+    content = {"key": job.key, "values": list(job.values), "numbers": columns, "failed": failures}
+    write_whole(job.folder / "sweep.json", json.dumps(content, indent=1).encode())
+
+
+def _table(columns: dict[str, list[Any]], pages: list[str]) -> list[str]:
+    """The first quantities that change, from their least to their largest value."""
+    moving = {name: own for name, column in columns.items()
+              if len(set(own := [v for v in column if v is not None])) > 1}  # fmt: skip
+    lines = [f"    {name:<58} {own[0]:>12.5g} at first {own[-1]:>12.5g} at last {min(own):>12.5g} to {max(own):.5g}"
+             for name, own in list(moving.items())[:12]]  # fmt: skip
+    rest = f", {len(moving) - 12} more of them" if len(moving) > 12 else ""
+    return [*lines, f"  {len(moving)} of {len(columns)} numbers change{rest}: sweep.csv, {', '.join(pages)}"]
