@@ -10,10 +10,16 @@ from importlib import import_module
 from validation.hard_cases.case import Case
 
 FAMILIES = ("stepping", "sampled_input", "contact_points", "prescribed_pitch", "stabilisers", "invariants", "extremes",
-            "accelerometers", "drift", "kalman", "covariance", "contact", "ride", "rolling",
-            "rolling_contacts", "braking", "measured_files")  # fmt: skip
+            "accelerometers", "random_input", "drift", "kalman", "covariance", "contact", "contact_limits", "ride",
+            "rolling", "rolling_contacts", "braking", "brake_loops", "recordings", "measured_files")  # fmt: skip
+
+
+def cases_by_family() -> tuple[tuple[str, Case], ...]:
+    """(family, case) of every case, in the order of the table."""
+    return tuple((family, case) for family in FAMILIES
+                 for case in import_module(f"validation.hard_cases.{family}").CASES)  # fmt: skip
 
 
 def all_cases() -> tuple[Case, ...]:
-    """Every case of every family, in the order of the table."""
-    return tuple(case for family in FAMILIES for case in import_module(f"validation.hard_cases.{family}").CASES)
+    """Every case of every family, in the same order."""
+    return tuple(case for _, case in cases_by_family())

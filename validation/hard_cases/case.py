@@ -3,12 +3,13 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from models.errors import InputError, RunFailed
 from validation.rows import Independence
 
 Word = Literal["right", "refused", "raised", "SILENT"]
+WORDS: tuple[Word, ...] = get_args(Word)
 IMPLEMENTATIONS = ("reference", "exudyn", "mujoco")
 
 

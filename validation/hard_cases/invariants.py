@@ -64,6 +64,20 @@ def nose_up(engine: str, folder: Path) -> float:
     return setups.largest(found - hand) / setups.largest(hand)
 
 
+def push(engine: str, folder: Path) -> float:
+    """Each wheel pushed up by 100 N beside the loads that carry it: the accelerations, whole, against 100 N / mass."""
+    base = setups.vehicle("asymmetric_twin")
+    p, worst = base.parameters, 0.0
+    for wheel, mass in enumerate((p.m1, p.m2)):
+        forces = setups.static_forces(base, 3, 1e-3)
+        forces.values[:, wheel] += 100.0
+        model = build(engine, setups.driven(base, forces), setups.settings(engine, 1e-3, 2e-3))
+        wanted = np.zeros(4)
+        wanted[wheel] = -100.0 / mass
+        worst = max(worst, setups.largest(model.acceleration(0.0, base.initial) - wanted) * mass / 100.0)
+    return worst
+
+
 def raised_front(engine: str, folder: Path) -> float:
     """More force under the front wheel, for 50 ms: the front must rise, the pitch grow."""
     base = setups.vehicle("asymmetric_twin")
@@ -200,6 +214,15 @@ CASES = (
         1e-11,
         "a preload of 4 kN cancels to 10 N",
         nose_up,
+    ),
+    Case(
+        "nothing but what is described",
+        "engines add gravity, inertia from density and contacts on their own",
+        "a push at one wheel: 100 N / its mass, and no other acceleration",
+        "of the acceleration",
+        1e-11,
+        "a preload of 4 kN cancels to nothing",
+        push,
     ),
     Case(
         "more force in front",

@@ -1,5 +1,6 @@
 """The Kalman filter of the pitch: holes in the measurement, a wrong start, a vehicle too stiff for its samples."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ from filterpy.common import van_loan_discretization
 from filterpy.kalman import ExtendedKalmanFilter
 from scipy.linalg import expm
 
+from models.drift.pitch_filter import PITCH, Measurement, estimate
 from models.drift.pitch_step import KEPT, RELATIVE, PitchStep
 from models.engines.stability import first_order, linearised
 from models.noise import PITCH_SENSOR, normal
@@ -70,6 +72,25 @@ def wrong_start(engine: str, folder: Path) -> float:
     return _drawn(engine, folder, slice(0, 0), TURN, start_deviation=TURN)
 
 
+def sure(engine: str, folder: Path) -> float:
+    """Angles known to 1e-9 rad after a start known to 1 rad: pitch error by its deviation, covariance not negative."""
+    count, exact = 400, 1e-9
+    base = setups.vehicle()
+    forces = setups.static_forces(base, count + 1, PERIOD, held=False)
+    own = setups.driven(base, forces)
+    own = replace(own, scene=own.scene.model_copy(update={"run": own.scene.run.model_copy(
+        update={"duration": count * PERIOD})}))  # fmt: skip
+    seen = base.initial[3] + exact * normal(7, 0, count + 1, 1, source=PITCH_SENSOR)
+    found = estimate(own, Measurement(seen, PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0)
+    P = found.errors()
+    scale = np.sqrt(np.diagonal(P, axis1=1, axis2=2).clip(1e-300))
+    values = np.linalg.eigvalsh(P / (scale[:, :, None] * scale[:, None, :]))
+    if not np.isfinite(values).all() or values.min() < -1e-6:
+        return np.inf
+    off = found.states[1:, PITCH] - base.initial[3]
+    return float(np.abs(off / np.sqrt(P[1:, PITCH, PITCH])).max())
+
+
 def nothing(engine: str, folder: Path) -> float:
     """A column without a single number."""
     return _drawn(engine, folder, slice(None))
@@ -112,6 +133,9 @@ CASES = (
     Case("filter from a wrong start", "vehicle and filter begin 0.2 rad from where the true one is",
          "the true pitch after 1 s, by the deviation that the filter states", "deviations", 5.0,
          "Gaussian: 5 deviations are left once in 1.7 million", wrong_start),
+    Case("filter told of angles to a billionth", "R = 1e-18 beside P = 1: subtracted covariances lose all digits",
+         "the true pitch by the stated deviation, eigenvalues of the scaled covariance above -1e-6", "deviations", 5.0,
+         "Gaussian: 5 deviations are left once in 1.7 million", sure, once=True),
     Case("pitch measurement without a number", "a column of NaN", "refused", "", 0.0, "there is nothing to follow",
          nothing, dict.fromkeys(("reference", "exudyn", "mujoco"), "refused")),
     Case("process noise of a stiff vehicle", "forces at 10 Hz, a pole of -697 1/s",

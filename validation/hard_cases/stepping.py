@@ -165,6 +165,20 @@ def stamps_naive(folder: Path) -> str:
 REFUSED: dict[str, Word] = {"reference": "refused", "exudyn": "refused", "mujoco": "refused"}
 RAISED: dict[str, Word] = {"reference": "raised", "exudyn": "raised", "mujoco": "raised"}
 
+ORDERS = {"reference": 4.0, "exudyn": 2.0, "mujoco": 4.0}
+
+
+def keeps_order(engine: str, folder: Path) -> float:
+    """By how much the observed order falls short while the step is halved four times, from 2 ms on."""
+    base = setups.vehicle("asymmetric_twin", "linear")
+    base = replace(base, initial=base.initial - np.array([0, 0, 0.01, 0.02, 0, 0, 0, 0]))
+    truth, errors = setups.exact(base, 0.1, 2)[-1], []
+    for step in (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4):
+        end = setups.run(engine, base, step, 0.2, setups.CONSTRAINED[engine]).states[-1]
+        errors.append(setups.largest(end - truth))
+    return float(ORDERS[engine] - np.log2(np.array(errors[:-1]) / errors[1:]).min())
+
+
 CASES = (
     Case(
         "stiff damper, step just inside the limit",
@@ -249,5 +263,14 @@ CASES = (
         stamps,
         {"mujoco": "refused"},
         stamps_naive,
+    ),
+    Case(
+        "order down to fine steps",
+        "a Newton tolerance looser than a step's error stops convergence, and more work buys nothing",
+        "matrix exponential: the order of the method from 2 to 0.125 ms",
+        "by which the order falls short",
+        0.25,
+        "the first halvings still see the next order",
+        keeps_order,
     ),
 )

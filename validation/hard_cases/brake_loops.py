@@ -1,0 +1,51 @@
+"""A brake's loop of pressure and torque, at steps that hit none of its corners."""
+
+from pathlib import Path
+
+import numpy as np
+
+from models.braking.brake import Brake, of_wheels, torque
+from validation.hard_cases.case import Case
+
+OWN = of_wheels(Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
+
+
+def _followed(pressures: np.ndarray) -> np.ndarray:
+    """Torques (n,) in N m along pressures (n,) in bar, from a free brake."""
+    level, found = 0.0, []
+    for pressure in pressures:
+        level = torque(0, pressure, level, OWN)
+        found.append(level)
+    return np.array(found)
+
+
+def ways(implementation: str, folder: Path) -> float:
+    """A way of random turns walked in 1, 7 and 50 parts between its turns: largest difference at the turns, N m."""
+    turns = np.concatenate(([0.0], np.random.default_rng(2).uniform(0.0, 6.0, 60)))
+    found = []
+    for parts in (1, 7, 50):
+        between = np.linspace(turns[:-1], turns[1:], parts, endpoint=False, axis=1).ravel()
+        found.append(_followed(np.append(between, turns[-1]))[::parts])
+    return float(max(np.abs(one - found[0]).max() for one in found))
+
+
+def loops(implementation: str, folder: Path) -> float:
+    """Loops between random pressures: the most negative area or torque, N m bar; 1000 steps each way."""
+    worst = 0.0
+    for low, high in np.sort(np.random.default_rng(3).uniform(0.0, 6.0, (20, 2)), axis=1):
+        once = np.concatenate((np.linspace(low, high, 1001), np.linspace(high, low, 1001)))
+        pressures = np.concatenate((once, once))
+        found = _followed(pressures)
+        area = -float(np.trapezoid(found[once.size :], once))
+        worst = max(worst, -area, -float(found.min()))
+    return worst
+
+
+CASES = (
+    Case("loop of a brake in odd steps", "corners of the loop lie within steps",
+         "the same torque at every turn of the pressure in 1, 7 or 50 steps", "N m", 1e-9, "rounding of kN m", ways,
+         once=True),
+    Case("small loops of a brake", "hysteresis passed in the wrong sense gives energy",
+         "no loop between random pressures has a negative area or torque", "N m bar", 1e-9, "rounding of kN m bar",
+         loops, once=True),
+)  # fmt: skip

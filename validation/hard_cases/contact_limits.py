@@ -1,0 +1,120 @@
+"""Contact at its limits: few cells, mirrors, nothing but spin, patches that separate, merge or reach the grid's edge.
+
+No engine takes part: forces are plain functions of the creepages, so each case has one answer for all.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from models.contact import hertz
+from models.contact.fastsim import March, fastsim
+from models.contact.linear_theory import forces
+from models.contact.material import Pair
+from models.contact.normal_problem import NormalSolution, centres, solve_normal
+from validation.hard_cases.case import IMPLEMENTATIONS, Case
+
+PAIR = Pair()
+A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
+SMALL = 1e-7
+CELL, RADIUS, SPHERE = 1.5e-4, 0.3, 1e4
+"""m, m, N: two balls of that radius, each pressed by that load, on a grid of such cells."""
+
+
+def _linear_error(cells: int, march: March) -> float:
+    found = fastsim(A, B, LOAD, MU, SMALL, 0.0, 0.0, PAIR, cells=cells, march=march)
+    return abs(float(found.fx / forces(A, B, SMALL, 0.0, 0.0, PAIR)[0]) - 1.0)
+
+
+def few_cells(implementation: str, folder: Path) -> float:
+    """Error of the force of a small creepage by 8, 16 and 32 cells, by 1.6 (8 / cells)^1.9 per cent."""
+    return max(_linear_error(n, "second-order") / (0.017 * (8.0 / n) ** 1.9) for n in (8, 16, 32))
+
+
+def few_cells_naive(folder: Path) -> str:
+    """A whole first step at the leading edge."""
+    return f"a whole first step makes the force {100 * _linear_error(8, 'plain'):.1f} % too large by 8 cells"
+
+
+def _drawn(count: int = 400) -> np.ndarray:
+    """Creepages and spin (3, count) from sticking to sliding."""
+    own = np.random.default_rng(8)
+    return own.uniform(-1.0, 1.0, (3, count)) * 10.0 ** own.uniform(-5.0, -1.0, count) * [[1.0], [1.0], [100.0]]
+
+
+def reversed_signs(implementation: str, folder: Path) -> float:
+    """All creepages turned round: forces that do not turn round exactly, by mu N."""
+    along, across, spin = _drawn()
+    one, two = (fastsim(A, B, LOAD, MU, s * along, s * across, s * spin, PAIR) for s in (1.0, -1.0))
+    return float(max(np.abs(one.fx + two.fx).max(), np.abs(one.fy + two.fy).max()) / (MU * LOAD))
+
+
+def mirrored(implementation: str, folder: Path) -> float:
+    """Left and right exchanged: lateral creepage, spin and lateral force change their sign; by mu N."""
+    along, across, spin = _drawn()
+    one, two = (fastsim(A, B, LOAD, MU, along, s * across, s * spin, PAIR) for s in (1.0, -1.0))
+    return float(max(np.abs(one.fx - two.fx).max(), np.abs(one.fy + two.fy).max()) / (MU * LOAD))
+
+
+def power(implementation: str, folder: Path) -> float:
+    """Most power gained per metre, by mu N times the creepage, 21 cells."""
+    along, across, spin = _drawn()
+    size = MU * LOAD * (np.hypot(along, across) + A * np.abs(spin))
+    return float(max(np.max(-fastsim(A, B, LOAD, MU, along, across, spin, PAIR).dissipation / size), 0.0))
+
+
+def only_spin(implementation: str, folder: Path) -> float:
+    """Nothing but spin: force along the rail, and of small spin across it against the linear theory."""
+    small = fastsim(A, B, LOAD, MU, 0.0, 0.0, 1e-6, PAIR)
+    large = fastsim(A, B, LOAD, MU, 0.0, 0.0, [0.1, 1.0, 10.0, 1e3], PAIR)
+    wanted = float(forces(A, B, 0.0, 0.0, 1e-6, PAIR)[1])
+    return max(abs(float(small.fy) / wanted - 1.0), float(np.abs(large.fx).max()) / (MU * LOAD))
+
+
+def _balls(apart: float, load: float, cells: tuple[int, int] = (41, 101)) -> NormalSolution:
+    """Two balls side by side, their centres so far apart (m)."""
+    y, x = (centres(n, CELL) for n in cells)
+    away = np.minimum((x - apart / 2) ** 2, (x + apart / 2) ** 2) + y[:, None] ** 2
+    return solve_normal(away / (2.0 * RADIUS), CELL, CELL, PAIR, load=load)
+
+
+def two_patches(implementation: str, folder: Path) -> float:
+    """Two patches: halves that differ, or an area off that of a ball alone by more than the cells along its edge."""
+    own = _balls(9e-3, 2.0 * SPHERE)
+    left = float(own.pressure[:, : own.x.size // 2].sum() * CELL**2)
+    alone = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, SPHERE, PAIR)
+    edge = CELL * 2.0 * np.pi * float(alone.a)
+    return max(abs(left / SPHERE - 1.0), abs(own.area / 2.0 - np.pi * float(alone.a) ** 2) / edge - 1.0, 0.0)
+
+
+def merging(implementation: str, folder: Path) -> float:
+    """Balls that come nearer in steps of a fifth of a cell: largest jump of the approach, by itself."""
+    found = [_balls(apart, 2.0 * SPHERE, (41, 81)).approach for apart in np.linspace(4.0e-3, 3.4e-3, 21)]
+    return float(np.abs(np.diff(found, 2)).max() / found[0])
+
+
+def at_the_edge(implementation: str, folder: Path) -> float:
+    """A patch that the grid cuts off."""
+    return _balls(9e-3, 2.0 * SPHERE, (41, 61)).load
+
+
+CASES = (
+    Case("leading edge by few cells", "a whole first step is of first order in the cells",
+         "linear theory: 1.7 % by 8 cells, of order 1.9 in them", "of the error allowed", 1.0,
+         "second order; measured 1.67 % by 8 cells", few_cells, naive=few_cells_naive, once=True),
+    Case("all creepages turned round", "branches of sticking and slipping", "the force turned round, bit by bit",
+         "mu N", 0.0, "every operation is odd", reversed_signs, once=True),
+    Case("contact in a mirror", "strips are marched from one side to the other", "mirrored forces", "mu N", 1e-12,
+         "sums in another order", mirrored, once=True),
+    Case("power of a contact", "tractions lag behind the slip", "never gained, 400 creepages", "of mu N creepage", 1e-5,
+         "what 21 cells leave", power, once=True),
+    Case("nothing but spin", "the pole of slip lies inside the patch", "no force along; linear theory across",
+         "relative", 4e-3, "error of 21 cells", only_spin, once=True),
+    Case("two patches under one load", "the load is shared, each patch is lost or doubled easily",
+         "halves alike, area of a ball alone", "relative, beyond a row of cells", 0.01,
+         "one ball deforms the other's ground by 1 %", two_patches, once=True),
+    Case("patches that merge", "the area jumps", "second difference of the approach", "of the approach", 1e-3,
+         "a twentieth of what merging changes", merging, against="none", once=True),
+    Case("patch cut off by the grid", "the load fits on what is left", "refused",
+         "N", 0.0, "a part of a contact is none", at_the_edge, dict.fromkeys(IMPLEMENTATIONS, "refused"), once=True),
+)  # fmt: skip

@@ -1,0 +1,187 @@
+"""Random input: noise that belongs to its samples and streams, filters at any step, laws at their limits.
+
+No engine takes part except where a model is asked: noise is drawn before a run and is the same for all.
+"""
+
+from dataclasses import replace
+from decimal import Decimal, localcontext
+from itertools import combinations, pairwise
+from pathlib import Path
+
+import numpy as np
+
+from models.drift.growth import SERIES, pitch_variance
+from models.engines.protocol import build
+from models.noise import BLOCK, FORCES, GYRO, ROAD, normal
+from models.ride.covariance import stationary
+from models.ride.excitation import Excitation, excited
+from models.ride.of_scene import linear_vehicle
+from models.ride.road_path import RoadPath, road_path
+from models.road.two_track import excitation, on_track, road_of_level
+from models.sensors.inertial_unit import (
+    error_rotation,
+    euler_mean_square,
+    euler_quaternions,
+    mean_trace,
+    measured_attitude,
+    random_walk,
+)
+from models.sensors.rotations import matrix
+from models.vehicles.vehicle_file import load_vehicle
+from validation.hard_cases import setups
+from validation.hard_cases.case import Case
+
+BEYOND = 3.29
+"""Standard errors that a normal value exceeds once in a thousand."""
+CORNER, Q, SPEED = 0.3, 1e-4, 31.0
+WALK, PATHS, SAMPLES, RATE = 0.5, 600, 100, 50.0
+"""Angle random walk (rad/sqrt(s)), paths, samples of each and their rate (Hz): E[tr E] falls from 3 to 1.8."""
+
+
+def asked_again(engine: str, folder: Path) -> float:
+    """Largest difference of accelerations asked forwards, backwards and twice, noise of 800 N on the samples."""
+    base = setups.vehicle("asymmetric_twin")
+    forces = setups.static_forces(base, 200, 1e-3, noise=800.0)
+    model = build(engine, setups.driven(base, forces), setups.settings(engine, 1e-3, 0.1))
+    states = base.initial + 1e-3 * np.random.default_rng(3).standard_normal((40, 8))
+    asked = [(2e-3 * i, state) for i, state in enumerate(states)]
+    once = [model.acceleration(*own).copy() for own in asked]
+    again = [model.acceleration(*own).copy() for own in reversed(asked)][::-1]
+    return setups.largest(np.array(once) - again)
+
+
+def streams(implementation: str, folder: Path) -> float:
+    """Largest correlation of any two streams, in standard errors of none, by what so many pairs allow."""
+    own = [normal(seed, path, BLOCK, 1, source=source)[:, 0]
+           for seed in (0, 1) for path in (0, 1) for source in (FORCES, GYRO, ROAD)]  # fmt: skip
+    own += [normal(0, 0, BLOCK, 1, first=BLOCK)[:, 0], *normal(5, 0, BLOCK, 2).T]
+    worst = max(abs(float(one @ two)) / BLOCK**0.5 for one, two in combinations(own, 2))
+    return worst / 4.75  # one pair of 105 beyond 4.75 errors once in 5000
+
+
+def pieces(implementation: str, folder: Path) -> float:
+    """A stream in pieces of odd lengths, last ones first, against the whole."""
+    whole, edges = normal(9, 4, 3 * BLOCK, 3), [0, 1, BLOCK - 1, BLOCK, BLOCK + 7, 2 * BLOCK + 1, 3 * BLOCK]
+    parts = [normal(9, 4, end - start, 3, first=start)
+             for start, end in reversed(list(pairwise(edges)))]  # fmt: skip
+    return float(np.abs(np.concatenate(parts[::-1]) - whole).max())
+
+
+def _one_state() -> Excitation:
+    return Excitation(np.array([[-CORNER]]), np.array([[Q**0.5]]), (np.ones((1, 1)),), (0.0,))
+
+
+def any_step(implementation: str, folder: Path) -> float:
+    """Variance of the road at half steps of 1e-3 to 30 corner lengths against q / (2 corner), in standard errors."""
+    worst = 0.0
+    for part in (1e-3, 0.1, 0.9, 2.5, 30.0):
+        keeps = np.exp(-2.0 * part)  # squared correlation of neighbours: n samples count as n (1 - keeps) / (1 + keeps)
+        road = RoadPath(_one_state(), SPEED, part / (CORNER * SPEED)).table(20_000, seed=12)[:, 0]
+        error = (2.0 / len(road) * (1.0 + keeps) / (1.0 - keeps)) ** 0.5
+        worst = max(worst, abs(float(np.mean(road**2)) / (Q / (2.0 * CORNER)) - 1.0) / error)
+    return worst
+
+
+def any_step_naive(folder: Path) -> str:
+    """Explicit Euler's variance, 1 / (1 - part / 2) of the true one."""
+    return f"explicit Euler at 0.9 corner lengths has {1.0 / (1.0 - 0.45):.2f} times the variance, at 2.5 none at all"
+
+
+def odd_delay(implementation: str, folder: Path) -> float:
+    """Distance of the axles in whole half steps against the wheelbase, relative; infinite if the heights differ."""
+    worst = 0.0
+    for length, speed, longest in ((2.7, 31.0, 0.02), (3.1415926, 17.3, 0.0055), (1.234567, 0.37, 0.001)):
+        heights = (np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]]))
+        own = road_path(replace(_one_state(), heights=heights, lengths=(0.0, length)), speed, longest)
+        steps = int(2.0 * length / (speed * own.step)) + 50
+        front, rear = own.table(steps, seed=3)[:, :2].T
+        lag = next((i for i in range(1, len(front)) if np.array_equal(rear[i : i + 20], front[:20])), 0)
+        worst = max(worst, abs(lag * own.half * speed / length - 1.0) if lag else np.inf)
+    return worst
+
+
+def odd_delay_naive(folder: Path) -> str:
+    """Correlation of the axles with the delay rounded to whole steps of 20 ms."""
+    length, speed, step = 2.7, SPEED, 0.02
+    lag = round(length / (speed * step)) * speed * step
+    return f"rounded to steps of 20 ms the axles stand {lag:.2f} m apart in place of {length} m"
+
+
+def attitude(implementation: str, folder: Path) -> float:
+    """Mean trace of the error of a noisy gyro on a turning body against 3 exp(-s^2 t), in standard errors."""
+    rates = np.tile([0.0, 0.0, 2.0], (SAMPLES, 1))
+    start, deviation = np.array([1.0, 0.0, 0.0, 0.0]), np.full(3, WALK * RATE**0.5)
+    found = measured_attitude(rates, 1.0 / RATE, deviation, start, range(PATHS), seed=5)[-1]
+    true = measured_attitude(rates, 1.0 / RATE, np.zeros(3), start, range(1))[-1]
+    traces = np.trace(matrix(error_rotation(found, true)), axis1=-2, axis2=-1)
+    wanted = mean_trace(random_walk(deviation[0], RATE), SAMPLES / RATE)
+    return abs(float(traces.mean()) - wanted) / (float(traces.std()) / PATHS**0.5)
+
+
+def attitude_naive(folder: Path) -> str:
+    """Length of a quaternion that explicit Euler makes."""
+    turns = WALK / RATE**0.5 * np.stack([normal(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
+    q = euler_quaternions(turns, np.array([1.0, 0.0, 0.0, 0.0]))
+    return (f"explicit Euler's quaternion has a mean square of {float((q**2).sum(axis=-1).mean()):.3f} "
+            f"({euler_mean_square(WALK, 3, 1.0 / RATE, SAMPLES):.3f} by its law): its matrix is no rotation")
+
+
+def no_growth(implementation: str, folder: Path) -> float:
+    """Variance of the pitch for 2 lambda t of 1e-12 to 600, either side of its series, against 60 digits, relative."""
+    worst = 0.0
+    for x in (1e-12, 1e-6, 1e-3, 0.0999, SERIES, np.nextafter(SERIES, 1.0), 0.1001, 0.5, 1.0, 10.0, 600.0):
+        found = float(pitch_variance(2.0, x / 4.0, 0.7))
+        worst = max(worst, abs(found / _law(Decimal(x)) - 1.0))
+    return max(worst, abs(float(pitch_variance(2.0, 0.0, 0.7)) / (0.7 * 8.0 / 3.0) - 1.0))
+
+
+def _law(x: Decimal) -> float:
+    with localcontext() as context:
+        context.prec = 60
+        sinh = (x.exp() - (-x).exp()) / 2
+        return float(Decimal("0.7") * 8 / 3 * 6 * (sinh - x) / x**3)
+
+
+def no_growth_naive(folder: Path) -> str:
+    """The law as it is printed."""
+    x = 1e-8
+    return f"the closed law as printed is {6.0 * (np.sinh(x) - x) / x**3:.2f} times the truth at 2 lambda t = 1e-8"
+
+
+def indefinite(implementation: str, folder: Path) -> float:
+    """Most negative eigenvalue of the half car's covariance by the largest, from 2 to 60 m/s; states have own units."""
+    vehicle = linear_vehicle(load_vehicle("half_car"), implementation)
+    worst = 0.0
+    for speed in (2.0, 7.0, 20.0, 60.0):
+        own = vehicle(speed)
+        P = stationary(excited(own, excitation(road_of_level(1.0), on_track(own.wheels, 1.0)), speed)).P
+        scale = np.sqrt(np.diag(P))
+        values = np.linalg.eigvalsh(P / np.outer(scale, scale))
+        worst = max(worst, -values[0] / values[-1])
+    return worst
+
+
+CASES = (
+    Case("accelerations asked again", "noise drawn inside a callback changes from one stage to the next",
+         "the same time and state, the same bits", "m/s^2", 0.0, "a function has no memory", asked_again),
+    Case("streams of noise", "one seed for forces, gyro and road, two for two runs, one path for front and rear",
+         "no correlation of any two of 15", "of 4.75 standard errors", 1.0, "once in 5000 by chance, fixed seeds",
+         streams, against="none", once=True),
+    Case("stream in pieces", "blocks may be asked for in any order by any worker", "the whole, bit by bit", "", 0.0,
+         "the same numbers", pieces, against="none", once=True),
+    Case("shape filter at any step", "explicit Euler has 1 / (1 - a h / 2) of the variance",
+         "q / (2 corner) at half steps of 0.001 to 30 corner lengths", "standard errors", BEYOND + 0.6,
+         "once in a thousand by chance in five lengths, fixed seed", any_step, naive=any_step_naive, once=True),
+    Case("delay between steps", "the wheelbase is no whole number of steps",
+         "the rear axle meets the front one's heights, its wheelbase later", "of the wheelbase", 1e-3,
+         "the tolerance of the cells of the path", odd_delay, naive=odd_delay_naive, once=True),
+    Case("white noise on a gyro", "Ito and Stratonovich differ, and a quaternion grows",
+         "E[tr E] = 3 exp(-s^2 t) on a turning body", "standard errors", BEYOND, "once in a thousand, fixed seed",
+         attitude, naive=attitude_naive, once=True),
+    Case("growth law at no growth", "sinh x - x loses all digits where the exponent 3/2 begins",
+         "60 digits, for 2 lambda t from 0 to 600", "relative", 1e-12, "rounding of sinh x - x at x = 0.1 is 6e-14",
+         no_growth, naive=no_growth_naive, once=True),
+    Case("delayed axle in Lyapunov's equation", "its right side is indefinite: roots of it do not exist",
+         "the covariance is positive semidefinite at 2 to 60 m/s", "of the largest eigenvalue", 1e-12,
+         "rounding; scaled by the states' own deviations", indefinite, against="none"),
+)  # fmt: skip

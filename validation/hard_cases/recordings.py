@@ -1,0 +1,67 @@
+"""Recordings that are plausible and wrong: units, signs, sides, clocks, gaps, clipped and dead channels.
+
+A virtual measurement of 5 s on a rough road is spoilt; the check must name the fault at its place. The error is the
+size found against the size planted, relative; infinite where nothing is named, or another channel is.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.measured.faults_of_measurement import Faults
+from models.measured.finding import Finding
+from validation.cases import measured_checks as bench
+from validation.hard_cases.case import Case
+
+ROAD: bench.Ride = ("C", 1, 20.0, 5.0)
+SIZE = 0.2
+
+
+def _found(folder: Path, change: bench.Samples | None = None, **faults: Any) -> tuple[Finding, ...]:
+    """Errors and doubts in the recording, spoilt."""
+    own = bench.measurement(road=ROAD)
+    samples = own.samples(Faults(**{"noise": bench.NOISE} | faults), bench.SEED)
+    return bench.findings(own, change(own, samples) if change else samples, folder)
+
+
+def spoilt(check: str, place: str, size: float | None, change: bench.Samples | None = None,
+           **faults: Any) -> Callable[[str, Path], float]:  # fmt: skip
+    """A case of one fault: ``check`` must speak first, and of no other place than ``place``."""
+
+    def error(implementation: str, folder: Path) -> float:
+        found = _found(folder, change, **faults)
+        if not found or found[0].check != check or not all(place in one.place for one in found):
+            return np.inf
+        return 0.0 if size is None else abs((found[0].size or 0.0) / size - 1.0)
+
+    return error
+
+
+def clean(implementation: str, folder: Path) -> float:
+    """Errors and doubts in the recording as it is."""
+    return float(len(_found(folder)))
+
+
+CASES = (
+    Case("clean recording", "a check that always cries is no check", "no error, no doubt", "findings", 0.0,
+         "noise as stated, nothing planted", clean, once=True),
+    *(Case(name, hard, check, "of its size", SIZE, "what was planted, 20 %", error, once=True)
+      for name, hard, check, error in (
+          ("wheel force in kN read as N", "a vehicle that flies off, or a plausible bias", "unit named at its channel",
+           spoilt("unit", "fl_fz", 1e-3, bench._times(1e-3, "fl_fz"))),
+          ("wheel force with the other sign", "its mean is that of another load", "sign named at its channel",
+           spoilt("sign", "rr_fz", -1.0, bench._times(-1.0, "rr_fz"))),
+          ("clipped wheel force", "the worst loads are missing, the mean hardly changes", "clipping, 3 % of samples",
+           spoilt("clipped", "fl_fz", 3.0, bench._clipped("fl_fz", 0.03))),
+          ("dead channel", "a constant is a valid number", "named as dead",
+           spoilt("clipped", "fr_fz", None, bench._times(0.0, "fr_fz", add=3e3))),
+          ("front wheels exchanged", "loads are alike left and right", "the sides named",
+           spoilt("swapped", "fl with fr", None, bench._exchanged(("fl", "fr")))),
+          ("one channel 3 ms late", "a phantom moment of pitch", "the delay and its channel",
+           spoilt("shift", "fl_fz", 3e-3, delay={"fl_fz": 3e-3})),
+          ("gap of half a second", "interpolated it is a road without roughness", "length and place",
+           spoilt("gaps", "rr_fz", 0.5, bench._lost("rr_fz", 3.0, 0.5))),
+      )),
+)  # fmt: skip
