@@ -9,8 +9,8 @@ from models.errors import InputError
 
 SCENES = Path(__file__).parent / "scenes"
 
-NOT_STUDIES = ("__init__", "asked", "braking_figures", "command_line", "contact_figures", "figures", "folders",
-               "handling_figures", "hub_forces_figures", "manchester_figure", "recording_figures",
+NOT_STUDIES = ("__init__", "asked", "braking_figures", "command_line", "comparison", "contact_figures", "figures",
+               "folders", "handling_figures", "hub_forces_figures", "manchester_figure", "recording_figures",
                "recording_page", "recording_runs", "ride_figures", "ride_nonlinear_figures", "stabiliser_figures",
                "summary_numbers", "sweep", "sweep_figure", "tyre_figure", "virtual_measurement",
                "wheelset_figures")  # fmt: skip

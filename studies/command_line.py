@@ -152,6 +152,22 @@ def price(
 
 
 @app.command()
+def compare(
+    one: Annotated[Path, typer.Argument(help="A folder of results, or one file of it.")],
+    two: Annotated[Path, typer.Argument(help="Another one of the same study.")],
+    out: Out = None,
+    as_json: AsJson = False,
+) -> None:
+    """Compare two results quantity by quantity: largest and rms difference, and where."""
+    from studies.comparison import compare as differences
+    from studies.comparison import report
+
+    differences(one, two)  # before a folder is made
+    folder = _folder("compare", None, "", out, None)
+    _finish(lambda progress: report(one, two, folder), folder, as_json)
+
+
+@app.command()
 def validate(
     quick: Annotated[bool, typer.Option("--quick", help="The named short subset, in about a minute.")] = False,
     out: Out = None,

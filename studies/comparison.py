@@ -1,0 +1,248 @@
+"""Two results of one study beside each other: every quantity's largest and rms difference, and where it is largest."""
+
+import csv
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.errors import InputError
+from models.result import load
+
+SUFFIXES = (".nc", ".csv")
+SHOWN = 20
+"""Quantities that are printed, those that differ most; ``compare.csv`` has them all."""
+KINDS = ("system", "mode")
+"""Attributes of a result that must be the same."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """values (n,) over ``grid`` (n,), which is a time or the first column of a table, or counts rows.
+
+    kind : system and mode of the run, where the file says them.
+    """
+
+    unit: str
+    values: np.ndarray
+    over: str
+    grid: np.ndarray
+    kind: str = ""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """``two`` less ``one`` over ``grid`` (n,); ``note`` says how they came onto the same rows."""
+
+    name: str
+    unit: str
+    over: str
+    grid: np.ndarray
+    one: np.ndarray
+    two: np.ndarray
+    note: str = ""
+
+    @property
+    def gap(self) -> np.ndarray:
+        """(n,) nan in both is no difference; infinite where only one of them is a number, or the infinities differ."""
+        with np.errstate(invalid="ignore"):
+            gap = self.two - self.one
+        same = (self.one == self.two) | (np.isnan(self.one) & np.isnan(self.two))
+        return np.where(same, 0.0, np.where(np.isnan(gap), np.inf, gap))
+
+    @property
+    def largest(self) -> float:
+        """Largest magnitude of the difference."""
+        return float(np.abs(self.gap).max())
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square of the difference."""
+        return float(np.sqrt(np.mean(self.gap**2)))
+
+    @property
+    def at(self) -> float:
+        """Where on the grid the difference is largest."""
+        return float(self.grid[np.abs(self.gap).argmax()])
+
+    @property
+    def share(self) -> float:
+        """Largest difference by the largest magnitude of the first."""
+        size = np.abs(self.one[np.isfinite(self.one)]).max(initial=0.0)
+        return 0.0 if self.largest == 0.0 else self.largest / size if size > 0 else np.inf
+
+
+def compare(one: Path, two: Path) -> tuple[list[Difference], list[str]]:
+    """Differences of all quantities that both hold, largest share first, and notes on what only one holds.
+
+    Raises InputError for what is no result, and for two results that have nothing to compare.
+    """
+    found, notes = list[Difference](), list[str]()
+    pairs = _pairs(one, two, notes)
+    for name, first, second in pairs:
+        a, b = _read(first), _read(second)
+        prefix = f"{name}: " if len(pairs) > 1 else ""
+        notes += [f"{prefix}only in {path}: {', '.join(own)}" for path, own in
+                  ((first, [key for key in a if key not in b]), (second, [key for key in b if key not in a]))
+                  if own]  # fmt: skip
+        found += [_difference(prefix + key, a[key], b[key], second) for key in a if key in b]
+    if not found:
+        raise InputError(two, "", None, f"has no quantity in common with {one}: compare two results of one study")
+    return sorted(found, key=lambda each: -each.share), notes
+
+
+def _pairs(one: Path, two: Path, notes: list[str]) -> list[tuple[str, Path, Path]]:
+    """Files to compare: the two themselves, or those of the same name in both folders."""
+    for path in (one, two):
+        if not path.exists():
+            raise InputError(path, "", None, "no such file or folder")
+        if path.is_file() and path.suffix not in SUFFIXES:
+            raise InputError(path, "", None, "is no result: name a folder, a netCDF file (.nc) or a table (.csv)")
+    if one.is_file() != two.is_file():
+        raise InputError(two, "", None, f"is a {_kind(two)} and {one} a {_kind(one)}: name two of a kind")
+    if one.is_file():
+        return [("", one, two)]
+    first, second = _files(one), _files(two)
+    common = [name for name in first if name in second]
+    if not common and len(first) == len(second) == 1:
+        return [("", *first.values(), *second.values())]
+    if not common:
+        raise InputError(two, "", None, f"has no results of the same names as {one}: compare two results of one study")
+    notes += [f"only in {path}: {', '.join(own)}" for path, own in
+              ((one, [name for name in first if name not in second]),
+               (two, [name for name in second if name not in first])) if own]  # fmt: skip
+    return [(name, first[name], second[name]) for name in common]
+
+
+def _kind(path: Path) -> str:
+    return "file" if path.is_file() else "folder"
+
+
+def _files(folder: Path) -> dict[str, Path]:
+    """Results of a folder by their names within it; netCDF files alone where there are any."""
+    found = {path.relative_to(folder).as_posix(): path for path in sorted(folder.rglob("*"))
+             if path.suffix in SUFFIXES and not any(part.startswith(".") for part in path.parts[len(folder.parts) :])}
+    netcdf = {name: path for name, path in found.items() if path.suffix == ".nc"}
+    return netcdf or found
+
+
+def _read(path: Path) -> dict[str, Quantity]:
+    return dict(_netcdf(path) if path.suffix == ".nc" else _table(path))
+
+
+def _netcdf(path: Path) -> Iterator[tuple[str, Quantity]]:
+    data = load(path).data
+    kinds = ", ".join(str(data.attrs[kind]) for kind in KINDS if kind in data.attrs)
+    for name, channel in data.data_vars.items():
+        if channel.dtype.kind not in "fiu" or channel.size == 0:
+            continue
+        values = channel.values.astype(float)
+        unit, time = str(channel.attrs.get("units", "")), channel.dims == ("time",)
+        grid = channel["time"].values.astype(float) if time else np.arange(values.size, dtype=float)
+        yield str(name), Quantity(unit, values.ravel(), "time [s]" if time else "entry", grid, kinds)
+
+
+def _table(path: Path) -> Iterator[tuple[str, Quantity]]:
+    """Columns of numbers of a CSV file; an empty cell is not a number."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            heads, *rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
+        columns = dict(zip((head.strip() for head in heads), zip(*rows, strict=True), strict=True))
+    except (OSError, ValueError, csv.Error) as error:
+        raise InputError(path, "", None, f"is not a table of results: {error}") from None
+    numeric = {head: own for head, cells in columns.items() if (own := _numbers(cells)) is not None}
+    over = next(iter(columns))
+    grid = numeric.pop(over, np.arange(len(rows), dtype=float))
+    for head, values in numeric.items():
+        name, _, unit = head.partition(" [")
+        yield name, Quantity(unit.rstrip("]"), values, over, grid)
+
+
+def _numbers(cells: tuple[str, ...]) -> np.ndarray | None:
+    try:
+        values = np.array([float(cell) if cell.strip() else np.nan for cell in cells])
+    except ValueError:
+        return None
+    return values if np.isfinite(values).any() else None
+
+
+def _difference(name: str, one: Quantity, two: Quantity, file: Path) -> Difference:
+    """Raises InputError where kinds of runs, units or rows do not fit."""
+    if one.kind != two.kind:
+        raise InputError(file, name, two.kind, f"the other run is of {one.kind}: compare two runs of one kind")
+    if one.unit != two.unit or one.over != two.over:
+        raise InputError(file, name, f"{two.unit} over {two.over}", f"the other one is in {one.unit} over {one.over}")
+    if one.grid.shape == two.grid.shape and np.allclose(one.grid, two.grid, rtol=1e-9, atol=1e-9):
+        return Difference(name, one.unit, one.over, one.grid, one.values, two.values)
+    if one.over != "time [s]":
+        raise InputError(file, name, None, f"has other rows ({one.over}) than the first: {len(two.grid)} instead of "
+                                           f"{len(one.grid)}, or at other places")  # fmt: skip
+    return _in_time(name, one, two, file)
+
+
+def _in_time(name: str, one: Quantity, two: Quantity, file: Path) -> Difference:
+    """Runs with rows at other times: the denser one is read at the rows of the other by a cubic spline."""
+    from scipy.interpolate import CubicSpline
+
+    fine, coarse = (one, two) if len(one.grid) > len(two.grid) else (two, one)
+    inside = (coarse.grid >= fine.grid[0] - 1e-9) & (coarse.grid <= fine.grid[-1] + 1e-9)
+    if not (inside.sum() > 1 and np.isfinite(fine.values).all() and len(fine.grid) > 3):
+        raise InputError(file, name, None, "has no times in common with the first")
+    read = CubicSpline(fine.grid, fine.values)(coarse.grid[inside])
+    pair = (read, coarse.values[inside]) if fine is one else (coarse.values[inside], read)
+    note = f"on {int(inside.sum())} common rows, the denser run by a cubic spline"
+    return Difference(name, one.unit, one.over, coarse.grid[inside], *pair, note)
+
+
+def report(one: Path, two: Path, folder: Path) -> dict[str, Any]:
+    """Compare, save ``compare.csv`` and ``compare.png``, and say it in lines."""
+    found, notes = compare(one, two)
+    names = [each.name for each in found]
+    table = {"largest": [each.largest for each in found], "rms": [each.rms for each in found],
+             "at": [each.at for each in found], "share": [each.share for each in found]}  # fmt: skip
+    _save(folder / "compare.csv", found)
+    _figure(one, two, found, folder / "compare.png")
+    return {"scene": f"{two} less {one}", "folder": str(folder), "failed": {}, "names": names, "differences": table,
+            "table": [*_lines(found), *(f"  {note}" for note in notes)]}  # fmt: skip
+
+
+def _save(path: Path, found: list[Difference]) -> None:
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(("quantity", "unit", "largest difference", "at", "rms difference", "share of largest value"))
+        writer.writerows((d.name, d.unit, d.largest, f"{d.over.partition(' ')[0]} {d.at:.9g}", d.rms, d.share)
+                         for d in found)  # fmt: skip
+
+
+def _lines(found: list[Difference]) -> list[str]:
+    same = [each.name for each in found if each.largest == 0.0]
+    if len(same) == len(found):
+        return [f"  all {len(found)} quantities are the same to the last bit"]
+    lines = [f"  {'quantity':<44} {'largest':>11} {'rms':>11} {'unit':<9} {'share':>8}  where it is largest"]
+    lines += [f"  {d.name:<44} {d.largest:>11.4g} {d.rms:>11.4g} {d.unit:<9} {d.share:>8.1e}  "
+              f"{d.over.partition(' ')[0]} = {d.at:.6g}" for d in found[:SHOWN] if d.largest > 0.0]  # fmt: skip
+    more = sum(each.largest > 0.0 for each in found[SHOWN:])
+    lines += [f"  {more} more that differ less: compare.csv"] if more else []
+    lines += [f"  the same to the last bit: {len(same)} of {len(found)}"] if same else []
+    return lines + [f"  {note}" for note in dict.fromkeys(each.note for each in found if each.note)]
+
+
+def _figure(one: Path, two: Path, found: list[Difference], path: Path) -> None:
+    """Both results and, below, their difference, of the three quantities that differ most."""
+    from studies.figures import plt, save
+
+    shown = found[:3]
+    figure, axes = plt.subplots(2, len(shown), figsize=(4.2 * len(shown) + 0.6, 5.4), sharex="col", squeeze=False)
+    for (top, below), each in zip(axes.T, shown, strict=True):
+        top.plot(each.grid, each.one, color="#222222", linewidth=2.0, label=str(one))
+        top.plot(each.grid, each.two, color="#d55e00", linewidth=1.0, label=str(two))
+        top.set_title(f"{each.name} [{each.unit or '-'}]")
+        below.plot(each.grid, np.where(np.isfinite(each.gap), each.gap, np.nan), color="#0072b2")
+        below.plot(each.at, each.gap[np.abs(each.gap).argmax()], "o", color="#0072b2", markersize=5)
+        below.set_title(f"difference, largest {each.largest:.3g} at the mark")
+        below.set_xlabel(each.over)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    figure.suptitle(f"Largest differences of {len(found)} quantities", x=0.01, ha="left", fontweight="bold")
+    save(figure, path)

@@ -1,0 +1,74 @@
+"""Comparing results: differences and where they are, other steps and durations, and what cannot be compared."""
+
+import numpy as np
+import pytest
+
+from models.errors import InputError
+from models.simulate import simulate
+from studies.comparison import compare
+from validation.scenes import road_scene
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulate(road_scene(duration=0.1), "reference")
+
+
+def saved(run, path, **changes):
+    """The run with changed channels, in a file."""
+    data = run.data.copy(deep=True)
+    for name, change in changes.items():
+        data[name].values[:] = change(data[name].values)
+    type(run)(data).save(path)
+    return path
+
+
+def test_one_changed_value_is_found_with_its_place(run, tmp_path):
+    def kick(values):
+        return values + np.where(np.arange(len(values)) == 40, 0.25, 0.0)
+
+    found, notes = compare(saved(run, tmp_path / "a.nc"), saved(run, tmp_path / "b.nc", pitch=kick))
+    worst = found[0]
+    assert (worst.name, worst.unit, worst.largest) == ("pitch", "rad", pytest.approx(0.25, rel=1e-12))
+    assert worst.at == pytest.approx(run.times[40]) and worst.rms == pytest.approx(0.25 / len(run.times) ** 0.5)
+    assert [each.name for each in found if each.largest > 0] == ["pitch"] and not notes
+
+
+def test_what_is_no_number_in_one_alone_is_an_infinite_difference(run, tmp_path):
+    holed = saved(run, tmp_path / "b.nc", f1=lambda v: np.where(np.arange(len(v)) == 3, np.nan, v))
+    found, _ = compare(saved(run, tmp_path / "a.nc"), holed)
+    assert found[0].name == "f1" and found[0].largest == np.inf and found[0].at == pytest.approx(run.times[3])
+    assert all(each.largest == 0.0 for each in compare(holed, holed)[0])
+
+
+def test_another_step_is_read_by_a_spline_and_said(run, tmp_path):
+    coarse = simulate(road_scene(duration=0.1, step=5e-4), "reference")
+    found, _ = compare(saved(run, tmp_path / "a.nc"), saved(coarse, tmp_path / "b.nc"))
+    states = {each.name: each for each in found}
+    assert states["pitch"].note and states["pitch"].largest < 1e-7  # order 4 and a cubic spline on 0.25 ms
+
+
+@pytest.mark.parametrize(("first", "second", "said"), [
+    ("t [s],x [m]\n0,1\n1,2\n", "t [s],x [mm]\n0,1\n1,2\n", "the other one is in m"),
+    ("v,x\n0,1\n1,2\n", "v,x\n0,1\n3,2\n", "other rows"),
+    ("v,x\n0,1\n1,2\n", "v,y\n0,1\n1,2\n", "no quantity in common"),
+    ("v,x\n0,1\n1,2\n", "", "not a table of results"),
+    ("v,x\n0,1\n1,2\n", "v,x\n0\n", "not a table of results")], ids=str)  # fmt: skip
+def test_tables_that_do_not_fit_are_refused(tmp_path, first, second, said):
+    for name, text in (("a.csv", first), ("b.csv", second)):
+        (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=said):
+        compare(tmp_path / "a.csv", tmp_path / "b.csv")
+
+
+def test_what_is_no_pair_of_results_is_refused(run, tmp_path, twinrig, capsys):
+    file = saved(run, tmp_path / "a.nc")
+    (tmp_path / "b.nc").write_bytes(file.read_bytes()[:1000])
+    (tmp_path / "empty").mkdir()
+    for other, said in (("b.nc", "not a saved result"), ("empty", "is a folder"), ("c.nc", "no such file")):
+        assert twinrig("compare", "a.nc", other) == 2
+        assert said in capsys.readouterr().err
+    assert not (tmp_path / "results").exists()
+    assert twinrig("compare", "a.nc", "a.nc", "--out", "out") == 0
+    assert "the same to the last bit" in capsys.readouterr().out
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"command.txt", "compare.csv", "compare.png"}
