@@ -12,7 +12,7 @@ import numpy as np
 from models.braking.plane_vehicle import Axle, Truck
 from models.errors import InputError
 from models.handling.numbers import Handling, Tyres
-from models.vehicles.free_vehicle import CARRIER, SWAY, chassis_of
+from models.vehicles.free_vehicle import CARRIER, SWAY
 from models.vehicles.spatial import Freedom, SpatialVehicle, Vector
 
 ROLL, PITCH = 4, 5
@@ -50,20 +50,11 @@ def sprung(vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5) -> 
     if [tyre.axle for tyre in tyres] != [0, 0, 1, 1] or any(
             left.point[1] <= right.point[1] for left, right in (tyres[:2], tyres[2:])):  # fmt: skip
         raise InputError(vehicle.name, "tyres", [tyre.name for tyre in tyres], "must be two of each of two axles")
-    centred = _moved(_guided(replace(vehicle, tyres=tuple(tyres))), -centre(vehicle))
+    centred = _moved(replace(vehicle, tyres=tuple(tyres)), -centre(vehicle))
     handling = Handling(centred, Tyres(spin_inertia=0.0))
     if handling.vehicle.coordinates()[: len(LEADING)] != LEADING:
         raise ValueError("the carrier and the sway are not the first bodies")
     return Sprung(handling, _plane(centred, spin_inertia, front))
-
-
-def _guided(vehicle: SpatialVehicle) -> SpatialVehicle:
-    """The vehicle with all that had no parent on its chassis, which guides it: so its wheels push the chassis where
-    they are, and the weight of the occupants leans on it, and loads balance the inertia of the whole vehicle."""
-    chassis = chassis_of(vehicle).name
-    bodies = tuple(replace(body, parent=body.parent or chassis) if body.name != chassis else body
-                   for body in vehicle.bodies)  # fmt: skip
-    return replace(vehicle, bodies=bodies)
 
 
 def centre(vehicle: SpatialVehicle) -> np.ndarray:

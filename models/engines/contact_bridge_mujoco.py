@@ -82,6 +82,9 @@ class Marcher:
         whole = np.concatenate((np.zeros((len(states), 1)), states), axis=1)
         path = rollout.rollout(self.model, self._data, whole, nstep=steps)[0][..., : 1 + 2 * self.model.nv]
         late = path[:, -1, 0] < (steps - 0.5) * self.model.opt.timestep
-        if late.any() or not np.isfinite(path[:, -1]).all():  # MuJoCo starts again at time zero where it gives up
-            raise RunFailed("mujoco", "the engine gave up", float(path[..., 0].max()))
+        failed = late | ~np.isfinite(path[:, -1]).all(axis=1)  # MuJoCo starts again at time zero where it gives up
+        if failed.any():
+            own = path[int(failed.argmax())]
+            last = own[int(own[:, 0].argmax())]
+            raise RunFailed("mujoco", "the engine gave up", float(last[0]), last[1:])
         return path[..., 1:]

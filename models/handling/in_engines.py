@@ -60,7 +60,13 @@ def driven_by(handling: Handling) -> Driven:
 
 def driven(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
     """Drive from straight rolling at a speed (m/s) for a duration (s); RunFailed where it does not end well."""
-    return read(handling, build(engine, handling).run(*handling.straight(speed), duration, step), engine)
+    try:
+        run = build(engine, handling).run(*handling.straight(speed), duration, step)
+    except RunFailed as error:  # a car on its roof is soon no state that an engine can march
+        if error.state is not None:
+            _check_upright(handling, np.array([error.time]), error.state[None], engine)
+        raise
+    return read(handling, run, engine)
 
 
 def read(handling: Handling, run: SpatialRun, engine: str = "") -> Drive:
@@ -71,18 +77,18 @@ def read(handling: Handling, run: SpatialRun, engine: str = "") -> Drive:
                report, ledger)  # fmt: skip
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
-    _check_upright(handling, run, engine)
+    _check_upright(handling, run.times, run.positions, engine)
     _check_step(handling, run, report, engine)
     return Drive(handling, run, report, ledger)
 
 
-def _check_upright(h: Handling, run: SpatialRun, engine: str) -> None:
+def _check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
     """Refuse a run whose car turns over: what follows is no car's motion."""
     leans = [h.vehicle.coordinates().index((SWAY, turn)) for turn in ("rx", "ry")]
-    over = (np.abs(run.positions[:, leans]) > UPRIGHT).any(axis=1)
+    over = (np.abs(positions[:, leans]) > UPRIGHT).any(axis=1)
     if over.any():
         raise RunFailed(engine, f"the car turns over: it leans by more than {UPRIGHT} rad; drive more slowly or "
-                        "steer less", float(run.times[np.argmax(over)]))  # fmt: skip
+                        "steer less", float(times[np.argmax(over)]))  # fmt: skip
 
 
 def _check_step(h: Handling, run: SpatialRun, report: np.ndarray, engine: str) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.errors import InputError
+from models.vehicles.free_vehicle import guided
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import preloads
 
@@ -74,9 +75,7 @@ class CutVehicle:
 def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
     """Cut a vehicle whose body ``chassis`` has all six freedoms; InputError for what cannot be cut."""
     _check(vehicle, chassis)
-    riders = tuple(body if body.name == chassis or body.parent else replace(body, parent=chassis)
-                   for body in vehicle.bodies)  # fmt: skip
-    whole = replace(vehicle, bodies=riders, gravity=GRAVITY, drags=())
+    whole = replace(guided(vehicle, chassis), gravity=GRAVITY, drags=())
     held = preloads(whole)
     springs = [_spring(spring, held.parts[spring.name]) for spring in whole.springs]
     bars = [Element(bar.name, bar.left, bar.right, np.array(bar.point_left), np.array(bar.point_right),

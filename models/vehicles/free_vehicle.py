@@ -3,10 +3,10 @@
 The laws of ``spatial`` hold along directions fixed in space, for small motion about straight travel. Here a massless
 **carrier** on the ground has the chassis' motion in the plane, x, y and yaw, all finite (ISO 8855: x forward, y left, z
 up). On it a massless **sway** has the rest, z, roll and pitch, about axes on the ground below the chassis' centre, and
-the chassis is fixed to it. All that had no parent rides on the carrier. Directions that were fixed in space are fixed
-in the carrier now, points of the chassis on the ground move sideways with it as they did, and to first order in all
-other coordinates nothing else changes but this: what had no coordinate along y, as wheels and occupants, rides along,
-so that its mass takes part sideways and in yaw. Each tyre that turns gets a **rotor**, a body of its own with the spin.
+the chassis is fixed to it. Directions that were fixed in space are fixed in the carrier now. All that had no parent
+rides on the chassis, which guides it: what it has no coordinate for, as wheels and occupants have none along y, it does
+with the chassis, which feels its inertia and its weight there. So wheel loads balance the inertia of the whole vehicle.
+Each tyre that turns gets a **rotor**, a body of its own with the spin.
 """
 
 from dataclasses import replace
@@ -33,16 +33,19 @@ def free_vehicle(vehicle: SpatialVehicle, gravity: float = 9.81, spin_inertia: f
     chassis = chassis_of(vehicle)
     x, y, _ = chassis.position
     bodies = [Body(CARRIER, 0.0, (0.0, 0.0, 0.0), PLANE), Body(SWAY, 0.0, (x, y, 0.0), REST, parent=CARRIER)]
-    for body in vehicle.bodies:
-        if body.name == chassis.name:
-            bodies.append(replace(body, freedoms=(), parent=SWAY))
-        else:
-            bodies.append(replace(body, parent=body.parent or CARRIER))
+    bodies += [replace(body, freedoms=(), parent=SWAY) if body.name == chassis.name else body
+               for body in guided(vehicle, chassis.name).bodies]  # fmt: skip
     turning = ((0.0, 0.0, 0.0), (0.0, spin_inertia, 0.0), (0.0, 0.0, 0.0))
     bodies += [Body(rotor(tyre.name), SPECK, tyre.point, ("ry",), turning, tyre.body)
                for tyre in vehicle.tyres if spin_inertia and tyre.name not in fixed]  # fmt: skip
     bars = tuple(_swaying(bar) if bar.body == chassis.name else bar for bar in vehicle.bars)
     return replace(vehicle, bodies=_walked(bodies), bars=bars, side_forces=(), drags=(), outputs=(), gravity=gravity)
+
+
+def guided(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
+    """The vehicle with all that had no parent on its chassis, in whose axes it moves."""
+    return replace(vehicle, bodies=tuple(
+        body if body.parent or body.name == chassis else replace(body, parent=chassis) for body in vehicle.bodies))
 
 
 def chassis_of(vehicle: SpatialVehicle) -> Body:

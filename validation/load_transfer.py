@@ -1,0 +1,56 @@
+"""Transfer of wheel loads in a settled drive, beside what inertia, spinning wheels and weight that leans ask for.
+
+About the ground, with m and h of the whole vehicle, r its wheels' radius and J their inertia, all over the vehicle,
+
+    sum dN x = -a_x (m h + sum J / r) + m g (h - r) pitch,    sum dN y = -a_y (m h + sum J / r) - m g (h - r) roll
+
+to first order, whatever springs do: contacts go with their wheels, spins slow down or turn with the vehicle.
+"""
+
+import numpy as np
+
+from models.handling.forces import PRESS
+from models.handling.in_engines import Drive
+from models.handling.numbers import GRAVITY, Controls, Handling, Tyres
+from models.vehicles.free_vehicle import SWAY
+from models.vehicles.spatial import SpatialVehicle
+
+
+def sliding(vehicle: SpatialVehicle, mu: float) -> Handling:
+    """Wheels that are locked: they brake by mu g, and none of them spins."""
+    return Handling(vehicle, Tyres(friction=mu, fixed=tuple(tyre.name for tyre in vehicle.tyres)))
+
+
+def turning(vehicle: SpatialVehicle, steer: float) -> Handling:
+    """A turn by a steer angle (rad), from 0.5 s on."""
+    return Handling(vehicle, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
+
+
+def transfer(drive: Drive) -> np.ndarray:
+    """(2,) N m: last loads less those at rest, by their design places ahead and to the left."""
+    design = np.array([tyre.point[:2] for tyre in drive.handling.vehicle.tyres])
+    moments: np.ndarray = (drive.tyres[-1, :, PRESS] - drive.tyres[0, :, PRESS]) @ design
+    return moments
+
+
+def asked(drive: Drive, accelerations: np.ndarray) -> np.ndarray:
+    """(2,) N m: what ``transfer`` must be at accelerations (2,) ahead and to the left in m/s^2."""
+    own, free = drive.handling, drive.handling.vehicle
+    masses, heights = np.array([(body.mass, body.position[2]) for body in free.bodies]).T
+    radii = np.array([tyre.point[2] for tyre in free.tyres])
+    roll, pitch = (drive.run.positions[-1, free.coordinates().index((SWAY, turn))] for turn in ("rx", "ry"))
+    spins = sum(own.tyres.spin_inertia / r for r, tyre in zip(radii, free.tyres, strict=True)
+                if tyre.name not in own.tyres.fixed)  # fmt: skip
+    leaning = GRAVITY * float(masses @ heights - masses.sum() * radii.mean())
+    return leaning * np.array([pitch, -roll]) - accelerations * (masses @ heights + spins)
+
+
+def braked_error(drive: Drive, mu: float) -> float:
+    """Transfer between the axles of a drive that slides, beside what is asked for, less 1."""
+    return float(transfer(drive)[0] / asked(drive, np.array([-mu * GRAVITY, 0.0]))[0] - 1.0)
+
+
+def turning_error(drive: Drive) -> float:
+    """Transfer between the sides of a drive in a steady turn, beside what is asked for, less 1."""
+    ahead, _, rate = drive.velocity()[-1]
+    return float(transfer(drive)[1] / asked(drive, np.array([0.0, ahead * rate]))[1] - 1.0)
