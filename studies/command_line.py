@@ -170,14 +170,19 @@ def compare(
 @app.command()
 def validate(
     quick: Annotated[bool, typer.Option("--quick", help="The named short subset, in about a minute.")] = False,
+    against: Annotated[
+        Path | None, typer.Option(help="results.json of an earlier report: what changed is told first.")
+    ] = None,
     out: Out = None,
 ) -> None:
     """Run the validation cases and write report.html, results.json and results.csv."""
     from studies.folders import new_folder
+    from validation.changes import read
     from validation.run import validate as run_all
 
+    earlier = None if against is None else read(against)
     folder = new_folder(out, "validate-quick" if quick else "validate")
-    failed = run_all(folder, quick, " ".join(["twinrig", *sys.argv[1:]]))
+    failed = run_all(folder, quick, " ".join(["twinrig", *sys.argv[1:]]), earlier)
     sys.exit(1 if failed else 0)
 
 

@@ -12,8 +12,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from models.ensemble.store import write_whole
 from models.ensemble.workers import one_thread_each
 from models.result import provenance
+from validation.changes import against, lines
 from validation.rows import REPORTED, Row
 
 CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "growth",
@@ -34,8 +36,8 @@ WORKERS = 2
 """Processes that measure the other cases."""
 
 
-def validate(folder: Path, quick: bool, command: str) -> int:
-    """Measure all cases into ``folder``; returns the number of failed rows."""
+def validate(folder: Path, quick: bool, command: str, earlier: dict[str, Any] | None = None) -> int:
+    """Measure all cases into ``folder``; returns the number of failed rows. earlier : ``changes.read`` of a report."""
     from rich.console import Console
     from rich.progress import Progress
 
@@ -50,7 +52,8 @@ def validate(folder: Path, quick: bool, command: str) -> int:
     rows = [row for name in CASES for row in found[name][0]]
     seconds = {name: found[name][1] for name in CASES}
     wall = time.perf_counter() - start
-    _save(folder, rows, {**provenance(command), "seeds": seeds(), "quick": quick, "seconds": seconds, "wall": wall})
+    _save(folder, rows, {**provenance(command), "seeds": seeds(), "quick": quick, "seconds": seconds, "wall": wall},
+          earlier)  # fmt: skip
     from validation.report.page import write
 
     return _say(rows, wall, write(folder))
@@ -143,10 +146,14 @@ def seeds() -> dict[str, int]:
             "long recordings": long_recording.SEED}  # fmt: skip
 
 
-def _save(folder: Path, rows: list[Row], source: dict[str, Any]) -> None:
-    """results.json and results.csv."""
+def _save(folder: Path, rows: list[Row], source: dict[str, Any], earlier: dict[str, Any] | None = None) -> None:
+    """results.json and results.csv; what changed since an earlier report is printed first."""
     table = [row.as_dict() for row in rows]
-    (folder / "results.json").write_text(json.dumps({"provenance": source, "rows": table}, indent=1))
+    content: dict[str, Any] = {"provenance": source, "rows": table}
+    if earlier is not None:
+        content["against"] = against(earlier, table, source["quick"])
+        print("\n".join(lines(content["against"])))
+    write_whole(folder / "results.json", json.dumps(content, indent=1).encode())
     with (folder / "results.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(Row.__dataclass_fields__))
         writer.writeheader()

@@ -31,7 +31,8 @@ def _read(path: Path) -> dict[str, Any]:
     """Saved results; raises InputError if the file is not one."""
     try:
         results = json.loads(path.read_text(encoding="utf-8"))
-        return {"provenance": {**BLANK, **results["provenance"]}, "rows": list(results["rows"])}
+        return {"provenance": {**BLANK, **results["provenance"]}, "rows": list(results["rows"]),
+                "against": results.get("against")}  # fmt: skip
     except FileNotFoundError:
         raise InputError(path, "", None, "no such file: `twinrig validate` writes it") from None
     except (ValueError, KeyError, TypeError) as error:
@@ -52,7 +53,8 @@ def page(results: dict[str, Any], data: Path) -> str:
     for case in (case for system in systems for case in system["cases"]):
         case |= _shown(case, data / f"{case['name']}.json")
     return environment.get_template(TEMPLATE).render(
-        verdict=content.verdict(results), systems=systems, silent=content.silent_systems(results["rows"]),
+        verdict=content.verdict(results), against=results.get("against"), systems=systems,
+        silent=content.silent_systems(results["rows"]),
         independence=content.independence(results), conventions=content.conventions(),
         parameters=content.parameter_tables(), provenance=results["provenance"],
     )  # fmt: skip

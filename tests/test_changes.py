@@ -1,0 +1,65 @@
+"""What changed between two reports: each kind is found, rounding is not, and what is no report is refused."""
+
+import json
+
+import pytest
+
+from models.errors import InputError
+from validation.changes import KINDS, against, changes, lines, read
+from validation.report.page import write
+from validation.rows import at_most, behaves, within
+
+ERROR = at_most("a.error", "drift", "an error", 1e-6, "m", 1e-5, "why", "native")
+VALUE = within("a.value", "drift", "a value", 2.0, "m", 2.0, 0.5, "why", "native")
+WORD = behaves("a.word", "drift", "a word", "refused", "refused", "why")
+
+
+def table(*rows):
+    return {row.id: row.as_dict() for row in rows}
+
+
+def changed(row, **keys):
+    return {row.id: {**row.as_dict(), **keys}}
+
+
+@pytest.mark.parametrize(("before", "after", "kinds"), [
+    (table(ERROR), changed(ERROR, value=1e-4, status="failed"), ["status", "value"]),
+    (table(VALUE), changed(VALUE, value=2.1), ["value"]),
+    (table(VALUE), changed(VALUE, tolerance=5.0), ["expected"]),
+    (table(WORD), changed(WORD, value="silent", status="failed"), ["status", "value"]),
+    (table(VALUE), changed(VALUE, value=float("nan")), ["value"]),
+    (table(VALUE), changed(VALUE, value=None, status="not run"), ["status", "value"]),
+    (table(VALUE, WORD), table(VALUE), ["gone"]), (table(VALUE), table(VALUE, WORD), ["new"]),
+    (table(VALUE), changed(VALUE, value=2.0 * (1 + 1e-12)), []),          # rounding
+    (table(ERROR), changed(ERROR, value=1.001e-6), []),                   # an error by 1e-4 of its tolerance
+    (changed(VALUE, value=float("nan")), changed(VALUE, value=float("nan")), []),
+    (table(ERROR, VALUE, WORD), table(WORD, VALUE, ERROR), [])])  # fmt: skip
+def test_every_kind_of_change_is_found_and_rounding_is_none(before, after, kinds):
+    assert [one["kind"] for one in changes(before, after)] == kinds
+
+
+def test_what_fails_now_comes_first():
+    before = table(ERROR, VALUE, WORD)
+    after = changed(VALUE, value=2.2) | changed(WORD, status="failed", reason="found 'silent'")
+    found = changes(before, after)
+    assert [one["id"] for one in found] == ["a.word", "a.error", "a.value"]
+    assert [KINDS.index(one["kind"]) for one in found] == sorted(KINDS.index(one["kind"]) for one in found)
+
+
+def test_the_report_tells_changes_and_is_drawn_again_from_its_results(tmp_path):
+    (tmp_path / "old.json").write_text(json.dumps({"provenance": {"quick": True, "commit": "abc"},
+                                                   "rows": [*table(VALUE, WORD).values()]}))  # fmt: skip
+    rows = [*changed(VALUE, value=2.25).values()]
+    found = against(read(tmp_path / "old.json"), rows, quick=False)
+    assert found["note"] and "2 changes: 0 of status, 1 gone, 0 new, 0 judged otherwise, 1 of value" in lines(found)[0]
+    (tmp_path / "results.json").write_text(json.dumps({"provenance": {}, "rows": rows, "against": found}))
+    first = write(tmp_path).read_bytes()
+    assert b"What changed" in first and b"a.word" in first and write(tmp_path).read_bytes() == first
+
+
+@pytest.mark.parametrize("content", [None, "{", "[]", '{"rows": [{"id": "a"}], "provenance": {}}', '{"rows": 3}'])
+def test_what_is_no_report_is_refused(tmp_path, content):
+    if content is not None:
+        (tmp_path / "results.json").write_text(content)
+    with pytest.raises(InputError, match="--against"):
+        read(tmp_path)

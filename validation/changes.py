@@ -1,0 +1,110 @@
+"""What changed between two reports: rows that are new, gone, or found something else than before."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from models.errors import InputError
+from validation.rows import Row
+
+ROUNDING = 1e-9
+"""Relative change that rounding explains."""
+NEGLIGIBLE = 1e-3
+"""Share of its tolerance by which an error (expected 0) may change unmentioned: its digits are those of rounding."""
+KINDS = ("status", "gone", "new", "expected", "value")
+"""In the order in which they are told: what passes or fails now, then what is judged otherwise, then values."""
+
+Change = dict[str, Any]
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Rows by id and provenance of an earlier ``results.json``, or of the folder that holds it; else InputError."""
+    file = path / "results.json" if path.is_dir() else path
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        rows = {row["id"]: {name: row[name] for name in Row.__dataclass_fields__} for row in content["rows"]}
+        return {"file": str(file), "provenance": dict(content["provenance"]), "rows": rows}
+    except FileNotFoundError:
+        raise InputError("--against", "", str(file), "no such file: name the results.json of a report") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError("--against", "", str(file), f"cannot be read: {error}") from None
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        allowed = f"is not the results of a validation ({type(error).__name__}: {error})"
+        raise InputError("--against", "", str(file), allowed) from None
+
+
+def against(earlier: dict[str, Any], rows: list[dict[str, Any]], quick: bool) -> dict[str, Any]:
+    """What ``results.json`` keeps of the comparison: with what, a warning if that was another share, all changes."""
+    source = earlier["provenance"]
+    shares = [("quick" if one else "full") for one in (bool(source.get("quick")), quick)]
+    note = "" if shares[0] == shares[1] else f"the earlier report is the {shares[0]} one and this the {shares[1]} one"
+    return {"file": earlier["file"], "commit": str(source.get("commit", "unknown")), "note": note,
+            "changes": changes(earlier["rows"], {row["id"]: row for row in rows})}  # fmt: skip
+
+
+def changes(before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any]]) -> list[Change]:
+    """Changed rows by id, in the order of KINDS and, within values, the largest share of a tolerance first."""
+    found = [change for id in (*before, *(id for id in after if id not in before))
+             for change in _of(id, before.get(id), after.get(id))]  # fmt: skip
+    return sorted(found, key=lambda one: (KINDS.index(one["kind"]), one["after"] == "passed", -one["size"]))
+
+
+def _of(id: str, old: dict[str, Any] | None, new: dict[str, Any] | None) -> Iterator[Change]:
+    row = new or old or {}
+
+    def change(kind: str, before: Any, after: Any, size: float = 0.0) -> Change:
+        return {"id": id, "kind": kind, "quantity": row["quantity"], "unit": row["unit"], "before": before,
+                "after": after, "size": size, "reason": row["reason"] if kind in ("status", "new") else ""}  # fmt: skip
+
+    if old is None or new is None:
+        yield change("new" if old is None else "gone", old and old["status"], new and new["status"])
+        return
+    if old["status"] != new["status"]:
+        yield change("status", old["status"], new["status"])
+    for name in ("expected", "tolerance"):
+        if _differ(old[name], new[name]):
+            yield change("expected", f"{name} {old[name]}", f"{name} {new[name]}")
+    size = _size(old, new)
+    if size > 0.0:
+        yield change("value", old["value"], new["value"], size)
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _differ(old: Any, new: Any) -> bool:
+    if not (_number(old) and _number(new)):
+        return old != new
+    both_none = old != old and new != new  # neither is a number
+    return not (both_none or old == new or abs(new - old) <= ROUNDING * max(abs(old), abs(new)))
+
+
+def _size(old: dict[str, Any], new: dict[str, Any]) -> float:
+    """Change of the value as a share of the tolerance, or of the value where there is none; 0 if only rounding."""
+    was, now, tolerance = old["value"], new["value"], new["tolerance"]
+    if not _differ(was, now):
+        return 0.0
+    if not (_number(was) and _number(now)) or not abs(now - was) < float("inf"):
+        return float("inf")
+    if tolerance and _number(tolerance):
+        share = abs(now - was) / tolerance
+        return 0.0 if new["expected"] == 0 and share < NEGLIGIBLE else share
+    return abs(now - was) / max(abs(was), abs(now))
+
+
+def lines(found: dict[str, Any]) -> list[str]:
+    """The comparison as text, changed rows first."""
+    own = found["changes"]
+    names = zip(KINDS, ("of status", "gone", "new", "judged otherwise", "of value"), strict=True)
+    counts = ", ".join(f"{sum(one['kind'] == kind for one in own)} {text}" for kind, text in names)
+    head = f"against {found['file']} (commit {found['commit']}): {len(own)} changes: {counts}"
+    told = [f"  {one['kind']}: {one['id']}: {one['quantity']}: {_shown(one['before'])} -> {_shown(one['after'])}"
+            f"{' ' + one['unit'] if one['kind'] == 'value' and one['unit'] else ''}"
+            f"{': ' + one['reason'] if one['reason'] else ''}" for one in own]  # fmt: skip
+    return [head, *([f"  note: {found['note']}"] if found["note"] else []), *told]
+
+
+def _shown(value: Any) -> str:
+    return "-" if value is None else f"{value:.6g}" if _number(value) else str(value)
