@@ -24,7 +24,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         with TemporaryDirectory() as own:
             outcomes = {name: judge(case, name, Path(own)) for name in case.judged()}
             naive = case.naive(Path(own)) if case.naive else ""
-        rows += [_row(case, "any" if case.once else name, outcome) for name, outcome in outcomes.items()]
+        rows += [_row(case, name, outcome) for name, outcome in outcomes.items()]
         data.append({"family": family, **_record(case, outcomes, naive)})
     silent = sum(outcome["word"] == "SILENT" for entry in data for outcome in entry["outcomes"].values())
     counted = len([entry for entry in data if entry["family"] not in FILES])
@@ -46,7 +46,7 @@ def _judged(data: list[dict[str, Any]]) -> int:
 
 def _row(case: Case, implementation: str, outcome: Outcome) -> Row:
     """The error where an answer is wanted and given, the behaviour otherwise."""
-    id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{implementation}"
+    id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{'any' if case.once else implementation}"
     quantity = f"{case.name}{'' if case.once else f', {implementation}'}: {case.check}"
     if case.wanted(implementation) == "right" and outcome.error is not None:
         error, judged = outcome.error, case.independence(implementation)
