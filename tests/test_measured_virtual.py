@@ -210,6 +210,21 @@ def test_a_recording_on_the_pitch_plane_gives_its_pitch_back(planar: Recording, 
     assert free.verdict.word == "stabilise" and free.trust is not None and free.trust.until is not None
 
 
+def test_a_free_run_on_turning_forces_is_accepted_only_beside_its_pitch(planar: Recording, tmp_path: Path) -> None:
+    turning = replace(planar, signals=tuple(replace(s, frame="body") for s in planar.signals))
+    job = PlaneJob(turning, "itwm_drift", hold=Hold("none", force=10.0))
+    assert plane_run(job, tmp_path / "right").verdict.word == "accepted"
+    # nothing grows where forces turn with the vehicle, so that its own prediction never ends
+    blind = replace(turning, signals=turning.signals[:4])
+    unseen = plane_run(replace(job, recording=blind), tmp_path / "blind").verdict
+    assert unseen.word == "stabilise" and "no measured pitch" in unseen.reason
+    names = planar.columns.names
+    tilted = Columns(tmp_path / "tilted.bin", names, planar.count)
+    tilted.write(0, planar.columns.block(names, 0, planar.count) + 0.03 * (np.array(names) == "pitch"))
+    off = plane_run(replace(job, recording=replace(turning, columns=tilted)), tmp_path / "off").verdict
+    assert off.word == "stabilise" and "0.03 rad off the measured one" in off.reason
+
+
 def test_another_vehicle_or_a_missing_wheel_is_refused(planar: Recording, tmp_path: Path) -> None:
     names = planar.columns.names
     light = Columns(tmp_path / "light.bin", names, planar.count)

@@ -41,6 +41,8 @@ WEIGHT = 0.05
 """Largest departure of the mean force from the weight; what is beyond falls or rises for ever."""
 RISE = 1.0
 """m/s: as much may the vertical speed of the vehicle change from the first to the last sample."""
+UNSEEN = ("free, with forces that turn with the vehicle and no measured pitch: an offset, or forces of another frame, "
+          "would drive it off unseen")  # fmt: skip
 EFFECTS = {"kalman": "kalman_filter", "prescribed": "prescribed_pitch"}
 SPRINGS = {"f3": "front spring", "f4": "rear spring"}
 
@@ -84,7 +86,29 @@ def run(job: PlaneJob, folder: Path, limits: Limits | None = None) -> PlaneRun:
     # whether the filter's innovations are as large as stated is not asked: deviations of a recording are estimates
     verdict = score.blind_verdict(own, effects, result.times[-1], limits or Limits(), until,
                                   uncertainty=score.uncertainty(result))  # fmt: skip
+    if job.effect is None and verdict.word == "accepted":
+        verdict = _beside_pitch(job, result, limits or Limits(), verdict)
     return PlaneRun(result, limited, verdict, _outcome(result, said, folder))
+
+
+def _beside_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdict) -> Verdict:
+    """The verdict on a free run that ends before noise drives it off, beside its pitch as measured.
+
+    Where forces turn with the vehicle nothing grows, but offsets and forces of another frame drive it off all the same,
+    and its forces along the vehicle are as wrong as its pitch: there a measured pitch must bear the run out.
+    """
+    found = job.recording.find("angle", CHASSIS, "pitch")
+    if not found:
+        turns = any(signal.frame != "inertial" for axle in AXLES for signal in _signals(job.recording, axle))
+        return Verdict("stabilise", UNSEEN) if turns else verdict
+    measured = job.recording.samples(found[0])
+    known = np.flatnonzero(np.isfinite(measured))
+    beside = np.interp(result.times, job.recording.period * known, measured[known])
+    off = float(np.abs(score.low_pass(result["pitch"] + beside, float(result.times[1]))).max())
+    if off <= limits.pitch_error:
+        return verdict
+    return Verdict("stabilise", f"free, and its pitch is up to {off:.2g} rad off the measured one "
+                   f"(at most {limits.pitch_error:g}): check the frame of the forces and their offsets")  # fmt: skip
 
 
 def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
@@ -96,8 +120,9 @@ def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
     if len(frames & {"inertial"}) != len(frames) and "inertial" in frames:
         raise InputError(job.file, "files.channels", None, "vertical forces must all keep their direction in space, or "
                          "all turn with the vehicle")  # fmt: skip
+    fixed = frames == {"inertial"} or job.hold.method == "prescribed"  # an enforced pitch does not feel the frame
     effects: dict[str, Any] = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "smooth",
-                                                "frame": "inertial" if frames == {"inertial"} else "body"}}  # fmt: skip
+                                                "frame": "inertial" if fixed else "body"}}  # fmt: skip
     if job.effect:
         effects[job.effect] = _held(job, folder, said)
     step = job.step or period / math.ceil(period / STEP * (1 - 1e-9))
