@@ -59,8 +59,22 @@ def engines_of(name: str | None, system: str) -> tuple[str, ...]:
         raise InputError("--engine", "", name, f"has no meaning for {system}, which no engine computes: leave it out")
     if name is None or name == "all":
         return engines
+    if ":" in name:
+        return _outside(name, system)
     if name not in engines:
         raise InputError("--engine", "", name, "no such engine", (*engines, "all"))
+    return (name,)
+
+
+def _outside(name: str, system: str) -> tuple[str, ...]:
+    """An engine or an integrator from outside the tree, once it is registered."""
+    from models.systems import DEFAULT
+
+    if system != DEFAULT:
+        raise InputError("--engine", "", name, f"can run scenes of {DEFAULT} only, and this one is of {system}")
+    from models.engines.outside import register
+
+    register(name)
     return (name,)
 
 

@@ -119,6 +119,19 @@ def run(
     _finish(lambda progress: module.run(loaded, engines, folder, progress), folder, as_json)
 
 
+def _conformity(engine: str, more: bool, out: Path | None) -> None:
+    """Put an engine from outside the tree through the suite."""
+    from models.engines.outside import register
+    from studies.folders import new_folder
+    from validation.conformity import conformity
+
+    if more:
+        raise InputError("--engine", "", engine, "has one suite, without --quick and --against")
+    register(engine)
+    folder = new_folder(out, "conformity")
+    sys.exit(1 if conformity(engine, folder, " ".join(["twinrig", *sys.argv[1:]])) else 0)
+
+
 def _sweep(text: str, scene: str, engine: str | None, changes: list[str] | None, out: Path | None, resume: Path | None,
            as_json: bool) -> None:  # fmt: skip
     """Run a scene at every value of a key."""
@@ -173,9 +186,14 @@ def validate(
     against: Annotated[
         Path | None, typer.Option(help="results.json of an earlier report: what changed is told first.")
     ] = None,
+    engine: Annotated[
+        str | None, typer.Option(metavar="MODULE:CLASS", help="Judge an engine or integrator of your own instead.")
+    ] = None,
     out: Out = None,
 ) -> None:
     """Run the validation cases and write report.html, results.json and results.csv."""
+    if engine is not None:
+        return _conformity(engine, quick or against is not None, out)
     from studies.folders import new_folder
     from validation.changes import read
     from validation.run import validate as run_all

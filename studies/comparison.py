@@ -107,7 +107,7 @@ def _pairs(one: Path, two: Path, notes: list[str]) -> list[tuple[str, Path, Path
     first, second = _files(one), _files(two)
     common = [name for name in first if name in second]
     if not common and len(first) == len(second) == 1:
-        return [("", *first.values(), *second.values())]
+        return [("", next(iter(first.values())), next(iter(second.values())))]
     if not common:
         raise InputError(two, "", None, f"has no results of the same names as {one}: compare two results of one study")
     notes += [f"only in {path}: {', '.join(own)}" for path, own in

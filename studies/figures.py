@@ -9,9 +9,21 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-COLOURS = {"reference": "#222222", "exudyn": "#0072b2", "mujoco": "#d55e00"}
+
+class _Colours(dict[str, str]):
+    def __missing__(self, engine: str) -> str:
+        return "#009e73"
+
+
+class _Labels(dict[str, str]):
+    def __missing__(self, engine: str) -> str:
+        return engine
+
+
+COLOURS = _Colours({"reference": "#222222", "exudyn": "#0072b2", "mujoco": "#d55e00"})
 """One colour per implementation in every figure; told apart by people who see colours differently."""
-LABELS = {"reference": "reference", "exudyn": "Exudyn", "mujoco": "MuJoCo"}
+LABELS = _Labels({"reference": "reference", "exudyn": "Exudyn", "mujoco": "MuJoCo"})
+"""As figures call them; one from outside the tree by its own name and in a colour of its own."""
 
 plt.rcParams.update({
     "figure.dpi": 110, "savefig.dpi": 130, "font.size": 9.5, "axes.titlesize": 10.5, "axes.titlelocation": "left",

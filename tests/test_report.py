@@ -14,7 +14,7 @@ from models.errors import InputError
 from validation.report import page as report
 from validation.report.numbers import margin, number, numeric_columns, powers, share
 from validation.rows import Row, at_most, behaves, finding, not_run, within
-from validation.run import _save
+from validation.run import save as _save
 
 ODD = '<script>alert("1")</script> & "quotes" µ'
 FAILED = at_most("audit.mujoco.broken", "pitch-plane", "acceleration of a broken model", 3e-3, "of the largest", 1e-12,
@@ -94,7 +94,7 @@ def test_verdict_comes_first_and_then_what_is_not_covered(page):
 
 def test_gaps_name_systems_without_rows_and_rows_not_run(page):
     gaps = page[page.index('id="gaps"') : page.index('id="system-')]
-    assert "No rows yet for contact, ride, rolling-vehicle, anti-lock, cost:" in gaps
+    assert "No rows yet for contact, ride, rolling-vehicle, anti-lock, measured, cost:" in gaps
     assert "roads.measured" in gaps and "no folder named" in gaps
     assert "effects" not in gaps.split("No rows yet for")[1].split(":")[0], "it has a row, although a failed one"
 

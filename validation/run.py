@@ -23,8 +23,8 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
          "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
          "contact_simplified", "contact_profiles", "manchester", "ride_road", "ride_covariance", "ride_engines",
-         "ride_varying_speed", "ride_nonlinear", "ride_faults", "hub_forces", "contact_price", "fastsim", "wheelset",
-         "rolling_faults", "contact_bridges", "handling", "braking_stop", "braking_faults", "braking_port",
+         "ride_varying_speed", "ride_nonlinear", "hub_forces", "contact_price", "fastsim", "wheelset",
+         "contact_bridges", "handling", "braking_stop", "braking_port",
          "braking_controllers", "braking_engines", "braking_suspension", "measured_formats", "measured_virtual",
          "measured_long", "measured_checks")  # fmt: skip
 """Case modules in the order of the report."""
@@ -52,11 +52,11 @@ def validate(folder: Path, quick: bool, command: str, earlier: dict[str, Any] | 
     rows = [row for name in CASES for row in found[name][0]]
     seconds = {name: found[name][1] for name in CASES}
     wall = time.perf_counter() - start
-    _save(folder, rows, {**provenance(command), "seeds": seeds(), "quick": quick, "seconds": seconds, "wall": wall},
+    save(folder, rows, {**provenance(command), "seeds": seeds(), "quick": quick, "seconds": seconds, "wall": wall},
           earlier)  # fmt: skip
     from validation.report.page import write
 
-    return _say(rows, wall, write(folder))
+    return say(rows, wall, write(folder))
 
 
 def _outcomes(quick: bool, folder: Path) -> Iterator[tuple[str, tuple[list[Row], float]]]:
@@ -146,7 +146,7 @@ def seeds() -> dict[str, int]:
             "long recordings": long_recording.SEED}  # fmt: skip
 
 
-def _save(folder: Path, rows: list[Row], source: dict[str, Any], earlier: dict[str, Any] | None = None) -> None:
+def save(folder: Path, rows: list[Row], source: dict[str, Any], earlier: dict[str, Any] | None = None) -> None:
     """results.json and results.csv; what changed since an earlier report is printed first."""
     table = [row.as_dict() for row in rows]
     content: dict[str, Any] = {"provenance": source, "rows": table}
@@ -160,7 +160,7 @@ def _save(folder: Path, rows: list[Row], source: dict[str, Any], earlier: dict[s
         writer.writerows(table)
 
 
-def _say(rows: list[Row], seconds: float, page: Path) -> int:
+def say(rows: list[Row], seconds: float | None, page: Path) -> int:
     """Print the verdict and every row that did not pass."""
     failed = [row for row in rows if row.status == "failed"]
     skipped = [row for row in rows if row.status == "not run"]
@@ -168,7 +168,7 @@ def _say(rows: list[Row], seconds: float, page: Path) -> int:
     passed = len(rows) - len(failed) - len(skipped) - len(told)
     print(
         f"{len(rows)} rows: {passed} passed, {len(told)} reported without being judged, {len(failed)} failed, "
-        f"{len(skipped)} not run, {seconds:.0f} s"
+        f"{len(skipped)} not run{'' if seconds is None else f', {seconds:.0f} s'}"
     )
     for row in failed + skipped:
         print(f"  {row.status}: {row.id}: {row.quantity}: {row.reason}")

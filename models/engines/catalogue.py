@@ -55,6 +55,9 @@ CATALOGUE: dict[str, dict[str, Integrator]] = {
 MISSING = {("exudyn", "DVERK6"): "DVERK6 is named but not implemented in Exudyn; use DOPRI5 or RK67"}
 """Integrators that an engine names and does not have, with what to say to who asks for one."""
 
+OUTSIDE: dict[str, type] = {}
+"""Classes from files outside the tree by their names ``module:Class``, once they are registered (outside.py)."""
+
 RECOMMENDED = {"reference": "RK4", "exudyn": "RK44", "mujoco": "RK4"}
 DEFAULT = {"exudyn": "GeneralizedAlpha", "mujoco": "Euler"}
 """What an engine does if it is not told otherwise (Exudyn 1.13, MuJoCo 4)."""

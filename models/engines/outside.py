@@ -1,0 +1,193 @@
+"""Engines and integrators from a file outside the tree, named ``module:Class``; nothing but that is imported.
+
+An integrator has ``integrate(f, times, start, tolerance)``, which returns states (len(times), 8) of y' = f(t, y) from
+``start`` (8,) at ``times[0]`` on; it is called for each stretch on which f is smooth. An engine is built with
+``(assembly, settings)`` and has ``run()``, which returns something with ``times`` (n,) and ``states`` (n, 8), and
+``acceleration(time, state)`` (4,). Either says its ``order``, and ``adaptive = True`` if it keeps a tolerance instead
+of taking steps of fixed length. What it returns passes the guard that every run passes, and what it raises is a
+failed run.
+
+::
+
+    class Scipy:                                   # mine.py: twinrig run SCENE --engine mine:Scipy
+        order, adaptive = 8, True
+
+        def integrate(self, f, times, start, tolerance):
+            found = solve_ivp(f, times[[0, -1]], start, "DOP853", times, rtol=tolerance, atol=tolerance)
+            return found.y.T
+"""
+
+import math
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from models.assembly import Assembly
+from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED, Integrator
+from models.engines.protocol import Model, Settings, Trajectory, guard
+from models.engines.reference import Reference, derivative_of
+from models.errors import InputError, RunFailed
+
+HIGHEST = 20
+"""Order that a method may claim."""
+
+
+def register(name: str) -> None:
+    """Import the class that ``module:Class`` names and enter it in the catalogue; InputError if it cannot be used."""
+    found = _class(name)
+    order = getattr(found, "order", None)
+    if isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= HIGHEST:
+        raise _unusable(name, f"must say its order of convergence: order = a whole number from 1 to {HIGHEST}")
+    integrates = callable(getattr(found, "integrate", None))
+    missing = [] if integrates else [own for own in ("run", "acceleration") if not callable(getattr(found, own, None))]
+    if missing:
+        raise _unusable(name, f"has no {' and no '.join(missing)}(): an engine has run() and acceleration(time, "
+                              "state), an integrator has integrate(f, times, start, tolerance)")  # fmt: skip
+    own = bool(getattr(found, "constraints", False))
+    CATALOGUE[name] = {name: Integrator(order, "any", constraints=integrates or own)}
+    RECOMMENDED[name], OUTSIDE[name] = name, found
+
+
+def _unusable(name: str, why: str) -> InputError:
+    return InputError("--engine", "", name, why)
+
+
+def _class(name: str) -> type:
+    module, _, attribute = name.partition(":")
+    if not all(part.isidentifier() for part in (*module.split("."), attribute)):
+        raise _unusable(name, "must read module:Class, for mine.py in this folder for example mine:Scipy")
+    if os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    try:
+        found = getattr(import_module(module), attribute)
+    except ModuleNotFoundError as error:
+        raise _unusable(name, f"there is no module {error.name!r} here, nor among the installed ones") from None
+    except AttributeError:
+        raise _unusable(name, f"the module {module} has no {attribute}") from None
+    except (Exception, SystemExit) as error:
+        raise _unusable(name, f"the module {module} cannot be imported: {_said(error)}") from None
+    if not isinstance(found, type):
+        raise _unusable(name, f"{attribute} is no class")
+    return found
+
+
+def _said(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}".rstrip(": ")
+
+
+def build(name: str, assembly: Assembly, settings: Settings) -> Model:
+    """The class on an assembly: as an engine of its own, or as an integrator of the reference's equations."""
+    found = OUTSIDE[name]
+    if callable(getattr(found, "integrate", None)):
+        return Integrated(assembly, settings, name, _asked(name, "building it", found).integrate)
+    return Guarded(name, _asked(name, "building it", found, assembly, settings), assembly, settings)
+
+
+def _asked(name: str, what: str, function: Callable, *arguments: Any) -> Any:
+    """What foreign code answers; RunFailed if it raises anything but the project's own errors."""
+    try:
+        return function(*arguments)
+    except (InputError, RunFailed):
+        raise
+    except Exception as error:
+        raise RunFailed(name, f"{what} raised {_said(error)}") from error
+
+
+def _numbers(name: str, what: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """An answer as an array of this shape; RunFailed if it is none."""
+    try:
+        found = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise RunFailed(name, f"{what} gave {type(value).__name__} instead of numbers") from None
+    if found.shape != shape:
+        raise RunFailed(name, f"{what} gave the shape {found.shape} instead of {shape}")
+    return found
+
+
+@dataclass
+class Integrated(Reference):
+    """The reference's equations under an integrator from outside; a prescribed pitch is an input of them."""
+
+    name: str
+    integrate: Callable
+
+    def run(self) -> Trajectory:
+        """Stretch by stretch between the knots of the input; raises RunFailed as every engine does."""
+        times = self.settings.step * np.arange(self.settings.steps + 1)
+        states, calls = self._march(times)
+        guard(self.name, times, states, self.settings.duration)
+        self._guide(states)
+        enforced = self._enforced(times, states)
+        guard(self.name, times, states, self.settings.duration, enforced=enforced)
+        return Trajectory(times, states, enforced, {"steps": self.settings.steps, "force calls": calls})
+
+    def _march(self, times: np.ndarray) -> tuple[np.ndarray, int]:
+        """States (n, 8) at the times, and how often the right-hand side was asked for."""
+        states, calls = np.empty((len(times), 8)), [0]
+        y = states[0] = self.assembly.initial
+        knots = np.empty(0) if self._input is None else self._input.knots(self.settings.duration)
+        small = 1e-9 * self.settings.step
+        for start, end in pairwise((0.0, *knots, times[-1])):
+            inside = slice(*np.searchsorted(times, (start + small, end + small)))
+            within = times[inside]
+            last = [] if len(within) and within[-1] > end - small else [end]
+            grid = np.array([start, *within, *last])
+            answer = _asked(self.name, "integrate", self.integrate, self._rhs(start, end, calls), grid, y.copy(),
+                            self.settings.tolerance)  # fmt: skip
+            found = _numbers(self.name, "integrate", answer, (len(grid), 8))
+            states[inside], y = found[1 : 1 + len(within)], found[-1]
+            if not np.isfinite(y).all():
+                raise RunFailed(self.name, "the state became infinite or not a number", start)
+        return states, calls[0]
+
+    def _rhs(self, start: float, end: float, calls: list[int]) -> Callable[[float, np.ndarray], np.ndarray]:
+        derivative, p, at = derivative_of(*self._key), self._p, self._reader(start, end)
+
+        def rhs(t: float, y: np.ndarray) -> np.ndarray:
+            calls[0] += 1
+            dy = derivative(np.ascontiguousarray(y, dtype=float), at(t), p)
+            if not math.isfinite(dy.sum()):
+                raise RunFailed(self.name, "the derivative became infinite or not a number", start)
+            return dy
+
+        return rhs
+
+
+@dataclass
+class Guarded:
+    """An engine from outside behind the guard that every run passes."""
+
+    name: str
+    model: Any
+    assembly: Assembly
+    settings: Settings
+
+    def run(self) -> Trajectory:
+        """What the engine's own run gives, checked."""
+        found = _asked(self.name, "run", self.model.run)
+        if not (hasattr(found, "times") and hasattr(found, "states")):
+            raise RunFailed(self.name, f"run gave {type(found).__name__}, which has no times and states")
+        count = np.size(found.times)
+        times = _numbers(self.name, "run, as times,", found.times, (count,))
+        states = _numbers(self.name, "run, as states,", found.states, (count, 8))
+        enforced = getattr(found, "enforced", None)
+        if self.assembly.guided:
+            enforced = _numbers(self.name, "run, as enforced,", enforced, (count, len(self.assembly.guided)))
+        guard(self.name, times, states, self.settings.duration, enforced=enforced)
+        return Trajectory(times, states, enforced, dict(getattr(found, "counts", {})))
+
+    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
+        """Accelerations (4,) at a state (8,)."""
+        found = _asked(self.name, "acceleration", self.model.acceleration, time, state)
+        return _numbers(self.name, "acceleration", found, (4,))
+
+    def plan(self) -> dict[str, int]:
+        """What was built, as far as the engine says."""
+        blank = {"degrees of freedom": 4 - len(self.assembly.guided), "native items": 0, "callbacks": 0}
+        return blank | dict(getattr(self.model, "plan", dict)())

@@ -1,0 +1,217 @@
+"""Conformity of an engine or an integrator from outside the tree: the checks that the built-in ones pass.
+
+The same functions judge it (``checks``, the hard cases of the pitch plane), so a row means what it means in the
+report. A check in which it raises, or gives something that is no answer, is a failed row with the reason.
+"""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from models.assembly import Assembly, assemble
+from models.engines.catalogue import CATALOGUE, OUTSIDE
+from models.engines.outside import register
+from models.engines.protocol import Settings
+from models.errors import InputError, RunFailed
+from models.result import provenance
+from models.simulate import simulate
+from validation import checks
+from validation.hard_cases.case import Outcome, judge
+from validation.rows import Independence, Row, System, at_most, behaves, not_run
+from validation.run import save, say
+from validation.scenes import VEHICLES, force_scene, road_scene, write_forces
+
+SYSTEM: System = "pitch-plane"
+FAMILIES = ("stepping", "sampled_input", "contact_points", "prescribed_pitch", "stabilisers", "invariants", "extremes")
+"""Families of hard cases that any engine of the pitch plane can be put through."""
+STEP, DURATION = 1e-3, 0.5
+COARSE = 2e-3
+"""Step (s) from which the order is measured by halving."""
+TOLERANCE = 1e-9
+"""Asked of a method that keeps one."""
+LOOSE = 1e-4
+"""Largest state error (m, rad, m/s, rad/s) of a method of order 4 or more at 1 ms; RK4 has 1e-6."""
+EXACT = 1e-11
+"""Errors below this are rounding, in which no order shows."""
+
+Check = tuple[str, str, str, float, str, Callable[[], float]]
+
+
+def conformity(name: str, folder: Path, command: str) -> int:
+    """Run the suite on ``module:Class``; writes report.html, results.json and results.csv, prints the table.
+
+    Returns the number of failed rows; raises InputError if there is no such class.
+    """
+    register(name)
+    with TemporaryDirectory() as own:
+        rows = list(_rows(name, Path(own)))
+    for row in rows:
+        print(f"  {row.status:<8} {row.quantity:<86} {_value(row):>12}  {row.reason}")
+    (folder / "data").mkdir(exist_ok=True)
+    save(folder, rows, {**provenance(command), "engine": name, "seeds": {"random states": checks.SEED}, "quick": False,
+                        "seconds": {}, "wall": None})  # fmt: skip
+    from validation.report.page import write
+
+    return say(rows, None, write(folder))
+
+
+def _value(row: Row) -> str:
+    return f"{row.value:.3g}" if isinstance(row.value, int | float) else str(row.value or "")
+
+
+def _rows(name: str, folder: Path) -> Iterator[Row]:
+    second: Independence = "shared kernel" if hasattr(OUTSIDE[name], "integrate") else "native"
+    for id, quantity, unit, bound, why, error in _checks(name, folder):
+        yield _judged(f"conformity.{id}", quantity, unit, bound, why, error, second)
+    yield _order(name, second)
+    yield _guards(name, folder)
+    yield from _hard_cases(name, folder)
+
+
+def _judged(id: str, quantity: str, unit: str, bound: float, why: str, error: Callable[[], float],
+            second: Independence) -> Row:  # fmt: skip
+    """Row of an error; a check that cannot be carried out is failed, with what was raised."""
+    try:
+        return at_most(id, SYSTEM, quantity, error(), unit, bound, why, second)
+    except (InputError, RunFailed) as reason:
+        return Row(id, SYSTEM, quantity, None, unit, 0.0, bound, why, second, "failed", str(reason))
+
+
+def _settings(name: str, step: float = STEP) -> Settings:
+    return Settings(name, step, DURATION, TOLERANCE)
+
+
+def _run(name: str, assembly: Assembly, settings: Settings) -> Any:
+    """The run itself, so that what it raises is told, which the checks count as infinitely far."""
+    return checks.engine(name)(assembly, settings).run()
+
+
+def _checks(name: str, folder: Path) -> Iterator[Check]:
+    make, settings = checks.engine(name), _settings(name)
+    for vehicle in VEHICLES:
+        for geometry in ("exact", "linear"):
+            yield (f"audit.{vehicle}.{geometry}",
+                   f"acceleration at 100 random states against the equations of the paper, {vehicle}, {geometry}",
+                   "of the largest", 1e-12, "both sides are a dozen products of doubles",
+                   partial(checks.acceleration_gap, make, _road(vehicle, geometry), settings))  # fmt: skip
+    yield ("equilibrium", "distance from the static equilibrium on a flat road", "m, rad, m/s, rad/s", 1e-9,
+           "nothing moves what is at rest", partial(_at_rest, name, settings))  # fmt: skip
+    for kind, scene in _paths(folder).items():
+        yield (f"path.{kind}", f"largest state error, {kind}, against the reference by DOP853 at 1e-13",
+               "m, rad, m/s, rad/s", _bound(name), f"{DURATION:g} s at {STEP:g} s, RK4 has 1e-6 at most",
+               partial(_off, name, assemble(scene), settings))  # fmt: skip
+    yield ("momentum", "vertical momentum against weight less wheel forces over time", "of weight times time",
+           1e-9 if not _adaptive(name) else 1e-7, "an invariant of any vehicle, exact for a sound method",
+           partial(_momentum, name, assemble(_paths(folder)["wheel forces, linear"]), settings))  # fmt: skip
+
+
+def _road(vehicle: str, geometry: str) -> Assembly:
+    audit = import_module("validation.cases.audit")
+    return assemble(audit.scene(vehicle, geometry))
+
+
+def _adaptive(name: str) -> bool:
+    return bool(getattr(OUTSIDE[name], "adaptive", False))
+
+
+def _bound(name: str) -> float:
+    """A method of low order is as far off as its order says, which the order's own row judges."""
+    order = CATALOGUE[name][name].order
+    return 1e-5 if _adaptive(name) else LOOSE if order >= 4 else 0.5
+
+
+def _paths(folder: Path) -> dict[str, Any]:
+    """Scenes whose paths are compared: a road, and wheel forces read in two ways."""
+    if not (folder / "wheel_forces.csv").exists():
+        write_forces(simulate(road_scene(duration=DURATION), "reference"), folder, STEP)
+    return {"study road": road_scene(duration=DURATION),
+            "wheel forces, linear": force_scene(folder, duration=DURATION),
+            "wheel forces, held": force_scene(folder, duration=DURATION, interpolation="held")}  # fmt: skip
+
+
+def _truth(assembly: Assembly, step: float = STEP) -> Any:
+    return checks.engine("reference")(assembly, Settings("DOP853", step, DURATION, 1e-13)).run()
+
+
+def _off(name: str, assembly: Assembly, settings: Settings) -> float:
+    return checks.state_gap(_run(name, assembly, settings), _truth(assembly))
+
+
+def _at_rest(name: str, settings: Settings) -> float:
+    from models.scene import build
+
+    flat = assemble(build({"title": "at rest", "run": {"duration": DURATION, "step": STEP}}))
+    _run(name, flat, settings)
+    return checks.equilibrium_gap(checks.engine(name), flat, settings)
+
+
+def _momentum(name: str, assembly: Assembly, settings: Settings) -> float:
+    _run(name, assembly, settings)
+    return checks.momentum_gap(checks.engine(name), assembly, settings)
+
+
+def _order(name: str, second: Independence) -> Row:
+    """Observed order of a method of fixed steps, or that a tighter tolerance gives a smaller error."""
+    road = assemble(road_scene(duration=DURATION))
+    if _adaptive(name):
+        return _judged("conformity.tolerance", "error at a tolerance of 1e-9 by that at 1e-5", "ratio", 0.1,
+                       "a method that keeps a tolerance is the more exact the tighter it is",
+                       partial(_tightened, name, road), second)  # fmt: skip
+    declared, why = CATALOGUE[name][name].order, "one halving; the band leaves room for the next term of the error"
+
+    def gap() -> float:
+        errors = [checks.state_gap(_run(name, road, _settings(name, step)), _truth(road)) for step in (COARSE, STEP)]
+        return 0.0 if errors[0] < EXACT else abs(float(np.log2(errors[0] / errors[1])) - declared)
+
+    return _judged("conformity.order", f"observed order less the declared {declared}", "", 0.35, why, gap, second)
+
+
+def _tightened(name: str, road: Assembly) -> float:
+    loose = Settings(name, STEP, DURATION, 1e-5)
+    errors = [checks.state_gap(_run(name, road, own), _truth(road)) for own in (loose, _settings(name))]
+    return errors[1] / errors[0] if errors[0] > EXACT else 0.0
+
+
+def _guards(name: str, folder: Path) -> Row:
+    """Forces of a thousand times the weight throw the vehicle out of all bounds, which must not pass as an answer."""
+    throw = folder / "throw"
+    throw.mkdir(exist_ok=True)
+    run = simulate(road_scene(duration=DURATION), "reference")
+    for channel in ("f1", "f2"):
+        run.data[channel].values[:] *= 1e6
+    write_forces(run, throw, STEP)
+    try:
+        _run(name, assemble(force_scene(throw, duration=DURATION)), _settings(name))
+        found = "silent"
+    except RunFailed:
+        found = "raised"
+    except InputError:
+        found = "refused"
+    return behaves("conformity.guard", SYSTEM, "a run that leaves all bounds", found, "raised",
+                   "what is no vehicle any more is no answer")  # fmt: skip
+
+
+def _hard_cases(name: str, folder: Path) -> Iterator[Row]:
+    for family in FAMILIES:
+        for case in import_module(f"validation.hard_cases.{family}").CASES:
+            id = f"conformity.hard.{case.name.replace(',', '').replace(' ', '-')}"
+            quantity, own = f"hard case: {case.name}: {case.check}", folder / id
+            own.mkdir()
+            try:
+                outcome = judge(case, name, own)
+            except KeyError as error:
+                if error.args != (name,):
+                    raise
+                yield not_run(id, SYSTEM, quantity, "is about the built-in implementations")
+                continue
+            except Exception as error:  # what foreign code leads to is a row, not the end of the table
+                outcome = Outcome("SILENT", float("inf"), f"{type(error).__name__}: {error}")
+            good = outcome.word != "SILENT"
+            yield behaves(id, SYSTEM, quantity, outcome.word if good else f"SILENT, off by {outcome.error:.3g}",
+                          outcome.word if good else "right, refused or raised",
+                          f"{case.hard}{f': {outcome.message}' if outcome.message else ''}")  # fmt: skip
