@@ -224,6 +224,10 @@ def _raises(given):
     raise ValueError("no idea")
 
 
+def _exits(given):
+    raise SystemExit(0)
+
+
 def _sleeps(given):
     time.sleep(5.0)
 
@@ -238,6 +242,7 @@ def _loops(given):
 
 @pytest.mark.parametrize(("answer", "name"), [
     (_raises, "crash: ValueError: no idea"),
+    (_exits, "crash: SystemExit: 0"),
     (_sleeps, "silence: no answer within 0.05 s"),
     (_loops, "silence: no answer within 0.05 s"),
     (lambda given: None, "wrong frame"),

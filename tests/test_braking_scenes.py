@@ -11,7 +11,7 @@ import pytest
 from models.braking.adhesion import Adhesion, NoAdhesion, utilisation
 from models.braking.controller import Command
 from models.braking.of_scene import braked
-from models.braking.plan import check, describe
+from models.braking.plan import check, check_reference, describe
 from models.braking.port.ask import ControllerFailed
 from models.braking.port.example import Example
 from models.braking.procedures import drive, ready
@@ -192,6 +192,44 @@ def test_what_is_wrong_behind_the_port_is_told_by_the_scene_s_key(tmp_path, port
     with pytest.raises(InputError, match=said) as error:
         drive(build({**PLAIN, "port": port}, "s.toml", tmp_path), "stop")
     assert error.value.file == "s.toml" and error.value.place == place
+
+
+@pytest.mark.parametrize(("port", "engines", "said"), [
+    ({"log": "{engine}.log"}, ("reference",), r"{procedure} in it: 2"),
+    ({"log": "{procedure}.log"}, ("reference", "mujoco"), r"{engine} in it: 2"),
+    ({"log": "none/{procedure}.log"}, ("reference",), "no such folder"),
+    ({"log": "{procedure}.csv"}, ("reference",), "is no log"),
+    ({"log": ".{procedure}"}, ("reference",), "is a folder"),
+])  # fmt: skip
+def test_a_log_that_another_drive_or_file_would_lose_is_refused(tmp_path, port, engines, said):
+    (tmp_path / "b.csv").write_text("mine")
+    (tmp_path / ".b").mkdir()
+    two = {"procedures": {"a": {"speed": 9.0}, "b": {"speed": 8.0}}}
+    with pytest.raises(InputError, match=said) as error:
+        check(build({**PLAIN, **two, "port": port}, "s.toml", tmp_path), engines)
+    assert error.value.place == "port.log"
+
+
+def test_a_study_of_many_drives_keeps_no_log():
+    with pytest.raises(InputError, match="many times"):
+        check_reference(scene(port={"log": "a.log"}), ())
+
+
+def test_the_surface_on_the_right_is_told_by_its_procedure():
+    with pytest.raises(InputError, match="icee") as error:
+        describe(scene(procedures={"a": {"kind": "split", "right": "icee"}}))
+    assert error.value.place == "procedures.a.right"
+
+
+def test_stretches_shorter_than_a_step_are_told_before_a_run():
+    with pytest.raises(InputError, match="way in a step") as error:
+        check(scene(road={"stretches": [{"left": "ice"}, {"x": 1.0, "left": "dry"}, {"x": 1.001, "left": "ice"}]}), ())
+    assert (error.value.file, error.value.place) == ("s.toml", "road.stretches")
+
+
+def test_a_run_of_less_than_two_samples_is_refused():
+    with pytest.raises(InputError, match=r"at least 0\.011 s"):
+        scene(run={"duration": 0.01})
 
 
 def test_adhesion_of_an_axle_that_does_not_lock_is_not_told():

@@ -4,6 +4,7 @@ from models.braking.of_scene import braked, controller_of, surfaces_of, vehicle_
 from models.braking.port.setup import BEHIND, check_port
 from models.braking.procedures import check_engine, engines_of, port_of, ready
 from models.braking.scene import BrakingScene
+from models.braking.tyre_source import NAMES
 from models.errors import InputError
 
 PROCEDURES = {
@@ -18,25 +19,43 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
     for engine in engines_of(scene, engines):
         check_engine(scene, engine)
-    _check_parts(scene)
+    _check_parts(scene, engines_of(scene, engines))
     for name in scene.procedures:
         ready(scene, name)
 
 
-def _check_parts(scene: BrakingScene) -> None:
+def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Tyres, brakes, road, controller and port, without a step of the vehicle."""
     for name, own in scene.procedures.items():
+        known = (*NAMES, *scene.tyres.files)
+        if own.right is not None and own.right not in known:
+            raise InputError(scene.file, f"procedures.{name}.right", own.right, "no such surface", known)
         vehicle = braked(scene, own)
         controller_of(scene, vehicle.plane.wheels, name)
         if scene.port is not None:
-            check_port(scene.port, port_of(scene, name, vehicle))
+            for engine in engines:
+                check_port(scene.port, port_of(scene, name, vehicle, engine))
+    if scene.port is not None and scene.port.log is not None:
+        _check_log(scene, scene.port.log, len(engines))
+
+
+def _check_log(scene: BrakingScene, log: str, engines: int) -> None:
+    """Each drive writes a log of its own."""
+    drives = {"procedure": len(scene.procedures), "engine": engines}
+    for key, several in drives.items():
+        if several > 1 and f"{{{key}}}" not in log:
+            allowed = f"must have {{{key}}} in it: {several} of them are driven, and each writes a log of its own"
+            raise InputError(scene.file, "port.log", log, allowed)
 
 
 def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
-    """Refuse an engine on its own where a study computes by the reference."""
+    """Refuse an engine on its own where a study computes by the reference, and a log of its many drives."""
     if engines and "reference" not in engines:
         allowed = f"the study {scene.study!r} computes by the reference: leave it out"
         raise InputError("--engine", "", engines[0], allowed)
+    if scene.port is not None and scene.port.log is not None:
+        allowed = f"the study {scene.study!r} drives many times: leave the log out"
+        raise InputError(scene.file, "port.log", scene.port.log, allowed)
 
 
 def describe(scene: BrakingScene) -> str:
@@ -44,7 +63,7 @@ def describe(scene: BrakingScene) -> str:
 
     Raises InputError for parts that cannot be.
     """
-    _check_parts(scene)
+    _check_parts(scene, engines_of(scene, ())[:1])
     vehicle, run = vehicle_of(scene), scene.run
     axles = (vehicle.front.x, vehicle.rear.x)
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]

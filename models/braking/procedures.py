@@ -14,7 +14,7 @@ from models.braking.port.setup import Run, opened
 from models.braking.run import Braked, Path, Start
 from models.braking.scene import BrakingScene, Procedure
 from models.braking.steering import Response, Steering, response
-from models.braking.surfaces import under_wheels
+from models.braking.surfaces import check_way, under_wheels
 from models.errors import InputError, Refused
 
 UNBRAKED = 4.0
@@ -35,6 +35,10 @@ def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
     """Vehicle and start of a procedure; InputError for a circle that tyres cannot hold."""
     own = scene.procedures[name]
     vehicle = braked(scene, own)
+    try:
+        check_way(vehicle.road, scene.run.sample / scene.run.substeps * own.speed)
+    except InputError as error:
+        raise InputError(scene.file, f"road.{error.place}", error.value, error.allowed) from None
     if own.radius is not None:
         turn = steady_turn(vehicle, own.speed, own.radius)
         if turn is not None and vehicle.sprung is not None:
@@ -94,7 +98,7 @@ def drive(scene: BrakingScene, name: str, engine: str | None = None) -> Path:
         from models.engines.braking import Carried
 
         vehicle = replace(vehicle, engine=Carried(engine, vehicle.plane))
-    return looped(scene, name, vehicle, start)
+    return looped(scene, name, vehicle, start, engine)
 
 
 def check_engine(scene: BrakingScene, engine: str) -> None:
@@ -105,21 +109,23 @@ def check_engine(scene: BrakingScene, engine: str) -> None:
         raise Refused(engine, "it has no suspension, roll and pitch: use --engine mujoco or exudyn", scene.file)
 
 
-def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start) -> Path:
-    """One run from a start with the scene's controller in the loop, or with what stands behind the port instead."""
+def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str = "") -> Path:
+    """One run from a start with the scene's controller in the loop, or with what stands behind the port instead; of
+    the engine only the name is needed, for files."""
     own = controller_of(scene, vehicle.plane.wheels, name)
     if scene.port is None:
         return vehicle.run(own, start, scene.run.duration)
-    with opened(scene.port, port_of(scene, name, vehicle), own) as (controller, clock):
+    with opened(scene.port, port_of(scene, name, vehicle, engine), own) as (controller, clock):
         path = vehicle.run(controller, start, scene.run.duration)
     return path if clock is None else replace(path, clock=clock.report())
 
 
-def port_of(scene: BrakingScene, name: str, vehicle: Braked) -> Run:
+def port_of(scene: BrakingScene, name: str, vehicle: Braked, engine: str) -> Run:
     """What the port needs to know; a log is that of a vehicle and its drive, whatever answered."""
     known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}
     text = json.dumps([name, known], sort_keys=True)
-    return Run(vehicle.plane.radius, scene.run.sample, text, Folder(scene.folder), scene.file, name)
+    return Run(vehicle.plane.radius, scene.run.sample, text, Folder(scene.folder), scene.file, name,
+               engine)  # fmt: skip
 
 
 def steered(vehicle: Braked, angle: float) -> np.ndarray:

@@ -216,5 +216,8 @@ def _check_run(scene: BrakingScene) -> None:
         raise InputError(scene.file, "run.sample", scene.run.sample, "must be from 0.0001 to 0.1 s")
     if scene.pressure is not None and scene.pressure.delay > 1.0:
         raise InputError(scene.file, "pressure.delay", scene.pressure.delay, "must be at most 1 s")
+    if scene.run.duration < 2.0 * scene.run.sample:
+        raise InputError(scene.file, "run.duration", scene.run.duration, f"must be at least {2.0 * scene.run.sample:g} "
+                         "s, two samples")  # fmt: skip
     if scene.run.duration > 1000.0:
         raise InputError(scene.file, "run.duration", scene.run.duration, "must be at most 1000 s")

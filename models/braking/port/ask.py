@@ -32,7 +32,7 @@ def ask(controller: Controller, given: Sample) -> Command:
         command = controller.sample(given)
     except RunFailed:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ControllerFailed(given, "crash", f"{type(error).__name__}: {error}") from error
     return checked(command, given)
 

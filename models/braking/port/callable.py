@@ -24,7 +24,7 @@ def named_controller(name: str, folder: Path, wheels: int, parameters: dict[str,
     make = _find(name, folder, file)
     try:
         made = make(wheels, **parameters)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(file, "port.callable", name, f"was not made: {type(error).__name__}: {error}") from error
     if not callable(getattr(made, "sample", None)):
         raise InputError(file, "port.callable", name, "makes something that has no method sample(given)")
@@ -37,7 +37,7 @@ def _find(name: str, folder: Path, file: str) -> Callable[..., Any]:
         raise InputError(file, "port.callable", name, 'must be "module:Name" or "file.py:Name"')
     try:
         module = _of_file(folder / place) if place.endswith(".py") else import_module(place)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(file, "port.callable", name, f"was not loaded: {type(error).__name__}: {error}") from error
     choices = tuple(key for key in vars(module) if not key.startswith("_"))
     if attribute not in choices:

@@ -46,16 +46,29 @@ def logged(inner: Controller, path: Path, scene: str) -> Iterator[Logged]:
         yield Logged(inner, file)
 
 
+def refusal(path: Path) -> str:
+    """Why no log can be written to a path, "" if one can: a log of before is written anew, no other file is."""
+    if path.is_dir():
+        return "is a folder: name a file"
+    if not path.parent.is_dir():
+        return f"no such folder: {str(path.parent)!r}"
+    if not path.exists():
+        return ""
+    with path.open("rb") as file:
+        known = file.read(len(TITLE)) == TITLE
+    return "" if known else "is a file that is no log, and would be overwritten: name another one"
+
+
 class Replay:
     """Answers as a log does, as long as it is asked as the log was; raises InputError for the log of another scene."""
 
     def __init__(self, path: Path, scene: str) -> None:
         try:
-            title, name, records = path.read_bytes().split(b"\n", 2)
-        except (OSError, ValueError) as error:
-            raise InputError(path.name, "replay", None, f"is no log: {error}") from None
+            title, name, records = (path.read_bytes() + b"\n\n").split(b"\n", 2)
+        except OSError as error:
+            raise InputError(path.name, "replay", None, f"cannot be read: {error.strerror}") from None
         if title + b"\n" != TITLE:
-            raise InputError(path.name, "replay", None, "is no log of this version")
+            raise InputError(path.name, "replay", None, "is no log of the port, or of another version of it")
         if name != scene.encode():
             raise InputError(path.name, "replay", None, "is the log of another scene")
         self._records, self._path = records, path

@@ -15,7 +15,7 @@ from models.braking.port import fmu_port, socket_port
 from models.braking.port.ask import Asked
 from models.braking.port.callable import Within, named_controller
 from models.braking.port.faults import Fault, Faulty, missing_teeth
-from models.braking.port.log import Replay, logged, name_of
+from models.braking.port.log import Replay, logged, name_of, refusal
 from models.braking.port.pace import WallClock
 from models.braking.port.sensors import Conversion, sensed
 from models.braking.port.teeth import Counted, Teeth
@@ -27,7 +27,8 @@ BEHIND = ("callable", "command", "port", "fmu", "replay")
 
 
 class PortTable(Strict):
-    """[port]: paths are seen from the scene's folder; {procedure} in them is the name of what is driven."""
+    """[port]: paths are seen from the scene's folder; {procedure} in them is the name of what is driven, {engine} that
+    of what computes it."""
 
     callable: str | None = Field(default=None, description="module:Name or file.py:Name, a class")
     parameters: dict[str, Any] = Field(default_factory=dict, description="of the callable")
@@ -59,7 +60,7 @@ class PortTable(Strict):
 @dataclass(frozen=True)
 class Run:
     """What the port needs to know of a run. radius (W,): of the wheels, m; sample: s; scene: its text, by which a log
-    is known; folder: of its paths; file: its name, for messages.
+    is known; folder: of its paths; file: its name, for messages; procedure, engine: names for those of its files.
     """
 
     radius: np.ndarray
@@ -68,10 +69,11 @@ class Run:
     folder: Path = Path()
     file: str = ""
     procedure: str = ""
+    engine: str = ""
 
     def path(self, name: str) -> Path:
         """A file that the table names."""
-        return self.folder / name.replace("{procedure}", self.procedure)
+        return self.folder / name.replace("{procedure}", self.procedure).replace("{engine}", self.engine)
 
 
 @contextmanager
@@ -130,11 +132,14 @@ def _told_of_scene(table: PortTable, run: Run) -> Iterator[None]:
 
 
 def check_port(table: PortTable, run: Run) -> None:
-    """Refuse files that are not there and faults of wheels or teeth that are not."""
+    """Refuse files that are not there or must stay as they are, and faults of wheels or teeth that are not."""
     for key in ("fmu", "replay"):
         name = getattr(table, key)
         if name is not None and not run.path(name).is_file():
             raise InputError(run.file, f"port.{key}", name, f"no such file, looked for as {str(run.path(name))!r}")
+    reason = "" if table.log is None else refusal(run.path(table.log))
+    if reason:
+        raise InputError(run.file, "port.log", table.log, reason)
     wheels = run.radius.size
     for i, fault in enumerate(table.faults):
         for wheel in fault.of(wheels):
