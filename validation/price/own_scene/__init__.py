@@ -45,18 +45,42 @@ class Answer:
 
 
 class OwnScene(Protocol):
-    """What the search asks of a scene.
+    """What the search asks of a scene."""
 
-    title : of the scene; quantity, unit : what the tolerance is set on; whole : length of the scene's run, s; first :
-    length of the part that is searched, s; note : what is left out, "" if nothing is
-    """
+    @property
+    def title(self) -> str:
+        """Of the scene."""
+        ...
 
-    title: str
-    quantity: str
-    unit: str
-    whole: float
-    first: float
-    note: str
+    @property
+    def quantity(self) -> str:
+        """What the tolerance is set on."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """Of the quantity."""
+        ...
+
+    @property
+    def whole(self) -> float:
+        """Length of the scene's run, s."""
+        ...
+
+    @property
+    def first(self) -> float:
+        """Length of the part that is searched, s."""
+        ...
+
+    @property
+    def cell(self) -> float:
+        """Time between kinks of the quantity, s; 0 where there are none."""
+        ...
+
+    @property
+    def note(self) -> str:
+        """What is left out, "" if nothing is."""
+        ...
 
     def ladders(self) -> list[Ladder]:
         """Every method of every engine that was asked for."""

@@ -66,6 +66,11 @@ class OwnPitchPlane:
         return signal is not None and signal.period is not None and len(signal.knots(self.whole)) > 0
 
     @property
+    def cell(self) -> float:
+        """The sampling period of an input with a kink at every sample."""
+        return self.base if self.sampled else 0.0
+
+    @property
     def note(self) -> str:
         """What is left out."""
         return "adaptive methods are left out: they restart at every sample" if self.sampled else ""

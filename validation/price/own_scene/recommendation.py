@@ -11,13 +11,13 @@ from models.errors import InputError
 from validation.price.own_scene import Ladder, OwnScene
 from validation.price.own_scene.search import Search, Tried
 from validation.price.own_scene.truth import Truth, truth
-from validation.timing import interleave
+from validation.timing import interleave, paired_ratio
 
 SYSTEMS = {"pitch-plane": "validation.price.own_scene.pitch_plane"}
 """Systems whose scenes have a price, and the modules that know them."""
 NEAR = 2.5
 """Settings that took up to so many times the least seconds in one run are timed beside one another."""
-ROUNDS, LEAST = 5, 0.01
+ROUNDS, LEAST = 7, 0.01
 """Interleaved rounds of timing; a short run is repeated until its turn lasts this long (s)."""
 ATTEMPTS = 6
 """Settings that are confirmed over the whole run, at most, for one recommendation."""
@@ -25,13 +25,15 @@ ATTEMPTS = 6
 
 @dataclass(frozen=True)
 class Choice:
-    """A setting with the error that it has (in the quantity's unit), its force calls, and its seconds (median)."""
+    """A setting with the error that it has (in the quantity's unit), its force calls, its seconds (median), and those
+    of the rounds in which it was timed beside others; ``confirmed`` : over the whole run."""
 
     tried: Tried
     error: float
     calls: float
     seconds: float
     confirmed: bool
+    rounds: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -96,15 +98,28 @@ def _timed(search: Search) -> list[Choice]:
              for one in found}  # fmt: skip
     near = [one for one in found if one.seconds <= NEAR * least[one.setting.engine]]
     jobs = [partial(search.scene.solve, one.setting, search.duration) for one in near]
-    taken = dict(zip((id(one) for one in near), np.median(interleave(jobs, ROUNDS, LEAST), axis=1), strict=True))
+    taken = dict(zip((one.setting for one in near), interleave(jobs, ROUNDS, LEAST), strict=True))
     longer = search.scene.whole / search.duration
-    return [Choice(one, one.error, longer * one.calls, longer * float(taken.get(id(one), one.seconds)), False)
-            for one in found]  # fmt: skip
+    rounds = {one.setting: tuple(longer * taken.get(one.setting, np.array([one.seconds]))) for one in found}
+    return [Choice(one, one.error, longer * one.calls, float(np.median(rounds[one.setting])), False,
+                   rounds[one.setting]) for one in found]  # fmt: skip
 
 
 def _cheapest(timed: list[Choice], engine: str, kind: str) -> Choice | None:
+    """The least cost; an engine's default method is kept where it does not take longer beyond doubt: seconds wander."""
     able = [one for one in timed if one.tried.setting.engine.startswith(engine)]
-    return min(able, key=lambda one: getattr(one, kind)) if able else None
+    if not able:
+        return None
+    best = min(able, key=lambda one: getattr(one, kind))
+    usual = [one for one in able if one.tried.setting.default and kind == "seconds" and not _slower(one, best)]
+    return min(usual, key=lambda one: one.seconds) if usual else best
+
+
+def _slower(one: Choice, best: Choice) -> bool:
+    """Whether a choice takes longer than another one, beyond doubt where both were timed in the same rounds."""
+    if len(one.rounds) != len(best.rounds) or len(one.rounds) == 1:
+        return one.seconds > best.seconds
+    return paired_ratio(one.rounds, best.rounds)[1] > 1.0
 
 
 def _confirmed(search: Search, timed: list[Choice],
@@ -128,7 +143,7 @@ def _over_all(over: Search, ladder: Ladder, one: Choice) -> Choice | None:
         now = over.attempt(ladder.setting(i))
         if now.error <= over.tolerance:
             ratio = 1.0 if ladder.adaptive else first.setting.value / now.setting.value
-            return Choice(now, now.error, now.calls, ratio * one.seconds, True)
+            return Choice(now, now.error, now.calls, ratio * one.seconds, True, tuple(ratio * s for s in one.rounds))
         finer = (now.error / over.tolerance) ** (1 / (ladder.order or 1)) if np.isfinite(now.error) else 2.0
         wanted = ladder.values[i] / finer
         i = next((k for k in range(i + 1, len(ladder.values)) if ladder.values[k] <= wanted * (1 + 1e-9)), -1)

@@ -12,24 +12,28 @@ SURE = 20.0
 """Halving the step of the reference changes less than this part of the tolerance."""
 AGREED = 4.0
 """A solver of another family differs by less than this part of the tolerance."""
+NEARLY = 1e-3
+"""Of a row's spacing: times so near to a row are its own, to the rounding of times."""
 MOST_ROWS = 4_000_000
 """Rows of a reference: beyond, it takes gigabytes."""
 
 
 @dataclass(frozen=True)
 class Truth:
-    """answer : of the reference; uncertainty : in the unit of the quantity; rung : of the reference's ladder."""
+    """answer : of the reference; uncertainty : in the unit of the quantity; rung : of the reference's ladder; cell : s
+    between kinks of the quantity, 0 where there are none."""
 
     answer: Answer
     uncertainty: float
     how: str
     rung: int
+    cell: float = 0.0
 
     def error(self, other: Answer) -> float:
         """Largest difference over the run, at the other's own instants; infinite for what is not finite."""
         if not np.isfinite(other.values).all():
             return float("inf")
-        return float(np.abs(other.values - at(self.answer, other.times)).max())
+        return float(np.abs(other.values - at(self.answer, other.times, self.cell)).max())
 
     @property
     def size(self) -> float:
@@ -37,16 +41,18 @@ class Truth:
         return float(np.abs(self.answer.values).max())
 
 
-def at(answer: Answer, times: np.ndarray) -> np.ndarray:
-    """Values (m, k) at ``times`` (m,) in s: those of the rows where they lie on them, else cubic between four rows."""
-    if len(answer.times) < 5:
-        return answer.values
-    step = float(answer.times[-1]) / (len(answer.times) - 1)
+def at(answer: Answer, times: np.ndarray, cell: float = 0.0) -> np.ndarray:
+    """Values (m, k) at ``times`` (m,) in s: those of the rows where they lie on them, else cubic between four rows,
+    all of them of one cell."""
+    last = len(answer.times) - 1
+    step = float(answer.times[-1]) / last
     place = times / step
     index = np.rint(place).astype(int)
-    if np.abs(place - index).max() < 1e-6 * len(answer.times) and np.abs(place - index).max() < 1e-3:
-        return answer.values[np.minimum(index, len(answer.times) - 1)]
-    left = np.clip(np.floor(place).astype(int) - 1, 0, len(answer.times) - 4)
+    if np.abs(place - index).max() < NEARLY:
+        return answer.values[np.minimum(index, last)]
+    rows = max(3, round(cell / step)) if cell else last
+    first = np.minimum((place + NEARLY) // rows * rows, last - 3).astype(int)
+    left = np.clip(np.floor(place).astype(int) - 1, first, np.minimum(first + rows, last) - 3)
     s = place - left
     weights = (-(s - 1) * (s - 2) * (s - 3) / 6, s * (s - 2) * (s - 3) / 2, -s * (s - 1) * (s - 3) / 2,
                s * (s - 1) * (s - 2) / 6)  # fmt: skip
@@ -62,13 +68,21 @@ def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twi
     found, rung, change = _settled(scene, ladder, tolerance, duration, rung)
     said = f"{ladder.engine} {ladder.method} at {ladder.setting(rung).label()}"
     other = scene.second() if twice else None
+    alone = Truth(found, change, f"{said}; halving its step changes", rung, scene.cell)
     if other is None:
-        return Truth(found, change, f"{said}; halving its step changes", rung)
-    differs = Truth(found, change, "", rung).error(scene.answer(scene.solve(other, duration)))
+        return alone
+    differs = alone.error(scene.answer(scene.solve(other, duration)))
     if differs > tolerance / AGREED:
         raise RunFailed("reference", f"{said} and {_named(other)} differ by {differs:.3g} {scene.unit}: the tolerance "
                         "cannot be judged")  # fmt: skip
-    return Truth(found, max(change, differs), f"{said} and {_named(other)}, which differ by", rung)
+    return Truth(found, max(change, differs), f"{said} and {_named(other)}, which differ by", rung, scene.cell)
+
+
+def _change(scene: OwnScene, before: Answer, now: Answer) -> float:
+    """Largest difference that half the step makes, at the rows of both: between rows the coarser one is interpolated.
+    """
+    both = ((now, before), (before, now))
+    return max(Truth(one, 0.0, "", 0, scene.cell).error(other) for one, other in both)
 
 
 def _named(setting: Setting) -> str:
@@ -90,10 +104,10 @@ def _settled(scene: OwnScene, ladder: Ladder, tolerance: float, duration: float,
             before, failure = None, str(error)
             continue
         if before is not None:
-            last, change = change, Truth(now, 0.0, "", i).error(before)
+            last, change = change, _change(scene, before, now)
             if change <= tolerance / SURE:
                 return now, i, change
-            if change > 0.7 * last and change < 1e-6 * Truth(now, 0.0, "", i).size:
+            if change > 0.7 * last and change < 1e-6 * float(np.abs(now.values).max()):
                 break  # rounding: finer steps no longer help
         before = now
     if before is None:
