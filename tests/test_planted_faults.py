@@ -6,20 +6,27 @@ import pytest
 from models.engines import exudyn, mujoco, reference
 from models.vehicles import pitch_plane_equations as equations
 from validation import checks
-from validation.cases import planted_faults as case
+from validation.cases import planted_faults
+from validation.faults import pitch_plane as case
 from validation.faults.bench import CHECKS, Bench, size
 from validation.faults.planting import CLEAN, FAULTS, planted
 
 
 @pytest.fixture(scope="module")
-def measured(tmp_path_factory):
-    """The quick case: every fault in short runs."""
-    return case.measure(True, tmp_path_factory.mktemp("faults"))
+def measured():
+    """Every fault of the pitch plane."""
+    return case.measure()
+
+
+@pytest.fixture(scope="module")
+def campaigns():
+    """Every fault of every other system."""
+    return {own.id: own.measure() for own in planted_faults.CAMPAIGNS}
 
 
 @pytest.fixture(scope="module")
 def found(measured):
-    return {record["fault"]: record for record in measured[1]["faults"]}
+    return {record["fault"]: record for record in measured["faults"]}
 
 
 def fault(name):
@@ -32,7 +39,28 @@ def test_there_are_enough_and_each_has_a_name_of_its_own():
 
 
 def test_all_rows_pass(measured):
-    assert [row.reason for row in measured[0] if row.status != "passed"] == []
+    assert [row.reason for row in case.rows(measured) if row.status != "passed"] == []
+
+
+@pytest.mark.parametrize("own", planted_faults.CAMPAIGNS, ids=lambda own: own.id)
+def test_every_fault_of_a_campaign_is_caught_and_nothing_else(own, campaigns):
+    assert [row.reason for row in own.rows(campaigns[own.id]) if row.status != "passed"] == []
+    assert len({(fault.place, fault.name) for fault in own.faults}) == len(own.faults) >= 6
+
+
+def test_one_table_has_the_faults_of_all_systems(measured, campaigns):
+    whole, *_ = planted_faults.tables({"pitch-plane": measured, **campaigns})
+    assert len(whole.rows) >= 120 and len({line[0] for line in whole.rows}) >= 6
+    assert all(line[3] != "none" for line in whole.rows)
+    assert sum(line[4] != "" for line in whole.rows) > len(whole.rows) / 2  # no one check would do
+
+
+def test_the_quick_share_plants_in_every_system_and_says_of_how_many(tmp_path):
+    rows, data = planted_faults.measure(True, tmp_path)
+    assert [row.reason for row in rows if row.status != "passed"] == []
+    assert set(data) == {"pitch-plane", *(own.id for own in planted_faults.CAMPAIGNS)}
+    assert all(len(data[own.id]) > 1 for own in planted_faults.CAMPAIGNS)
+    assert "2 of 47 were planted" in next(row.why for row in rows if row.id == "planted.caught")
 
 
 def test_every_fault_is_caught_in_every_engine_that_has_it(found):
@@ -95,13 +123,13 @@ def test_a_run_that_fails_is_infinitely_far():
 
 
 def test_tables_name_every_fault_and_every_check(measured):
-    checks_table, faults_table = case.tables(measured[1])
+    checks_table, faults_table = case.tables(measured)
     assert [line[0] for line in checks_table.rows] == list(CHECKS)
     assert [line[0] for line in faults_table.rows] == [fault.name for fault in FAULTS]
     assert all(line[2] for line in faults_table.rows), "each is caught by something"
 
 
 def test_figure_draws_from_saved_data(measured):
-    ((caption, figure),) = case.draw(measured[1])
+    ((caption, figure),) = case.draw(measured)
     assert "5 faults" in caption
     figure.canvas.draw()

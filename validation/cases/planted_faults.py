@@ -1,146 +1,55 @@
-"""Planted faults: whether the checks see what they are there to see, on both vehicles."""
+"""Planted faults of all systems: each is put into one side on purpose, and the checks must see it.
 
-import math
+In full every fault is planted. The quick share plants two of the pitch plane on one vehicle and every eighth of the
+other systems, beside all runs without a fault that these need.
+"""
+
 from pathlib import Path
 from typing import Any
 
-from validation.faults.bench import CHECKS, Bench, size
-from validation.faults.planting import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, Fault, planted
-from validation.rows import Row, System, Table, finding, within
+from validation.faults import braking, contact, hubs, measuring, pitch_plane, ride, tyres, wheelset
+from validation.faults.campaign import SYSTEM
+from validation.faults.planting import CLEAN, DESCRIPTION, EQUATIONS
+from validation.rows import Row, Table, at_most
 
 TITLE = "Planted faults: what each check sees"
-SYSTEM: System = "pitch-plane"
-TWIN, SYMMETRIC = "asymmetric_twin", "itwm_drift"
-DURATION, QUICK_DURATION = 0.4, 0.1
-HIDDEN = ("a and b swapped", "front and rear suspension swapped", "front and rear tyre swapped",
-          "front and rear wheel mass swapped", "chassis row of eq. (39) with the other sign")  # fmt: skip
-"""What a vehicle with equal halves cannot show: exchanges of the halves, and terms in k3 b - k4 a."""
+CAMPAIGNS = (contact.CAMPAIGN, ride.CAMPAIGN, wheelset.CAMPAIGN, tyres.CAMPAIGN, hubs.CAMPAIGN, braking.CAMPAIGN,
+             measuring.CAMPAIGN)  # fmt: skip
+FEW = (DESCRIPTION[0], EQUATIONS[0])
+EVERY, LEAST = 8, 40
+"""Quick share of the campaigns; faults that there must be in all."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Every fault on both vehicles under every check; ``quick`` shortens the runs, it leaves no fault out."""
-    benches = [Bench(name, QUICK_DURATION if quick else DURATION) for name in (TWIN, SYMMETRIC)]
-    clean = [_record(fault, benches) for fault in CLEAN]
-    found = [_record(fault, benches) for fault in FAULTS]
-    return _rows(clean, found), {"clean": clean, "faults": found}
+    """Rows by system and of the whole."""
+    plane = pitch_plane.measure(FEW, CLEAN[:1], (pitch_plane.TWIN,)) if quick else pitch_plane.measure()
+    data: dict[str, Any] = {"pitch-plane": plane, **{own.id: own.measure(EVERY if quick else 1) for own in CAMPAIGNS}}
+    rows = [*pitch_plane.rows(plane), *(row for own in CAMPAIGNS for row in own.rows(data[own.id]))]
+    return [*rows, *([] if quick else [_enough(data)])], data
 
 
-def _record(fault: Fault, benches: list[Bench]) -> dict[str, Any]:
-    """Size over tolerance of every check, by vehicle and engine; None stands for a refused or failed run."""
-    ratios = {
-        bench.parameters: {
-            engine: {name: _ratio(fault, engine, name, bench) for name in CHECKS} for engine in fault.engines
-        }
-        for bench in benches
-    }
-    return {"fault": fault.name, "place": _place(fault), "engines": fault.engines, "ratios": ratios}
+def _enough(data: dict[str, Any]) -> Row:
+    caught = sum(line[3] != "none" for line in _lines(data))
+    return at_most("planted.count", SYSTEM, f"by how many fewer than {LEAST} faults of all systems are caught",
+                   max(0, LEAST - caught), "faults", 0, f"{caught} of {len(_lines(data))} are", "native")  # fmt: skip
 
 
-def _ratio(fault: Fault, engine: str, name: str, bench: Bench) -> float | None:
-    check = CHECKS[name]
-    found = size(check, bench, engine, planted(fault, engine)) / check.tolerance(engine)
-    return found if math.isfinite(found) else None
-
-
-def _place(fault: Fault) -> str:
-    places = {"description": DESCRIPTION, "input": INPUT, "adapter": ADAPTER, "equations": EQUATIONS}
-    return next((name for name, group in places.items() if fault in group), "nowhere")
-
-
-def seen(record: dict[str, Any], check: str, vehicle: str = TWIN) -> bool:
-    """Whether a check sees the fault in every engine that it was planted in."""
-    return all(ratio is None or ratio > 1 for ratio in _of(record, check, vehicle))
-
-
-def least(record: dict[str, Any], check: str, vehicle: str) -> float:
-    """Smallest size over tolerance among the engines; infinite for refused runs."""
-    return min(math.inf if ratio is None else ratio for ratio in _of(record, check, vehicle))
-
-
-def _of(record: dict[str, Any], check: str, vehicle: str) -> list[float | None]:
-    return [ratios[check] for ratios in record["ratios"][vehicle].values()]
-
-
-def caught(record: dict[str, Any], vehicle: str = TWIN) -> bool:
-    """Whether in every engine at least one check sees the fault."""
-    engines = record["ratios"][vehicle].values()
-    return all(any(ratio is None or ratio > 1 for ratio in ratios.values()) for ratios in engines)
-
-
-def _rows(clean: list[dict[str, Any]], found: list[dict[str, Any]]) -> list[Row]:
-    alarms = sum(ratio is None or ratio > 1 for record in clean for vehicle in (TWIN, SYMMETRIC)
-                 for ratios in record["ratios"][vehicle].values() for ratio in ratios.values())  # fmt: skip
-    missed = {record["fault"] for record in found if not caught(record, SYMMETRIC)}
-    single = [record for record in found if sum(seen(record, name) for name in CHECKS) == 1]
-    return [
-        within("planted.caught", SYSTEM, "planted faults that a check catches, asymmetric vehicle",
-               sum(map(caught, found)), "faults", len(found), 0, "every one of them is a wrong model", "native"),
-        within("planted.false_alarms", SYSTEM, "alarms without a fault, all checks, both vehicles, all implementations",
-               alarms, "alarms", 0, 0, "a check that cries without a fault is no check", "native"),
-        within("planted.hidden", SYSTEM, "planted faults that the symmetric vehicle of the paper hides", len(missed),
-               "faults", len(HIDDEN), 0,
-               "exchanges of front and rear, and terms in k3 b - k4 a: equal halves cannot show them", "native"),
-        finding("planted.single", SYSTEM, "planted faults that one check alone catches", len(single), "faults",
-                "few", "what would pass if that check were dropped: " + _listed(single), "native"),
-    ]  # fmt: skip
-
-
-def _listed(records: list[dict[str, Any]]) -> str:
-    """Faults with the one check that sees each."""
-    sees = [(record["fault"], next(name for name in CHECKS if seen(record, name))) for record in records]
-    return ", ".join(f"{fault} ({name})" for fault, name in sees) or "none"
+def _lines(data: dict[str, Any]) -> list[tuple[str, ...]]:
+    """Of every fault: system, what it is in, fault, checks that see it, checks that had missed it."""
+    return [*pitch_plane.lines(data["pitch-plane"]), *(line for own in CAMPAIGNS for line in own.lines(data[own.id]))]
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """The checks with their tolerances, and every fault with what sees it."""
-    return [_check_table(data), _fault_table(data)]
-
-
-def _check_table(data: dict[str, Any]) -> Table:
-    lines = []
-    for name, check in CHECKS.items():
-        worst = max(ratio or 0.0 for record in data["clean"] for vehicle in (TWIN, SYMMETRIC)
-                    for ratio in _of(record, name, vehicle))  # fmt: skip
-        catches = sum(seen(record, name) for record in data["faults"])
-        limits = sorted({check.tolerance(engine) for engine in ("exudyn", "mujoco")})
-        lines.append((name, check.title, " / ".join(f"{limit:g}" for limit in limits), check.unit, check.why,
-                      f"{worst:.2g}", f"{catches} of {len(data['faults'])}"))
-    headings = ("check", "compares", "tolerance", "unit", "because", "worst without a fault", "faults seen")
-    note = "Worst without a fault is size over tolerance: below 1 is quiet."
-    return Table("The checks", note, headings, tuple(lines))
-
-
-def _fault_table(data: dict[str, Any]) -> Table:
-    lines = tuple(
-        (record["fault"], f"{record['place']} ({', '.join(record['engines'])})",
-         ", ".join(f"{name} {_size(record, name)}" for name in CHECKS if seen(record, name)),
-         ", ".join(name for name in CHECKS if not seen(record, name)) or "-",
-         "no" if caught(record, SYMMETRIC) else "yes")
-        for record in data["faults"]
-    )  # fmt: skip
-    note = ("Sizes on the asymmetric vehicle, in the unit of the check, the smaller one where a fault was planted in "
-            "two engines. Each check in the fourth column, had it been the only one, would have let the fault pass.")
-    return Table("Every fault, one at a time", note,
-                 ("fault", "planted in", "caught by", "not seen by", "symmetric vehicle hides it"), lines)
-
-
-def _size(record: dict[str, Any], name: str) -> str:
-    """The smaller size among the engines, from its ratio to the tolerance."""
-    sizes = [math.inf if ratios[name] is None else ratios[name] * CHECKS[name].tolerance(engine)
-             for engine, ratios in record["ratios"][TWIN].items()]  # fmt: skip
-    least = min(sizes)
-    return "refused" if least == math.inf else f"{least:.0e}" if least < 0.01 else f"{least:.2g}"
+    """All faults in one table, then each system's with sizes and what its checks are."""
+    lines = _lines(data)
+    systems = len({line[0] for line in lines})
+    note = (f"{len(lines)} faults in {systems} systems, one at a time. Each check in the last column, had it been the "
+            "only one, would have let the fault pass.")  # fmt: skip
+    headings = ("system", "planted in", "fault", "caught by", "would have been missed by")
+    whole = Table("Planted faults of all systems", note, headings, tuple(lines))
+    return [whole, *pitch_plane.tables(data["pitch-plane"]), *(own.table(data[own.id]) for own in CAMPAIGNS)]
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """How far above its tolerance each check stands, fault by fault, on both vehicles."""
-    from validation.faults.figure import fault_map
-
-    vehicles = {TWIN: "asymmetric vehicle", SYMMETRIC: "symmetric vehicle (the paper's)"}
-    records = data["faults"]
-    depth = {vehicle: [[least(record, name, vehicle) for name in CHECKS] for record in records] for vehicle in vehicles}
-    marks = [not caught(record, SYMMETRIC) for record in records]
-    figure = fault_map([record["fault"] for record in records], tuple(CHECKS), depth, vehicles, marks)
-    caption = ("Decades between what a check finds and its tolerance; white: not seen. Left the asymmetric twin, right "
-               f"the paper's vehicle, whose equal halves hide {sum(marks)} faults from every check (marked).")
-    return [(caption, figure)]
+    """How far above its tolerance each check of the pitch plane stands, fault by fault."""
+    return pitch_plane.draw(data["pitch-plane"])

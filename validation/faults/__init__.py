@@ -1,5 +1,5 @@
 """Planted faults: each is put into one side on purpose, and the checks must see it.
 
-``planting`` lists them, ``changes`` alters description and input, ``patches`` alters adapters and
-equations, ``bench`` runs the checks on them.
+Of the pitch plane ``planting`` lists them, ``changes`` alters description and input, ``patches`` alters adapters and
+equations, ``bench`` runs the checks on them, ``pitch_plane`` reports. Every other module is a ``campaign``.
 """

@@ -211,4 +211,4 @@ FAULTS = (
     Fault("friction 1 % too large", "tyre", _tables(lambda mu: 1.01 * mu)),
 )  # fmt: skip
 
-CAMPAIGN = Campaign("braking_faults", "braking", "anti-lock", CHECKS, FAULTS)
+CAMPAIGN = Campaign("planted.braking", "braking", "anti-lock", CHECKS, FAULTS)

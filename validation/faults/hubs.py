@@ -100,4 +100,4 @@ FAULTS = (
         parts[0].shape))),
 )  # fmt: skip
 
-CAMPAIGN = Campaign("rolling_faults.hubs", "hub forces", "rolling-vehicle", CHECKS, FAULTS)
+CAMPAIGN = Campaign("planted.hubs", "hub forces", "rolling-vehicle", CHECKS, FAULTS)

@@ -256,4 +256,4 @@ FAULTS = (
 )  # fmt: skip
 
 
-CAMPAIGN = Campaign("ride_faults", "ride", "ride", CHECKS, FAULTS)
+CAMPAIGN = Campaign("planted.ride", "ride", "ride", CHECKS, FAULTS)

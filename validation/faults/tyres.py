@@ -125,4 +125,4 @@ FAULTS = (
     Fault("inclination of one wheel, which has none, by half a degree", "tyre", tyre(_inclined)),
 )
 
-CAMPAIGN = Campaign("rolling_faults.tyres", "a car on tyres", "rolling-vehicle", CHECKS, FAULTS)
+CAMPAIGN = Campaign("planted.tyres", "a car on tyres", "rolling-vehicle", CHECKS, FAULTS)

@@ -241,4 +241,4 @@ FAULTS = (
     Fault("dampers twice as strong", "suspension", attribute("models.rail.equations:rates", _damped_twice)),
 )
 
-CAMPAIGN = Campaign("rolling_faults.wheelset", "a wheelset", "rolling-vehicle", CHECKS, FAULTS)
+CAMPAIGN = Campaign("planted.wheelset", "a wheelset", "rolling-vehicle", CHECKS, FAULTS)

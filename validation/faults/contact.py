@@ -1,0 +1,175 @@
+"""Faults of contact, planted one at a time into pressure, creep law and exact theory, and what sees them."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from models.contact import fastsim as creep
+from models.contact import hertz, normal_problem, rolling_problem
+from models.contact.fastsim_kernels import PLAIN
+from models.contact.linear_theory import forces
+from models.contact.material import STEEL, Material, Pair
+from models.contact.normal_problem import NormalSolution, centres
+from validation.faults.campaign import Campaign, Check, Fault, off
+from validation.faults.patches import Patch, attribute
+
+PAIR = Pair()
+LOAD, RADIUS, MU = 1e4, 0.3, 0.3
+A, B = 6e-3, 4e-3
+CELLS, DX, DY = (21, 31), 3.0e-4, 4.2e-4
+"""Rows and columns, sizes (m) of cells that are not square: what is exchanged then shows."""
+PUBLISHED = (4.12, 3.67, 1.47)
+"""C11, C22, C23 of Kalker's table for a = b, nu = 0.25."""
+
+
+def _ball() -> tuple[float, float, float]:
+    """Radius (m), approach (m) and greatest pressure (Pa) of a ball on a plane, in closed form."""
+    stiff = STEEL.E / (2.0 * (1.0 - STEEL.nu**2))
+    a = (0.75 * LOAD * RADIUS / stiff) ** (1.0 / 3.0)
+    return a, a * a / RADIUS, 1.5 * LOAD / (np.pi * a * a)
+
+
+def _hertz() -> float:
+    """Hertz's ball: radius, approach, greatest pressure."""
+    found = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, LOAD, PAIR)
+    return off(np.array([found.a, found.approach, found.p0]) / _ball(), np.ones(3))
+
+
+def _ellipse() -> float:
+    """Ellipse of unlike curvatures: load by the integral of its pressure, 2/3 pi a b p0, and its longer axis."""
+    found = hertz.by_load(2.0, 1.0, LOAD, PAIR)
+    balanced = abs(float(2.0 / 3.0 * np.pi * found.a * found.b * found.p0) / LOAD - 1.0)
+    return balanced if found.b > found.a else np.inf
+
+
+def _pressed() -> NormalSolution:
+    y, x = centres(CELLS[0], DY), centres(CELLS[1], DX)
+    away = (x**2 + y[:, None] ** 2) / (2.0 * RADIUS)
+    return normal_problem.solve_normal(away, DX, DY, PAIR, load=LOAD)
+
+
+def _normal() -> float:
+    """Ball on cells against the closed form: approach and greatest pressure."""
+    found = _pressed()
+    return off(np.array([found.approach, found.pressure.max()]) / _ball()[1:], np.ones(2))
+
+
+def _published() -> float:
+    """Forces of small creepages and spin by Kalker's published coefficients."""
+    soft = Pair(Material(E=2.5e11, nu=0.25), Material(E=2.5e11, nu=0.25))
+    a, shear = 5e-3, 1e11
+    given = np.array([[1e-7, 0.0, 0.0], [0.0, 1e-7, 0.0], [0.0, 0.0, 1e-4]])
+    found = creep.fastsim(a, a, LOAD, MU, given[0], given[1], given[2], soft)
+    c11, c22, c23 = PUBLISHED
+    wanted = -shear * a * a * np.array([c11 * 1e-7, c22 * 1e-7, c23 * a * 1e-4])
+    return off(np.array([found.fx[0], found.fy[1], found.fy[2]]) / wanted, np.ones(3))
+
+
+def _linear() -> float:
+    """Small creepages on an ellipse against the linear theory: all of them, 41 cells."""
+    given = (1e-7, 0.7e-7, 2e-5)
+    found = creep.fastsim(A, B, LOAD, MU, *given, PAIR, cells=41)
+    return off(np.array([found.fx, found.fy]), np.array(forces(A, B, *given, PAIR)[:2]))
+
+
+def _sliding() -> float:
+    """Gross sliding against mu N, and its direction."""
+    found = creep.fastsim(A, B, LOAD, MU, 0.03, 0.04, 0.0, PAIR)
+    return off(np.array([found.fx, found.fy]), -MU * LOAD * np.array([0.6, 0.8]))
+
+
+def _theories() -> float:
+    """Exact theory and FASTSIM under creepages that slip in part, by mu N."""
+    pressed, a = _pressed(), _ball()[0]
+    given = (1.2e-3, -0.8e-3, 0.2)
+    exact = rolling_problem.solve_rolling(pressed, MU, *given, PAIR)
+    found = creep.fastsim(a, a, LOAD, MU, *given, PAIR)
+    return float(np.hypot(exact.fx - found.fx, exact.fy - found.fy) / (MU * LOAD))
+
+
+@cache
+def _stuck() -> np.ndarray:
+    a = _ball()[0]
+    return np.array(forces(a, a, 2e-5, 1e-5, 0.0, PAIR)[:2])
+
+
+def _exact_linear() -> float:
+    """Exact theory under small creepages against the linear one."""
+    exact = rolling_problem.solve_rolling(_pressed(), MU, 2e-5, 1e-5, 0.0, PAIR)
+    return off(np.array([exact.fx, exact.fy]), _stuck())
+
+
+CHECKS = {
+    "ball": Check("Hertz's ball in closed form", "relative", 1e-9, _hertz),
+    "ellipse": Check("load of an ellipse by its pressure", "relative", 1e-9, _ellipse),
+    "cells": Check("pressure of a ball on cells in closed form", "relative", 2e-3, _normal),
+    "Kalker's table": Check("creep forces by published coefficients", "relative", 0.015, _published),
+    "linear": Check("creep forces of small creepages by linear theory", "of the largest", 5e-3, _linear),
+    "sliding": Check("sliding by mu N", "relative", 1e-6, _sliding),
+    "exact small": Check("exact theory by linear theory", "of the largest", 0.08, _exact_linear),
+    "theories": Check("exact theory beside FASTSIM", "mu N", 0.04, _theories),
+}
+
+
+def _columns(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
+    """Contacts (n, 10) of FASTSIM changed: a, b, load, mu, xi_x, xi_y, spin and flexibilities."""
+
+    def contacts(real: Any) -> Any:
+        def made(*given: Any) -> Any:
+            columns, shape = real(*given)
+            return np.ascontiguousarray(change(columns)), shape
+
+        return made
+
+    return attribute("models.contact.fastsim:contacts_of", contacts)
+
+
+def _times(column: int, factor: float) -> Patch:
+    factors = np.ones(10)
+    factors[column] = factor
+    return _columns(lambda columns: columns * factors)
+
+
+def _exchanged(one: int, other: int) -> Patch:
+    order = list(range(10))
+    order[one], order[other] = other, one
+    return _columns(lambda columns: columns[:, order])
+
+
+FAULTS = (
+    Fault("one body's modulus for the pair's", "Hertz",
+          attribute("models.contact.hertz:by_load", lambda real: lambda a, b, load, pair: real(a, b, load / 2, pair))),
+    Fault("diameter for radius", "Hertz",
+          attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *own: real(a / 2, b / 2, *own))),
+    Fault("curvatures exchanged", "Hertz",
+          attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *own: real(b, a, *own))),
+    Fault("axes not squared up: p0 of a cylinder", "Hertz",
+          attribute("models.contact.hertz:by_load",
+                    lambda real: lambda *own: replace(real(*own), p0=2.0 / 3.0 * 4.0 / np.pi * real(*own).p0))),
+    Fault("sides of a cell exchanged", "normal problem",
+          attribute("models.contact.normal_problem:influence",
+                    lambda real: lambda x, y, dx, dy, pair: real(x, y, dy, dx, pair))),
+    Fault("influence of one body alone", "normal problem",
+          attribute("models.contact.normal_problem:influence", lambda real: lambda *own: 0.5 * real(*own))),
+    Fault("whole first step at the leading edge", "FASTSIM",
+          attribute("models.contact.fastsim:MARCHES", lambda real: {**real, "second-order": PLAIN})),
+    Fault("sign of the spin", "FASTSIM", _times(6, -1.0)),
+    Fault("creepages exchanged", "FASTSIM", _exchanged(4, 5)),
+    Fault("semi-axes exchanged", "FASTSIM", _exchanged(0, 1)),
+    Fault("flexibilities along and across exchanged", "FASTSIM", _exchanged(7, 8)),
+    Fault("flexibility of spin 10 % off", "FASTSIM", _times(9, 1.1)),
+    Fault("friction 1 % off", "FASTSIM", _times(3, 1.01)),
+    Fault("bound of the cylinder", "FASTSIM", _times(2, 0.9)),
+    Fault("gradient taken downstream", "exact theory",
+          attribute("models.contact.rolling_problem:rigid_slip", lambda real: lambda *own: -real(*own))),
+    Fault("gradient of half the length", "exact theory",
+          attribute("models.contact.rolling_problem:UPSTREAM", lambda real: tuple(2.0 * own for own in real))),
+    Fault("sign of the spin", "exact theory",
+          attribute("models.contact.rolling_problem:rigid_slip",
+                    lambda real: lambda x, y, xi_x, xi_y, spin: real(x, y, xi_x, xi_y, -spin))),
+)  # fmt: skip
+
+CAMPAIGN = Campaign("planted.contact", "contact", "contact", CHECKS, FAULTS)

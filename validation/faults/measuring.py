@@ -1,0 +1,237 @@
+"""Faults of what surrounds a vehicle, one at a time: noise, sensors, units, clocks, counting, sections, roads."""
+
+from collections.abc import Callable
+from functools import cache
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from models import damage, noise, section_forces
+from models.measured import counting, resampling, units
+from models.road import iso8608
+from models.sensors import rigid_body_motion as body
+from models.sensors.rotations import from_cardan, matrix
+from models.sensors.sensor_array import SensorArray, sensor_array
+from models.sensors.virtual_accelerometers import in_space
+from validation.faults.campaign import Campaign, Check, Fault, off
+from validation.faults.patches import Patch, attribute
+
+LOAD = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
+"""Figure 6 of ASTM E1049-85, whose cycles are printed there: 0.5 of 3, 1.5 of 4, 0.5 of 6, 1 of 8, 0.5 of 9."""
+PRINTED = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
+PLACES = {"a": (1.2, 0.3, 0.1), "b": (-0.9, 0.5, 0.4), "c": (0.2, -0.8, -0.3), "d": (0.1, 0.2, 0.9)}
+PERIOD, COUNT = 5e-3, 400
+UNITS = {("kN", "force"): 1e3, ("deg/s", "angular rate"): np.pi / 180, ("g", "acceleration"): 9.80665,
+         ("mm", "travel"): 1e-3, ("N m", "moment"): 1.0}  # fmt: skip
+
+
+def _streams() -> float:
+    """Largest correlation of streams of two paths and two sources, in standard errors."""
+    own = [noise.normal(3, path, noise.BLOCK, 1, source=source)[:, 0]
+           for path in (0, 1) for source in (noise.FORCES, noise.GYRO)]  # fmt: skip
+    return max(abs(float(one @ two)) / noise.BLOCK**0.5 for one, two in combinations(own, 2))
+
+
+def _variance() -> float:
+    """Variance of a stream against 1, in standard errors."""
+    own = noise.normal(3, 0, noise.BLOCK, 1)
+    return abs(float(np.mean(own**2)) - 1.0) * (noise.BLOCK / 2.0) ** 0.5
+
+
+def _again() -> float:
+    """A stream in pieces against the whole."""
+    parts = [noise.normal(3, 0, 50, 1, first=first) for first in (0, 50)]
+    return float(np.abs(np.concatenate(parts) - noise.normal(3, 0, 100, 1)).max())
+
+
+def _damage() -> float:
+    """Damage of the standard's load at slopes 1 and 5 by its printed cycles."""
+    return max(abs(damage.pseudo_damage(LOAD, slope) / sum(n * size**slope for size, n in PRINTED.items()) - 1.0)
+               for slope in (1.0, 5.0))  # fmt: skip
+
+
+def _pairs() -> float:
+    """Range pairs of the standard's load by its printed cycles."""
+    found = counting.range_pairs(np.array(list(PRINTED)), np.array(list(PRINTED.values())), np.array([3.5, 4.0, 8.5]))
+    return off(found, np.array([3.5, 3.5, 0.5]))
+
+
+def _crossings() -> float:
+    """Crossings of the standard's load: through 0, 2 and 4.5, counted by hand."""
+    return off(counting.level_crossings(LOAD, np.array([0.0, 2.0, 4.5])), np.array([4.0, 3.0, 1.0]))
+
+
+def _units() -> float:
+    """Factors of units."""
+    return max(abs(units.conversion(unit, quantity, "", "") / wanted - 1.0)  # type: ignore[arg-type]
+               for (unit, quantity), wanted in UNITS.items())  # fmt: skip
+
+
+def _clock() -> float:
+    """A sine of 2 Hz at 200 Hz and at 4 kHz onto 1 kHz, by its amplitude."""
+    grid, worst = np.arange(1000) / 1000.0 + 0.2, 0.0
+    for rate in (200.0, 4000.0):
+        times = np.arange(round(1.5 * rate)) / rate
+        found = resampling.onto(times, np.sin(4 * np.pi * times), 1.0 / rate, grid)
+        worst = max(worst, float(np.abs(found - np.sin(4 * np.pi * grid)).max()))
+    return worst
+
+
+def _gap() -> float:
+    """Points that are numbers within a gap of ten samples, of nine."""
+    times = np.delete(np.arange(100) / 100.0, np.arange(40, 49))
+    found = resampling.onto(times, times, 0.01, np.arange(41, 48) / 100.0)
+    return float(np.isfinite(found).sum())
+
+
+def _sections() -> float:
+    """An upward force on a body that stands on its tail, and one with its nose 30 degrees up: along the body."""
+    found = section_forces.section_forces(np.array([100.0, 200.0]), np.array([50.0, 0.0]),
+                                          np.array([np.pi / 2, np.pi / 6]))  # fmt: skip
+    have = np.concatenate([found[name] for name in section_forces.CHANNELS])
+    return off(have, np.array([100.0, 100.0, 0.0, 200.0 * 3**0.5 / 2, 50.0, 0.0, 0.0, 0.0]))
+
+
+@cache
+def _turning() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
+    """Sensors on a body that nods and rises: their array, readings (n, 4, 3), pitch (n,) and acceleration up."""
+    t = PERIOD * np.arange(COUNT)
+    pitch, rate, turn = (0.3 * np.sin(2 * t), 0.6 * np.cos(2 * t), -1.2 * np.sin(2 * t))
+    heave = 2.0 * np.cos(3 * t)
+    none = np.zeros(COUNT)
+    S = matrix(from_cardan(none, pitch, none))
+    felt = np.einsum("nji,nj->ni", S, np.column_stack([none, none, heave - 9.81]))
+    w, alpha = (np.column_stack([none, own, none]) for own in (rate, turn))
+    return sensor_array(PLACES), in_space(np.array(list(PLACES.values())), felt, w, alpha), pitch, heave
+
+
+def _motion() -> float:
+    """Rates and vertical acceleration of that body from the readings."""
+    array, read, _, heave = _turning()
+    found = body.motion(array, read, PERIOD, body.Start(rates=(0.0, 0.6, 0.0)))
+    rate = 0.6 * np.cos(2 * PERIOD * np.arange(COUNT))
+    return max(off(found.rates[:, 1], rate), off(found.acceleration[:, 2], heave))
+
+
+def _rigid() -> float:
+    """Share of the readings that no rigid motion explains."""
+    array, read, *_ = _turning()
+    return body.quality(array, read).share
+
+
+def _road() -> float:
+    """Variance of a road of class C by the standard's density, integrated over the band by hand."""
+    road = iso8608.iso8608_road("C", 1, waves=400)
+    wanted = 256e-6 * 0.1**2 * (1.0 / 0.011 - 1.0 / 2.83)
+    return abs(0.5 * float(np.sum(road.amplitude**2)) / wanted - 1.0)
+
+
+def _levels() -> float:
+    """Two-sided level of class C over rad/m: pi n0^2 Gd."""
+    return abs(iso8608.level_of_class("C") / (np.pi * 0.01 * 256e-6) - 1.0)
+
+
+CHECKS = {
+    "streams": Check("streams of two paths and sources are uncorrelated", "standard errors", 4.5, _streams),
+    "variance": Check("variance of a stream is 1", "standard errors", 4.5, _variance),
+    "pieces": Check("a stream in pieces is the whole", "", 1e-15, _again),
+    "damage": Check("damage by the cycles that the standard prints", "relative", 1e-12, _damage),
+    "pairs": Check("range pairs by the same", "of the largest", 1e-12, _pairs),
+    "crossings": Check("crossings counted by hand", "of the largest", 1e-12, _crossings),
+    "units": Check("factors of units", "relative", 1e-12, _units),
+    "clock": Check("sines of two rates onto one clock", "of the amplitude", 1e-3, _clock),
+    "gap": Check("numbers within a gap", "samples", 0.5, _gap),
+    "sections": Check("forces along a turned body", "of the largest", 1e-12, _sections),
+    "motion": Check("rate and acceleration from accelerometers", "of the largest", 1e-4, _motion),
+    "rigid": Check("a rigid body is found rigid", "share", 1e-9, _rigid),
+    "road": Check("variance of a road of class C", "relative", 1e-9, _road),
+    "levels": Check("two-sided level of class C", "relative", 1e-9, _levels),
+}
+
+
+def _normal(change: Callable[..., tuple[int, ...]]) -> Patch:
+    """Blocks of noise drawn for another (seed, path, block, channels, source)."""
+    return attribute("models.noise:normal_block",
+                     lambda real: lambda seed, path, block, channels, source=0: real(
+                         *change(seed, path, block, channels, source)))  # fmt: skip
+
+
+def _onto(late: float = 0.0, change: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Patch:
+    return attribute("models.measured.resampling:onto",
+                     lambda real: lambda times, values, period, grid: change(
+                         real(times + late * period, values, period, grid)))  # fmt: skip
+
+
+def _factor(name: str, factor: float) -> Patch:
+    return attribute("models.measured.units:conversion",
+                     lambda real: lambda unit, *own: real(unit, *own) * (factor if unit == name else 1.0))  # fmt: skip
+
+
+def _counted(change: Callable[[Any], Any]) -> Patch:
+    """Spans, means and counts of the cycles changed."""
+    return attribute("models.rainflow_cycles:cycles", lambda real: lambda turns: change(real(turns)))
+
+
+def _read(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
+    """Readings (n, 4, 3) of all sensors changed before motion is made of them."""
+    return attribute("models.sensors.rigid_body_motion:spin",
+                     lambda real: lambda array, own: real(array, change(own) if own.shape[1] == len(PLACES) else own))
+
+
+def _second_scaled(read: np.ndarray) -> np.ndarray:
+    return read * np.array([1.0, 1.01, 1.0, 1.0])[:, None]
+
+
+def _every_way(real: Any) -> Any:
+    return lambda load, levels: real(load, levels) + real(-np.asarray(load), -np.asarray(levels)[::-1])[::-1]
+
+
+FAULTS = (
+    Fault("paths share one stream", "noise", _normal(lambda s, p, b, c, o: (s, 0, b, c, o))),
+    Fault("gyro and forces share one stream", "noise", _normal(lambda s, p, b, c, o: (s, p, b, c, 0))),
+    Fault("deviation for variance", "noise",
+          attribute("models.noise:normal_block", lambda real: lambda *own: real(*own) * 2.0**0.5)),
+    Fault("stream begins anew at every call", "noise",
+          attribute("models.noise:normal",
+                    lambda real: lambda s, p, n, c, first=0, source=0: real(s, p, n, c, source=source))),
+    Fault("residue counted as whole cycles", "counting", _counted(lambda own: (own[0], own[1], np.ceil(own[2])))),
+    Fault("residue lost", "counting", _counted(lambda own: (own[0], own[1], np.floor(own[2])))),
+    Fault("amplitude for range", "counting", _counted(lambda own: (own[0] / 2.0, own[1], own[2]))),
+    Fault("pairs beyond a range, not from it on", "counting",
+          attribute("models.measured.counting:range_pairs",
+                    lambda real: lambda spans, counts, ranges: real(spans, counts, ranges * (1.0 + 1e-9)))),
+    Fault("levels crossed either way", "counting",
+          attribute("models.measured.counting:level_crossings", _every_way)),
+    Fault("kN taken for N", "units", _factor("kN", 1e-3)),
+    Fault("degrees taken for rad", "units", _factor("deg/s", 180.0 / np.pi)),
+    Fault("g of 9.81 m/s^2", "units", _factor("g", 9.81 / 9.80665)),
+    Fault("sign of one channel", "units", _factor("mm", -1.0)),
+    Fault("a sample late", "clock", _onto(1.0)),
+    Fault("half a sample late", "clock", _onto(0.5)),
+    Fault("gaps bridged", "clock",
+          attribute("models.measured.resampling:_unknown", lambda real: lambda times, *own: np.zeros(7, dtype=bool)
+                    if len(times) < 100 else real(times, *own))),
+    Fault("section forces in the inertial frame", "sections",
+          attribute("models.section_forces:section_forces",
+                    lambda real: lambda f3, f4, pitch: real(f3, f4, 0.0 * pitch))),
+    Fault("body turned the other way", "sections",
+          attribute("models.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, -pitch))),
+    Fault("front and rear sections exchanged", "sections",
+          attribute("models.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f4, f3, pitch))),
+    Fault("gravity turned round", "motion",
+          attribute("models.sensors.rigid_body_motion:motion",
+                    lambda real: lambda *own: real(*own, gravity=-9.81))),
+    Fault("readings of two sensors exchanged", "motion", _read(lambda read: read[:, [1, 0, 2, 3]])),
+    Fault("one sensor 1 % off", "motion", _read(_second_scaled)),
+    Fault("lever of the sensors left out", "motion",
+          attribute("models.sensors.rigid_body_motion:reference_acceleration",
+                    lambda real: lambda a, r, o, alpha, w, down: real(a, r, o, 0.0 * alpha, 0.0 * w, down))),
+    Fault("two-sided density for one-sided", "road",
+          attribute("models.road.iso8608:SIDES", lambda real: {**real, "one-sided": 2.0})),
+    Fault("class D for C", "road",
+          attribute("models.road.iso8608:CLASSES", lambda real: {**real, "C": real["D"]})),
+)  # fmt: skip
+
+WHAT = "noise, sensors, units, clocks, counting and roads"
+CAMPAIGN = Campaign("planted.measuring", WHAT, "measured", CHECKS, FAULTS)
