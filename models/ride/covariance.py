@@ -102,10 +102,13 @@ def _responses(A: np.ndarray, B: Sequence[np.ndarray], delays: Sequence[float],
 def _stable(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float],
             independent: bool) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
     """Covariance of the stable part, its last correction, and the residual that is left."""
-    own = [(split.W @ b).astype(float) for b in B]
-    before = _responses(split.S, own, delays, independent)
-    Q = sum(b @ b.T + f @ b.T + b @ f.T for f, b in zip(before, own, strict=True))
-    return lyapunov(split.S, Q)
+    return lyapunov(split.S, intensity(split.S, [(split.W @ b).astype(float) for b in B], delays, independent))
+
+
+def intensity(A: np.ndarray, B: Sequence[np.ndarray], delays: Sequence[float], independent: bool) -> np.ndarray:
+    """Q (n, n) of A P + P A' + Q = 0: what the noise of all hits adds to the covariance per second, delays exact."""
+    before = _responses(A, B, delays, independent)
+    return np.asarray(sum(b @ b.T + f @ b.T + b @ f.T for f, b in zip(before, B, strict=True)))
 
 
 def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

@@ -1,0 +1,80 @@
+"""What a linear stationary scene holds, and effects that may be left out of it."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from pathlib import Path
+
+from models.ride.excitation import Excitation
+from models.ride.of_scene import excitation_of
+from models.ride.scene import RideScene
+from models.vehicles.spatial import Freedom, SpatialVehicle
+from models.vehicles.spatial_linear import wheels
+
+FOLDER = Path(__file__).parents[1] / "effects"
+
+
+@dataclass(frozen=True)
+class Held:
+    """Scene and vehicle, less what is left out: ``massless`` bodies, ``rigid`` springs, ``locked`` freedoms."""
+
+    scene: RideScene
+    vehicle: SpatialVehicle
+    massless: frozenset[str] = frozenset()
+    rigid: frozenset[str] = frozenset()
+    locked: frozenset[tuple[str, Freedom]] = frozenset()
+
+    def on_road(self, **changes: object) -> "Held":
+        """With other values in [road]."""
+        road = self.scene.road.model_copy(update=changes)
+        return replace(self, scene=self.scene.model_copy(update={"road": road}))
+
+    def excitation(self) -> Excitation:
+        """The road under the wheels; axles that meet the same at once share one filter."""
+        found = excitation_of(self.scene, wheels(self.vehicle))
+        if found.independent or any(found.lengths):
+            return found
+        return replace(found, heights=(sum(found.heights),), lengths=(0.0,))  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One thing that may be left out: its name, what leaving it out means, and with what it goes.
+
+    needs : effects that must be left out, too; excludes : effects that may not be left out beside it; ``why``, a
+    sentence for both.
+    """
+
+    name: str
+    without: Callable[[Held], Held] = field(compare=False)
+    says: str
+    needs: tuple[str, ...] = ()
+    excludes: tuple[str, ...] = ()
+    why: str = ""
+
+
+def effects_of(held: Held) -> tuple[Effect, ...]:
+    """Every effect that the scene's vehicle and road hold, file by file."""
+    names = sorted(path.stem for path in FOLDER.glob("*.py") if path.stem != "__init__")
+    modules = (import_module(f"models.ride.effects.{name}") for name in names)
+    return tuple(effect for module in modules for effect in module.found(held))
+
+
+def illegal(chosen: Sequence[Effect]) -> str:
+    """Why these may not be left out together, with the remedy; empty where they may."""
+    names = {effect.name for effect in chosen}
+    for effect in chosen:
+        missing = [name for name in effect.needs if name not in names]
+        if missing:
+            return f"{effect.name} cannot be left out alone: leave out {' and '.join(missing)}, too, {effect.why}"
+        clashing = [name for name in effect.excludes if name in names]
+        if clashing:
+            return f"{effect.name} cannot be left out beside {clashing[0]}: {effect.why}"
+    return ""
+
+
+def without(held: Held, chosen: Iterable[Effect]) -> Held:
+    """The scene less these effects."""
+    for effect in chosen:
+        held = effect.without(held)
+    return held

@@ -1,0 +1,16 @@
+"""Anti-roll bars, one by one."""
+
+from dataclasses import replace
+from functools import partial
+
+from models.ride.choice.held import Effect, Held
+
+
+def found(held: Held) -> list[Effect]:
+    """One effect per bar."""
+    return [Effect(f"bar {bar.name}", partial(_without, bar=bar.name), f"no {bar.name}") for bar in held.vehicle.bars]
+
+
+def _without(held: Held, bar: str) -> Held:
+    bars = tuple(own for own in held.vehicle.bars if own.name != bar)
+    return replace(held, vehicle=replace(held.vehicle, bars=bars))
