@@ -55,7 +55,7 @@ def test_the_contact_of_the_readme_is_a_valid_scene_and_its_python_runs(tmp_path
 
     table = tomllib.loads(re.findall(r"```toml\n(.*?)```", README, flags=re.DOTALL)[1])
     assert build(table, "README.md", tmp_path).geometry == "radii"
-    exec(re.search(r"```python\n(.*?)```", README, flags=re.DOTALL).group(1), {})
+    exec(re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)[1], {})
     assert float(capsys.readouterr().out.split()[0]) < 0
 
 

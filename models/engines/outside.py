@@ -102,7 +102,7 @@ def _asked(name: str, what: str, function: Callable, *arguments: Any) -> Any:
 def _numbers(name: str, what: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """An answer as an array of this shape; RunFailed if it is none."""
     try:
-        found = np.asarray(value, dtype=float)
+        found = np.asarray(value if value is not None else "nothing", dtype=float)
     except (TypeError, ValueError):
         raise RunFailed(name, f"{what} gave {type(value).__name__} instead of numbers") from None
     if found.shape != shape:

@@ -1,0 +1,178 @@
+"""Engines and integrators from outside the tree: right ones agree with the reference, wrong ones are told."""
+
+import re
+import sys
+import types
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.assembly import assemble
+from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED
+from models.engines.outside import register
+from models.engines.protocol import Settings, build
+from models.errors import InputError, Refused, RunFailed
+from models.simulate import simulate
+from validation import checks, conformity
+from validation.scenes import force_scene, road_scene, write_forces
+
+
+def of_the_readme():
+    """The class that the README shows."""
+    shown: dict = {}
+    readme = (Path(__file__).parents[1] / "README.md").read_text()
+    exec(re.search(r"```python\n(.*?)```", readme, flags=re.DOTALL).group(1), shown)
+    return shown["Scipy"]
+
+
+Scipy = of_the_readme()
+
+
+class Euler:
+    order = 1
+
+    def integrate(self, f, times, start, tolerance):
+        states = [start]
+        for t, end in pairwise(times):
+            states.append(states[-1] + (end - t) * f(t, states[-1]))
+        return states
+
+
+class Boast(Euler):
+    """The fault to be seen: of order 1, and says 2."""
+
+    order = 2
+
+
+class Engine:
+    """An engine of its own, here with the reference inside."""
+
+    order = 4
+
+    def __init__(self, assembly, settings):
+        self.inside = checks.engine("reference")(assembly, checks.by_hand(settings))
+
+    def run(self):
+        return self.inside.run()
+
+    def acceleration(self, time, state):
+        return self.inside.acceleration(time, state)
+
+
+class Tilted(Engine):
+    """The fault to be seen: accelerations that are a little off."""
+
+    def acceleration(self, time, state):
+        return self.inside.acceleration(time, state) * (1 + 1e-9)
+
+
+def answering(answer):
+    """Class of an integrator with that answer to (times, start)."""
+    return type("Bad", (), {"order": 4, "integrate": lambda self, f, times, start, tolerance: answer(times, start)})
+
+
+class Deaf:
+    order = 4
+
+    def run(self):
+        return None
+
+
+@pytest.fixture
+def own(monkeypatch):
+    """Function that gives classes names, as if they stood in a file ``mine.py``."""
+    before = [dict(table) for table in (CATALOGUE, RECOMMENDED, OUTSIDE)]
+    module = types.ModuleType("mine_of_the_tests")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+
+    def enter(found):
+        module.Own = found
+        register("mine_of_the_tests:Own")
+        return "mine_of_the_tests:Own"
+
+    yield enter
+    for table, kept in zip((CATALOGUE, RECOMMENDED, OUTSIDE), before, strict=True):
+        table.clear()
+        table.update(kept)
+
+
+SHORT = 0.1
+
+
+def test_a_scipy_solver_of_a_dozen_lines_agrees_with_the_reference(own, tmp_path):
+    """On a road, and on forces that are held or linear: each jump of a held sample begins a stretch of its own.
+
+    Between its own steps, 0.01 s at most, scipy interpolates to 1.3e-8; a jump read half a step late costs 1e-5.
+    """
+    name = own(Scipy)
+    write_forces(simulate(road_scene(duration=SHORT), "reference"), tmp_path, 5e-3)
+    scenes = [road_scene(duration=SHORT), force_scene(tmp_path, duration=SHORT),
+              force_scene(tmp_path, duration=SHORT, interpolation="held")]  # fmt: skip
+    for scene in scenes:
+        assembly = assemble(scene)
+        found = build(name, assembly, Settings(name, 1e-3, SHORT, 1e-11)).run()
+        tight = build("reference", assembly, Settings("DOP853", 1e-3, SHORT, 1e-13)).run()
+        assert np.abs(found.states - tight.states).max() < 1e-7 and found.counts["force calls"] > 100
+
+
+@pytest.mark.parametrize(("answer", "said"), [
+    (lambda times, start: None, "gave NoneType instead of numbers"), (lambda times, start: "x", "instead of numbers"),
+    (lambda times, start: np.zeros((3, 8)), r"gave the shape \(3, 8\)"),
+    (lambda times, start: np.full((len(times), 8), np.nan), "infinite or not a number"),
+    (lambda times, start: np.full((len(times), 8), 1e9), "no vehicle any more"),
+    (lambda times, start: 1 / 0, "integrate raised ZeroDivisionError")])  # fmt: skip
+def test_a_wrong_answer_is_a_failed_run_that_says_so(own, answer, said):
+    name = own(answering(answer))
+    with pytest.raises(RunFailed, match=said):
+        simulate(road_scene(duration=0.01), name, Settings(name, 1e-3, 0.01))
+
+
+@pytest.mark.parametrize(("found", "said"), [
+    (Deaf, r"has no acceleration\(\)"), (type("Empty", (), {"order": 3}), r"no run and no acceleration\(\)"),
+    (type("Unordered", (Euler,), {"order": None}), "must say its order"),
+    (type("Zeroth", (Euler,), {"order": 0}), "must say its order"), (len, "is no class")])  # fmt: skip
+def test_what_is_no_engine_is_refused(own, found, said):
+    with pytest.raises(InputError, match=said):
+        own(found)
+
+
+@pytest.mark.parametrize(("name", "said"), [
+    ("nowhere_at_all:X", "no module 'nowhere_at_all'"), ("json:Nope", "has no Nope"), (":", "must read module:Class"),
+    ("a b:C", "must read module:Class"), ("broken:X", "cannot be imported: ZeroDivisionError"),
+    ("leaving:X", "cannot be imported: SystemExit")])  # fmt: skip
+def test_a_name_that_leads_nowhere_is_refused_by_the_command(name, said, twinrig, empty_folder, capsys):
+    (empty_folder / "broken.py").write_text("1 / 0\n")
+    (empty_folder / "leaving.py").write_text("import sys\nsys.exit(3)\n")
+    assert twinrig("run", "study_road", "--engine", name) == 2 == twinrig("validate", "--engine", name)
+    assert said in capsys.readouterr().err and not (empty_folder / "results").exists()
+
+
+def test_an_engine_of_its_own_runs_and_what_it_cannot_do_is_refused(own, tmp_path):
+    name = own(Engine)
+    run = simulate(road_scene(duration=SHORT), "reference")
+    write_forces(run, tmp_path, 5e-3)
+    assert np.array_equal(simulate(road_scene(duration=SHORT), name).states, run.states)
+    guided = force_scene(tmp_path, duration=SHORT, effects={"prescribed_pitch": {"file": "pitch.csv"}})
+    with pytest.raises(Refused, match="does not solve for a prescribed pitch"):
+        simulate(guided, name)
+
+
+def judged(name, folder, monkeypatch):
+    """Rows of the conformity of a class without hard cases."""
+    monkeypatch.setattr(conformity, "FAMILIES", ())
+    return {row.id.removeprefix("conformity."): row.status for row in conformity._rows(name, folder)}
+
+
+@pytest.mark.parametrize(("found", "failed"), [
+    (Scipy, set()), (Engine, set()), (Boast, {"order", "momentum"}),
+    (Tilted, {f"audit.{v}.{g}" for v in ("itwm_drift", "asymmetric_twin") for g in ("exact", "linear")})])  # fmt: skip
+def test_the_suite_passes_what_is_right_and_names_what_is_wrong(own, tmp_path, monkeypatch, found, failed):
+    rows = judged(own(found), tmp_path, monkeypatch)
+    assert {id for id, status in rows.items() if status != "passed"} == failed and len(rows) == 11
+
+
+def test_a_class_that_answers_nothing_fails_row_by_row(own, tmp_path, monkeypatch):
+    rows = judged(own(answering(lambda times, start: None)), tmp_path, monkeypatch)
+    assert {status for id, status in rows.items() if id.startswith(("path", "order", "equil", "mom"))} == {"failed"}
