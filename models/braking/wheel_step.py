@@ -85,7 +85,8 @@ def roll(slip, left, kappa, fade, held, grip, slips, mu_x):
         if used + time >= left:
             some = left - used
             way = rate * some * phi_1(-decay * some)
-            return left, slip + way, area + some * slip + passed(way, rate, decay, some)
+            end = min(slip + way, target) if turn > 0 else max(slip + way, target)  # not beyond it by rounding
+            return left, end, area + some * slip + passed(way, rate, decay, some)
         area += time * slip + passed(target - slip, rate, decay, time)
         used, slip, turned = used + time, target, 0
     return used, math.nan, area
