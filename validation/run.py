@@ -21,7 +21,8 @@ from validation.rows import REPORTED, Row
 CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "growth",
          "drift_off", "drift_solvers", "holding_spring", "point_mass",
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
-         "planted_faults", "absent", "price", "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
+         "planted_faults", "absent", "price", "recommendation", "ensemble", "contact_hertz",
+         "contact_coefficients", "contact_exact",
          "contact_simplified", "contact_profiles", "manchester", "ride_road", "ride_covariance", "ride_engines",
          "ride_varying_speed", "ride_nonlinear", "hub_forces", "contact_price", "fastsim", "wheelset",
          "contact_bridges", "handling", "braking_stop", "braking_port",
@@ -30,7 +31,7 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
 """Case modules in the order of the report."""
 
 
-ALONE = ("absent", "price", "ensemble", "fastsim", "contact_price", "contact_bridges", "handling")
+ALONE = ("absent", "price", "recommendation", "ensemble", "fastsim", "contact_price", "contact_bridges", "handling")
 """Cases that time what they run: they begin when all others have ended, and have the machine to themselves."""
 WORKERS = 2
 """Processes that measure the other cases."""
@@ -128,6 +129,7 @@ def seeds() -> dict[str, int]:
         stabilisers,
         wheelset,
     )
+    from validation.price.own_scene import unseen
 
     return {"random states": checks.SEED, "class C road": roads.SEED, "six runs": Options.model_fields["seed"].default,
             "order of timing": timing.SEED, "point mass": point_mass.SEED,
@@ -143,7 +145,7 @@ def seeds() -> dict[str, int]:
             "drawn wheelsets": wheelset.SEED, "rough road of handling": handling.SEED,
             "speeds on ice": braking_controllers.SEED, "measurement files": measured_formats.SEED,
             "virtual measurements": measured_virtual.SEED, "checks of recordings": measured_checks.SEED,
-            "long recordings": long_recording.SEED}  # fmt: skip
+            "long recordings": long_recording.SEED, "scenes never seen": unseen.SEED}  # fmt: skip
 
 
 def save(folder: Path, rows: list[Row], source: dict[str, Any], earlier: dict[str, Any] | None = None) -> None:

@@ -18,13 +18,16 @@ TITLE = "What to recommend"
 SYSTEM: System = "cost"
 SCENES = {True: (8,), False: tuple(range(100))}
 """Numbers of the scenes that are drawn, by ``quick``."""
+ENGINE = "mujoco"
+"""The one that a quick run asks about; a full one asks about all."""
 MET, FACTOR = 0.95, 3.0
 """Least share of scenes whose every recommended setting holds its tolerance; bound of predicted by true error."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Verdicts on all recommendations for all scenes."""
-    found = [_verdicts(folder, n) for n in SCENES[quick]] if quick else _shared(folder, SCENES[quick])
+    alone = (judge(drawn(n, folder), (ENGINE,)) for n in SCENES[quick])
+    found = list(alone) if quick else _shared(folder, SCENES[quick])
     return _rows(found), {"verdicts": [[asdict(one) for one in own] for own in found]}
 
 

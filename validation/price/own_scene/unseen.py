@@ -146,9 +146,9 @@ def _written(rng: np.random.Generator, folder: Path, number: int, period: float)
     return name
 
 
-def judge(one: Drawn) -> list[Verdict]:
-    """A verdict on every setting that is recommended for a scene: of all engines, and of each."""
-    scene = own(one.scene, one.quantity, ENGINES)
+def judge(one: Drawn, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
+    """A verdict on every setting that is recommended for a scene: of all these engines, and of each."""
+    scene = own(one.scene, one.quantity, engines)
     found = recommend(scene, one.tolerance)
     errors = true_errors(scene, [choice.tried.setting for choice in found.winners.values()])
     return [Verdict(one.scene.title, choice.tried.setting.curve, choice.tried.setting.label(), one.tolerance,

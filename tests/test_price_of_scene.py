@@ -1,0 +1,122 @@
+"""The price of accuracy of a user's own scene: what is recommended, what is refused, and whether both are true."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from models.errors import InputError, RunFailed
+from models.scene import build
+from validation.price.own_scene import Answer, Ladder
+from validation.price.own_scene.pitch_plane import own
+from validation.price.own_scene.recommendation import price, recommend
+from validation.price.own_scene.text import as_dict, lines
+from validation.price.own_scene.truth import at
+from validation.price.own_scene.unseen import true_errors
+from validation.price.problems import Setting
+
+STEPS = tuple(0.1 / 2**k for k in range(12))
+
+
+@dataclass(frozen=True)
+class Planted:
+    """y = t^2 sin 5t with an error of scale h^order, and one method that lies."""
+
+    title, quantity, unit, cell, note = "planted", "y", "N", 0.0, ""
+    whole: float = 2.0
+    first: float = 1.0
+    growing: float = 0.0
+    lies: float = 0.0
+
+    def ladders(self):
+        return [Ladder("exudyn", "fourth", STEPS, 4), Ladder("exudyn", "first", STEPS, 1, default=0.05),
+                Ladder("exudyn", "liar", STEPS, 2)]  # fmt: skip
+
+    def reference(self):
+        return Ladder("reference", "exact", tuple(5e-3 / 2**k for k in range(6)), 4)
+
+    def second(self):
+        return Setting("reference", "other", 1e-9, 0, adaptive=True)
+
+    def solve(self, setting, duration):
+        if setting.method == "fourth" and setting.value > 0.06:
+            raise RunFailed("exudyn", "unstable", 0.5)
+        return setting, duration
+
+    def answer(self, solution):
+        setting, duration = solution
+        step = 1e-2 if setting.adaptive else setting.value
+        times = np.linspace(0.0, duration, round(duration / step) + 1)
+        error = {"fourth": 1e3, "first": 1.0, "liar": 1e9}.get(setting.method, 0.0) * step ** (setting.order or 1)
+        if setting.method == "other":
+            error = self.lies
+        grown = 1.0 + self.growing * (times > 1.5)
+        values = times**2 * np.sin(5 * times) + error * grown
+        return Answer(times, values[:, None], {"steps": len(times) - 1, "force calls": 4 * (len(times) - 1)})
+
+    def lines(self, setting):
+        return [setting.label()]
+
+
+def test_the_coarsest_setting_that_meets_the_tolerance_wins_and_liars_are_named():
+    found = recommend(Planted(), 1e-2)
+    best = found.winners["exudyn", "calls"].tried.setting
+    # 1e3 h^4 <= 1e-2 from h = 56 ms on: the rung of 50 ms
+    assert (best.method, best.value) == ("fourth", 0.05)
+    assert found.winners["exudyn", "calls"].error == pytest.approx(1e3 * 0.05**4, rel=1e-3)
+    assert {one.status for one in found.tried if one.setting.method == "liar" and one.setting.value == STEPS[0]} <= {
+        "SILENT"}  # fmt: skip
+    assert found.defaults["exudyn"].refined.tried.setting.value <= 1e-2
+
+
+def test_an_error_that_grows_after_the_part_searched_is_found_and_met():
+    calm, wild = recommend(Planted(), 1e-2), recommend(Planted(growing=20.0), 1e-2)
+    assert wild.winners["", "calls"].tried.setting.value < calm.winners["", "calls"].tried.setting.value
+    assert wild.winners["", "calls"].error <= 1e-2 and wild.winners["", "calls"].confirmed
+
+
+def test_two_families_that_differ_are_no_truth():
+    with pytest.raises(RunFailed, match="differ by"):
+        recommend(Planted(lies=5e-3), 1e-2)
+
+
+def test_values_between_rows_do_not_reach_across_a_kink():
+    times = np.linspace(0.0, 1.0, 41)
+    kinked = Answer(times, np.abs(times - 0.5)[:, None] ** 3, {})
+    between = np.linspace(0.0, 1.0, 333)
+    off = {cell: np.abs(at(kinked, between, cell)[:, 0] - np.abs(between - 0.5) ** 3).max() for cell in (0.0, 0.5)}
+    assert off[0.5] < 1e-12 < 1e-7 < off[0.0]
+
+
+RELEASE = {"title": "release", "run": {"duration": 0.2}, "start": {"z3": 0.02}, "vehicle": {"geometry": "linear"}}
+
+
+def test_a_recommendation_holds_beside_another_solver():
+    scene = own(build(RELEASE), None, ("mujoco",))
+    found = recommend(scene, 0.5)
+    for one in found.winners.values():
+        assert true_errors(scene, [one.tried.setting])[one.tried.setting] == pytest.approx(one.error, rel=0.2)
+        assert one.error <= 0.5
+    text = "\n".join(lines(found))
+    assert "f1 and f2 within 0.5 N" in text and "[engines.mujoco]" in text
+    assert as_dict(found)["cheapest"][0]["error"] == found.winners["", "seconds"].error
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "quantity", "message"),
+    [
+        (0.0, None, "--tolerance = 0.0: must be a finite number above 0"),
+        (float("nan"), None, "--tolerance"),
+        (1.0, "f9", "--quantity = 'f9': is no channel"),
+        (1.0, "f1,pitch", "has several units, N and rad"),
+    ],
+)
+def test_what_cannot_be_asked_is_one_message(tolerance, quantity, message):
+    with pytest.raises(InputError, match=message.replace("(", r"\(")):
+        price(build(RELEASE), tolerance, quantity, ("reference",))
+
+
+def test_a_tolerance_below_rounding_is_refused():
+    scene = own(build(RELEASE), "z3", ("reference",))
+    with pytest.raises((InputError, RunFailed), match=r"finer than|differ by"):
+        recommend(scene, 1e-17)
