@@ -5,6 +5,8 @@ conventions differ by a third on a drifting signal, so figures are comparable on
 exponent ``slope`` is 5 unless another is named.
 """
 
+import math
+
 import numpy as np
 
 from models.errors import InputError
@@ -36,16 +38,29 @@ def checked(load: np.ndarray) -> np.ndarray:
     return load
 
 
+def summed(spans: np.ndarray, counts: np.ndarray, slope: float) -> float:
+    """Sum of count times range^slope of cycles (c,); InputError for a slope that is none and a sum beyond doubles."""
+    if not (math.isfinite(slope) and slope > 0.0):
+        raise InputError("", "slope", slope, "must be a Woehler exponent above 0")
+    with np.errstate(over="ignore"):
+        found = float(np.sum(counts * spans**slope))
+    if not math.isfinite(found):
+        raise InputError("", "load", float(spans.max()), f"has a range whose power {slope:g} is beyond all numbers: "
+                         "use another unit")  # fmt: skip
+    return found
+
+
 def pseudo_damage(load: np.ndarray, slope: float = SLOPE) -> float:
     """Sum of count times range^slope over the rainflow cycles of ``load`` (n,); unit: that of the load, to ``slope``.
 
     A load that never turns has none. Raises InputError for a load without a sample, or with one that is not
-    finite: damage of a broken run is not a number to compare.
+    finite: damage of a broken run is not a number to compare; for a slope that is not above 0; and where the damage
+    is too large for a number.
     """
     from models.rainflow_cycles import cycles
 
     spans, _, counts = cycles(turning_points(checked(load)))
-    return float(np.sum(counts * spans**slope))
+    return summed(spans, counts, slope)
 
 
 def damage_ratio(load: np.ndarray, truth: np.ndarray, slope: float = SLOPE) -> float:

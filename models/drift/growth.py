@@ -13,10 +13,12 @@ both arms measured from the common centre of mass, b - c/M and a + c/M, and J = 
 "Drift from noisy wheel forces" knows the law for lambda = 0 alone (t^1.5); this one goes beyond it.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from models.errors import InputError
 from models.vehicles.pitch_plane import Parameters
 
 CUTOFF = 0.2
@@ -25,6 +27,8 @@ roads, for an average over a motion means something only where the error hardly 
 as much changes the growth rate of these roads by 1 to 3 %."""
 SERIES = 0.1
 """Below this 2 lambda t the sinh law is summed as a series, which loses no digit."""
+LEAST = 1e-300
+"""What counts as above 0 (rad^2/s^3, rad)."""
 MEDIAN = 0.6744897501960817
 """Median of |x| of a normal x, by its standard deviation."""
 
@@ -119,9 +123,13 @@ def growth_until(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: f
 def pitch_variance(times: np.ndarray | float, rate: np.ndarray | float, intensity: float) -> np.ndarray:
     """Variance (rad^2) of the pitch: q / (4 lambda^3) (sinh(2 lambda t) - 2 lambda t); q t^3 / 3 for lambda = 0.
 
-    times in s, rate lambda in 1/s, 0 or more, intensity q in rad^2/s^3. With x = 2 lambda t it is
-    q t^3 / 3 times 6 (sinh x - x) / x^3, whose bracket loses its digits for small x and is summed there.
+    times in s, rate lambda in 1/s, intensity q in rad^2/s^3; InputError for one that is negative or no number. With
+    x = 2 lambda t it is q t^3 / 3 times 6 (sinh x - x) / x^3, whose bracket loses its digits for small x and is summed
+    there.
     """
+    for name, given in (("times", times), ("rate", rate), ("intensity", intensity)):
+        if not (np.asarray(given, dtype=float) >= 0.0).all():
+            raise InputError("", name, None, "must be 0 or more, and a number")
     t, x = np.asarray(times, dtype=float), 2.0 * np.asarray(rate, dtype=float) * np.asarray(times, dtype=float)
     small = np.minimum(np.abs(x), SERIES) ** 2
     series = 1.0 + small / 20 * (1.0 + small / 42 * (1.0 + small / 72 * (1.0 + small / 110)))
@@ -141,9 +149,15 @@ def holding_stiffness(p: Parameters, rate: float) -> float:
 
 
 def drift_off_time(rate: float, intensity: float, angle: float) -> float:
-    """Time (s) by which half of all runs are more than ``angle`` (rad) off, for a constant growth rate (1/s)."""
+    """Time (s) by which half of all runs are more than ``angle`` (rad) off, for a constant growth rate (1/s).
+
+    Raises InputError for an intensity or angle that is not above 0, and for a rate below it.
+    """
     from scipy.optimize import brentq
 
+    for name, value, least in (("rate", rate, 0.0), ("intensity", intensity, LEAST), ("angle", angle, LEAST)):
+        if not (math.isfinite(value) and value >= least):
+            raise InputError("", name, value, "must be finite, intensity and angle above 0 and the rate not below")
     wanted = (angle / MEDIAN) ** 2
     longest = (3 * wanted / intensity) ** (1 / 3)  # lambda = 0 is the slowest growth
     return float(brentq(lambda t: float(pitch_variance(t, rate, intensity)) - wanted, 0.0, longest * (1 + 1e-9)))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.damage import checked, turning_points
+from models.damage import checked, summed, turning_points
 from models.rainflow_cycles import cycles
 
 LEVELS, RANGES = 64, 64
@@ -42,7 +42,7 @@ def count(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> Coun
     least, greatest = float(load.min()), float(load.max())
     levels = np.linspace(least, greatest, LEVELS + 1)
     ranges = np.linspace(0.0, greatest - least, RANGES + 1)[1:]
-    return Counted({slope: float(np.sum(counts * spans**slope)) for slope in slopes}, levels,
+    return Counted({slope: summed(spans, counts, slope) for slope in slopes}, levels,
                    level_crossings(turns, levels), ranges, range_pairs(spans, counts, ranges), least, greatest,
                    float(load.mean()))  # fmt: skip
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.damage import damage_ratio, pseudo_damage
+from models.drift.growth import drift_off_time
 from models.drift.score import Errors, Limits, Own, blind_verdict, errors, own_figures, verdict
 from models.engines.protocol import Settings
 from models.result import Result
@@ -130,6 +131,22 @@ def constant_truth(engine: str, folder: Path) -> float:
     return damage_ratio(_walk(), np.full(500, 3.0))
 
 
+def huge_load(engine: str, folder: Path) -> float:
+    """Ratio of damages that are both beyond all numbers."""
+    load = np.array([0.0, 1e200, 0.0])
+    return damage_ratio(load, load)
+
+
+def no_slope(engine: str, folder: Path) -> float:
+    """Damage at a Woehler exponent that is no number: a power of 1 hides it."""
+    return pseudo_damage(np.array([0.0, 1.0, 0.0]), np.nan)
+
+
+def no_intensity(engine: str, folder: Path) -> float:
+    """Time to drift off under noise of negative intensity."""
+    return drift_off_time(1.0, -1.0, 0.05)
+
+
 def two_points(engine: str, folder: Path) -> float:
     """A load of one rise."""
     return abs(pseudo_damage(np.array([0.0, 2.0]), 5.0) - 0.5 * 2.0**5)
@@ -183,6 +200,12 @@ CASES = (
          "refused", "N^5", 0.0, "no damage is right", broken_load, REFUSED, broken_load_naive),
     Case("load without a sample", "no cycle, but no measurement either", "refused", "N^5", 0.0, "no damage is right",
          empty_load, REFUSED),
+    Case("load beyond all numbers", "inf / inf is not a number, and a table shows it as a ratio", "refused", "", 0.0,
+         "there is no answer", huge_load, REFUSED, once=True),
+    Case("Woehler exponent that is no number", "1 to any power is 1", "refused", "", 0.0, "there is no answer",
+         no_slope, REFUSED, once=True),
+    Case("drift-off by noise of negative intensity", "a root is found where none has a meaning", "refused", "", 0.0,
+         "there is no answer", no_intensity, REFUSED, once=True),
     Case("true load that never varies", "its damage is 0, by which the ratio would divide", "refused", "", 0.0,
          "no ratio is right", constant_truth, REFUSED),
     Case("load of a single rise", "two turning points make half a cycle", "half of range^5", "N^5", 0.0,

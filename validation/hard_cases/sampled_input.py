@@ -231,6 +231,19 @@ def largest_pitch(states: np.ndarray) -> str:
     return f"{np.abs(states[3]).max():.0e} rad"
 
 
+def passed_over(engine: str, folder: Path) -> float:
+    """The study road at 280 m/s in steps of 2 ms: 0.56 m each."""
+    base = setups.vehicle(effects={"road": {"source": "study", "speed": 280.0}})
+    return setups.largest(setups.run(engine, base, 2e-3, 0.2).states)
+
+
+def passed_over_naive(folder: Path) -> str:
+    """The same past the check, and in steps that see every wave."""
+    base = setups.vehicle(effects={"road": {"source": "study", "speed": 280.0}})
+    ends = [setups.unchecked("reference", base, step, 0.2).states[-1, 4] for step in (2e-3, 1e-4)]
+    return f"past the check the front wheel ends at {ends[0]:.2f} m/s, in steps of 0.1 ms at {ends[1]:.2f} m/s"
+
+
 CASES = (
     Case(
         "replay of a ramp",
@@ -328,5 +341,16 @@ CASES = (
         "there is no answer",
         uneven,
         REFUSED,
+    ),
+    Case(
+        "step over whole waves of the road",
+        "at 1000 km/h a step of 2 ms sees a wave of 0.5 m once: another, longer one",
+        "refused",
+        "",
+        0.0,
+        "what lies between the steps is not in the answer, and all implementations agree on the wrong one",
+        passed_over,
+        REFUSED,
+        passed_over_naive,
     ),
 )
