@@ -13,11 +13,13 @@ from models.drift.score import Verdict
 from models.drift.trust import ANGLE, Trust
 from models.errors import RunFailed
 from models.hub_forces.cut_vehicle import CutVehicle
+from models.hub_forces.kernel import WRENCH
 from models.measured import plan
 from models.measured.checks import findings as findings_of
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.noise_floor import noise
 from models.measured.checks.place import Place
+from models.measured.checks.weight import moments
 from models.measured.clock import record
 from models.measured.comparison import Compared, checks, compare
 from models.measured.counting import Counted, count
@@ -215,8 +217,16 @@ def _predicted(found: Found) -> Drift:
     tilt, rate = ((_began(own, what, "roll", chassis), _began(own, what, "pitch", chassis))
                   for what in ("angle", "angular rate"))  # fmt: skip
     frame = next(s.frame for s in own.signals if s.at in vehicle.hubs)
-    level = Level(noise["force"], noise["moment"], None, tilt, rate)
+    level = Level(noise["force"], noise["moment"], _bias(found), tilt, rate)
     return drift(vehicle, level, own.period, own.duration, frame)
+
+
+def _bias(found: Found) -> np.ndarray | None:
+    """Moments that the motion does not bear out, as a couple at the first hub (6 h,); None where there are none."""
+    couple = moments(found.evidence)
+    if not couple.any():
+        return None
+    return np.concatenate([np.zeros(3), couple, np.zeros(WRENCH * len(_vehicle(found).hubs) - 5)])
 
 
 def _began(own: Recording, what: str, axis: str, chassis: str) -> float:

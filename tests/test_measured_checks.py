@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.hub_forces.rigid import rigid
-from models.measured.checks import check, clipped, findings, gaps, gravity, noise, turning
+from models.measured.checks import check, clipped, findings, gaps, gravity, noise, turning, weight
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.means import mean
 from models.measured.checks.place import Place
@@ -60,6 +60,22 @@ def test_a_planted_fault_is_named_with_its_size(fault, ridden, tmp_path):
 
 def test_a_clean_recording_of_five_seconds_raises_nothing(ridden, tmp_path):
     assert not case.findings(ridden, ridden.samples(Faults(noise=case.NOISE), 5), tmp_path)
+
+
+@pytest.mark.parametrize(("fault", "check_name", "size"), [({"gain": {"rr_fz": -0.02}}, "gain", -2.0),
+                                                           ({"gain": {"fl_fz": 0.02}}, "gain", 2.0)])  # fmt: skip
+def test_two_percent_are_seen_in_five_seconds(fault, check_name, size, ridden, tmp_path):
+    # the mean moment of the hub forces is what the gyros say that it must be
+    (found,) = case.findings(ridden, ridden.samples(Faults(noise=case.NOISE, **fault), 5), tmp_path)
+    assert found.check == check_name and found.size == pytest.approx(size, rel=0.2) and "offset of" in found.text
+
+
+def test_moments_of_an_offset_are_known_before_a_run(ridden, tmp_path):
+    values = [ridden.samples(Faults(noise=case.NOISE, bias=bias), 5) for bias in ({}, {"fl_fz": 30.0})]
+    clean, off = (weight.moments(Evidence(case.recording(ridden, own, tmp_path / f"{i}.columns"), ridden.vehicle))
+                  for i, own in enumerate(values))  # fmt: skip
+    arm = rigid(ridden.vehicle).arms[0]
+    assert not clean.any() and off == pytest.approx([30 * arm[1], -30 * arm[0]], rel=0.1)
 
 
 def test_hub_forces_explain_the_motion_through_the_vehicle_and_only_with_their_signs(ridden, tmp_path):

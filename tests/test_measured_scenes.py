@@ -103,6 +103,17 @@ def test_files_are_placed_by_their_start_times_and_must_overlap(tmp_path):
         recorded(apart, tmp_path / "other")
 
 
+def test_a_clock_that_is_fast_is_slowed_down_and_a_zero_is_taken_off(tmp_path):
+    t = np.arange(2000) * 1e-2
+    a = write_csv(tmp_path / "a.csv", t, fl__kN=t + 0.25)
+    b = write_csv(tmp_path / "b.csv", 1.002 * t, fr__N=t)
+    own = scene(tmp_path, {"file": a, "channels": [force("fl", "fl", sign=-1, zero=0.25)]},
+                {"file": b, "drift": 2e-3, "channels": [force("fr", "fr")]})  # fmt: skip
+    found = recorded(own, tmp_path)
+    assert found.samples(found.signals[0]) == pytest.approx(-1e3 * t, abs=1e-4)
+    assert found.samples(found.signals[1]) == pytest.approx(t, abs=1e-6) and found.count == 2000
+
+
 def test_gaps_are_not_measured_and_all_else_is(tmp_path):
     t = np.delete(np.arange(1000) * 1e-3, np.arange(400, 600))
     own = scene(tmp_path, {"file": write_csv(tmp_path / "a.csv", t, fl__N=t), "channels": [force("fl", "fl")]})

@@ -97,6 +97,9 @@ class TiltFilter:
     def _check_balance(self, turning: np.ndarray, rates: np.ndarray) -> None:
         """Refuse hub forces whose moments, integrated, are not the measured rates of roll and pitch.
 
+        A constant offset of a transducer, which the filter takes for noise, makes a straight line of what is left of a
+        stretch: it is not counted, or 30 N at one wheel would be as much as a smooth road.
+
         turning : (n, 2), rad/s^2; rates : (n, 2), rad/s.
         """
         dt, length = self.period, round(BALANCED / self.period)
@@ -106,7 +109,8 @@ class TiltFilter:
                 continue
             integral = np.vstack((np.zeros(2), np.cumsum(part[1:] + part[:-1], axis=0) * dt / 2))
             allowed = self.variances[2:] + np.diag(self.forces_noise) * dt * dt * len(own) / 6
-            self.state.rates += np.maximum(np.var(own - integral, axis=0) - 9 * allowed, 0.0), np.var(own, axis=0)
+            left = np.var(_level_line(own - integral), axis=0)
+            self.state.rates += np.maximum(left - 9 * allowed, 0.0), np.var(own, axis=0)
         unexplained, whole = self.state.rates
         share = np.sqrt(unexplained / np.where(whole > 0, whole, 1.0))
         for name, found in zip(("roll", "pitch"), share, strict=True):
@@ -114,6 +118,12 @@ class TiltFilter:
                 raise InputError(self.file, f"angles.{name}_rate", None, f"contradicts the hub forces: {found:.0%} of "
                                  "it is not the integral of their moment "
                                  f"(at most {UNEXPLAINED:.0%}): {REMEDY}")  # fmt: skip
+
+
+def _level_line(values: np.ndarray) -> np.ndarray:
+    """Values (n, k) without their straight lines."""
+    line = np.linspace(-1.0, 1.0, len(values))
+    return values - np.outer(line, line @ values / (line @ line))
 
 
 def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, force_deviation: np.ndarray,

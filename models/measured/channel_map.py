@@ -53,7 +53,7 @@ def _signal(file: str, place: str, row: MappedChannel, source: Source, places: P
         raise InputError(file, f"{place}, frame", frame, f"is no frame of {row.quantity} at {row.at!r}", frames)
     check = row.check or row.quantity == "strain" or row.at in places.connectors
     return Signal(name, source.path.name, row.channel, row.quantity, row.at, row.component, frame, row.sign, unit,
-                  factor, gravity=row.gravity, check=check)  # fmt: skip
+                  factor, zero=row.zero, gravity=row.gravity, check=check)  # fmt: skip
 
 
 def find(source: Source, name: str, file: str, place: str) -> Channel:

@@ -33,12 +33,16 @@ LEAST = 100
 
 @dataclass(frozen=True)
 class Group:
-    """Mapped signals of one group of one file, with their timing on the common time; ``shift`` (s) was added to it."""
+    """Mapped signals of one group of one file, with their timing on the common time.
+
+    The file's clock was slowed down by its ``drift``, and ``shift`` (s) added.
+    """
 
     source: Source
     signals: tuple[Signal, ...]
     timing: Timing
     shift: float
+    drift: float
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -49,6 +53,10 @@ class Group:
     def factors(self) -> np.ndarray:
         """To SI, with sign."""
         return np.array([signal.sign * signal.factor for signal in self.signals])
+
+    def si(self, values: np.ndarray) -> np.ndarray:
+        """Values (n, signals) of the file in SI."""
+        return (values - np.array([signal.zero for signal in self.signals])) * self.factors
 
 
 @dataclass(frozen=True)
@@ -77,7 +85,8 @@ def record(scene: MeasuredScene, sources: Sequence[Source], signals: Sequence[Si
     """
     shifts, start, noticed = placed(scene, sources)
     progress("reading times", 0.0)
-    groups = [each for i, source in enumerate(sources) for each in _groups(source, signals, shifts[i])]
+    placing = zip(sources, shifts, (file.drift for file in scene.files), strict=True)
+    groups = [each for source, shift, drift in placing for each in _groups(source, signals, shift, drift)]
     leading = [group for group in groups if any(s.at in hubs and not s.check for s in group.signals)]
     if not leading:
         raise InputError(scene.file, "files", None, "no channel is mapped to a hub: wheel forces are what drives the "
@@ -128,7 +137,7 @@ def placed(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float]
     return offsets, known[0] if len(starts) == 1 and known else None, [found]
 
 
-def _groups(source: Source, signals: Sequence[Signal], shift: float) -> Iterator[Group]:
+def _groups(source: Source, signals: Sequence[Signal], shift: float, drift: float) -> Iterator[Group]:
     """Groups of a file of which any channel is mapped."""
     of = {channel.name: channel.group for channel in source.channels}
     own = [signal for signal in signals if signal.file == source.path.name]
@@ -137,7 +146,8 @@ def _groups(source: Source, signals: Sequence[Signal], shift: float) -> Iterator
         times = np.concatenate([block.times for block in source.blocks([mapped[0].channel])])
         where = source.path.name if len(set(of.values())) == 1 else f"{source.path.name}, {mapped[0].channel} ..."
         found = timing(times, where, tuple(s.name for s in mapped[:1]))
-        yield Group(source, mapped, replace(found, times=found.times + shift), shift)
+        slowed = replace(found, times=found.times / (1 + drift) + shift, period=found.period / (1 + drift))
+        yield Group(source, mapped, slowed, shift, drift)
 
 
 def _grid(scene: MeasuredScene, leading: list[Group]) -> Grid:
@@ -182,7 +192,8 @@ def _outside(scene: MeasuredScene, group: Group, grid: Grid) -> Iterator[Finding
 def _columns(folder: Path, signals: Sequence[Signal], sources: Sequence[Source], grid: Grid) -> Columns:
     """Columns of this recording, or those begun from the same files; InputError where the folder holds others."""
     files = {source.path.name: [(at := source.path.stat()).st_size, at.st_mtime_ns] for source in sources}
-    now = {"files": files, "map": [[s.channel, s.sign, s.factor] for s in signals], "clock": [grid.start, grid.period]}
+    own = [[s.channel, s.sign, s.factor, s.zero] for s in signals]
+    now = {"files": files, "map": own, "clock": [grid.start, grid.period]}
     path = folder / SOURCES
     if path.is_file() and json.loads(path.read_text()) != now:
         raise InputError(path, "", None, "was written from other files or by another map: choose a new folder")
@@ -203,7 +214,7 @@ def _direct(group: Group, grid: Grid, columns: Columns, folder: Path) -> None:
     """Samples that are on the clock already, block by block, with NaN between them."""
     names, done = tuple(signal.name for signal in group.signals), 0
     for block in group.source.blocks(group.names):
-        at = grid.places(block.times + group.shift)
+        at = grid.places(block.times / (1 + group.drift) + group.shift)
         inside = (at >= done) & (at < grid.count)
         if inside.any():
             last = int(at[inside][-1]) + 1
@@ -211,7 +222,7 @@ def _direct(group: Group, grid: Grid, columns: Columns, folder: Path) -> None:
                 count = min(BLOCK, last - first)
                 here = inside & (at >= first) & (at < first + count)
                 values = np.full((count, len(names)), np.nan)
-                values[at[here] - first] = block.values[here] * group.factors
+                values[at[here] - first] = group.si(block.values[here])
                 columns.put(names, first, values)
             done = last
     for first in range(done, grid.count, BLOCK):
@@ -223,7 +234,7 @@ def _resampled(group: Group, grid: Grid, columns: Columns, folder: Path) -> None
     count = next(channel.count for channel in group.source.channels if channel.name == group.names[0])
     raw = Columns(folder / RAW, group.names, count)
     for block in group.source.blocks(group.names):
-        raw.put(group.names, block.first, block.values * group.factors)
+        raw.put(group.names, block.first, group.si(block.values))
     times, order = grid.times(), group.timing.order
     for signal in group.signals:
         values = raw.read(signal.channel)

@@ -38,6 +38,7 @@ class MappedChannel(Strict):
     frame: Frame | None = Field(default=None, description="whose axes")
     sign: Literal[1, -1] = Field(default=1, description="-1 where the file counts the other way")
     unit: str | None = Field(default=None, description="where the file names none, or another than it means")
+    zero: float = Field(default=0.0, allow_inf_nan=False, description="what it reads at nought, in its unit: taken off")
     gravity: bool = Field(default=True, description="whether an acceleration includes it: +9.81 m/s^2 upwards at rest")
     check: bool = Field(default=False, description="only compared with, never put in")
 
@@ -47,6 +48,7 @@ class MeasuredFile(Strict):
 
     file: str = Field(description="the file, beside the scene")
     offset: float = quantity("s", "added to its clock", default=0.0, signed=True)
+    drift: float = Field(default=0.0, gt=-0.1, lt=0.1, description="by which its clock is fast: 1e-4 is 0.36 s an hour")
     channels: list[MappedChannel] = Field(min_length=1, description="what its channels measure")
 
 

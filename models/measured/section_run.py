@@ -32,6 +32,8 @@ BLOCK = 60.0
 """s of recording between two checkpoints."""
 DAMPING = 0.7
 """Of the moment towards the filter's estimate, of the critical one."""
+STIFF = 0.1
+"""Bandwidth of the pull by the rate of the steps: a stiffer one outruns Runge-Kutta 4."""
 Progress = Callable[[float, float], None]
 
 
@@ -97,6 +99,9 @@ def check(own: SectionRun) -> None:
     if own.count < 2:
         raise InputError(own.file, "files", None, f"the recording has {own.recording.count} samples: nothing to run")
     check_step(own.engine, own.vehicle, own.grid.step, own.grid.step * own.grid.every)
+    if own.hold.method == "kalman" and own.hold.bandwidth * own.grid.step > STIFF:
+        raise InputError(own.file, "stabilise.bandwidth", own.hold.bandwidth, f"must be at most {STIFF:g} of the rate "
+                         f"of the run's steps, {STIFF / own.grid.step:g} Hz")  # fmt: skip
     used = [signal for signal in own.recording.signals if not signal.check and signal.at == own.vehicle.chassis]
     if own.hold.method != "none" and not any(signal.quantity in ("angle", "angular rate") for signal in used):
         raise InputError(own.file, "stabilise.method", own.hold.method, "needs roll and pitch or their rates at the "

@@ -17,8 +17,8 @@ class Signal:
     """A channel of a file, as the channel map reads it.
 
     at : the hub (tyre), body, connector or accelerometer that it belongs to. component : x, y, z; roll, pitch, yaw of
-    angles and angular rates; empty for a travel or a strain. frame : whose axes. factor : value in SI = sign * (file's
-    value * factor + zero). gravity : whether an acceleration includes it. check : named only to be compared with.
+    angles and angular rates; empty for a travel or a strain. frame : whose axes. factor : value in SI = sign * factor *
+    (file's value - zero). gravity : whether an acceleration includes it. check : named only to be compared with.
     """
 
     name: str

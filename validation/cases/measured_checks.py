@@ -123,6 +123,7 @@ FULL = (
     Planted("40 ms late, one force", "shift", "fr_fz", 4e-2, "s", {"delay": {"fr_fz": 4e-2}}),
     Planted("2 % too much, front wheel", "gain", "fl_fz", 2.0, "%", {"gain": {"fl_fz": 0.02}}),
     Planted("2 % too little, rear wheel", "gain", "rr_fz", -2.0, "%", {"gain": {"rr_fz": -0.02}}),
+    Planted("offset of 30 N, one force", "offset", "rl_fz", -30.0, "N", {"bias": {"rl_fz": -30.0}}),
     Planted("3 % too much, accelerometer", "gain", "tower_az", 3.0, "%", {"gain": {"tower_az": 0.03}}),
     Planted("gravity not included", "gravity", "tower_az", 9.81, "m/s^2", {}, _times(1.0, "tower_az", add=-9.81)),
     Planted("kN for N, one wheel", "unit", "fr_fz", 1e-3, "1", {}, _times(1e-3, "fr_fz")),

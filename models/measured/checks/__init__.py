@@ -20,7 +20,8 @@ CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
 )  # fmt: skip
 """In this order: what an earlier one has named, a later one does not name again."""
 FAMILIES = defaultdict(frozenset[str], {
-    **dict.fromkeys(("sign", "unit", "gain", "weight", "gravity"), frozenset({"size"})), "shift": frozenset({"time"}),
+    **dict.fromkeys(("sign", "unit", "gain", "offset", "weight", "gravity"), frozenset({"size"})),
+    **dict.fromkeys(("drift", "shift"), frozenset({"time"})),
     "clipped": frozenset({"value"}), "noise": frozenset({"size", "value"}),
     "rigid": frozenset({"size", "time", "value"}),
 })  # fmt: skip

@@ -244,6 +244,12 @@ class Agreement:
                 found[group.name] = _least(late, rest, SMALL_DELAY), _least(wrong, rest, SMALL_FACTOR)
         return found
 
+    def factor(self, signal: Signal) -> tuple[float, float]:
+        """Recorded by true value of a force by the motion alone, as it is now, and its standard error."""
+        group = Group(signal.name, True, (self.inputs.index(signal),))
+        cross, power = ((self.weights * part).sum() for part in self.share(group))
+        return (float(power / cross.real), float(2 * power) ** -0.5) if power > 0 else (1.0, float("inf"))
+
     def _rest(self, weights: np.ndarray) -> np.ndarray:
         """Weighted power (k,) of every reading that neither forces nor noise explain."""
         return np.maximum((weights * (self.left - self.noise)).sum(axis=0), 0.0)

@@ -1,5 +1,6 @@
 """Mean vertical forces against the static load of every hub and against the weight: sign, unit and calibration."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -14,6 +15,7 @@ from models.measured.checks.means import mean
 from models.measured.checks.ratios import sentence
 from models.measured.checks.response import AXES
 from models.measured.finding import Finding
+from models.measured.recording import Recording
 from models.measured.signal import Signal
 
 NAME = "weight"
@@ -21,6 +23,10 @@ KNOWN = 1e-3
 """Part of each hub's load by which a vehicle that is not wrong may differ from its file: tilt alone takes 0.1 %."""
 SMALL = 0.005
 """Part of a load below which nothing is said."""
+RIGHT = 0.35
+"""Part of an excess of the mean by which a factor may differ from 1 by the motion, for the excess to be an offset."""
+SURE = 4.0
+"""Standard deviations by which a mean moment must differ from what the motion asks for."""
 CERTAIN = 25.0
 """Fall of chi square that a wrong channel must bring."""
 
@@ -51,12 +57,41 @@ def check(evidence: Evidence) -> list[Finding]:
         return [Finding(NAME, "note", "", text)]
     signals = tuple(own[hub] for hub in vehicle.hubs)
     numbers = _numbers(evidence, vehicle)
-    centre, spread = mean([partial(evidence.recording.samples, s) for s in evidence.forces])
-    loads, at = centre[[numbers.index(WRENCH * i + 2) for i in range(len(signals))]], vehicle.loads
+    means = mean(_columns(evidence, vehicle))
+    loads, at = means[0][[numbers.index(WRENCH * i + 2) for i in range(len(signals))]], vehicle.loads
     coarse = [_coarse(s, load, static) for s, load, static in zip(signals, loads, at, strict=True)]
     if any(coarse):
         return [finding for finding in coarse if finding]
-    return _fine(_balance(vehicle, numbers, centre, spread), signals, at)
+    return _fine(evidence, _balance(vehicle, numbers, *means), signals, at)
+
+
+def moments(evidence: Evidence) -> np.ndarray:
+    """Moments (2,) of the hub forces about x and y, N m, on average, that the measured rates of roll and pitch do not
+    bear out: of offsets, gains, or a load that is not in the vehicle file; 0 where they may be chance, or not known."""
+    vehicle, none = evidence.vehicle, np.zeros(2)
+    if vehicle is None or evidence.frame == "inertial" or not _turns(evidence, vehicle):
+        return none
+    own = _balance(vehicle, _numbers(evidence, vehicle), *mean(_columns(evidence, vehicle)))
+    left, sure = own.left[1:3], np.sqrt(np.diag(np.linalg.inv(own.inverse)))[1:3]
+    return left if (np.abs(left) > SURE * sure).any() else none
+
+
+def _columns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndarray]]:
+    """Readers of all hub forces, and of the angular accelerations."""
+    forces: list[Callable[[], np.ndarray]] = [partial(evidence.recording.samples, s) for s in evidence.forces]
+    return forces + _turns(evidence, vehicle)
+
+
+def _turns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndarray]]:
+    """Readers of the angular accelerations of roll and pitch by the chassis' gyros; none where one is missing."""
+    own = evidence.recording
+    found = [own.find("angular rate", vehicle.chassis, axis)[:1] for axis in ("roll", "pitch")]
+    return [partial(_slope, own, one[0]) for one in found] if all(found) else []
+
+
+def _slope(own: Recording, signal: Signal) -> np.ndarray:
+    """Derivative (n,) of a signal, 1/s."""
+    return np.gradient(own.samples(signal), own.period)
 
 
 def _numbers(evidence: Evidence, vehicle: CutVehicle) -> list[int]:
@@ -73,6 +108,7 @@ def _coarse(signal: Signal, load: float, static: float) -> Finding | None:
 
 
 def _balance(vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread: np.ndarray) -> Balance:
+    """Of means (k,), or (k + 2,) with the angular accelerations of roll and pitch, which moments owe to the motion."""
     whole, hubs = rigid(vehicle), len(vehicle.hubs)
     unit = np.eye(WRENCH * hubs)[numbers]
     turning = whole.moments(unit)[:, :2].T
@@ -80,14 +116,18 @@ def _balance(vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread
     lift = np.vstack([np.ones(hubs), whole.arms[:, 1], -whole.arms[:, 0]])
     elastic = null_space(lift).T
     rows = np.vstack([vertical.sum(axis=0), turning, elastic @ vertical])
+    if len(centre) > len(numbers):
+        turned = np.zeros((len(rows), 2))
+        turned[1:3] = -whole.inertia[:2, :2]
+        rows = np.hstack([rows, turned])
     rest = np.concatenate([[whole.mass * GRAVITY, 0.0, 0.0], elastic @ vehicle.loads])
     columns = np.vstack([lift, elastic]) * vehicle.loads
     covariance = np.diag(np.diag(rows @ spread @ rows.T)) + KNOWN**2 * columns @ columns.T
     return Balance(rows @ centre - rest, columns, np.linalg.inv(covariance))
 
 
-def _fine(balance: Balance, signals: tuple[Signal, ...], loads: np.ndarray) -> list[Finding]:
-    """Calibration of single channels, or another weight than the file's."""
+def _fine(evidence: Evidence, balance: Balance, signals: tuple[Signal, ...], loads: np.ndarray) -> list[Finding]:
+    """Offset or calibration of single channels, or another weight than the file's."""
     names, weight = tuple(s.name for s in signals), float(loads.sum())
     single = [balance.fit(balance.columns[:, [i]]) for i in range(len(signals))]
     worst = max(range(len(signals)), key=lambda i: single[i][2])
@@ -96,14 +136,35 @@ def _fine(balance: Balance, signals: tuple[Signal, ...], loads: np.ndarray) -> l
     excess, sure = float(force[0]) / weight, float(error[0, 0]) ** 0.5 / weight
     if single[worst][2] > CERTAIN and abs(share) > max(SMALL, 4 * own) and single[worst][2] > fall - CERTAIN:
         signal = signals[worst]
+        if _moves_rightly(evidence, signal, share):
+            return [_offset(signal, share * loads[worst], own * loads[worst])]
         _, text = sentence(1 + share, signal, f"the {loads[worst]:.0f} N that rest on {signal.at} on average")
-        sure_text = f" The mean is known to {2 * own:.2%} (95 %), and what is too much acts at this hub alone."
+        sure_text = (f" The mean is known to {2 * own:.2%} (95 %), and what is too much acts at this hub alone; an "
+                     f"offset of {share * loads[worst]:+.3g} N would do the same.")  # fmt: skip
         return [Finding("gain", "doubt", signal.name, text + sure_text, 100 * share, "%", (signal.name,))]
     if fall > CERTAIN and max(abs(excess), float(np.abs(force[1:]).max()) / weight) > max(SMALL, 4 * sure):
         return [_other_weight(force, weight, sure, names)]
     text = (f"The mean vertical forces carry the vehicle's weight of {weight:.0f} N to {excess:+.2%} (+-{2 * sure:.2%} "
             f"at 95 %); a channel that is wrong by {max(100 * SMALL, 5 * _coarsest(single)):.2g} % would be seen.")
     return [Finding(NAME, "note", "", text, 100 * excess, "%", names)]
+
+
+def _moves_rightly(evidence: Evidence, signal: Signal, share: float) -> bool:
+    """Whether the motion of the vehicle says that a channel's factor is right, and not wrong by this share."""
+    if evidence.searched is None or any(signal in f.signals for f in evidence.faults if f.kind == "factor"):
+        return False
+    ratio, error = evidence.searched[0].factor(signal)
+    return 4 * error < abs(share) and abs(ratio - 1) < RIGHT * abs(share)
+
+
+def _offset(signal: Signal, size: float, sure: float) -> Finding:
+    """A constant error (N) of one channel."""
+    zero = size / (signal.sign * signal.factor)
+    word = "much" if size > 0 else "little"
+    text = (f"{signal.name} reads {abs(size):.3g} N too {word} (+-{2 * sure:.2g} N at 95 %) on average, while its "
+            f"factor is right by the motion of the vehicle: an offset; give it zero = {signal.zero + zero:.4g} in the "
+            "channel map.")  # fmt: skip
+    return Finding("offset", "doubt", signal.name, text, size, "N", (signal.name,))
 
 
 def _coarsest(single: list[tuple[np.ndarray, np.ndarray, float]]) -> float:
