@@ -30,8 +30,8 @@ SYSTEM: System = "pitch-plane"
 FAMILIES = ("stepping", "sampled_input", "contact_points", "prescribed_pitch", "stabilisers", "invariants", "extremes")
 """Families of hard cases that any engine of the pitch plane can be put through."""
 STEP, DURATION = 1e-3, 0.5
-COARSE = 2e-3
-"""Step (s) from which the order is measured by halving."""
+HALVED = (5e-4, 2.5e-4)
+"""Steps (s) between which the order is measured, as in the report: RK4 is not asymptotic at 1 ms yet."""
 TOLERANCE = 1e-9
 """Asked of a method that keeps one."""
 LOOSE = 1e-4
@@ -104,8 +104,9 @@ def _checks(name: str, folder: Path) -> Iterator[Check]:
                    f"acceleration at 100 random states against the equations of the paper, {vehicle}, {geometry}",
                    "of the largest", 1e-12, "both sides are a dozen products of doubles",
                    partial(checks.acceleration_gap, make, _road(vehicle, geometry), settings))  # fmt: skip
-    yield ("equilibrium", "distance from the static equilibrium on a flat road", "m, rad, m/s, rad/s", 1e-9,
-           "nothing moves what is at rest", partial(_at_rest, name, settings))  # fmt: skip
+    yield ("equilibrium", "distance from the static equilibrium on a flat road", "m, rad, m/s, rad/s",
+           1e3 * TOLERANCE if _adaptive(name) else 1e-9, "nothing moves what is at rest, beyond a kept tolerance",
+           partial(_at_rest, name, settings))  # fmt: skip
     for kind, scene in _paths(folder).items():
         yield (f"path.{kind}", f"largest state error, {kind}, against the reference by DOP853 at 1e-13",
                "m, rad, m/s, rad/s", _bound(name), f"{DURATION:g} s at {STEP:g} s, RK4 has 1e-6 at most",
@@ -174,7 +175,8 @@ def _order(name: str, second: Independence) -> Row:
     declared, why = CATALOGUE[name][name].order, "one halving; the band leaves room for the next term of the error"
 
     def gap() -> float:
-        errors = [checks.state_gap(_run(name, road, _settings(name, step)), _truth(road)) for step in (COARSE, STEP)]
+        truth = _truth(road, HALVED[-1])
+        errors = [checks.state_gap(_run(name, road, _settings(name, step)), truth) for step in HALVED]
         return 0.0 if errors[0] < EXACT else abs(float(np.log2(errors[0] / errors[1])) - declared)
 
     return _judged("conformity.order", f"observed order less the declared {declared}", "", 0.35, why, gap, second)
