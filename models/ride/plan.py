@@ -16,6 +16,10 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     vehicle = vehicle_of(scene)
     excitation_of(scene, wheels(vehicle))
     kinds = {output.name: output.kind for output in vehicle.outputs}
+    weighted = tuple(f"{name} {by}" for name, by in scene.weighting.items())
+    for i, name in enumerate(scene.quantities):
+        if name not in (*kinds, *weighted):
+            raise InputError(scene.file, f"quantities.{i}", name, "is no output of the vehicle", (*kinds, *weighted))
     for name in scene.weighting:
         if name not in kinds:
             raise InputError(scene.file, f"weighting.{name}", None, "is no output of the vehicle", tuple(kinds))

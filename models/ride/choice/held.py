@@ -1,6 +1,6 @@
 """What a linear stationary scene holds, and effects that may be left out of it."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -42,7 +42,7 @@ class Effect:
     """One thing that may be left out: its name, what leaving it out means, and with what it goes.
 
     needs : effects that must be left out, too; excludes : effects that may not be left out beside it; ``why``, a
-    sentence for both.
+    phrase for both. singular : no small change in any respect, so that it is solved and not screened.
     """
 
     name: str
@@ -51,6 +51,7 @@ class Effect:
     needs: tuple[str, ...] = ()
     excludes: tuple[str, ...] = ()
     why: str = ""
+    singular: bool = False
 
 
 def effects_of(held: Held) -> tuple[Effect, ...]:
@@ -60,8 +61,9 @@ def effects_of(held: Held) -> tuple[Effect, ...]:
     return tuple(effect for module in modules for effect in module.found(held))
 
 
-def illegal(chosen: Sequence[Effect]) -> str:
+def illegal(chosen: Iterable[Effect]) -> str:
     """Why these may not be left out together, with the remedy; empty where they may."""
+    chosen = tuple(chosen)
     names = {effect.name for effect in chosen}
     for effect in chosen:
         missing = [name for name in effect.needs if name not in names]

@@ -9,6 +9,7 @@ Nothing is taken to a limit with large numbers, so that singular changes are as 
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import block_diag, null_space
@@ -20,6 +21,7 @@ from models.ride.excitation import Excitation
 from models.ride.linear_vehicle import LinearVehicle
 from models.ride.weighting import weighted
 from models.vehicles.kinematics import Kinematics
+from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, mass
 
 NOTHING = 1e-10
@@ -30,7 +32,7 @@ NOTHING = 1e-10
 class Reduced:
     """``vehicle`` M, D, K in what coordinates are left (M may be singular), N (n, r) to those of the whole vehicle,
     ``excitation`` and ``system``; T (n, x) from its state to (q, q', f, weightings) of the whole, ``left`` (x, n) a way
-    back that keeps momentum."""
+    back that keeps momentum; ``states`` of vehicle and road, before those of the weightings."""
 
     vehicle: LinearVehicle
     N: np.ndarray
@@ -38,6 +40,7 @@ class Reduced:
     system: DelayedSystem
     T: np.ndarray
     left: np.ndarray
+    states: int
 
 
 class Whole:
@@ -67,16 +70,14 @@ class Whole:
         out = weighted(system, self.held.scene.weighting)
         more = np.eye(len(out.A) - x)
         return Reduced(constrained, N, excitation, out, block_diag(np.vstack([q, q @ system.A, f]), more),
-                       block_diag(left, more))  # fmt: skip
+                       block_diag(left, more), x)  # fmt: skip
 
 
 def constrain(held: Held, speed: float) -> tuple[LinearVehicle, np.ndarray]:
     """M, D, K and outputs in the coordinates that rigid springs and locked freedoms leave, and N with q = N r."""
     vehicle = held.vehicle
-    linear = linearise(vehicle, speed)
-    light = tuple(replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in held.massless else body
-                  for body in vehicle.bodies)  # fmt: skip
-    M, N = mass(replace(vehicle, bodies=light)), _free(held)
+    linear = _linear(vehicle, speed)
+    M, N = _mass(vehicle, held.massless), _free(held)
     if not N.size:
         raise InputError("", "effects", None, "nothing is left that could move")
     outputs = tuple(replace(o, acceleration=o.acceleration @ N, rate=o.rate @ N, displacement=o.displacement @ N)
@@ -86,12 +87,31 @@ def constrain(held: Held, speed: float) -> tuple[LinearVehicle, np.ndarray]:
                    coordinates=tuple(("", str(i)) for i in range(N.shape[1])), outputs=outputs), N  # fmt: skip
 
 
+@lru_cache(maxsize=64)
+def _linear(vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
+    return linearise(vehicle, speed)
+
+
+@lru_cache(maxsize=64)
+def _mass(vehicle: SpatialVehicle, massless: frozenset[str]) -> np.ndarray:
+    light = tuple(replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in massless else body
+                  for body in vehicle.bodies)  # fmt: skip
+    return mass(replace(vehicle, bodies=light))
+
+
+@lru_cache(maxsize=64)
+def _travels(vehicle: SpatialVehicle) -> dict[str, np.ndarray]:
+    """Row (n,) of every spring's travel."""
+    motion = Kinematics(vehicle)
+    return {s.name: np.array(s.axis) @ (motion.shift(s.two, s.point_two) - motion.shift(s.one, s.point_one))
+            for s in vehicle.springs}  # fmt: skip
+
+
 def _free(held: Held) -> np.ndarray:
     """N (n, r): single coordinates where nothing but locks holds them, else a basis of what the rigid springs leave."""
-    motion, coordinates = Kinematics(held.vehicle), held.vehicle.coordinates()
-    kept = np.eye(motion.size)[:, [c not in held.locked for c in coordinates]]
-    rows = np.array([np.array(s.axis) @ (motion.shift(s.two, s.point_two) - motion.shift(s.one, s.point_one)) @ kept
-                     for s in held.vehicle.springs if s.name in held.rigid])  # fmt: skip
+    coordinates = held.vehicle.coordinates()
+    kept = np.eye(len(coordinates))[:, [c not in held.locked for c in coordinates]]
+    rows = np.array([row @ kept for name, row in _travels(held.vehicle).items() if name in held.rigid])
     return kept @ null_space(rows, rcond=NOTHING) if len(rows) else kept
 
 

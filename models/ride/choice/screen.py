@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.errors import InputError
-from models.ride.choice.reduced import Reduced, Whole
-from models.ride.covariance import FINITE, Covariance, intensity, lyapunov, stationary
+from models.ride.choice.reduced import Reduced
+from models.ride.covariance import FINITE, Covariance, hits, intensity, lyapunov, stationary
 from models.ride.delayed_system import DelayedSystem
 from models.ride.marginal import parts
 
@@ -47,37 +47,30 @@ def solve(system: DelayedSystem, rows: list[int]) -> Solved:
 
 def noise_of(system: DelayedSystem) -> np.ndarray:
     """Q of the system's Lyapunov equation."""
-    return intensity(system.A, *_hits(system))
-
-
-def _hits(system: DelayedSystem) -> tuple[list[np.ndarray], list[float], bool]:
-    from models.ride.covariance import hits
-
     B, _, delays = hits(system)
-    return B, delays, system.independent
+    return intensity(system.A, B, delays, system.independent)
 
 
 class Screen:
-    """Predictions for reduced systems from the whole one's solution; quantities by their rows of C."""
+    """Predictions for systems reduced further than ``base``, from its solution; quantities by their rows of C."""
 
-    def __init__(self, whole: Whole, rows: list[int]) -> None:
-        self.rows, self.solved = rows, solve(whole.full.system, rows)
+    def __init__(self, base: Reduced, rows: list[int]) -> None:
+        self.base, self.rows, self.solved = base, rows, solve(base.system, rows)
         self.P, self.L = self.solved.P.astype(float), self.solved.L.astype(float)
 
     def predicted(self, reduced: Reduced) -> np.ndarray:
-        """Relative changes (quantities,) of standard deviations; inf where the reduced system passes white noise."""
-        system, T = reduced.system, reduced.T
-        P, C = reduced.left @ self.P @ reduced.left.T, system.C[self.rows]
+        """Variances (quantities,) of the reduced system; inf where it passes white noise."""
+        system, left, T = reduced.system, reduced.left @ self.base.T, self.base.left @ reduced.T
+        P, C = left @ self.P @ left.T, system.C[self.rows]
         half = system.A @ P
-        left = half + half.T + noise_of(system)
-        own = np.einsum("ki,ij,kj->k", C, P, C)
-        J = own + np.einsum("kij,ij->k", T.T @ self.L @ T, left)
+        rest = half + half.T + noise_of(system)
+        J = np.einsum("ki,ij,kj->k", C, P, C) + np.einsum("kij,ij->k", T.T @ self.L @ T, rest)
         white = sum((d[self.rows] ** 2).sum(axis=1) for d in system.D) > 0
-        return np.where(white, np.inf, np.sqrt(np.maximum(J / self.solved.variance.astype(float), 0.0)) - 1.0)
+        return np.where(white, np.inf, np.maximum(J, 0.0))
 
     def identity(self, reduced: Reduced) -> tuple[np.ndarray, np.ndarray]:
         """Certificate: variances (quantities,) by the whole scene's P and the reduced L, and by the reduced P."""
-        system, left = reduced.system, reduced.left.astype(np.longdouble)
+        system, left = reduced.system, (reduced.left @ self.base.T).astype(np.longdouble)
         own = solve(system, self.rows)
         P = left @ self.solved.P @ left.T
         half = system.A.astype(np.longdouble) @ P
@@ -87,11 +80,7 @@ class Screen:
         return found.astype(float), own.variance.astype(float)
 
 
-def confirmed(reduced: Reduced, rows: list[int], full: np.ndarray) -> np.ndarray:
-    """Relative changes (quantities,) of standard deviations by the exact solve of the reduced system.
-
-    inf where a quantity has none in it; ``full`` (quantities,) are the whole scene's variances. Raises InputError.
-    """
+def confirmed(reduced: Reduced, rows: list[int]) -> np.ndarray:
+    """Variances (quantities,) by the exact solve of the reduced system, inf where it has none. Raises InputError."""
     found: Covariance = stationary(reduced.system)
-    ratio = np.sqrt(found.variance[rows] / full.astype(float)) - 1.0
-    return np.where([found.status[row] == FINITE for row in rows], ratio, np.inf)
+    return np.array([found.variance[row] if found.status[row] == FINITE else np.inf for row in rows])

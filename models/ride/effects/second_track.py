@@ -6,8 +6,9 @@ from models.ride.choice.held import Effect, Held
 def found(held: Held) -> list[Effect]:
     """One effect, where wheels stand beside the centre line of a road with two tracks as modelled."""
     wide = len({tyre.point[1] for tyre in held.vehicle.tyres}) > 1
-    return [Effect("second track", _without, "left and right meet the same")] if (
-        wide and held.scene.road.left_right == "modelled") else []  # fmt: skip
+    if not wide or held.scene.road.left_right != "modelled":
+        return []
+    return [Effect("second track", _without, "left and right meet the same", singular=True)]
 
 
 def _without(held: Held) -> Held:

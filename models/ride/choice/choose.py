@@ -1,0 +1,227 @@
+"""Which effects a scene's quantities can do without: screened one by one and in pairs, chosen by what they save.
+
+A greedy choice: of all single effects, and of all pairs where no single one will do, the next to be left out is the
+one that saves most (logarithm of calls times states) for the error that the screen predicts for the whole set. The
+set is then confirmed by the exact solve at every speed. Where it is not kept, the step of the path that breaks it is
+found by halving, taken back for good, and the choice goes on without it. So what is reported was confirmed, always.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import inf, log
+
+import numpy as np
+
+from models.errors import InputError
+from models.ride.choice.cost import Cost, cost
+from models.ride.choice.held import Effect, Held, effects_of, illegal, without
+from models.ride.choice.reduced import Reduced, Whole
+from models.ride.choice.screen import Screen, confirmed
+
+BUDGET = 0.9
+"""Share of the tolerance that predictions may use."""
+SCREENED = 3
+"""Speeds at which effects are screened, from the slowest to the fastest; the choice is confirmed at all."""
+HOPELESS = 20.0
+"""A single effect that breaks the tolerance so many times is not tried in pairs, unless it is singular."""
+ROUNDS = 30
+"""Choices that are confirmed at most."""
+
+Set = frozenset[Effect]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Effects ``left_out`` of all ``candidates``; relative changes (quantities,) of standard deviations.
+
+    predicted and confirmed : the worst over speeds, with sign; kept : every confirmed change within the tolerance.
+    singles and pairs : predicted changes by effects, pairs where both may go; ``rounds``: choices that were confirmed.
+    """
+
+    candidates: tuple[Effect, ...]
+    left_out: tuple[Effect, ...]
+    predicted: np.ndarray
+    confirmed: np.ndarray
+    kept: bool
+    before: Cost
+    after: Cost
+    singles: dict[tuple[Effect, ...], np.ndarray]
+    pairs: dict[tuple[Effect, ...], np.ndarray]
+    rounds: int
+
+
+class Chooser:
+    """Candidates of a scene at its speeds (m/s), for quantities (names of outputs, weighted ones too)."""
+
+    def __init__(self, held: Held, speeds: Sequence[float], quantities: Sequence[str], tolerance: float) -> None:
+        self.held, self.tolerance, self.effects = held, tolerance, effects_of(held)
+        self.wholes = [Whole(held, speed) for speed in speeds]
+        names = self.wholes[0].full.system.names
+        self.rows = [names.index(name) for name in quantities]
+        few = min(SCREENED, len(speeds))
+        self.screened = [self.wholes[i] for i in np.linspace(0, len(speeds) - 1, few).round().astype(int)]
+        self.full = [confirmed(whole.full, self.rows) for whole in self.wholes]
+        self._check(quantities)
+        self._screens: dict[tuple[int, Set], Screen] = {}
+        self._systems: dict[tuple[int, Set], Reduced | None] = {}
+        self._predicted: dict[Set, np.ndarray] = {}
+        self._costs: dict[Set, Cost] = {}
+        self._promising: list[Set] | None = None
+
+    def _check(self, quantities: Sequence[str]) -> None:
+        for variances in self.full:
+            for name, own in zip(quantities, variances, strict=True):
+                if not 0.0 < own < inf:
+                    said = "has no finite standard deviation above zero in this scene, so nothing to hold it to"
+                    raise InputError("", f"quantities.{name}", None, said)
+
+    def system(self, whole: Whole, chosen: Set) -> Reduced | None:
+        """The scene less these effects at a speed; None where nothing sensible is left."""
+        key = (id(whole), chosen)
+        if key not in self._systems:
+            try:
+                self._systems[key] = whole.reduced(without(self.held, sorted(chosen, key=lambda e: e.name)))
+            except InputError:
+                self._systems[key] = None
+        return self._systems[key]
+
+    def screen(self, whole: Whole, chosen: Set) -> Screen | None:
+        """Covariance and adjoints of the scene less the singular ones of these effects."""
+        base = frozenset(effect for effect in chosen if effect.singular)
+        if base and any(effect.needs for effect in base):
+            base |= {effect for effect in chosen for one in base if effect.name in one.needs}
+        key = (id(whole), base)
+        if key not in self._screens:
+            reduced = self.system(whole, base)
+            if reduced is None:
+                return None
+            try:
+                self._screens[key] = Screen(reduced, self.rows)
+            except InputError:
+                return None
+        return self._screens[key]
+
+    def predicted(self, chosen: Set) -> np.ndarray:
+        """Changes (quantities,) of the worst of the screened speeds; inf where there is no system."""
+        if chosen not in self._predicted:
+            self._predicted[chosen] = self._worst(self.screened, chosen, self._predict)
+        return self._predicted[chosen]
+
+    def confirm(self, chosen: Set) -> np.ndarray:
+        """The same by the exact solve, of all speeds."""
+        return self._worst(self.wholes, chosen, lambda whole, chosen, reduced: confirmed(reduced, self.rows))
+
+    def _predict(self, whole: Whole, chosen: Set, reduced: Reduced) -> np.ndarray:
+        screen = self.screen(whole, chosen)
+        return np.full(len(self.rows), inf) if screen is None else screen.predicted(reduced)
+
+    def _worst(self, wholes: Sequence[Whole], chosen: Set,
+               variances: Callable[[Whole, Set, Reduced], np.ndarray]) -> np.ndarray:  # fmt: skip
+        changes = []
+        for whole in wholes:
+            reduced, full = self.system(whole, chosen), self.full[self.wholes.index(whole)]
+            try:
+                found = np.full(len(full), inf) if reduced is None else variances(whole, chosen, reduced)
+            except InputError:  # unstable
+                found = np.full(len(full), inf)
+            changes.append(np.sqrt(found / full) - 1.0)
+        of = np.array(changes)
+        return of[abs(of).argmax(axis=0), np.arange(of.shape[1])]
+
+    def cost(self, chosen: Set) -> Cost:
+        """Of the dearest screened speed; without end where nothing sensible is left."""
+        if chosen not in self._costs:
+            systems = [self.system(whole, chosen) for whole in self.screened]
+            costs = (Cost(0, 0.0, inf) if system is None else cost(system) for system in systems)
+            self._costs[chosen] = max(costs, key=lambda c: c.calls)
+        return self._costs[chosen]
+
+    def choose(self) -> Choice:
+        """The greedy choice, confirmed."""
+        kept: list[Set] = [frozenset()]
+        banned: set[Set] = set()
+        rounds, found = 0, self.confirm(frozenset())
+        while rounds < ROUNDS:
+            path = self.path(kept, banned)
+            if path == kept:
+                break
+            rounds += 1
+            last = self.confirm(path[-1])
+            if self.holds(last):
+                kept, found = path, last
+                continue
+            low, high = len(kept) - 1, len(path) - 1  # path[low] is kept, path[high] is not
+            while high - low > 1:
+                middle = (low + high) // 2
+                rounds, tried = rounds + 1, self.confirm(path[middle])
+                low, high, found = (middle, high, tried) if self.holds(tried) else (low, middle, found)
+            banned.add(path[high] - path[low])
+            kept = path[: low + 1]
+        chosen = kept[-1]
+        left_out = tuple(effect for effect in self.effects if effect in chosen)
+        singles, pairs = self.table()
+        return Choice(self.effects, left_out, self.predicted(chosen), found, self.holds(found),
+                      self.cost(frozenset()), self.cost(chosen), singles, pairs, rounds)  # fmt: skip
+
+    def holds(self, changes: np.ndarray) -> bool:
+        """Whether all changes are within the tolerance."""
+        return bool((abs(changes) <= self.tolerance).all())
+
+    def path(self, kept: list[Set], banned: set[Set]) -> list[Set]:
+        """The path that goes on from a kept one, step by step, as far as predictions allow."""
+        path = list(kept)
+        while True:
+            step = self._next(path[-1], banned, self._singles()) or self._next(path[-1], banned, self._pairs())
+            if not step:
+                return path
+            path.append(path[-1] | step)
+
+    def _singles(self) -> list[Set]:
+        """Every effect with those that it needs."""
+        named = {effect.name: effect for effect in self.effects}
+        return [frozenset([effect, *(named[name] for name in effect.needs)]) for effect in self.effects]
+
+    def _pairs(self) -> list[Set]:
+        """Pairs of which at least one breaks the tolerance alone, while both together hold it."""
+        if self._promising is None:
+            alone = {one: self._share(one) for one in self._singles()}
+            tried = [one for one, share in alone.items() if share < HOPELESS or any(effect.singular for effect in one)]
+            found = [one | two for one, two in combinations(tried, 2) if max(alone[one], alone[two]) > BUDGET
+                     and not illegal(one | two) and not (one <= two or two <= one)]  # fmt: skip
+            self._promising = [pair for pair in found if self._glance(pair) <= BUDGET and self._share(pair) <= BUDGET]
+        return self._promising
+
+    def _glance(self, chosen: Set) -> float:
+        """Share of the tolerance at the middle one of the screened speeds."""
+        at = self.screened[len(self.screened) // 2]
+        return float(abs(self._worst([at], chosen, self._predict)).max()) / self.tolerance
+
+    def _next(self, chosen: Set, banned: set[Set], steps: list[Set]) -> Set:
+        """The step that saves most for what it adds to the predicted error; empty where none is within the budget."""
+        best, most = frozenset[Effect](), 0.0
+        now, work = self._share(chosen), self.cost(chosen).work
+        for step in steps:
+            further = chosen | step
+            if further == chosen or step - chosen in banned or step in banned or illegal(further):
+                continue
+            share = self._share(further)
+            saved = log(work / self.cost(further).work) if share <= BUDGET else 0.0
+            score = saved / max(share - now, LEAST)
+            if score > most:
+                best, most = step - chosen, score
+        return best
+
+    def _share(self, chosen: Set) -> float:
+        """Largest predicted change by the tolerance."""
+        return float(abs(self.predicted(chosen)).max()) / self.tolerance
+
+    def table(self) -> tuple[dict[tuple[Effect, ...], np.ndarray], dict[tuple[Effect, ...], np.ndarray]]:
+        """Predictions of all single effects, legal or not, and of pairs that hold the tolerance only together."""
+        singles = {(effect,): self.predicted(frozenset([effect])) for effect in self.effects}
+        pairs = {tuple(sorted(pair, key=lambda e: e.name)): self.predicted(pair) for pair in self._pairs()}
+        return singles, pairs
+
+
+LEAST = 1e-3
+"""Share of the tolerance below which an error counts as none."""
