@@ -136,7 +136,7 @@ def _reading(engine: str, integrator: Integrator, settings: Settings, signal: Si
     if integrator.adaptive and engine != "reference" and settings.step > signal.resolution:
         raise Refused(engine, f"{settings.integrator} may take steps of {settings.step:g} s and miss details of the "
                               f"input, which are {signal.resolution:.3g} s long: use a step of at most that")
-    if signal.period is None and settings.step > WAVE * signal.resolution:
+    if signal.period is None and not integrator.adaptive and settings.step > WAVE * signal.resolution:
         raise Refused(engine, f"a step of {settings.step:g} s passes over whole waves of the road, whose finest "
                               f"details are {signal.resolution:.3g} s long, and would see another one: use at most "
                               f"{WAVE * signal.resolution:.3g} s, a quarter of it to follow them")
