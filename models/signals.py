@@ -13,6 +13,8 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 Interpolation = Literal["held", "linear", "smooth"]
+SNAP = 1e-6
+"""Part of a period within which a time is taken for that of a sample."""
 
 
 class Signal(Protocol):
@@ -94,8 +96,13 @@ class Sampled:
         return interpolate(self.values, index, part)
 
     def at(self, time: float) -> np.ndarray:
-        """Values at one time (s), shape (channels,)."""
-        return self.sample(time, self.period, 1)[0]
+        """Values at one time (s), shape (channels,): the bits of ``sample``, by scalars, as solvers ask one by one."""
+        position, last = time / self.period, len(self.values) - 1
+        nearest = round(position)
+        snapped = nearest if abs(position - nearest) < SNAP else position
+        row = min(max(math.floor(snapped), 0), last)
+        before = self.values[row]
+        return before.copy() if self.held else before + (snapped - row) * (self.values[min(row + 1, last)] - before)
 
     def knots(self, duration: float) -> np.ndarray:
         """All sample times inside (0, duration)."""
@@ -104,7 +111,7 @@ class Sampled:
     def _place(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Index of the sample at or before each position, and the part of the period after it."""
         nearest = np.rint(position)
-        snapped = np.where(np.abs(position - nearest) < 1e-6, nearest, position)
+        snapped = np.where(np.abs(position - nearest) < SNAP, nearest, position)
         index = np.clip(np.floor(snapped), 0, len(self.values) - 1).astype(np.int64)
         return index, snapped - index
 
@@ -204,7 +211,7 @@ class Stacked:
 
     def at(self, time: float) -> np.ndarray:
         """Values of all parts at one time (s), shape (channels,)."""
-        return np.hstack([part.at(time) for part in self.parts])
+        return np.concatenate([part.at(time) for part in self.parts])
 
     def knots(self, duration: float) -> np.ndarray:
         """Times at which any part is not smooth."""

@@ -23,6 +23,14 @@ def test_index_survives_accumulated_time():
         t += 0.1
 
 
+@pytest.mark.parametrize("held", [True, False])
+def test_one_instant_has_the_bits_of_a_grid(held):
+    signal = Sampled(np.sin(1e3 * RAMP), 0.1, held)
+    near = 0.1 * np.arange(-2, 53)
+    times = np.concatenate([near, near + 0.9e-7, near - 0.9e-7, near + 1.1e-7, near + 0.05, near + 0.0314])
+    assert all(np.array_equal(signal.at(t), signal.sample(t, 0.1, 1)[0]) for t in times)
+
+
 def test_linear_is_exact_on_a_ramp_between_samples():
     linear = Sampled(RAMP, 0.1, held=False)
     got = linear.sample(0.05, 0.1, 40)

@@ -149,17 +149,19 @@ class Reference:
         edges = np.concatenate(([0.0], knots, [self.settings.duration]))
         steps = calls = 0
         for start, end in pairwise(edges):
-            solution = self._piece(start, end, y)
             inside = slice(*np.searchsorted(times, (start + 1e-9 * h, end + 1e-9 * h)))
-            if inside.start < inside.stop:
-                states[inside] = solution.sol(np.minimum(times[inside], end)).T
+            within = times[inside]
+            dense = bool(len(within)) and within[0] < end - 1e-9 * h  # else a row at the end at most, which is y there
+            solution = self._piece(start, end, y, dense)
             y = solution.y[:, -1]
+            if len(within):
+                states[inside] = solution.sol(np.minimum(within, end)).T if dense else y
             steps, calls = steps + len(solution.t) - 1, calls + solution.nfev
         states[-1] = y
         self._guide(states)
         return times, states, {"steps": steps, "force calls": calls}
 
-    def _piece(self, start: float, end: float, y: np.ndarray):
+    def _piece(self, start: float, end: float, y: np.ndarray, dense: bool):
         derivative, p, at = derivative_of(*self._key), self._p, self._reader(start, end)
 
         def rhs(t, y):
@@ -170,7 +172,7 @@ class Reference:
 
         tolerance = max(self.settings.tolerance, 3e-14)
         longest = math.inf if self._input is None else self._input.resolution
-        solution = solve_ivp(rhs, (start, end), y, method=self.settings.integrator, dense_output=True,
+        solution = solve_ivp(rhs, (start, end), y, method=self.settings.integrator, dense_output=dense,
                              rtol=tolerance, atol=tolerance * 1e-2, max_step=longest)
         if not solution.success:
             raise RunFailed("reference", solution.message, solution.t[-1], solution.y[:, -1])
