@@ -13,7 +13,16 @@ from validation.price import ride, speed
 from validation.price import runner as cost
 from validation.price.figure import draw as draw_figure
 from validation.price.force_calls import counted
-from validation.price.problems import Problem, Setting, braking_stop, force_excited, road_excited, wheelset
+from validation.price.problems import (
+    Problem,
+    Setting,
+    braking_stop,
+    force_excited,
+    noisy_forces,
+    prescribed_pitch,
+    road_excited,
+    wheelset,
+)
 from validation.price.rows import rows_of
 from validation.price.tables import tables as cost_tables
 from validation.rows import Row, System, Table, at_most, behaves, finding, within
@@ -22,6 +31,8 @@ TITLE = "What accuracy costs"
 SYSTEM: System = "cost"
 PROBLEMS: tuple[Callable[[bool], Problem], ...] = (road_excited.problem, force_excited.problem,
                                                    wheelset.problem, braking_stop.problem)  # fmt: skip
+FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (noisy_forces.problem, prescribed_pitch.problem)
+"""Problems that a quick run leaves out; it has those of PROBLEMS."""
 ROUNDS = {True: 5, False: 15}
 """Interleaved rounds of timing, by ``quick``."""
 LEAST = {True: 0.004, False: 0.01}
@@ -39,7 +50,7 @@ COUNTED = 0.2
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of all problems, of the force calls, and of two claims about speed."""
     rows, saved = [], []
-    for problem in (make(quick) for make in PROBLEMS):
+    for problem in (make(quick) for make in (PROBLEMS if quick else PROBLEMS + FULL_ONLY)):
         points = cost.measure(problem, quick, ROUNDS[quick], LEAST[quick])
         saved.append({"problem": cost.describe(problem, ROUNDS[quick]), "points": [p.as_dict() for p in points]})
         rows += rows_of(problem, points, quick)

@@ -25,20 +25,20 @@ FINE = PERIOD / 1280
 """Step (s) of the reference's own Runge-Kutta march, which meets every sample: its error is that of rounding."""
 
 MS = 1e-3
-_STEPS = (2.5 * MS, 2 * MS, 1.25 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS, 0.0625 * MS)
+STEPS = (2.5 * MS, 2 * MS, 1.25 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS, 0.0625 * MS)
 FULL: dict[tuple[str, str], tuple[float, ...]] = {
-    ("reference", "RK4"): _STEPS,
-    ("exudyn", "RK44"): _STEPS,
-    ("exudyn", "ExplicitMidpoint"): _STEPS,
-    ("exudyn", "ExplicitEuler"): _STEPS,
-    ("exudyn", "GeneralizedAlpha 0.9"): (10 * MS, *_STEPS),
-    ("exudyn", "GeneralizedAlpha 0.6"): _STEPS,
-    ("exudyn", "TrapezoidalIndex2"): _STEPS,
-    ("mujoco", "RK4"): _STEPS,
-    ("mujoco", "Euler"): _STEPS,
-    ("mujoco", "implicit"): _STEPS,
-    ("mujoco", "implicitfast"): _STEPS,
-    ("mujoco", "discrete"): _STEPS,
+    ("reference", "RK4"): STEPS,
+    ("exudyn", "RK44"): STEPS,
+    ("exudyn", "ExplicitMidpoint"): STEPS,
+    ("exudyn", "ExplicitEuler"): STEPS,
+    ("exudyn", "GeneralizedAlpha 0.9"): (10 * MS, *STEPS),
+    ("exudyn", "GeneralizedAlpha 0.6"): STEPS,
+    ("exudyn", "TrapezoidalIndex2"): STEPS,
+    ("mujoco", "RK4"): STEPS,
+    ("mujoco", "Euler"): STEPS,
+    ("mujoco", "implicit"): STEPS,
+    ("mujoco", "implicitfast"): STEPS,
+    ("mujoco", "discrete"): STEPS,
 }
 QUICK: dict[tuple[str, str], tuple[float, ...]] = {
     ("reference", "RK4"): (0.5 * MS, 0.25 * MS, 0.125 * MS),
@@ -62,27 +62,49 @@ class ForceExcited:
     key = "forces"
     duration = DURATION
     note = "The forces are those of a virtual measurement at 100 Hz, linear between the samples, the same for all."
+    tolerances: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+    what = "driven by its wheel forces"
 
-    def __init__(self, quick: bool) -> None:
+    def __init__(self, quick: bool, first: tuple[str, str] | None = None) -> None:
+        """first : a quantity and its unit on which tolerances are set, before those of the states."""
+        self.units = dict([*([first] if first else []), ("state", "m, rad, m/s, rad/s")])
         steps = [1e3 * one.value for one in self.settings(quick)]
-        self.title = (f"Pitch-plane vehicle driven by its wheel forces, {DURATION:g} s at {SPEED:g} m/s, before "
+        self.title = (f"Pitch-plane vehicle {self.what}, {DURATION:g} s at {SPEED:g} m/s, before "
                       f"drift-off, fixed steps of {min(steps):g} to {max(steps):g} ms")  # fmt: skip
-        self.units = {"state": "m, rad, m/s, rad/s"}
-        self.tolerances: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-        self.assembly = driven()
+        self.assembly = self.driven()
         other = Settings("RK4", 2 * FINE, DURATION) if quick else Settings("DOP853", PERIOD, DURATION, 1e-12)
         self.reference = f"RK4 at {1e6 * FINE:.2g} us and " + ("twice that" if quick else "DOP853 at 1e-12")
-        self._states = self._rows(Settings("RK4", FINE, DURATION))
-        self.uncertainty = {"state": float(np.abs(self._rows(other) - self._states).max())}
-        self.bound = 10 * float(np.abs(self._states).max())
+        self._true = self._by(Settings("RK4", FINE, DURATION))
+        self.uncertainty = self._off(self._by(other))
+        self.bound = 10 * float(np.abs(next(iter(self._true.values()))).max())
 
-    def _rows(self, settings: Settings) -> np.ndarray:
-        """States (n, 8) of the paper's equations at the samples."""
-        return build("reference", self.assembly, settings).run().states[:: round(PERIOD / settings.step)]
+    def chosen(self, quick: bool) -> dict[tuple[str, str], tuple[float, ...]]:
+        """Steps (s) of every method."""
+        return QUICK if quick else FULL
+
+    def driven(self) -> Assembly:
+        """What is solved."""
+        return driven()
+
+    def read(self, run: Trajectory) -> dict[str, np.ndarray]:
+        """The quantities, (n, ...) each, at all instants of a run."""
+        return {"state": run.states}
+
+    def _by(self, settings: Settings) -> dict[str, np.ndarray]:
+        """The quantities by the paper's equations at the samples."""
+        return self._sampled(build("reference", self.assembly, settings).run())
+
+    def _sampled(self, run: Trajectory) -> dict[str, np.ndarray]:
+        every = (len(run.states) - 1) // round(DURATION / PERIOD)
+        return {name: values[::every] for name, values in self.read(run).items()}
+
+    def _off(self, found: dict[str, np.ndarray]) -> dict[str, float]:
+        """Largest difference of each quantity from the reference."""
+        return {name: float(np.abs(values - self._true[name]).max()) for name, values in found.items()}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """FULL, or its named share QUICK."""
-        chosen = QUICK if quick else FULL
+        chosen = self.chosen(quick)
         return tuple(setting(*curve, value) for curve, values in chosen.items() for value in values)
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
@@ -94,9 +116,8 @@ class ForceExcited:
         return build(setting.engine, self.assembly, settings_of(setting))
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
-        """Largest error of any state at the samples, which every fixed step meets."""
-        every = (len(solution.states) - 1) // (len(self._states) - 1)
-        return {"state": float(np.abs(solution.states[::every] - self._states).max())}
+        """Largest error of each quantity at the samples, which every fixed step meets."""
+        return self._off(self._sampled(solution))
 
 
 @cache

@@ -1,0 +1,49 @@
+"""Problem B with a fixed noise file: the same vehicle and forces, with the error of a sensor on every sample.
+
+The noise is one file for all: no sampling error enters, and what differs is the integrator. The quantity that an
+engineer reads is the pitch, with whose error the vehicle begins to drift.
+"""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from models.assembly import Assembly
+from models.engines.protocol import Trajectory
+from models.noise import normal
+from models.signals import Sampled
+from validation.price.problems import force_excited
+from validation.price.problems.force_excited import PERIOD, ForceExcited
+
+SEED, DEVIATION = 77, 100.0
+"""Of the noise; its standard deviation, N."""
+
+
+class NoisyForces(ForceExcited):
+    """The problem with its reference; see ``validation.price.problems.Problem``."""
+
+    key = "noise"
+    note = f"The forces carry the noise of one fixed file, {DEVIATION:g} N on every sample at 100 Hz."
+    tolerances: tuple[float, ...] = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+    what = "driven by noisy wheel forces"
+
+    def __init__(self, quick: bool) -> None:
+        super().__init__(quick, ("pitch", "rad"))
+
+    def driven(self) -> Assembly:
+        """The vehicle driven by forces with noise on them."""
+        clean = force_excited.driven()
+        assert isinstance(clean.input, Sampled)
+        noise = DEVIATION * normal(SEED, 0, *clean.input.values.shape)
+        return replace(clean, input=Sampled(clean.input.values + noise, PERIOD, held=False))
+
+    def read(self, run: Trajectory) -> dict[str, np.ndarray]:
+        """Pitch and states."""
+        return {"pitch": run.states[:, 3], "state": run.states}
+
+
+@cache
+def problem(quick: bool) -> NoisyForces:
+    """The problem, its reference computed once per process."""
+    return NoisyForces(quick)
