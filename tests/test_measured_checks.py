@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.hub_forces.rigid import rigid
-from models.measured.checks import check, clipped, findings, gaps, gravity, noise, turning, weight
+from models.measured.checks import check, clipped, drift, findings, gaps, gravity, noise, turning, weight
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.means import mean
 from models.measured.checks.place import Place
@@ -68,6 +68,21 @@ def test_two_percent_are_seen_in_five_seconds(fault, check_name, size, ridden, t
     # the mean moment of the hub forces is what the gyros say that it must be
     (found,) = case.findings(ridden, ridden.samples(Faults(noise=case.NOISE, **fault), 5), tmp_path)
     assert found.check == check_name and found.size == pytest.approx(size, rel=0.2) and "offset of" in found.text
+
+
+def test_the_slope_of_delays_and_its_error_by_their_scatter():
+    times, late = np.arange(5.0), 2e-3 * np.arange(5.0) + 1e-3 * np.array([1.0, -2.0, 0.0, 2.0, -1.0])
+    slope, error = drift._slope(times, late, np.full(5, 1e-6))
+    line, covariance = np.polyfit(times, late, 1, cov=True)
+    assert (slope, error) == pytest.approx((line[0], covariance[0, 0] ** 0.5))
+    assert drift._slope(times, 2e-3 * times, np.full(5, 1e-3))[1] == pytest.approx(1e-3 / np.sqrt(10))
+
+
+@pytest.mark.full
+def test_a_clock_that_is_fast_is_named_and_nothing_else(tmp_path):
+    (found,) = (one for one in case.drifting(case.measurement(), -5e-4, tmp_path) if one.check != "noise")
+    assert found.check == "drift" and found.place == "inertial" and found.size == pytest.approx(-5e-4, rel=0.2)
+    assert not case.drifting(case.measurement(), 0.0, tmp_path)  # no noise is filtered by interpolation, either
 
 
 def test_moments_of_an_offset_are_known_before_a_run(ridden, tmp_path):

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from models.hub_forces.cut_vehicle import GRAVITY, CutVehicle, cut
 from models.hub_forces.scene import Road
@@ -198,7 +199,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, {"said": said}
     return [*rows, *_clean(folder), *_strangers(folder), *_together(found, folder),
-            _spread(found, folder), *_moving_car(folder)], {"said": said}
+            _spread(found, folder), _clocks(found, folder), *_moving_car(folder)], {"said": said}
 
 
 def _rows(fault: Planted, own: tuple[Finding, ...]) -> list[Row]:
@@ -279,6 +280,24 @@ def _spread(found: VirtualMeasurement, folder: Path) -> Row:
     value = 1e3 * float(np.mean(sizes)) if len(sizes) == SAMPLES else float("nan")
     return within("measured_checks.spread", SYSTEM, f"3 ms late, one force: mean over {SAMPLES} samples of noise",
                   value, "ms", 3.0, 0.15, "5 %: the response is linear, the vehicle is not", "closed form")  # fmt: skip
+
+
+def drifting(found: VirtualMeasurement, fast: float, folder: Path) -> tuple[Finding, ...]:
+    """Findings where all but the hub forces is in a file whose clock is fast by a part."""
+    samples, driving = found.samples(Faults(noise=NOISE), SEED), ("force", "moment")
+    times = found.period * np.arange(len(samples))
+    for i in (i for i, s in enumerate(found.signals) if s.quantity not in driving):
+        samples[:, i] = make_interp_spline(times, samples[:, i])(np.minimum(times / (1 + fast), times[-1]))
+    signals = tuple(replace(s, file="wheels" if s.quantity in driving else "inertial") for s in found.signals)
+    return findings(replace(found, signals=signals), samples, folder)
+
+
+def _clocks(found: VirtualMeasurement, folder: Path) -> Row:
+    """Drift between the clocks of two files."""
+    named = [one.size for one in drifting(found, 5e-4, folder) if one.check == "drift"]
+    value = 1e6 * named[0] if named and named[0] is not None else float("nan")
+    return within("measured_checks.clocks", SYSTEM, "drift between the clocks of two files", value, "1e-6", 500.0,
+                  SHARE * 500.0, "what was planted, 20 %", "closed form")  # fmt: skip
 
 
 def _moving_car(folder: Path) -> list[Row]:

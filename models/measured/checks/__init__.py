@@ -8,15 +8,15 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping
 
 from models.hub_forces.cut_vehicle import CutVehicle
-from models.measured.checks import clipped, factor, gaps, gravity, noise, rigid, shift, swapped, turning, weight
+from models.measured.checks import clipped, drift, factor, gaps, gravity, noise, rigid, shift, swapped, turning, weight
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.place import Place
 from models.measured.finding import Finding, Weight
 from models.measured.recording import Recording
 
 CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
-    gaps.check, clipped.check, gravity.check, swapped.check, weight.check, factor.check, shift.check, turning.check,
-    rigid.check, noise.check,
+    gaps.check, clipped.check, gravity.check, swapped.check, weight.check, factor.check, drift.check, shift.check,
+    turning.check, rigid.check, noise.check,
 )  # fmt: skip
 """In this order: what an earlier one has named, a later one does not name again."""
 FAMILIES = defaultdict(frozenset[str], {

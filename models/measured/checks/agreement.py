@@ -179,7 +179,8 @@ class Agreement:
         power[:, pick] = np.einsum("fkc,fkc->fk", self._told[:, pick], own.conj())
         return cross, power.real
 
-    def _late(self, group: Group, weights: np.ndarray) -> Iterator[Fault]:
+    def lateness(self, group: Group, weights: np.ndarray) -> tuple[float, float, float]:
+        """Delay (s) of a group, its standard error, infinite if nothing tells, and the fall of chi square."""
         cross, power = self.share(group)
         line = (weights * (cross.conj() if group.forces else cross)).sum(axis=1)
         likely = (self._turns @ line).real
@@ -188,8 +189,12 @@ class Agreement:
         turn = 2j * np.pi * self.frequencies
         fall = 2 * float((np.exp(turn * late) @ line - line.sum()).real)
         steep = 2 * float((np.abs(turn) ** 2 @ (weights * power)).sum())
-        if fall > CERTAIN and steep > 0 and abs(late) > max(SMALL_DELAY, 4 * steep**-0.5):
-            yield Fault("late", group.name, self._signals(group), late, steep**-0.5, fall)
+        return late, steep**-0.5 if steep > 0 else float("inf"), fall
+
+    def _late(self, group: Group, weights: np.ndarray) -> Iterator[Fault]:
+        late, error, fall = self.lateness(group, weights)
+        if fall > CERTAIN and abs(late) > max(SMALL_DELAY, 4 * error):
+            yield Fault("late", group.name, self._signals(group), late, error, fall)
 
     def _wrong(self, group: Group, weights: np.ndarray) -> Iterator[Fault]:
         cross, power = ((weights * part).sum() for part in self.share(group))

@@ -1,5 +1,6 @@
 """Cross spectra of signals of a recording, segment by segment: an hour costs no more memory than a minute."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,10 +32,15 @@ class Spectra:
     white: float
 
 
-def spectra(recording: Recording, signals: tuple[Signal, ...], band: tuple[float, float]) -> Spectra | None:
-    """Of a band (Hz), in SI units squared by window sums squared; None where too little is unbroken."""
-    length = min(round(SEGMENT / recording.period), 2 * recording.count // (LEAST + 1))
-    firsts = np.arange(0, recording.count - length + 1, max(length // 2, 1))
+def spectra(recording: Recording, signals: tuple[Signal, ...], band: Sequence[float],
+            stretch: tuple[int, int] | None = None) -> Spectra | None:  # fmt: skip
+    """Of a band (Hz), in SI units squared by window sums squared; None where too little is unbroken.
+
+    stretch : first sample and number of samples that are looked at; else all.
+    """
+    begin, count = stretch or (0, recording.count)
+    length = min(round(SEGMENT / recording.period), 2 * count // (LEAST + 1))
+    firsts = np.arange(begin, begin + count - length + 1, max(length // 2, 1))
     frequencies = np.fft.rfftfreq(length, recording.period)
     own = (frequencies >= band[0]) & (frequencies <= band[1])
     window, names = np.hanning(length + 1)[:length, None], tuple(s.name for s in signals)

@@ -37,6 +37,6 @@ def _rest(evidence: Evidence) -> Finding:
     if told <= FITS:
         return Finding(NAME, "note", "", f"{text}.", 100 * told, "%")
     text += (f"; typically {100 * told:.0f} % stay unexplained: forces, motion and vehicle do not belong together, "
-             "so that delays and factors are not to be relied upon. Check frame, places of the sensors and the "
-             "vehicle file.")  # fmt: skip
+             "so that delays and factors are not to be relied upon, and true ones may be hidden. Check frame, clocks, "
+             "places of the sensors and the vehicle file.")  # fmt: skip
     return Finding(NAME, "doubt", "", text, 100 * told, "%", tuple(s.name for s in left.outputs))

@@ -1,0 +1,82 @@
+"""Clocks of files that run at different speeds: the motion that hub forces should cause comes later and later."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.measured.checks.agreement import Agreement, Group
+from models.measured.checks.evidence import Evidence
+from models.measured.checks.spectra import SEGMENT, spectra
+from models.measured.finding import Finding
+
+NAME = "drift"
+WINDOW, MOST = SEGMENT, 30
+"""s over which a delay is taken, in halves that overlap; windows at the most, spread evenly."""
+LEAST = 3
+"""Windows that a slope needs."""
+CERTAIN = 5.0
+"""Standard errors of the slope that must be passed."""
+SMALL = 1e-3
+"""s by which the clocks must part over the recording."""
+
+
+def check(evidence: Evidence) -> list[Finding]:
+    """Sizes are the part by which a file's clock is fast against that of the hub forces."""
+    clocks = {s.file for s in evidence.forces}
+    others = dict.fromkeys(s.file for s in evidence.inertial if s.file not in clocks)
+    if not others:
+        return []
+    windows = _windows(evidence) if evidence.searched and len(clocks) == 1 else []
+    if len(windows) < LEAST:
+        return [Finding(NAME, "note", name, f"Whether the clock of {name} runs as fast as that of the hub forces was "
+                        "not looked at: this needs their motion by the vehicle file, hub forces in one file, and "
+                        f"{LEAST} stretches of {WINDOW:g} s without a gap.") for name in others]  # fmt: skip
+    return [_finding(evidence, windows, name, min(clocks)) for name in others]
+
+
+def _windows(evidence: Evidence) -> list[tuple[float, Agreement]]:
+    """Middle (s) and agreement of stretches of the recording, with all corrections of the whole."""
+    assert evidence.searched is not None
+    now, own = evidence.searched[0], evidence.recording
+    length = round(WINDOW / own.period)
+    firsts = np.linspace(0, own.count - length, max(min(own.count // length, MOST), 1)).astype(int)
+    found = []
+    for first in firsts if own.count >= length else ():
+        part = spectra(own, (*now.inputs, *now.outputs), tuple(now.frequencies[[0, -1]]), (int(first), length))
+        if part is not None:
+            lines = np.abs(now.frequencies[:, None] - part.frequencies).argmin(axis=0)
+            c, cross = len(now.inputs), part.cross
+            readings = np.einsum("fkk->fk", cross[:, c:, c:]).real
+            local = replace(now, frequencies=part.frequencies, forces=cross[:, :c, :c], between=cross[:, c:, :c],
+                            readings=readings, response=now.response[lines], averages=part.averages)  # fmt: skip
+            found.append(((first + length / 2) * own.period, local))
+    return found
+
+
+def _finding(evidence: Evidence, windows: list[tuple[float, Agreement]], name: str, clock: str) -> Finding:
+    own = tuple(i for i, s in enumerate(windows[0][1].outputs) if s.file == name)
+    signals = tuple(s.name for s in evidence.inertial if s.file == name)
+    late = np.array([part.lateness(Group(name, False, own), part.weights)[:2] for _, part in windows])
+    slope, error = _slope(np.array([at for at, _ in windows]), *late.T)
+    apart = slope * evidence.recording.duration
+    if abs(slope) > CERTAIN * error and abs(apart) > SMALL:
+        word = "fast" if slope > 0 else "slow"
+        text = (f"The clock of {name} is {1e6 * abs(slope):.3g} ppm {word} (+-{2e6 * error:.2g} ppm at 95 %) against "
+                f"that of {clock}: {1e3 * abs(apart):.2g} ms over the recording, if the vehicle file is right; add "
+                f"{slope:.3g} to the file's drift under [[files]].")  # fmt: skip
+        return Finding(NAME, "doubt", name, text, slope, "1", signals, (0.0, evidence.recording.duration))
+    text = (f"The clock of {name} runs as fast as that of {clock}: {1e6 * slope:+.2g} ppm (+-{2e6 * error:.2g} ppm at "
+            "95 %) by the motion of the vehicle.")  # fmt: skip
+    return Finding(NAME, "note", name, text, slope, "1", signals)
+
+
+def _slope(times: np.ndarray, late: np.ndarray, errors: np.ndarray) -> tuple[float, float]:
+    """Slope of delays (n,) and its standard error, by their own errors or their scatter, whichever is more."""
+    weights = 1 / errors**2
+    middle = times - weights @ times / weights.sum()
+    steep = float(weights @ middle**2)
+    slope = float(weights @ (middle * late)) / steep
+    rest = late - slope * middle
+    rest -= weights @ rest / weights.sum()
+    scatter = float(weights @ rest**2) / (len(times) - 2)
+    return slope, float(np.sqrt(max(scatter, 1.0) / steep))
