@@ -15,7 +15,7 @@ from models.braking.plane_vehicle import Plane
 from models.braking.port.ask import ask
 from models.braking.pressure import RELEASE, Chambers, still
 from models.braking.row import Row, parts, row
-from models.braking.samples import Braking, Told, by_steps, moved
+from models.braking.samples import Braking, Told, by_steps
 from models.braking.surfaces import Road, check_way
 from models.braking.tyre_table import Tables
 from models.errors import RunFailed
@@ -125,7 +125,8 @@ class Braked:
         given = (told, self.sample, Braking(air, self.chambers, self.brakes, torques), now.state, now.turning,
                  self.slope, self.plane, self.kind, self.road, self.tables.packed, found, now.report)  # fmt: skip
         if self.engine is not None:
-            return moved(self.engine.advance)(*given)
+            moving: Iterator[tuple[int, float, float, float]] = self.engine.moving(*given)
+            return moving
         if self.relaxation is None:
             return by_steps(*given)
         from models.braking.relaxation import by_lagging_steps

@@ -6,6 +6,7 @@ own Runge-Kutta method with these forces held at the wheels, turned with them, a
 Y and the heading of the first unit and the angles of the hinges.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from numba import carray
 from models.braking.advance import FINE, advance
 from models.braking.plane_step import FORCE_X, FORCE_Y
 from models.braking.plane_vehicle import Plane
+from models.braking.samples import moved
 from models.compiled import njit
 from models.contact.stack import at, beyond, start
 from models.engines.free_vehicle import Driven, FreeModel, free_model
@@ -100,6 +102,10 @@ class Carried:
             self._wheels[:, 3], self._wheels[:, 4:] = steer, report[:, [FORCE_X, FORCE_Y]]
             state[:] = self._moved(before, step)
         return FINE, time
+
+    def moving(self, *given: Any) -> Iterator[tuple[int, float, float, float]]:
+        """As ``models.braking.samples.samples``."""
+        return moved(self.advance)(*given)
 
     def _moved(self, before: np.ndarray, step: float) -> np.ndarray:
         """Positions and rates (2, 2 + U) after a step of the engine."""

@@ -1,30 +1,30 @@
 """A braked vehicle on its suspension in an engine: "exudyn" or "mujoco" has bodies, joints, masses and weights.
 
-Each step (s) the wheels are exact under the torques that they have, with loads and slip angles in the middle of the
-step, to which half a step by the accelerations leads; the engine then marches the whole step by its own Runge-Kutta
-method around the compiled forces, the tyres' mean ones held at their contacts and turned with their wheels.
+Its steps are those of ``models.braking.sprung_step``; compiled code calls MuJoCo, and all of a sample is compiled.
 """
 
+from collections.abc import Iterator
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from models.braking.advance import AT_REST, FINE
-from models.braking.plane_step import KNOWN, REPORTED, begin, comes_to_rest
+from models.braking.plane_step import KNOWN, REPORTED, begin
 from models.braking.plane_vehicle import Plane
-from models.braking.sprung import PITCH, ROLL, Sprung
+from models.braking.samples import moved
+from models.braking.sprung import Sprung
 from models.braking.sprung_forces import ROW, STEER, fill, held, held_forces, hold
+from models.braking.sprung_step import GAVE_UP, OVER, UPRIGHT, OnEngine, advance
 from models.braking.surfaces import under_wheels
 from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.protocol import Settings
+from models.engines.spatial_protocol import INTEGRATORS, _check_step
+from models.engines.stability import LONG_RUN
 from models.errors import RunFailed
-from models.vehicles.spatial_linear import mass
+from models.vehicles.spatial_linear import linearise, mass
 
 BLINK = 1e-5
 """s: time over which wheels that only roll are looked at."""
-UPRIGHT = 0.5
-"""Roll and pitch (rad) beyond which the vehicle turns over."""
 
 
 class OnSprings:
@@ -33,9 +33,8 @@ class OnSprings:
     def __init__(self, engine: str, vehicle: Sprung) -> None:
         own, wheels = vehicle.handling, len(vehicle.handling.vehicle.tyres)
         self.engine, self.vehicle, self.size = engine, vehicle, vehicle.size
-        self.numbers = table = np.concatenate((own.numbers, np.zeros(ROW * wheels)))
-        self._rows = table[own.numbers.size :].reshape(wheels, ROW)
-        self._rates, self._known = np.zeros(wheels), np.empty((wheels, KNOWN))
+        self._table = np.concatenate((own.numbers, np.zeros(ROW * wheels)))
+        self._known = np.empty((wheels, KNOWN))
 
     @cached_property
     def _liveliness(self) -> float:
@@ -46,7 +45,7 @@ class OnSprings:
         own, size = self.vehicle.handling, self.size
         motion, across = np.empty((len(self._known), 3)), np.empty((len(self._known), size))
         for j, rate in enumerate(np.eye(size)):
-            held_forces(self.numbers, np.zeros(size), rate, np.zeros(size), motion)
+            held_forces(self._table, np.zeros(size), rate, np.zeros(size), motion)
             across[:, j] = motion[:, 1]
         loads = np.array([own.held.tyres[tyre.name] for tyre in own.vehicle.tyres])
         damping = np.linalg.solve(mass(own.vehicle), across.T @ (loads[:, None] * across))
@@ -55,72 +54,66 @@ class OnSprings:
     @cached_property
     def _model(self) -> FreeModel:
         """Built with the first step."""
-        own, table = self.vehicle.handling, self.numbers
+        own, table = self.vehicle.handling, self._table
         driven = Driven(own.vehicle, own.gravity, table, held, lambda block, t, n: fill(block, n, table))
         return free_model(self.engine, driven)
 
-    def advance(self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float, steer: np.ndarray,
-                slope: float, plane: Plane, kind: np.ndarray, road: Any, tables: tuple[np.ndarray, ...],
-                found: np.ndarray, report: np.ndarray) -> tuple[int, float]:  # fmt: skip
+    @cached_property
+    def _parts(self) -> tuple[OnEngine, Any, Any]:
+        """What steps need, ``advance`` and the generator of samples: compiled where the engine can be called so."""
+        wheels, engine, go, by_steps = len(self._known), self._model.compiled(), advance, moved(advance)
+        if engine is not None:
+            from models.engines import braking_sprung_mujoco as native
+
+            go, by_steps = native.advance, native.by_steps
+        table = self._model.numbers
+        rows = table[-ROW * wheels :].reshape(wheels, ROW)
+        return OnEngine(table, rows, np.zeros(wheels), self._liveliness, engine or self._model), go, by_steps
+
+    def advance(self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float,
+                *rest: Any) -> tuple[int, float]:  # fmt: skip
         """As ``models.braking.advance.advance``, ``state`` (2, n) having all coordinates and their rates.
 
-        A run begins with zeros in ``found``.
+        A run begins with zeros in the accelerations ``found``. Raises RunFailed where the vehicle turns over.
         """
-        surface, time, regular = np.empty((turning.size, 3)), 0.0, slope * self._liveliness * step
-        if not found.any():
-            self._rates[:] = 0.0
-        self._rows[:, STEER] = steer
-        for before, after in pairwise(torques):
-            under_wheels(state, step, plane, kind, road, surface)
-            begin(turning, surface, plane, self._known)
-            used = self._step(state, turning, before, after, step, regular, plane, tables, found, report)
-            time += used
-            if used < step:
-                return AT_REST, time
-            if np.abs(state[0, [ROLL, PITCH]]).max() > UPRIGHT:
-                raise RunFailed(self.engine, f"the vehicle turns over: it leans by more than {UPRIGHT} rad", time)
-        return FINE, time
+        own, go, _ = self._parts
+        with self._model.at_step(step):
+            status, time = go(state, turning, torques, step, *rest, own)
+        return self._sound(status, time), time
 
-    def _step(self, state: np.ndarray, turning: np.ndarray, torque0: np.ndarray, torque1: np.ndarray, step: float,
-              regular: float, plane: Plane, tables: tuple[np.ndarray, ...], found: np.ndarray,
-              report: np.ndarray) -> float:  # fmt: skip
-        """Time (s) of the step at which the vehicle comes to rest, ``step`` if it does not."""
-        numbers, known, (q, v) = self.numbers, self._known, state
-        hold(numbers, q, v, torque0, 0.5 * (torque0 + torque1), 0.5 * step, self._rates, regular, True, tables, known,
-             report)  # fmt: skip
-        rates = self.accelerations(q, v)
-        found[:] = rates[: found.size]
-        rest = comes_to_rest(v[: found.size], turning, found, step, plane)
-        if rest >= 0.0:
-            q += rest * v + 0.5 * rest**2 * rates
-            v[: found.size], turning[:] = 0.0, 0.0
-            return rest
-        half = 0.5 * step
-        hold(numbers, q + half * v + 0.5 * half**2 * rates, v + half * rates, torque0, torque1, step, self._rates,
-             regular, False, tables, known, report)  # fmt: skip
-        self._hand_over()
-        state[:] = self._model.march(q, v, 1, step)[-1].reshape(2, -1)
-        turning[:] = report[:, -1]
-        return step
+    def moving(self, told: Any, sample: float, braking: Any, *rest: Any) -> Iterator[tuple[int, float, float, float]]:
+        """As ``models.braking.samples.samples``; Refused for a step that is too long, RunFailed as ``advance``."""
+        own, _, by_steps = self._parts
+        step = sample / (braking.torques.shape[0] - 1)
+        self.check_step(step)
+        rows = by_steps(told, sample, braking, *rest, own)
+        while True:
+            with self._model.at_step(step):
+                status, time, speed, supply = next(rows)
+            yield self._sound(status, time), time, speed, supply
+
+    def check_step(self, step: float) -> None:
+        """Refuse a step (s) at which a mode of the vehicle on its springs and tyres would grow."""
+        _check_step(self.engine, linearise(self.vehicle.handling.vehicle),
+                    Settings(INTEGRATORS[self.engine], step, LONG_RUN * step))  # fmt: skip
+
+    def _sound(self, status: int, time: float) -> int:
+        if status == OVER:
+            raise RunFailed(self.engine, f"the vehicle turns over: it leans by more than {UPRIGHT} rad", time)
+        if status == GAVE_UP:
+            raise RunFailed(self.engine, "the engine gave up", time)
+        return status
 
     def rolling(self, state: np.ndarray, steer: np.ndarray, plane: Plane, kind: np.ndarray, road: Any,
                 tables: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
         """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
         surface, known = np.empty((steer.size, 3)), self._known
         none, motion, report = np.zeros(steer.size), np.empty((steer.size, 3)), np.empty((steer.size, REPORTED))
-        self._rows[:], self._rows[:, STEER] = 0.0, steer
-        held_forces(self.numbers, *state, np.zeros(self.size), motion)
+        own = self._parts[0]
+        own.rows[:], own.rows[:, STEER] = 0.0, steer
+        held_forces(own.numbers, *state, np.zeros(self.size), motion)
         turning = motion[:, 0] / plane.radius
         under_wheels(state, 0.0, plane, kind, road, surface)
         begin(turning, surface, plane, known)
-        hold(self.numbers, *state, none, none, BLINK, none.copy(), 0.0, True, tables, known, report)
-        return self.accelerations(*state), turning
-
-    def accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """(n,) by the engine, with the forces that are held."""
-        self._hand_over()
-        return self._model.acceleration(0.0, q, v)
-
-    def _hand_over(self) -> None:
-        if hasattr(self._model, "model"):
-            self._model.model.numeric_data[:] = self.numbers
+        hold(own.numbers, *state, none, none, BLINK, none.copy(), 0.0, True, tables, known, report)
+        return self._model.acceleration(0.0, *state), turning

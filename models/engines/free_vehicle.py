@@ -7,6 +7,8 @@ method.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, ClassVar
@@ -45,6 +47,24 @@ class FreeModel(ABC):
     """A free vehicle built in one engine."""
 
     ENGINE: ClassVar[str]
+
+    driven: Driven
+    step: float
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """The table that the kernel reads: what is written there holds from then on."""
+        return self.driven.numbers
+
+    @contextmanager
+    def at_step(self, step: float) -> Iterator[None]:
+        """For the block only the engine is ready to be marched from outside by steps (s)."""
+        self.step = step
+        yield
+
+    def compiled(self) -> Any:
+        """What compiled code calls the engine by; None where it cannot."""
+        return None
 
     @abstractmethod
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:

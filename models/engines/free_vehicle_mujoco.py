@@ -1,5 +1,7 @@
 """A free vehicle in MuJoCo: native bodies and joints, all forces by a native callback."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
@@ -11,6 +13,7 @@ from models.engines.contact_bridge_mujoco import Marcher
 from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.mujoco_callback import _array_at, _double_at, installed
 from models.engines.mujoco_layout import check, offset
+from models.engines.mujoco_native import Native, native
 from models.engines.spatial_mujoco import Numbers, _spec, _weigh
 from models.errors import RunFailed
 
@@ -49,6 +52,22 @@ class FreeMujoco(FreeModel):
         self.law = timed_law(driven.kernel)
         self._marcher = Marcher(self.model)
         check(self.model, self.data)
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """The table in the model."""
+        return self.model.numeric_data
+
+    @contextmanager
+    def at_step(self, step: float) -> Iterator[None]:
+        """The callback is installed for the block, too."""
+        self.model.opt.timestep = step
+        with installed(self.law):
+            yield
+
+    def compiled(self) -> Native:
+        """MuJoCo's own functions and arrays."""
+        return native(self.model, self.data)
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) by ``mj_forward``."""

@@ -1,0 +1,84 @@
+"""MuJoCo's own functions called by compiled code: a model's accelerations and steps without a line of Python."""
+
+import ctypes
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import llvmlite.ir as ir
+import mujoco
+import numpy as np
+from numba import types
+from numba.extending import intrinsic
+
+from models.compiled import lean
+from models.engines.mujoco_layout import offset
+
+_intrinsic: Any = intrinsic
+
+
+class Native(NamedTuple):
+    """A model for compiled functions: arrays that are MuJoCo's own, and addresses as whole numbers.
+
+    place, rate, acceleration (n,) : of the coordinates; time (1,) : s; forward, step, model, data : addresses.
+    """
+
+    place: np.ndarray
+    rate: np.ndarray
+    acceleration: np.ndarray
+    time: np.ndarray
+    forward: int
+    step: int
+    model: int
+    data: int
+
+
+@_intrinsic
+def _call(typing_context, function, model, data):
+    """The function void(mjModel*, mjData*) at an address."""
+
+    def generate(context, builder, signature, arguments):
+        pointer = ir.IntType(8).as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [pointer, pointer]).as_pointer()
+        own = [builder.inttoptr(argument, pointer) for argument in arguments[1:]]
+        builder.call(builder.inttoptr(arguments[0], kind), own)
+        return context.get_dummy_value()
+
+    return types.void(types.intp, types.intp, types.intp), generate
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    """MuJoCo as it is loaded already."""
+    return ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco*"))))
+
+
+def native(model: mujoco.MjModel, data: mujoco.MjData) -> Native:
+    """A model with its data, both of which must outlive it."""
+    time = ctypes.c_double.from_address(data._address + offset("mjData", "time"))
+    forward, step = (ctypes.cast(getattr(_library(), name), ctypes.c_void_p).value or 0
+                     for name in ("mj_forward", "mj_step"))  # fmt: skip
+    return Native(data.qpos, data.qvel, data.qacc, np.ctypeslib.as_array(ctypes.pointer(time), (1,)), forward, step,
+                  model._address, data._address)  # fmt: skip
+
+
+@lean
+def accelerate(native, q, v, out):
+    """Fill ``out`` (n,) with the accelerations at positions and rates (n,)."""
+    for i in range(q.size):
+        native.place[i], native.rate[i] = q[i], v[i]
+    _call(native.forward, native.model, native.data)
+    for i in range(q.size):
+        out[i] = native.acceleration[i]
+
+
+@lean
+def march(native, q, v):
+    """Move positions and rates (n,) on by a step of the model's; False where MuJoCo starts again at time zero."""
+    for i in range(q.size):
+        native.place[i], native.rate[i] = q[i], v[i]
+    native.time[0] = 1.0
+    _call(native.step, native.model, native.data)
+    for i in range(q.size):
+        q[i], v[i] = native.place[i], native.rate[i]
+    return native.time[0] > 1.0
