@@ -11,8 +11,8 @@ SCENES = Path(__file__).parent / "scenes"
 
 NOT_STUDIES = ("__init__", "asked", "braking_figures", "command_line", "comparison", "contact_figures", "figures",
                "folders", "handling_figures", "hub_forces_figures", "manchester_figure", "recording_figures",
-               "recording_page", "recording_runs", "ride_figures", "ride_nonlinear_figures", "stabiliser_figures",
-               "summary_numbers", "sweep", "sweep_figure", "tyre_figure", "virtual_measurement",
+               "recording_page", "recording_runs", "ride_choice_figure", "ride_figures", "ride_nonlinear_figures",
+               "stabiliser_figures", "summary_numbers", "sweep", "sweep_figure", "tyre_figure", "virtual_measurement",
                "wheelset_figures")  # fmt: skip
 """Modules beside the studies that are none."""
 

@@ -19,7 +19,7 @@ from models.ride.choice.held import Effect, Held, effects_of, illegal, without
 from models.ride.choice.reduced import Reduced, Whole
 from models.ride.choice.screen import Screen, confirmed
 
-BUDGET = 0.9
+BUDGET = 1.0
 """Share of the tolerance that predictions may use."""
 SCREENED = 3
 """Speeds at which effects are screened, from the slowest to the fastest; the choice is confirmed at all."""
@@ -36,7 +36,9 @@ class Choice:
     """Effects ``left_out`` of all ``candidates``; relative changes (quantities,) of standard deviations.
 
     predicted and confirmed : the worst over speeds, with sign; kept : every confirmed change within the tolerance.
-    singles and pairs : predicted changes by effects, pairs where both may go; ``rounds``: choices that were confirmed.
+    singles and pairs : predicted changes by effects; pairs are those that hold the tolerance together while one breaks
+    it alone. rounds : choices that were confirmed. further : per effect that stayed, the confirmed largest change if
+    it went, too: at a tolerance above it would no longer matter.
     """
 
     candidates: tuple[Effect, ...]
@@ -49,6 +51,7 @@ class Choice:
     singles: dict[tuple[Effect, ...], np.ndarray]
     pairs: dict[tuple[Effect, ...], np.ndarray]
     rounds: int
+    further: dict[Effect, float]
 
 
 class Chooser:
@@ -162,7 +165,16 @@ class Chooser:
         left_out = tuple(effect for effect in self.effects if effect in chosen)
         singles, pairs = self.table()
         return Choice(self.effects, left_out, self.predicted(chosen), found, self.holds(found),
-                      self.cost(frozenset()), self.cost(chosen), singles, pairs, rounds)  # fmt: skip
+                      self.cost(frozenset()), self.cost(chosen), singles, pairs, rounds,
+                      self.further(chosen))  # fmt: skip
+
+    def further(self, chosen: Set) -> dict[Effect, float]:
+        """Largest confirmed change without each effect that stayed, and what it needs; only legal and finite ones."""
+        found = {}
+        for effect, step in zip(self.effects, self._singles(), strict=True):
+            if effect not in chosen and not illegal(chosen | step):
+                found[effect] = float(abs(self.confirm(chosen | step)).max())
+        return {effect: change for effect, change in found.items() if change < inf}
 
     def holds(self, changes: np.ndarray) -> bool:
         """Whether all changes are within the tolerance."""
