@@ -30,6 +30,7 @@ from models.measured.recording import Recording
 from models.measured.rig import Rig
 from models.measured.scene import MeasuredScene
 from models.measured.section_run import Hold, Outcome, SectionRun
+from models.measured.section_run import check as check_run
 from models.measured.section_run import run as march
 from models.measured.sections import Answer, Sections, points
 from models.measured.signal import Quantity, Signal
@@ -238,6 +239,8 @@ def _began(own: Recording, what: str, axis: str, chassis: str) -> float:
 def _run(found: Found, work: Path, progress: Progress) -> None:
     """Free, and with the stabiliser that the scene names; a run that fails keeps what it has."""
     holds = _holds(found)
+    for name in holds:
+        check_run(_job(found, name))
     for i, name in enumerate(holds):
         told = _left(f"{name} run", progress, 0.2 + 0.7 * i / len(holds), 0.7 / len(holds))
         try:
