@@ -17,8 +17,10 @@ SYSTEMS = {"pitch-plane": "validation.price.own_scene.pitch_plane"}
 """Systems whose scenes have a price, and the modules that know them."""
 NEAR = 2.5
 """Settings that took up to so many times the least seconds in one run are timed beside one another."""
-ROUNDS, LEAST = 7, 0.01
+ROUNDS, LEAST = 9, 0.005
 """Interleaved rounds of timing; a short run is repeated until its turn lasts this long (s)."""
+SLOWER = 1.05
+"""A ratio of seconds whose 95 % interval lies above this is slower beyond doubt."""
 ATTEMPTS = 6
 """Settings that are confirmed over the whole run, at most, for one recommendation."""
 
@@ -119,7 +121,7 @@ def _slower(one: Choice, best: Choice) -> bool:
     """Whether a choice takes longer than another one, beyond doubt where both were timed in the same rounds."""
     if len(one.rounds) != len(best.rounds) or len(one.rounds) == 1:
         return one.seconds > best.seconds
-    return paired_ratio(one.rounds, best.rounds)[1] > 1.0
+    return paired_ratio(one.rounds, best.rounds)[1] > SLOWER
 
 
 def _confirmed(search: Search, timed: list[Choice],

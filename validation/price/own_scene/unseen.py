@@ -20,7 +20,7 @@ from models.scene import Scene, build
 from models.time_series import write_time_series
 from validation.price.own_scene import Answer
 from validation.price.own_scene.pitch_plane import OwnPitchPlane, own
-from validation.price.own_scene.recommendation import Choice, Recommendation, recommend
+from validation.price.own_scene.recommendation import SLOWER, Choice, Recommendation, recommend
 from validation.price.own_scene.truth import Truth
 from validation.price.problems import Setting
 from validation.timing import interleave, paired_ratio
@@ -35,8 +35,6 @@ ROUNDS, LEAST = (9, 25), 0.005
 lasts this long (s)."""
 CONTEST = 3.0
 """A default that took so many times the seconds is not timed again: that is beyond what seconds wander."""
-SLOWER = 1.05
-"""A ratio of seconds whose interval lies above this is slower."""
 SCALES = {"f1,f2": 1e3, "pitch": 1e-2, "z3": 1e-2, "f3,f4": 1e3, "suspension_moment": 1e3, "enforced_moment": 1e3}
 """Usual size of a quantity, of which tolerances are parts."""
 PARTS = (-5.0, -1.5)
