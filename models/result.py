@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 PACKAGES = ("exudyn", "mujoco", "numpy", "scipy", "numba")
+_version = cache(version)
+"""Version of an installed package; finding it out takes longer than a short run."""
 
 
 @dataclass(frozen=True)
@@ -76,9 +78,9 @@ def load(path: Path) -> Result:
 def provenance(command: str = "") -> dict[str, Any]:
     """Versions, machine and commit: what someone needs to repeat a figure."""
     return {
-        "twinrig": version("twinrig"),
+        "twinrig": _version("twinrig"),
         "commit": _commit(),
-        "versions": {name: version(name) for name in PACKAGES},
+        "versions": {name: _version(name) for name in PACKAGES},
         "python": platform.python_version(),
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, {_processor()}",
         "system": f"{platform.system()} {platform.release()}",
@@ -102,6 +104,7 @@ def _commit() -> str:
         return "not a checkout"
 
 
+@cache
 def _processor() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
