@@ -92,6 +92,13 @@ def test_verdict_comes_first_and_then_what_is_not_covered(page):
     assert "<b>5 min</b><span>to measure it all" in before  # not the sum over cases that ran side by side
 
 
+def test_each_system_has_a_stated_share_of_the_quick_minute(page):
+    table = page[page.index('<section id="shares">') : page.index('<section id="independence">')]
+    lines = [re.findall(r"<td[^>]*>([^<]*)</td>", line) for line in table.split("<tr>")]
+    assert ["pitch-plane", "3", "4", "400.0", "22 (over)"] in lines  # of two cases that took 200 s each
+    assert [line[0] for line in lines if line] == ["pitch-plane", "drift", "hard-cases", "effects"]
+
+
 def test_gaps_name_systems_without_rows_and_rows_not_run(page):
     gaps = page[page.index('id="gaps"') : page.index('id="system-')]
     assert "No rows yet for contact, ride, rolling-vehicle, anti-lock, measured, cost:" in gaps

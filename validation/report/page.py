@@ -55,7 +55,7 @@ def page(results: dict[str, Any], data: Path) -> str:
     return environment.get_template(TEMPLATE).render(
         verdict=content.verdict(results), against=results.get("against"), systems=systems,
         silent=content.silent_systems(results["rows"]),
-        independence=content.independence(results), conventions=content.conventions(),
+        shares=content.shares(results), independence=content.independence(results), conventions=content.conventions(),
         parameters=content.parameter_tables(), provenance=results["provenance"],
     )  # fmt: skip
 
