@@ -1,6 +1,7 @@
 """Problem sheets serve without twinrig: their equations and files, solved by scipy alone, give their end values."""
 
 import csv
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -26,8 +27,9 @@ def test_the_sheet_of_noisy_forces_is_solved_by_scipy_alone(tmp_path):
 
     start = (tmp_path / "noise.md").read_text().partition("Start: ")[2].partition(".\n")[0]
     y = np.array([float(part.partition(" = ")[2]) for part in start.split(", ")])
-    for begin, end in zip(t[:-1], t[1:], strict=True):
+    for begin, end in pairwise(t):
         y = solve_ivp(rates, (begin, end), y, method="LSODA", rtol=1e-11, atol=1e-13).y[:, -1]
-    rows = list(csv.DictReader(open(tmp_path / "reference_values.csv")))
+    with open(tmp_path / "reference_values.csv") as file:
+        rows = list(csv.DictReader(file))
     assert y == pytest.approx([float(row["value"]) for row in rows], abs=1e-8)
     assert max(float(row["uncertainty"]) for row in rows) < 1e-11  # ten digits of what is of size 1
