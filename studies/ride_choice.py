@@ -1,4 +1,4 @@
-"""Which effects of a ride scene do its quantities call for: chosen within a tolerance, confirmed, with what it saves."""
+"""Which effects of a ride scene do its quantities call for: chosen within a tolerance, and confirmed."""
 
 import csv
 import time
@@ -135,9 +135,9 @@ def _table(scene: RideScene, choice: Choice, alone: list[Alone], seconds: tuple[
     names = ", ".join(effect.name for effect in choice.left_out) or "nothing"
     lines = [f"  left out: {names}"]
     lines += [f"    {effect.name}: {effect.says}" for effect in choice.left_out]
-    lines += [f"  {name}: {percent(predicted)} predicted, {percent(found)} confirmed, tolerance "
-              f"{100 * (scene.tolerance or 0):g} %"
-              for name, predicted, found in zip(scene.quantities, choice.predicted, choice.confirmed, strict=True)]  # fmt: skip
+    for name, predicted, found in zip(scene.quantities, choice.predicted, choice.confirmed, strict=True):
+        lines.append(f"  {name}: {percent(predicted)} predicted, {percent(found)} confirmed, tolerance "
+                     f"{100 * (scene.tolerance or 0):g} %")  # fmt: skip
     lines += [f"  states {before.states} -> {after.states}; step limit {1e3 * before.step:.3g} -> "
               f"{1e3 * after.step:.3g} ms; calls per second of motion {before.calls:.4g} -> {after.calls:.4g}, "
               f"{before.calls / after.calls:.3g} times fewer; {SECONDS:g} s of motion in {1e3 * seconds[0]:.3g} -> "

@@ -27,15 +27,19 @@ class Drawn:
     tolerance: float
 
 
-def drawn(seed: int, tolerance: float | None = None) -> Drawn:
-    """The scene of a seed; tolerance from 0.5 to 10 % where none is given."""
+def drawn(seed: int, tolerance: float | None = None, detailed: bool = True) -> Drawn:
+    """The scene of a seed; tolerance from 0.5 to 10 % where none is given.
+
+    detailed : a vehicle as multibody programs hold it, every wheel on a stiff bushing and a light part on stiff mounts;
+    else each of them in about half of the scenes, and soft at times.
+    """
     rng = np.random.default_rng(seed)
 
     def between(low: float, high: float) -> float:
         return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
     name = str(rng.choice(VEHICLES))
-    vehicle = _vehicle(twin(_loaded(name), seed), rng, between)
+    vehicle = _vehicle(twin(_loaded(name), seed), rng, between, detailed)
     cutoff = between(20.0, 200.0) if rng.random() < 0.4 else None
     road = {} if cutoff is None else {"cutoff": cutoff}
     speed = float(rng.uniform(8.0, 40.0))
@@ -60,7 +64,7 @@ def _scene(name: str, road: dict[str, float], speed: float) -> RideScene:
 
 
 def _vehicle(vehicle: SpatialVehicle, rng: np.random.Generator,
-             between: Callable[[float, float], float]) -> SpatialVehicle:  # fmt: skip
+             between: Callable[[float, float], float], detailed: bool) -> SpatialVehicle:  # fmt: skip
     """Light wheels, firm dampers, damped tyres in three of five; a fore-aft bushing and a part on mounts at times."""
     wheels = {tyre.body for tyre in vehicle.tyres}
     light, firm = between(0.15, 1.2), between(0.5, 4.0)
@@ -68,22 +72,23 @@ def _vehicle(vehicle: SpatialVehicle, rng: np.random.Generator,
     bodies = [replace(b, mass=light * b.mass) if b.name in wheels else b for b in vehicle.bodies]
     springs = [replace(s, damping=firm * s.damping) for s in vehicle.springs]
     outputs = list(vehicle.outputs)
-    if rng.random() < 0.4:
-        k, lean = between(3e5, 1e7), rng.uniform(0.02, 0.15)
+    if detailed or rng.random() < 0.4:
+        k, lean = between(1e6 if detailed else 3e5, 2e7), rng.uniform(0.02, 0.15)
         for i, body in enumerate(bodies):
             if body.name in wheels:
                 bodies[i] = replace(body, freedoms=("x", "z"))
                 axis = (float(np.cos(lean)), 0.0, float(np.sin(lean)))
                 springs.append(SpringDamper(f"{body.name} bush", "body", body.name, body.position, body.position, axis,
                                             k, 0.1 * float(np.sqrt(k * body.mass))))  # fmt: skip
-    if rng.random() < 0.6:
+    if detailed or rng.random() < 0.6:
         own = next(b for b in bodies if b.name == "body")
-        m = own.mass * between(0.005, 0.15)
+        m = own.mass * between(0.002, 0.02 if detailed else 0.15)
         at = (own.position[0] + float(rng.uniform(-1, 1)), own.position[1], own.position[2])
-        k = m * (2 * np.pi * between(3.0, 120.0)) ** 2
+        k = m * (2 * np.pi * between(20.0 if detailed else 3.0, 200.0)) ** 2
         bodies.append(Body("part", m, at, ("z",)))
         up = (0.0, 0.0, 1.0)
         springs.append(SpringDamper("part", "part", "body", at, at, up, k, 0.2 * float(np.sqrt(k * m))))
-        outputs.append(PointOutput("part", "acceleration", "part", at, up))
+        if not detailed:
+            outputs.append(PointOutput("part", "acceleration", "part", at, up))
     tyres = tuple(replace(tyre, damping=damping) for tyre in vehicle.tyres)
     return replace(vehicle, bodies=tuple(bodies), springs=tuple(springs), tyres=tyres, outputs=tuple(outputs))

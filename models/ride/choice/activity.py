@@ -34,7 +34,7 @@ def activity(whole: Whole) -> dict[str, float]:
         v = u @ system.A[:states, :states]
         return _deviation(u, P), _deviation(v, P)
 
-    out = {}
+    out: dict[str, float] = {}
     for spring in vehicle.springs:
         apart = motion.shift(spring.two, spring.point_two) - motion.shift(spring.one, spring.point_one)
         k, c = slopes_at_rest(spring)

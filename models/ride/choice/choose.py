@@ -57,9 +57,9 @@ class Choice:
 class Chooser:
     """Candidates of a scene at its speeds (m/s), for quantities (names of outputs, weighted ones too)."""
 
-    def __init__(self, held: Held, speeds: Sequence[float], quantities: Sequence[str], tolerance: float) -> None:
+    def __init__(self, held: Held, speeds: Sequence[float] | np.ndarray, quantities: Sequence[str], tolerance: float) -> None:
         self.held, self.tolerance, self.effects = held, tolerance, effects_of(held)
-        self.wholes = [Whole(held, speed) for speed in speeds]
+        self.wholes = [Whole(held, float(speed)) for speed in speeds]
         names = self.wholes[0].full.system.names
         self.rows = [names.index(name) for name in quantities]
         few = min(SCREENED, len(speeds))
@@ -230,7 +230,8 @@ class Chooser:
 
     def table(self) -> tuple[dict[tuple[Effect, ...], np.ndarray], dict[tuple[Effect, ...], np.ndarray]]:
         """Predictions of all single effects, legal or not, and of pairs that hold the tolerance only together."""
-        singles = {(effect,): self.predicted(frozenset([effect])) for effect in self.effects}
+        singles: dict[tuple[Effect, ...], np.ndarray] = {(effect,): self.predicted(frozenset([effect]))
+                                                         for effect in self.effects}  # fmt: skip
         pairs = {tuple(sorted(pair, key=lambda e: e.name)): self.predicted(pair) for pair in self._pairs()}
         return singles, pairs
 

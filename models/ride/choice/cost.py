@@ -14,8 +14,12 @@ REACH = np.linspace(0.0, 3.0, 601)[1:]
 
 @dataclass(frozen=True)
 class Cost:
-    """Of vehicle and road filters, without weightings: states; ``step`` (s), the largest stable one of the classical
-    Runge-Kutta method; ``calls`` of the right-hand side per second of motion at that step."""
+    """``states`` of vehicle and road filters, without weightings; ``step`` (s), the largest at which the classical
+    Runge-Kutta method is stable for the vehicle; ``calls`` of its right-hand side per second of motion at that step.
+
+    The road's own poles do not bound the step: a time run reads heights from a table made beforehand. How fine a step
+    must be to resolve the road or a quantity is another question, the same with and without an effect.
+    """
 
     states: int
     step: float
@@ -29,9 +33,9 @@ class Cost:
 
 def cost(reduced: Reduced) -> Cost:
     """Cost of a system whose every motion dies out; a motion that grows has no stable step and costs without end."""
-    n = reduced.states
+    n = reduced.states - len(reduced.excitation.heights) * len(reduced.excitation.F)
     step = stable_step(np.linalg.eigvals(reduced.system.A[:n, :n]))
-    return Cost(n, step, STAGES / step if step else np.inf)
+    return Cost(reduced.states, step, STAGES / step if step else np.inf)
 
 
 def stable_step(values: np.ndarray) -> float:

@@ -134,7 +134,7 @@ def first_order(
     if E.shape[1]:
         held = E.T @ vehicle.stiffness
         q = q + E @ _solved(held @ E, E.T @ vehicle.road_stiffness @ z - held @ q)
-    force = vehicle.road_stiffness @ z + vehicle.road_damping @ rate - vehicle.stiffness @ q
+    force: np.ndarray = vehicle.road_stiffness @ z + vehicle.road_damping @ rate - vehicle.stiffness @ q
     direct = [vehicle.road_damping @ heights @ each for each in noise]
     force = force - vehicle.damping @ Y @ v_a
     damped = V.T @ vehicle.damping @ V
@@ -186,7 +186,8 @@ def _outputs(vehicle: LinearVehicle, q: np.ndarray, A: np.ndarray, B: tuple[np.n
 def _of_road(full: Held, whole: Excitation, held: Held, rest: Excitation) -> tuple[np.ndarray, np.ndarray]:
     """States of the whole road's filters by those that are left, axle by axle, and back."""
     order = 1 if full.scene.road.cutoff is None else 2
-    one, back = np.eye(len(whole.F)), np.eye(len(whole.F))
+    one: np.ndarray = np.eye(len(whole.F))
+    back: np.ndarray = one
     if order == 2 and held.scene.road.cutoff is None:
         one = np.kron(np.eye(len(rest.F)), [[1.0], [0.0]])
         back = np.kron(np.eye(len(rest.F)), [[1.0, 1.0 / (full.scene.road.cutoff or 1.0)]])

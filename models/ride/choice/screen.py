@@ -11,8 +11,10 @@ alone, T = 1, it reads dJ = tr(L (dA P + P dA' + dQ)) + 2 dC P C' + dC P dC'.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.linalg import solve_continuous_lyapunov
 
 from models.errors import InputError
 from models.ride.choice.reduced import Reduced
@@ -23,7 +25,7 @@ from models.ride.marginal import parts
 
 @dataclass(frozen=True)
 class Solved:
-    """Covariance P (n, n), adjoints L (quantities, n, n) and variances (quantities,) of a system, extended precision."""
+    """Covariance P (n, n), adjoints L (quantities, n, n) and variances (quantities,), in extended precision."""
 
     P: np.ndarray
     L: np.ndarray
@@ -55,8 +57,18 @@ class Screen:
     """Predictions for systems reduced further than ``base``, from its solution; quantities by their rows of C."""
 
     def __init__(self, base: Reduced, rows: list[int]) -> None:
-        self.base, self.rows, self.solved = base, rows, solve(base.system, rows)
-        self.P, self.L = self.solved.P.astype(float), self.solved.L.astype(float)
+        self.base, self.rows = base, rows
+        A, C = base.system.A, base.system.C[rows]
+        growth = float(np.linalg.eigvals(A).real.max(initial=-np.inf))
+        if growth >= 0.0:
+            raise InputError("", "vehicle", None, "has a motion that does not die out: no adjoint to screen effects by")
+        self.P = solve_continuous_lyapunov(A, -noise_of(base.system))
+        self.L = np.array([solve_continuous_lyapunov(A.T, -np.outer(c, c)) for c in C])
+
+    @cached_property
+    def solved(self) -> Solved:
+        """The base's solution in extended precision, for the certificate."""
+        return solve(self.base.system, self.rows)
 
     def predicted(self, reduced: Reduced) -> np.ndarray:
         """Variances (quantities,) of the reduced system; inf where it passes white noise."""

@@ -23,7 +23,7 @@ def found(held: Held) -> list[Effect]:
 
 def _of(name: str, freedoms: list[tuple[str, Freedom]]) -> Effect:
     said = ", ".join(f"{body} {freedom}" for body, freedom in freedoms)
-    return Effect(name, partial(_without, freedoms=freedoms), f"locked: {said}")
+    return Effect(name, partial(_without, freedoms=freedoms), f"locked: {said}", singular=True)
 
 
 def _without(held: Held, freedoms: list[tuple[str, Freedom]]) -> Held:

@@ -1,0 +1,138 @@
+"""Effects of a ride scene chosen by its quantities: reduced systems, screen, certificate, choice, refusals."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.errors import InputError
+from models.ride.choice.cost import stable_step
+from models.ride.choice.held import Held, effects_of, illegal, without
+from models.ride.choice.reduced import Whole
+from models.ride.choice.screen import Screen, confirmed
+from models.ride.covariance import stationary
+from models.ride.excitation import excited
+from models.ride.scene import build
+from models.vehicles.spatial_linear import linearise
+from models.vehicles.vehicle_file import load_vehicle
+from validation.drawn_rides import drawn
+
+SPEED = 20.0
+
+
+def held(name="half_car", tyre_damping=0.0, **road):
+    scene = build({"title": "t", "system": "ride", "vehicle": {"file": name}, "road": road,
+                   "speeds": {"values": [SPEED]}}, "t")  # fmt: skip
+    vehicle = load_vehicle(name)
+    tyres = tuple(replace(tyre, damping=tyre_damping) for tyre in vehicle.tyres)
+    return Held(scene, replace(vehicle, tyres=tyres))
+
+
+def named(scene):
+    return {effect.name: effect for effect in effects_of(scene)}
+
+
+def deviations(scene, *names):
+    own = named(scene)
+    return stationary(Whole(scene, SPEED).reduced(without(scene, [own[name] for name in names])).system).deviation
+
+
+def of_vehicle(scene, vehicle):
+    return stationary(excited(linearise(vehicle), scene.excitation(), SPEED)).deviation
+
+
+def test_nothing_left_out_is_the_system_itself():
+    scene = held("seven_freedoms", 100.0)
+    whole = Whole(scene, SPEED)
+    own = excited(whole.linear, whole.excitation, SPEED)
+    assert np.abs(whole.full.system.A - own.A).max() < 1e-11 * np.abs(own.A).max()
+    assert np.abs(whole.full.left @ whole.full.T - np.eye(len(own.A))).max() < 1e-12
+
+
+@pytest.mark.parametrize(("name", "small"), [("half_car", 1e-5), ("seven_freedoms", 1e-5)])
+def test_wheels_without_mass_are_the_limit_of_light_ones(name, small):
+    scene = held(name)
+    bodies = tuple(replace(b, mass=small * b.mass) if b.name in {t.body for t in scene.vehicle.tyres} else b
+                   for b in scene.vehicle.bodies)  # fmt: skip
+    light = of_vehicle(scene, replace(scene.vehicle, bodies=bodies))
+    assert deviations(scene, "mass of all wheels") == pytest.approx(light, rel=1e-4, abs=1e-9)  # error of order small
+
+
+def test_rigid_springs_and_locked_freedoms_are_limits():
+    drew = drawn(2)  # a car with bushings; undamped tyres, for white noise never lets a stiff spring come to rest
+    tyres = tuple(replace(tyre, damping=0.0) for tyre in drew.held.vehicle.tyres)
+    one = replace(drew, held=replace(drew.held, vehicle=replace(drew.held.vehicle, tyres=tyres)))
+    own = named(one.held)
+    bush = next(name for name in own if name.startswith("bushings"))
+    stiff = tuple(replace(s, stiffness=1e4 * s.stiffness, damping=1e2 * s.damping) if "bush" in s.name else s
+                  for s in one.held.vehicle.springs)  # fmt: skip
+    limit = of_vehicle(one.held, replace(one.held.vehicle, springs=stiff))
+    found = deviations(one.held, bush)
+    told = np.isfinite(limit) & (limit > 1e-6)
+    assert found[told] == pytest.approx(limit[told], rel=2e-3)  # compliance 1e-4 of a few per cent's effect
+    scene = held()
+    heavy = tuple(replace(b, inertia=((0.0,) * 3, (0.0, 1e12, 0.0), (0.0,) * 3)) if b.name == "body" else b
+                  for b in scene.vehicle.bodies)  # fmt: skip
+    front = [output.name for output in scene.vehicle.outputs].index("body front")
+    limit = of_vehicle(scene, replace(scene.vehicle, bodies=heavy))[front]
+    assert deviations(scene, "body ry")[front] == pytest.approx(limit, rel=1e-6)
+
+
+def test_roads_without_delay_and_second_corner():
+    alike = held(front_rear="equal")
+    assert deviations(held(), "delay front to rear") == pytest.approx(deviations(alike), rel=1e-9)
+    assert deviations(held(cutoff=50.0), "second corner of the road") == pytest.approx(deviations(held()), rel=1e-9)
+
+
+def test_identity_and_screen_of_a_small_change():
+    scene = held("seven_freedoms", 50.0)
+    whole, rows = Whole(scene, SPEED), [0, 2, 4]
+    screen, effect = Screen(whole.full, rows), named(scene)["tyre damping"]
+    rest = whole.reduced(without(scene, [effect]))
+    two, one = screen.identity(rest)
+    assert np.abs(two / one - 1).max() < 1e-12
+    full = screen.solved.variance.astype(float)
+    predicted, true = (np.sqrt(v / full) - 1 for v in (screen.predicted(rest), confirmed(rest, rows)))
+    assert np.all((predicted / true > 0.9) & (predicted / true < 1.1)) and np.all(true > 1e-3)
+
+
+def test_wheel_mass_needs_the_tyre_damper_and_says_so():
+    own = named(held(tyre_damping=100.0))
+    mass, damper = own["mass of all wheels"], own["tyre damping"]
+    assert "leave out tyre damping, too" in illegal([mass]) and not illegal([mass, damper])
+    assert not illegal([named(held())["mass of all wheels"]])
+    assert "cannot be left out beside" in illegal([mass, damper, own["mass of the wheels of axle 1"]])
+
+
+def test_stable_step_of_runge_kutta():
+    assert stable_step(np.array([-10.0])) == pytest.approx(0.2785, abs=6e-4)  # 2.785 on the real axis
+    assert stable_step(np.array([10j])) == pytest.approx(0.2828, abs=6e-4)  # 2 sqrt(2) on the imaginary one
+    assert stable_step(np.array([1.0])) == 0.0
+
+
+def test_the_published_pair_is_found_and_reported(twinrig, capsys):
+    assert twinrig("run", "ride_choice", "--out", "out", "--json") == 0
+    found = json.loads(capsys.readouterr().out)["answer"]
+    assert {"mass of all wheels", "tyre damping"} <= set(found["left out"]) and found["kept"]
+    assert all(abs(error["confirmed"]) <= 0.02 for error in found["errors"].values())
+    assert found["calls"][0] / found["calls"][1] == pytest.approx(28.8, abs=0.5)  # the published 691 and 24 1/s
+
+
+ASKING = {"title": "t", "system": "ride", "study": "ride_choice", "vehicle": {"file": "half_car"}, "effects": "auto",
+          "quantities": ["body front"], "tolerance": 0.02, "speeds": {"values": [SPEED]}}  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ({"quantities": []}, "quantities"), ({"tolerance": None}, "tolerance"), ({"study": "ride"}, "ride_choice"),
+    ({"effects": None}, "quantities"), ({"tolerance": 1.5}, "below 1"),
+])  # fmt: skip
+def test_scenes_that_ask_half_a_question(change, said):
+    table = {key: value for key, value in {**ASKING, **change}.items() if value is not None}
+    with pytest.raises(InputError, match=said):
+        build(table, "mine.toml")
+
+
+def test_a_quantity_that_is_none(twinrig, capsys):
+    assert twinrig("run", "ride_choice", "--set", "quantities=['body center']", "--out", "out") == 2
+    assert "did you mean 'body centre'" in capsys.readouterr().err
