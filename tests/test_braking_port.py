@@ -248,6 +248,7 @@ def _loops(given):
     (lambda given: None, "wrong frame"),
     (lambda given: Command(), "wrong frame"),
     (lambda given: Command(valves=np.ones(3)), "wrong length: 3 values for 4 wheels"),
+    (lambda given: Command(valves=np.ones((2, 2))), "wrong length: 2 x 2 values for 4 wheels"),
     (lambda given: Command(valves=np.array([1, 1, 1, 2])), "no state of a valve: 2 is none"),
     (lambda given: Command(pressures=np.array([1, 1, np.inf, 1])), "not a number: inf"),
     (lambda given: Command(pressures=np.array([1, -1e-9, 1, 1])), "below zero"),
@@ -460,6 +461,17 @@ def test_a_callable_by_its_name(tmp_path):
                        ("mine.py:NOT", "not made"), ("types:SimpleNamespace", "not made|no method")):  # fmt: skip
         with pytest.raises(InputError, match=told):
             named_controller(name, tmp_path, 4, {})
+
+
+def test_a_controller_that_writes_into_its_question_does_not_change_the_log(tmp_path):
+    def writes(given):
+        given.wheels[:] = 0.0
+        return Command(valves=np.ones(4, dtype=np.int64))
+
+    with opened(PortTable(log="a.log"), Run(RADIUS, SAMPLE, "s", tmp_path), Says(writes)) as (own, _):
+        own.sample(of())
+    with opened(PortTable(replay="a.log"), Run(RADIUS, SAMPLE, "s", tmp_path), Says(_raises)) as (replayed, _):
+        assert (replayed.sample(of()).valves == 1).all()
 
 
 def test_a_scene_logs_and_replays_what_it_drives(tmp_path):

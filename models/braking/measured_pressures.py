@@ -15,8 +15,8 @@ from models.tables import SECONDS, read_table, write_table
 
 BARS = {"bar": 1.0, "Pa": 1e-5, "kPa": 1e-2, "MPa": 10.0}
 SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6}
-LARGEST = 100.0
-"""bar; no brake chamber holds more."""
+LARGEST = 300.0
+"""bar; no brake of a road vehicle holds more, by air some 10 and by fluid 200."""
 FASTEST = 150.0
 """m/s; no wheel of a road vehicle turns faster."""
 

@@ -73,5 +73,6 @@ def _array(values: object, given: Sample) -> np.ndarray:
     except (TypeError, ValueError) as error:
         raise ControllerFailed(given, "wrong frame", str(error)) from None
     if array.shape != given.wheels.shape:
-        raise ControllerFailed(given, "wrong length", f"{array.size} values for {given.wheels.size} wheels")
+        size = " x ".join(map(str, array.shape)) or "one"
+        raise ControllerFailed(given, "wrong length", f"{size} values for {given.wheels.size} wheels")
     return array

@@ -33,8 +33,9 @@ class Logged:
 
     def sample(self, given: Sample) -> Command:
         """Its answer, written down."""
+        asked = question(given)  # before a controller can write into what it is given
         said = self.inner.sample(given)
-        self.file.write(question(given) + answer(given.number, said))
+        self.file.write(asked + answer(given.number, said))
         return said
 
 
