@@ -48,5 +48,5 @@ def _activity(axis: Any, watts: dict[str, float]) -> None:
     shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS][::-1]
     axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color="#0072b2", alpha=0.7)
     without = [name for name in watts if name not in finite]
-    note = f"\nunbounded under white noise: {', '.join(without)}" if without else ""
-    axis.set(title="Energy activity, which does not know the question", xlabel=f"share of the mean power [%]{note}")
+    note = f"\n{len(without)} inertias are unbounded under white noise" if without else ""
+    axis.set(title="Energy activity: blind to the question", xlabel=f"share of the mean power [%]{note}")

@@ -57,7 +57,8 @@ class Choice:
 class Chooser:
     """Candidates of a scene at its speeds (m/s), for quantities (names of outputs, weighted ones too)."""
 
-    def __init__(self, held: Held, speeds: Sequence[float] | np.ndarray, quantities: Sequence[str], tolerance: float) -> None:
+    def __init__(self, held: Held, speeds: Sequence[float] | np.ndarray, quantities: Sequence[str],
+                 tolerance: float) -> None:  # fmt: skip
         self.held, self.tolerance, self.effects = held, tolerance, effects_of(held)
         self.wholes = [Whole(held, float(speed)) for speed in speeds]
         names = self.wholes[0].full.system.names
