@@ -11,7 +11,8 @@ from validation.hard_cases.case import Case, Word
 
 IMPLICIT = {**setups.IMPLICIT, "reference": "LSODA"}
 """Radau takes minutes here: its error estimate chases the rounding of kN on a wheel of a gram."""
-TOLERANCE = 1e-7
+TOLERANCE = 1e-6
+"""Of the adaptive solvers; at a tenth of it LSODA, too, chases that rounding, in 140,000 steps instead of 300."""
 
 
 def _off(base: Assembly) -> Assembly:
