@@ -38,6 +38,9 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
     tyres = [table_of(scene, name, rear) for name in names for rear in kinds_of(scene)]
     front, rear, behind = (brake_of(scene, axle) for axle in ("front", "rear", "trailer"))
     own = None if scene.vehicle.file is None else sprung_of(scene)
+    engine = None if own is None else on_springs(SPRUNG_ENGINE, own)
+    if engine is not None:
+        engine.check_step(scene.run.sample / scene.run.substeps)
     return Braked(
         plane=plane, kind=np.where(np.arange(plane.wheels) < 2, 0, len(kinds_of(scene)) - 1), tables=stacked(tyres),
         slope=max(table.cornering for table in tyres), road=road_of(scene, procedure, names),
@@ -45,7 +48,7 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
         chambers=chambers_of(scene, plane.wheels),
         steer=np.zeros(plane.wheels), substeps=scene.run.substeps, sample=scene.run.sample,
         speed_given=scene.controller.true_speed, relaxation=lags_of(scene, plane.wheels), sprung=own,
-        engine=None if own is None else on_springs(SPRUNG_ENGINE, own),
+        engine=engine,
     )  # fmt: skip
 
 

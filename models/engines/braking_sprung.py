@@ -34,7 +34,7 @@ class OnSprings:
         own, wheels = vehicle.handling, len(vehicle.handling.vehicle.tyres)
         self.engine, self.vehicle, self.size = engine, vehicle, vehicle.size
         self._table = np.concatenate((own.numbers, np.zeros(ROW * wheels)))
-        self._known = np.empty((wheels, KNOWN))
+        self._known, self._allowed = np.empty((wheels, KNOWN)), set[float]()
 
     @cached_property
     def _liveliness(self) -> float:
@@ -94,8 +94,11 @@ class OnSprings:
 
     def check_step(self, step: float) -> None:
         """Refuse a step (s) at which a mode of the vehicle on its springs and tyres would grow."""
+        if step in self._allowed:
+            return
         _check_step(self.engine, linearise(self.vehicle.handling.vehicle),
                     Settings(INTEGRATORS[self.engine], step, LONG_RUN * step))  # fmt: skip
+        self._allowed.add(step)
 
     def _sound(self, status: int, time: float) -> int:
         if status == OVER:

@@ -1,11 +1,14 @@
 """A braked vehicle on its suspension in both engines: loads, pitch and stops by closed forms, and the plane vehicle."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
+from models.braking.controller import Command, Controller, Sample
 from models.braking.controllers.slip_bang_bang import SlipBangBang
 from models.braking.magic_formula import surface
 from models.braking.plane_step import LOAD
@@ -32,7 +35,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows = [*_locked_rows(GENTLE), *_mirror_rows(*turns)]
     data: dict[str, Any] = {"limit": []}
     if not quick:
-        rows += [*_locked_rows(HARD), *_engine_rows(wet), *_ice_rows(), *_order_rows(wet)]
+        rows += [*_locked_rows(HARD), *_engine_rows(wet), *_ice_rows(), *_order_rows(wet), _speed_row(wet)]
         data["limit"] = limit(wet)
         rows += _limit_rows(data["limit"])
     return rows, data
@@ -114,6 +117,30 @@ def _ice_rows() -> list[Row]:
                     float(stops[0].locks().longest.max()), "s", 0.1, "the controller holds the wheels", "none"),
             finding("braking_suspension.ice.distance", SYSTEM, "stopping distance on ice beside the plane vehicle's",
                     abs(ways[0] / ways[1] - 1.0), "relative", 0.05, "single runs on ice scatter", "none")]  # fmt: skip
+
+
+class _Timed:
+    """A controller that keeps the seconds which the vehicle took before each of its samples."""
+
+    def __init__(self, own: Controller) -> None:
+        self.own, self.answered, self.seconds = own, math.nan, list[float]()
+
+    def sample(self, given: Sample) -> Command:
+        """As the controller answers."""
+        self.seconds.append(perf_counter() - self.answered)
+        command = self.own.sample(given)
+        self.answered = perf_counter()
+        return command
+
+
+def _speed_row(wet: TyreTable) -> Row:
+    """Of the tenth part of samples that the rest of the machine disturbs least."""
+    vehicle, controller = braked(car(), wet, substeps=4, gradient=150.0), _Timed(SlipBangBang(wheels=4))
+    vehicle.run(controller, 15.0, 2.0)
+    speed = vehicle.sample / float(np.nanquantile(controller.seconds, 0.1))
+    return finding("braking_suspension.speed", SYSTEM, "the car in MuJoCo at four substeps, by the time on the wall",
+                   speed, "times real time", "above 20", "all of a sample is one call of compiled code, which calls "
+                   "MuJoCo; the swiftest tenth of samples", "none")  # fmt: skip
 
 
 def limit(tyre: TyreTable) -> list[list[float]]:
