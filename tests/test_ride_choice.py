@@ -133,6 +133,11 @@ def test_scenes_that_ask_half_a_question(change, said):
         build(table, "mine.toml")
 
 
+def test_a_vehicle_that_is_free_to_drive_away_is_refused(twinrig, capsys):
+    assert twinrig("run", "ride_choice", "--set", "vehicle.file=r19_free", "--out", "out") == 2
+    assert "nothing pulls back" in capsys.readouterr().err
+
+
 def test_a_quantity_that_is_none(twinrig, capsys):
     assert twinrig("run", "ride_choice", "--set", "quantities=['body center']", "--out", "out") == 2
     assert "did you mean 'body centre'" in capsys.readouterr().err

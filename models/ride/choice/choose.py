@@ -67,6 +67,7 @@ class Chooser:
         self.screened = [self.wholes[i] for i in np.linspace(0, len(speeds) - 1, few).round().astype(int)]
         self.full = [confirmed(whole.full, self.rows) for whole in self.wholes]
         self._check(quantities)
+        Screen(self.wholes[0].full, self.rows)  # refuses a vehicle that cannot be screened
         self._screens: dict[tuple[int, Set], Screen] = {}
         self._systems: dict[tuple[int, Set], Reduced | None] = {}
         self._predicted: dict[Set, np.ndarray] = {}

@@ -53,15 +53,20 @@ def noise_of(system: DelayedSystem) -> np.ndarray:
     return intensity(system.A, B, delays, system.independent)
 
 
+SLOWEST = 1e-9
+"""Decay, by the fastest rate, below which a motion counts as one that does not die out."""
+
+
 class Screen:
     """Predictions for systems reduced further than ``base``, from its solution; quantities by their rows of C."""
 
     def __init__(self, base: Reduced, rows: list[int]) -> None:
         self.base, self.rows = base, rows
         A, C = base.system.A, base.system.C[rows]
-        growth = float(np.linalg.eigvals(A).real.max(initial=-np.inf))
-        if growth >= 0.0:
-            raise InputError("", "vehicle", None, "has a motion that does not die out: no adjoint to screen effects by")
+        values = np.linalg.eigvals(A)
+        if values.real.max(initial=-np.inf) > -SLOWEST * abs(values).max(initial=0.0):
+            raise InputError("", "vehicle", None, "has a motion that nothing pulls back, as one that is free to drive "
+                             "away: effects are chosen for vehicles of which every motion dies out")
         self.P = solve_continuous_lyapunov(A, -noise_of(base.system))
         self.L = np.array([solve_continuous_lyapunov(A.T, -np.outer(c, c)) for c in C])
 
