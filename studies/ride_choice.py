@@ -57,14 +57,15 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         chooser = Chooser(Held(scene, vehicle_of(scene)), scene.speeds.all(), scene.quantities, scene.tolerance)
         choice = chooser.choose()
         progress("single effects", 0.7)
+        further = chooser.further(frozenset(choice.left_out))
         alone = [_alone(chooser, effect) for effect in chooser.effects]
         middle = chooser.wholes[len(chooser.wholes) // 2]
         watts = activity(middle)
     _save(scene, alone, choice, folder / "effects.csv")
     _save_activity(watts, folder / "activity.csv")
     choice_figure(scene, alone, choice, watts, folder / "choice.png")
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(scene, choice),
-            "table": _table(scene, choice, alone, _seconds(chooser, choice, middle))}  # fmt: skip
+    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(scene, choice, further),
+            "table": _table(scene, choice, alone, further, _seconds(chooser, choice, middle))}  # fmt: skip
 
 
 def _alone(chooser: Chooser, effect: Effect) -> Alone:
@@ -72,7 +73,7 @@ def _alone(chooser: Chooser, effect: Effect) -> Alone:
     return Alone(effect, chooser.predicted(one), chooser.confirm(one), illegal(one))
 
 
-def _answer(scene: RideScene, choice: Choice) -> dict[str, Any]:
+def _answer(scene: RideScene, choice: Choice, further: dict[Effect, float]) -> dict[str, Any]:
     """What was chosen, and how right and how cheap that is."""
     errors = zip(scene.quantities, choice.predicted.tolist(), choice.confirmed.tolist(), strict=True)
     return {
@@ -82,7 +83,7 @@ def _answer(scene: RideScene, choice: Choice) -> dict[str, Any]:
         "kept": choice.kept, "states": [choice.before.states, choice.after.states],
         "step limit": [choice.before.step, choice.after.step], "calls": [choice.before.calls, choice.after.calls],
         "confirmations": choice.rounds, "would matter no more above": {
-            effect.name: change for effect, change in choice.further.items()},
+            effect.name: change for effect, change in further.items()},
     }  # fmt: skip
 
 
@@ -129,7 +130,8 @@ def percent(value: float) -> str:
     return f"{100 * value:+.2g} %" if np.isfinite(value) else "without end"
 
 
-def _table(scene: RideScene, choice: Choice, alone: list[Alone], seconds: tuple[float, float]) -> list[str]:
+def _table(scene: RideScene, choice: Choice, alone: list[Alone], further: dict[Effect, float],
+           seconds: tuple[float, float]) -> list[str]:  # fmt: skip
     """The choice in words."""
     before, after = choice.before, choice.after
     names = ", ".join(effect.name for effect in choice.left_out) or "nothing"
@@ -145,7 +147,7 @@ def _table(scene: RideScene, choice: Choice, alone: list[Alone], seconds: tuple[
     lines += ["  alone, what leaving it out changes (confirmed):"]
     lines += [f"    {one.effect.name}: {', '.join(map(percent, one.confirmed))}"
               + (f" ({one.illegal})" if one.illegal else "") for one in alone]  # fmt: skip
-    for effect, change in sorted(choice.further.items(), key=lambda item: item[1])[:3]:
+    for effect, change in sorted(further.items(), key=lambda item: item[1])[:3]:
         lines.append(f"  {effect.name} would matter no more at a tolerance above {100 * change:.3g} %")
     worst = float(abs(choice.confirmed).max())
     return [*lines, f"  the choice holds for tolerances down to {100 * worst:.3g} %"] if choice.left_out else lines

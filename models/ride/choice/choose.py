@@ -36,9 +36,7 @@ class Choice:
     """Effects ``left_out`` of all ``candidates``; relative changes (quantities,) of standard deviations.
 
     predicted and confirmed : the worst over speeds, with sign; kept : every confirmed change within the tolerance.
-    singles and pairs : predicted changes by effects; pairs are those that hold the tolerance together while one breaks
-    it alone. rounds : choices that were confirmed. further : per effect that stayed, the confirmed largest change if
-    it went, too: at a tolerance above it would no longer matter.
+    rounds : choices that were confirmed.
     """
 
     candidates: tuple[Effect, ...]
@@ -48,10 +46,7 @@ class Choice:
     kept: bool
     before: Cost
     after: Cost
-    singles: dict[tuple[Effect, ...], np.ndarray]
-    pairs: dict[tuple[Effect, ...], np.ndarray]
     rounds: int
-    further: dict[Effect, float]
 
 
 class Chooser:
@@ -165,13 +160,12 @@ class Chooser:
             kept = path[: low + 1]
         chosen = kept[-1]
         left_out = tuple(effect for effect in self.effects if effect in chosen)
-        singles, pairs = self.table()
         return Choice(self.effects, left_out, self.predicted(chosen), found, self.holds(found),
-                      self.cost(frozenset()), self.cost(chosen), singles, pairs, rounds,
-                      self.further(chosen))  # fmt: skip
+                      self.cost(frozenset()), self.cost(chosen), rounds)  # fmt: skip
 
     def further(self, chosen: Set) -> dict[Effect, float]:
-        """Largest confirmed change without each effect that stayed, and what it needs; only legal and finite ones."""
+        """Largest confirmed change if an effect that stayed went, too, with what it needs: at a tolerance above, it
+        would no longer matter. Only legal and finite ones."""
         found = {}
         for effect, step in zip(self.effects, self._singles(), strict=True):
             if effect not in chosen and not illegal(chosen | step):
@@ -229,13 +223,6 @@ class Chooser:
     def _share(self, chosen: Set) -> float:
         """Largest predicted change by the tolerance."""
         return float(abs(self.predicted(chosen)).max()) / self.tolerance
-
-    def table(self) -> tuple[dict[tuple[Effect, ...], np.ndarray], dict[tuple[Effect, ...], np.ndarray]]:
-        """Predictions of all single effects, legal or not, and of pairs that hold the tolerance only together."""
-        singles: dict[tuple[Effect, ...], np.ndarray] = {(effect,): self.predicted(frozenset([effect]))
-                                                         for effect in self.effects}  # fmt: skip
-        pairs = {tuple(sorted(pair, key=lambda e: e.name)): self.predicted(pair) for pair in self._pairs()}
-        return singles, pairs
 
 
 LEAST = 1e-3
