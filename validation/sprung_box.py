@@ -23,6 +23,8 @@ SPIN = 1.7
 TENSOR = ((400.0, 0.0, 0.0), (0.0, 1500.0, 0.0), (0.0, 0.0, 1700.0))
 LOCKS = 1e5
 """Torque (N m) that locks a wheel at once."""
+GRADIENT = 1e3
+"""Torque by pressure (N m/bar) of brakes whose torques are given."""
 
 
 @cache
@@ -78,14 +80,14 @@ class Torques:
 
     def sample(self, given: Sample) -> Command:
         """Always the same."""
-        return Command(pressures=self.torques)
+        return Command(pressures=self.torques / GRADIENT)
 
 
 def braked(own: Sprung, tyre: TyreTable, engine: str | None = "mujoco", steer: float = 0.0, step: float = 5.5e-3,
-           substeps: int = 1, supply: float = 6.0, gradient: float = 1.0) -> Braked:  # fmt: skip
-    """The vehicle on one surface, brakes of 1 N m/bar that follow at once; without an engine the plane one.
+           substeps: int = 1, supply: float = 6.0, gradient: float = GRADIENT) -> Braked:  # fmt: skip
+    """The vehicle on one surface, brakes that follow at once; without an engine the plane one.
 
-    steer : rad, of the front wheels; supply : bar, and gradient : N m/bar, for a controller of valves.
+    steer : rad, of the front wheels; supply : bar, for a controller of valves; gradient : N m/bar.
     """
     brake, none = Brake(push_out=0.0, release=0.0, rising=gradient, falling=gradient), np.zeros(4)
     return Braked(
