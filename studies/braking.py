@@ -136,13 +136,17 @@ def lines(name: str, stop: Stop, told: dict[str, float], wheels: dict[str, np.nd
     rows = [f"  {name.replace('_', ' ')}" + _unfinished(stop)]
     rows += [f"    {stop.path.clock}"] if stop.path.clock else []
     rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.of_vehicle().items()]
-    rows += [f"    {key:<40}{value:>10.3f}" for key, value in told.items()]
+    rows += [f"    {key:<40}{_figure_of_merit(value):>10}" for key, value in told.items()]
     rows += [f"    ({NOT_CHECKED})"] if told else []
     rows += ["    (without steering correction, and of the vehicle without trailer)"] if "z_MALS" in told else []
     names = WHEELS[: stop.path.turning.shape[1]]
     rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel.replace('trailer ', 'tr. '):>17}" for wheel in names)]
     return rows + [f"    {key:<40}" + "".join(f"{value:>17.2f}" for value in values)
                    for key, values in wheels.items()]  # fmt: skip
+
+
+def _figure_of_merit(value: float) -> str:
+    return f"{value:.3f}" if np.isfinite(value) else "not steady"
 
 
 def _unfinished(stop: Stop) -> str:

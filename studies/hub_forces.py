@@ -163,12 +163,16 @@ def _table(scene: HubScene, found: Found) -> list[str]:
         ratios = damages(found, run).values()
         lines.append(f"  {name:<18}" + "".join(f"{1e3 * v:>9.3g}" for v in off[:3])
                      + "".join(f"{v:>8.2g}" for v in off[3:])
-                     + f"{drift_off(found, run):>11.4g}{roll:>8.3g}{pitch:>8.3g}   "
+                     + f"{_told(drift_off(found, run)):>11}{roll:>8.3g}{pitch:>8.3g}   "
                      + f"{min(ratios):.3g}, {max(ratios):.3g}")  # fmt: skip
     lines += [f"  {name}: {text}" for name, text in found.failed.items()]
     if sum(name.startswith(FREE) for name in found.runs) > 1:
         lines.append(f"  engines before drift-off: {engines_apart(found):.1e}")
     return lines
+
+
+def _told(time: float) -> str:
+    return f"{time:.4g}" if np.isfinite(time) else "never"
 
 
 def _save(found: Found, folder: Path) -> None:

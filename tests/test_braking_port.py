@@ -185,6 +185,7 @@ def _double(value):
 NONSENSE = {
     "not a number": _said(bytes={16: _double(np.nan)}),
     "below zero": _said(bytes={24: _double(-1.0)}),
+    "too high": _said(bytes={24: _double(1e300)}),
     "no state of a valve": _said(bytes={8: b"V", 16: _double(0.5)}),
     "wrong length": _said(bytes={9: b"\x03"}),
     "wrong length: an answer of more than 80 bytes": _said(more=1),

@@ -7,6 +7,8 @@ import numpy as np
 
 SAMPLE = 0.0055
 """Time between two samples (s): the paper's, 182 a second."""
+LARGEST_PRESSURE = 300.0
+"""bar; no brake of a road vehicle holds more, by air some 10 and by fluid 200."""
 
 
 class Sample(NamedTuple):

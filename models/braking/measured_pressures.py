@@ -9,14 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from models.braking.controller import SAMPLE, Command, Sample
+from models.braking.controller import LARGEST_PRESSURE, SAMPLE, Command, Sample
 from models.errors import InputError
 from models.tables import SECONDS, read_table, write_table
 
 BARS = {"bar": 1.0, "Pa": 1e-5, "kPa": 1e-2, "MPa": 10.0}
 SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6}
-LARGEST = 300.0
-"""bar; no brake of a road vehicle holds more, by air some 10 and by fluid 200."""
 FASTEST = 150.0
 """m/s; no wheel of a road vehicle turns faster."""
 
@@ -70,7 +68,7 @@ def read_pressures(path: str | Path, wheels: int, period: float = SAMPLE) -> Mea
     table = read_table(path, columns, increasing="time", least=2)
     if table["time"][0] != 0.0:
         raise InputError(path, "time", float(table["time"][0]), "must begin at 0, when the brake is applied")
-    pressures = _within(path, table, "pressure", names, LARGEST, "bar above the air's")
+    pressures = _within(path, table, "pressure", names, LARGEST_PRESSURE, "bar above the air's")
     speeds = _within(path, table, "speed", names, FASTEST, "m/s") if measured else None
     return MeasuredPressures(table["time"], pressures, speeds, period)
 

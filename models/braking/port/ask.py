@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.braking.controller import Command, Controller, Sample
+from models.braking.controller import LARGEST_PRESSURE, Command, Controller, Sample
 from models.braking.pressure import APPLY, HOLD, RELEASE
 from models.errors import RunFailed
 
 NAMES = ("crash", "silence", "wrong length", "wrong frame", "wrong number", "not a number", "no state of a valve",
-         "below zero")  # fmt: skip
+         "below zero", "too high")  # fmt: skip
 """What a controller can do wrong: it raised, died or closed; did not answer in time; answered with too little or too
 much; what is no answer frame; to another sample; with what is no finite number; with a valve in none of
--1, 0, 1; with a pressure below none."""
+-1, 0, 1; with a pressure below none, or above what any brake holds."""
 
 STATES = frozenset((RELEASE, HOLD, APPLY))
 
@@ -62,6 +62,8 @@ def checked(command: Command, given: Sample) -> Command:
             raise ControllerFailed(given, "not a number", f"{value:g} for a wheel")
         if command.pressures is not None and value < 0.0:
             raise ControllerFailed(given, "below zero", f"a pressure of {value:g} bar")
+        if command.pressures is not None and value > LARGEST_PRESSURE:
+            raise ControllerFailed(given, "too high", f"a pressure of {value:g} bar, above {LARGEST_PRESSURE:g} bar")
         if command.valves is not None and value not in STATES:
             raise ControllerFailed(given, "no state of a valve", f"{value:g} is none of -1, 0, 1")
     return Command(pressures=values) if command.valves is None else Command(valves=values.astype(np.int64))
