@@ -1,6 +1,7 @@
 """One figure for each finding of the checks of a recording: what an engineer looks at before he believes it."""
 
 from pathlib import Path
+from textwrap import shorten
 
 import numpy as np
 
@@ -15,6 +16,8 @@ AROUND, LONGEST, MOST = 0.6, 15.0, 20_000
 """s drawn beside a marked time; s drawn where none is marked; samples drawn at the most."""
 SHOWN = 4
 """Signals drawn at the most."""
+TITLE = 60
+"""Letters of a place in a title."""
 LOUD, QUIET, MARK = "#d55e00", "#222222", "#f0e442"
 
 
@@ -64,7 +67,8 @@ def _times(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], pa
         if finding.check == "clipped" and marked:
             axis.axhline(float(own.columns.read(signal.name, round(marked[0] / own.period), 1)[0]), color=LOUD, ls="--")
     axes[-1, 0].set_xlabel("time [s]" + ("; yellow: what is meant" if marked else ""))
-    drawn.suptitle(f"{finding.place or 'Recording'}: as recorded", x=0.01, ha="left", fontweight="bold")
+    place = shorten(finding.place or "Recording", TITLE, placeholder=" ...")
+    drawn.suptitle(f"{place}: as recorded", x=0.01, ha="left", fontweight="bold")
     return save(drawn, path)
 
 
