@@ -23,7 +23,7 @@ def at(tables, number, angle, load, slip):
     j, q = place(tables.loads, load)
     k, w = place(tables.slips, slip)
     mu = [along(number, i, p, j, q, node, tables.mu_x) for node in (k, min(k + 1, tables.slips.size - 1))]
-    return (1 - w) * mu[0] + w * mu[1], across(number, angle, load, slip, *tables.packed[:3], *tables.packed[4:])
+    return (1 - w) * mu[0] + w * mu[1], across(number, i, p, j, q, k, w, tables.g, tables.h)
 
 
 def test_exact_at_nodes_linear_between_constant_beyond():
