@@ -1,5 +1,6 @@
 """What the readers of all formats share: channels chosen by name, blocks cut and checked, one kind of error."""
 
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -31,7 +32,7 @@ class Spans:
 
 
 @dataclass(frozen=True)
-class Opened:
+class Opened(ABC):
     """A file whose channels are known; its samples are read when asked for, and no handle stays open between."""
 
     path: Path
@@ -46,9 +47,9 @@ class Opened:
         count = self.channels[chosen[0]].count
         return self._checked(chosen, Spans(first, count, length))
 
+    @abstractmethod
     def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times (n,) in s and values (n, chosen) of each span, by the format; fewer where the file ends."""
-        raise NotImplementedError
 
     def _chosen(self, names: Sequence[str]) -> list[int]:
         """Indices of channels, which must be of one group."""
