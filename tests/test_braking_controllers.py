@@ -14,7 +14,7 @@ from models.braking.frozen import Frozen, limit_cycle
 from models.braking.magic_formula import surface
 from models.braking.speed_estimate import SpeedEstimate
 from models.errors import InputError, RunFailed
-from validation.five_phase_exact import Wheel, cycle
+from validation.braking.five_phase_exact import Wheel, cycle
 
 PHASES = FivePhase(1, e1=20.0, e2=30.0, e3=20.0, e4=2.0, e5=60.0, falling=60.0, fast=40.0, slow=8.0)
 LINE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)

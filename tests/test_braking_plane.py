@@ -10,7 +10,7 @@ from models.braking.trailer import CHOSEN, follow, hooked
 from models.braking.tyre_table import Tables, TyreTable, stacked
 from models.braking.written import turned
 from models.engines.braking import Carried
-from validation.braked_truck import ICE, braked, constant, sideways_with_locked_front_wheels, transfer_errors
+from validation.braking.braked_truck import ICE, braked, constant, sideways_with_locked_front_wheels, transfer_errors
 
 LOCKING = np.full(4, 1e5)
 

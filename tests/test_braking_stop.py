@@ -8,7 +8,7 @@ from models.braking.relaxation import by_lagging_steps
 from models.braking.samples import by_steps
 from models.braking.tyre_table import TyreTable, stacked
 from models.errors import InputError
-from validation.braking_schemes import LITERAL, exact, stopped
+from validation.braking.braking_schemes import LITERAL, exact, stopped
 from validation.cases import braking_stop as case
 
 

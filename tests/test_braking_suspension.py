@@ -13,7 +13,7 @@ from models.braking.sprung import PITCH, ROLL, sprung
 from models.braking.stop_report import Stop
 from models.errors import InputError, Refused, RunFailed
 from models.vehicles.vehicle_file import load_vehicle
-from validation.sprung_box import LOCKS, Torques, box, braked, car, constant, pitch_and_transfer, stays
+from validation.braking.sprung_box import LOCKS, Torques, box, braked, car, constant, pitch_and_transfer, stays
 
 TORQUES = Torques(600.0, 600.0, 200.0, 200.0)
 

@@ -20,7 +20,7 @@ from models.table_stream import blocks
 from models.tables import NEWTONS, SHARES, read_table
 from studies.contact_table import told
 from validation.cases import contact_price
-from validation.contact_set import FRICTION, JUDGED, LOAD, read, read_drawn
+from validation.contact.contact_set import FRICTION, JUDGED, LOAD, read, read_drawn
 
 CASES = "a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [-],spin [1/mm]\n"
 ROW = "5,4,80,0.3,0.1,-2e-4,4e-4\n"

@@ -16,8 +16,8 @@ from models.handling.tyre import SLOW, brush
 from models.vehicles.free_vehicle import SWAY, free_vehicle
 from models.vehicles.spatial_linear import mass
 from models.vehicles.vehicle_file import load_vehicle
-from validation.load_transfer import turning, turning_error
-from validation.sprung_box import box
+from validation.braking.load_transfer import turning, turning_error
+from validation.braking.sprung_box import box
 
 LOAD, MU, A, B, K = 3000.0, 0.8, 0.08, 0.09, 4e7
 R19 = load_vehicle("r19_free")

@@ -6,8 +6,8 @@ import pytest
 from models.noise import GYRO, normal
 from models.sensors import inertial_unit as unit
 from models.sensors.rotations import exponential, logarithm, matrix
-from validation import recording
 from validation.cases.inertial_unit import START, cone, measure, turning
+from validation.measured import recording
 
 
 def test_every_row_of_the_case_passes(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from models.errors import RunFailed
 from models.rail.contact_table import Contact, benchmark_side
-from validation.manchester_references import searched
+from validation.contact.manchester_references import searched
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 

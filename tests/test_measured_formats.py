@@ -12,10 +12,10 @@ from models.measured.formats import mdf4, open_source, tdms, write
 from models.measured.formats.opened import Opened
 from models.measured.formats.writing import Group
 from validation.cases import measured_formats as case
-from validation.measured_files import csv as csv_files
-from validation.measured_files import mdf4 as mdf4_files
-from validation.measured_files import tdms as tdms_files
-from validation.measured_files.odd import FX, FZ, TIMES, Sweep, read, usual, written
+from validation.measured.measured_files import csv as csv_files
+from validation.measured.measured_files import mdf4 as mdf4_files
+from validation.measured.measured_files import tdms as tdms_files
+from validation.measured.measured_files.odd import FX, FZ, TIMES, Sweep, read, usual, written
 
 EXTENSIONS = (".csv", ".mf4", ".rsp", ".tdms")
 

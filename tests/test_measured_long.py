@@ -26,7 +26,7 @@ from models.rainflow_cycles import cycles
 from models.signals import Sampled
 from validation.cases import measured_long as case
 from validation.cases.hub_forces import r19
-from validation.long_recording import answers_of, killed, pattern, recorded, run_of
+from validation.measured.long_recording import answers_of, killed, pattern, recorded, run_of
 
 SECONDS = 0.2
 
@@ -259,7 +259,7 @@ def test_an_hour_at_1_khz_in_less_than_2_gb_killed_and_gone_on_to_the_same_bits(
         if times:
             killed(folder, 3600.0, 20.0, 60.0, times, lasting=60.0)
         else:
-            command = [sys.executable, "-m", "validation.long_recording", str(folder), "3600", "20", "60"]
+            command = [sys.executable, "-m", "validation.measured.long_recording", str(folder), "3600", "20", "60"]
             told = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
             assert len(told) == 61 and float(told[-1].split()[1]) < 2e9
         bits.append(np.memmap(folder / "run" / "run.f64", np.int64, "r"))

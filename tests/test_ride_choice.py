@@ -16,7 +16,7 @@ from models.ride.excitation import excited
 from models.ride.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.drawn_rides import drawn
+from validation.ride.drawn_rides import drawn
 
 SPEED = 20.0
 

@@ -9,7 +9,7 @@ from models.sensors.high_pass import high_pass
 from models.sensors.rate_filter import filter_rates
 from models.sensors.rotations import from_cardan, matrix
 from models.sensors.sensor_array import sensor_array
-from validation.spatial_motion import ARRAYS, PATH, readings, tilted
+from validation.spatial.spatial_motion import ARRAYS, PATH, readings, tilted
 
 RANDOM = np.random.default_rng(8)
 

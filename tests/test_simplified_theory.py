@@ -15,7 +15,7 @@ from models.contact.simplified_theory import PAPER, Options, press, roll
 from models.contact.undeformed_distance import Distance, from_arrays, from_function, quadratic
 from models.errors import InputError
 from validation.cases.contact_simplified import _largest_jump
-from validation.contact_shapes import Shape, exact_normal
+from validation.contact.contact_shapes import Shape, exact_normal
 
 PAIR = Pair()
 A = 1.0 / 0.92

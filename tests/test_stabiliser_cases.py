@@ -7,9 +7,9 @@ import pytest
 
 from models.engines import exudyn, mujoco, reference
 from models.errors import RunFailed
-from validation import index_reduction
 from validation.cases import index_reduction as index_case
 from validation.cases import stabilisers as case
+from validation.drift import index_reduction
 from validation.hard_cases import stabilisers as hard
 from validation.hard_cases.case import judge
 

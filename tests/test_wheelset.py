@@ -24,7 +24,7 @@ from models.rail.limit_cycle import attained
 from models.rail.linear import _gravity, critical_speed, growth, kinematic_wavelength, klingel, matrices
 from models.rail.orbit import refined
 from models.rail.wheelset import CHOSEN
-from validation.manchester_references import CONTACT, sums
+from validation.contact.manchester_references import CONTACT, sums
 
 SPRINGS = {f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"}
 FREE = CHOSEN.changed(**SPRINGS)

@@ -100,7 +100,7 @@ def _broken(name: str, error: BaseException) -> Row:
 def seeds() -> dict[str, int]:
     """Every seed that the rows depend on; with them and the versions all counts and states repeat exactly."""
     from studies.six_runs import Options
-    from validation import checks, contact_set, fitted_roads, long_recording, timing
+    from validation import checks, timing
     from validation.cases import (
         braking_controllers,
         contact_price,
@@ -129,7 +129,10 @@ def seeds() -> dict[str, int]:
         stabilisers,
         wheelset,
     )
+    from validation.contact import contact_set
+    from validation.measured import long_recording
     from validation.price.own_scene import unseen
+    from validation.ride import fitted_roads
 
     return {"random states": checks.SEED, "class C road": roads.SEED, "six runs": Options.model_fields["seed"].default,
             "order of timing": timing.SEED, "point mass": point_mass.SEED,

@@ -21,9 +21,9 @@ from models.braking.run import Braked
 from models.braking.run import Path as Recorded
 from models.braking.surfaces import Stretch, road
 from models.braking.tyre_table import stacked
-from validation.five_phase_exact import Wheel, cycle
+from validation.braking.five_phase_exact import Wheel, cycle
+from validation.braking.sampled_quarter import own_distance, reference_distance
 from validation.rows import Row, System, Table, at_most, behaves, finding
-from validation.sampled_quarter import own_distance, reference_distance
 
 TITLE = "Brakes and controllers of anti-lock braking"
 SYSTEM: System = "anti-lock"

@@ -19,7 +19,7 @@ from models.braking.trailer import CHOSEN, follow, hooked
 from models.braking.tyre_table import Tables, TyreTable, stacked
 from models.braking.written import Turned, turned
 from models.engines.braking import Carried
-from validation.braked_truck import ICE, sideways_with_locked_front_wheels, transfer_errors
+from validation.braking.braked_truck import ICE, sideways_with_locked_front_wheels, transfer_errors
 from validation.rows import Row, System, Table, at_most, finding
 
 TITLE = "Braking in a turn, in engines and with a trailer"

@@ -23,7 +23,7 @@ from models.braking.port.setup import PortTable, Run, opened
 from models.braking.procedures import drive
 from models.braking.run import Path as Driven
 from models.braking.scene import build
-from validation import misbehaving_client
+from validation.braking import misbehaving_client
 from validation.rows import Row, System, Table, at_most, behaves, finding, not_run
 
 TITLE = "The controller port: same bits on every way, and controllers that fail"

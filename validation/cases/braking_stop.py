@@ -13,7 +13,7 @@ from models.braking.plane_vehicle import GRAVITY
 from models.braking.quarter import PLACE, SPEED, TURNING, Quarter, Stop, braked
 from models.braking.surfaces import Stretch, road
 from models.braking.tyre_table import Tables, TyreTable, stacked
-from validation.braking_schemes import PATIENCE, SCHEMES, exact, stopped
+from validation.braking.braking_schemes import PATIENCE, SCHEMES, exact, stopped
 from validation.rows import Row, System, Table, at_most, finding, within
 
 TITLE = "Braking to a stop"

@@ -17,8 +17,8 @@ from models.braking.run import Path as Run
 from models.braking.sprung import PITCH, Sprung
 from models.braking.stop_report import Stop
 from models.braking.tyre_table import TyreTable
+from validation.braking.sprung_box import LOCKS, Torques, box, braked, car, constant, pitch_and_transfer, stays
 from validation.rows import Row, System, Table, at_most, finding, within
-from validation.sprung_box import LOCKS, Torques, box, braked, car, constant, pitch_and_transfer, stays
 
 TITLE = "Braking on the suspension"
 SYSTEM: System = "anti-lock"

@@ -15,7 +15,7 @@ from models.ride.frequency import spectra
 from models.ride.of_scene import vehicle_of
 from models.systems import load
 from studies.asked import SCENES
-from validation.drawn_rides import Drawn, drawn
+from validation.ride.drawn_rides import Drawn, drawn
 from validation.rows import Row, System, Table, at_most, behaves, finding, within
 
 TITLE = "Effects that a ride scene calls for, chosen with a certificate"

@@ -20,7 +20,7 @@ from models.engines.contact_bridge import FREEDOMS, SUNK, YAW, Theory, Wheels, X
 from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law, python_law
 from models.engines.mujoco_callback import installed
-from validation import slow_wheels
+from validation.contact import slow_wheels
 from validation.rows import Row, System, Table, at_most, behaves
 from validation.timing import interleave, interval, resamples
 
@@ -288,6 +288,6 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Cost per step over the law, and shares of engine, kernel and bridge."""
     if "points" not in data:
         return []
-    from validation.contact_bridges_figure import figure
+    from validation.contact.contact_bridges_figure import figure
 
     return [("Contact kernels inside the engines: cost per step by law, and its shares", figure(data["points"]))]

@@ -14,9 +14,9 @@ from models.contact.scene import Method
 from models.contact.theories import Fastsim
 from models.contact.work_precision import WAYS, Case, Point, cheapest_lines, duration, exact
 from models.contact.work_precision import measure as price
-from validation.contact_bands import FASTSIM, SHARE, held, kept
-from validation.contact_set import FRICTION, JUDGED, LOAD, PAIR, read, read_drawn
-from validation.programs import compare, table
+from validation.contact.contact_bands import FASTSIM, SHARE, held, kept
+from validation.contact.contact_set import FRICTION, JUDGED, LOAD, PAIR, read, read_drawn
+from validation.contact.programs import compare, table
 from validation.rows import Row, System, Table, at_most, finding
 
 TITLE = "What accuracy costs in rolling contact"

@@ -14,7 +14,7 @@ from models.contact.simplified_theory import press
 from models.contact.standard_profiles import s1002, uic60
 from models.contact.wheel_on_rail import Track, wheel_on_rail
 from models.errors import InputError
-from validation.contact_shapes import Shape, exact_normal
+from validation.contact.contact_shapes import Shape, exact_normal
 from validation.rows import Row, System, Table, at_most, finding, not_run, within
 from validation.scenes import data_folder
 

@@ -15,7 +15,7 @@ from models.contact.hertz import by_load
 from models.contact.patches import Patch, separate
 from models.contact.simplified_theory import PAPER, PLAIN, NormalContact, Options, load_at_depth, press, roll
 from models.contact.undeformed_distance import quadratic
-from validation.contact_shapes import (
+from validation.contact.contact_shapes import (
     CURVATURE,
     FRICTION,
     PAIR,

@@ -15,10 +15,10 @@ from models.contact.material import Pair
 from models.contact.normal_problem import Pressed, centres
 from models.contact.rolling_problem import solve_rolling
 from models.errors import RunFailed
-from validation.contact_bands import held
-from validation.contact_set import JUDGED, read_drawn
-from validation.fastsim_speed import speed
-from validation.fuzzed_creepage import OPTIONS, ROUNDING, contacts, worst
+from validation.contact.contact_bands import held
+from validation.contact.contact_set import JUDGED, read_drawn
+from validation.contact.fastsim_speed import speed
+from validation.contact.fuzzed_creepage import OPTIONS, ROUNDING, contacts, worst
 from validation.rows import Row, System, Table, at_most, not_run
 
 TITLE = "FASTSIM"

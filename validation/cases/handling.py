@@ -19,9 +19,9 @@ from models.handling.road import plane_waves
 from models.handling.single_track import steady_turn
 from models.handling.tyre import FIRST, brush, net, tyre_forces
 from models.vehicles.vehicle_file import load_vehicle
-from validation.load_transfer import braked_error, sliding, turning, turning_error
+from validation.braking.load_transfer import braked_error, sliding, turning, turning_error
+from validation.braking.sprung_box import box
 from validation.rows import Row, System, Table, at_most, behaves, finding
-from validation.sprung_box import box
 from validation.timing import interleave
 
 TITLE = "A car on four rolling tyres"

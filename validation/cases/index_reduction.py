@@ -13,8 +13,8 @@ from models.noise import normal
 from models.scene import Scene
 from models.simulate import simulate
 from models.time_series import write_time_series
+from validation.drift.index_reduction import IndexOne, gap_law
 from validation.hard_cases.prescribed_pitch import AsItComes
-from validation.index_reduction import IndexOne, gap_law
 from validation.rows import Row, System, at_most, behaves, finding, not_run
 from validation.scenes import force_scene, road_scene, write_forces
 

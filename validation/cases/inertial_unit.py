@@ -16,8 +16,8 @@ from models.simulate import simulate
 from models.time_series import write_time_series
 from studies.virtual_measurement import follower, write_measurement
 from studies.virtual_measurement import measure as measure_road
-from validation import recording
 from validation.bands import mean_square
+from validation.measured import recording
 from validation.rows import Row, System, Table, at_most, finding, not_run, within
 from validation.scenes import road_scene
 

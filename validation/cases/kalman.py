@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from models.drift.pitch_filter import PITCH, RATE
 from models.section_forces import CHANNELS
-from validation import kalman_runs as runs
+from validation.drift import kalman_runs as runs
 from validation.rows import Row, System, Table, at_most, behaves, finding, within
 
 TITLE = "The Kalman filter of the pitch"

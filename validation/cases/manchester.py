@@ -10,7 +10,7 @@ from models.contact.profile_files import read_profile
 from models.contact.wheel_on_rail import Side, Track, Wheelset, laid
 from models.rail.contact_table import BENCHMARK_FRICTION, BENCHMARK_LOAD, BENCHMARK_YAW, Contact, Placed, benchmark_side
 from validation.cases.contact_profiles import RAIL_FILE, WHEEL_FILE
-from validation.manchester_references import CONTACT, apart, on_one_plane, searched, sums
+from validation.contact.manchester_references import CONTACT, apart, on_one_plane, searched, sums
 from validation.rows import Row, System, Table, at_most, finding, not_run, within
 from validation.scenes import data_folder
 

@@ -18,9 +18,9 @@ from models.measured.finding import Finding
 from models.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
-from validation import measured_car
-from validation import recording as car
 from validation.cases.hub_forces import r19, twin
+from validation.measured import measured_car
+from validation.measured import recording as car
 from validation.rows import Row, System, Table, behaves, finding, not_run, within
 
 TITLE = "Checks of a recording"

@@ -16,8 +16,8 @@ from models.measured.channel import Source
 from models.measured.formats import open_source, write
 from models.measured.formats.writing import Group
 from models.noise import normal
-from validation.measured_files.odd import read
-from validation.measured_files.own_libraries import LIBRARIES
+from validation.measured.measured_files.odd import read
+from validation.measured.measured_files.own_libraries import LIBRARIES
 from validation.rows import Row, System, Table, at_most, behaves, finding, not_run
 
 TITLE = "Measurement files"

@@ -17,9 +17,9 @@ from models.measured.section_run import Hold, run
 from models.measured.sections import Sections, guided
 from models.rainflow_cycles import cycles
 from validation.cases.hub_forces import _anywhere, _shaken, twin
-from validation.joint_forces import exudyn_guides, mujoco_guides
-from validation.long_recording import SEED, answers_of, killed, run_of
+from validation.measured.long_recording import SEED, answers_of, killed, run_of
 from validation.rows import Row, System, Table, at_most, behaves, finding, within
+from validation.spatial.joint_forces import exudyn_guides, mujoco_guides
 
 TITLE = "Long recordings, section forces, what is handed on"
 SYSTEM: System = "measured"
@@ -132,7 +132,8 @@ def _killed(folder: Path) -> Row:
 def _memory(folder: Path) -> list[Row]:
     """Memory that a longer recording takes, and what an hour of it would; how fast it goes."""
     run_of(folder, 50.0, REPEATED)
-    command = [sys.executable, "-m", "validation.long_recording", str(folder), "50", str(REPEATED), "5", "2e-3"]
+    command = [sys.executable, "-m", "validation.measured.long_recording", str(folder), "50", str(REPEATED), "5",
+               "2e-3"]  # fmt: skip
     told = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
     lines = np.array([line.split() for line in told], float)  # of every block: seconds, memory, processor
     half, last = lines[len(lines) // 2], lines[-1]

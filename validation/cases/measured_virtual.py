@@ -33,7 +33,7 @@ from models.measured.virtual import VirtualMeasurement, VirtualTable, map_lines,
 from models.strict import read
 from models.systems import load
 from models.vehicles.vehicle_file import SHIPPED, load_vehicle
-from validation import recording as moving_car
+from validation.measured import recording as moving_car
 from validation.rows import Row, System, Table, at_most, behaves, finding, not_run, within
 
 TITLE = "Measurement files against the truth"

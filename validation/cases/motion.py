@@ -27,7 +27,7 @@ from models.simulate import outputs
 from validation.bands import mean_square
 from validation.hard_cases.case import IMPLEMENTATIONS
 from validation.rows import Row, System, Table, at_most, behaves, within
-from validation.spatial_motion import ARRAYS, PATH, readings, tilted
+from validation.spatial.spatial_motion import ARRAYS, PATH, readings, tilted
 
 TITLE = "Motion from accelerometers"
 SYSTEM: System = "drift"

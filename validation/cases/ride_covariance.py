@@ -24,8 +24,8 @@ from models.road.two_track import CASES, TwoTrackRoad, excitation, half_track, i
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.ride_corners import corners
-from validation.ride_twins import twin
+from validation.ride.ride_corners import corners
+from validation.ride.ride_twins import twin
 from validation.rows import Row, System, Table, at_most, behaves, finding, within
 
 TITLE = "Ride: stationary covariance with exact delays"

@@ -17,8 +17,8 @@ from models.vehicles.curve import Curve
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation import spatial_twin
 from validation.rows import Row, System, Table, at_most, behaves, finding
+from validation.spatial import spatial_twin
 
 TITLE = "Vehicles in space: both engines, the analytic matrices and equations written by hand"
 SYSTEM: System = "ride"

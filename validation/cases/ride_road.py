@@ -18,8 +18,8 @@ from models.road.isotropic import IsotropicRoad, Part, cross_spectrum_of, isotro
 from models.road.two_track import CASES, LEVEL, TwoTrackRoad, excitation, input_covariance, road_of_level
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.fitted_roads import HALF_TRACK, fits_table, made, measured
-from validation.road_figure import coherency_figure
+from validation.ride.fitted_roads import HALF_TRACK, fits_table, made, measured
+from validation.ride.road_figure import coherency_figure
 from validation.rows import REPORTED, Row, System, Table, at_most, finding
 
 TITLE = "Ride: roads under two tracks"

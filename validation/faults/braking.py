@@ -17,7 +17,7 @@ from models.braking.plane_step import FORCE_X, FORCE_Y, LOAD, REPORTED
 from models.braking.plane_vehicle import GRAVITY, PAPER, Plane
 from models.braking.port import sensors
 from models.braking.surfaces import Stretch, road
-from validation.braking_schemes import LITERAL, stopped
+from validation.braking.braking_schemes import LITERAL, stopped
 from validation.cases import braking_stop as stops
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute

@@ -26,7 +26,7 @@ from models.braking.trailer import CHOSEN, train
 from models.braking.tyre_table import Tables, TyreTable, stacked
 from models.engines.braking import Carried
 from models.errors import InputError, RunFailed
-from validation.braking_schemes import exact
+from validation.braking.braking_schemes import exact
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 
 STEP, SPEED = 5.5e-3, 10.0

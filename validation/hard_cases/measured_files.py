@@ -8,8 +8,8 @@ import numpy as np
 from models.measured.formats.mdf4 import opened as mdf4_opened
 from models.measured.formats.tdms import Bounded, opened
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
-from validation.measured_files import csv, mdf4, rpc3, tdms
-from validation.measured_files.odd import FX, FZ, TOLERANCE, Odd, Sweep, cut
+from validation.measured.measured_files import csv, mdf4, rpc3, tdms
+from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, Odd, Sweep, cut
 
 CHECKS = {
     "right": "times, values and names as they were written",

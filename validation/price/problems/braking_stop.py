@@ -26,9 +26,9 @@ from models.braking.surfaces import Stretch, road
 from models.braking.tyre_table import stacked
 from models.compiled import njit
 from models.errors import RunFailed
-from validation.braking_schemes import advanced
+from validation.braking.braking_schemes import advanced
+from validation.braking.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
 from validation.price.problems import Setting
-from validation.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
 
 VEHICLE = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
 """A front wheel of the paper's truck under what it bears while braking."""

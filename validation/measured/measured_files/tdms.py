@@ -10,8 +10,20 @@ import numpy as np
 
 from models.measured.formats.write_tdms import write_tdms
 from models.measured.formats.writing import Group
-from validation.measured_files.csv import BACK, MANY, WIDE, raw
-from validation.measured_files.odd import COUNT, FX, FZ, PERIOD, TIMES, Odd, Truth, cut, patched, usual, written
+from validation.measured.measured_files.csv import BACK, MANY, WIDE, raw
+from validation.measured.measured_files.odd import (
+    COUNT,
+    FX,
+    FZ,
+    PERIOD,
+    TIMES,
+    Odd,
+    Truth,
+    cut,
+    patched,
+    usual,
+    written,
+)
 
 LEAD = 28
 """Bytes that lead in a segment."""

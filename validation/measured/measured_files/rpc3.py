@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from validation.measured_files.csv import raw
-from validation.measured_files.odd import COUNT, FX, FZ, PERIOD, TIMES, Odd, cut, usual, written
+from validation.measured.measured_files.csv import raw
+from validation.measured.measured_files.odd import COUNT, FX, FZ, PERIOD, TIMES, Odd, cut, usual, written
 
 KEY, RECORD, BLOCK, POINTS = 32, 128, 512, 2048
 

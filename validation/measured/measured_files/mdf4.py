@@ -10,8 +10,8 @@ import numpy as np
 
 from models.measured.formats.mdf4 import unheard
 from models.measured.formats.writing import Group
-from validation.measured_files.csv import BACK, MANY, WIDE, raw
-from validation.measured_files.odd import COUNT, FX, FZ, PERIOD, TIMES, Odd, Truth, patched, usual, written
+from validation.measured.measured_files.csv import BACK, MANY, WIDE, raw
+from validation.measured.measured_files.odd import COUNT, FX, FZ, PERIOD, TIMES, Odd, Truth, patched, usual, written
 
 DATA = 24
 """Bytes of a block before its links."""

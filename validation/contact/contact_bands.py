@@ -2,7 +2,7 @@
 
 Those contacts are the set and one of the two parts of the drawn ones; the other part judges.
 
-``python -m validation.contact_bands`` prints what ``models.contact.accuracy`` keeps.
+``python -m validation.contact.contact_bands`` prints what ``models.contact.accuracy`` keeps.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from models.contact.hertz import by_axes
 from models.contact.of_scene import interpenetrating
 from models.contact.theories import Simplified
 from models.contact.work_precision import Case
-from validation.contact_set import FITTED, FRICTION, LOAD, PAIR, read, read_drawn
+from validation.contact.contact_set import FITTED, FRICTION, LOAD, PAIR, read, read_drawn
 
 CELLS = 101
 """In each strip of FASTSIM: its own error is then below 0.05 % of mu N."""

@@ -12,7 +12,7 @@ from models.ride.covariance import FINITE, stationary
 from models.ride.scene import RideScene, build
 from models.vehicles.spatial import Body, PointOutput, SpatialVehicle, SpringDamper
 from models.vehicles.vehicle_file import load_vehicle
-from validation.ride_twins import twin
+from validation.ride.ride_twins import twin
 
 VEHICLES = ("quarter_car", "half_car", "half_car", "seven_freedoms")
 

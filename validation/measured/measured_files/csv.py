@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from validation.measured_files.odd import COUNT, FX, FZ, TIMES, Odd, cut, usual, written
+from validation.measured.measured_files.odd import COUNT, FX, FZ, TIMES, Odd, cut, usual, written
 
 HEADER = "time [s],Fz [N],Fx [N]"
 

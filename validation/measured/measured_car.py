@@ -1,4 +1,4 @@
-"""The moving car of ``validation.recording`` as an engineer's recording: accelerometers, gyros, roll and pitch."""
+"""The moving car of ``validation.measured.recording`` as an engineer's recording: accelerometers, gyros, angles."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from models.measured.columns import Columns
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
 from models.sensors.rotations import matrix
-from validation import recording as car
+from validation.measured import recording as car
 
 CHANNELS: tuple[tuple[str, Quantity, str], ...] = (
     ("ax", "acceleration", "x"), ("ay", "acceleration", "y"), ("az", "acceleration", "z"),

@@ -95,7 +95,8 @@ def killed(folder: Path, seconds: float, repeated: float, block: float, times: i
     Moments are drawn from the ``lasting`` s after the first line of progress.
     """
     rng, kills, runs = np.random.default_rng(SEED), 0, 0
-    command = [sys.executable, "-m", "validation.long_recording", str(folder), str(seconds), str(repeated), str(block)]
+    command = [sys.executable, "-m", "validation.measured.long_recording", str(folder), str(seconds), str(repeated),
+               str(block)]  # fmt: skip
     while True:
         runs += 1
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:

@@ -1,0 +1,1 @@
+"""Vehicles, exact stops and other schemes that cases and tests of braking share."""

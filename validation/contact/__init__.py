@@ -1,0 +1,1 @@
+"""Sets of contacts, exact answers and bounds that cases and tests of rolling contact share."""

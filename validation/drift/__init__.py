@@ -1,0 +1,1 @@
+"""Experiments that cases and tests of drift share."""

@@ -1,0 +1,1 @@
+"""Recordings and measurement files that cases and tests of measured vehicles share."""

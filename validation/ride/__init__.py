@@ -1,0 +1,1 @@
+"""Vehicles and roads that cases and tests of ride share."""

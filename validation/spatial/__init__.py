@@ -1,0 +1,1 @@
+"""Vehicles and motions in space that several systems are tested on."""
