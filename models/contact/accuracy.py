@@ -5,7 +5,8 @@ Cells
     the ratio of the cells to the power p, which tells how much of it is left.
 Theory
     On converged cells the theories were held against the exact one, on 820 contacts of
-    ``validation.contact.contact_set``: ellipses of a/b from 0.2 to 5, creepage and spin of 0.05 to 10 times what the linear theory takes to reach mu N, of
+    ``validation.contact.contact_set``: ellipses of a/b from 0.2 to 5,
+    creepage and spin of 0.05 to 10 times what the linear theory takes to reach mu N, of
     thirteen kinds and in 300 directions drawn at random, nu = 0.28. ``BANDS`` and ``MOMENT_BANDS`` keep what 95 % of
     contacts keep to that are drawn anew, and the validation case ``contact_price`` tells whether they still do. The
     theory of 1983 was so measured on the same ellipses; other shapes are outside of what its band was measured on.

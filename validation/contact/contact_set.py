@@ -4,7 +4,8 @@ The set: five ellipses, thirteen kinds of creepage and eight sizes of it. Drawn 
 at random, in two parts, of which one goes into the bands of error that are stated and the other one judges them. Forces
 are kept as shares of mu N and of mu N sqrt(ab), so that they hold for every load, size and friction of the same ellipse
 and Poisson's ratio. ``contact_set.csv`` and ``contact_drawn.csv`` hold them:
-``python -m validation.contact.contact_set`` computes both anew in half an hour, and every report does so for a few rows.
+``python -m validation.contact.contact_set`` computes both anew in half an hour, and every report
+does so for a few rows.
 """
 
 import csv
