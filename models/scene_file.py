@@ -103,11 +103,19 @@ def _apply(table: dict[str, Any], change: str) -> None:
     *parents, last = key.split(".")
     if not equals or not all((*parents, last)):
         raise InputError("--set", "", change, "must read KEY=VALUE, for example run.step=5e-4")
+    at: Any = table
     for i, parent in enumerate(parents):
-        table = table.setdefault(parent, {})
-        if not isinstance(table, dict):
+        at = at.setdefault(parent, {}) if isinstance(at, dict) else at[_entry(at, parent, key, text)]
+        if not isinstance(at, dict | list):
             raise InputError("--set", key, text, f"{'.'.join(parents[: i + 1])} is a value, not a table of keys")
-    table[last] = _value(text)
+    at[last if isinstance(at, dict) else _entry(at, last, key, text)] = _value(text)
+
+
+def _entry(listed: list[Any], number: str, key: str, text: str) -> int:
+    """Place in a list, counted from 0 as in messages."""
+    if not (number.isdecimal() and int(number) < len(listed)):
+        raise InputError("--set", key, text, f"a list of {len(listed)} has no entry {number!r}: they count from 0")
+    return int(number)
 
 
 def _value(text: str) -> Any:

@@ -6,12 +6,12 @@ an ensemble whose path i is point i: the records of finished points lie in ``poi
 """
 
 import csv
-import hashlib
 import io
 import json
 import os
 import re
 import shutil
+import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from models.ensemble.named_files import named_files
 from models.ensemble.runner import Progress as Done
 from models.ensemble.runner import run_paths
 from models.ensemble.store import Arrays, code, locked, write_whole
@@ -56,7 +57,7 @@ class Points:
 
     def ready(self, i: int) -> tuple[Any, tuple[str, ...], Any]:
         """Scene, engines and study of a point; InputError if it cannot be run."""
-        scene = load_scene(self.scene, [*self.changes, f"{self.key}={json.dumps(self.values[i])}"])
+        scene = load_scene(self.scene, [*self.changes, f"{self.key}={_written(self.values[i])}"])
         engine = self.engine or getattr(getattr(scene, "run", None), "engine", None)
         engines = engines_of(engine, scene.system)
         return scene, engines, ready(scene, engines)
@@ -87,7 +88,8 @@ class Points:
         path = scene_path(self.scene)
         table = changed(path, self.changes)
         return {"sweep": self.key, "values": list(self.values), "engine": self.engine, "scene": table,
-                "files": dict(_files(table, path.parent)), "code of studies": code(Path(__file__).parent)}  # fmt: skip
+                "files": named_files([table, self.values, self.engine], path.parent),
+                "code of studies": code(Path(__file__).parent)}  # fmt: skip
 
 
 def _array(records: list[Record]) -> Arrays:
@@ -96,18 +98,6 @@ def _array(records: list[Record]) -> Arrays:
 
 def _failed(reason: str) -> Record:
     return {"numbers": {}, "failed": {"": reason}}
-
-
-def _files(value: Any, folder: Path) -> Iterator[tuple[str, str]]:
-    """Files that a table names anywhere, beside the scene or where the command runs, with their checksums."""
-    if isinstance(value, dict | list):
-        for inner in value.values() if isinstance(value, dict) else value:
-            yield from _files(inner, folder)
-    elif isinstance(value, str) and value:
-        for path in (folder / value, Path(value)):
-            if os.path.isfile(path):
-                yield value, hashlib.sha256(path.read_bytes()).hexdigest()[:16]
-                return
 
 
 @contextmanager
@@ -133,9 +123,13 @@ def asked(text: str) -> tuple[str, tuple[Any, ...]]:
         raise InputError("--sweep", "", text, "must read KEY=FROM:TO:N or KEY=a,b,c, for example run.step=1e-4,2e-4")
     found = _RANGE.fullmatch(rest)
     values = _spaced(text, *found.groups()) if found else _listed(rest)
+    for value in values:
+        if not _writable(value):
+            allowed = "must be a finite number, a text, true, false or a list of these"
+            raise InputError("--sweep", key, str(value), allowed)
     if not 2 <= len(values) <= MOST:
         raise InputError("--sweep", key, rest, f"gives {len(values)} value(s): 2 to {MOST:,} make a sweep")
-    if len({json.dumps(value) for value in values}) < len(values):
+    if len(set(map(_written, values))) < len(values):
         raise InputError("--sweep", key, rest, "gives a value twice")
     return key, values
 
@@ -155,12 +149,23 @@ def _spaced(text: str, first: str, last: str, count: str) -> tuple[Any, ...]:
 
 def _listed(rest: str) -> tuple[Any, ...]:
     """Values as a scene file would hold them, or texts without quotes."""
-    import tomllib
-
     try:
         return tuple(tomllib.loads(f"x = [{rest}]")["x"])
     except ValueError:
         return tuple(part.strip() for part in rest.split(","))
+
+
+def _written(value: Any) -> str:
+    """The value as a scene file would hold it."""
+    return json.dumps(value, ensure_ascii=False, default=str)
+
+
+def _writable(value: Any) -> bool:
+    """Whether a scene file that holds what is written holds this value."""
+    try:
+        return bool(tomllib.loads(f"x = {_written(value)}")["x"] == value)
+    except ValueError:
+        return False
 
 
 def run(job: Points, progress: Callable[[str, float], None]) -> dict[str, Any]:
