@@ -300,7 +300,7 @@ class ExudynModel:
         times, states = self._recorded()
         enforced = self._enforced()
         guard("exudyn", times, states, self.settings.duration, note, enforced)
-        counts = self._counts()
+        counts = counted(self.built.mbs)
         if enforced is not None:
             balanced("exudyn", times, enforced, lambda i: self._balance(times[i], states[i]))
         return Trajectory(times, states, enforced, counts)
@@ -353,14 +353,15 @@ class ExudynModel:
         enforced[0] = self._first
         return enforced
 
-    def _counts(self) -> dict[str, int]:
-        """Steps and evaluations of the forces, from the solver's own counters."""
-        solver = self.built.mbs.sys["dynamicSolver"]
-        steps = solver.it.currentStepIndex - 1
-        tried = steps + solver.it.rejectedAutomaticStepSizeSteps
-        explicit = hasattr(solver, "GetNumberOfStages")
-        calls = tried * solver.GetNumberOfStages() if explicit else solver.it.newtonStepsCount + steps
-        return {"steps": steps, "force calls": calls, "Jacobians": solver.it.newtonJacobiCount}
+
+def counted(mbs: Any) -> dict[str, int]:
+    """Steps, evaluations of the forces and Jacobians of a system's last run, from the solver's own counters."""
+    solver = mbs.sys["dynamicSolver"]
+    steps = solver.it.currentStepIndex - 1
+    tried = steps + solver.it.rejectedAutomaticStepSizeSteps
+    explicit = hasattr(solver, "GetNumberOfStages")
+    calls = tried * solver.GetNumberOfStages() if explicit else solver.it.newtonStepsCount + steps
+    return {"steps": steps, "force calls": calls, "Jacobians": solver.it.newtonJacobiCount}
 
 
 def build(assembly: Assembly, settings: Settings) -> ExudynModel:

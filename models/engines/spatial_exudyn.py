@@ -1,10 +1,11 @@
-"""A vehicle in space in Exudyn: its own linearised system, and its explicit Runge-Kutta solver in time."""
+"""A vehicle in space in Exudyn: its own linearised system, and its solvers in time."""
 
 from typing import Any
 
 import exudyn as exu
 import numpy as np
 
+from models.engines.exudyn import counted
 from models.engines.protocol import Settings
 from models.engines.spatial_exudyn_build import KINDS, RoadTable, assemble, items
 from models.engines.spatial_protocol import (
@@ -134,6 +135,8 @@ class SpatialExudyn:
         ti.numberOfSteps, ti.endTime, ti.verboseMode = own.steps, own.duration, 0
         ti.adaptiveStep = ti.automaticStepSize = False
         ti.explicit.computeEndOfStepAccelerations = False
+        ti.generalizedAlpha.spectralRadius = own.spectral_radius
+        ti.newton.relativeTolerance, ti.newton.absoluteTolerance = 1e-8, 1e-10
         self._start(q, v)
         try:
             if not self.mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, own.integrator)):
@@ -143,7 +146,7 @@ class SpatialExudyn:
                 raise KeyboardInterrupt from error
             note = f"; the solver stopped: {str(error).strip().splitlines()[0]}"
         times, states = self._recorded(own)
-        return sound("exudyn", own, times, states, note, {"steps": own.steps, "force calls": 4 * own.steps})
+        return sound("exudyn", own, times, states, note, counted(self.mbs))
 
     def _recorded(self, own: Settings) -> tuple[np.ndarray, np.ndarray]:
         """Times (m,) and states (m, 2 n) from the sensors. Steps are counted: Exudyn's sum of them ends 1e-13 early."""

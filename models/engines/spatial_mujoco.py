@@ -16,6 +16,7 @@ import numpy as np
 from mujoco import rollout
 
 from models.engines.mujoco import CHUNK
+from models.engines.mujoco import INTEGRATORS as OWN_NAMES
 from models.engines.mujoco_callback import installed
 from models.engines.mujoco_layout import check
 from models.engines.mujoco_quiet import quiet
@@ -171,10 +172,11 @@ def _last(model: mujoco.MjModel, body: int) -> int:
     return int(model.body_jntadr[body] + model.body_jntnum[body] - 1) if body else -1
 
 
-def _compiled(vehicle: SpatialVehicle, step: float, speed: float | None, road: np.ndarray,
+def _compiled(vehicle: SpatialVehicle, step: float, integrator: str, speed: float | None, road: np.ndarray,
               per_time: float) -> mujoco.MjModel:  # fmt: skip
     """The model with all numbers of the callback in its numeric data."""
     spec = _spec(vehicle, step)
+    spec.option.integrator = OWN_NAMES[integrator]
     plain = spec.compile()
     tree = [value for i in range(plain.njnt) for value in (
         float(plain.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE), float(plain.dof_parentid[i]))]  # fmt: skip
@@ -197,9 +199,9 @@ class SpatialMujoco:
                  road: np.ndarray | None) -> None:  # fmt: skip
         self.vehicle, self.settings = vehicle, settings
         self._flat = np.zeros(2 * len(vehicle.tyres))
-        step = settings.step if settings else 1e-3
+        step, integrator = (settings.step, settings.integrator) if settings else (1e-3, "RK4")
         table = self._flat[None, :] if road is None else road
-        self.model = _compiled(vehicle, step, speed, table, 0.0 if road is None else 2.0 / step)
+        self.model = _compiled(vehicle, step, integrator, speed, table, 0.0 if road is None else 2.0 / step)
         self.data = mujoco.MjData(self.model)
         self.numbers = Numbers(vehicle, self.model)
         self.law: Any = spatial_law()
@@ -287,7 +289,7 @@ class SpatialMujoco:
         with self._forces(), quiet():
             self._advance(states, own)
         times = own.step * np.arange(own.steps + 1)
-        counts = {"steps": own.steps, "force calls": 4 * own.steps}
+        counts = {"steps": own.steps, "force calls": (4 if own.integrator == "RK4" else 1) * own.steps}
         return sound("mujoco", own, times, states[:, both], self._warned(), counts)
 
     def _advance(self, states: np.ndarray, own: Settings) -> None:

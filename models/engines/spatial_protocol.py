@@ -1,8 +1,8 @@
 """What an engine is to a vehicle in space: it is linearised there and runs in time on a given road.
 
-An engine's module ``spatial_NAME`` has ``build(vehicle, settings, speed, road)``. Both engines march with the same
-tableau, the classical Runge-Kutta one, and read the road from one table at half steps, so that they may be compared
-to rounding. Nothing is integrated here.
+An engine's module ``spatial_NAME`` has ``build(vehicle, settings, speed, road)``. Rides march in both with the
+same tableau, the classical Runge-Kutta one, so that they may be compared to rounding; METHODS has the others. All read
+the road from one table at half steps. Nothing is integrated here.
 """
 
 import math
@@ -13,6 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
+from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, guard
 from models.engines.stability import GROWTH, growth, limit
 from models.errors import Refused, RunFailed
@@ -24,6 +25,9 @@ from models.vehicles.spatial_linear import linearise, outputs, wheels
 
 INTEGRATORS = {"exudyn": "RK44", "mujoco": "RK4"}
 """What each engine calls the classical Runge-Kutta method."""
+METHODS = {engine: tuple(name for name, method in CATALOGUE[engine].items() if method.nodes != "any")
+           for engine in INTEGRATORS}  # fmt: skip
+"""All that read nothing between half steps."""
 DIFFERENCES = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
 """Weights of f(i h) - f(-i h) in h f'(0): central differences of order six (by their defining equations)."""
 SMOOTH_STEP, CORNERED_STEP = 4e-3, 1e-5
@@ -79,8 +83,9 @@ def build(engine: str, vehicle: SpatialVehicle, settings: Settings | None = None
 
 def _check(engine: str, linear: LinearVehicle, settings: Settings, road: np.ndarray | None) -> None:
     """Refuse what would run and be wrong."""
-    if settings.integrator != INTEGRATORS[engine]:
-        raise Refused(engine, f"vehicles in space march with {INTEGRATORS[engine]}, not with {settings.integrator}")
+    if settings.integrator not in METHODS[engine]:
+        raise Refused(engine, f"vehicles in space march with {' or '.join(METHODS[engine])}, not with "
+                              f"{settings.integrator}")
     if not divides(settings.step, settings.duration):
         raise Refused(engine, f"the step {settings.step:g} s does not divide the duration {settings.duration:g} s; "
                               f"use for example {fitting(settings.step, settings.duration)} s")
@@ -95,7 +100,7 @@ def _check_step(engine: str, linear: LinearVehicle, settings: Settings) -> None:
     """Refuse a step at which a mode of the linear vehicle grows that does not grow by itself."""
     n = len(linear.mass)
     damping, stiffness = np.split(np.linalg.solve(linear.mass, np.hstack([linear.damping, linear.stiffness])), 2, 1)
-    own = (np.eye(n), damping, stiffness, damping, damping)
+    own = (np.eye(n), damping, stiffness, np.zeros((n, n)), np.zeros((n, n)))  # no engine knows its callback's damping
     name, h, duration = settings.integrator, settings.step, settings.duration
     poles = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
     if growth(name, h, duration, own) > math.log(GROWTH) + max(0.0, float(poles.real.max())) * duration:
