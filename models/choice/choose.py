@@ -1,0 +1,198 @@
+"""Which effects a scene's quantities can do without, and how long its steps may be: screened, chosen, confirmed.
+
+Screened are runs over the first part of the scene: without single effects, and without pairs. Of all that the screen
+keeps within the tolerance, the next to go is the effect, or the pair where no single one will do, that saves most
+(logarithm of seconds at the longest step that is then allowed) for what it adds to the error. What is left is run over
+the whole scene, beside the scene as it is. Where it is not within the tolerance, steps become shorter; if that does not
+help, the step of the path that breaks it is found by halving and taken back for good, and the choice goes on without
+it. So what is reported was confirmed, always; the scene as it is holds with no error at all.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from models.choice.answer import added
+from models.choice.screen import Screen
+from models.choice.variants import Set, Variants
+
+BUDGET = 0.8
+"""Share of the tolerance that predictions may use."""
+WINDOW = 0.25
+"""Share of a run that is screened."""
+WORTH = math.log(1.05)
+"""Least that an effect must save to be worth leaving out: seconds are known no better."""
+LEAST = 1e-3
+"""Share of the tolerance below which an error counts as none."""
+SHORTER = 2
+"""Times that steps become shorter where a confirmation fails, before effects are taken back."""
+ROUNDS = 30
+"""Sets that are confirmed at most."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Effects ``left_out`` of all ``candidates``, and steps so many ``times`` as long; relative changes (quantities,).
+
+    predicted : over the first part of the run, by the screen; remainder : what that leaves out, estimated; confirmed :
+    over the whole run; kept : every confirmed change within the tolerance. calls and seconds (CPU) of the scene, of the
+    scene with longer steps alone, and of what is left. rounds : runs of the whole scene that confirmed or did not.
+    """
+
+    candidates: tuple[str, ...]
+    left_out: tuple[str, ...]
+    times: int
+    predicted: np.ndarray
+    remainder: np.ndarray
+    confirmed: np.ndarray
+    kept: bool
+    calls: tuple[int, int, int]
+    seconds: tuple[float, float, float]
+    rounds: int
+    spent: int
+
+
+class Chooser:
+    """A scene's effects in one implementation, for quantities (see ``models.choice.answer``) and a tolerance."""
+
+    def __init__(self, scene: Any, engine: str, quantities: list[str], tolerance: float,
+                 window: float = WINDOW) -> None:  # fmt: skip
+        self.tolerance = tolerance
+        self.whole = Screen(Variants(scene, engine), quantities)
+        part = self.whole.variants.window(window)
+        self.screen = self.whole if part is self.whole.variants else Screen(part, quantities)
+        self.lengths = [k for k in self.whole.variants.lengths() if k in part.lengths()]
+        self.effects = self.whole.variants.effects
+        self._reach: dict[Set, int] = {}
+        self._confirmed: dict[Set, tuple[int, np.ndarray]] = {}
+        self._pairs: list[Set] | None = None
+        self.rounds = 0
+
+    def share(self, chosen: Set) -> float:
+        """Largest predicted change, with what may be left out of it, by the tolerance."""
+        return float(np.max(self.screen.predicted(chosen) + self.screen.remainder(chosen))) / self.tolerance
+
+    def reach(self, chosen: Set) -> int:
+        """Longest step, by the scene's own, that the predictions allow without these effects."""
+        if chosen not in self._reach:
+            left = BUDGET * self.tolerance * (1.0 - min(1.0, self.share(chosen) / BUDGET))
+            low, high = 0, len(self.lengths)  # lengths[low] holds, lengths[high] does not
+            while high - low > 1:
+                middle = (low + high) // 2
+                holds = float(np.max(self.screen.of_step(chosen, self.lengths[middle]))) <= left
+                low, high = (middle, high) if holds else (low, middle)
+            self._reach[chosen] = self.lengths[low]
+        return self._reach[chosen]
+
+    def work(self, chosen: Set) -> float:
+        """CPU seconds of the first part of the run without these effects, at the longest step; infinite if it fails."""
+        run = self.screen.variants.of(chosen, self.reach(chosen))
+        return math.inf if run is None else run.counts["calls"] * self.screen.variants.per_call(chosen)
+
+    def confirm(self, chosen: Set) -> np.ndarray:
+        """Relative changes (quantities,) over the whole run, at the longest step that holds or nearly so."""
+        if chosen not in self._confirmed:
+            longest = self.reach(chosen)
+            for times in [k for k in reversed(self.lengths) if k <= longest][: 1 + SHORTER]:
+                self.rounds += 1
+                found = self.whole.shares(self.whole.between(self.whole.variants.of(chosen, times),
+                                                             self.whole.variants.of()))  # fmt: skip
+                self._confirmed[chosen] = times, found
+                if self.holds(found):
+                    break
+        return self._confirmed[chosen][1]
+
+    def holds(self, changes: np.ndarray) -> bool:
+        """Whether all changes are within the tolerance."""
+        return bool((changes <= self.tolerance).all())
+
+    def choose(self) -> Choice:
+        """The greedy choice, confirmed."""
+        none: Set = frozenset()
+        if not self.holds(self.confirm(none)):
+            self._confirmed[none] = 1, np.zeros(len(self.whole.quantities))
+        kept, banned = [none], set[Set]()
+        while self.rounds < ROUNDS:
+            path = self.path(kept, banned)
+            if path == kept:
+                break
+            if self.holds(self.confirm(path[-1])):
+                kept = path
+                continue
+            low, high = len(kept) - 1, len(path) - 1  # path[low] is kept, path[high] is not
+            while high - low > 1:
+                middle = (low + high) // 2
+                low, high = (middle, high) if self.holds(self.confirm(path[middle])) else (low, middle)
+            banned.add(path[high] - path[low])
+            kept = path[: low + 1]
+        return self._choice(kept[-1])
+
+    def _choice(self, chosen: Set) -> Choice:
+        times, found = self._confirmed[chosen]
+        whole = self.whole.variants
+        shown = [(frozenset[str](), 1), (frozenset[str](), self._confirmed[frozenset()][0]), (chosen, times)]
+        runs = [run for key in shown if (run := whole.of(*key)) is not None]
+        seconds = [run.counts["calls"] * self.screen.variants.per_call(left_out)
+                   for run, (left_out, _) in zip(runs, shown, strict=True)]  # fmt: skip
+        calls = [run.counts["calls"] for run in runs]
+        spent = whole.calls + (0 if self.screen is self.whole else self.screen.variants.calls)
+        return Choice(self.effects, tuple(sorted(chosen)), times, self.told(chosen, times),
+                      self.screen.remainder(chosen), found, self.holds(found), tuple(calls), tuple(seconds),
+                      self.rounds, spent)  # type: ignore[arg-type]  # fmt: skip
+
+    def told(self, chosen: Set, times: int) -> np.ndarray:
+        """Predicted changes (quantities,) of a set and a step together."""
+        screen = self.screen
+        step = screen.between(screen.variants.of(chosen, times), screen.variants.of(chosen))
+        change = screen.change(chosen)
+        if step is None or change is None:
+            return screen.shares(None)
+        return screen.shares({name: added(change[name], step[name]) for name in screen.quantities})
+
+    def further(self, chosen: Set) -> dict[str, float]:
+        """Largest predicted change if an effect that stayed went, too: above, as a tolerance, it would matter no more.
+
+        Only those that may go, and whose going would save anything."""
+        found = {}
+        for effect in self.effects:
+            if effect not in chosen and self.work(chosen | {effect}) * math.exp(WORTH) < self.work(chosen):
+                found[effect] = self.share(chosen | {effect}) * self.tolerance
+        return {effect: change for effect, change in found.items() if math.isfinite(change)}
+
+    def path(self, kept: list[Set], banned: set[Set]) -> list[Set]:
+        """The path that goes on from a kept one, step by step, as far as predictions allow."""
+        path = list(kept)
+        while True:
+            step = self._next(path[-1], banned, [frozenset([one]) for one in self.effects])
+            step = step or self._next(path[-1], banned, self._promising())
+            if not step:
+                return path
+            path.append(path[-1] | step)
+
+    def _promising(self) -> list[Set]:
+        """Pairs of which at least one breaks the budget alone, while both together hold it."""
+        if self._pairs is None:
+            alone = {one: self.share(frozenset([one])) for one in self.effects}
+            pairs = [pair for pair in combinations(self.effects, 2) if max(alone[one] for one in pair) > BUDGET]
+            self._pairs = [frozenset(pair) for pair in pairs if self.share(frozenset(pair)) <= BUDGET]
+        return self._pairs
+
+    def _next(self, chosen: Set, banned: set[Set], steps: list[Set]) -> Set:
+        """The step that saves most for what it adds to the predicted error; empty where none is within the budget."""
+        best, most = frozenset[str](), 0.0
+        now, work = self.share(chosen), self.work(chosen)
+        for step in steps:
+            further = chosen | step
+            if further == chosen or step - chosen in banned or step in banned:
+                continue
+            share = self.share(further)
+            saved = math.log(work / self.work(further)) if share <= BUDGET else 0.0
+            score = saved / max(share - now, LEAST) if saved > WORTH else 0.0
+            if score > most:
+                best, most = step - chosen, score
+        return best
+
+

@@ -1,0 +1,39 @@
+"""Rolling contact: quantities are the forces, a case per creepage; every creepage counts as a call."""
+
+import time
+from typing import Any
+
+import numpy as np
+
+from models.choice.answer import Answer, Quantity
+from models.contact.of_scene import contact
+from models.contact.scene import ContactScene
+from models.errors import InputError
+
+ENGINE, WINDOWED = "reference", False
+FORCES = {"fx": "N", "fy": "N", "mz": "N m", "dissipation": "N"}
+
+
+def answer(scene: ContactScene, engine: str) -> Answer:
+    """Press the bodies and roll them at every creepage."""
+    if scene.cases is not None:
+        raise InputError(scene.file, "cases", None, "is a table of contacts: give the price of one of them")
+    begun = time.process_time()
+    body = contact(scene)
+    rolled = [body.roll(*motion, scene.method.cells) for motion in scene.motions()]
+    seconds = time.process_time() - begun
+    found = {name: Quantity(unit, (np.array([getattr(one, name) for one in rolled]),)) for name, unit in FORCES.items()}
+    return Answer(found, {"steps": len(rolled), "calls": len(rolled), "states": 0}, seconds)
+
+
+def steps(scene: ContactScene) -> int:
+    """None: nothing is marched in time."""
+    return 0
+
+
+def shorten(table: dict[str, Any], scene: ContactScene, steps: int) -> None:
+    """Nothing."""
+
+
+def coarsen(table: dict[str, Any], scene: ContactScene, times: int) -> None:
+    """Nothing."""

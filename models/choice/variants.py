@@ -1,0 +1,98 @@
+"""A scene less some of its effects and with longer steps, each variant run once and kept."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from models.choice.answer import Answer
+from models.errors import InputError, RunFailed
+from models.scene_effects import named, own_table, rebuilt, without
+
+Set = frozenset[str]
+LONGEST = 128
+"""No step is tried that is more times as long as the scene's."""
+REPEATS = 3
+"""Runs of which the shortest tells the seconds."""
+
+
+def system_of(scene: Any) -> ModuleType:
+    """The file that runs scenes of this one's system; InputError where there is none."""
+    folder = Path(__file__).parent / "systems"
+    names = {path.stem.replace("_", "-"): path.stem for path in sorted(folder.glob("*.py")) if path.stem != "__init__"}
+    if scene.system not in names:
+        raise InputError(scene.file, "system", scene.system, "has no runs in time that effects could be priced or "
+                         "chosen by: scenes of these systems have", tuple(names))  # fmt: skip
+    return import_module(f"models.choice.systems.{names[scene.system]}")
+
+
+@dataclass
+class Variants:
+    """Runs of a ``scene`` by one implementation; a variant is the effects that are left out, and the step by its own.
+
+    None stands for one that cannot be, or whose run fails. ``calls`` : of all runs made so far.
+    """
+
+    scene: Any
+    engine: str
+    system: ModuleType = field(init=False)
+    calls: int = 0
+    _kept: dict[tuple[Set, int], Answer | None] = field(default_factory=dict)
+    _costs: dict[Set, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.system = system_of(self.scene)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects that the scene names."""
+        return named(self.scene)
+
+    def of(self, left_out: Iterable[str] = (), times: int = 1) -> Answer | None:
+        """The run without these effects, with steps so many times as long."""
+        key = (frozenset(left_out), times)
+        if key not in self._kept:
+            self._kept[key] = self._run(*key)
+        return self._kept[key]
+
+    def _run(self, left_out: Set, times: int) -> Answer | None:
+        try:
+            found: Answer = self.system.answer(self.changed(left_out, times), self.engine)
+        except (InputError, RunFailed):
+            return None
+        self.calls += found.counts["calls"]
+        return found
+
+    def changed(self, left_out: Set, times: int = 1) -> Any:
+        """The scene of a variant; InputError where it cannot be."""
+        scene = without(self.scene, *sorted(left_out)) if left_out else self.scene
+        if times == 1:
+            return scene
+        table = own_table(scene)
+        self.system.coarsen(table, scene, times)
+        return rebuilt(table, scene)
+
+    def per_call(self, left_out: Set) -> float:
+        """CPU seconds of one call, the least of a few runs; infinite where there is none."""
+        if left_out not in self._costs:
+            runs = [self.of(left_out), *(self._run(left_out, 1) for _ in range(REPEATS - 1))]
+            self._costs[left_out] = min((run.seconds / run.counts["calls"] for run in runs if run), default=math.inf)
+        return self._costs[left_out]
+
+    def lengths(self) -> list[int]:
+        """How many times as long a step may be, as far as whole numbers of them make up the run."""
+        count = self.system.steps(self.scene)
+        return [times for times in range(1, min(count, LONGEST) + 1) if count % times == 0] or [1]
+
+    def window(self, share: float) -> "Variants":
+        """The first part of the run, about this share of it, or all of it where a part tells nothing."""
+        count = self.system.steps(self.scene)
+        few = next((n for n in range(math.ceil(share * count), count) if count % n == 0 or n % 60 == 0), count)
+        if not self.system.WINDOWED or few == count:
+            return self
+        table = own_table(self.scene)
+        self.system.shorten(table, self.scene, few)
+        return Variants(rebuilt(table, self.scene), self.engine)
