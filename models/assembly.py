@@ -8,6 +8,7 @@ import numpy as np
 
 from models.errors import InputError
 from models.scene import Scene
+from models.scene_effects import legal
 from models.signals import Signal
 from models.vehicles import pitch_plane
 from models.vehicles.description import Vehicle
@@ -90,15 +91,7 @@ def _initial(scene: Scene, p: pitch_plane.Parameters) -> np.ndarray:
 def ordered(scene: Scene) -> list[str]:
     """The scene's effects, each after those that it needs; refuses illegal combinations."""
     modules = {name: import_module(f"models.effects.{name}") for name in scene.effects}
-    for name, module in modules.items():
-        for needed in module.NEEDS:
-            if needed not in modules:
-                raise InputError(scene.file, f"effects.{name}", None, f"needs the effect {needed!r}: name it too")
-        for other in module.EXCLUDES:
-            if other in modules:
-                raise InputError(
-                    scene.file, f"effects.{name}", None, f"cannot stand beside {other!r}: drop one of them"
-                )
+    legal(modules, scene)
     done: list[str] = []
     waiting = list(modules)
     while waiting:

@@ -7,7 +7,8 @@ from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build, settings_of
 from models.engines.protocol import check as check_engine
 from models.errors import Refused
-from models.scene import Scene, effect_names
+from models.scene import Scene
+from models.scene_effects import lines as effect_lines
 from models.simulate import state_names
 
 MODES = {
@@ -35,7 +36,7 @@ def describe(scene: Scene) -> str:
     assembly = assemble(scene)
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
     lines += [_line("motion", _motion(scene, assembly))]
-    lines += _vehicle(scene, assembly) + _effects(scene)
+    lines += _vehicle(scene, assembly) + effect_lines(scene)
     lines += [_line("channels", ", ".join(_channels(assembly))), *trust_line(assembly), "", *_engines(scene, assembly)]
     return "\n".join(lines)
 
@@ -75,13 +76,6 @@ def _channels(assembly: Assembly) -> list[str]:
     names += ["inertia_term", "enforced_moment"] if assembly.guided else []
     modules = [import_module(f"models.effects.{name}") for name in assembly.scene.effects]
     return names + [channel for module in modules for channel in getattr(module, "CHANNELS", ())]
-
-
-def _effects(scene: Scene) -> list[str]:
-    """Effects that the scene names, with what each costs; all others are not imported."""
-    lines = [_line("effect", f"{name}: {import_module(f'models.effects.{name}').COST}") for name in scene.effects]
-    absent = ", ".join(name for name in effect_names() if name not in scene.effects)
-    return [*lines, _line("absent", f"{absent} (not imported, not computed)")]
 
 
 def trust_line(assembly: Assembly) -> list[str]:

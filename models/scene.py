@@ -10,28 +10,25 @@ from pydantic import Field
 
 from models.engines.catalogue import CATALOGUE, MISSING, RECOMMENDED
 from models.errors import InputError
+from models.scene_effects import names_of, read_tables
 from models.scene_file import SceneFile, checked, existing, parse
 from models.steps import MOST_STEPS, divides, fitting
 from models.strict import Strict, quantity, read
+from models.systems import DEFAULT
 from models.vehicles import pitch_plane
 from models.vehicles.description import Geometry
 
 FOLDER = Path(__file__).parent
 
 
-def _names(folder: str) -> tuple[str, ...]:
-    """Files of a folder of models, without suffix: the names that a scene may use."""
-    return tuple(sorted(path.stem for path in (FOLDER / folder).glob("*.py") if path.stem != "__init__"))
-
-
 def effect_names() -> tuple[str, ...]:
     """Names of all effects that a scene may call for."""
-    return _names("effects")
+    return names_of(DEFAULT)
 
 
 def parameter_sets() -> tuple[str, ...]:
     """Names of the published parameter sets."""
-    return _names("parameters")
+    return tuple(sorted(path.stem for path in (FOLDER / "parameters").glob("*.py") if path.stem != "__init__"))
 
 
 class VehicleTable(Strict):
@@ -128,17 +125,11 @@ def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Scene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(Scene, table, file, folder)
-    effects = {name: _effect(name, values, file) for name, values in scene.effects.items()}
+    effects = read_tables(scene.effects, DEFAULT, file)
     for name in scene.engines:
         _check_engine(name, scene)
     _check_times(scene)
     return scene.model_copy(update={"effects": effects})
-
-
-def _effect(name: str, values: Any, file: str) -> Any:
-    if name not in effect_names():
-        raise InputError(file, f"effects.{name}", None, "no such effect", effect_names())
-    return read(import_module(f"models.effects.{name}").Parameters, values, file, f"effects.{name}")
 
 
 def _check_engine(name: str, scene: Scene) -> None:

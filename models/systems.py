@@ -18,26 +18,28 @@ class System:
     """Modules of one system, and the implementations among which ``--engine`` chooses.
 
     ``scene`` has build(table, file, folder) -> scene; ``plan`` has check(scene, engines), which refuses what cannot
-    be run, and describe(scene) -> text.
+    be run, and describe(scene) -> text. ``effects`` is the package that holds an effect in every file.
     """
 
     scene: str
     plan: str
     engines: tuple[str, ...] = ()
+    effects: str = ""
 
 
 SYSTEMS = {
-    DEFAULT: System("models.scene", "models.plan", ("reference", "exudyn", "mujoco")),
+    DEFAULT: System("models.scene", "models.plan", ("reference", "exudyn", "mujoco"), "models.effects"),
     "ride": System("models.ride.scene", "models.ride.plan", ("reference", "exudyn", "mujoco")),
     "wheelset": System("models.rail.scene", "models.rail.plan", ("reference", "exudyn", "mujoco")),
     "contact": System("models.contact.scene", "models.contact.plan"),
     "handling": System("models.handling.scene", "models.handling.plan", ("exudyn", "mujoco")),
     "hub-forces": System("models.hub_forces.scene", "models.hub_forces.plan", ("reference", "exudyn", "mujoco")),
-    "braking": System("models.braking.scene", "models.braking.plan", ("reference", "exudyn", "mujoco")),
+    "braking": System("models.braking.scene", "models.braking.plan", ("reference", "exudyn", "mujoco"),
+                      "models.braking.effects"),
     "measured": System("models.measured.scene", "models.measured.plan", ("reference", "exudyn", "mujoco")),
     "pictures": System("studies.pictures.scene", "studies.pictures.plan", ("exudyn", "mujoco")),
     "wheel-rail": System("models.rail.benchmark_scene", "models.rail.benchmark_plan"),
-}
+}  # fmt: skip
 
 
 def load(path: Path, changes: Iterable[str] = ()) -> Any:

@@ -11,14 +11,17 @@ import pytest
 import models
 from models.assembly import assemble
 from models.scene import effect_names
+from models.scene_effects import module_of
+from models.systems import DEFAULT
 from validation.absence import ride
 from validation.absence.hand_built import mujoco_model
 from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, user_functions
 from validation.cases import absent
-from validation.cases.absent import ENGINES, FORCES, LINEAR, PRICED, change, declared, hand_built, model, scene
+from validation.cases.absent import EFFECTS, ENGINES, FORCES, added_to, change, declared, hand_built, model, scene
 
 BARE = {"title": "bare", "run": {"duration": 0.02, "step": 0.001}, "start": {"pitch": 0.1}}
 FORCED = {**BARE, "effects": FORCES}
+ROAD = module_of(DEFAULT, "road").EXAMPLE
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +76,7 @@ def test_no_python_and_no_memory_within_a_march(engine, folder):
 
 def test_the_watch_sees_callbacks_where_there_are_some(folder):
     """Positive control: four Python callbacks at each of RK44's four stages, and one compiled one in MuJoCo."""
-    road = {"road": PRICED["road"][1]}
+    road = {"road": ROAD}
     assert march("exudyn", model(scene(road, 50, folder), "exudyn")).frames >= 50 * 4 * 4
     assert march("mujoco", model(scene(road, 50, folder), "mujoco")).callbacks == 1
     assert installed() == 0
@@ -88,8 +91,8 @@ def test_no_callback_before_during_and_after(folder):
 
 def test_user_functions_are_counted(folder):
     """Positive control, over Exudyn's own items: two loads per wheel on a road; two offsets of the constraint."""
-    assert user_functions(model(scene({"road": PRICED["road"][1]}, 50, folder), "exudyn")) == 4
-    guided = {**LINEAR, "prescribed_pitch": PRICED["prescribed_pitch"][1]}
+    assert user_functions(model(scene({"road": ROAD}, 50, folder), "exudyn")) == 4
+    guided = {**added_to("prescribed_pitch"), "prescribed_pitch": module_of(DEFAULT, "prescribed_pitch").EXAMPLE}
     built = model(scene(guided, 50, folder, guided=True), "exudyn")
     assert user_functions(built) == built.plan()["callbacks"] == 4
     built = model(scene(FORCES, 50, folder), "exudyn")
@@ -109,13 +112,9 @@ def test_a_bare_scene_has_the_states_of_the_vehicle_and_no_others(folder):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("effect", PRICED)
+@pytest.mark.parametrize("effect", EFFECTS)
 def test_an_effect_changes_the_counts_by_what_it_declares(effect, engine, folder):
     assert change(effect, engine, folder) == declared(effect, engine)
-
-
-def test_every_effect_has_its_price():
-    assert set(PRICED) == set(effect_names())
 
 
 @pytest.mark.parametrize("kept", [(), ("wheel_forces",)], ids=["bare", "forced"])

@@ -20,6 +20,7 @@ from models.braking.trailer import train
 from models.braking.tyre_source import NAMES, SCALES, from_file, named
 from models.braking.tyre_table import TyreTable, stacked
 from models.errors import InputError
+from models.scene_effects import module_of
 from models.scene_file import parse
 from models.strict import read
 
@@ -41,7 +42,7 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
     engine = None if own is None else on_springs(SPRUNG_ENGINE, own)
     if engine is not None:
         engine.check_step(scene.run.sample / scene.run.substeps)
-    return Braked(
+    vehicle = Braked(
         plane=plane, kind=np.where(np.arange(plane.wheels) < 2, 0, len(kinds_of(scene)) - 1), tables=stacked(tyres),
         slope=max(table.cornering for table in tyres), road=road_of(scene, procedure, names),
         brakes=of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
@@ -50,6 +51,9 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
         speed_given=scene.controller.true_speed, relaxation=lags_of(scene, plane.wheels), sprung=own,
         engine=engine,
     )  # fmt: skip
+    for name, own_values in scene.effects.items():
+        vehicle = module_of(scene.system, name).extend(vehicle, own_values)
+    return vehicle
 
 
 def plane_of(scene: BrakingScene) -> Plane:
@@ -173,13 +177,9 @@ def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
 
 
 def measured_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPressures | None:
-    """Measured pressures that drive a procedure, None if there are none; they leave nothing for a controller to do."""
+    """Measured pressures that drive a procedure, None if there are none."""
     if scene.measured is None:
         return None
-    others = {"controller": scene.controller.kind != "none", "port": scene.port, "pressure": scene.pressure}
-    for key, there in others.items():
-        if there:
-            raise InputError(scene.file, key, None, "has no meaning with [measured]: its pressures are the chambers'")
     name = scene.measured.file.replace("{procedure}", procedure)
     return read_pressures(scene.path(name, "measured.file"), wheels, scene.run.sample)
 

@@ -6,6 +6,7 @@ from models.braking.procedures import check_engine, engines_of, port_of, ready
 from models.braking.scene import BrakingScene
 from models.braking.tyre_source import NAMES
 from models.errors import InputError
+from models.scene_effects import lines as effect_lines
 
 PROCEDURES = {
     "straight": "straight braking",
@@ -79,9 +80,7 @@ def describe(scene: BrakingScene) -> str:
         lines += [_line(name, f"{PROCEDURES[own.kind]}, from {own.speed:g} m/s on {names}")]
     lines += [_line("step", f"{1e3 * run.sample / run.substeps:g} ms, {run.substeps} to a sample; order two, wheels "
                     "exact within it")]  # fmt: skip
-    there, absent = effects(scene)
-    lines += [_line("effects", ", ".join(there) or "none")]
-    return "\n".join([*lines, _line("absent", ", ".join(absent) + " (not computed)" if absent else "nothing")])
+    return "\n".join([*lines, *effect_lines(scene)])
 
 
 def behind(scene: BrakingScene) -> str:
@@ -90,29 +89,6 @@ def behind(scene: BrakingScene) -> str:
         return f"measured pressures {scene.measured.file}"
     named = [] if scene.port is None else [key for key in BEHIND if getattr(scene.port, key) is not None]
     return f"{named[0]} {getattr(scene.port, named[0])}" if named else scene.controller.kind
-
-
-def effects(scene: BrakingScene) -> tuple[list[str], list[str]]:
-    """Effects that the scene names, and those that it does not."""
-    brakes, port = (scene.brakes.front, scene.brakes.rear), scene.port
-    present = {
-        "trailer": scene.trailer is not None,
-        "load transfer": scene.load_transfer is not None or scene.vehicle.file is not None,
-        "suspension, roll and pitch": scene.vehicle.file is not None,
-        "push-out": any(brake.push_out > 0.0 for brake in brakes),
-        "hysteresis": any(brake.release is not None or brake.falling is not None for brake in brakes),
-        "tyre relaxation": scene.relaxation is not None,
-        "pressure dynamics": scene.pressure is not None,
-        "delay of valves": scene.pressure is not None and scene.pressure.delay > 0.0,
-        "reservoir": scene.pressure is not None and scene.pressure.reservoir is not None,
-        "anti-lock system": scene.measured is None and behind(scene) != "none",
-        "measured pressures": scene.measured is not None,
-        "signals from teeth": port is not None and port.teeth is not None,
-        "conversion of signals": port is not None and bool(port.signals.model_fields_set),
-        "conversion of pressures": port is not None and bool(port.pressures.model_fields_set),
-        "faults": port is not None and bool(port.faults),
-    }
-    return [name for name, there in present.items() if there], [name for name, there in present.items() if not there]
 
 
 def _line(head: str, text: str) -> str:

@@ -11,6 +11,7 @@ from models.braking.controller import SAMPLE
 from models.braking.port.setup import PortTable
 from models.braking.trailer import Trailer
 from models.errors import InputError
+from models.scene_effects import check, read_tables
 from models.scene_file import SceneFile, checked
 from models.strict import Strict, quantity
 
@@ -147,6 +148,7 @@ class BrakingScene(SceneFile):
     controller: ControllerTable = ControllerTable()
     port: PortTable | None = Field(default=None, description="what stands behind the port, its signals and faults")
     measured: Measured | None = Field(default=None, description="pressures that were measured, instead of a controller")
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
     procedures: dict[str, Procedure] = Field(min_length=1, description="driven one by one, a table each")
     run: RunTable = RunTable()
 
@@ -158,7 +160,8 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Br
         _check_procedure(own, scene.file, f"procedures.{name}")
     _check_vehicle(scene)
     _check_run(scene)
-    return scene
+    check(scene)
+    return scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, file)})
 
 
 READ = {"straight": (), "split": ("right",), "turn": ("radius",), "j_turn": ("steer", "steering")}
@@ -196,7 +199,7 @@ def _check_steering(knots: list[Pair], file: str, place: str) -> None:
 
 
 def _check_vehicle(scene: BrakingScene) -> None:
-    """A vehicle on its suspension has loads of its own, and all that its file says."""
+    """A vehicle on its suspension has all that its file says."""
     own, file = scene.vehicle, scene.file
     if own.file is None:
         if own.spin_inertia is not None:
@@ -204,11 +207,10 @@ def _check_vehicle(scene: BrakingScene) -> None:
         return
     if own.spin_inertia is None:
         raise InputError(file, "vehicle.spin_inertia", None, "is missing: a vehicle file does not say it")
-    there = {"vehicle.parameters": "parameters" in own.model_fields_set, "vehicle.override": bool(own.override)}
-    there |= {name: getattr(scene, name) is not None for name in ("load_transfer", "trailer", "relaxation")}
-    for place, named in there.items():
+    for place, named in (("vehicle.parameters", "parameters" in own.model_fields_set),
+                         ("vehicle.override", bool(own.override))):  # fmt: skip
         if named:
-            raise InputError(file, place, None, "has no meaning beside vehicle.file: springs carry that vehicle, alone")
+            raise InputError(file, place, None, "has no meaning beside vehicle.file, which says it all")
 
 
 def _check_run(scene: BrakingScene) -> None:

@@ -19,6 +19,8 @@ NEEDS = ("wheel_forces",)
 EXCLUDES = ("road",)
 AFTER = ("wheel_forces", "force_noise", "prescribed_pitch", "prescribed_heave_and_pitch")
 COST = "two exact first-order filters after the run; no state in any engine"
+EXAMPLE: dict[str, float] = {}
+COUNTS = {"all": {"channels": 2}}
 
 Channels = dict[str, tuple[str, str, np.ndarray]]
 """Name -> unit, meaning, values."""

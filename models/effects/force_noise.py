@@ -18,6 +18,8 @@ NEEDS = ("wheel_forces",)
 EXCLUDES = ("road",)
 AFTER = ("wheel_forces",)
 COST = "nothing during the run: the samples are drawn before it"
+EXAMPLE = {"deviation": 8.0}
+COUNTS: dict[str, dict[str, int]] = {}
 
 
 class Parameters(Strict):

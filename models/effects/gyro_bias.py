@@ -19,6 +19,8 @@ NEEDS = ("gyro",)
 EXCLUDES: tuple[str, ...] = ()
 AFTER = ("gyro",)
 COST = "one filter over the gyro's samples after the run; no state in any engine"
+EXAMPLE = {"turn_on": 1.0}
+COUNTS = {"all": {"channels": 1}}
 
 CHANNELS = ("gyro_bias",)
 

@@ -33,6 +33,9 @@ NEEDS = ("wheel_forces",)
 EXCLUDES = ("pitch_spring", "high_pass", "prescribed_pitch", "prescribed_heave_and_pitch")
 AFTER = ("wheel_forces", "force_noise")
 COST = "a filter over all samples before the run, about 0.1 ms each; one native spring-damper and one moment over time"
+EXAMPLE = {"file": "pitch.csv", "force_deviation": 8.0, "pitch_deviation": 0.5}
+COUNTS = {"exudyn": {"native items": 2, "callbacks": 1},
+          "mujoco": {"native items": 1, "callbacks": 1}, "all": {"channels": 10}}  # fmt: skip
 
 Channels = dict[str, tuple[str, str, np.ndarray]]
 """Name -> unit, meaning, values."""

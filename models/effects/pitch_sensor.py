@@ -19,6 +19,8 @@ NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 AFTER: tuple[str, ...] = ()
 COST = "one reading after the run; no state in any engine"
+EXAMPLE = {"sampling_rate": 200.0, "deviation": 0.01}
+COUNTS = {"all": {"channels": 1}}
 
 Channels = dict[str, tuple[str, str, np.ndarray]]
 """Name -> unit, meaning, values."""

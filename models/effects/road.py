@@ -12,6 +12,8 @@ NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("wheel_forces", "prescribed_pitch", "contact_points")
 AFTER: tuple[str, ...] = ()
 COST = "height and slope under each wheel, read from a table of half steps"
+EXAMPLE = {"source": "study", "speed": 20.0}
+COUNTS = {"exudyn": {"native items": 4, "callbacks": 4}, "mujoco": {"callbacks": 1}, "all": {"channels": 2}}
 
 OWN = {
     "study": ("gd", "grade"),

@@ -14,6 +14,10 @@ NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("road",)
 AFTER: tuple[str, ...] = ()
 COST = "one force per wheel, read from a table; no tyre"
+EXAMPLE = {"file": "forces.csv", "interpolation": "held"}
+COUNTS = {"exudyn": {"callbacks": 3}}
+"""Two forces stand in the place of two tyres. Held ones take one callback before each of Exudyn's steps beside one per
+wheel, and none in MuJoCo."""
 
 
 class Parameters(Strict):

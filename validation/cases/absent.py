@@ -11,7 +11,9 @@ from models.assembly import assemble
 from models.engines.protocol import Model, build, guard, settings_of
 from models.scene import Scene
 from models.scene import build as build_scene
+from models.scene_effects import module_of, names_of
 from models.simulate import outputs
+from models.systems import DEFAULT
 from models.time_series import write_time_series
 from validation.absence import braking, ride, wheelset
 from validation.absence.hand_built import exudyn_run, mujoco_run
@@ -29,41 +31,16 @@ START = {"pitch": 0.1, "z3": -0.1}
 """m, rad: the vehicle moves, so that nothing is compared at rest."""
 
 FORCES = {"wheel_forces": {"file": "forces.csv", "interpolation": "held"}}
-LINEAR = {"wheel_forces": {"file": "forces.csv", "interpolation": "linear"}}
 GUIDED = {"integrator": "GeneralizedAlpha"}
 """The one integrator of Exudyn that solves for a prescribed pitch; its neighbour without one takes it, too."""
 
-PRICED: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, dict[str, int]]]] = {
-    "road": ({}, {"source": "study", "speed": 20.0},
-             {"exudyn": {"native items": 4, "callbacks": 4}, "mujoco": {"callbacks": 1}, "all": {"channels": 2}}),
-    "pitch_spring": ({}, {"stiffness": 2e4, "damping": 1e3},
-                     {"exudyn": {"native items": 1}, "mujoco": {"native items": 1}}),
-    "wheel_forces": ({}, FORCES["wheel_forces"], {"exudyn": {"callbacks": 3}}),
-    "force_noise": (FORCES, {"deviation": 8.0}, {}),
-    "contact_points": (FORCES, {}, {"all": {"channels": 2}}),
-    "gyro": ({}, {"sampling_rate": 200.0, "deviation": 0.1}, {"all": {"channels": 1}}),
-    "gyro_bias": ({"gyro": {"sampling_rate": 200.0, "deviation": 0.1}}, {"turn_on": 1.0}, {"all": {"channels": 1}}),
-    "pitch_sensor": ({}, {"sampling_rate": 200.0, "deviation": 0.01}, {"all": {"channels": 1}}),
-    "accelerometers": ({}, {"sampling_rate": 200.0, "sensors": {"one": {"x": 1.0, "z": 0.2}}},
-                       {"all": {"channels": 3}}),
-    "high_pass": (FORCES, {"cut_off": 0.5}, {"exudyn": {"native items": 1}, "mujoco": {"native items": 1}}),
-    "kalman_filter": (FORCES, {"file": "pitch.csv", "force_deviation": 8.0, "pitch_deviation": 0.5},
-                      {"exudyn": {"native items": 2, "callbacks": 1}, "mujoco": {"native items": 1, "callbacks": 1},
-                       "all": {"channels": 10}}),
-    "prescribed_pitch": (LINEAR, {"file": "pitch.csv"},
-                         {"reference": {"degrees of freedom": -1}, "exudyn": {"native items": 1, "callbacks": 2},
-                          "mujoco": {"degrees of freedom": -1},
-                          "all": {"channels": 2}}),
-    "prescribed_heave_and_pitch": (LINEAR, {"file": "motion.csv"},
-                                   {"reference": {"degrees of freedom": -2},
-                                    "exudyn": {"native items": 2, "callbacks": 4},
-                                    "mujoco": {"degrees of freedom": -2}, "all": {"channels": 3}}),
-}  # fmt: skip
-"""Effect -> the effects that it is added to, what the scene says of it, and what it must change: nothing else.
+EFFECTS = names_of(DEFAULT)
 
-wheel_forces takes two tyres away and puts two forces in their place, so its native items are as many as
-before; held forces take one callback before each of Exudyn's steps beside one per wheel, and none in MuJoCo.
-"""
+
+def added_to(effect: str) -> dict[str, Any]:
+    """Tables of the effects that one needs."""
+    module = module_of(DEFAULT, effect)
+    return {name: module_of(DEFAULT, name).EXAMPLE for name in module.NEEDS} | getattr(module, "BESIDE", {})
 
 
 def scene(effects: dict[str, Any], steps: int, folder: Path, guided: bool = False) -> Scene:
@@ -92,7 +69,7 @@ def model(own: Scene, engine: str) -> Model:
 
 def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
     """The same scene without and with one effect."""
-    base, values, _ = PRICED[effect]
+    base, values = added_to(effect), module_of(DEFAULT, effect).EXAMPLE
     guided = effect.startswith("prescribed")
     return scene(base, steps, folder, guided), scene({**base, effect: values}, steps, folder, guided)
 
@@ -111,8 +88,8 @@ def change(effect: str, engine: str, folder: Path) -> dict[str, int]:
 
 
 def declared(effect: str, engine: str) -> dict[str, int]:
-    """What it must add."""
-    table = PRICED[effect][2]
+    """What its file says that it adds."""
+    table = module_of(DEFAULT, effect).COUNTS
     return {key: value for key, value in {**table.get("all", {}), **table.get(engine, {})}.items() if value}
 
 
@@ -129,9 +106,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         place = Path(name)
         write_files(place)
         rows = [*_imports(), *(row for engine in ENGINES for row in _absence(engine, place))]
-        rows += [_control(effect, place) for effect in PRICED]
+        rows += [_control(effect, place) for effect in EFFECTS]
         ratios = {engine: _ratio(engine, place, 9 if quick else 40) for engine in ("exudyn", "mujoco")}
-        price = [line for effect in PRICED for line in _price(effect, place, 7 if quick else 25)]
+        price = [line for effect in EFFECTS for line in _price(effect, place, 7 if quick else 25)]
     rows += [row for engine, ratio in ratios.items() for row in _machinery(engine, ratio)]
     rows += ride.rows() + wheelset.rows() + braking.rows()
     return rows, {"price": price, "ratios": ratios}

@@ -1,0 +1,19 @@
+"""Pressures from a file in place of pedal and controller."""
+
+from typing import Any
+
+PLACE = "measured"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "a row of a table per sample"
+COUNTS = {"all": {"controllers": 1}}
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene has it."""
+    return scene.measured is not None
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """The pedal alone: all valves are open."""
+    del table["measured"]

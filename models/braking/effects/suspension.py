@@ -1,0 +1,22 @@
+"""A vehicle from a file on its springs, whose body rolls and pitches as it brakes."""
+
+from typing import Any
+
+PLACE = "vehicle.file"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "every freedom of its file, and a step of an engine around the compiled tyres"
+COUNTS: dict[str, dict[str, int]] = {"all": {"freedoms on springs": 26}}
+MODULES = ("models.braking.sprung", "models.engines")
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene has it."""
+    return scene.vehicle.file is not None
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """The same masses, axles and wheels in the plane."""
+    from models.braking.of_scene import vehicle_of
+
+    table["vehicle"] = {"override": vehicle_of(scene).model_dump()}

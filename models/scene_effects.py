@@ -1,0 +1,164 @@
+"""Effects of the scenes of every system: one file each, found by listing its system's folder; nothing registers them.
+
+A system's ``effects`` is the package that holds them. An effect's file has
+
+- a docstring, whose first sentence is its line in every list;
+- ``COST``, one sentence on what it takes, and ``COUNTS``, {"all" or an engine: {count: change}}, what it adds to the
+  counts of a scene; the proof of absence finds these and no others;
+- ``NEEDS`` and ``EXCLUDES``, names of other effects of its system, with ``WHY``, a phrase for both, if it has one;
+- ``MODULES``, those that are imported for its sake alone, if there are any.
+
+A scene names it in one of two ways. Either by a table [effects.NAME]: then the file has ``Parameters``, ``EXAMPLE``, a
+table of usual values, and ``extend(built, parameters)``, which puts it into what its system builds; also ``BESIDE``,
+tables of effects that it needs, if those with usual values do not serve. Or by the system's own tables: then the file
+has ``PLACE``, the key that names it, ``named(scene)``, and two edits of the scene's table, ``leave_out(table, scene)``
+and, if there are usual values, ``put_in(table, scene)``; both raise InputError with the remedy where it cannot be.
+Where an effect is a choice of method, to leave it out is the next cheaper one.
+"""
+
+from collections.abc import Iterable, Mapping
+from copy import deepcopy
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from typing import Any
+
+from models.errors import InputError
+from models.strict import read
+from models.systems import DEFAULT, SYSTEMS
+
+Table = dict[str, Any]
+
+
+def names_of(system: str) -> tuple[str, ...]:
+    """All effects that scenes of a system may have; none is imported."""
+    package = SYSTEMS[system].effects
+    return tuple(sorted(found.name for found in iter_modules(import_module(package).__path__))) if package else ()
+
+
+def module_of(system: str, name: str) -> Any:
+    """The file of an effect."""
+    return import_module(f"{SYSTEMS[system].effects}.{name}")
+
+
+def named(scene: Any) -> tuple[str, ...]:
+    """Effects that a scene names; of the pitch plane none is imported to know it."""
+    return tuple(name for name in names_of(scene.system) if name in tables_of(scene) or _says(scene, name))
+
+
+def absent(scene: Any) -> tuple[str, ...]:
+    """Effects of its system that a scene does not name."""
+    there = named(scene)
+    return tuple(name for name in names_of(scene.system) if name not in there)
+
+
+def tables_of(scene: Any) -> Mapping[str, Any]:
+    """The scene's tables [effects.NAME]."""
+    own = getattr(scene, "effects", None)
+    return own if isinstance(own, Mapping) else {}
+
+
+def _says(scene: Any, name: str) -> bool:
+    if scene.system == DEFAULT:  # which names its effects by tables alone
+        return False
+    module = module_of(scene.system, name)
+    return hasattr(module, "named") and bool(module.named(scene))
+
+
+def read_tables(tables: Mapping[str, Any], system: str, file: str) -> Table:
+    """Parameters of every table [effects.NAME]; raises InputError for what is no effect or has another place."""
+    return {name: _read(name, values, system, file) for name, values in tables.items()}
+
+
+def _read(name: str, values: Any, system: str, file: str) -> Any:
+    if name not in names_of(system):
+        raise InputError(file, f"effects.{name}", None, "no such effect", names_of(system))
+    module = module_of(system, name)
+    if not hasattr(module, "Parameters"):
+        raise InputError(file, f"effects.{name}", None, f"has another place in a scene: {module.PLACE}")
+    return read(module.Parameters, values, file, f"effects.{name}")
+
+
+def check(scene: Any) -> None:
+    """Refuse effects that cannot be together, with the remedy."""
+    legal(named(scene), scene)
+
+
+def legal(there: Iterable[str], scene: Any) -> None:
+    """The same of effects that are known to be there."""
+    there = tuple(there)
+    for name in there:
+        module = module_of(scene.system, name)
+        why = f", {module.WHY}" if hasattr(module, "WHY") else ""
+        for other in module.NEEDS:
+            if other not in there:
+                raise InputError(scene.file, _place(module, name), None, f"needs the effect {other!r}{why}: name it "
+                                 f"too{_at(scene, other)}")  # fmt: skip
+        for other in module.EXCLUDES:
+            if other in there:
+                raise InputError(scene.file, _place(module, name), None, f"cannot stand beside {other!r}{why}: drop "
+                                 f"one of them{_at(scene, other)}")  # fmt: skip
+
+
+def _place(module: Any, name: str) -> str:
+    """The key that names an effect."""
+    return str(module.PLACE) if hasattr(module, "named") else f"effects.{name}"
+
+
+def _at(scene: Any, name: str) -> str:
+    """Where an effect is named that has no table of its name."""
+    module = module_of(scene.system, name)
+    return f"; {name!r} is named by {module.PLACE}" if hasattr(module, "named") else ""
+
+
+def own_table(scene: Any) -> Table:
+    """What the scene's file says, as nested tables that may be edited; no defaults."""
+    table: Table = deepcopy(scene.model_dump(exclude_unset=True))
+    return {key: value for key, value in table.items() if key not in ("file", "folder")}
+
+
+def without(scene: Any, *left_out: str) -> Any:
+    """The scene less these effects; raises InputError where one cannot be left out, or others need it."""
+    table = own_table(scene)
+    for name in left_out:
+        if name in tables_of(scene):
+            del table["effects"][name]
+        else:
+            module_of(scene.system, name).leave_out(table, scene)
+    return rebuilt(table, scene)
+
+
+def beside(scene: Any, *more: str) -> Any:
+    """The scene with these effects at their usual values; raises InputError where one cannot be, or not beside others.
+    """
+    table = own_table(scene)
+    for name in more:
+        _put_in(table, name, scene)
+    return rebuilt(table, scene)
+
+
+def _put_in(table: Table, name: str, scene: Any) -> None:
+    module = module_of(scene.system, name)
+    if "file" in getattr(module, "EXAMPLE", ()):
+        raise InputError(scene.file, f"effects.{name}.file", None, "has no usual value: name a file of yours")
+    if hasattr(module, "EXAMPLE"):
+        table.setdefault("effects", {})[name] = deepcopy(module.EXAMPLE)
+    elif hasattr(module, "put_in"):
+        module.put_in(table, scene)
+    else:
+        raise InputError(scene.file, _place(module, name), None, "there are no usual values: name it in the scene")
+
+
+def rebuilt(table: Table, scene: Any) -> Any:
+    """The scene of an edited table, checked."""
+    found = import_module(SYSTEMS[scene.system].scene).build(table, scene.file, Path(scene.folder))
+    check(found)
+    return found
+
+
+def lines(scene: Any, width: int = 10) -> list[str]:
+    """What ``twinrig show`` says: a line per effect of the scene with what it takes, and one of all that are absent."""
+    said = {name: module_of(scene.system, name).COST for name in named(scene)}
+    there = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in said.items()]
+    imported = "not imported, not computed" if scene.system == DEFAULT else "not computed"
+    return [*there, f"  {'absent':<{width}} {', '.join(absent(scene)) or 'nothing'} ({imported})"]
