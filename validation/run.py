@@ -4,8 +4,9 @@ import csv
 import json
 import os
 import time
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
@@ -45,37 +46,53 @@ def validate(folder: Path, quick: bool, command: str, earlier: dict[str, Any] | 
     start = time.perf_counter()
     found: dict[str, tuple[list[Row], float]] = {}
     (folder / "data").mkdir(exist_ok=True)
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("validate", total=len(CASES))
-        for name, outcome in _outcomes(quick, folder):
-            found[name] = outcome
-            bar.update(task, description=name, advance=1)
-    rows = [row for name in CASES for row in found[name][0]]
-    seconds = {name: found[name][1] for name in CASES}
-    wall = time.perf_counter() - start
-    save(folder, rows, {**provenance(command), "seeds": seeds(), "quick": quick, "seconds": seconds, "wall": wall},
-          earlier)  # fmt: skip
-    from validation.report.page import write
-
-    return say(rows, wall, write(folder))
-
-
-def _outcomes(quick: bool, folder: Path) -> Iterator[tuple[str, tuple[list[Row], float]]]:
-    """Rows and seconds of every case, as they end: first those that may share the machine, then the others."""
-    shared = [name for name in CASES if name not in ALONE]
     context = get_context("spawn")  # an engine's threads do not survive a fork
     with one_thread_each(), ProcessPoolExecutor(min(WORKERS, os.cpu_count() or 1), mp_context=context) as pool:
-        jobs = {pool.submit(_measure, name, quick, folder): name for name in shared}
-        try:
-            for job in as_completed(jobs):
-                error = job.exception()  # of a process that died: what a case raises is a row already
-                yield jobs[job], job.result() if error is None else ([_broken(jobs[job], error)], 0.0)
-        except KeyboardInterrupt:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-    for name in CASES:
-        if name in ALONE:
-            yield name, _measure(name, quick, folder)
+        with Progress(console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task("validate", total=len(CASES))
+            for name, outcome in _outcomes(pool, quick, folder):
+                found[name] = outcome
+                bar.update(task, description=name, advance=1)
+        rows = [row for name in CASES for row in found[name][0]]
+        seconds = {name: found[name][1] for name in CASES}
+        wall = time.perf_counter() - start
+        source = provenance(command)
+        save(folder, rows, {**source, "seeds": _in(pool, seeds), "quick": quick, "seconds": seconds, "wall": wall},
+             earlier)  # fmt: skip
+        path = _written(pool, folder)
+    return say(rows, time.perf_counter() - start, path)
+
+
+def _outcomes(pool: Executor, quick: bool, folder: Path) -> Iterator[tuple[str, tuple[list[Row], float]]]:
+    """Rows and seconds of every case, as they end: first those that may share the machine, then the others."""
+    jobs = {pool.submit(_measure, name, quick, folder): name for name in CASES if name not in ALONE}
+    try:
+        for job in as_completed(jobs):
+            error = job.exception()  # of a process that died: what a case raises is a row already
+            yield jobs[job], job.result() if error is None else ([_broken(jobs[job], error)], 0.0)
+        for name in ALONE:
+            yield name, _in(pool, _measure, name, quick, folder)
+    except KeyboardInterrupt:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+
+
+def _in(pool: Executor, function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a process of the pool makes of this, which has its imports done; this process, once one of them died."""
+    try:
+        return pool.submit(function, *arguments).result()
+    except BrokenProcessPool:
+        return function(*arguments)
+
+
+def _written(pool: Executor, folder: Path) -> Path:
+    """The report, its figures drawn by the pool; by this process, once one of the pool's died."""
+    from validation.report.page import write
+
+    try:
+        return write(folder, pool.map)
+    except BrokenProcessPool:
+        return write(folder)
 
 
 def _measure(name: str, quick: bool, folder: Path) -> tuple[list[Row], float]:

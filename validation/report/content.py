@@ -79,13 +79,8 @@ def systems(results: Results) -> list[dict[str, Any]]:
 def _cases(rows: list[dict[str, Any]], results: Results) -> Iterator[dict[str, Any]]:
     for name in dict.fromkeys(map(case_of, rows)):
         own = [row for row in rows if case_of(row) == name]
-        module = case_module(name)
-        doc = inspect.getdoc(module) if module else ""
         yield {
             "name": name,
-            "title": getattr(module, "TITLE", name.replace("_", " ")),
-            "about": (doc or "").partition("\n\n")[0],
-            "module": module,
             "seconds": results["provenance"]["seconds"].get(name),
             "groups": [{"why": why, "rows": [row for row in own if row["why"] == why]}
                        for why in dict.fromkeys(row["why"] for row in own)],
@@ -110,23 +105,12 @@ def shares(results: Results) -> list[dict[str, Any]]:
     return [line for line in lines.values() if line["rows"]]
 
 
-def case_module(name: str) -> ModuleType | None:
-    """The module of a case, None where this checkout has none of that name."""
-    if not name.isidentifier():
-        return None
-    try:
-        return import_module(f"validation.cases.{name}")
-    except ImportError:
-        return None
-
-
-def independence(results: Results) -> dict[str, Any]:
-    """How many rows of each case rest on which kind of second side."""
+def independence(results: Results, drawn: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """How many rows of each case rest on which kind of second side; drawn : what is shown of each, by name."""
     lines = []
     for name in dict.fromkeys(map(case_of, results["rows"])):
         own = [row["independence"] for row in results["rows"] if case_of(row) == name and row["status"] != "not run"]
-        title = getattr(case_module(name), "TITLE", name.replace("_", " "))
-        lines.append((name, title, [own.count(kind) for kind in KINDS]))
+        lines.append((name, drawn[name]["title"], [own.count(kind) for kind in KINDS]))
     return {"kinds": KINDS, "lines": lines, "total": [sum(line[2][i] for line in lines) for i in range(len(KINDS))]}
 
 

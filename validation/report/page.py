@@ -5,24 +5,30 @@
 
 import json
 import os
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from models.errors import InputError
 from validation.report import content
 from validation.report.numbers import duration, margin, marked, number, numeric_columns, powers, share
+from validation.report.shown import shown
 
 TEMPLATE = "page.html.jinja"
 BLANK: dict[str, Any] = {"quick": False, "command": "", "versions": {}, "seconds": {}, "wall": None}
 """What a page needs of its provenance, where the results do not hold it."""
 
 
-def write(folder: Path) -> Path:
-    """Write ``folder/report.html`` from ``results.json`` and ``data/CASE.json``; returns its path."""
+def write(folder: Path, each: Callable[..., Iterable[Any]] = map) -> Path:
+    """Write ``folder/report.html`` from ``results.json`` and ``data/CASE.json``; returns its path.
+
+    each : draws the cases, such as the map of a pool of processes.
+    """
     results = _read(folder / "results.json")
     path = folder / "report.html"
     part = folder / ".report.html.part"
-    part.write_text(page(results, folder / "data"), encoding="utf-8")
+    part.write_text(page(results, folder / "data", each), encoding="utf-8")
     os.replace(part, path)
     return path
 
@@ -39,7 +45,7 @@ def _read(path: Path) -> dict[str, Any]:
         raise InputError(path, "", None, f"not the results of a validation: {error}") from None
 
 
-def page(results: dict[str, Any], data: Path) -> str:
+def page(results: dict[str, Any], data: Path, each: Callable[..., Iterable[Any]] = map) -> str:
     """The page as text."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -49,46 +55,14 @@ def page(results: dict[str, Any], data: Path) -> str:
     environment.filters |= {"number": number, "share": share, "duration": duration, "powers": powers, "marked": marked,
                             "numeric_columns": numeric_columns}  # fmt: skip
     environment.globals |= {"margin": margin, "reported": content.reported, "case_of": content.case_of}
+    names = list(dict.fromkeys(map(content.case_of, results["rows"])))
+    drawn = dict(zip(names, each(partial(shown, data), names), strict=True))
     systems = content.systems(results)
     for case in (case for system in systems for case in system["cases"]):
-        case |= _shown(case, data / f"{case['name']}.json")
+        case |= drawn[case["name"]]
     return environment.get_template(TEMPLATE).render(
         verdict=content.verdict(results), against=results.get("against"), systems=systems,
         silent=content.silent_systems(results["rows"]),
-        shares=content.shares(results), independence=content.independence(results), conventions=content.conventions(),
-        parameters=content.parameter_tables(), provenance=results["provenance"],
+        shares=content.shares(results), independence=content.independence(results, drawn),
+        conventions=content.conventions(), parameters=content.parameter_tables(), provenance=results["provenance"],
     )  # fmt: skip
-
-
-def _shown(case: dict[str, Any], path: Path) -> dict[str, Any]:
-    """Tables and figures of a case; what is missing or cannot be read is said on the page."""
-    shown: dict[str, Any] = {"tables": [], "figures": [], "notes": []}
-    module = case["module"]
-    if module is None:
-        shown["notes"].append("This version of twinrig has no such case; its rows are shown as they were saved.")
-    if not (hasattr(module, "tables") or hasattr(module, "draw")):
-        return shown
-    try:
-        saved = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        shown["notes"].append(f"data/{path.name} is missing or damaged: no tables and figures.")
-        return shown
-    for kind, make in (("tables", _tables), ("figures", _figures)):
-        try:
-            shown[kind] = make(module, saved, case["name"])
-        except Exception as error:  # old data under new code must still give a page
-            shown["notes"].append(f"The {kind} cannot be shown from data/{path.name}: {type(error).__name__}: {error}")
-    return shown
-
-
-def _tables(module: Any, saved: Any, name: str) -> list[Any]:
-    return list(module.tables(saved)) if hasattr(module, "tables") else []
-
-
-def _figures(module: Any, saved: Any, name: str) -> list[tuple[str, Any]]:
-    if not hasattr(module, "draw"):
-        return []
-    from validation.report.figures import inline
-
-    drawn = module.draw(saved)
-    return [(caption, inline(figure, caption, f"{name}-{i}")) for i, (caption, figure) in enumerate(drawn)]
