@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from models.contact.accuracy import Error, rolled
-from models.contact.of_scene import contact, touches
+from models.contact.of_scene import contact, creepages, touches
 from models.contact.scene import ContactScene, Method
 from models.contact.theories import Contact, ExactOnEllipse, Fastsim, Motion, OnEllipse, Rolled
 from models.contact.work_precision import duration
@@ -63,13 +63,6 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     _figures(scene, body, motions, found, folder)
     return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(body, motions, found),
             "table": _table(scene, body, motions, found, times)}  # fmt: skip
-
-
-def creepages(scene: ContactScene) -> list[Motion]:
-    """The creepages of the scene, one or a sweep of them."""
-    fixed = scene.creepage.model_dump()
-    values = [{}] if scene.sweep is None else [{scene.sweep.of: float(value)} for value in scene.sweep.values()]
-    return [tuple({**fixed, **value}.values()) for value in values]  # type: ignore[misc]
 
 
 def _save(motions: list[Motion], found: list[tuple[Rolled, Error]], folder: Path) -> None:

@@ -11,7 +11,7 @@ from models.contact.profiles import Profile
 from models.contact.scene import ContactScene
 from models.contact.simplified_theory import NormalContact, press
 from models.contact.standard_profiles import RAILS, WHEELS, built_in
-from models.contact.theories import Contact, Exact, ExactOnEllipse, Fastsim, Linear, Simplified
+from models.contact.theories import Contact, Exact, ExactOnEllipse, Fastsim, Linear, Motion, Simplified
 from models.contact.undeformed_distance import quadratic
 from models.contact.wheel_on_rail import Touch, Track, Wheelset, wheel_on_rail
 from models.errors import InputError
@@ -35,6 +35,13 @@ def contact(scene: ContactScene) -> Contact:
         choices = method.model_dump(include={"march", "bound", "flexibilities"})
         return Fastsim(hertz, friction, scene.pair, **choices, falling=scene.falling_friction)
     return (Linear if method.name == "linear" else ExactOnEllipse)(hertz, friction, scene.pair)
+
+
+def creepages(scene: ContactScene) -> list[Motion]:
+    """The creepages of the scene, one or a sweep of them."""
+    fixed = scene.creepage.model_dump()
+    values = [{}] if scene.sweep is None else [{scene.sweep.of: float(value)} for value in scene.sweep.values()]
+    return [tuple({**fixed, **value}.values()) for value in values]  # type: ignore[misc]
 
 
 def _pressed(scene: ContactScene) -> tuple[float | None, float | None]:

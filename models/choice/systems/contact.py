@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from models.choice.answer import Answer, Quantity
-from models.contact.of_scene import contact
+from models.contact.of_scene import contact, creepages
 from models.contact.scene import ContactScene
 from models.errors import InputError
 
@@ -20,7 +20,7 @@ def answer(scene: ContactScene, engine: str) -> Answer:
         raise InputError(scene.file, "cases", None, "is a table of contacts: give the price of one of them")
     begun = time.process_time()
     body = contact(scene)
-    rolled = [body.roll(*motion, scene.method.cells) for motion in scene.motions()]
+    rolled = [body.roll(*motion, scene.method.cells) for motion in creepages(scene)]
     seconds = time.process_time() - begun
     found = {name: Quantity(unit, (np.array([getattr(one, name) for one in rolled]),)) for name, unit in FORCES.items()}
     return Answer(found, {"steps": len(rolled), "calls": len(rolled), "states": 0}, seconds)
