@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -162,3 +163,29 @@ def test_a_sweep_knows_its_scene_its_files_its_values_and_its_engine(tmp_path):
         assert facts(**change) != first
     (tmp_path / "cases.csv").write_text("2\n")
     assert facts() != first
+
+
+class Counted:
+    """A job that notes how many of its blocks are under way."""
+
+    def __init__(self):
+        self.now, self.most = 0, 0
+
+    def __call__(self, paths):
+        self.now += 1
+        self.most = max(self.most, self.now)
+        time.sleep(0.01)
+        self.now -= 1
+        return {"x": np.arange(paths[0], paths[-1] + 1)}
+
+    def facts(self):
+        return {}
+
+
+@pytest.mark.parametrize("ahead", [1, 2])
+def test_no_more_blocks_are_under_way_than_were_asked_for(ahead):
+    """What is timed must have the machine to itself."""
+    job = Counted()
+    with ThreadPoolExecutor(4) as pool:
+        run_paths(job, 6, executor=pool, block=1, ahead=ahead)
+    assert job.most == ahead

@@ -96,7 +96,7 @@ class _Memory:
 
 def run_paths(job: Job, paths: int, folder: Path | None = None, executor: Executor | None = None,
               block: int = BLOCK, progress: Callable[[Progress], None] = lambda state: None,
-              lost: Callable[[range, str], Arrays] | None = None) -> Arrays:  # fmt: skip
+              lost: Callable[[range, str], Arrays] | None = None, ahead: int = AHEAD) -> Arrays:  # fmt: skip
     """Arrays of all paths 0 to ``paths`` - 1, the same bits on any executor, in any order and after any interruption.
 
     folder : keeps every finished block; one that holds blocks of the same job is resumed, one of another job is
@@ -104,13 +104,14 @@ def run_paths(job: Job, paths: int, folder: Path | None = None, executor: Execut
     (``processes``), a Dask cluster (``cluster``), a thread pool; None computes here. A block that fails does
     not stop the others, and one that loses its worker is computed again: RunFailed then names the blocks and paths
     that are left, and what is finished is kept. A full disk ends it at once, with RunFailed. lost : (paths, reason)
-    -> what stands for a block that failed, in place of RunFailed; it is not kept, so that resuming tries again.
+    -> what stands for a block that failed, in place of RunFailed; it is not kept, so that resuming tries again. ahead :
+    blocks under way at once.
     """
     facts = {"paths": paths, "paths per block": block, **job.facts()}
     cut = [range(first, min(first + block, paths)) for first in range(0, paths, block)]
     store = _Memory() if folder is None else Store(folder)
     with nullcontext() if isinstance(store, _Memory) else store.claimed(facts):
-        failed = _compute(job, cut, store, executor, progress)
+        failed = _compute(job, cut, store, executor, progress, ahead)
         if failed and lost is None:
             told = [f"block {i} (paths {cut[i][0]} to {cut[i][-1]}): {reason}" for i, reason in failed.items()]
             kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
@@ -120,14 +121,14 @@ def run_paths(job: Job, paths: int, folder: Path | None = None, executor: Execut
 
 
 def _compute(job: Job, cut: list[range], store: Store | _Memory, executor: Executor | None,
-             progress: Callable[[Progress], None]) -> dict[int, str]:  # fmt: skip
+             progress: Callable[[Progress], None], ahead: int) -> dict[int, str]:  # fmt: skip
     """Compute and save the missing blocks; returns the reasons of those that failed."""
     missing = [i for i in range(len(cut)) if not store.has(i)]
     paths = sum(map(len, cut))
     done = before = paths - sum(len(cut[i]) for i in missing)
     start, failed = time.perf_counter(), dict[int, str]()
     progress(Progress(done, paths, 0.0, math.inf if missing else 0.0))
-    with closing(_answers(job, cut, missing, executor)) as answers:  # an interrupt drops at once what waits
+    with closing(_answers(job, cut, missing, executor, ahead)) as answers:  # an interrupt drops at once what waits
         for i, answer in answers:
             if isinstance(answer, _Failure) and answer.full:
                 raise _full(answer.reason, store)
@@ -141,8 +142,8 @@ def _compute(job: Job, cut: list[range], store: Store | _Memory, executor: Execu
     return failed
 
 
-def _answers(job: Job, cut: list[range], missing: list[int],
-             executor: Executor | None) -> Generator[tuple[int, Arrays | _Failure]]:  # fmt: skip
+def _answers(job: Job, cut: list[range], missing: list[int], executor: Executor | None,
+             ahead: int) -> Generator[tuple[int, Arrays | _Failure]]:  # fmt: skip
     """Blocks and their answers, as they come."""
     if executor is None:
         yield from ((i, _attempt(job, cut[i])) for i in missing)
@@ -150,7 +151,7 @@ def _answers(job: Job, cut: list[range], missing: list[int],
     queue, alone, lost, waiting = deque(missing), deque[int](), Counter[int](), dict[Future, int]()
     try:
         while queue or alone or waiting:
-            while (queue and len(waiting) < AHEAD) or (alone and not waiting):
+            while (queue and len(waiting) < ahead) or (alone and not waiting):
                 i = (queue or alone).popleft()
                 waiting[_submitted(executor, job, cut[i])] = i
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
