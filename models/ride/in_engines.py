@@ -53,14 +53,15 @@ def ridden(engine: str, vehicle: SpatialVehicle, road: RoadPath, duration: float
     states = [(run.positions[i], run.rates[i], table[2 * i]) for i in at]
     accelerations = np.array([model.acceleration(*state) for state in states])
     rows = np.column_stack([accelerations, run.rates[at], run.positions[at], table[2 * at]])
-    outputs = rows @ np.array([_row(output) for output in own]).T
+    outputs = rows @ np.array([row_of(output) for output in own]).T
     for i, spec in enumerate(vehicle.outputs):
         if spec.kind == "force" and _bent(vehicle, spec.part):
             outputs[:, i] = np.nan
     return Ride(tuple(output.name for output in own), run, at * road.step - at[0] * road.step, outputs)
 
 
-def _row(output: Output) -> np.ndarray:
+def row_of(output: Output) -> np.ndarray:
+    """Factors (3 n + 2 w,) of accelerations, rates, positions, road heights and their rates."""
     return np.concatenate([output.acceleration, output.rate, output.displacement, output.road, output.road_rate])
 
 

@@ -18,6 +18,7 @@ from validation.price.problems import (
     Setting,
     braking_stop,
     force_excited,
+    free_vehicle,
     noisy_forces,
     prescribed_pitch,
     road_excited,
@@ -31,10 +32,13 @@ TITLE = "What accuracy costs"
 SYSTEM: System = "cost"
 PROBLEMS: tuple[Callable[[bool], Problem], ...] = (road_excited.problem, force_excited.problem,
                                                    wheelset.problem, braking_stop.problem)  # fmt: skip
-FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (noisy_forces.problem, prescribed_pitch.problem)
+FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (noisy_forces.problem, prescribed_pitch.problem,
+                                                    free_vehicle.problem)  # fmt: skip
 """Problems that a quick run leaves out; it has those of PROBLEMS."""
 ROUNDS = {True: 5, False: 15}
 """Interleaved rounds of timing, by ``quick``."""
+FEW: dict[Callable[[bool], Problem], int] = {free_vehicle.problem: 1}
+"""Rounds of problems whose settings take seconds each."""
 LEAST = {True: 0.004, False: 0.01}
 """A short run is repeated until its turn lasts this long (s), by ``quick``."""
 CALLBACKS = {
@@ -50,9 +54,10 @@ COUNTED = 0.2
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of all problems, of the force calls, and of two claims about speed."""
     rows, saved = [], []
-    for problem in (make(quick) for make in (PROBLEMS if quick else PROBLEMS + FULL_ONLY)):
-        points = cost.measure(problem, quick, ROUNDS[quick], LEAST[quick])
-        saved.append({"problem": cost.describe(problem, ROUNDS[quick]), "points": [p.as_dict() for p in points]})
+    for make in PROBLEMS if quick else PROBLEMS + FULL_ONLY:
+        problem, rounds = make(quick), FEW.get(make, ROUNDS[quick])
+        points = cost.measure(problem, quick, rounds, LEAST[quick])
+        saved.append({"problem": cost.describe(problem, rounds), "points": [p.as_dict() for p in points]})
         rows += rows_of(problem, points, quick)
     road = road_excited.problem(quick)
     ride_rows, ride_data = ride.measure(quick, ROUNDS[True], LEAST[True])

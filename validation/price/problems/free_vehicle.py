@@ -1,0 +1,165 @@
+"""Problem F: the passenger car of 19 freedoms, free on the road, in time; what its variances cost is in ``price.ride``.
+
+The road is a formula, smooth in every derivative, so that a method keeps its order and another tool has the same one:
+two tracks of sines that rise out of the plane some metres after the start. An engineer reads wheel loads and the
+accelerations of body and occupants. Every engine has its own bodies, joints and turns; the reference is the equations
+written by hand. The price of a call differs fifty-fold: Exudyn asks Python for the side forces, the road and the bars.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, partial
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.integrate import solve_ivp
+
+from models.engines.catalogue import CATALOGUE
+from models.engines.spatial_protocol import SpatialRun, build
+from models.engines.spatial_reference import SpatialReference
+from models.ride.in_engines import row_of
+from models.vehicles.spatial_linear import linearise
+from models.vehicles.vehicle_file import load_vehicle
+from validation.price.problems import Setting
+from validation.price.problems.road_excited import setting, settings_of
+
+DURATION, SPEED = 0.5, 20.0
+"""s, m/s"""
+SINES, LONGEST, HEIGHT = 12, 24.0, 0.012
+"""Of each track; length (m) of the first sine, whose k-th has a k-th of it; its amplitude (m), falling as 1 / k."""
+GOLDEN = 0.6180339887498949
+"""Phases of the sines are its multiples: a formula that nobody has to draw."""
+RISE, SOFT = 3.0, 0.5
+"""Where the road has half its height (m from the origin), and over what length it rises."""
+GRID = 20e-3
+"""Spacing (s) of the instants that are compared, which every step meets."""
+GRAVITY = 9.81
+MS = 1e-3
+_LONG = (20 * MS, 10 * MS, 20 / 3 * MS, 5 * MS, 4 * MS, 2 * MS)
+_MIDDLE = (10 * MS, 5 * MS, 4 * MS, 2.5 * MS, 2 * MS, 1 * MS)
+_SHORT = (20 / 7 * MS, 2.5 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.3125 * MS)
+_NATIVE = (20 * MS, 10 * MS, 5 * MS, 4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS)
+FULL: dict[tuple[str, str], tuple[float, ...]] = {
+    ("exudyn", "RK44"): _LONG,
+    ("exudyn", "ExplicitMidpoint"): (10 * MS, 20 / 3 * MS, 5 * MS, 4 * MS, 2.5 * MS, 2 * MS),
+    ("exudyn", "ExplicitEuler"): _SHORT,
+    ("exudyn", "VelocityVerlet"): _MIDDLE,
+    ("exudyn", "GeneralizedAlpha 0.9"): _LONG,
+    ("exudyn", "TrapezoidalIndex2"): _LONG,
+    ("exudyn", "DOPRI5"): (1e-6,),
+    ("exudyn", "ODE23"): (1e-6,),
+    ("mujoco", "RK4"): _NATIVE,
+    ("mujoco", "Euler"): _NATIVE[1:],
+    ("mujoco", "implicit"): _NATIVE[1:],
+    ("mujoco", "implicitfast"): _NATIVE[1:],
+    ("mujoco", "discrete"): _NATIVE[1:],
+}
+"""Steps (s) of every method; Exudyn's are few, because a call takes it half a millisecond. Adaptive methods are there
+to be refused: the road is read at half steps."""
+KINDS = {"wheel load": "tyre force", "acceleration": "acceleration"}
+"""Kinds of the vehicle's outputs that are read."""
+REFERENCES = (("DOP853", 1e-11, "equations by hand"), ("LSODA", 1e-12, "MuJoCo's accelerations"))
+"""Solvers with their relative tolerances and what they solve: a Runge-Kutta method and a multistep one."""
+
+
+def heights(place: ArrayLike, track: int) -> tuple[np.ndarray, np.ndarray]:
+    """Height (m) and slope of a track, 0 the left one and 1 the right one, at places (...) in m along the road."""
+    x, k = np.asarray(place, dtype=float), np.arange(1, SINES + 1)
+    angle = 2 * np.pi * (x[..., None] * k / LONGEST + GOLDEN * k * (k + SINES * track))
+    shape = (HEIGHT / k * np.sin(angle)).sum(axis=-1)
+    slope = 2 * np.pi * HEIGHT / LONGEST * np.cos(angle).sum(axis=-1)
+    rise = 1 / (1 + np.exp(-(x - RISE) / SOFT))
+    return rise * shape, rise * slope + rise * (1 - rise) / SOFT * shape
+
+
+@dataclass(frozen=True)
+class Solver:
+    """A run that is ready."""
+
+    run: Callable[[], SpatialRun]
+
+
+class FreeVehicle:
+    """The problem with its reference; see ``validation.price.problems.Problem``."""
+
+    key = "vehicle"
+    duration = DURATION
+    note = ("All of Exudyn's calls ask Python for side forces, bars and the road, fifty times as dear as MuJoCo's "
+            "compiled callback: force calls do not show it, seconds do.")  # fmt: skip
+    tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1)
+
+    def __init__(self, quick: bool) -> None:
+        steps = [1e3 * one.value for one in self.settings(quick) if not one.adaptive]
+        self.title = (f"Passenger car of 19 freedoms, free on a road of two tracks, {DURATION:g} s at {SPEED:g} m/s, "
+                      f"steps of {min(steps):g} to {max(steps):g} ms")  # fmt: skip
+        self.units = {"wheel load": "N", "acceleration": "m/s^2"}
+        self.vehicle = replace(load_vehicle("r19_free"), gravity=GRAVITY)
+        self.instants = GRID * np.arange(round(DURATION / GRID) + 1)
+        self.reference = " and ".join(f"{what} by {method} at {tol:g}" for method, tol, what in REFERENCES)
+        self._outputs = linearise(self.vehicle, SPEED).outputs
+        self._model = build("mujoco", self.vehicle, None, SPEED)
+        laws = SpatialReference(self.vehicle, SPEED).acceleration, self._model.acceleration
+        self.states, self.others = (self._solved(law, *one[:2]) for law, one in zip(laws, REFERENCES, strict=True))
+        self._true = self.read(self.states, self.instants)
+        self.uncertainty = self._off(self.read(self.others, self.instants))
+        self.bound = 10 * float(np.abs(self._true["wheel load"]).max())
+
+    def road(self, times: ArrayLike) -> np.ndarray:
+        """Heights (m) under the wheels at times (..., ) in s, then their rates (m/s): (..., 2 w)."""
+        found = [heights(SPEED * np.asarray(times) + tyre.point[0], int(tyre.point[1] < 0))
+                 for tyre in self.vehicle.tyres]  # fmt: skip
+        return np.stack([*(height for height, _ in found), *(SPEED * slope for _, slope in found)], axis=-1)
+
+    def _solved(self, acceleration: Callable[..., np.ndarray], method: str, tolerance: float) -> np.ndarray:
+        """States (m, 2 n) at the instants, from rest."""
+        n = len(self.vehicle.coordinates())
+
+        def rates(t: float, y: np.ndarray) -> np.ndarray:
+            return np.concatenate([y[n:], acceleration(y[:n], y[n:], self.road(t))])
+
+        found = solve_ivp(rates, (0.0, DURATION), np.zeros(2 * n), method=method, t_eval=self.instants,
+                          rtol=tolerance, atol=1e-2 * tolerance)  # fmt: skip
+        return found.y.T
+
+    def read(self, states: np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
+        """Wheel loads beside the static ones (m, w) in N and accelerations (m, p) in m/s^2 of states (m, 2 n)."""
+        road = self.road(times)
+        n = states.shape[1] // 2
+        given = [self._model.acceleration(y[:n], y[n:], z) for y, z in zip(states, road, strict=True)]
+        motion = np.column_stack([given, states[:, n:], states[:, :n], road])
+        return {name: motion @ np.array([row_of(output) for output in self._outputs if output.kind == kind]).T
+                for name, kind in KINDS.items()}  # fmt: skip
+
+    def settings(self, quick: bool) -> tuple[Setting, ...]:
+        """FULL: there is no quick share, of which the reference alone would take seconds."""
+        return tuple(self.setting(*curve, value) for curve, values in FULL.items() for value in values)
+
+    def setting(self, engine: str, method: str, value: float) -> Setting:
+        """A setting by its curve and the longest step (s) up to ``value`` that meets every instant, or a tolerance."""
+        known = CATALOGUE[engine][method.split()[0]]
+        own = value if known.adaptive else GRID / np.ceil(GRID / value * (1 - 1e-9))
+        return setting(engine, method, float(own))
+
+    def build(self, setting: Setting) -> Solver:
+        """The vehicle in one engine."""
+        own = replace(settings_of(setting, DURATION), step=MS if setting.adaptive else setting.value)
+        times = 0.5 * own.step * np.arange(2 * own.steps + 1)
+        model = build(setting.engine, self.vehicle, own, SPEED, self.road(times))
+        rest = np.zeros(len(self.vehicle.coordinates()))
+        return Solver(partial(model.run, rest, rest))
+
+    def errors(self, solution: SpatialRun) -> dict[str, float]:
+        """Largest error of any wheel load and of any acceleration, at the instants."""
+        every = round(GRID / (solution.times[1] - solution.times[0]))
+        states = np.hstack([solution.positions, solution.rates])[::every]
+        return self._off(self.read(states, self.instants))
+
+    def _off(self, found: dict[str, np.ndarray]) -> dict[str, float]:
+        """Largest difference of each quantity from the reference."""
+        return {name: float(np.abs(values - self._true[name]).max()) for name, values in found.items()}
+
+
+@cache
+def problem(quick: bool) -> FreeVehicle:
+    """The problem, its reference computed once per process."""
+    return FreeVehicle(quick)
