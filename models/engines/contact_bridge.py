@@ -235,9 +235,13 @@ def linear(wheels: Wheels) -> Linear:
 
 
 def check_step(engine: str, wheels: Wheels, method: str, step: float, steps: int = LONG_RUN) -> None:
-    """Refuse a step (s) at which a motion of the wheels would grow over the run, naming the limit."""
-    about = linear(replace(wheels, count=1))
-    if growth(method, step, steps * step, about) > np.log(GROWTH):
-        longest = limit(method, step, LONG_RUN * step, about)
+    """Refuse a step (s) at which a motion of the wheels would grow over the run, naming the limit.
+
+    MuJoCo's ``discrete`` is implicit in its own springs and dampers, not in forces of a callback: it goes by the limit
+    of ``Euler``.
+    """
+    about, like = linear(replace(wheels, count=1)), "Euler" if method == "discrete" else method
+    if growth(like, step, steps * step, about) > np.log(GROWTH):
+        longest = limit(like, step, LONG_RUN * step, about)
         raise Refused(engine, f"step {step:g} s exceeds the stability limit of {method}, {0.999 * longest:.3g} s, for "
                               f"wheels at {wheels.speed:g} m/s: shorten it, or take an implicit method")  # fmt: skip

@@ -119,9 +119,11 @@ class Rolling:
 
         self.mbs.SetPreStepUserFunction(hold)
 
-    def run(self, q: Array, v: Array, steps: int, step: float = 1e-4, solver: str = "ExplicitEuler") -> Array:
+    def run(self, q: Array, v: Array, steps: int, step: float = 1e-4, solver: str = "ExplicitEuler",
+            tolerance: float = 0.0) -> Array:  # fmt: skip
         """State (2 size,) after some steps from positions and rates (size,); RunFailed unless it is finite.
 
+        tolerance : relative, of a solver that picks its own steps, at most ``step`` long; 0 for steps as they are.
         Refused is raised for a step that an explicit solver cannot take; RunFailed where Newton's method gives up.
         """
         check_step("exudyn", self.wheels, solver, step, steps)
@@ -132,7 +134,9 @@ class Rolling:
         options.solution.file.write = options.solution.sensors.active = False
         ti = options.timeIntegration
         ti.numberOfSteps, ti.endTime, ti.verboseMode = steps, steps * step, 0
-        ti.adaptiveStep = ti.automaticStepSize = ti.explicit.computeEndOfStepAccelerations = False
+        ti.adaptiveStep = ti.explicit.computeEndOfStepAccelerations = False
+        ti.automaticStepSize = tolerance > 0.0
+        ti.relativeTolerance, ti.absoluteTolerance = tolerance, 1e-2 * tolerance
         if self._slopes is not None:  # steep slopes converge slowly but surely: keep the matrix, go on for longer
             ti.newton.useModifiedNewton, ti.newton.modifiedNewtonContractivity = True, CONTRACTIVITY
             ti.newton.maxIterations = ITERATIONS
