@@ -43,11 +43,8 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     """All six runs in each engine; saves every result, five figures and ``table.txt``."""
     check(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
-    every = stride(scene, options.sampling_rate)
-    measured = measure(scene)
+    measured, deviation, scenes = followed(scene, folder)
     measured.save(folder / "measurement.nc")
-    deviation = options.noise_fraction * write_measurement(measured, options.sampling_rate, every, folder)
-    scenes = _scenes(scene, options, folder, deviation)
     runs: dict[str, dict[str, Result]] = {engine: {} for engine in engines}
     failed: dict[str, str] = {}
     pairs = [(engine, name) for engine in engines for name in scenes]
@@ -74,6 +71,15 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "failed": failed,
         "table": table,
     }
+
+
+def followed(scene: Scene, folder: Path) -> tuple[Result, float, dict[str, Scene]]:
+    """The measurement, the noise's deviation (N), and by name the scenes of the runs that follow its files in folder."""
+    options = read(Options, scene.options, scene.file, "options")
+    measured = measure(scene)
+    largest = write_measurement(measured, options.sampling_rate, stride(scene, options.sampling_rate), folder)
+    deviation = options.noise_fraction * largest
+    return measured, deviation, _scenes(scene, options, folder, deviation)
 
 
 def check(scene: Scene, engines: tuple[str, ...]) -> None:

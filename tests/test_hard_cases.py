@@ -160,13 +160,20 @@ def test_a_silent_case_fails_its_row_and_the_total(monkeypatch, tmp_path):
     assert next(row for row in rows if row.id == "hard.silent").value == 3
     of_numbers, counts, table = hard_cases.tables(data)
     assert len(of_numbers.rows) == 54 and "missing" in of_numbers.rows[0][2]
-    assert counts.rows[-1] == ("all", "1", "0", "0", "0", "3")
+    assert counts.rows[-1] == ("all", "1 of 1", "0", "0", "0", "3")
     assert table.rows[0][3:] == ("SILENT, 2.0e+00",) * 3 + ("worse",)
 
 
 def test_every_family_is_in_the_table():
     files = {path.stem for path in Path(invariants.__file__).parent.glob("*.py")}
     assert set(FAMILIES) == files - {"__init__", "case", "catalogue", "setups"}
+
+
+def test_the_quick_share_has_cases_of_every_family():
+    known = cases_by_family()
+    own = hard_cases.some(known)
+    assert {family for family, _ in own} == set(FAMILIES) and all(pair in known for pair in own)
+    assert len(own) <= len(FAMILIES) + len(known) / hard_cases.EVERY
 
 
 def test_every_number_of_the_catalogue_has_its_cases():

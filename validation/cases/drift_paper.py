@@ -1,11 +1,14 @@
 """The paper's six runs beside its figures, and why they cannot all be reproduced."""
 
+from collections.abc import Collection
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from models.scene import Scene
+from models.simulate import simulate
 from models.systems import load
-from studies.six_runs import run
+from studies.six_runs import followed, row
 from validation.rows import Row, System, Table, finding, within
 
 TITLE = "The paper's six runs"
@@ -15,6 +18,8 @@ ALONE = ("options.noise_samples=1", "options.perturbed_models=0")
 """Without the random models and all noise samples but one."""
 RATES = (200.0, 400.0, 1000.0, 2000.0)
 """Sampling rates (Hz) of the full report; the quick one has the study's own alone."""
+QUICK = (*ALONE, "run.duration=15")
+"""Of the quick share: a quarter of a minute, in which undisturbed forces do not drift off."""
 
 FIGURES = (
     ("undisturbed", "undisturbed", "drift-off", "drift-off of undisturbed forces", "s", "about 30 (Fig. 5, read off)",
@@ -36,11 +41,10 @@ FIGURES = (
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for drift-off times, enforced moments and the inertia term of the reference."""
-    summary = _run(ALONE if quick else ())
-    found = {row["run"]: row for row in summary["rows"]}
-    rate = f"{summary['sampling rate']:g} Hz, linear in between"
+    scene = load(SCENE, QUICK if quick else ())
+    found, rate = _run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
     rows = [finding(f"drift.{name}", SYSTEM, f"{words}, {rate}", found[which][what], unit, paper, why)
-            for name, which, what, words, unit, paper, why in FIGURES]  # fmt: skip
+            for name, which, what, words, unit, paper, why in FIGURES if found[which][what] is not None]  # fmt: skip
     lacking = found["guided, perturbed"]
     rows.append(within("drift.moment.ratio", SYSTEM, "enforced moment by inertia term, perturbed model alone",
                        lacking["moment max"] / lacking["inertia max"], "", 0.052, 0.003,
@@ -51,18 +55,22 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         rows.append(within("drift.moment.order", SYSTEM, "order in which the undisturbed moment falls with the period, "
                            "1000 to 2000 Hz", _order(rates[1000.0]["moment max"], rates[2000.0]["moment max"]), "", 2.0,
                            0.2, "linear interpolation errs by f'' T^2 / 8", "closed form"))  # fmt: skip
-    return rows, {"rows": summary["rows"], "rates": [[rate, *row.values()] for rate, row in rates.items()]}
+    return rows, {"duration": scene.run.duration, "rows": list(found.values()),
+                  "rates": [[rate, *row.values()] for rate, row in rates.items()]}  # fmt: skip
 
 
-def _run(changes: tuple[str, ...]) -> dict[str, Any]:
-    """The study in the reference."""
-    with TemporaryDirectory() as name:
-        return run(load(SCENE, changes), ("reference",), Path(name), lambda text, part: None)
+def _run(scene: Scene, names: Collection[str] = ()) -> dict[str, dict[str, Any]]:
+    """Figures of the study's runs in the reference by name: of some, or of all."""
+    with TemporaryDirectory() as folder:
+        measured, _, scenes = followed(scene, Path(folder))
+        return {name: row("reference", name, measured, simulate(scenes[name], "reference"))
+                for name in names or scenes}  # fmt: skip
 
 
 def _at_rate(rate: float) -> dict[str, float]:
     """Undisturbed drift-off (s) and largest enforced moment (N m) at one sampling rate, steps of 0.5 ms."""
-    rows = {row["run"]: row for row in _run((*ALONE, "run.step=5e-4", f"options.sampling_rate={rate}"))["rows"]}
+    scene = load(SCENE, (*ALONE, "run.step=5e-4", f"options.sampling_rate={rate}"))
+    rows = _run(scene, ("undisturbed", "guided, undisturbed"))
     return {"drift-off": rows["undisturbed"]["drift-off"], "moment max": rows["guided, undisturbed"]["moment max"]}
 
 
@@ -81,7 +89,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     )  # fmt: skip
     heads = ("run", "drift-off [s]", "heave error [m]", "moment rms [N m]", "moment max [N m]", "I beta'' max [N m]")
     note = "A run has drifted off when its pitch is 0.05 rad wrong."
-    found = [Table("The six runs, 60 s on the study road", note, heads, rows)]
+    found = [Table(f"The six runs, {data['duration']:g} s on the study road", note, heads, rows)]
     if data["rates"]:
         rates = tuple((f"{rate:g}", _cell(when, ".1f") or "never", f"{most:.1f}") for rate, when, most in data["rates"])
         note = "Undisturbed forces, linear between the samples. The paper's 70 N m fits a rate of about 400 Hz."

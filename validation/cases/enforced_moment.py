@@ -1,5 +1,6 @@
 """The moment that a prescribed pitch takes: Exudyn's multiplier, MuJoCo's inverse dynamics, the eliminated form."""
 
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -18,7 +19,8 @@ from validation.scenes import VEHICLES, force_scene, road_scene, write_forces
 
 TITLE = "Enforced moment of a prescribed pitch"
 SYSTEM: System = "pitch-plane"
-DURATION = 4.0
+DURATION, QUICK_DURATION, START = 4.0, 1.5, 1.0
+"""Of a manoeuvre, in full and in quick, and of an abrupt start whose ringing must not be most of the run (s)."""
 PERIOD = 1e-3
 STEP = 1e-3
 BOUND = 1e-4
@@ -54,8 +56,9 @@ def manoeuvre(folder: Path, parameters: str, abrupt: bool = False) -> None:
 
 
 def moment(scene: Scene, engine: str, settings: Settings) -> np.ndarray:
-    """Enforced moment (n,) in N m at every millisecond."""
-    return simulate(scene, engine, settings)["enforced_moment"][:: round(PERIOD / settings.step)]
+    """Enforced moment (n,) in N m at every millisecond of a scene."""
+    own = replace(settings, duration=scene.run.duration)
+    return simulate(scene, engine, own)["enforced_moment"][:: round(PERIOD / settings.step)]
 
 
 def truth(scene: Scene) -> np.ndarray:
@@ -69,22 +72,22 @@ def relative(found: np.ndarray, true: np.ndarray) -> float:
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows for both engines and vehicles, start-up ringing, and the study road."""
+    """Rows for both engines and vehicles, start-up ringing, and the study road; quick: one vehicle, without the road."""
     with TemporaryDirectory() as name:
         work = Path(name)
-        rows = _manoeuvre(work)
+        rows = _manoeuvre(work, VEHICLES[-1:] if quick else VEHICLES, QUICK_DURATION if quick else DURATION)
         ringing, paths = _ringing(work)
-        rough, table = _study_road(work, (1e-3, 2.5e-4) if quick else (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5))
+        rough, table = ([], []) if quick else _study_road(work, (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5))
     return rows + ringing + rough, {"table": table, "ringing": paths}
 
 
-def _manoeuvre(folder: Path) -> list[Row]:
+def _manoeuvre(folder: Path, vehicles: tuple[str, ...], duration: float) -> list[Row]:
     rows = []
-    for parameters in VEHICLES:
+    for parameters in vehicles:
         manoeuvre(folder, parameters)
-        scene = force_scene(folder, parameters, STEP, DURATION, "smooth", effects=GUIDE)
+        scene = force_scene(folder, parameters, STEP, duration, "smooth", effects=GUIDE)
         true = truth(scene)
-        if parameters == VEHICLES[0]:
+        if parameters == vehicles[0]:
             rows.append(_uncertainty(scene, true))
         for engine, settings in BEST.items():
             route = "Lagrange multiplier" if engine == "exudyn" else "reduced model and inverse dynamics"
@@ -122,12 +125,12 @@ def _uncertainty(scene: Scene, true: np.ndarray) -> Row:
 def _ringing(folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """An abrupt start: error of the multiplier over the first 0.1 s with and without consistent accelerations."""
     manoeuvre(folder, "itwm_drift", abrupt=True)
-    scene = force_scene(folder, step=STEP, duration=DURATION, interpolation="smooth", effects=GUIDE)
+    scene = force_scene(folder, step=STEP, duration=START, interpolation="smooth", effects=GUIDE)
     true = truth(scene)
     first = slice(1, 101)
     paths: dict[str, Any] = {"time": (STEP * np.arange(1, 101)).tolist()}
     for radius in (0.6, 0.9):
-        settings = Settings("GeneralizedAlpha", STEP, DURATION, spectral_radius=radius)
+        settings = Settings("GeneralizedAlpha", STEP, START, spectral_radius=radius)
         paths[f"inconsistent start, spectral radius {radius}"] = (_inconsistent(scene, settings) - true)[first].tolist()
         paths[f"consistent start, spectral radius {radius}"] = (moment(scene, "exudyn", settings) - true)[
             first
@@ -200,7 +203,9 @@ def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """Error by step on the study road."""
+    """Error by step on the study road, where it was driven."""
+    if not data["table"]:
+        return []
     rows = tuple((engine, name, f"{1e3 * step:g}", f"{error:.1e}") for engine, name, step, error in data["table"])
     return [
         Table(

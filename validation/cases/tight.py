@@ -11,7 +11,7 @@ from validation.scenes import gap, road_scene
 TITLE = "Road-excited run at the recommended setting against a tight-tolerance solution"
 SYSTEM: System = "pitch-plane"
 DURATION = 20.0
-QUICK_DURATION = 2.0
+QUICK_DURATION = 0.5
 STEP = 2.5e-4
 
 
