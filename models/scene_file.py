@@ -4,7 +4,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from pydantic import Field
 
@@ -15,16 +15,31 @@ from models.strict import Strict, read
 class SceneFile(Strict):
     """What the scenes of all systems have in common; ``options`` is checked by the study that owns it."""
 
+    READS_AUTO: ClassVar[bool] = False
+    """Whether ``effects = "auto"`` is a key of the system's own."""
+
     title: str = Field(description="what the scene shows")
     system: str
     study: str = Field(description="the study that runs the scene")
     options: dict[str, Any] = Field(default_factory=dict, description="options of the study")
+    quantities: list[str] = Field(default_factory=list, description="what a choice of effects must hold")
+    tolerance: float | None = Field(default=None, gt=0, lt=1, description="relative, of their standard deviations")
     file: str = Field(default="", exclude=True)
     folder: str = Field(default=".", exclude=True)
 
     def table(self) -> dict[str, Any]:
         """The scene as nested tables of plain values, defaults included: enough to run it again."""
         return self.model_dump(exclude_none=True)
+
+    def check_choice(self) -> None:
+        """Quantities and a tolerance belong to a choice of effects, and to nothing else."""
+        given = {"quantities": self.quantities or None, "tolerance": self.tolerance}
+        for key, value in given.items():
+            if self.study == CHOOSING and value is None:
+                asks = "which quantities must stay right" if key == "quantities" else "how wrong they may be, as 0.02"
+                raise InputError(self.file, key, None, f"is missing: a choice of effects asks {asks}")
+            if self.study != CHOOSING and value is not None:
+                raise InputError(self.file, key, value, f'is read by effects = "auto", of the study {CHOOSING!r}, only')
 
     def path(self, name: str, place: str = "") -> Path:
         """A file that the scene names at ``place``: beside the scene, or else in the folder of the command."""
@@ -39,7 +54,22 @@ def checked(model: type[Model], table: Mapping[str, Any], file: str, folder: Pat
     for key in ("file", "folder"):
         if key in table:
             raise InputError(file, key, table[key], "unknown key", tuple(set(model.model_fields) - {"file", "folder"}))
-    return read(model, {**table, "file": file, "folder": str(folder)}, file)
+    found = read(model, {**_automatic(model, table), "file": file, "folder": str(folder)}, file)
+    found.check_choice()
+    return found
+
+
+CHOOSING, AUTO = "choice", "auto"
+"""The study that chooses among the effects of a scene, and what a scene says in their place to ask for it."""
+
+
+def _automatic(model: type[SceneFile], table: Mapping[str, Any]) -> dict[str, Any]:
+    """The table with ``effects = "auto"`` as the study that makes the choice, but where a system reads it itself."""
+    plain = dict(table)
+    if plain.get("effects") == AUTO and not model.READS_AUTO:
+        del plain["effects"]
+        plain.setdefault("study", CHOOSING)
+    return plain
 
 
 def existing(name: str, folder: Path, file: str, place: str) -> Path:

@@ -9,11 +9,13 @@ from models.errors import InputError
 
 SCENES = Path(__file__).parent / "scenes"
 
-NOT_STUDIES = ("__init__", "asked", "braking_figures", "command_line", "comparison", "contact_figures", "figures",
-               "folders", "handling_figures", "hub_forces_figures", "manchester_figure", "recording_figures",
-               "recording_page", "recording_runs", "ride_choice_figure", "ride_figures", "ride_nonlinear_figures",
-               "stabiliser_figures", "summary_numbers", "sweep", "sweep_figure", "tyre_figure", "virtual_measurement",
-               "wheelset_figures")  # fmt: skip
+ANY = "any"
+"""System of a study that runs scenes of all systems."""
+NOT_STUDIES = ("__init__", "asked", "braking_figures", "choice_figure", "command_line", "comparison",
+               "contact_figures", "figures", "folders", "handling_figures", "hub_forces_figures",
+               "manchester_figure", "recording_figures", "recording_page", "recording_runs", "ride_choice_figure",
+               "ride_figures", "ride_nonlinear_figures", "stabiliser_figures", "summary_numbers", "sweep",
+               "sweep_figure", "tyre_figure", "virtual_measurement", "wheelset_figures")  # fmt: skip
 """Modules beside the studies that are none."""
 
 
@@ -88,7 +90,7 @@ def study_of(scene: Any) -> Any:
         raise InputError(scene.file, "study", scene.study, "no such study", names)
     module = import_module(f"studies.{scene.study}")
     own = getattr(module, "SYSTEM", DEFAULT)
-    if own != scene.system:
+    if own not in (ANY, scene.system):
         allowed = f"is a study of system {own!r}; this scene's system is {scene.system!r}"
         raise InputError(scene.file, "study", scene.study, allowed)
     if hasattr(module, "Options"):

@@ -29,7 +29,7 @@ Changes = Annotated[
 ]
 Out = Annotated[Path | None, typer.Option(help="Folder for the results; it must be new or empty.")]
 Resume = Annotated[
-    Path | None, typer.Option(help="Folder of a killed sweep, ensemble or recording: go on with what it kept.")
+    Path | None, typer.Option(help="Folder of a killed sweep, ensemble, recording or report: go on with what it kept.")
 ]
 Sweep = Annotated[
     str | None,
@@ -89,14 +89,28 @@ def _print_list(title: str, entries: dict[str, str]) -> None:
 
 
 @app.command()
-def show(scene: SceneName, changes: Changes = None) -> None:
+def show(
+    scene: SceneName,
+    price: Annotated[bool, typer.Option("--price", help="What each effect costs and changes, by short runs.")] = False,
+    engine: Annotated[str | None, typer.Option(help="Of --price: one of exudyn, mujoco, reference.")] = None,
+    changes: Changes = None,
+    as_json: AsJson = False,
+) -> None:
     """Print what a scene will compute, without running it, or what is in a measurement file, with a scene for it."""
+    if not price and (engine is not None or as_json):
+        raise InputError("--engine" if engine else "--json", "", engine, "belongs to --price here: name it too")
     if Path(scene).suffix.lower() in MEASURED:
         from models.measured.listing import describe
 
         return print(describe(Path(scene)))
     loaded = load_scene(scene, changes)
-    print(plan_of(loaded).describe(loaded))
+    if not price:
+        return print(plan_of(loaded).describe(loaded))
+    from validation.price.effects import price_list
+    from validation.price.effects_text import as_dict, lines
+
+    found = price_list(loaded, None if engine is None else engines_of(engine, loaded.system)[0])
+    print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(lines(found, loaded.quantities)))
 
 
 @app.command()
@@ -126,7 +140,7 @@ def _conformity(engine: str, more: bool, out: Path | None) -> None:
     from validation.conformity import conformity
 
     if more:
-        raise InputError("--engine", "", engine, "has one suite, without --quick and --against")
+        raise InputError("--engine", "", engine, "has one suite, without --quick, --against and --resume")
     register(engine)
     folder = new_folder(out, "conformity")
     sys.exit(1 if conformity(engine, folder, " ".join(["twinrig", *sys.argv[1:]])) else 0)
@@ -190,17 +204,21 @@ def validate(
         str | None, typer.Option(metavar="MODULE:CLASS", help="Judge an engine or integrator of your own instead.")
     ] = None,
     out: Out = None,
+    resume: Resume = None,
 ) -> None:
     """Run the validation cases and write report.html, results.json and results.csv."""
     if engine is not None:
-        return _conformity(engine, quick or against is not None, out)
-    from studies.folders import new_folder
+        return _conformity(engine, quick or against is not None or resume is not None, out)
     from validation.changes import read
+    from validation.measured_cases import KEPT
     from validation.run import validate as run_all
 
     earlier = None if against is None else read(against)
-    folder = new_folder(out, "validate-quick" if quick else "validate")
-    failed = run_all(folder, quick, " ".join(["twinrig", *sys.argv[1:]]), earlier)
+    folder = _folder("validate-quick" if quick else "validate", KEPT, "", out, resume)
+    try:
+        failed = run_all(folder, quick, " ".join(["twinrig", *sys.argv[1:]]), earlier, resume is not None)
+    except KeyboardInterrupt:
+        _end(f"interrupted; finished cases are kept: twinrig validate --resume {folder}", 130)
     sys.exit(1 if failed else 0)
 
 

@@ -62,7 +62,10 @@ class Chooser:
                  window: float = WINDOW) -> None:  # fmt: skip
         self.tolerance = tolerance
         self.whole = Screen(Variants(scene, engine), quantities)
-        part = self.whole.variants.window(window)
+        system = self.whole.variants.system
+        part = self.whole.variants
+        if system.WINDOWED:
+            part = part.window(math.ceil(window * system.steps(scene)))
         self.screen = self.whole if part is self.whole.variants else Screen(part, quantities)
         self.lengths = [k for k in self.whole.variants.lengths() if k in part.lengths()]
         self.effects = self.whole.variants.effects

@@ -15,6 +15,8 @@ from models.scene_effects import named, own_table, rebuilt, without
 Set = frozenset[str]
 LONGEST = 128
 """No step is tried that is more times as long as the scene's."""
+FINE = 60
+"""Steps of which whole numbers make up a part of a run, so that it can be taken in longer steps, too."""
 REPEATS = 3
 """Runs of which the shortest tells the seconds."""
 
@@ -84,14 +86,14 @@ class Variants:
 
     def lengths(self) -> list[int]:
         """How many times as long a step may be, as far as whole numbers of them make up the run."""
-        count = self.system.steps(self.scene)
-        return [times for times in range(1, min(count, LONGEST) + 1) if count % times == 0] or [1]
+        count = self.system.parts(self.scene)
+        return [times for times in range(1, min(count, LONGEST) + 1) if count % times == 0]
 
-    def window(self, share: float) -> "Variants":
-        """The first part of the run, about this share of it, or all of it where a part tells nothing."""
+    def window(self, steps: int) -> "Variants":
+        """The first part of the run, of at least so many steps, or all of it if it has not many more."""
         count = self.system.steps(self.scene)
-        few = next((n for n in range(math.ceil(share * count), count) if count % n == 0 or n % 60 == 0), count)
-        if not self.system.WINDOWED or few == count:
+        few = next((n for n in range(steps, count) if n % FINE == 0 or count % n == 0), count)
+        if few == count:
             return self
         table = own_table(self.scene)
         self.system.shorten(table, self.scene, few)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -63,6 +63,8 @@ class Drive(Strict):
 class RideScene(SceneFile):
     """One scene of ride; it has either [speeds] or a [drive]."""
 
+    READS_AUTO: ClassVar[bool] = True
+
     system: Literal["ride"] = "ride"
     study: str = Field(default="ride", description="the study that runs the scene")
     vehicle: RideVehicle
@@ -70,9 +72,24 @@ class RideScene(SceneFile):
     speeds: Speeds | None = Field(default=None, description="constant speeds")
     drive: Drive | None = Field(default=None, description="a speed that varies")
     weighting: dict[str, Literal["Wk", "Wd"]] = Field(default_factory=dict, description="ISO 2631-1, output by output")
-    quantities: list[str] = Field(default_factory=list, description="outputs that a choice of effects must hold")
-    tolerance: float | None = Field(default=None, gt=0, lt=1, description="relative, of their standard deviations")
     effects: Literal["auto"] | None = Field(default=None, description="auto: only those that the quantities call for")
+
+    def check_choice(self) -> None:
+        """A choice of effects wants quantities, a tolerance and constant speeds, and a study that makes it."""
+        if self.effects is None:
+            for name in ("quantities", "tolerance"):
+                if name in self.model_fields_set:
+                    raise InputError(self.file, name, getattr(self, name), 'is read beside effects = "auto" only')
+            return
+        missing = 'is missing: effects = "auto" asks'
+        if not self.quantities:
+            raise InputError(self.file, "quantities", None, f"{missing} which outputs must stay right")
+        if self.tolerance is None:
+            raise InputError(self.file, "tolerance", None, f"{missing} how wrong they may be, as 0.02")
+        if self.speeds is None:
+            raise InputError(self.file, "drive", None, 'with effects = "auto" speeds are constant: give [speeds]')
+        if self.study != CHOOSING:
+            raise InputError(self.file, "study", self.study, f'with effects = "auto" the study is {CHOOSING}')
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> RideScene:
@@ -85,25 +102,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ri
     if scene.drive is not None:
         scene.drive.profile(file)
     _check_road(file, scene.road)
-    _check_choice(file, scene)
     return scene
-
-
-def _check_choice(file: str, scene: RideScene) -> None:
-    """A choice of effects wants quantities, a tolerance and constant speeds, and a study that makes it."""
-    if scene.effects is None:
-        for name in ("quantities", "tolerance"):
-            if name in scene.model_fields_set:
-                raise InputError(file, name, getattr(scene, name), 'is read beside effects = "auto" only')
-        return
-    if not scene.quantities:
-        raise InputError(file, "quantities", None, 'is missing: effects = "auto" asks which outputs must stay right')
-    if scene.tolerance is None:
-        raise InputError(file, "tolerance", None, 'is missing: effects = "auto" asks how wrong they may be, as 0.02')
-    if scene.speeds is None:
-        raise InputError(file, "drive", None, 'with effects = "auto" speeds are constant: give [speeds]')
-    if scene.study != CHOOSING:
-        raise InputError(file, "study", scene.study, f'with effects = "auto" the study is {CHOOSING}')
 
 
 CHOOSING = "ride_choice"

@@ -39,12 +39,18 @@ def _quantity(name: str, cases: list[np.ndarray]) -> Quantity:
 
 
 def steps(scene: BrakingScene) -> int:
+    """Of a procedure, if it lasts as long as it may."""
+    return round(scene.run.duration / scene.run.sample) * scene.run.substeps
+
+
+def parts(scene: BrakingScene) -> int:
     """Steps within a sample, which alone may be longer: the controller's samples stay."""
     return scene.run.substeps
 
 
 def shorten(table: dict[str, Any], scene: BrakingScene, steps: int) -> None:
-    """Nothing: a stop is known at its end."""
+    """Every procedure's first samples."""
+    table.setdefault("run", {})["duration"] = max(2, steps // scene.run.substeps) * scene.run.sample
 
 
 def coarsen(table: dict[str, Any], scene: BrakingScene, times: int) -> None:

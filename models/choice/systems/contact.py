@@ -20,15 +20,20 @@ def answer(scene: ContactScene, engine: str) -> Answer:
         raise InputError(scene.file, "cases", None, "is a table of contacts: give the price of one of them")
     begun = time.process_time()
     body = contact(scene)
-    rolled = [body.roll(*motion, scene.method.cells) for motion in creepages(scene)]
+    rolled = [body.roll(motion, scene.method.cells) for motion in creepages(scene)]
     seconds = time.process_time() - begun
     found = {name: Quantity(unit, (np.array([getattr(one, name) for one in rolled]),)) for name, unit in FORCES.items()}
     return Answer(found, {"steps": len(rolled), "calls": len(rolled), "states": 0}, seconds)
 
 
 def steps(scene: ContactScene) -> int:
-    """None: nothing is marched in time."""
-    return 0
+    """Creepages: nothing is marched in time."""
+    return len(creepages(scene))
+
+
+def parts(scene: ContactScene) -> int:
+    """One: there is no step."""
+    return 1
 
 
 def shorten(table: dict[str, Any], scene: ContactScene, steps: int) -> None:

@@ -42,6 +42,9 @@ def steps(scene: HandlingScene) -> int:
     return min(round(own.duration / scene.run.step) for own in scene.manoeuvres.values())
 
 
+parts = steps
+
+
 def shorten(table: dict[str, Any], scene: HandlingScene, steps: int) -> None:
     """At most so many steps of the scene's own in every manoeuvre."""
     for name, own in table["manoeuvres"].items():

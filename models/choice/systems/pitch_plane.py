@@ -20,8 +20,8 @@ def answer(scene: Scene, engine: str) -> Answer:
     model = build(engine, assembly, own)
     begun = time.process_time()
     run = model.run()
-    seconds = time.process_time() - begun
     found = outputs(assembly, run, model)
+    seconds = time.process_time() - begun
     counts = {"steps": run.counts.get("steps", len(run.times) - 1), "states": run.states.shape[1]}
     counts["calls"] = run.counts.get("force calls", CALLS.get(own.integrator, 1) * counts["steps"])
     return Answer({name: Quantity(unit, (values,)) for name, (unit, _, values) in found.items()}, counts, seconds)
@@ -30,6 +30,9 @@ def answer(scene: Scene, engine: str) -> Answer:
 def steps(scene: Scene) -> int:
     """Steps of the run."""
     return round(scene.run.duration / scene.run.step)
+
+
+parts = steps
 
 
 def shorten(table: dict[str, Any], scene: Scene, steps: int) -> None:

@@ -41,6 +41,9 @@ def steps(scene: WheelsetScene) -> int:
     return round(scene.run.duration / scene.run.step)
 
 
+parts = steps
+
+
 def shorten(table: dict[str, Any], scene: WheelsetScene, steps: int) -> None:
     """So many steps of the scene's own, at the speeds of the whole scene."""
     table.setdefault("run", {}).update(duration=steps * scene.run.step, speeds=path_speeds(scene))
