@@ -34,11 +34,11 @@ def cases(monkeypatch):
     return done, broken
 
 
-def go(folder, quick=True, ahead=2):
+def go(folder, quick=True):
     (folder / "data").mkdir(exist_ok=True)
     told = []
     with ThreadPoolExecutor(2) as pool:
-        return measured(Cases(NAMES, quick, folder), pool, ahead, told.append), told
+        return measured(Cases(NAMES, quick, folder), pool, told.append), told
 
 
 def test_a_report_goes_on_with_the_cases_that_have_not_ended(cases, tmp_path):

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from models.ensemble.runner import run_paths
+from models.ensemble.runner import AHEAD, run_paths
 from models.ensemble.store import Arrays, code, write_whole
 from validation.rows import Row
 from validation.scenes import data_folder
@@ -62,10 +62,10 @@ def _array(records: list[dict[str, Any]]) -> Arrays:
     return {"record": np.array([json.dumps(record) for record in records])}
 
 
-def measured(job: Cases, pool: Executor, ahead: int, progress: Callable[[int], None]) -> Outcomes:
+def measured(job: Cases, pool: Executor, progress: Callable[[int], None], alone: bool = False) -> Outcomes:
     """Rows and seconds of all cases; those that an earlier go has finished are taken from there.
 
-    ahead : cases under way at once; progress : told how many are done. A case that breaks, or whose process dies
+    alone : one after the other; progress : told how many are done. A case that breaks, or whose process dies
     again and again, is a failed row and is measured again by the next go. Raises InputError for a folder of another
     version or share, RunFailed for a full disk.
     """
@@ -73,7 +73,7 @@ def measured(job: Cases, pool: Executor, ahead: int, progress: Callable[[int], N
     def lost(cases: range, reason: str) -> Arrays:
         return _array([{"rows": [_broken(job.names[i], reason).as_dict()], "seconds": 0.0} for i in cases])
 
-    store = job.folder / KEPT / ("together" if ahead > 1 else "alone")
+    store, ahead = job.folder / KEPT / ("alone" if alone else "together"), 1 if alone else AHEAD
     found = run_paths(job, len(job.names), store, pool, 1, lambda done: progress(done.done), lost, ahead)["record"]
     records = (json.loads(str(one)) for one in found)
     return {name: ([Row(**row) for row in record["rows"]], record["seconds"])

@@ -4,19 +4,17 @@ import csv
 import json
 import os
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from collections.abc import Callable
+from concurrent.futures import Executor
 from concurrent.futures.process import BrokenProcessPool
-from importlib import import_module
-from multiprocessing import get_context
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
-from models.ensemble.store import write_whole
-from models.ensemble.workers import one_thread_each
+from models.ensemble.store import locked, write_whole
+from models.ensemble.workers import processes
 from models.result import provenance
 from validation.changes import against, lines
+from validation.measured_cases import Cases, Outcomes, measured
 from validation.rows import REPORTED, Row
 
 CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "growth",
@@ -38,24 +36,19 @@ WORKERS = 2
 """Processes that measure the other cases."""
 
 
-def validate(folder: Path, quick: bool, command: str, earlier: dict[str, Any] | None = None) -> int:
-    """Measure all cases into ``folder``; returns the number of failed rows. earlier : ``changes.read`` of a report."""
-    from rich.console import Console
-    from rich.progress import Progress
+def validate(folder: Path, quick: bool, command: str, earlier: dict[str, Any] | None = None,
+             resumed: bool = False) -> int:  # fmt: skip
+    """Measure all cases into ``folder``; returns the number of failed rows. earlier : ``changes.read`` of a report.
 
+    resumed : the folder may hold cases that have ended; the time of them all together is then not known.
+    """
     start = time.perf_counter()
-    found: dict[str, tuple[list[Row], float]] = {}
     (folder / "data").mkdir(exist_ok=True)
-    context = get_context("spawn")  # an engine's threads do not survive a fork
-    with one_thread_each(), ProcessPoolExecutor(min(WORKERS, os.cpu_count() or 1), mp_context=context) as pool:
-        with Progress(console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task("validate", total=len(CASES))
-            for name, outcome in _outcomes(pool, quick, folder):
-                found[name] = outcome
-                bar.update(task, description=name, advance=1)
+    with locked(folder), processes(min(WORKERS, os.cpu_count() or 1)) as pool:
+        found = _outcomes(pool, quick, folder)
         rows = [row for name in CASES for row in found[name][0]]
         seconds = {name: found[name][1] for name in CASES}
-        wall = time.perf_counter() - start
+        wall = None if resumed else time.perf_counter() - start
         source = provenance(command)
         save(folder, rows, {**source, "seeds": _in(pool, seeds), "quick": quick, "seconds": seconds, "wall": wall},
              earlier)  # fmt: skip
@@ -63,18 +56,17 @@ def validate(folder: Path, quick: bool, command: str, earlier: dict[str, Any] | 
     return say(rows, time.perf_counter() - start, path)
 
 
-def _outcomes(pool: Executor, quick: bool, folder: Path) -> Iterator[tuple[str, tuple[list[Row], float]]]:
-    """Rows and seconds of every case, as they end: first those that may share the machine, then the others."""
-    jobs = {pool.submit(_measure, name, quick, folder): name for name in CASES if name not in ALONE}
-    try:
-        for job in as_completed(jobs):
-            error = job.exception()  # of a process that died: what a case raises is a row already
-            yield jobs[job], job.result() if error is None else ([_broken(jobs[job], error)], 0.0)
-        for name in ALONE:
-            yield name, _in(pool, _measure, name, quick, folder)
-    except KeyboardInterrupt:
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
+def _outcomes(pool: Executor, quick: bool, folder: Path) -> Outcomes:
+    """Rows and seconds of every case: first of those that may share the machine, then of the others."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    together = tuple(name for name in CASES if name not in ALONE)
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("validate", total=len(CASES))
+        first = measured(Cases(together, quick, folder), pool, lambda done: bar.update(task, completed=done))
+        return first | measured(Cases(ALONE, quick, folder), pool,
+                                lambda done: bar.update(task, completed=len(together) + done), alone=True)  # fmt: skip
 
 
 def _in(pool: Executor, function: Callable[..., Any], *arguments: Any) -> Any:
@@ -93,25 +85,6 @@ def _written(pool: Executor, folder: Path) -> Path:
         return write(folder, pool.map)
     except BrokenProcessPool:
         return write(folder)
-
-
-def _measure(name: str, quick: bool, folder: Path) -> tuple[list[Row], float]:
-    """Rows of one case and its seconds; a case that breaks is a failed row, not the end of the report."""
-    start = time.perf_counter()
-    try:
-        case = import_module(f"validation.cases.{name}")
-        with TemporaryDirectory(ignore_cleanup_errors=True) as own:  # what cases write to run is no part of the report
-            rows, data = case.measure(quick, Path(own))
-    except Exception as error:
-        return [_broken(name, error)], time.perf_counter() - start
-    (folder / "data" / f"{name}.json").write_text(json.dumps(data))
-    return rows, time.perf_counter() - start
-
-
-def _broken(name: str, error: BaseException) -> Row:
-    """The failed row of a case that gave none."""
-    reason = f"{type(error).__name__}: {error}"
-    return Row(f"{name}.broken", "pitch-plane", f"case {name}", None, "", "", None, "", "none", "failed", reason)
 
 
 def seeds() -> dict[str, int]:
