@@ -74,7 +74,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 
 def followed(scene: Scene, folder: Path) -> tuple[Result, float, dict[str, Scene]]:
-    """The measurement, the noise's deviation (N), and by name the scenes of the runs that follow its files in folder."""
+    """The measurement, the noise's deviation (N), and by name the scenes of runs on the files that it leaves."""
     options = read(Options, scene.options, scene.file, "options")
     measured = measure(scene)
     largest = write_measurement(measured, options.sampling_rate, stride(scene, options.sampling_rate), folder)

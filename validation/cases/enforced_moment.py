@@ -72,7 +72,7 @@ def relative(found: np.ndarray, true: np.ndarray) -> float:
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows for both engines and vehicles, start-up ringing, and the study road; quick: one vehicle, without the road."""
+    """Rows for both engines and vehicles, start-up ringing, and the study road; quick: one vehicle, no road."""
     with TemporaryDirectory() as name:
         work = Path(name)
         rows = _manoeuvre(work, VEHICLES[-1:] if quick else VEHICLES, QUICK_DURATION if quick else DURATION)

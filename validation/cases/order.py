@@ -86,6 +86,6 @@ def tables(data: dict[str, Any]) -> list[Table]:
     """Largest state error by step."""
     heads = ("engine", "integrator", *(f"{1e3 * step:g} ms" for step in data["steps"]))
     rows = tuple((engine, name, *(f"{value:.2e}" for value in found)) for engine, name, *found in data["table"])
-    note = (f"Largest error of any state (m, rad, m/s, rad/s) over the first {data['duration']:g} s. Equal rows are the "
-            "same method.")  # fmt: skip
+    note = (f"Largest error of any state (m, rad, m/s, rad/s) over the first {data['duration']:g} s. Equal rows are "
+            "the same method.")  # fmt: skip
     return [Table(TITLE, note, heads, rows)]
