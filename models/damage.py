@@ -30,8 +30,11 @@ def turning_points(load: np.ndarray) -> np.ndarray:
 
 
 def checked(load: np.ndarray) -> np.ndarray:
-    """The load (n,) as doubles; InputError for one without a sample, or with one that is not finite."""
-    load = np.asarray(load, dtype=float)
+    """The load (n,) as doubles; InputError for none, for one that is not finite, for no row of them."""
+    given = np.asarray(load)
+    if given.ndim != 1 or given.dtype.kind not in "biuf":
+        raise InputError("", "load", f"{given.ndim}-dimensional, {given.dtype}", "must be one row of real numbers")
+    load = given.astype(float)
     if not len(load) or not np.isfinite(load).all():
         found = f"{np.count_nonzero(~np.isfinite(load))} of {len(load)} samples are not finite"
         raise InputError("", "load", None, f"{found}: damage needs at least one sample, and all of them finite")

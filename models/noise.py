@@ -7,6 +7,8 @@ noise it is: an engineer who gives one seed to forces and gyro still gets indepe
 
 import numpy as np
 
+from models.errors import InputError
+
 BLOCK = 4096
 """Samples per block; part of what names a sample, so it never changes."""
 
@@ -19,15 +21,26 @@ BLOCK = 4096
 def normal_block(seed: int, path: int, block: int, channels: int, source: int = FORCES) -> np.ndarray:
     """Standard normal samples (BLOCK, channels) of one block: samples BLOCK block and following of a stream.
 
-    seed : 0 to 2**64 - 1; path : 0 to 2**64 - 1; block : 0 to 2**64 - 1. Philox with the key (seed, path), the
-    block in the counter's third word and the source in its fourth, so that blocks never overlap.
+    seed : 0 to 2**64 - 1; path : 0 to 2**64 - 1; block : 0 to 2**64 - 1; InputError for others, which would name the
+    stream of another one. Philox with the key (seed, path), the block in the counter's third word and the source in
+    its fourth, so that blocks never overlap.
     """
-    bits = np.random.Philox(key=[seed, path], counter=[0, 0, block, source])
+    key = np.array([_word("seed", seed), _word("path", path)], dtype=np.uint64)
+    bits = np.random.Philox(key=key, counter=np.array([0, 0, _word("block", block), source], dtype=np.uint64))
     return np.random.Generator(bits).standard_normal((BLOCK, channels))
 
 
+def _word(name: str, value: int) -> int:
+    """A whole number of 64 bits."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value < 2**64:
+        raise InputError("", name, value, "must be a whole number from 0 to 2^64 - 1")
+    return int(value)
+
+
 def normal(seed: int, path: int, count: int, channels: int, first: int = 0, source: int = FORCES) -> np.ndarray:
-    """Standard normal samples (count, channels) of a stream from sample ``first`` on."""
+    """Standard normal samples (count, channels) of a stream from sample ``first`` on; raises InputError."""
+    if min(count, first) < 0:
+        raise InputError("", "count, first", (count, first), "must be 0 or more")
     start, end = first // BLOCK, -(-(first + count) // BLOCK)
     blocks = [normal_block(seed, path, block, channels, source) for block in range(start, end)]
     return np.concatenate(blocks)[first - start * BLOCK :][:count] if blocks else np.empty((0, channels))

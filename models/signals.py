@@ -7,10 +7,12 @@ is not smooth, where an accurate solver must restart.
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
+
+from models.errors import InputError
 
 Interpolation = Literal["held", "linear", "smooth"]
 SNAP = 1e-6
@@ -173,7 +175,18 @@ class Smooth:
 
 
 def sampled(values: np.ndarray, period: float, interpolation: Interpolation) -> Sampled | Smooth:
-    """Signal from uniform samples, shape (n, channels), by the rule that a scene declares."""
+    """Signal from uniform samples, shape (n, channels), by the rule that a scene declares.
+
+    Raises InputError for a period or a rule that is none, and for fewer samples than the rule needs: 4, or 1 if held
+    or linear.
+    """
+    least = 4 if interpolation == "smooth" else 1
+    if interpolation not in get_args(Interpolation):
+        raise InputError("", "interpolation", interpolation, "is not known", get_args(Interpolation))
+    if not 0.0 < period < math.inf:
+        raise InputError("", "period", period, "must be above 0, in s")
+    if len(values) < least:
+        raise InputError("", "samples", len(values), f"{least} or more are needed for {interpolation!r}")
     if interpolation == "smooth":
         return Smooth(values, period)
     return Sampled(values, period, held=interpolation == "held")

@@ -27,6 +27,8 @@ roads, for an average over a motion means something only where the error hardly 
 as much changes the growth rate of these roads by 1 to 3 %."""
 SERIES = 0.1
 """Below this 2 lambda t the sinh law is summed as a series, which loses no digit."""
+LONGEST = 710.0
+"""From about this 2 lambda t on, sinh is beyond all numbers."""
 LEAST = 1e-300
 """What counts as above 0 (rad^2/s^3, rad)."""
 MEDIAN = 0.6744897501960817
@@ -134,7 +136,9 @@ def pitch_variance(times: np.ndarray | float, rate: np.ndarray | float, intensit
     small = np.minimum(np.abs(x), SERIES) ** 2
     series = 1.0 + small / 20 * (1.0 + small / 42 * (1.0 + small / 72 * (1.0 + small / 110)))
     large = np.where(np.abs(x) > SERIES, x, 1.0)
-    return intensity * t**3 / 3 * np.where(np.abs(x) > SERIES, 6 * (np.sinh(large) - large) / large**3, series)
+    with np.errstate(over="ignore", invalid="ignore"):  # beyond all numbers is infinite, at no rate and no time alike
+        closed = np.where(large > LONGEST, np.inf, 6 * (np.sinh(large) - large) / large**3)
+    return intensity * t**3 / 3 * np.where(np.abs(x) > SERIES, closed, series)
 
 
 def heave_variance(times: np.ndarray | float, p: Parameters, deviation: float, period: float) -> np.ndarray:

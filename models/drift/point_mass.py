@@ -53,14 +53,19 @@ def discrete(steps: int, deviation: float, step: float, mass: float = 1.0, dampi
     scheme is unstable, h >= 2.
     """
     _check(deviation, step, mass, damping, steps)
-    h = damping * step
-    if h >= 2:
-        raise ValueError(f"damping times step is {h:g}: the explicit Euler scheme is unstable from 2 on")
+    h = _stable(damping * step)
     kick = (deviation * step / mass) ** 2
     last, before = _gone(h, steps), _gone(h, steps - 1)
     mixed = (1 - h) * last * before / (2 - h) if h else steps * (steps - 1) / 2
     velocity = _gone(h * (2 - h), steps)
     return kick * np.array([[step**2 * _squares(h, steps), step * mixed], [step * mixed, velocity]])
+
+
+def _stable(h: float) -> float:
+    """Damping times step, which is below 2."""
+    if h >= 2:
+        raise ValueError(f"damping times step is {h:g}: the explicit Euler scheme is unstable from 2 on")
+    return h
 
 
 def _gone(h: float, n: int) -> float:
@@ -95,7 +100,12 @@ def _check(deviation: float, step: float, mass: float, damping: float, length: f
 
 def paths(count: int, steps: int, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0,
           seed: int = 0) -> np.ndarray:  # fmt: skip
-    """Monte Carlo: errors (count, 2) of position (m) and velocity (m/s) of Euler paths after ``steps`` steps."""
+    """Monte Carlo: errors (count, 2) of position (m) and velocity (m/s) of Euler paths after ``steps`` steps.
+
+    Raises ValueError as ``discrete`` does.
+    """
+    _check(deviation, step, mass, damping, steps)
+    _stable(damping * step)
     kicks = deviation * step / mass * normal(seed, 0, count * steps, 1).reshape(count, steps)
     velocity = lfilter([1.0], [1.0, damping * step - 1.0], kicks, axis=1)
     return np.column_stack([step * velocity[:, :-1].sum(axis=1), velocity[:, -1]])

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.damage import checked, summed, turning_points
+from models.errors import InputError
 from models.rainflow_cycles import cycles
 
 LEVELS, RANGES = 64, 64
@@ -48,12 +49,17 @@ def count(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> Coun
 
 
 def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
-    """How often a load (n,), or its turning points, rises through each level (l,), ascending."""
+    """How often a load (n,), or its turning points, rises through each level (l,), in any order; raises InputError for
+    a load as ``count`` does, and for a level that is no number."""
+    load, given = checked(load), np.asarray(levels, float)
+    if np.isnan(given).any():
+        raise InputError("", "levels", None, "must be numbers")
+    levels, places = np.unique(given, return_inverse=True)
     rising = load[1:] > load[:-1]
     begun = np.searchsorted(levels, load[:-1][rising], side="right")  # the first level above the start
     ended = np.searchsorted(levels, load[1:][rising], side="right")  # one beyond the last level reached
     change = np.bincount(begun, minlength=len(levels) + 1) - np.bincount(ended, minlength=len(levels) + 1)
-    return np.cumsum(change)[: len(levels)]
+    return np.cumsum(change)[: len(levels)][places]
 
 
 def range_pairs(spans: np.ndarray, counts: np.ndarray, ranges: np.ndarray) -> np.ndarray:

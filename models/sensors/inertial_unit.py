@@ -13,12 +13,18 @@ quaternion then grows, by exp(k s^2 t / 8) for k noisy axes, as eq. (28) has it,
 
 import numpy as np
 
+from models.errors import InputError
 from models.noise import GYRO, normal
 from models.sensors.rotations import conjugate, integrate, matrix, product, skew
 
 
 def random_walk(deviation: float, rate: float) -> float:
-    """Angle random walk s (rad per sqrt(s)) of samples with ``deviation`` (rad/s) at ``rate`` (Hz), eq. (5)."""
+    """Angle random walk s (rad per sqrt(s)) of samples with ``deviation`` (rad/s) at ``rate`` (Hz), eq. (5).
+
+    Raises InputError for a rate that is not above 0.
+    """
+    if not rate > 0.0:
+        raise InputError("", "rate", rate, "must be above 0, in Hz")
     return deviation / rate**0.5
 
 

@@ -5,7 +5,7 @@ q = (q1, q2, q3, q4) has its scalar first; q and -q are the same orientation. Ra
 S' = S skew(w), q' = q (0, w) / 2 (eq. 22). Axes as everywhere: x forward, y right, z down.
 """
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,10 @@ from models.errors import InputError
 
 Rule = Literal["held", "mean", "cubic"]
 """How a rate runs between its samples; order 1, 2, 4 of the orientation in the sampling period."""
+HALF = np.pi
+"""Turn (rad) from sample to sample beyond which nobody can tell the way it went; the series of Magnus ends there."""
+UNIT = 1e-6
+"""Largest departure of a quaternion's norm from 1."""
 LOCK = 1e-6
 """Cosine of pitch below which roll and yaw turn about the same axis: their errors grow as 1 / cosine, so that
 rounding alone would reach 1e-10 rad and a sensor's 1e-3 rad any angle at all."""
@@ -75,8 +79,13 @@ def turns(rates: np.ndarray, period: float, rule: Rule = "cubic") -> np.ndarray:
     "held" : the rate of the sample before, h w0, which is exact for rates that are constant over a period;
     "mean" : the mean of both neighbours; "cubic" : the integral of the cubic through four neighbours and the
     second Magnus term h^2/12 (w0 x w1), the part of the turning that comes from a turning axis. Needs 2 samples,
-    for "cubic" 4. Raises ValueError for fewer, and for a rate that is not finite.
+    for "cubic" 4. Raises ValueError for fewer, for a rate that is not finite, and InputError for a period or a rule
+    that is none and for rates that turn a body farther than HALF from one sample to the next, unless they are held.
     """
+    if not 0.0 < period < np.inf:
+        raise InputError("", "period", period, "must be above 0, in s")
+    if rule not in get_args(Rule):
+        raise InputError("", "rule", rule, "is not known", get_args(Rule))
     if len(rates) < (needed := 4 if rule == "cubic" else 2):
         raise ValueError(f"{len(rates)} samples of the angular velocity: the rule {rule!r} needs at least {needed}")
     if not np.isfinite(rates).all():
@@ -85,9 +94,18 @@ def turns(rates: np.ndarray, period: float, rule: Rule = "cubic") -> np.ndarray:
     before, after = rates[:-1], rates[1:]
     if rule == "held":
         return period * before
+    _check_turned(rates, period)
     if rule == "mean":
         return 0.5 * period * (before + after)
     return integrals(rates, period) + period**2 / 12 * np.cross(before, after)
+
+
+def _check_turned(rates: np.ndarray, period: float) -> None:
+    """Refuse rates that say too little of what lies between their samples."""
+    fastest = float(np.linalg.norm(rates, axis=-1).max())
+    if fastest * period > HALF:
+        raise InputError("", "rates", fastest, f"must be at most {HALF / period:.4g} rad/s for samples every "
+                         f"{period:g} s, half a turn from one to the next: are they in degrees?")
 
 
 def integrals(values: np.ndarray, period: float) -> np.ndarray:
@@ -103,7 +121,10 @@ def integrate(rates: np.ndarray, period: float, start: np.ndarray, rule: Rule = 
 
     Each step is the exact exponential of its rotation vector (``turns``), and each result is divided by its
     norm, which therefore stays 1 within rounding for ever. Several bodies stand side by side in the middle axes.
+    Raises InputError for a start that is no unit quaternion, and as ``turns`` does.
     """
+    if not np.abs(np.linalg.norm(np.asarray(start, dtype=float), axis=-1) - 1.0).max() <= UNIT:
+        raise InputError("", "start", start, "must be unit quaternions")
     steps = exponential(turns(rates, period, rule))
     count, middle = len(steps), steps.shape[1:-1]
     first = np.broadcast_to(np.asarray(start, dtype=float), (*middle, 4)).reshape(-1, 4)
