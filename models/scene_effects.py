@@ -16,11 +16,11 @@ and, if there are usual values, ``put_in(table, scene)``; both raise InputError 
 Where an effect is a choice of method, to leave it out is the next cheaper one.
 """
 
+import ast
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
 from typing import Any
 
 from models.errors import InputError
@@ -32,8 +32,19 @@ Table = dict[str, Any]
 
 def names_of(system: str) -> tuple[str, ...]:
     """All effects that scenes of a system may have; none is imported."""
+    return tuple(sorted(_files(system)))
+
+
+def _files(system: str) -> dict[str, Path]:
     package = SYSTEMS[system].effects
-    return tuple(sorted(found.name for found in iter_modules(import_module(package).__path__))) if package else ()
+    folders = import_module(package).__path__ if package else ()
+    return {file.stem: file for folder in folders for file in Path(folder).glob("[!_]*.py")}
+
+
+def listing(system: str) -> dict[str, str]:
+    """First sentence of every effect of a system, read and not imported."""
+    texts = {name: ast.get_docstring(ast.parse(file.read_text())) or "" for name, file in _files(system).items()}
+    return {name: text.partition("\n")[0].rstrip(".") for name, text in sorted(texts.items())}
 
 
 def module_of(system: str, name: str) -> Any:
@@ -107,8 +118,8 @@ def _place(module: Any, name: str) -> str:
 
 def _at(scene: Any, name: str) -> str:
     """Where an effect is named that has no table of its name."""
-    module = module_of(scene.system, name)
-    return f"; {name!r} is named by {module.PLACE}" if hasattr(module, "named") else ""
+    place = _place(module_of(scene.system, name), name).removeprefix("effects.")
+    return "" if place == name else f"; {name!r} is named by {place}"
 
 
 def own_table(scene: Any) -> Table:
@@ -120,12 +131,17 @@ def own_table(scene: Any) -> Table:
 def without(scene: Any, *left_out: str) -> Any:
     """The scene less these effects; raises InputError where one cannot be left out, or others need it."""
     table = own_table(scene)
-    for name in left_out:
+    for name in sorted(left_out, key=lambda name: _depth(name, scene.system), reverse=True):
         if name in tables_of(scene):
             del table["effects"][name]
         else:
             module_of(scene.system, name).leave_out(table, scene)
-    return rebuilt(table, scene)
+    return _confirmed(rebuilt(table, scene), left_out, False)
+
+
+def _depth(name: str, system: str) -> int:
+    """How long the longest chain of needs is; who needs another one leaves before it."""
+    return 1 + max((_depth(other, system) for other in module_of(system, name).NEEDS), default=0)
 
 
 def beside(scene: Any, *more: str) -> Any:
@@ -134,7 +150,17 @@ def beside(scene: Any, *more: str) -> Any:
     table = own_table(scene)
     for name in more:
         _put_in(table, name, scene)
-    return rebuilt(table, scene)
+    return _confirmed(rebuilt(table, scene), more, True)
+
+
+def _confirmed(scene: Any, effects: Iterable[str], wanted: bool) -> Any:
+    """The scene, once it is known that it names each of these, or none of them."""
+    there = named(scene)
+    for name in effects:
+        if (name in there) is not wanted:
+            said = "cannot be in this scene: nothing of it takes part" if wanted else "is still there: leave it in"
+            raise InputError(scene.file, _place(module_of(scene.system, name), name), None, f"{name!r} {said}")
+    return scene
 
 
 def _put_in(table: Table, name: str, scene: Any) -> None:

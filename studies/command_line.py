@@ -64,24 +64,25 @@ def _end(message: str, code: int) -> NoReturn:
 def list_scenes() -> None:
     """List the scenes that come with twinrig, the effects, the parameter sets and the engines."""
     from models.engines.catalogue import CATALOGUE
-    from models.scene import effect_names, parameter_sets
+    from models.scene import parameter_sets
+    from models.scene_effects import listing
     from models.scene_file import parse
+    from models.systems import DEFAULT, SYSTEMS
 
     scenes = {path.stem: parse(path)["title"] for path in sorted(SCENES.glob("*.toml"))}
-    effects = {name: _first_sentence(f"models.effects.{name}") for name in effect_names()}
     sets = {name: import_module(f"models.parameters.{name}").SOURCE for name in parameter_sets()}
     _print_list("scenes (twinrig run NAME, or a file of your own)", scenes)
-    _print_list("effects ([effects.NAME] in a scene; one that is not named is not computed)", effects)
+    for system in SYSTEMS:
+        named = "[effects.NAME] in a scene" if system == DEFAULT else "by the tables of its scenes"
+        _print_list(f"effects of {system} ({named}; one that is not named is not computed)", listing(system))
     _print_list("parameter sets (vehicle.parameters = NAME, or a TOML file of your own)", sets)
     _print_list("engines and their integrators (--engine NAME; [engines.NAME] integrator = ...)",
                 {name: ", ".join(integrators) for name, integrators in CATALOGUE.items()})
 
 
-def _first_sentence(module: str) -> str:
-    return (import_module(module).__doc__ or "").partition("\n")[0].rstrip(".")
-
-
 def _print_list(title: str, entries: dict[str, str]) -> None:
+    if not entries:
+        return
     width = max(map(len, entries))
     print(title)
     for name, text in entries.items():

@@ -128,7 +128,8 @@ def test_falling_friction_is_computed_only_where_a_scene_names_it(monkeypatch):
 
 
 def test_falling_friction_is_refused_where_it_would_not_be_read():
-    assert "has no meaning for exact" in refused(falling_friction=FALLING, method={"name": "exact"})
+    remedy = "method.name: cannot stand beside 'falling_friction', which FASTSIM alone computes: drop one of them"
+    assert remedy in refused(falling_friction=FALLING, method={"name": "exact"})
     assert "second-order" in refused(falling_friction=FALLING, method={"march": "plain"})
     with pytest.raises(InputError) as of_cases:
         build({"title": "t", "system": "contact", "cases": {"file": "x.csv"}, "falling_friction": FALLING}, "c.toml")

@@ -2,6 +2,7 @@
 
 from models.contact.material import Material
 from models.contact.scene import ContactScene
+from models.scene_effects import lines as effect_lines
 
 THEORIES = {
     "linear": "Kalker's linear theory: no slip, exact for small creepage",
@@ -32,7 +33,8 @@ def describe(scene: ContactScene) -> str:
     if scene.sweep is not None:
         lines.append(_line("sweep", _values(scene.sweep)))
     method = _values(scene.method, {"name", *scene.method.unread()})
-    return "\n".join([*lines, _line("theory", THEORIES[scene.method.name] + (f"; {method}" if method else ""))])
+    theory = _line("theory", THEORIES[scene.method.name] + (f"; {method}" if method else ""))
+    return "\n".join([*lines, theory, *effect_lines(scene)])
 
 
 def _line(head: str, text: str) -> str:

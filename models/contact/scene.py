@@ -11,6 +11,7 @@ from models.contact.falling_friction import Falling
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN
 from models.contact.material import STEEL, Material, Pair
 from models.errors import InputError
+from models.scene_effects import check
 from models.scene_file import SceneFile, checked
 from models.strict import Strict, quantity
 
@@ -179,6 +180,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Co
     _check_size(scene)
     _check_sweep(scene)
     _check_method(scene)
+    check(scene)
     _check_friction(scene)
     return scene
 
@@ -276,13 +278,11 @@ def _check_method(scene: ContactScene) -> None:
 
 
 def _check_friction(scene: ContactScene) -> None:
-    """Friction falls in FASTSIM alone, marched to second order, and not in a table of cases."""
+    """Friction falls in FASTSIM marched to second order, and not in a table of cases."""
     method = scene.method
     if scene.falling_friction is None:
         return
     if scene.cases is not None:
         raise InputError(scene.file, "falling_friction", None, "a table of cases has constant friction")
-    if method.name != "fastsim":
-        raise InputError(scene.file, "falling_friction", None, f"has no meaning for {method.name}: use fastsim")
     if method.march != "second-order":
         raise InputError(scene.file, "method.march", method.march, "must be second-order where friction falls")

@@ -1,6 +1,7 @@
 """What a scene of handling will compute: printed by ``twinrig show``, checked before any run."""
 
 from models.handling.scene import HandlingScene
+from models.scene_effects import lines as effect_lines
 
 
 def check(scene: HandlingScene, engines: tuple[str, ...]) -> None:
@@ -26,8 +27,8 @@ def describe(scene: HandlingScene) -> str:
         *(_line(name, _manoeuvre(scene, name)) for name in scene.manoeuvres),
         _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
     ]  # fmt: skip
-    return "\n".join([*lines, _line("absent", "compliance of the carcass, roll and pitch of wheels, steering system "
-                                              "(not computed)")])  # fmt: skip
+    never = "compliance of the carcass, roll and pitch of wheels, steering system"
+    return "\n".join([*lines, *effect_lines(scene, 18), _line("never", never)])
 
 
 def _manoeuvre(scene: HandlingScene, name: str) -> str:

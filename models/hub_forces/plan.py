@@ -6,6 +6,7 @@ from models.engines.hub_forces import check_step
 from models.errors import InputError
 from models.hub_forces.rigid import rigid
 from models.hub_forces.scene import HubScene
+from models.scene_effects import lines as effect_lines
 
 
 def check(scene: HubScene, engines: tuple[str, ...]) -> None:
@@ -37,7 +38,8 @@ def describe(scene: HubScene) -> str:
         lines.append(_line("road", f"ISO 8608 class {scene.road.iso8608}, two independent tracks, seeds "
                                    f"{scene.road.seed} and {scene.road.seed + 1}, {scene.road.speed:g} m/s"))
     lines.append(_line("run", f"{scene.run.duration:g} s, Runge-Kutta 4, {scene.run.step:g} s"))
-    return "\n".join([*lines, _line("absent", "drag, tyres that roll, curves and friction of springs (not computed)")])
+    never = "drag, tyres that roll, curves and friction of springs"
+    return "\n".join([*lines, *effect_lines(scene), _line("never", never)])
 
 
 def _line(head: str, text: str) -> str:

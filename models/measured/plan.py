@@ -10,6 +10,7 @@ from models.measured.rig import Rig
 from models.measured.scene import MeasuredScene
 from models.measured.signal import Signal
 from models.measured.virtual import check as check_virtual
+from models.scene_effects import lines as effect_lines
 
 MISSING = "no vertical force is mapped at {}: without it the vehicle falls"
 
@@ -73,7 +74,7 @@ def describe(scene: MeasuredScene) -> str:
               _line("hand on", f"{', '.join(scene.hand_on.sections or ['every section'])}; as "
                                f"{', '.join(scene.hand_on.formats)}; damage of slopes "
                                f"{', '.join(f'{slope:g}' for slope in scene.hand_on.slopes)}")]  # fmt: skip
-    return "\n".join(lines)
+    return "\n".join([*lines, *effect_lines(scene)])
 
 
 def _virtual(scene: MeasuredScene) -> list[str]:

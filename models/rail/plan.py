@@ -5,6 +5,7 @@ from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
 from models.rail.of_scene import equations_of, path_speeds, wheelset_of
 from models.rail.scene import WheelsetScene
 from models.rail.wheelset import Wheelset
+from models.scene_effects import lines as effect_lines
 
 LAWS = {"linear": "Kalker's linear theory, without bound", "fastsim": "FASTSIM, {} cells along each strip"}
 
@@ -41,21 +42,7 @@ def describe(scene: WheelsetScene) -> str:
         _line("paths", f"at {' and '.join(f'{speed:g}' for speed in path_speeds(scene))} m/s, {run.duration:g} s in "
                        f"steps of {run.step:g} s, from {1e3 * run.displacement:g} mm and {run.yaw:g} rad"),
     ]  # fmt: skip
-    return "\n".join([*lines, _line("absent", ", ".join(absent(scene, wheelset)) + " (not computed)"), "",
-                      *ENGINES])  # fmt: skip
-
-
-def absent(scene: WheelsetScene, wheelset: Wheelset) -> list[str]:
-    """What the scene or its wheelset does not name."""
-    present = {
-        "FASTSIM": scene.contact.law == "fastsim",
-        "springs": bool(wheelset.stiffness_x or wheelset.stiffness_y or wheelset.stiffness_z),
-        "dampers": bool(wheelset.damping_x or wheelset.damping_y or wheelset.damping_z),
-        "friction": wheelset.friction > 0.0,
-        "flange": wheelset.profiles is not None or wheelset.flange_stiffness > 0.0,
-        "damping of the contact": wheelset.contact_damping > 0.0, "irregularities of the track": False,
-    }  # fmt: skip
-    return [name for name, there in present.items() if not there]
+    return "\n".join([*lines, *effect_lines(scene), "", *ENGINES])
 
 
 def _line(head: str, text: str) -> str:

@@ -7,6 +7,7 @@ from models.ride.linear_vehicle import Wheel
 from models.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
 from models.ride.scene import RideScene
 from models.road.two_track import half_track
+from models.scene_effects import lines as effect_lines
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 
@@ -39,7 +40,7 @@ def describe(scene: RideScene) -> str:
     lines += [_line("speed", _speed(scene))]
     lines += [_line("outputs", ", ".join(output.name for output in vehicle.outputs))]
     lines += [_line("weighting", ", ".join(f"{name} by {by}" for name, by in scene.weighting.items()) or "none")]
-    return "\n".join([*lines, _line("absent", ", ".join(absent(scene, vehicle)) + " (not computed)")])
+    return "\n".join([*lines, *effect_lines(scene)])
 
 
 LEFT_RIGHT = {
@@ -62,19 +63,6 @@ def met(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[str, str]:
         place = f"{placed[0].y:g} m for all: one track"
     return (f"left and right {road.left_right}: {LEFT_RIGHT[road.left_right]}; y is {place}",
             f"axles {road.front_rear}: {FRONT_REAR[road.front_rear]}")  # fmt: skip
-
-
-def absent(scene: RideScene, vehicle: SpatialVehicle) -> list[str]:
-    """Effects that the scene or its vehicle does not name."""
-    curves = any(s.travel_force or s.rate_force or s.friction for s in vehicle.springs)
-    present = {
-        "gravity and preload": scene.vehicle.operating_point == "loaded", "curves of springs and dampers": curves,
-        "tyre damping": any(tyre.damping for tyre in vehicle.tyres), "side forces": bool(vehicle.side_forces),
-        "roll steer": any(force.roll_steer for force in vehicle.side_forces), "drag": bool(vehicle.drags),
-        "second corner of the road": scene.road.cutoff is not None, "weighting": bool(scene.weighting),
-        "varying speed": scene.drive is not None,
-    }  # fmt: skip
-    return [name for name, there in present.items() if not there]
 
 
 def _line(head: str, text: str) -> str:

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 
+from models.errors import InputError
 from models.ride.excitation import Excitation
-from models.ride.of_scene import excitation_of
+from models.ride.of_scene import excitation_of, vehicle_of
 from models.ride.scene import RideScene
 from models.vehicles.spatial import Freedom, SpatialVehicle
 from models.vehicles.spatial_linear import wheels
@@ -58,7 +59,18 @@ def effects_of(held: Held) -> tuple[Effect, ...]:
     """Every effect that the scene's vehicle and road hold, file by file."""
     names = sorted(path.stem for path in FOLDER.glob("*.py") if path.stem != "__init__")
     modules = (import_module(f"models.ride.effects.{name}") for name in names)
-    return tuple(effect for module in modules for effect in module.found(held))
+    return tuple(effect for module in modules if hasattr(module, "found") for effect in module.found(held))
+
+
+def holds(scene: RideScene, found: Callable[[Held], list[Effect]]) -> bool:
+    """Whether a scene's vehicle and road hold any of the effects that a file finds."""
+    return bool(found(Held(scene, vehicle_of(scene))))
+
+
+def of_vehicle(scene: RideScene) -> InputError:
+    """Why a scene cannot leave out what its vehicle has."""
+    return InputError(scene.file, "vehicle.file", scene.vehicle.file, "has it: name a file without it, or let effects "
+                      '= "auto" leave it out')  # fmt: skip
 
 
 def illegal(chosen: Iterable[Effect]) -> str:

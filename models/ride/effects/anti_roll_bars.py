@@ -2,8 +2,15 @@
 
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
-from models.ride.choice.held import Effect, Held
+from models.ride.choice.held import Effect, Held, holds, of_vehicle
+
+PLACE = "vehicle.file"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "a product per bar"
+COUNTS: dict[str, dict[str, int]] = {}
 
 
 def found(held: Held) -> list[Effect]:
@@ -14,3 +21,13 @@ def found(held: Held) -> list[Effect]:
 def _without(held: Held, bar: str) -> Held:
     bars = tuple(own for own in held.vehicle.bars if own.name != bar)
     return replace(held, vehicle=replace(held.vehicle, bars=bars))
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene's vehicle has it."""
+    return holds(scene, found)
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """InputError: it is the vehicle's."""
+    raise of_vehicle(scene)

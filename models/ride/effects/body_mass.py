@@ -2,13 +2,20 @@
 
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
-from models.ride.choice.held import Effect, Held
+from models.ride.choice.held import Effect, Held, holds, of_vehicle
 from models.ride.effects import tyre_damping
 
 LIGHT = 0.2
 """A body that is not a wheel counts as light up to this share of the whole mass."""
 ALL = "mass of all wheels"
+
+PLACE = "vehicle.file"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "two states per freedom of a light body"
+COUNTS: dict[str, dict[str, int]] = {}
 
 
 def found(held: Held) -> list[Effect]:
@@ -36,3 +43,13 @@ def _of(held: Held, name: str, bodies: list[str], excludes: tuple[str, ...]) -> 
 
 def _without(held: Held, bodies: list[str]) -> Held:
     return replace(held, massless=held.massless | set(bodies))
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene's vehicle has it."""
+    return holds(scene, found)
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """InputError: it is the vehicle's."""
+    raise of_vehicle(scene)

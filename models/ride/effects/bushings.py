@@ -3,13 +3,20 @@
 from collections import defaultdict
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
-from models.ride.choice.held import Effect, Held
+from models.ride.choice.held import Effect, Held, holds, of_vehicle
 from models.vehicles.spatial import SpringDamper
 from models.vehicles.spatial_linear import slopes_at_rest
 
 ALIKE = 2.0
 """Stiffnesses apart by no more than this factor are of one sort of bushing."""
+
+PLACE = "vehicle.file"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "a product per bushing, and the fastest modes of the vehicle"
+COUNTS: dict[str, dict[str, int]] = {}
 
 
 def found(held: Held) -> list[Effect]:
@@ -45,3 +52,13 @@ def _of(springs: list[SpringDamper]) -> Effect:
 
 def _without(held: Held, springs: list[str]) -> Held:
     return replace(held, rigid=held.rigid | set(springs))
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene's vehicle has it."""
+    return holds(scene, found)
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """InputError: it is the vehicle's."""
+    raise of_vehicle(scene)

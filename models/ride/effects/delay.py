@@ -1,6 +1,14 @@
 """The delay from front to rear: every axle meets at once what the first one meets."""
 
-from models.ride.choice.held import Effect, Held
+from typing import Any
+
+from models.ride.choice.held import Effect, Held, holds
+
+PLACE = "road.front_rear"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "a filter of the road per axle"
+COUNTS: dict[str, dict[str, int]] = {"all": {"states": 2}}
 
 
 def found(held: Held) -> list[Effect]:
@@ -11,3 +19,18 @@ def found(held: Held) -> list[Effect]:
 
 def _without(held: Held) -> Held:
     return held.on_road(front_rear="equal")
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene has it."""
+    return holds(scene, found)
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """All axles meet the same at once."""
+    table.setdefault("road", {})["front_rear"] = "equal"
+
+
+def put_in(table: dict[str, Any], scene: Any) -> None:
+    """Every axle meets what the first one met, its distance later."""
+    table.setdefault("road", {})["front_rear"] = "delayed"

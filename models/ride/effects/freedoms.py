@@ -3,9 +3,16 @@
 from collections import defaultdict
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
-from models.ride.choice.held import Effect, Held
+from models.ride.choice.held import Effect, Held, holds, of_vehicle
 from models.vehicles.spatial import Freedom
+
+PLACE = "vehicle.file"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "two states per freedom"
+COUNTS: dict[str, dict[str, int]] = {}
 
 
 def found(held: Held) -> list[Effect]:
@@ -28,3 +35,13 @@ def _of(name: str, freedoms: list[tuple[str, Freedom]]) -> Effect:
 
 def _without(held: Held, freedoms: list[tuple[str, Freedom]]) -> Held:
     return replace(held, locked=held.locked | set(freedoms))
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene's vehicle has it."""
+    return holds(scene, found)
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """InputError: it is the vehicle's."""
+    raise of_vehicle(scene)

@@ -3,8 +3,15 @@
 from collections import defaultdict
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
-from models.ride.choice.held import Effect, Held
+from models.ride.choice.held import Effect, Held, holds, of_vehicle
+
+PLACE = "vehicle.file"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "a product per mount, and the freedoms of what it carries"
+COUNTS: dict[str, dict[str, int]] = {}
 
 
 def found(held: Held) -> list[Effect]:
@@ -27,3 +34,13 @@ def _of(held: Held, pair: tuple[str, str], springs: list[str]) -> Effect:
 
 def _without(held: Held, springs: list[str]) -> Held:
     return replace(held, rigid=held.rigid | set(springs))
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene's vehicle has it."""
+    return holds(scene, found)
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """InputError: it is the vehicle's."""
+    raise of_vehicle(scene)

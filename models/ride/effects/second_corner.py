@@ -1,7 +1,15 @@
 """The road's second corner: its filters of second order become those of first order."""
 
-from models.ride.choice.held import Effect, Held
+from typing import Any
+
+from models.ride.choice.held import Effect, Held, holds
 from models.ride.effects import tyre_damping
+
+PLACE = "road.cutoff"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "a state more per filter of the road"
+COUNTS: dict[str, dict[str, int]] = {"all": {"states": 4}}
 
 
 def found(held: Held) -> list[Effect]:
@@ -15,3 +23,18 @@ def found(held: Held) -> list[Effect]:
 
 def _without(held: Held) -> Held:
     return held.on_road(cutoff=None)
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene has it."""
+    return holds(scene, found)
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """Road filters of first order."""
+    table["road"].pop("cutoff", None)
+
+
+def put_in(table: dict[str, Any], scene: Any) -> None:
+    """At 20 rad/m, a wavelength of a third of a metre."""
+    table.setdefault("road", {})["cutoff"] = 20.0

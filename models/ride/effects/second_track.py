@@ -1,6 +1,14 @@
 """The second track: left and right wheels of an axle meet the same height."""
 
-from models.ride.choice.held import Effect, Held
+from typing import Any
+
+from models.ride.choice.held import Effect, Held, holds
+
+PLACE = "road.left_right"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "a second filter of the road per axle"
+COUNTS: dict[str, dict[str, int]] = {"all": {"states": 2}}
 
 
 def found(held: Held) -> list[Effect]:
@@ -13,3 +21,18 @@ def found(held: Held) -> list[Effect]:
 
 def _without(held: Held) -> Held:
     return held.on_road(left_right="equal")
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene has it."""
+    return holds(scene, found)
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """Left and right wheels meet the same height."""
+    table.setdefault("road", {})["left_right"] = "equal"
+
+
+def put_in(table: dict[str, Any], scene: Any) -> None:
+    """The mean and the roll process."""
+    table.setdefault("road", {})["left_right"] = "modelled"

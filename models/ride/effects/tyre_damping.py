@@ -1,10 +1,17 @@
 """Damping of the tyres: nothing but their springs is left."""
 
 from dataclasses import replace
+from typing import Any
 
-from models.ride.choice.held import Effect, Held
+from models.ride.choice.held import Effect, Held, holds, of_vehicle
 
 NAME = "tyre damping"
+
+PLACE = "vehicle.file"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "a product per tyre; without a second corner white noise at the outputs"
+COUNTS: dict[str, dict[str, int]] = {}
 
 
 def found(held: Held) -> list[Effect]:
@@ -16,3 +23,13 @@ def found(held: Held) -> list[Effect]:
 def _without(held: Held) -> Held:
     tyres = tuple(replace(tyre, damping=0.0) for tyre in held.vehicle.tyres)
     return replace(held, vehicle=replace(held.vehicle, tyres=tyres))
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene's vehicle has it."""
+    return holds(scene, found)
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """InputError: it is the vehicle's."""
+    raise of_vehicle(scene)

@@ -1,0 +1,25 @@
+"""Roll and pitch held by a moment towards a Kalman filter's estimate."""
+
+from typing import Any
+
+PLACE = "stabilise.method"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "a filter over all samples before the run, and a moment over time"
+COUNTS = {"all": {"filters": 1}}
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene has it."""
+    return bool(scene.stabilise.method == "kalman")
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """Measured angles are enforced as they are."""
+    table["stabilise"] = {key: value for key, value in table.get("stabilise", {}).items() if key == "smoothing"} | {
+        "method": "prescribed"}
+
+
+def put_in(table: dict[str, Any], scene: Any) -> None:
+    """With the usual bandwidth."""
+    table.setdefault("stabilise", {})["method"] = "kalman"

@@ -1,0 +1,24 @@
+"""Roll and pitch enforced as measured, smoothed."""
+
+from typing import Any
+
+PLACE = "stabilise.method"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "two coordinates less, and derivatives of the smoothed angles"
+COUNTS = {"all": {"enforced angles": 1}}
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene has it."""
+    return bool(scene.stabilise.method == "prescribed")
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """Nothing holds roll and pitch."""
+    table["stabilise"]["method"] = "none"
+
+
+def put_in(table: dict[str, Any], scene: Any) -> None:
+    """Smoothed as usual."""
+    table.setdefault("stabilise", {})["method"] = "prescribed"

@@ -1,0 +1,25 @@
+"""Measured cross-sections in place of cones on round heads."""
+
+from typing import Any
+
+PLACE = "profiles"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "tables of contact places by lateral displacement, made once"
+COUNTS = {"all": {"profiles": 1}}
+MODULES = ("models.rail.contact_table",)
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene has it."""
+    return scene.profiles is not None
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """Cones, heads of one radius, and flanges that are springs."""
+    del table["profiles"]
+
+
+def put_in(table: dict[str, Any], scene: Any) -> None:
+    """S1002 on UIC60."""
+    table["profiles"] = {}

@@ -1,0 +1,22 @@
+"""Drag of the air, which loads the axles by the speed."""
+
+from typing import Any
+
+from models.ride.choice.held import of_vehicle
+from models.ride.of_scene import vehicle_of
+
+PLACE = "vehicle.file"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "a linear vehicle of its own at every speed"
+COUNTS: dict[str, dict[str, int]] = {}
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene has it."""
+    return bool(vehicle_of(scene).drags)
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """InputError: it is the vehicle's."""
+    raise of_vehicle(scene)

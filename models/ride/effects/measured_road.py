@@ -1,0 +1,20 @@
+"""A road that is fitted to a measured one."""
+
+from typing import Any
+
+PLACE = "road.file"
+NEEDS: tuple[str, ...] = ()
+EXCLUDES: tuple[str, ...] = ()
+COST = "a fit before all, no more in the runs"
+COUNTS: dict[str, dict[str, int]] = {"all": {"fits": 1}}
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene has it."""
+    return scene.road.file is not None
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """The paper's road."""
+    for key in ("file", "track_width", "first", "last"):
+        table["road"].pop(key, None)
