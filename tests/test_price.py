@@ -167,7 +167,7 @@ def test_what_a_default_loses():
 def test_tables_come_from_saved_points():
     problem = PlantedProblem("raises")
     points = [cost.point(p.as_dict()) for p in points_of(problem)]
-    found = {table.title: table for table in tables(cost.describe(problem, 3), points)}
+    found = {table.title: table for table in tables(cost.describe(problem, points), points)}
     cheapest = found["Cheapest setting that meets the tolerance"].rows[0]
     assert cheapest[0] == "0.1"
     assert cheapest[1].startswith("Exudyn fourth, 4.5 ms"), "0.1^(1/4) 8 ms = 4.499 ms"

@@ -5,6 +5,7 @@ which does not, has routes of its own beside them.
 """
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +32,14 @@ from validation.rows import Row, System, Table, at_most, behaves, finding, withi
 TITLE = "What accuracy costs"
 SYSTEM: System = "cost"
 PROBLEMS: tuple[Callable[[bool], Problem], ...] = (road_excited.problem, force_excited.problem,
-                                                   wheelset.problem, braking_stop.problem)  # fmt: skip
+                                                   partial(wheelset.problem, speed=20.0),
+                                                   braking_stop.problem)  # fmt: skip
 FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (noisy_forces.problem, prescribed_pitch.problem,
-                                                    free_vehicle.problem)  # fmt: skip
+                                                    free_vehicle.problem, partial(wheelset.problem, speed=5.0),
+                                                    partial(wheelset.problem, speed=1.0))  # fmt: skip
 """Problems that a quick run leaves out; it has those of PROBLEMS."""
 ROUNDS = {True: 5, False: 15}
-"""Interleaved rounds of timing, by ``quick``."""
-FEW: dict[Callable[[bool], Problem], int] = {free_vehicle.problem: 1}
-"""Rounds of problems whose settings take seconds each."""
+"""Interleaved rounds of timing at most, by ``quick``."""
 LEAST = {True: 0.004, False: 0.01}
 """A short run is repeated until its turn lasts this long (s), by ``quick``."""
 CALLBACKS = {
@@ -55,9 +56,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of all problems, of the force calls, and of two claims about speed."""
     rows, saved = [], []
     for make in PROBLEMS if quick else PROBLEMS + FULL_ONLY:
-        problem, rounds = make(quick), FEW.get(make, ROUNDS[quick])
-        points = cost.measure(problem, quick, rounds, LEAST[quick])
-        saved.append({"problem": cost.describe(problem, rounds), "points": [p.as_dict() for p in points]})
+        problem = make(quick)
+        points = cost.measure(problem, quick, ROUNDS[quick], LEAST[quick])
+        saved.append({"problem": cost.describe(problem, points), "points": [p.as_dict() for p in points]})
         rows += rows_of(problem, points, quick)
     road = road_excited.problem(quick)
     ride_rows, ride_data = ride.measure(quick, ROUNDS[True], LEAST[True])

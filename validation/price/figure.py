@@ -1,4 +1,4 @@
-"""The work-precision figure: error over force calls and over seconds, a curve per integrator."""
+"""The work-precision figure: error over what work is counted in and over seconds, a curve per integrator."""
 
 from typing import Any
 
@@ -19,7 +19,6 @@ MARKERS = "s^v<>PXhp*d"
 STYLES = {1: ":", 2: "--", 3: "-.", 4: "-"}
 SIZES = {"reference": 8.5, "exudyn": 6.5, "mujoco": 4.5}
 """Coinciding curves show as rings within each other."""
-AXES = {"force calls": "force calls in the run", "seconds": "seconds for the run, model built anew (median)"}
 
 
 def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
@@ -27,18 +26,20 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
     figure, axes = plt.subplots(1, 2, figsize=(12.5, 8.4), sharey=True)
     styles = _styles(points)
     top = _top(problem, points)
-    for ax, kind in zip(axes, cost.COSTS, strict=True):
+    for ax, kind in zip(axes, cost.costs(points), strict=True):
         _floor(ax, problem)
         _front(ax, problem, points, kind)
         for curve, own in by_curve(points).items():
             _curve(ax, problem, own, kind, styles[curve])
         _defaults(ax, problem, points, kind)
-        ax.set(xscale="log", yscale="log", xlabel=AXES[kind])
-        measured = "exact" if kind == "force calls" else f"{problem['rounds']} interleaved rounds"
+        timed = kind == "seconds"
+        label = "seconds for the run, model built anew (median)" if timed else f"{kind} in the run"
+        ax.set(xscale="log", yscale="log", xlabel=label)
+        measured = f"{problem['rounds']} interleaved rounds" if timed else "exact"
         ax.set_title(f"by {kind}, {measured}")
     _failures(axes[0], points, top)
     quantity = quantity_of(problem)
-    axes[0].set_ylabel(f"largest {quantity} error over the run [{problem['units'][quantity]}]")
+    axes[0].set_ylabel(f"largest {quantity} error [{problem['units'][quantity]}]")
     axes[0].set_ylim(0.3 * problem["uncertainty"][quantity], 12 * top)
     alike = "; ".join(named(group[0], [group]) for group in groups_of(problem, points))
     figure.suptitle(f"What accuracy costs. {problem['title']}\n", x=0.01, ha="left", fontsize=12)
@@ -100,18 +101,19 @@ def _front(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) ->
 def _defaults(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> None:
     """Ring and name each engine's default setting."""
     found = [(owner, p) for owner, p in cost.defaults(points).items() if p.status == "ok"]
-    for (owner, p), text in zip(found, PLACES[kind], strict=False):
+    for (owner, p), text in zip(found, PLACES[kind == "seconds"], strict=False):
         place = (p.cost(kind), p.errors[quantity_of(problem)])
         ax.plot(*place, "o", markersize=15, markerfacecolor="none", markeredgecolor="#111111", markeredgewidth=1.4,
                 zorder=5)  # fmt: skip
         ax.annotate(f"{owner} default:\n{p.setting.method},\n{p.setting.label()}", place, fontsize=8.5,
                     xytext=text, textcoords="axes fraction", ha="left", va="center", zorder=6,
                     arrowprops={"arrowstyle": "-", "color": "#111111", "linewidth": 0.7, "shrinkB": 7,
-                                "relpos": (0.12, 1) if kind == "force calls" else (1, 0.5)})  # fmt: skip
+                                "relpos": (1, 0.5) if kind == "seconds" else (0.12, 1)})  # fmt: skip
 
 
-PLACES = {"force calls": ((0.015, 0.36), (0.17, 0.46)), "seconds": ((0.015, 0.85), (0.015, 0.95))}
-"""Where the defaults are named, in fractions of the panel: the corner that accuracy leaves empty."""
+PLACES = {False: ((0.015, 0.36), (0.17, 0.46)), True: ((0.015, 0.85), (0.015, 0.95))}
+"""Where the defaults are named, by whether it is over seconds, in fractions of the panel: the corner that accuracy
+leaves empty."""
 
 
 def _failures(ax: Axes, points: list[Point], top: float) -> None:
@@ -132,7 +134,7 @@ def _expected(p: Point, points: list[Point]) -> float:
     own = by_curve(points).get(p.setting.curve)
     if not own or p.setting.adaptive:
         return 0.0
-    return own[0].cost("force calls") * own[0].setting.value / p.setting.value
+    return own[0].cost(cost.costs(points)[0]) * own[0].setting.value / p.setting.value
 
 
 def _who(failed: list[Point], status: str) -> str:

@@ -17,7 +17,8 @@ PROMISE = 1.25
 
 def rows_of(problem: Problem, points: list[Point], quick: bool) -> list[Row]:
     """All rows of one problem; the width of the sweep is asked of the full run only."""
-    rows = [_reference(problem), *_orders(problem, points), _silent(problem, points), _counts(problem, points)]
+    rows = [_reference(problem), *_orders(problem, points), _silent(problem, points), _counts(problem, points),
+            _repeat(problem, points)]  # fmt: skip
     rows += [_promises(problem, points)] if quick else [_promises(problem, points), _sweep(problem, points)]
     return rows + _losses(problem, points)
 
@@ -66,6 +67,13 @@ def _counts(problem: Problem, points: list[Point]) -> Row:
                     cost.miscounted(points, problem.duration), "exact: stages from the methods' tableaux")
 
 
+def _repeat(problem: Problem, points: list[Point]) -> Row:
+    """A run that is repeated counts the same and errs by the same."""
+    changed = [f"{p.setting.curve} {p.setting.label()}" for p in points if p.changed]
+    return _none_of(f"price.{problem.key}.counts.repeat", f"settings of {len(points)} that count or err otherwise when "
+                    "they are run again", changed, "exact: all counts, and errors to the last digit")  # fmt: skip
+
+
 def _none_of(name: str, what: str, found: list[str], why: str) -> Row:
     """Row that passes if a list of offenders is empty, and names them if it is not."""
     named_ones = f": {', '.join(found)}" if found else ""
@@ -77,7 +85,7 @@ def _promises(problem: Problem, points: list[Point]) -> Row:
     quantity, _ = _quantity(problem)
     worst = 0.0
     for target in problem.tolerances:
-        best = cost.cheapest(cost.reaches(points, quantity, target, "force calls"))
+        best = cost.cheapest(cost.reaches(points, quantity, target, cost.costs(points)[0]))
         if best is not None:
             found = cost.attempt(problem, _runnable(problem, points, *best))
             worst = max(worst, found.errors.get(quantity, float("inf")) / target)
@@ -94,14 +102,17 @@ def _runnable(problem: Problem, points: list[Point], curve: str, one: Reach) -> 
 
 
 def _sweep(problem: Problem, points: list[Point]) -> Row:
-    """Six settings of each method, and four decades of error from order 4 up."""
+    """Six settings of each method, and four decades of error from order 4 up where nothing else ends the curve."""
     quantity, _ = _quantity(problem)
+    tried = cost.by_curve(points, None)
     short = []
     for curve, own in cost.by_curve(points).items():
         wide = own[0].errors[quantity] >= 1e4 * own[-1].errors[quantity]
-        if len(own) < 6 or not (wide or 0 < own[0].setting.order < 4):
+        whole = tried[curve][0].status != "ok" and own[-1].errors[quantity] <= min(problem.tolerances)
+        if len(own) < 6 or not (wide or whole or 0 < own[0].setting.order < 4):
             short.append(curve)
-    what = "methods with fewer than 6 settings that answered, or fewer than 4 decades of error from order 4 up"
+    what = ("methods with fewer than 6 settings that answered, or from order 4 up with fewer than 4 decades of error "
+            "although coarser settings answer or the finest tolerance is not met")  # fmt: skip
     return _none_of(f"price.{problem.key}.sweep", what, short, "what the study was asked to cover")
 
 
@@ -110,7 +121,7 @@ def _losses(problem: Problem, points: list[Point]) -> list[Row]:
     target = sorted(problem.tolerances)[len(problem.tolerances) // 2]
     return [row for owner, p in cost.defaults(points).items() if p.status == "ok"
             for among, words in ((p.setting.engine, f"{owner}'s own cheapest"), ("", "the cheapest of all"))
-            for kind in cost.COSTS
+            for kind in cost.costs(points)
             for row in _loss(problem, points, owner, p, target, among, words, kind)]  # fmt: skip
 
 
@@ -122,7 +133,7 @@ def _loss(problem: Problem, points: list[Point], owner: str, p: Point, target: f
         return []
     how = ", extrapolated by its order" if one.how == "extrapolated" else ""
     name = f"price.{problem.key}.default.{p.setting.engine}.{'own' if among else 'all'}.{kind}".replace(" ", "-")
-    bounds = "exact" if kind == "force calls" else f"95 % interval {one.low:.3g} to {one.high:.3g}"
+    bounds = f"95 % interval {one.low:.3g} to {one.high:.3g}" if kind == "seconds" else "exact"
     what = f"{owner}'s default, {p.setting.method}, refined to {target:g} {unit}{how}, by {words}: {kind}"
     why = f"at its default {p.setting.label()} its error is {p.errors[quantity]:.3g} {unit}"
     return [finding(name, SYSTEM, what, one.factor, "times", bounds, why, "none")]

@@ -7,9 +7,10 @@ any other, and one that gives a wrong answer without saying so is called SILENT.
 """
 
 import math
+import time
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -20,14 +21,20 @@ from validation.price.problems import Problem, Setting
 from validation.timing import interleave, interval, resamples
 
 Status = Literal["ok", "raised", "refused", "SILENT"]
-COSTS = ("force calls", "seconds")
+WORK = ("contact cells", "force calls")
+"""What work may be counted in: the first that a problem's points have."""
+PATIENCE = 10.0
+"""Seconds for all rounds of one problem together: long sweeps are timed in fewer."""
 DRAWS = 200
 """Bootstrapped sets of rounds behind the interval of an interpolated ratio."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """One setting and what became of it: errors by quantity, counts, seconds of every round."""
+    """One setting and what became of it: errors by quantity, counts, seconds of every round.
+
+    changed : whether the last of those rounds counted, or erred by, anything else.
+    """
 
     setting: Setting
     status: Status
@@ -35,10 +42,11 @@ class Point:
     errors: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     seconds: tuple[float, ...] = ()
+    changed: bool = False
 
     def cost(self, kind: str) -> float:
-        """Force calls, or the median of the seconds."""
-        return float(np.median(self.seconds)) if kind == "seconds" else float(self.counts["force calls"])
+        """A count, or the median of the seconds."""
+        return float(np.median(self.seconds)) if kind == "seconds" else float(self.counts[kind])
 
     def as_dict(self) -> dict[str, Any]:
         """The point as ``data/price.json`` keeps it."""
@@ -48,6 +56,11 @@ class Point:
 def point(saved: dict[str, Any]) -> Point:
     """A point from what ``as_dict`` saved."""
     return Point(**{**saved, "setting": Setting(**saved["setting"]), "seconds": tuple(saved["seconds"])})
+
+
+def costs(points: list[Point]) -> tuple[str, str]:
+    """What work is counted in, and seconds."""
+    return next(kind for kind in WORK if any(kind in p.counts for p in points)), "seconds"
 
 
 def attempt(problem: Problem, setting: Setting) -> Point:
@@ -72,10 +85,10 @@ def _judged(problem: Problem, errors: dict[str, float]) -> tuple[Status, str]:
     return "ok", ""
 
 
-def describe(problem: Problem, rounds: int) -> dict[str, Any]:
+def describe(problem: Problem, points: list[Point]) -> dict[str, Any]:
     """What tables and figures need to know of a problem, as JSON keeps it."""
     names = ("key", "title", "note", "units", "reference", "uncertainty", "bound", "tolerances", "duration")
-    return {**{name: getattr(problem, name) for name in names}, "rounds": rounds}
+    return {**{name: getattr(problem, name) for name in names}, "rounds": max(len(p.seconds) for p in points)}
 
 
 def miscounted(points: list[Point], duration: float) -> list[str]:
@@ -91,17 +104,25 @@ def miscounted(points: list[Point], duration: float) -> list[str]:
 
 
 def measure(problem: Problem, quick: bool, rounds: int, least: float) -> list[Point]:
-    """All points of a problem, with the seconds of ``rounds`` interleaved rounds for those that are ok.
+    """All points of a problem, with the seconds of up to ``rounds`` interleaved rounds for those that are ok.
 
     Seconds are those of building the model and running it, input tables included, for every engine alike.
     """
+    start = time.perf_counter()
     points = [attempt(problem, setting) for setting in problem.settings(quick)]
+    rounds = max(1, min(rounds, int(PATIENCE / (time.perf_counter() - start))))
     timed = [i for i, p in enumerate(points) if p.status == "ok"]
-    jobs = [lambda s=points[i].setting: problem.build(s).run() for i in timed]
+    last: dict[int, Any] = {}
+    jobs = [lambda i=i: last.update({i: problem.build(points[i].setting).run()}) for i in timed]
     for i, seconds in zip(timed, interleave(jobs, rounds, least), strict=True):
-        p = points[i]
-        points[i] = Point(p.setting, p.status, p.reason, p.errors, p.counts, tuple(seconds))
+        changed = _changed(problem, points[i], last[i])
+        points[i] = replace(points[i], seconds=tuple(seconds), changed=changed)
     return points
+
+
+def _changed(problem: Problem, p: Point, again: Any) -> bool:
+    """Whether a repeated run counted or gave something else."""
+    return dict(again.counts) != p.counts or problem.errors(again) != p.errors
 
 
 def by_curve(points: list[Point], status: Status | None = "ok") -> dict[str, list[Point]]:
@@ -117,7 +138,7 @@ def orders(points: list[Point], quantity: str, uncertainty: float) -> dict[str, 
     """Observed order of each curve: over the step, or over 1 / force calls for adaptive methods."""
     found = {}
     for curve, own in by_curve(points).items():
-        sizes = [1 / p.cost("force calls") if p.setting.adaptive else p.setting.value for p in own]
+        sizes = [1 / p.cost(costs(points)[0]) if p.setting.adaptive else p.setting.value for p in own]
         found[curve] = curves.observed_order(sizes, [p.errors[quantity] for p in own], curves.HOLLOW * uncertainty)
     return found
 
@@ -132,7 +153,7 @@ def same(points: list[Point], quantity: str, uncertainty: float) -> list[tuple[s
 
 def reaches(points: list[Point], quantity: str, target: float, kind: str,
             extrapolate: bool = False) -> dict[str, curves.Reach]:  # fmt: skip
-    """What each curve needs to meet ``target``, in force calls or seconds; curves that do not are left out."""
+    """What each curve needs to meet ``target``, in one of ``costs``; curves that do not are left out."""
     found = {}
     for curve, own in by_curve(points).items():
         one = _reach(own, quantity, target, [p.cost(kind) for p in own], extrapolate)

@@ -2,6 +2,7 @@
 
 import math
 from collections import defaultdict
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,14 @@ from validation.price.runner import Loss, Point, by_curve
 from validation.rows import Table
 from validation.timing import describe
 
+RIVALS = ("exudyn", "mujoco")
+"""Engines that have a column of their own, where a problem has them."""
+
 
 def tables(problem: dict[str, Any], points: list[Point]) -> list[Table]:
     """All tables of one problem from its saved data."""
-    return [cheapest(problem, points), losses(problem, points), every_curve(problem, points), failures(points)]
+    return [cheapest(problem, points), losses(problem, points), every_curve(problem, points), outcomes(points),
+            failures(points)]  # fmt: skip
 
 
 def named(curve: str, groups: list[tuple[str, ...]] | None = None) -> str:
@@ -45,19 +50,21 @@ def groups_of(problem: dict[str, Any], points: list[Point]) -> list[tuple[str, .
 def cheapest(problem: dict[str, Any], points: list[Point]) -> Table:
     """The cheapest setting that meets each tolerance."""
     quantity, groups = quantity_of(problem), groups_of(problem, points)
-    unit = problem["units"][quantity]
+    unit, work = problem["units"][quantity], cost.costs(points)[0]
+    rivals = [engine for engine in RIVALS if any(p.setting.engine == engine for p in points)]
     rows = []
     for target in problem["tolerances"]:
-        calls = cost.reaches(points, quantity, target, "force calls")
+        calls = cost.reaches(points, quantity, target, work)
         seconds = cost.reaches(points, quantity, target, "seconds")
-        rows.append((f"{target:g}", _won(points, calls, "", "calls", groups), *(
-            _won(points, seconds, among, "ms") for among in ("", "exudyn", "mujoco"))))  # fmt: skip
-    note = ("Fixed steps are interpolated log-log between neighbouring settings; adaptive methods count at the loosest "
-            "tolerance tried that does; 'coarsest' is the coarsest setting tried. Nothing is extrapolated. Force calls "
-            "are exact and the same on every machine; seconds are those of one run on this one, model and input tables "
-            f"built anew, and wander (median absolute deviation {100 * _spread(points):.0f} %).")  # fmt: skip
-    heads = (f"{quantity} error at most [{unit}]", "fewest force calls", "fewest seconds", "fewest in Exudyn",
-             "fewest in MuJoCo")  # fmt: skip
+        rows.append((f"{target:g}", _won(points, calls, "", work.split()[-1], groups), *(
+            _won(points, seconds, among, "ms") for among in ("", *rivals))))  # fmt: skip
+    note = ("Fixed steps are interpolated log-log between neighbouring settings; methods without one order count at "
+            "the loosest setting tried that does; 'coarsest' is the coarsest setting tried. Nothing is extrapolated. "
+            f"{work.capitalize()} are exact and the same on every machine; seconds are those of one run on this one, "
+            "everything built anew, and wander (median absolute deviation "
+            f"{100 * _spread(points):.0f} %).")  # fmt: skip
+    heads = (f"{quantity} error at most [{unit}]", f"fewest {work}", "fewest seconds",
+             *(f"fewest in {LABELS[engine]}" for engine in rivals))  # fmt: skip
     return Table("Cheapest setting that meets the tolerance", note, heads, tuple(rows))
 
 
@@ -73,13 +80,12 @@ def _won(points: list[Point], found: dict[str, Reach], among: str, unit: str,
     if best is None:
         return "none of those tried"
     curve, one = best
-    paid = f"{one.cost:,.0f} calls" if unit == "calls" else f"{1e3 * one.cost:.3g} ms"
+    paid = f"{1e3 * one.cost:.3g} ms" if unit == "ms" else f"{one.cost:,.0f} {unit}"
     return f"{named(curve, groups)}, {_setting(points, curve, one)}: {paid}"
 
 
 def _setting(points: list[Point], curve: str, one: Reach) -> str:
-    adaptive = by_curve(points)[curve][0].setting.adaptive
-    label = Setting("", "", one.value, 0, adaptive).label()
+    label = replace(by_curve(points)[curve][0].setting, value=one.value).label()
     return f"{label} (coarsest)" if one.how == "coarsest" else label
 
 
@@ -89,10 +95,10 @@ def losses(problem: dict[str, Any], points: list[Point]) -> Table:
     owners = cost.defaults(points)
     rows = [(f"{target:g}", *(
         _lost(cost.loss(points, quantity, target, kind, own.setting.curve, among))
-        for own in owners.values() for among in (own.setting.engine, "") for kind in cost.COSTS))
+        for own in owners.values() for among in (own.setting.engine, "") for kind in cost.costs(points)))
         for target in problem["tolerances"]]  # fmt: skip
     heads = tuple(f"{owner} by best of {among}: {kind}"
-                  for owner in owners for among in (owner, "all") for kind in cost.COSTS)  # fmt: skip
+                  for owner in owners for among in (owner, "all") for kind in cost.costs(points))  # fmt: skip
     as_is = "; ".join(f"{owner}: {own.setting.method} at {own.setting.label()}, which by itself gives "
                       f"{own.errors[quantity]:.3g} {problem['units'][quantity]}" for owner, own in owners.items()
                       if own.status == "ok")  # fmt: skip
@@ -119,8 +125,8 @@ def every_curve(problem: dict[str, Any], points: list[Point]) -> Table:
     """A row per curve: settings, errors, observed order, what an error of 1 costs."""
     quantity, groups = quantity_of(problem), groups_of(problem, points)
     orders = cost.orders(points, quantity, problem["uncertainty"][quantity])
-    calls = cost.reaches(points, quantity, 1.0, "force calls")
-    seconds = cost.reaches(points, quantity, 1.0, "seconds")
+    work, middle = cost.costs(points)[0], sorted(problem["tolerances"])[len(problem["tolerances"]) // 2]
+    calls, seconds = (cost.reaches(points, quantity, middle, kind) for kind in (work, "seconds"))
     rows = tuple(
         (_plain(curve), str(len(own)), f"{own[0].setting.label()} to {own[-1].setting.label()}",
          f"{own[0].errors[quantity]:.2g} to {own[-1].errors[quantity]:.2g}", _order(orders[curve]),
@@ -129,11 +135,11 @@ def every_curve(problem: dict[str, Any], points: list[Point]) -> Table:
         for curve, own in by_curve(points).items())  # fmt: skip
     unit = problem["units"][quantity]
     note = (f"Order: slope of the error over the step on the three finest settings whose error exceeds {HOLLOW:g} "
-            "times the uncertainty of the reference; for adaptive methods over 1 / force calls, where loose tolerances "
+            "times the uncertainty of the reference; for adaptive methods over 1 / calls, where loose tolerances "
             "are still ruled by stability. Curves coincide if their errors agree to 1 % at every common "
             "setting.")  # fmt: skip
     heads = ("curve", "settings", "from, to", f"{quantity} error [{unit}]", "observed order", "declared",
-             f"force calls for 1 {unit}", f"ms for 1 {unit}", "coincides with")  # fmt: skip
+             f"{work} for {middle:g} {unit}", f"ms for {middle:g} {unit}", "coincides with")  # fmt: skip
     return Table("Every integrator that each engine offers", note, heads, rows)
 
 
@@ -151,13 +157,29 @@ def _number(one: Reach | None, scale: float, form: str) -> str:
     return format(scale * one.cost, form) + (" (coarsest)" if one.how == "coarsest" else "")
 
 
+def outcomes(points: list[Point]) -> Table:
+    """How many settings of each engine ended in which way."""
+    engines = dict.fromkeys(p.setting.engine for p in points)
+    rows = tuple((LABELS.get(engine, engine), *(_ended(points, engine, status) for status in ("", *STATUSES)))
+                 for engine in engines)  # fmt: skip
+    note = ("Fine: an answer; raised: the run failed and said so; flagged: refused before the run, with the reason; "
+            "silent: a wrong answer that came back as a result, of which there must be none.")  # fmt: skip
+    return Table("Settings by how they ended", note, ("engine", "settings", *STATUSES.values()), rows)
+
+
+STATUSES = {"ok": "fine", "raised": "raised", "refused": "flagged", "SILENT": "silent"}
+
+
+def _ended(points: list[Point], engine: str, status: str) -> str:
+    return str(sum(p.setting.engine == engine and status in ("", p.status) for p in points))
+
+
 def failures(points: list[Point]) -> Table:
     """Everything that gave no answer, with what was said."""
     found: dict[tuple[str, str, str], list[str]] = defaultdict(list)
     for p in points:
         if p.status != "ok":
-            found[_plain(p.setting.curve), p.status, p.reason].append(p.setting.label())
+            found[_plain(p.setting.curve), STATUSES[p.status], p.reason].append(p.setting.label())
     rows = tuple((curve, ", ".join(labels), status, reason) for (curve, status, reason), labels in found.items())
-    note = ("refused: not run, because the answer would be wrong; raised: the run failed and said so; SILENT: a wrong "
-            "answer came back as a result, of which there must be none.")  # fmt: skip
-    return Table("Settings that gave no answer", note, ("curve", "setting", "status", "what was said"), rows)
+    return Table("Settings that gave no answer", "What was said, by how the setting ended.",
+                 ("curve", "setting", "status", "what was said"), rows)  # fmt: skip

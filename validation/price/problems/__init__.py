@@ -13,7 +13,7 @@ class Setting:
     """One way to solve a problem.
 
     engine, method : together the name of a work-precision curve
-    value : step in s, or relative tolerance where ``adaptive``
+    value : step in s, relative tolerance where ``adaptive``, or 1 by the number of cells where ``cells``
     order : declared order of the method, 0 if it varies
     stages : force evaluations per step, 0 where they are not fixed
     default : whose default setting this is, "" for no one's
@@ -26,6 +26,7 @@ class Setting:
     adaptive: bool = False
     stages: int = 0
     default: str = ""
+    cells: bool = False
 
     @property
     def curve(self) -> str:
@@ -33,7 +34,9 @@ class Setting:
         return f"{self.engine} {self.method}"
 
     def label(self) -> str:
-        """The setting as a reader names it: a step with its unit, or a tolerance."""
+        """The setting as a reader names it: a step with its unit, a tolerance, or cells along a contact."""
+        if self.cells:
+            return f"{round(1.0 / self.value)} cells"
         return f"tolerance {self.value:.3g}" if self.adaptive else f"{1e3 * self.value:.3g} ms"
 
 

@@ -1,10 +1,12 @@
-"""Problem C: a wheel that rolls with FASTSIM, released from where it slides, along the rail and across.
+"""Problems C: a wheel that rolls with FASTSIM at 1, 5 or 20 m/s, released from where it slides, along and across.
 
 The creep forces are those of the engines' callback in every solver, so that what differs is the integrator. They have
 kinks wherever a cell begins to slip or to stick, so that no method keeps an order above two: the order of the others is
-left open. Explicit methods are held to short steps by the contact's own spring, although it is at rest here.
+left open. They damp like 1 / speed: the slower the wheel, the shorter the steps of explicit methods, although nothing
+moves fast any more. The reference is a Runge-Kutta method beside a stiff multistep one.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -16,11 +18,15 @@ from scipy.integrate import solve_ivp
 from models.compiled import njit
 from models.contact.inputs import Array
 from models.contact.stack import start
-from models.engines.contact_bridge import Wheels, check_step, forces
+from models.engines.catalogue import MISSING
+from models.engines.contact_bridge import FREEDOMS, Wheels, Y, add_forces, check_step, forces, linear
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, model, native_law
+from models.engines.exudyn import counted
 from models.engines.mujoco_callback import installed
-from models.errors import RunFailed
+from models.engines.stability import LONG_RUN, limit
+from models.errors import Refused, RunFailed
+from validation.price.force_calls import AT_START
 from validation.price.problems import Setting
 from validation.price.problems.road_excited import STAGES, setting
 
@@ -32,31 +38,46 @@ LEVEL = np.array([1.0, 1.0, 0.0, 1.0])
 PLACES = 16
 """Evaluations behind one set of slopes."""
 MS = 1e-3
-SPEED = 20.0
-_STEPS = (2 * MS, 1.25 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS, 0.05 * MS, 0.025 * MS, 0.0125 * MS)
-_LONG = (10 * MS, 5 * MS, 4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS)
-_TIGHT = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-FULL: dict[tuple[str, str], tuple[float, ...]] = {
-    ("reference", "RK4"): _STEPS,
-    ("reference", "DOP853"): (*_TIGHT, 1e-10),
-    ("reference", "Radau"): _TIGHT,
-    ("exudyn", "RK44"): _STEPS,
-    ("exudyn", "GeneralizedAlpha 0.9"): _LONG,
-    ("exudyn", "TrapezoidalIndex2"): _LONG,
-    ("mujoco", "RK4"): _STEPS,
-    ("mujoco", "Euler"): _STEPS,
+SOLVERS = (("DOP853", 1e-12), ("LSODA", 1e-12))
+"""Reference solvers with their relative tolerances."""
+FINER = (0.5, 1, 1.5, 2, 3, 5, 8)
+"""Steps of a run of an explicit method by the fewest with which it is stable; the first is there to be refused."""
+WITH_SLOPES = "with slopes"
+"""Exudyn's implicit methods by the slopes of the linear theory; otherwise by its own differences of the forces."""
+EXPLICIT = {
+    "reference": ("RK4",),
+    "exudyn": ("RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler", "VelocityVerlet"),
+    "mujoco": ("RK4", "Euler", "implicit", "implicitfast", "discrete"),
 }
+_LONG = (10 * MS, 5 * MS, 4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS, 0.0625 * MS)
+_TIGHT = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+OTHERS: dict[tuple[str, str], tuple[float, ...]] = {
+    ("reference", "DOP853"): _TIGHT,
+    ("reference", "Radau"): _TIGHT[:6],
+    ("reference", "LSODA"): _TIGHT,
+    ("exudyn", "GeneralizedAlpha 0.9"): _LONG,
+    ("exudyn", f"GeneralizedAlpha {WITH_SLOPES}"): _LONG,
+    ("exudyn", "TrapezoidalIndex2"): _LONG,
+    ("exudyn", f"TrapezoidalIndex2 {WITH_SLOPES}"): _LONG,
+    ("exudyn", "DOPRI5"): _TIGHT,
+    ("exudyn", "ODE23"): _TIGHT,
+    ("exudyn", "DVERK6"): (1e-6,),
+    ("mujoco", "Euler"): (2 * MS,),
+}
+"""Steps and tolerances that do not go by stability; MuJoCo's is its default."""
+LARGEST = 5 * MS
+"""Largest step of Exudyn's adaptive solvers, s."""
 QUICK: dict[tuple[str, str], tuple[float, ...]] = {
     ("reference", "RK4"): (0.25 * MS, 0.125 * MS),
     ("exudyn", "GeneralizedAlpha 0.9"): (10 * MS, 2 * MS, 1 * MS, 0.5 * MS),
     ("mujoco", "Euler"): (2 * MS, 0.25 * MS, 0.125 * MS, 0.05 * MS),
 }
-"""The named share of FULL that the quick report takes."""
+"""The named share of it all that the quick report takes."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """Places and rates at the end (8,), and what they took."""
+    """Positions and rates at the end (8,), and what they took."""
 
     state: Array
     counts: dict[str, int]
@@ -99,27 +120,38 @@ def march(state, numbers, table, step, count):
 class RollingWheels:
     """The problem with its reference; see ``validation.price.problems.Problem``."""
 
-    key = "wheels"
     duration = DURATION
-    note = f"Every set of slopes that an implicit method asks for counts as {PLACES} force calls."
+    note = (f"Errors at the end. Every set of slopes that is given to an implicit method counts as {PLACES} force "
+            "calls; Exudyn's own differences count by themselves.")  # fmt: skip
+    tolerances: tuple[float, ...] = (10.0, 1.0, 0.1, 0.01)
 
-    def __init__(self, quick: bool) -> None:
-        self.title = f"A wheel with FASTSIM at {SPEED:g} m/s, released from sliding, {DURATION:g} s"
-        self.wheels, self.units = Wheels(1, cells=CELLS, speed=SPEED), {"place": "m, rad"}
-        self.tolerances: tuple[float, ...] = (1e-6, 1e-7, 1e-8)
+    def __init__(self, speed: float) -> None:
+        self.units = {"creep force": "N", "displacement": "m"}
+        self.key = f"wheel-{speed:g}"
+        self.title = f"A wheel with FASTSIM at {speed:g} m/s, released from sliding, {DURATION:g} s"
+        self.wheels = Wheels(1, cells=CELLS, speed=speed)
         self._start = np.concatenate([part * LEVEL for part in self.wheels.state()])
         springs = [np.array(values) for values in (self.wheels.stiffness, self.wheels.damping)]
         self._table = np.array([self.wheels.masses, *springs])
-        solvers = (("DOP853", 1e-12), ("DOP853", 1e-11) if quick else ("Radau", 1e-9))
-        self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
-        self._true, other = (self._by(*one).state[: self.wheels.size] for one in solvers)
-        self.uncertainty = {"place": float(np.abs(self._true - other).max())}
-        self.bound = 10.0 * float(np.abs(self._start[: self.wheels.size]).max())
+        self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in SOLVERS)
+        self._true, other = (self.read(self._by(*one).state) for one in SOLVERS)
+        self.uncertainty = self._off(other)
+        self.bound = self.wheels.mu * self.wheels.load
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """FULL, or its named share QUICK."""
-        chosen = QUICK if quick else FULL
-        return tuple(self.setting(*curve, value) for curve, values in chosen.items() for value in values)
+        """All of them, or their named share QUICK."""
+        chosen = [*QUICK.items()] if quick else [*self._explicit(), *OTHERS.items()]
+        return tuple(self.setting(*curve, value) for curve, values in chosen for value in values)
+
+    def _explicit(self) -> list[tuple[tuple[str, str], tuple[float, ...]]]:
+        """Curves with their steps (s), by the stability of each method."""
+        found = []
+        for engine, methods in EXPLICIT.items():
+            for method in methods:
+                like = "Euler" if method == "discrete" else method
+                fewest = math.ceil(1.02 * DURATION / limit(like, 10 * MS, LONG_RUN * MS, linear(self.wheels)))
+                found.append(((engine, method), tuple(DURATION / round(more * fewest) for more in FINER)))
+        return found
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting of this problem by its curve and its step (s) or tolerance."""
@@ -127,18 +159,31 @@ class RollingWheels:
         return made if made.order <= 2 else replace(made, order=0)
 
     def build(self, setting: Setting) -> Solver:
-        """The wheel in one engine; Refused for a step that the method cannot take."""
+        """The wheel in one engine; Refused for a step that the method cannot take, or a method that is not there."""
         method = setting.method.split()[0]
-        if setting.engine == "reference":
-            if not setting.adaptive:
-                check_step("reference", self.wheels, method, setting.value, round(DURATION / setting.value))
-            return Solver(partial(self._by, method, setting.value))
+        if (setting.engine, method) in MISSING:
+            raise Refused(setting.engine, MISSING[setting.engine, method])
+        if setting.engine == "exudyn":
+            return self._exudyn(setting, method)
         steps = round(DURATION / setting.value)
-        return (self._mujoco if setting.engine == "mujoco" else self._exudyn)(method, steps)
+        if setting.engine == "mujoco":
+            return self._mujoco(method, steps)
+        if not setting.adaptive:
+            check_step("reference", self.wheels, method, setting.value, steps)
+        return Solver(partial(self._by, method, setting.value))
 
     def errors(self, solution: Result) -> dict[str, float]:
-        """Largest error of any place at the end."""
-        return {"place": float(np.abs(solution.state[: self.wheels.size] - self._true).max())}
+        """Largest error of the creep forces along and across (N), and of the displacements along and across (m)."""
+        return self._off(self.read(solution.state))
+
+    def read(self, state: Array) -> dict[str, Array]:
+        """The quantities of a state (8,): creep forces (2,) in N and displacements (2,) in m, along and across."""
+        found = np.zeros(FREEDOMS)
+        add_forces(self.wheels.numbers, state[:FREEDOMS].copy(), state[FREEDOMS:].copy(), found)
+        return {"creep force": found[:2], "displacement": state[: Y + 1]}
+
+    def _off(self, found: dict[str, Array]) -> dict[str, float]:
+        return {name: float(np.abs(values - self._true[name]).max()) for name, values in found.items()}
 
     def _by(self, method: str, value: float) -> Result:
         """The written equations by RK4 in steps, or by scipy at a relative tolerance."""
@@ -168,8 +213,8 @@ class RollingWheels:
 
         return Solver(run)
 
-    def _exudyn(self, method: str, steps: int) -> Solver:
-        calls, law, implicit = [0], Forces(self.wheels), method not in STAGES
+    def _exudyn(self, setting: Setting, method: str) -> Solver:
+        calls, law = [0], Forces(self.wheels)
 
         def of(q: Any, v: Any) -> Any:
             calls[0] += 1
@@ -179,17 +224,19 @@ class RollingWheels:
             calls[0] += PLACES
             return law.slopes(q, v, by_q, by_v)
 
-        rolling, n = Rolling(self.wheels, of, slopes=slopes if implicit else None), self.wheels.size
+        rolling = Rolling(self.wheels, of, slopes=slopes if setting.method.endswith(WITH_SLOPES) else None)
+        steps = round(DURATION / (LARGEST if setting.adaptive else setting.value))
+        tolerance = setting.value if setting.adaptive else 0.0
 
         def run() -> Result:
             calls[0] = 0
-            state = rolling.run(self._start[:n], self._start[n:], steps, DURATION / steps, method)
-            return Result(state, {"steps": steps, "force calls": calls[0]})
+            state = rolling.run(*np.split(self._start, 2), steps, DURATION / steps, method, tolerance)
+            return Result(state, {**counted(rolling.mbs), "force calls": calls[0] - AT_START.get(method, 0)})
 
         return Solver(run)
 
 
 @cache
-def problem(quick: bool) -> RollingWheels:
-    """The problem, its reference computed once per process."""
-    return RollingWheels(quick)
+def problem(quick: bool, speed: float) -> RollingWheels:
+    """The problem at a speed (m/s), its reference computed once per process."""
+    return RollingWheels(speed)
