@@ -49,8 +49,8 @@ class Choice:
     remainder: np.ndarray
     confirmed: np.ndarray
     kept: bool
-    calls: tuple[int, int, int]
-    seconds: tuple[float, float, float]
+    calls: tuple[int, ...]
+    seconds: tuple[float, ...]
     rounds: int
     spent: int
 
@@ -144,7 +144,7 @@ class Chooser:
         spent = whole.calls + (0 if self.screen is self.whole else self.screen.variants.calls)
         return Choice(self.effects, tuple(sorted(chosen)), times, self.told(chosen, times),
                       self.screen.remainder(chosen), found, self.holds(found), tuple(calls), tuple(seconds),
-                      self.rounds, spent)  # type: ignore[arg-type]  # fmt: skip
+                      self.rounds, spent)  # fmt: skip
 
     def told(self, chosen: Set, times: int) -> np.ndarray:
         """Predicted changes (quantities,) of a set and a step together."""

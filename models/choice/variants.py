@@ -17,8 +17,8 @@ LONGEST = 128
 """No step is tried that is more times as long as the scene's."""
 FINE = 60
 """Steps of which whole numbers make up a part of a run, so that it can be taken in longer steps, too."""
-REPEATS = 3
-"""Runs of which the shortest tells the seconds."""
+REPEATS, ENOUGH = 3, 0.02
+"""Runs of which the shortest tells the seconds; fewer where they have taken so many (s) together."""
 
 
 def system_of(scene: Any) -> ModuleType:
@@ -80,8 +80,12 @@ class Variants:
     def per_call(self, left_out: Set) -> float:
         """CPU seconds of one call, the least of a few runs; infinite where there is none."""
         if left_out not in self._costs:
-            runs = [self.of(left_out), *(self._run(left_out, 1) for _ in range(REPEATS - 1))]
-            self._costs[left_out] = min((run.seconds / run.counts["calls"] for run in runs if run), default=math.inf)
+            took, run = list[float](), self.of(left_out)
+            while run is not None and len(took) < REPEATS and sum(took) < ENOUGH:
+                took.append(run.seconds)
+                self._costs[left_out] = min(took) / run.counts["calls"]
+                run = self._run(left_out, 1)
+            self._costs.setdefault(left_out, math.inf)
         return self._costs[left_out]
 
     def lengths(self) -> list[int]:

@@ -106,7 +106,7 @@ def _turns(runs: dict[str, Callable[[], Answer]]) -> dict[str, np.ndarray]:
 
 
 def _spread(values: np.ndarray) -> tuple[float, float]:
-    told = describe(values)
+    told = describe(values.tolist())
     return told["median"], told["mad"]
 
 

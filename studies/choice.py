@@ -1,0 +1,188 @@
+"""Which effects of a scene do its quantities call for: chosen within a tolerance by runs, and confirmed; any system."""
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.choice.choose import Choice, Chooser
+from models.choice.variants import system_of
+from models.errors import InputError
+from models.strict import Strict, read
+from studies.asked import ANY, load_scene, plan_of
+
+SYSTEM = ANY
+Progress = Callable[[str, float], None]
+
+
+class Options(Strict):
+    """[options] of this study."""
+
+    beside: list[str] = Field(default_factory=list, description="other scenes, drawn beside this one")
+
+
+@dataclass(frozen=True)
+class Alone:
+    """One effect: changes (quantities,) over the first part of the run if it alone is left out, inf where it cannot
+    be; seconds of that run, at the longest step that is then allowed, by those of the scene with longer steps alone."""
+
+    effect: str
+    changes: np.ndarray
+    saved: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """A scene's choice, effects one by one, tolerances above which effects that stay would go, energy activity (W) by
+    element where it has a closed form."""
+
+    scene: Any
+    engine: str
+    choice: Choice
+    alone: list[Alone]
+    further: dict[str, float]
+    watts: dict[str, float]
+
+
+def check(scene: Any, engines: tuple[str, ...]) -> None:
+    """Refuse scenes without runs in time, and scenes beside that make no choice."""
+    system_of(scene)
+    for name in read(Options, scene.options, scene.file, "options").beside:
+        other = load_scene(name, None)
+        if other.tolerance is None:
+            raise InputError(scene.file, "options.beside", name, 'asks for no choice: it has no effects = "auto"')
+
+
+def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Choose; saves ``SYSTEM.csv`` of every scene and a figure."""
+    from studies.choice_figure import choice_figure
+
+    check(scene, engines)
+    scenes = [scene, *(load_scene(name, None) for name in scene.options.get("beside", []))]
+    found = list[Found]()
+    for i, own in enumerate(scenes):
+        progress(own.title, i / len(scenes))
+        plan_of(own).check(own, ())
+        found.append(_linear(own) if own.study == "ride_choice" else chosen(own, engines if own is scene else ()))
+        _save(found[-1], folder / f"{i + 1}_{own.system.replace('-', '_')}.csv")
+    progress("figure", 1.0)
+    choice_figure(found, folder / "choice.png")
+    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": [_answer(one) for one in found],
+            "table": [line for one in found for line in lines(one, len(found) > 1)]}  # fmt: skip
+
+
+def chosen(scene: Any, engines: tuple[str, ...]) -> Found:
+    """A scene's choice by one implementation: the one that was asked for, or the system's usual one."""
+    usual: str = system_of(scene).ENGINE
+    engine = usual if not engines or usual in engines else engines[0]
+    chooser = Chooser(scene, engine, scene.quantities, scene.tolerance)
+    choice, none = chooser.choose(), chooser.work(frozenset())
+    alone = [Alone(one, chooser.screen.predicted(frozenset([one])), none / chooser.work(frozenset([one])))
+             for one in chooser.effects]  # fmt: skip
+    return Found(scene, engine, choice, alone, chooser.further(frozenset(choice.left_out)), {})
+
+
+def _linear(scene: Any) -> Found:
+    """The same of a linear stationary scene of ride, by its closed form; calls are those of a second of motion."""
+    from models.ride.choice.activity import activity
+    from models.ride.choice.choose import Chooser as Linear
+    from models.ride.choice.held import Held
+    from models.ride.of_scene import told_by, vehicle_of
+
+    with told_by(scene):
+        chooser = Linear(Held(scene, vehicle_of(scene)), scene.speeds.all(), scene.quantities, scene.tolerance)
+        found = chooser.choose()
+        singles = {effect: frozenset([effect]) for effect in chooser.effects}
+        calls = chooser.cost(frozenset()).calls
+        alone = [Alone(effect.name, abs(chooser.predicted(one)), calls / chooser.cost(one).calls)
+                 for effect, one in singles.items()]  # fmt: skip
+        further = {effect.name: change for effect, change in chooser.further(frozenset(found.left_out)).items()}
+        watts = activity(chooser.wholes[len(chooser.wholes) // 2])
+    before, after = round(found.before.calls), round(found.after.calls)
+    work = tuple(cost.work for cost in (found.before, found.before, found.after))
+    choice = Choice(tuple(one.name for one in found.candidates), tuple(one.name for one in found.left_out),
+                    1, abs(found.predicted), 0.0 * found.predicted, abs(found.confirmed), found.kept,
+                    (before, before, after), work, found.rounds, 0)  # fmt: skip
+    return Found(scene, "closed form", choice, alone, further, watts)
+
+
+def _answer(one: Found) -> dict[str, Any]:
+    """What was chosen, and how right and how cheap that is."""
+    choice = one.choice
+    errors = zip(one.scene.quantities, choice.predicted.tolist(), choice.confirmed.tolist(), strict=True)
+    return {
+        "system": one.scene.system, "implementation": one.engine, "left out": list(choice.left_out),
+        "stay": [name for name in choice.candidates if name not in choice.left_out], "step times": choice.times,
+        "errors": {name: {"predicted": predicted, "confirmed": found} for name, predicted, found in errors},
+        "kept": choice.kept, "calls": list(choice.calls), "confirmations": choice.rounds,
+        "would matter no more above": one.further,
+    }  # fmt: skip
+
+
+def _save(one: Found, path: Path) -> None:
+    """A row per effect: what leaving it out alone changes, what that saves, and whether it was left out."""
+    with path.open("x", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        heads = [f"{name}, change [-]" for name in one.scene.quantities]
+        writer.writerow(["effect", "left out", *heads, "times faster alone [-]"])
+        for effect in one.alone:
+            values = map(repr, effect.changes.tolist())
+            writer.writerow([effect.effect, effect.effect in one.choice.left_out, *values, repr(effect.saved)])
+
+
+def percent(value: float) -> str:
+    """A relative change in words."""
+    return f"{100 * value:.2g} %" if np.isfinite(value) else "without end"
+
+
+def lines(one: Found, named: bool) -> list[str]:
+    """The choice in words."""
+    choice, scene = one.choice, one.scene
+    rows = [f"  {scene.title} ({scene.system}, {one.engine})"] if named else [f"  by {one.engine}"]
+    rows.append(f"    left out: {', '.join(choice.left_out) or 'nothing'}")
+    stay = [name for name in choice.candidates if name not in choice.left_out]
+    rows.append(f"    stay: {', '.join(stay) or 'nothing'}")
+    for i, name in enumerate(scene.quantities):
+        rows.append(f"    {name}: {percent(choice.predicted[i])} predicted"
+                    + (f" +- {percent(choice.remainder[i])}" if choice.remainder[i] else "")
+                    + f", {percent(choice.confirmed[i])} confirmed, tolerance {100 * scene.tolerance:g} %: "
+                    + ("kept" if choice.confirmed[i] <= scene.tolerance else "NOT KEPT"))  # fmt: skip
+    before, step, after = choice.calls
+    saved = f"{before:,} -> {after:,}, {before / after:.3g} times fewer"
+    if one.watts:
+        rows.append(f"    calls per second of motion {saved}")
+    else:
+        faster = choice.seconds[0] / choice.seconds[2]
+        rows.append(f"    calls {saved}, by steps {choice.times} times as long; {before / step:.3g} times by longer "
+                    f"steps with all effects; CPU seconds {faster:.3g} times fewer")  # fmt: skip
+    rows += [f"    {name} would matter no more at a tolerance above {percent(change)}"
+             for name, change in sorted(one.further.items(), key=lambda item: item[1])[:3]]  # fmt: skip
+    rows += misled(one)
+    worst = float(choice.confirmed.max())
+    return [*rows, f"    the choice holds for tolerances down to {percent(worst)}"] if choice.left_out else rows
+
+
+ACTIVE, IDLE = 0.1, 1e-3
+"""Share of the energy activity from which an element counts as active; change below which a quantity is blind to it."""
+
+
+def misled(one: Found) -> list[str]:
+    """Where energy activity misleads: inertias that are active, and whose motion a quantity does not see."""
+    total, rows = sum(value for value in one.watts.values() if np.isfinite(value)), []
+    for effect in one.alone:
+        share = one.watts.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
+        for name, change in zip(one.scene.quantities, effect.changes, strict=True):
+            if np.isfinite(share) and share > ACTIVE and change < IDLE:
+                rows.append(f"    energy activity misleads: {effect.effect} holds {percent(share)} of it, and without "
+                            f"it {name} changes by {percent(change)}")  # fmt: skip
+    return rows
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("choice")
