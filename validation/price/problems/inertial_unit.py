@@ -1,0 +1,172 @@
+"""Problem G: the attitude of a car for ten minutes, integrated from the samples of a gyro.
+
+The motion is a formula: roll, pitch and yaw as sums of sines and a steady turn, with the exact local rates that belong
+to them. So the attitude is known in closed form at every sample, and what differs is how the rates are integrated
+between samples. What an engine does of it is in ``turning_sphere``.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from models.sensors.rotations import Rule, conjugate, from_cardan, integrate, logarithm, product
+from validation.price.problems import Setting
+from validation.price.problems.road_excited import STAGES
+from validation.price.problems.turning_sphere import Attitudes, in_exudyn, in_mujoco
+
+DURATION, GRID = 600.0, 1.0
+"""s, of the run and between the instants that are compared, which every step meets."""
+SINES = {
+    "roll": ((0.03, 1.1, 0.4), (0.015, 7.3, 1.9)),
+    "pitch": ((0.02, 0.9, 2.2), (0.01, 8.1, 0.7)),
+    "yaw": ((0.6, 0.05, 0.0), (0.01, 2.7, 1.1)),
+}
+"""Amplitude (rad), circular frequency (rad/s) and phase of the sines of each angle."""
+TURN = 0.02
+"""Steady part of the yaw rate, rad/s: two turns in ten minutes."""
+RULES: dict[str, tuple[Rule, int]] = {"held rates": ("held", 1), "mean rates": ("mean", 2), "cubic rates": ("cubic", 4)}
+"""What ``models.sensors.rotations`` offers, and the order."""
+FIRST = {"ExplicitEuler", "Euler", "implicit", "implicitfast", "discrete"}
+"""Methods of first order; all others are of second, because rates are linear between samples."""
+DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Euler", 2e-3): "MuJoCo"}
+_OWN, _FEW = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0), (5.0, 8.0, 10.0, 16.0, 20.0, 25.0)
+_NATIVE, _IMPLICIT = (5.0, 8.0, 10.0, 20.0, 50.0, 100.0), (10.0, 20.0, 25.0, 40.0, 50.0, 100.0)
+FULL: dict[tuple[str, str], tuple[float, ...]] = {
+    **{("reference", rule): _OWN for rule in RULES},
+    **{("exudyn", method): _FEW for method in ("RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler")},
+    **{("exudyn", method): _IMPLICIT for method in ("GeneralizedAlpha 0.9", "TrapezoidalIndex2")},
+    ("exudyn", "VelocityVerlet"): _IMPLICIT,
+    **{("exudyn", method): (100.0,) for method in ("DOPRI5", "ODE23")},
+    ("mujoco", "Euler"): (*_NATIVE, 500.0),
+    **{("mujoco", method): _NATIVE for method in ("RK4", "implicit", "implicitfast", "discrete")},
+}
+"""Samples per second of every method; the last two of Exudyn are there to be refused."""
+QUICK = {("reference", "cubic rates"): (10.0, 20.0, 50.0, 100.0), ("mujoco", "Euler"): (5.0, 10.0, 20.0)}
+"""The named share of FULL that the quick report takes."""
+FINE = 5e-3
+"""Step (s) of the sixth-order method that the closed form is compared with."""
+
+
+def angles(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Roll, pitch, yaw (n, 3) in rad at times (n,) in s, and their rates (n, 3) in rad/s."""
+    places, rates = [], []
+    for name, sines in SINES.items():
+        steady = TURN if name == "yaw" else 0.0
+        places.append(steady * times + sum(size * np.sin(f * times + phase) for size, f, phase in sines))
+        rates.append(steady + sum(size * f * np.cos(f * times + phase) for size, f, phase in sines))
+    return np.column_stack(places), np.column_stack(rates)
+
+
+def attitude(times: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4) of the motion at times (n,) in s."""
+    return from_cardan(*angles(times)[0].T)
+
+
+def gyro(times: np.ndarray) -> np.ndarray:
+    """Local rates (n, 3) in rad/s at times (n,) in s: what a gyro without errors measures."""
+    (roll, pitch, _), (by_roll, by_pitch, by_yaw) = (part.T for part in angles(times))
+    return np.column_stack([
+        by_roll - by_yaw * np.sin(pitch),
+        by_pitch * np.cos(roll) + by_yaw * np.sin(roll) * np.cos(pitch),
+        -by_pitch * np.sin(roll) + by_yaw * np.cos(roll) * np.cos(pitch),
+    ])  # fmt: skip
+
+
+def magnus(step: float) -> np.ndarray:
+    """Quaternions (n + 1, 4) by the Magnus method of order six, whose rates are read at the three Gauss points.
+
+    The bracket of two rotation vectors is their vector product, with the sign of rates that are local (Blanes, Casas,
+    Oteo and Ros, Physics Reports 470, 2009, eq. 257).
+    """
+    start = step * np.arange(round(DURATION / step))
+    first, middle, last = (step * gyro(start + step * (0.5 + off)) for off in np.array([-1, 0, 1]) * np.sqrt(0.15))
+    slope, bend = np.sqrt(15) / 3 * (last - first), 10 / 3 * (last - 2 * middle + first)
+    one = -np.cross(middle, slope)
+    two = np.cross(middle, 2 * bend + one) / 60
+    turn = middle + bend / 12 - np.cross(-20 * middle - bend + one, slope + two) / 240
+    # a chain of rotations is what rates that are held for one second each make
+    return integrate(np.concatenate([turn, turn[-1:]]), 1.0, attitude(np.zeros(1))[0], "held")
+
+
+def apart(found: np.ndarray, true: np.ndarray) -> float:
+    """Largest angle (rad) between attitudes (n, 4)."""
+    return float(np.linalg.norm(logarithm(product(conjugate(found), true)), axis=-1).max())
+
+
+@dataclass(frozen=True)
+class Rules:
+    """A rule of our own, ready to run."""
+
+    rule: Rule
+    period: float
+
+    def run(self) -> Attitudes:
+        """Attitudes at the instants."""
+        count = round(DURATION / self.period)
+        found = integrate(gyro(self.period * np.arange(count + 1)), self.period, attitude(np.zeros(1))[0], self.rule)
+        return Attitudes(found[:: round(GRID / self.period)], {"steps": count, "force calls": count})
+
+
+@dataclass(frozen=True)
+class InEngine:
+    """The sphere of an engine, ready to run."""
+
+    engine: str
+    method: str
+    period: float
+
+    def run(self) -> Attitudes:
+        """Attitudes at the instants; Refused or RunFailed by the engine."""
+        solve = in_exudyn if self.engine == "exudyn" else in_mujoco
+        return solve(self.method, self.period, round(DURATION / self.period), round(GRID / self.period),
+                     attitude(np.zeros(1))[0], gyro)  # fmt: skip
+
+
+class InertialUnit:
+    """The problem with its reference; see ``validation.price.problems.Problem``."""
+
+    key = "unit"
+    duration = DURATION
+    note = ("A force call is a sample of the rates, in an engine an evaluation of the torque. Rates are linear between "
+            "the samples for an engine, which leaves its methods order two at most.")  # fmt: skip
+    tolerances: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+    bound = 1.0
+
+    def __init__(self, quick: bool) -> None:
+        rates = [1 / one.value for one in self.settings(quick)]
+        self.title = (f"Attitude of a car for {DURATION:g} s from {min(rates):g} to {max(rates):g} samples of its "
+                      "rates a second")  # fmt: skip
+        self.units = {"attitude": "rad"}
+        self.reference = f"closed form, and a Magnus method of order six at {1e3 * FINE:g} ms"
+        self.true = attitude(GRID * np.arange(round(DURATION / GRID) + 1))
+        self.uncertainty = {"attitude": apart(magnus(FINE)[:: round(GRID / FINE)], self.true)}
+
+    def settings(self, quick: bool) -> tuple[Setting, ...]:
+        """FULL, or its named share QUICK."""
+        chosen = QUICK if quick else FULL
+        return tuple(self.setting(*curve, 1 / rate) for curve, rates in chosen.items() for rate in rates)
+
+    def setting(self, engine: str, method: str, value: float) -> Setting:
+        """A setting by its curve and the longest step (s) up to ``value`` that meets every instant."""
+        step = GRID / np.ceil(GRID / value * (1 - 1e-9))
+        order = RULES[method][1] if engine == "reference" else 1 if method in FIRST else 2
+        stages = 1 if engine == "reference" else STAGES.get(method, 0)
+        return Setting(engine, method, float(step), order, stages=stages,
+                       default=DEFAULTS.get((engine, method, float(step)), ""))  # fmt: skip
+
+    def build(self, setting: Setting) -> Rules | InEngine:
+        """One way to integrate, ready to run."""
+        if setting.engine == "reference":
+            return Rules(RULES[setting.method][0], setting.value)
+        return InEngine(setting.engine, setting.method, setting.value)
+
+    def errors(self, solution: Attitudes) -> dict[str, float]:
+        """Largest angle between the attitude and the true one at the instants."""
+        return {"attitude": apart(solution.quaternions, self.true)}
+
+
+@cache
+def problem(quick: bool) -> InertialUnit:
+    """The problem, its reference computed once per process."""
+    return InertialUnit(quick)

@@ -1,0 +1,124 @@
+"""A sphere of unit inertia in an engine under the torque that gives it the sampled rates of a gyro.
+
+The torque is held from one sample to the next, so that the rates are exact at all samples and linear between them; the
+attitude is the integrator's. Methods that blend a held force with the one before it take the angular acceleration at
+the end of each step instead.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import exudyn as exu
+import exudyn.itemInterface as typed_items
+import mujoco
+import numpy as np
+from mujoco import rollout
+
+from models.engines.catalogue import CATALOGUE
+from models.engines.exudyn import counted
+from models.engines.mujoco import INTEGRATORS
+from models.engines.mujoco_quiet import quiet
+from models.errors import Refused, RunFailed
+from models.sensors.rotations import from_matrix, logarithm, product
+
+items: Any = typed_items
+KINDS = exu.OutputVariableType
+Gyro = Callable[[np.ndarray], np.ndarray]
+"""Local rates (n, 3) in rad/s at times (n,) in s."""
+NUDGE = 1e-4
+"""Half the interval (s) of the central difference of the rates: its error is 1e-7 of the second-order methods'."""
+
+
+@dataclass(frozen=True)
+class Attitudes:
+    """Quaternions (n, 4) at the instants that are compared, and what they took."""
+
+    quaternions: np.ndarray
+    counts: dict[str, int]
+
+
+def in_mujoco(method: str, period: float, count: int, every: int, start: np.ndarray, gyro: Gyro) -> Attitudes:
+    """``count`` steps of ``period`` (s) from an attitude (4,), every so many of them kept."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep, spec.option.gravity, spec.option.integrator = period, [0, 0, 0], INTEGRATORS[method]
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    body = spec.worldbody.add_body(mass=1.0, inertia=[1.0, 1.0, 1.0], ipos=[0, 0, 0], explicitinertial=True)
+    body.add_joint(type=mujoco.mjtJoint.mjJNT_BALL)
+    model = spec.compile()
+    rates = gyro(period * np.arange(count + 1))
+    torques = np.diff(rates, axis=0)[None] / period
+    with quiet():
+        path, _ = rollout.rollout(model, mujoco.MjData(model), np.concatenate([[0.0], start, rates[0]])[None], torques,
+                                  control_spec=int(mujoco.mjtState.mjSTATE_QFRC_APPLIED))  # fmt: skip
+    found = np.vstack([start, path[0, every - 1 :: every, 1:5]])
+    return _sound("mujoco", found, {"steps": count, "force calls": (4 if method == "RK4" else 1) * count})
+
+
+def in_exudyn(method: str, period: float, count: int, every: int, start: np.ndarray, gyro: Gyro) -> Attitudes:
+    """The same in Exudyn; Refused for methods that do not end their steps on samples."""
+    name = method.split()[0]
+    known = CATALOGUE["exudyn"][name]
+    if known.adaptive:
+        raise Refused("exudyn", f"{name} picks its own steps, which do not end on the samples of the rates")
+    times = period * np.arange(count + 2)
+    rates = gyro(times)
+    pushed = np.diff(rates, axis=0) / period if known.holds else (gyro(times + NUDGE) - gyro(times - NUDGE)) / 2 / NUDGE
+    implicit = name in ("GeneralizedAlpha", "TrapezoidalIndex2")
+    mbs, sensor = _sphere(start, rates[0], pushed.tolist(), period, implicit, known.holds)
+    options = _options(period, count, every)
+    solved = mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, name))
+    kept = mbs.GetSensorStoredData(sensor)[:, 1:]
+    if not solved or len(kept) != count // every + 1:
+        raise RunFailed("exudyn", "the solver reported failure", period * every * len(kept))
+    found = start + kept[:, 3:] if implicit else from_matrix(kept.reshape(-1, 3, 3))
+    return _sound("exudyn", found, counted(mbs))
+
+
+def _sphere(start: np.ndarray, rate: np.ndarray, torques: list[list[float]], period: float,
+            implicit: bool, held: bool) -> tuple[Any, Any]:  # fmt: skip
+    """The system and its sensor: a rotation vector from the start for explicit methods, Euler parameters for others."""
+    mbs = exu.SystemContainer().AddSystem()
+    still, turning = [0.0] * 3, np.concatenate([[0.0], rate])
+    if implicit:
+        node = mbs.AddNode(items.NodeRigidBodyEP(
+            referenceCoordinates=still + start.tolist(),
+            initialVelocities=still + (0.5 * product(start, turning)).tolist()))  # fmt: skip
+    else:
+        node = mbs.AddNode(items.NodeRigidBodyRotVecLG(
+            referenceCoordinates=still + logarithm(start).tolist(), initialVelocities=still + rate.tolist()))
+    body = mbs.AddObject(items.ObjectRigidBody(nodeNumber=node, mass=1.0, inertia=[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
+    row = [0]
+
+    def begin(mbs: Any, t: float) -> bool:
+        row[0] = round(t / period) - held  # t is the end of the step
+        return True
+
+    mbs.SetPreStepUserFunction(begin)
+    mbs.AddLoad(items.LoadTorqueVector(
+        markerNumber=mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=body)), bodyFixed=True,
+        loadVectorUserFunction=lambda mbs, t, load: torques[row[0]]))  # fmt: skip
+    sensor = mbs.AddSensor(items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False,
+                                            outputVariableType=KINDS.Coordinates if implicit else KINDS.RotationMatrix))
+    mbs.Assemble()
+    return mbs, sensor
+
+
+def _options(period: float, count: int, every: int) -> Any:
+    options = exu.SimulationSettings()
+    options.solution.file.write, options.solution.sensors.active = False, True
+    options.solution.sensors.writePeriod = period * every
+    ti = options.timeIntegration
+    ti.numberOfSteps, ti.endTime, ti.verboseMode = count, period * count, 0
+    ti.adaptiveStep = ti.automaticStepSize = False
+    ti.generalizedAlpha.spectralRadius = 0.9
+    ti.explicit.computeEndOfStepAccelerations = False
+    return options
+
+
+def _sound(engine: str, found: np.ndarray, counts: dict[str, int]) -> Attitudes:
+    """Attitudes of unit length, where they are numbers that are nearly so."""
+    size = np.linalg.norm(found, axis=1, keepdims=True)
+    if not (np.abs(size - 1) < 0.01).all():
+        raise RunFailed(engine, "a quaternion is no rotation", 0.0)
+    return Attitudes(found / size, counts)
