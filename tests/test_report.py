@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+import shutil
 import subprocess
 import sys
 from html.parser import HTMLParser
@@ -11,7 +12,9 @@ from pathlib import Path
 import pytest
 
 from models.errors import InputError
+from validation.cases import point_mass
 from validation.report import page as report
+from validation.report import shares
 from validation.report.numbers import margin, number, numeric_columns, powers, share
 from validation.rows import Row, at_most, behaves, finding, not_run, within
 from validation.run import save as _save
@@ -95,7 +98,7 @@ def test_verdict_comes_first_and_then_what_is_not_covered(page):
 def test_each_system_has_a_stated_share_of_the_quick_minute(page):
     table = page[page.index('<section id="shares">') : page.index('<section id="independence">')]
     lines = [re.findall(r"<td[^>]*>([^<]*)</td>", line) for line in table.split("<tr>")]
-    assert ["pitch-plane", "3", "4", "400.0", "22 (over)"] in lines  # of two cases that took 200 s each
+    assert ["pitch-plane", "3", "4", "–", "400.0", "22 (over)", "–"] in lines  # of two cases that took 200 s each
     assert [line[0] for line in lines if line] == ["pitch-plane", "drift", "hard-cases", "effects"]
 
 
@@ -123,13 +126,40 @@ def test_odd_text_is_text(page):
     assert "&lt;script&gt;alert(&#34;1&#34;)&lt;/script&gt; &amp; &#34;quotes&#34; µ" in page
 
 
-def test_drawn_again_in_a_new_process_it_is_the_same_to_the_byte(folder):
+def test_drawn_again_elsewhere_by_a_new_process_from_saved_files_it_is_the_same_to_the_byte(folder, tmp_path):
+    own, data = point_mass.measure(True, folder)
+    _save(folder, [*rows(), *own], {"command": "", "seconds": {"point_mass": 1.0}})
+    (folder / "data" / "point_mass.json").write_text(json.dumps(data))
     first = report.write(folder).read_bytes()
-    done = subprocess.run([sys.executable, "-m", "validation.report", str(folder)], capture_output=True, text=True,
+    assert b"<svg role" in first, "there must be a figure to be drawn again"
+    other = tmp_path / "elsewhere"
+    shutil.copytree(folder / "data", other / "data")
+    shutil.copy(folder / "results.json", other)
+    done = subprocess.run([sys.executable, "-m", "validation.report", str(other)], capture_output=True, text=True,
                           timeout=120, check=True)  # fmt: skip
-    assert done.stdout.strip() == str(folder / "report.html")
-    assert (folder / "report.html").read_bytes() == first
-    assert not list(folder.glob(".report*"))
+    assert done.stdout.strip() == str(other / "report.html")
+    assert (other / "report.html").read_bytes() == first
+    assert not list(other.glob(".report*"))
+
+
+def test_a_quick_report_tells_its_share_of_the_last_full_one(folder, tmp_path, monkeypatch):
+    kept = tmp_path / "full_report.json"
+    kept.write_text('{"order": {"rows": {"pitch-plane": 7}, "seconds": 30.0, "commit": "abc"}}')
+    monkeypatch.setattr(shares, "KEPT", kept)
+    with pytest.raises(InputError, match="full report"):
+        shares.keep(folder)
+    results = report.read(folder / "results.json")
+    results["rows"] = results["rows"][:3]
+    results["provenance"]["quick"] = False
+    shares.full.cache_clear()
+    line = shares.shares(results)[0]
+    assert (line["rows"], line["seconds"], line["full_rows"], line["full_seconds"]) == (3, 400.0, None, None)
+    (folder / "results.json").write_text(json.dumps(results))
+    shares.keep(folder)
+    shares.full.cache_clear()
+    line = shares.shares(results)[0]
+    assert (line["full_rows"], line["full_seconds"]) == (3, 400.0), "audit has two of the rows, order one and not seven"
+    shares.full.cache_clear()
 
 
 def test_missing_and_damaged_data_still_give_a_page(folder):

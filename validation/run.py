@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 import os
 import time
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from models.ensemble.workers import processes
 from models.result import provenance
 from validation.changes import against, lines
 from validation.measured_cases import Cases, Outcomes, measured
+from validation.report.shares import full
 from validation.rows import REPORTED, Row
 
 CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "growth",
@@ -61,12 +63,17 @@ def _outcomes(pool: Executor, quick: bool, folder: Path) -> Outcomes:
     from rich.console import Console
     from rich.progress import Progress
 
-    together = tuple(name for name in CASES if name not in ALONE)
+    together = tuple(sorted((name for name in CASES if name not in ALONE), key=_lasting, reverse=True))
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("validate", total=len(CASES))
         first = measured(Cases(together, quick, folder), pool, lambda done: bar.update(task, completed=done))
         return first | measured(Cases(ALONE, quick, folder), pool,
                                 lambda done: bar.update(task, completed=len(together) + done), alone=True)  # fmt: skip
+
+
+def _lasting(name: str) -> float:
+    """Seconds of a case in the last full report; what lasts, or is not known, is begun first."""
+    return float(full()[name]["seconds"]) if name in full() else math.inf
 
 
 def _in(pool: Executor, function: Callable[..., Any], *arguments: Any) -> Any:

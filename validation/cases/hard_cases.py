@@ -19,7 +19,7 @@ SYSTEM: System = "hard-cases"
 LEAST = 80
 """Cases that there must be, without measurement files, which are many of a kind."""
 FILES = ("measured_files",)
-EVERY = 6
+EVERY = 8
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:

@@ -5,7 +5,6 @@ Everything measured comes from the saved results; titles, conventions and parame
 
 import inspect
 import pkgutil
-from collections import Counter
 from collections.abc import Iterator
 from importlib import import_module
 from itertools import groupby
@@ -26,12 +25,6 @@ KINDS = {
     "none": "there is no second side: a behaviour, or a count",
 }
 assert set(KINDS) == set(get_args(Independence))
-
-
-QUICK_SHARES = {"pitch-plane": 22, "drift": 14, "contact": 10, "ride": 10, "rolling-vehicle": 8, "anti-lock": 10,
-                "measured": 10, "hard-cases": 20, "cost": 10, "effects": 6}  # fmt: skip
-"""Seconds of two cores that each system may take of the quick report's minute, once kernels are compiled."""
-assert set(QUICK_SHARES) == set(get_args(System)) and sum(QUICK_SHARES.values()) == 120
 
 
 def verdict(results: Results) -> dict[str, Any]:
@@ -87,22 +80,6 @@ def _cases(rows: list[dict[str, Any]], results: Results) -> Iterator[dict[str, A
             "count": len(own),
             "failed": sum(row["status"] == "failed" for row in own),
         }
-
-
-def shares(results: Results) -> list[dict[str, Any]]:
-    """Cases, rows and seconds of each system that was measured; a case counts to the system of most of its rows."""
-    lines: dict[str, dict[str, Any]] = {name: {"name": name, "cases": 0, "rows": 0, "seconds": 0.0, "stated": stated}
-                                        for name, stated in QUICK_SHARES.items()}  # fmt: skip
-    owner: dict[str, Counter[str]] = {}
-    for row in results["rows"]:
-        owner.setdefault(case_of(row), Counter())[row["system"]] += 1
-        if row["system"] in lines:
-            lines[row["system"]]["rows"] += 1
-    for case, systems in owner.items():
-        if (system := systems.most_common(1)[0][0]) in lines:
-            lines[system]["cases"] += 1
-            lines[system]["seconds"] += results["provenance"]["seconds"].get(case, 0.0)
-    return [line for line in lines.values() if line["rows"]]
 
 
 def independence(results: Results, drawn: dict[str, dict[str, Any]]) -> dict[str, Any]:

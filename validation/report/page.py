@@ -13,6 +13,7 @@ from typing import Any
 from models.errors import InputError
 from validation.report import content
 from validation.report.numbers import duration, margin, marked, number, numeric_columns, powers, share
+from validation.report.shares import shares
 from validation.report.shown import shown
 
 TEMPLATE = "page.html.jinja"
@@ -25,7 +26,7 @@ def write(folder: Path, each: Callable[..., Iterable[Any]] = map) -> Path:
 
     each : draws the cases, such as the map of a pool of processes.
     """
-    results = _read(folder / "results.json")
+    results = read(folder / "results.json")
     path = folder / "report.html"
     part = folder / ".report.html.part"
     part.write_text(page(results, folder / "data", each), encoding="utf-8")
@@ -33,7 +34,7 @@ def write(folder: Path, each: Callable[..., Iterable[Any]] = map) -> Path:
     return path
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read(path: Path) -> dict[str, Any]:
     """Saved results; raises InputError if the file is not one."""
     try:
         results = json.loads(path.read_text(encoding="utf-8"))
@@ -63,6 +64,6 @@ def page(results: dict[str, Any], data: Path, each: Callable[..., Iterable[Any]]
     return environment.get_template(TEMPLATE).render(
         verdict=content.verdict(results), against=results.get("against"), systems=systems,
         silent=content.silent_systems(results["rows"]),
-        shares=content.shares(results), independence=content.independence(results, drawn),
+        shares=shares(results), independence=content.independence(results, drawn),
         conventions=content.conventions(), parameters=content.parameter_tables(), provenance=results["provenance"],
     )  # fmt: skip

@@ -1,0 +1,79 @@
+"""The share of a quick report in the full one, by system: rows and seconds.
+
+``python -m validation.report.shares FOLDER`` keeps what a full report had of each case in ``full_report.json``; quick
+ones tell it beside what they ran, and cases that took long are begun first.
+"""
+
+import json
+import sys
+from collections import Counter
+from functools import cache
+from pathlib import Path
+from typing import Any, get_args
+
+from models.ensemble.store import write_whole
+from models.errors import InputError
+from validation.rows import System
+
+KEPT = Path(__file__).with_name("full_report.json")
+QUICK_SHARES = {"pitch-plane": 22, "drift": 14, "contact": 10, "ride": 10, "rolling-vehicle": 8, "anti-lock": 10,
+                "measured": 10, "hard-cases": 20, "cost": 10, "effects": 6}  # fmt: skip
+"""Seconds of two cores that each system may take of the quick report's minute, once kernels are compiled."""
+assert set(QUICK_SHARES) == set(get_args(System)) and sum(QUICK_SHARES.values()) == 120
+
+
+@cache
+def full() -> dict[str, dict[str, Any]]:
+    """What the last full report had of each case: "rows" by system, "seconds", "commit"."""
+    found: dict[str, dict[str, Any]] = json.loads(KEPT.read_text(encoding="utf-8"))
+    return found
+
+
+def shares(results: dict[str, Any]) -> list[dict[str, Any]]:
+    """Cases, rows and seconds of each system that was measured, those of a full report, and the stated seconds.
+
+    A case counts to the system of most of its rows. What is not known of some case of a system is None.
+    """
+    found = _counted(results["rows"])
+    main = {case: systems.most_common(1)[0][0] for case, systems in found.items()}
+    return [_line(system, found, main, results["provenance"]["seconds"]) for system in QUICK_SHARES
+            if any(system in systems for systems in found.values())]  # fmt: skip
+
+
+def _line(system: str, found: dict[str, Counter[str]], main: dict[str, str], seconds: dict[str, float],
+          ) -> dict[str, Any]:  # fmt: skip
+    own = [case for case in found if main[case] == system]
+    shared = [case for case in found if system in found[case]]
+    return {"name": system, "cases": len(own), "rows": sum(found[case][system] for case in shared),
+            "seconds": sum(seconds.get(case, 0.0) for case in own), "stated": QUICK_SHARES[system],
+            "full_rows": sum(full()[case]["rows"].get(system, 0) for case in shared) if full().keys() >= set(shared)
+            else None,
+            "full_seconds": sum(full()[case]["seconds"] for case in own) if full().keys() >= set(own)
+            else None}  # fmt: skip
+
+
+def _counted(rows: list[dict[str, Any]]) -> dict[str, Counter[str]]:
+    """Rows of each case by system."""
+    from validation.report.content import case_of
+
+    found: dict[str, Counter[str]] = {}
+    for row in rows:
+        found.setdefault(case_of(row), Counter())[row["system"]] += 1
+    return found
+
+
+def keep(folder: Path) -> None:
+    """Keep what a full report had, case by case; raises InputError for the results of a quick one."""
+    from validation.report.page import read
+
+    results = read(folder / "results.json")
+    source = results["provenance"]
+    if source["quick"]:
+        raise InputError(folder / "results.json", "provenance.quick", True, "the results of a full report")
+    new = {case: {"rows": dict(systems), "seconds": round(source["seconds"][case], 1), "commit": source["commit"]}
+           for case, systems in _counted(results["rows"]).items() if case in source["seconds"]}  # fmt: skip
+    write_whole(KEPT, (json.dumps(dict(sorted((full() | new).items())), indent=1) + "\n").encode())
+
+
+if __name__ == "__main__":
+    keep(Path(sys.argv[1]))
