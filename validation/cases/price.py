@@ -20,6 +20,7 @@ from validation.price.problems import (
     braking_stop,
     force_excited,
     free_vehicle,
+    inertial_unit,
     noisy_forces,
     prescribed_pitch,
     road_excited,
@@ -33,7 +34,7 @@ TITLE = "What accuracy costs"
 SYSTEM: System = "cost"
 PROBLEMS: tuple[Callable[[bool], Problem], ...] = (road_excited.problem, force_excited.problem,
                                                    partial(wheelset.problem, speed=20.0),
-                                                   braking_stop.problem)  # fmt: skip
+                                                   braking_stop.problem, inertial_unit.problem)  # fmt: skip
 FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (noisy_forces.problem, prescribed_pitch.problem,
                                                     free_vehicle.problem, partial(wheelset.problem, speed=5.0),
                                                     partial(wheelset.problem, speed=1.0))  # fmt: skip
