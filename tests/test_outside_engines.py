@@ -73,6 +73,23 @@ def answering(answer):
     return type("Bad", (), {"order": 4, "integrate": lambda self, f, times, start, tolerance: answer(times, start)})
 
 
+class Sparse(Engine):
+    """The fault to be seen: a state at every second step."""
+
+    def run(self):
+        found = self.inside.run()
+        return types.SimpleNamespace(times=found.times[::2], states=found.states[::2])
+
+
+class Far(Engine):
+    """The fault to be seen: everything 1 % too far."""
+
+    def run(self):
+        found = self.inside.run()
+        first = found.states[0]
+        return types.SimpleNamespace(times=found.times, states=first + 1.01 * (found.states - first))
+
+
 class Deaf:
     order = 4
 
@@ -162,11 +179,17 @@ def test_an_engine_of_its_own_runs_and_what_it_cannot_do_is_refused(own, tmp_pat
 def judged(name, folder, monkeypatch):
     """Rows of the conformity of a class without hard cases."""
     monkeypatch.setattr(conformity, "FAMILIES", ())
-    return {row.id.removeprefix("conformity."): row.status for row in conformity._rows(name, folder)}
+    rows = {row.id.removeprefix("conformity."): row.status for row in conformity._rows(name, folder)}
+    assert rows.pop("others") == "not run"  # the table says what it does not judge
+    return rows
+
+
+RUNS = {"path.study road", "path.wheel forces, linear", "path.wheel forces, held", "momentum", "order"}
+"""Rows that a run decides, but for the equilibrium, in which nothing moves."""
 
 
 @pytest.mark.parametrize(("found", "failed"), [
-    (Scipy, set()), (Engine, set()), (Boast, {"order", "momentum"}),
+    (Sparse, RUNS | {"equilibrium"}), (Far, RUNS), (Scipy, set()), (Engine, set()), (Boast, {"order", "momentum"}),
     (Tilted, {f"audit.{v}.{g}" for v in ("itwm_drift", "asymmetric_twin") for g in ("exact", "linear")})])  # fmt: skip
 def test_the_suite_passes_what_is_right_and_names_what_is_wrong(own, tmp_path, monkeypatch, found, failed):
     rows = judged(own(found), tmp_path, monkeypatch)
