@@ -29,7 +29,7 @@ def difference(engine: str, parameters: str, geometry: str = "exact") -> float:
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """A row per engine, vehicle and geometry."""
+    """A row per engine, vehicle and geometry, the same in quick."""
     rows = [
         at_most(f"audit.{engine}.{parameters}.{geometry}", SYSTEM,
                 f"acceleration, {engine} against the equations of the paper, {parameters}, {geometry} geometry",

@@ -70,7 +70,7 @@ COMBINATIONS = (
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """A row per combination."""
+    """A row per combination; quick: the first one, by few paths."""
     found = [_combination(one, folder, quick) for one in (COMBINATIONS[:1] if quick else COMBINATIONS)]
     return [_row(one) for one in found], {"combinations": found}
 

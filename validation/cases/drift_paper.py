@@ -40,7 +40,7 @@ FIGURES = (
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows for drift-off times, enforced moments and the inertia term of the reference."""
+    """Rows for drift-off times, enforced moments, inertia term of the reference; quick: 15 s, one sampling rate."""
     scene = load(SCENE, QUICK if quick else ())
     found, rate = _run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
     rows = [finding(f"drift.{name}", SYSTEM, f"{words}, {rate}", found[which][what], unit, paper, why)

@@ -57,7 +57,7 @@ SCORED = 5.0
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Drift-off by solver and by interpolation, growth and bias by smoothing and scheme."""
+    """Drift-off by solver and by interpolation, growth and bias by smoothing and scheme; quick: four solvers."""
     solvers = _solvers(folder, (*SOLVERS[:2], *SOLVERS[-2:]) if quick else SOLVERS)
     rows = _solver_rows(solvers)
     if quick:

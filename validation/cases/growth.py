@@ -49,7 +49,7 @@ LAW = "the averaged law holds to its next order in growth rate over frequency; 3
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows on the growth rate, the spread of noise, and what neither the step nor the engine may change."""
+    """Growth rate, spread of noise, and what neither step nor engine may change; quick: one road, no Monte Carlo."""
     true = _measured(folder, LENGTH)
     spread = _spread(true, folder, quick)
     if quick:

@@ -62,7 +62,7 @@ class Measured:
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """For each setting: 0.6 of the law fails, 1.2 holds, and the stiffness found by bisection."""
+    """For each setting 0.6 of the law fails, 1.2 holds; in full also the stiffness by bisection; quick: one setting."""
     measured = _measure(folder)
     settings = JUDGED[2:3] if quick else JUDGED
     rows = [row for one in settings for row in _ends(one, measured, "reference")]

@@ -62,7 +62,7 @@ class Files:
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Gaps from a start off the constraint by formulation, then both drifts by noise in the same formulations."""
+    """Gaps from a start off the constraint by formulation, then both drifts by noise; quick: over short runs."""
     with TemporaryDirectory() as name:
         files = _drive(Path(name), 0.2 if quick else 4.0)
         gaps, laws = _gaps(files), _laws(files)

@@ -39,7 +39,7 @@ START = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows for clean data, the laws, the ten minutes, the bias, the section forces and the recording."""
+    """Rows for clean data, the laws, the ten minutes, the bias, the recording; in full the section forces, too."""
     paths = 200 if quick else 4000
     rows = [*_clean(), *_one_axis(paths), *_three_axes(paths), *_norms(paths), *_bias(paths)]
     example, data = _ten_minutes(0 if quick else 60)

@@ -44,7 +44,7 @@ BRACKET = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows for clean motions in space, for noise, for each engine's own readings, and for drift."""
+    """Clean motions in space, noise, each engine's own readings, and drift; quick: few paths, runs of 1 s."""
     rows = [row for name in ARRAYS for row in _exact(name)]
     rows += [_plain(), _order(), _tilt()]
     gains, found = _gains(4000 if quick else 40_000)

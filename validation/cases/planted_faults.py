@@ -21,7 +21,7 @@ EVERY, LEAST = 8, 40
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows by system and of the whole."""
+    """Rows by system and, in full, of the whole; quick: every EVERY-th fault of each system."""
     plane = pitch_plane.measure(FEW, CLEAN[:1], (pitch_plane.TWIN,)) if quick else pitch_plane.measure()
     data: dict[str, Any] = {"pitch-plane": plane, **{own.id: own.measure(EVERY if quick else 1) for own in CAMPAIGNS}}
     rows = [*pitch_plane.rows(plane), *(row for own in CAMPAIGNS for row in own.rows(data[own.id]))]

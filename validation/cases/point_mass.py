@@ -29,7 +29,7 @@ WHY = ("the linear equation of the covariance itself, stepped by squaring its ma
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows for both covariances against many digits, for their difference, and for Monte Carlo."""
+    """Rows for both covariances against many digits, for their difference, and for Monte Carlo; quick: 2000 paths."""
     exact = {"continuous": [_continuous_error(x) for x in DAMPED],
              **{f"{n} steps": [_discrete_error(x, n) for x in DAMPED] for n in LENGTHS}}  # fmt: skip
     rows = [at_most(f"point_mass.{name.replace(' ', '_')}.{x:g}", SYSTEM,

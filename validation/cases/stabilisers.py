@@ -42,7 +42,7 @@ BAND = {"pitch_spring": {"stiffness": 3e3, "damping": 200.0, "dead_band": 0.01}}
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Missing mass and misplaced centre on both vehicles; the rest on the asymmetric one."""
+    """Missing mass and misplaced centre on both vehicles; the rest on the asymmetric one; quick: half a second."""
     duration = 0.5 if quick else 10.0
     rows: list[Row] = []
     with TemporaryDirectory() as name:

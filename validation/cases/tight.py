@@ -16,7 +16,7 @@ STEP = 2.5e-4
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """A row for the reference's own uncertainty and one per implementation."""
+    """A row for the reference's own uncertainty and one per implementation; quick: half a second."""
     duration = QUICK_DURATION if quick else DURATION
     scene = road_scene(step=STEP, duration=duration)
     tight = simulate(scene, "reference", Settings("DOP853", STEP, duration, 1e-12))

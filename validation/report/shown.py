@@ -9,13 +9,13 @@ from typing import Any
 
 
 def shown(folder: Path, name: str) -> dict[str, Any]:
-    """Title, first paragraph, tables and figures of a case; what is missing or cannot be read is said in "notes".
+    """Title, tables and figures of a case, what is said of it and of its share; "notes" tell what cannot be read.
 
     folder : of the saved data, ``CASE.json`` each. The same data give the same bytes in any process.
     """
     module = _module(name)
-    about = (inspect.getdoc(module) or "").partition("\n\n")[0] if module else ""
-    found: dict[str, Any] = {"title": getattr(module, "TITLE", name.replace("_", " ")), "about": about,
+    found: dict[str, Any] = {"title": getattr(module, "TITLE", name.replace("_", " ")), "about": _doc(module),
+                             "share": _doc(getattr(module, "measure", None)),
                              "tables": [], "figures": [], "notes": []}  # fmt: skip
     if module is None:
         found["notes"].append("This version of twinrig has no such case; its rows are shown as they were saved.")
@@ -43,6 +43,11 @@ def _module(name: str) -> ModuleType | None:
         return import_module(f"validation.cases.{name}")
     except ImportError:
         return None
+
+
+def _doc(what: Any) -> str:
+    """The first paragraph of what is said of a module or a function."""
+    return "" if what is None else (inspect.getdoc(what) or "").partition("\n\n")[0]
 
 
 def _tables(module: Any, saved: Any, name: str) -> list[Any]:
