@@ -1,9 +1,13 @@
 """Forces for a table of contacts: from a CSV with a contact in every row to a CSV with forces, errors and a status."""
 
+import csv
 import time
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from models.contact.cases_table import answer, compile_first
 from models.contact.scene import ContactScene
@@ -13,6 +17,8 @@ from models.errors import InputError
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]
 ANSWER = "forces.csv"
+BLOCK = 10_000
+"""Rows of an answer that are read at once."""
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
@@ -32,7 +38,22 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     rows = answer(path, folder / ANSWER, scene.pair, scene.method, lambda done: progress(f"{done:,} rows", 0.0))
     seconds = time.perf_counter() - start
     table = told(rows["rows"], rows["wrong"], path.name, seconds)
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "rows": rows, "seconds": seconds, "table": table}
+    return {"scene": scene.title, "folder": str(folder), "failed": {}, "rows": rows, "answer": sizes(folder / ANSWER),
+            "seconds": seconds, "table": table}  # fmt: skip
+
+
+def sizes(path: Path) -> dict[str, dict[str, Any]]:
+    """Largest magnitude and rms of every column of an answer, over its sound rows; read block by block."""
+    with path.open(newline="") as file:
+        rows = csv.reader(file)
+        heads = [head.rstrip("]").split(" [") for head in next(rows)[1:-1]]
+        largest, squares, count = np.zeros(len(heads)), np.zeros(len(heads)), 0
+        while block := list(islice(rows, BLOCK)):
+            sound = np.array([row[1:-1] for row in block if row[-1] == "ok"], float).reshape(-1, len(heads))
+            largest = np.maximum(largest, np.abs(sound).max(axis=0, initial=0.0))
+            squares, count = squares + (sound**2).sum(axis=0), count + len(sound)
+    return {name: {"unit": unit, "largest": float(most), "rms": float(np.sqrt(square / count))}
+            for (name, unit), most, square in zip(heads, largest, squares, strict=True) if count}  # fmt: skip
 
 
 def told(rows: int, wrong: int, name: str, seconds: float) -> list[str]:

@@ -50,7 +50,7 @@ def _page(job: "Points", panels: list[tuple[str, dict[str, list[Any]]]], failure
     figure, axes = plt.subplots(down, min(ACROSS, len(panels)), figsize=(12, 2.6 * down + 0.9), squeeze=False)
     at, ticks = _places(job.values)
     for axis, (what, curves) in zip(axes.flat, panels, strict=False):
-        _panel(axis, at, what, curves, failures)
+        _panel(axis, at, what, curves, failures, "o" if ticks else "o-")
         if ticks:
             axis.set_xticks(at, ticks)
         elif _spread(at):
@@ -73,11 +73,12 @@ def _places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
     return np.arange(float(len(values))), [str(value)[:18] for value in values]
 
 
-def _panel(axis: Any, at: np.ndarray, what: str, curves: dict[str, list[Any]], failures: list[dict[str, str]]) -> None:
+def _panel(axis: Any, at: np.ndarray, what: str, curves: dict[str, list[Any]], failures: list[dict[str, str]],
+           style: str) -> None:  # fmt: skip
     order = np.argsort(at)
     for i, (engine, column) in enumerate(curves.items()):
         values = np.array([np.nan if value is None else float(value) for value in column])
-        axis.plot(at[order], values[order], "o-", color=COLOURS.get(engine, "#0072b2"), markersize=3.5,
+        axis.plot(at[order], values[order], style, color=COLOURS.get(engine, "#0072b2"), markersize=3.5,
                   linewidth=2.2 - 0.6 * min(i, 2), label=LABELS.get(engine, engine) or None)  # fmt: skip
     if all(_spread(np.array([v for v in column if v is not None], float)) for column in curves.values()):
         axis.set_yscale("log")

@@ -18,6 +18,7 @@ from models.contact.work_precision import Point, cheapest, exact
 from models.errors import InputError
 from models.table_stream import blocks
 from models.tables import NEWTONS, SHARES, read_table
+from studies import contact_table
 from studies.contact_table import told
 from validation.cases import contact_price
 from validation.contact.contact_set import FRICTION, JUDGED, LOAD, read, read_drawn
@@ -154,6 +155,18 @@ def test_wrong_rows_get_a_status_and_stop_no_other():
         assert rows[2 * i + 1]["line [-]"] == str(2 * i + 5)
     good = [row["fx [N]"] for row in rows[::2]]
     assert {row["status"] for row in rows[::2]} == {"ok"} and len(set(good)) == 1
+
+
+def test_sizes_of_an_answer_are_those_of_its_sound_rows(monkeypatch):
+    """They are what a sweep of a table draws."""
+    monkeypatch.setattr(contact_table, "BLOCK", 2)
+    rows = ["3,3,1,ok", "4,,,wrong", "5,,,wrong", "6,,,wrong", "7,-4,1,ok"]
+    Path("forces.csv").write_text("\n".join(["line [-],fx [N],stick [-],status", *rows]) + "\n")
+    assert contact_table.sizes(Path("forces.csv")) == {
+        "fx": {"unit": "N", "largest": 4.0, "rms": pytest.approx(12.5**0.5)}, "stick": {"unit": "-", "largest": 1.0,
+                                                                                       "rms": 1.0}}  # fmt: skip
+    Path("none.csv").write_text("line [-],fx [N],status\n3,,wrong\n")
+    assert contact_table.sizes(Path("none.csv")) == {}
 
 
 def test_a_table_that_was_cut_off_says_so():
