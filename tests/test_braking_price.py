@@ -1,10 +1,24 @@
 """The work-precision problem of an anti-lock stop, small: from 2 m/s, the wet road after 0.3 m."""
 
+import numpy as np
 import pytest
 
+from models.braking.run import Braked
+from models.braking.tyre_table import stacked
+from models.engines.braking import Carried
 from validation.price import runner as cost
 from validation.price.problems import braking_stop
-from validation.price.problems.braking_stop import EULER, FULL, LITERAL, OURS, QUICK, RK4, BrakingStop
+from validation.price.problems.braking_stop import (
+    EULER,
+    FULL,
+    LITERAL,
+    OURS,
+    QUICK,
+    RK4,
+    VEHICLE,
+    BrakingStop,
+    Played,
+)
 
 
 @pytest.fixture(scope="module")
@@ -29,6 +43,15 @@ def test_the_reference_knows_itself_and_where_friction_changes(short, monkeypatc
     monkeypatch.setattr(braking_stop, "CHANGE", 0.31)
     moved = abs(short._by("DOP853", 1e-8) - short._true)
     assert moved > 1e-5, "ten times the bound of the exact wheel: that test sees a change that is 1 cm off"
+
+
+@pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
+def test_an_engine_that_carries_the_chassis_gives_the_digits_of_the_exact_wheel(short, engine):
+    """What the problem's note says: rounding of some hundred steps of 10 mm, 1e-14 m each."""
+    stop = Braked(VEHICLE.plane, np.zeros(1, dtype=np.int64), stacked(short._tables), 1.0, short._road, short._brakes,
+                  short._chambers, np.zeros(1), substeps=2, engine=Carried(engine, VEHICLE.plane))  # fmt: skip
+    path = stop.run(Played(short._valves), 2.0)
+    assert path.stands and path.states[-1, 0, 0] == pytest.approx(short._ours(2).distance, abs=1e-12)
 
 
 def test_a_step_is_the_longest_that_divides_a_sample(short):

@@ -41,10 +41,12 @@ MORE = 40
 OURS, EULER, RK4, LITERAL = "exact wheel", "Euler", "RK4", "literal"
 WALKS = {OURS: 2, EULER: 1, RK4: 4, LITERAL: 1}
 """Force calls of a step; of ours, walks from node to node of the tyre's table."""
+DEFAULTS = {(OURS, Braked.substeps): "twinrig", (LITERAL, 1): "paper"}
+"""Whose default a method with so many steps in a sample is."""
 SUBSTEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
 ORDERS = {EULER: 1, LITERAL: 1}
 FULL = {OURS: SUBSTEPS, EULER: SUBSTEPS, RK4: SUBSTEPS, LITERAL: SUBSTEPS}
-QUICK = {OURS: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (8, 64)}
+QUICK = {OURS: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 8, 64)}
 """The named share of FULL that the quick report takes."""
 SOLVERS = {True: (("DOP853", 1e-9), ("LSODA", 1e-9)), False: (("DOP853", 1e-12), ("LSODA", 1e-11))}
 """Reference solvers with their relative tolerances, by ``quick``: a Runge-Kutta method and a multistep one."""
@@ -113,7 +115,8 @@ class BrakingStop:
 
     key = "braking"
     note = (f"Steps are those of {1e3 * SAMPLE:g} ms, the paper's, and its parts. The exact wheel walks twice in one, "
-            "from node to node; literal is the paper's scheme as it is written.")  # fmt: skip
+            "from node to node; literal is the paper's scheme as it is written. An engine that carries the chassis "
+            "leaves wheel and tyre with the exact step, and gives its digits.")  # fmt: skip
 
     def __init__(self, quick: bool) -> None:
         self.title = (f"Anti-lock stop of a quarter vehicle from {SPEED:g} m/s, {SURFACES[0]} and from {CHANGE:g} m on "
@@ -139,7 +142,9 @@ class BrakingStop:
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting by its curve and the longest step (s) up to ``value`` that divides a sample."""
-        return Setting(engine, method, SAMPLE / math.ceil(SAMPLE / value * (1 - 1e-9)), ORDERS.get(method, 0))
+        substeps = math.ceil(SAMPLE / value * (1 - 1e-9))
+        return Setting(engine, method, SAMPLE / substeps, ORDERS.get(method, 0),
+                       default=DEFAULTS.get((method, substeps), ""))  # fmt: skip
 
     def build(self, setting: Setting) -> Solver:
         """The stop by one method in steps."""
