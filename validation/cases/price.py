@@ -18,6 +18,7 @@ from validation.price.problems import (
     Problem,
     Setting,
     braking_stop,
+    contact_alone,
     force_excited,
     free_vehicle,
     inertial_unit,
@@ -37,7 +38,8 @@ PROBLEMS: tuple[Callable[[bool], Problem], ...] = (road_excited.problem, force_e
                                                    braking_stop.problem, inertial_unit.problem)  # fmt: skip
 FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (noisy_forces.problem, prescribed_pitch.problem,
                                                     free_vehicle.problem, partial(wheelset.problem, speed=5.0),
-                                                    partial(wheelset.problem, speed=1.0))  # fmt: skip
+                                                    partial(wheelset.problem, speed=1.0),
+                                                    contact_alone.problem)  # fmt: skip
 """Problems that a quick run leaves out; it has those of PROBLEMS."""
 ROUNDS = {True: 5, False: 15}
 """Interleaved rounds of timing at most, by ``quick``."""
@@ -146,6 +148,6 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
 
 
 def _caption(problem: dict[str, Any]) -> str:
-    return (f"{problem['title']}: error over force calls and over seconds. Reference: {problem['reference']}. "
+    return (f"{problem['title']}: error over work and over seconds. Reference: {problem['reference']}. "
             "Colour is the engine, marker the method, line its order (solid from 4 up, dashed 2, dotted 1). "
             f"{problem['note']}")  # fmt: skip

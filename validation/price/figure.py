@@ -17,6 +17,8 @@ SHARED = {"RK4": "o", "RK44": "o", "Euler": "D", "ExplicitEuler": "D"}
 MARKERS = "s^v<>PXhp*d"
 """Markers of the others, in turn within each engine."""
 STYLES = {1: ":", 2: "--", 3: "-.", 4: "-"}
+MORE = ("#999999", "#0072b2", "#009e73", "#cc79a7", "#d55e00", "#56b4e9")
+"""Colours of families that are no implementation."""
 SIZES = {"reference": 8.5, "exudyn": 6.5, "mujoco": 4.5}
 """Coinciding curves show as rings within each other."""
 
@@ -39,7 +41,7 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
         ax.set_title(f"by {kind}, {measured}")
     _failures(axes[0], points, top)
     quantity = quantity_of(problem)
-    axes[0].set_ylabel(f"largest {quantity} error [{problem['units'][quantity]}]")
+    axes[0].set_ylabel(f"error of the {quantity} [{problem['units'][quantity]}]")
     axes[0].set_ylim(0.3 * problem["uncertainty"][quantity], 12 * top)
     alike = "; ".join(named(group[0], [group]) for group in groups_of(problem, points))
     figure.suptitle(f"What accuracy costs. {problem['title']}\n", x=0.01, ha="left", fontsize=12)
@@ -53,12 +55,18 @@ def _styles(points: list[Point]) -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     for own in by_curve(points).values():
         one = own[0].setting
-        colour = COLOURS.get(one.engine, "grey")
+        colour = _colour(one.engine, points)
         used = {style["marker"] for style in found.values() if style["color"] == colour}
         marker = SHARED.get(one.method) or next((m for m in MARKERS if m not in used), ".")
         found[one.curve] = {"color": colour, "marker": marker, "linestyle": STYLES.get(one.order, "-"),
                             "markersize": SIZES.get(one.engine, 5)}  # fmt: skip
     return found
+
+
+def _colour(engine: str, points: list[Point]) -> str:
+    """That of an implementation, or else the next of MORE."""
+    others = [one for one in dict.fromkeys(p.setting.engine for p in points) if one not in COLOURS]
+    return COLOURS[engine] if engine in COLOURS else MORE[others.index(engine) % len(MORE)]
 
 
 def _top(problem: dict[str, Any], points: list[Point]) -> float:
@@ -123,7 +131,7 @@ def _failures(ax: Axes, points: list[Point], top: float) -> None:
         calls = _expected(p, points)
         if calls:
             size = 1.4 * SIZES.get(p.setting.engine, 5)
-            ax.plot(calls, top, "x", color=COLOURS.get(p.setting.engine, "grey"), markersize=size, markeredgewidth=1.6)
+            ax.plot(calls, top, "x", color=_colour(p.setting.engine, points), markersize=size, markeredgewidth=1.6)
     if failed:
         text = "; ".join(f"{status}: {_who(failed, status)}" for status in dict.fromkeys(p.status for p in failed))
         ax.annotate(text, (0.995, 0.99), xycoords="axes fraction", ha="right", va="top", fontsize=8)

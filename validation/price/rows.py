@@ -11,6 +11,10 @@ SYSTEM: System = "cost"
 BANDS = {1: 0.1, 2: 0.1, 3: 0.2, 4: 0.2, 6: 0.5}
 """Allowed distance of the observed from the declared order: at these steps the next power still shows,
 the more the higher the order (RK4 between 1 and 0.25 ms: 4.17)."""
+SURE = 1e-4
+"""Share of the finest tolerance that a reference may leave uncertain, where a problem has no ``sure`` of its own."""
+SETTLED = 0.9
+"""Of the last but one error: a curve that falls no further has come down to its theory's own."""
 PROMISE = 1.25
 """Allowed error at an interpolated cheapest setting, by its tolerance: curves bend between two settings."""
 
@@ -31,10 +35,12 @@ def _quantity(problem: Problem) -> tuple[str, str]:
 def _reference(problem: Problem) -> Row:
     """The reference must know more than the finest tolerance asks."""
     quantity, unit = _quantity(problem)
+    share = getattr(problem, "sure", SURE)
     return at_most(f"price.{problem.key}.reference", SYSTEM,
                    f"uncertainty of the reference ({problem.reference}), {quantity}", problem.uncertainty[quantity],
-                   unit, 1e-4 * min(problem.tolerances), "largest difference between solvers of different families; "
-                   "a ten-thousandth of the finest tolerance, so that curves stand clear", "closed form")  # fmt: skip
+                   unit, share * min(problem.tolerances), "what the reference states of itself or solvers of different "
+                   f"families differ by; {share:g} of the finest tolerance, so that curves stand clear",
+                   "closed form")  # fmt: skip
 
 
 def _orders(problem: Problem, points: list[Point]) -> list[Row]:
@@ -109,10 +115,12 @@ def _sweep(problem: Problem, points: list[Point]) -> Row:
     for curve, own in cost.by_curve(points).items():
         wide = own[0].errors[quantity] >= 1e4 * own[-1].errors[quantity]
         whole = tried[curve][0].status != "ok" and own[-1].errors[quantity] <= min(problem.tolerances)
-        if len(own) < 6 or not (wide or whole or 0 < own[0].setting.order < 4):
+        settled = len(own) > 1 and own[-1].errors[quantity] >= SETTLED * own[-2].errors[quantity]
+        uncut = own[0].setting.cells and len(tried[curve]) == 1
+        if not uncut and (len(own) < 6 or not (wide or whole or settled or 0 < own[0].setting.order < 4)):
             short.append(curve)
     what = ("methods with fewer than 6 settings that answered, or from order 4 up with fewer than 4 decades of error "
-            "although coarser settings answer or the finest tolerance is not met")  # fmt: skip
+            "although coarser settings answer, or the finest tolerance is not met and the error still falls")
     return _none_of(f"price.{problem.key}.sweep", what, short, "what the study was asked to cover")
 
 

@@ -1,0 +1,108 @@
+"""Problem G: creep forces of one contact by every theory, over the cells that it is cut into.
+
+Contacts of the kept set, each of another ellipse, kind and size of creepage. The reference is the exact theory of the
+half space with its cells extrapolated to none: another family than all but the exact theory itself, whose own curve
+therefore only shows what its cells cost. What is left of its cells is its uncertainty.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+
+from models.contact.work_precision import WAYS, Case, Way
+from validation.contact.contact_set import read
+from validation.price.problems import Setting
+
+EVERY = 23
+"""Every so many contacts of the set stand for all: they go through its ratios of axes, kinds and sizes of creepage."""
+CURVES = {
+    "linear theory": ("linear", "theory"),
+    "FASTSIM 1982": ("FASTSIM", "of 1982"),
+    "FASTSIM, plain march": ("FASTSIM", "plain march"),
+    "FASTSIM": ("FASTSIM", "second order"),
+    "FASTSIM, three flexibilities": ("FASTSIM", "three flexibilities"),
+    "FASTSIM, parabolic": ("FASTSIM", "parabolic bound"),
+    "theory of 1983": ("1983", "theory"),
+    "exact theory": ("exact", "theory"),
+}
+"""Family and member of every way."""
+_STRIPS, _NET = (5, 7, 11, 15, 21, 41, 81), (7, 11, 15, 21, 31, 45)
+CELLS = {"linear theory": (1,), "theory of 1983": _NET, "exact theory": (6, 8, 10, 14, 20, 28)}
+"""Cells along each axis of a contact, those of FASTSIM left out."""
+USUAL = ("FASTSIM", 21)
+"""What a scene of a contact is answered by if it does not say."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """Forces (n, 2) by mu N, and what they took."""
+
+    forces: np.ndarray
+    counts: dict[str, int]
+
+
+@dataclass(frozen=True)
+class Solver:
+    """A run that is ready."""
+
+    run: Callable[[], Result]
+
+
+class ContactAlone:
+    """The problem with its reference; see ``validation.price.problems.Problem``."""
+
+    key, duration, sure = "contact", 1.0, 0.25
+    note = ("Cells are those of the square about the contact; the exact theory solves for all of them together, others "
+            "march along strips. Seconds are those of all contacts, one call from Python each.")  # fmt: skip
+    reference = "exact theory, cells extrapolated to none"
+    tolerances: tuple[float, ...] = (10.0, 5.0, 2.0, 1.0)
+    bound = 100.0
+
+    def __init__(self) -> None:
+        self._cases = read()[::EVERY]
+        self._ways = {CURVES[way.name]: way for way in WAYS}
+        self._forces = np.array([case.force for case in self._cases])
+        self.title = f"Creep forces of {len(self._cases)} contacts by every theory of rolling contact"
+        self.units = {"mean creep force": "% of mu N", "creep force in 95 of 100": "% of mu N"}
+        left = 100.0 * np.array([case.error for case in self._cases])
+        self.uncertainty = dict(zip(self.units, (float(left.mean()), float(left.max())), strict=True))
+
+    def settings(self, quick: bool) -> tuple[Setting, ...]:
+        """Every theory with every number of cells."""
+        return tuple(self.setting(*curve, 1.0 / cells) for curve, way in self._ways.items()
+                     for cells in CELLS.get(way.name, _STRIPS))  # fmt: skip
+
+    def setting(self, engine: str, method: str, value: float) -> Setting:
+        """A setting of this problem by its curve and 1 by its cells."""
+        cells = round(1.0 / value)
+        usual = (self._ways[engine, method].name, cells) == USUAL
+        return Setting(engine, method, 1.0 / cells, 0, default="twinrig" if usual else "", cells=True)
+
+    def build(self, setting: Setting) -> Solver:
+        """All contacts, each by one theory."""
+        return Solver(partial(self._run, self._ways[setting.engine, setting.method], round(1.0 / setting.value)))
+
+    def errors(self, solution: Result) -> dict[str, float]:
+        """Mean over the contacts, and what 95 of 100 keep to, both in % of mu N."""
+        off = 100.0 * np.linalg.norm(solution.forces - self._forces, axis=1)
+        return dict(zip(self.units, (float(off.mean()), float(np.quantile(off, 0.95))), strict=True))
+
+    def _run(self, way: Way, cells: int) -> Result:
+        forces = [_force(way, case, cells) for case in self._cases]
+        each = 0 if way.name == "linear theory" else cells**2
+        return Result(np.array(forces), {"contacts": len(forces), "contact cells": max(1, each) * len(forces)})
+
+
+def _force(way: Way, case: Case, cells: int) -> np.ndarray:
+    """Force (2,) by mu N."""
+    found = way.rolled(case, cells)(case.motion)
+    force = found[:2] if isinstance(found, tuple) else found.force
+    return np.array(force) / case.limit
+
+
+@cache
+def problem(quick: bool) -> ContactAlone:
+    """The problem, its reference read once per process."""
+    return ContactAlone()
