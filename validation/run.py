@@ -32,8 +32,9 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
 """Case modules in the order of the report."""
 
 
-ALONE = ("absent", "price", "recommendation", "ensemble", "fastsim", "contact_price", "contact_bridges", "handling")
-"""Cases that time what they run: they begin when all others have ended, and have the machine to themselves."""
+TIMED = ("absent", "price", "recommendation")
+ALONE = {True: TIMED, False: (*TIMED, "ensemble", "fastsim", "contact_price", "contact_bridges", "handling")}
+"""Cases that time what they run, by ``quick``: they begin when all others have ended, and have the machine alone."""
 WORKERS = 2
 """Processes that measure the other cases."""
 
@@ -63,11 +64,12 @@ def _outcomes(pool: Executor, quick: bool, folder: Path) -> Outcomes:
     from rich.console import Console
     from rich.progress import Progress
 
-    together = tuple(sorted((name for name in CASES if name not in ALONE), key=_lasting, reverse=True))
+    alone = ALONE[quick]
+    together = tuple(sorted((name for name in CASES if name not in alone), key=_lasting, reverse=True))
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("validate", total=len(CASES))
         first = measured(Cases(together, quick, folder), pool, lambda done: bar.update(task, completed=done))
-        return first | measured(Cases(ALONE, quick, folder), pool,
+        return first | measured(Cases(alone, quick, folder), pool,
                                 lambda done: bar.update(task, completed=len(together) + done), alone=True)  # fmt: skip
 
 
