@@ -8,15 +8,20 @@ import subprocess
 import sys
 from dataclasses import replace
 from functools import cache
+from typing import Any
 from unittest import mock
+
+import numpy as np
 
 from models.engines.spatial_protocol import build
 from models.ride import of_scene
 from models.ride.excitation import excited
 from models.ride.linear_vehicle import LinearVehicle
+from models.ride.scene import RideScene
+from models.ride.sweep import sweep
 from models.ride.weighting import weighted
 from models.road.two_track import excitation, half_track, on_track, road_of_level
-from models.vehicles.spatial_linear import linearise
+from models.vehicles.spatial_linear import linearise, wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.absence.probes import user_functions
 from validation.rows import Row, System, at_most, behaves
@@ -27,6 +32,25 @@ FOREIGN = ("exudyn", "mujoco", "numba", "pyopencrg", "slycot", "models.engines",
            "models.drift", "models.road.fitted", "models.road.isotropic", "models.ride.varying_speed",
            "models.ride.monte_carlo", "models.ride.frequency")  # fmt: skip
 """What a linear ride of the reference at constant speeds does without."""
+
+ENGINES = ("reference",)
+BARE: dict[str, Any] = {"title": "bare", "system": "ride", "vehicle": {"file": "seven_freedoms"},
+                        "road": {"left_right": "equal", "front_rear": "equal"},
+                        "speeds": {"values": [20.0]}}  # fmt: skip
+
+
+def seen(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
+    """Counts of the linear system that a scene makes, and the variances of its outputs."""
+    vehicle = of_scene.vehicle_of(scene)
+    assert scene.speeds is not None
+    road, speeds = of_scene.excitation_of(scene, wheels(vehicle)), scene.speeds.all()
+    linear = of_scene.linear_vehicle(vehicle, engine)
+    system = weighted(excited(linear(speeds[0]), road, speeds[0]), scene.weighting)
+    counts = {"states": len(system.A), "preloads": int(vehicle.gravity > 0.0),
+              "delays": sum(length > 0.0 for length in road.lengths),
+              "heights": len(np.unique(sum(road.heights), axis=0))}
+    return counts, sweep(linear, {"own": road}, speeds, scene.weighting).variance.tobytes()
+
 
 PROBE = """
 import json, sys

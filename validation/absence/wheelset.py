@@ -12,13 +12,47 @@ import numpy as np
 from models.engines.wheelset_exudyn import ExudynWheelset
 from models.engines.wheelset_mujoco import MujocoWheelset
 from models.rail import equations as eq
+from models.rail import wheel_forces as forces
 from models.rail.eigenvalues import free
 from models.rail.equations import Equations
+from models.rail.scene import WheelsetScene
 from models.rail.wheelset import CHOSEN, Wheelset
 from validation.rows import Row, System, behaves
 
 SYSTEM: System = "effects"
 SPEED, SHIFT = 60.0, 3e-3
+ENGINES = ("reference", "exudyn", "mujoco")
+FREE = {name: 0.0 for name in Wheelset.model_fields if name.startswith(("stiffness", "damping"))}
+BARE: dict[str, Any] = {
+    "title": "bare", "system": "wheelset", "contact": {"law": "linear"}, "speeds": {"values": [SPEED]},
+    "wheelset": {"override": {**FREE, "flange_stiffness": 0.0, "contact_damping": 0.0}},
+    "run": {"duration": 0.01, "step": 5e-4, "displacement": 1e-3, "speeds": [SPEED]},
+}  # fmt: skip
+"""A free wheelset on cones without flanges."""
+
+
+def seen(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], bytes]:
+    """Counts of a wheelset, in its numbers and in what an engine builds of it, and its path."""
+    from models.rail.of_scene import equations_of
+
+    own = equations_of(scene, engine, SPEED)
+    _, body, contact, *_, law = own.given
+    counts = {
+        "springs": int((body[eq.KX : eq.KZ + 1] > 0.0).sum()), "dampers": int((body[eq.DX : eq.DZ + 1] > 0.0).sum()),
+        "creep nets": int(law == forces.FASTSIM), "flanges": int(contact[forces.FLANGE] > 0.0),
+        "contact damping": int(contact[forces.DAMPING] > 0.0), "profiles": int(contact.size > forces.NUMBERS),
+        **_built(own, engine),
+    }  # fmt: skip
+    path = own.run(own.displaced(scene.run.displacement), scene.run.duration, scene.run.step)
+    return counts, path.states.tobytes()
+
+
+def _built(own: Equations, engine: str) -> dict[str, int]:
+    """Items of an engine's own."""
+    if engine == "reference":
+        return {}
+    exudyn, mujoco = springs(own.wheelset)
+    return {"spring-dampers": exudyn} if engine == "exudyn" else {"actuators": mujoco}
 
 
 def without_net(law: Any) -> str:

@@ -15,7 +15,7 @@ from models.scene_effects import module_of, names_of
 from models.simulate import outputs
 from models.systems import DEFAULT
 from models.time_series import write_time_series
-from validation.absence import braking, ride, wheelset
+from validation.absence import of_systems, ride, wheelset
 from validation.absence.hand_built import exudyn_run, mujoco_run
 from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, user_functions
 from validation.rows import Row, System, Table, at_most, behaves, finding
@@ -110,7 +110,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         ratios = {engine: _ratio(engine, place, 9 if quick else 40) for engine in ("exudyn", "mujoco")}
         price = [line for effect in EFFECTS for line in _price(effect, place, 7 if quick else 25)]
     rows += [row for engine, ratio in ratios.items() for row in _machinery(engine, ratio)]
-    rows += ride.rows() + wheelset.rows() + braking.rows()
+    rows += ride.rows() + wheelset.rows() + of_systems.rows(quick)
     return rows, {"price": price, "ratios": ratios}
 
 

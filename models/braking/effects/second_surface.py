@@ -6,7 +6,7 @@ PLACE = "road.stretches"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "the surface under each wheel is looked up at every step"
-COUNTS = {"all": {"surfaces": 1}}
+COUNTS = {"all": {"surfaces": 1, "tables": 1}}
 
 
 def named(scene: Any) -> bool:

@@ -6,7 +6,7 @@ PLACE = "tyres.inclination"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "nothing: the same forces at an angle, with spin"
-COUNTS = {"all": {"leaning wheels": 1}}
+COUNTS = {"all": {"leaning wheels": 4}}
 
 
 def named(scene: Any) -> bool:

@@ -7,7 +7,6 @@ NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "tables of contact places by lateral displacement, made once"
 COUNTS = {"all": {"profiles": 1}}
-MODULES = ("models.rail.contact_table",)
 
 
 def named(scene: Any) -> bool:

@@ -8,7 +8,7 @@ PLACE = "road.front_rear"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "a filter of the road per axle"
-COUNTS: dict[str, dict[str, int]] = {"all": {"states": 2}}
+COUNTS: dict[str, dict[str, int]] = {"all": {"delays": 1}}
 
 
 def found(held: Held) -> list[Effect]:

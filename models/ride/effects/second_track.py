@@ -8,7 +8,7 @@ PLACE = "road.left_right"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "a second filter of the road per axle"
-COUNTS: dict[str, dict[str, int]] = {"all": {"states": 2}}
+COUNTS: dict[str, dict[str, int]] = {"all": {"heights": 2}}
 
 
 def found(held: Held) -> list[Effect]:

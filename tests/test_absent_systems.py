@@ -1,0 +1,103 @@
+"""What a scene of any system does not name is not there, and what it names adds what its file says and no more."""
+
+import pytest
+
+from models.braking.scene import build
+from models.errors import InputError
+from models.scene_effects import absent, beside, listing, module_of, named, names_of, own_table, rebuilt, without
+from models.systems import SYSTEMS, load
+from studies.asked import SCENES, plan_of
+from validation.absence import of_systems
+from validation.absence.of_systems import FILES, added, bare, controlled, declared, file_of, seen
+
+CHEAP = [(system, name) for system in ("contact", "braking") for name in controlled(system)]
+ALL = [(system, name) for system in FILES for name in controlled(system)]
+
+
+@pytest.mark.parametrize(("system", "effect"), CHEAP)
+def test_an_effect_adds_what_its_file_says(system, effect):
+    found = added(system, effect, quick=True)
+    assert found and found == declared(system, effect, found)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("system", "effect"), ALL)
+def test_an_effect_adds_what_its_file_says_in_every_engine(system, effect):
+    found = added(system, effect)
+    assert found and found == declared(system, effect, found)
+
+
+@pytest.mark.full
+def test_no_file_of_an_effect_is_needed_where_it_is_not_named():
+    assert [(row.id, row.reason) for row in of_systems.rows(False) if row.status != "passed"] == []
+
+
+def test_a_bare_scene_names_nothing():
+    for system in ("contact", "braking", "handling"):
+        assert named(bare(system)) == () and absent(bare(system)) == names_of(system)
+
+
+def test_the_counts_see_an_effect_that_says_nothing_of_itself(monkeypatch):
+    """Positive control of the comparison: a file that declares too little is found out."""
+    from models.braking.effects import load_transfer
+
+    monkeypatch.setattr(load_transfer, "COUNTS", {})
+    found = added("braking", "load_transfer", quick=True)
+    assert found == {"reference": {"moving loads": 4}} != declared("braking", "load_transfer", found)
+
+
+@pytest.mark.parametrize("name", ["braking", "contact_profiles", "handling", "hub_forces", "recording", "wheelset"])
+def test_a_scene_is_the_same_from_its_own_table_and_can_do_without_what_it_names(name):
+    scene = load(SCENES / f"{name}.toml")
+    assert rebuilt(own_table(scene), scene) == scene
+    for effect in named(scene):
+        try:
+            assert effect not in named(without(scene, effect))
+        except InputError as error:  # what cannot be left out says why and what to do
+            assert error.file == scene.file and ":" in error.allowed
+
+
+def test_what_needs_another_leaves_before_it():
+    full = beside(bare("braking"), "pressure_dynamics", "valve_delay", "port", "teeth")
+    assert named(without(full, "pressure_dynamics", "valve_delay", "teeth", "port")) == ()
+
+
+def test_effects_that_cannot_be_together_are_told_with_the_remedy():
+    on_springs = {**file_of("braking").BARE, "vehicle": {"file": "r19_free", "spin_inertia": 1.7}, "load_transfer": {}}
+    with pytest.raises(InputError, match=r"load_transfer: cannot stand beside 'suspension', whose springs carry the "
+                       r"loads: drop one of them; 'suspension' is named by vehicle.file"):  # fmt: skip
+        build(on_springs, "s.toml")
+    with pytest.raises(InputError, match="falling_friction: needs the effect 'saturation': name it too"):
+        without(beside(bare("contact"), "saturation", "falling_friction"), "saturation")
+    with pytest.raises(InputError, match=r"effects.trailer: has another place in a scene: trailer"):
+        build({**file_of("braking").BARE, "effects": {"trailer": {}}}, "s.toml")
+
+
+def test_what_cannot_be_put_in_is_refused():
+    with pytest.raises(InputError, match="'delay' cannot be in this scene"):
+        beside(load(SCENES / "ride_nonlinear.toml"), "delay")
+    with pytest.raises(InputError, match="there are no usual values"):
+        beside(bare("braking"), "measured_pressures")
+
+
+@pytest.mark.parametrize("system", [name for name, own in SYSTEMS.items() if own.effects])
+def test_every_effect_of_every_system_can_be_listed_and_judged(system):
+    assert all(listing(system).values())
+    for name in names_of(system):
+        module = module_of(system, name)
+        assert {*module.NEEDS, *module.EXCLUDES} <= {*names_of(system)} - {name} and module.COST
+        assert {*module.COUNTS} <= {"all", *SYSTEMS[system].engines}
+        assert hasattr(module, "extend") != hasattr(module, "leave_out")
+
+
+def test_a_plan_lists_effects_and_what_is_absent():
+    scene = load(SCENES / "contact_ellipse.toml")
+    told = plan_of(scene).describe(scene)
+    assert "effect     saturation: " in told and "absent     any_shape, falling_friction, half_space (not" in told
+
+
+def test_a_path_is_the_same_whatever_ran_before():
+    scene = bare("contact")
+    before = seen("contact", scene)
+    seen("contact", beside(scene, "saturation", "falling_friction"))
+    assert seen("contact", scene) == before

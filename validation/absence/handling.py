@@ -1,0 +1,21 @@
+"""Handling: a bare manoeuvre, what its table of numbers holds, and its path in both engines."""
+
+from typing import Any
+
+from models.handling.scene import HandlingScene
+
+ENGINES = ("mujoco", "exudyn")
+ROLLING = "rolling"
+BARE: dict[str, Any] = {"title": "bare", "system": "handling",
+                        "manoeuvres": {ROLLING: {"speed": 15.0, "duration": 0.01}}}  # fmt: skip
+
+
+def seen(scene: HandlingScene, engine: str) -> tuple[dict[str, int], bytes]:
+    """Counts of a manoeuvre as both engines are handed it, and its path."""
+    from models.handling.in_engines import driven
+
+    own, said = scene.handling(ROLLING), scene.manoeuvres[ROLLING]
+    controls = (own.controls.steer, own.controls.brake, own.controls.drive)
+    counts = {"waves": len(own.waves), "controls": sum(any(value for _, value in knots) for knots in controls),
+              "leaning wheels": len(own.vehicle.tyres) * (own.tyres.inclination != 0.0)}
+    return counts, driven(engine, own, said.speed, said.duration, scene.run.step).run.positions.tobytes()

@@ -1,0 +1,151 @@
+"""Every system: a scene that names nothing is made of no effect, and each effect adds what its file says and no more.
+
+One fresh process runs a bare scene of each system while the files of its effects are not there and what only they
+import cannot be imported; then, with all of it there, the scene with one effect after the other, each a positive
+control; last the bare scene again, which must give the same path to the last bit.
+"""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from importlib import import_module
+from typing import Any
+from unittest import mock
+
+from models.errors import Refused
+from models.scene_effects import beside, module_of, names_of
+from models.systems import SYSTEMS
+from validation.rows import Row, System, at_most, behaves
+
+SYSTEM: System = "effects"
+FILES = {"braking": "braking", "contact": "contact", "wheelset": "wheelset", "handling": "handling", "ride": "ride"}
+"""System -> the file beside this one that has its bare scene and counts what a run of a scene is made of."""
+Counts = dict[str, dict[str, int]]
+"""By engine; "all" where every engine agrees."""
+
+
+def file_of(system: str) -> Any:
+    """BARE, ENGINES and seen(scene, engine) -> counts and path of a system."""
+    return import_module(f"validation.absence.{FILES[system]}")
+
+
+def bare(system: str) -> Any:
+    """The bare scene of a system."""
+    file = file_of(system)
+    return import_module(SYSTEMS[system].scene).build(file.BARE)
+
+
+def seen(system: str, scene: Any, quick: bool = False) -> dict[str, tuple[dict[str, int], bytes]]:
+    """Counts and path of a scene in each engine that does not refuse it, or in the first one."""
+    file = file_of(system)
+    found = {}
+    for engine in file.ENGINES[:1] if quick else file.ENGINES:
+        with suppress(Refused):
+            found[engine] = file.seen(scene, engine)
+    return found
+
+
+def controlled(system: str) -> tuple[str, ...]:
+    """Effects that can be put into a bare scene by their usual values."""
+    modules = {name: module_of(system, name) for name in names_of(system)}
+    return tuple(name for name, module in modules.items()
+                 if hasattr(module, "put_in") or "file" not in getattr(module, "EXAMPLE", ("file",)))  # fmt: skip
+
+
+def declared(system: str, effect: str, engines: Iterable[str]) -> Counts:
+    """What the effect's file says that it adds, engine by engine."""
+    counts = module_of(system, effect).COUNTS
+    return {engine: {**counts.get("all", {}), **counts.get(engine, {})} for engine in engines}
+
+
+def added(system: str, effect: str, quick: bool = False) -> Counts:
+    """What it does add to a bare scene, or to that with what it needs, in each engine that takes it."""
+    needs = module_of(system, effect).NEEDS
+    without = beside(bare(system), *needs)
+    before, after = (seen(system, one, quick) for one in (without, beside(without, effect)))
+    return {engine: _more(before[engine][0], counts) for engine, (counts, _) in after.items()}
+
+
+def _more(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:
+    return {key: n - before[key] for key, n in after.items() if n != before[key]}
+
+
+def probed(systems: tuple[str, ...] = tuple(FILES)) -> dict[str, Any]:
+    """To be run in a fresh process: what a bare scene imports, what effects import, whether the path stays."""
+    return {system: _probed(system) for system in systems}
+
+
+def _probed(system: str) -> dict[str, Any]:
+    modules = {name: getattr(module_of(system, name), "MODULES", ()) for name in names_of(system)}
+    own = sorted({module for some in modules.values() for module in some})
+    with _removed(system, own):
+        first = seen(system, bare(system))
+    imported = _loaded(own)
+    missing = []
+    for name in controlled(system):
+        seen(system, beside(bare(system), *module_of(system, name).NEEDS, name))
+        missing += [module for module in modules[name] if not _loaded([module])]
+    last = seen(system, bare(system))
+    return {"imported": imported, "missing": missing, "same": all(first[e][1] == last[e][1] for e in first)}
+
+
+@contextmanager
+def _removed(system: str, modules: list[str]) -> Iterator[None]:
+    """As if the files of a system's effects, and what only they import, had been removed."""
+    assert not _loaded(modules), "the process is not fresh"
+    blocked: dict[str, Any] = dict.fromkeys(modules)
+    sys.modules.update(blocked)
+    with mock.patch.object(import_module(SYSTEMS[system].effects), "__path__", []):
+        assert not names_of(system)
+        yield
+    for name in modules:
+        del sys.modules[name]
+
+
+def _loaded(modules: list[str]) -> list[str]:
+    there = [name for name, module in sys.modules.items() if module is not None]
+    return [name for name in modules if any(one == name or one.startswith(f"{name}.") for one in there)]
+
+
+@cache
+def found() -> dict[str, Any]:
+    """``probed`` from a process of its own."""
+    code = "import json; from validation.absence.of_systems import probed; print(json.dumps(probed()))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return dict(json.loads(done.stdout.splitlines()[-1]))
+
+
+def rows(quick: bool) -> list[Row]:
+    """Absence of every effect of every system, and a positive control of each; quick: controls in one engine alone."""
+    present = [row for system in FILES for row in _present(system, quick)]
+    return present if quick else present + [row for system, probe in found().items() for row in _absent(system, probe)]
+
+
+def _absent(system: str, seen_there: dict[str, Any]) -> list[Row]:
+    why = "in a fresh process in which none of them could have been imported, nor any effect's file read"
+    return [
+        at_most(f"absent.{system}.modules", SYSTEM, f"{system}: modules of effects that a bare scene imports, and "
+                "those that no effect imports", len(seen_there["imported"]) + len(seen_there["missing"]), "", 0, why,
+                "none"),
+        behaves(f"absent.{system}.bits", SYSTEM, f"{system}: path of a bare scene, once without the files of effects, "
+                "once after all of them ran", "the same" if seen_there["same"] else "not the same", "the same",
+                "to the last bit, in every implementation"),
+    ]  # fmt: skip
+
+
+def _present(system: str, quick: bool) -> list[Row]:
+    more = {name: added(system, name, quick) for name in controlled(system)}
+    return [behaves(f"absent.{system}.adds.{name}", SYSTEM, f"{system}: what {name} adds", _text(counts),
+                    _text(declared(system, name, counts)), "positive control: what its file says, and no more")
+            for name, counts in more.items()]  # fmt: skip
+
+
+def _text(counts: Counts) -> str:
+    """The counts by engine, once where all agree."""
+    said = {engine: ", ".join(f"{n:+d} {key}" for key, n in sorted(own.items())) for engine, own in counts.items()}
+    if len({*said.values()}) == 1:
+        return next(iter(said.values())) or "nothing"
+    return "; ".join(f"{engine} {text or 'nothing'}" for engine, text in said.items())
