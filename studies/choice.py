@@ -27,7 +27,7 @@ class Options(Strict):
 
 @dataclass(frozen=True)
 class Alone:
-    """One effect: changes (quantities,) over the first part of the run if it alone is left out, inf where it cannot
+    """One effect: predicted changes (quantities,) if it alone is left out, inf where it cannot
     be; seconds of that run, at the longest step that is then allowed, by those of the scene with longer steps alone."""
 
     effect: str

@@ -41,7 +41,7 @@ def _changes(axis: Any, one: Any) -> None:
     axis.axvline(100 * one.scene.tolerance, color="#222222", ls="--", lw=1, label="tolerance")
     axis.set(xscale="log", xlim=(LOWEST / 1.5, HIGHEST * 1.5), yticks=y,
              yticklabels=[effect.effect.replace("_", " ") for effect in shown],
-             xlabel="change over the screened part [%] (at the ends: beyond)")  # fmt: skip
+             xlabel="change [%] (at the ends: beyond)")  # fmt: skip
     for label, effect in zip(axis.get_yticklabels(), shown, strict=True):
         label.set_color(LEFT if effect.effect in one.choice.left_out else STAYS)
     before, _, after = one.choice.calls

@@ -1,11 +1,12 @@
 """Which effects a scene's quantities can do without, and how long its steps may be: screened, chosen, confirmed.
 
-Screened are runs over the first part of the scene: without single effects, and without pairs. Of all that the screen
-keeps within the tolerance, the next to go is the effect, or the pair where no single one will do, that saves most
-(logarithm of seconds at the longest step that is then allowed) for what it adds to the error. What is left is run over
-the whole scene, beside the scene as it is. Where it is not within the tolerance, steps become shorter; if that does not
-help, the step of the path that breaks it is found by halving and taken back for good, and the choice goes on without
-it. So what is reported was confirmed, always; the scene as it is holds with no error at all.
+Screened are cheap runs: with steps as much longer as costs a small share of the tolerance over the first part of the
+scene; without single effects, and without pairs. Of all that the screen keeps within the tolerance, the next to go is
+the effect, or the pair where no single one will do, that saves most (logarithm of seconds at the longest step that is
+then allowed) for what it adds to the error. What is left is run over the whole scene, beside the scene as it is. Where
+it is not within the tolerance, steps become shorter; if that does not help, the step of the path that breaks it is
+found by halving and taken back for good, and the choice goes on without it. So what is reported was confirmed, always;
+the scene as it is holds with no error at all.
 """
 
 import math
@@ -21,8 +22,12 @@ from models.choice.variants import Set, Variants
 
 BUDGET = 0.8
 """Share of the tolerance that predictions may use."""
+FINE = 0.05
+"""Share of the tolerance that the steps of screened runs may cost."""
+SHARPER = 4
+"""Steps so many times as short tell what the longest ones cost."""
 WINDOW = 0.25
-"""Share of a run that is screened."""
+"""Share of a run by which these steps are chosen."""
 WORTH = math.log(1.05)
 """Least that an effect must save to be worth leaving out: seconds are known no better."""
 LEAST = 1e-3
@@ -37,7 +42,7 @@ ROUNDS = 30
 class Choice:
     """Effects ``left_out`` of all ``candidates``, and steps so many ``times`` as long; relative changes (quantities,).
 
-    predicted : over the first part of the run, by the screen; remainder : what that leaves out, estimated; confirmed :
+    predicted : by the screen; remainder : what that leaves out, estimated; confirmed :
     over the whole run; kept : every confirmed change within the tolerance. calls and seconds (CPU) of the scene, of the
     scene with longer steps alone, and of what is left. rounds : runs of the whole scene that confirmed or did not.
     """
@@ -62,44 +67,56 @@ class Chooser:
                  window: float = WINDOW) -> None:  # fmt: skip
         self.tolerance = tolerance
         self.whole = Screen(Variants(scene, engine), quantities)
-        system = self.whole.variants.system
-        part = self.whole.variants
-        if system.WINDOWED:
-            part = part.window(math.ceil(window * system.steps(scene)))
-        self.screen = self.whole if part is self.whole.variants else Screen(part, quantities)
-        self.lengths = [k for k in self.whole.variants.lengths() if k in part.lengths()]
+        self.own, self.error = self._steps(window)
+        coarse = self.whole.variants.changed(frozenset(), self.own)
+        self.screen = self.whole if self.own == 1 else Screen(Variants(coarse, engine), quantities)
+        self.lengths = [self.own * k for k in self.screen.variants.lengths()]
         self.effects = self.whole.variants.effects
         self._reach: dict[Set, int] = {}
         self._confirmed: dict[Set, tuple[int, np.ndarray]] = {}
         self._pairs: list[Set] | None = None
         self.rounds = 0
 
+    def _steps(self, window: float) -> tuple[int, np.ndarray]:
+        """Longest steps for the screen, by the scene's own, and the relative changes (quantities,) by them."""
+        whole = self.whole.variants
+        steps = math.ceil(window * whole.system.steps(whole.scene))
+        part = whole.window(steps) if whole.system.WINDOWED else whole
+        screen = self.whole if part is whole else Screen(part, self.whole.quantities)
+        lengths = [k for k in whole.lengths() if k in part.lengths()]
+        return self._longest(screen, frozenset(), lengths, FINE * self.tolerance)
+
+    def _longest(self, screen: Screen, chosen: Set, lengths: list[int], allowed: float) -> tuple[int, np.ndarray]:
+        """Longest of ``lengths`` whose changes are allowed, and these (quantities,); by halving, the first always."""
+        low, high, found = 0, len(lengths), np.zeros(len(screen.quantities))
+        while high - low > 1:
+            middle = (low + high) // 2
+            tried = screen.of_step(chosen, lengths[middle] // lengths[0])
+            low, high, found = (middle, high, tried) if (tried <= allowed).all() else (low, middle, found)
+        return lengths[low], found
+
     def share(self, chosen: Set) -> float:
         """Largest predicted change, with what may be left out of it, by the tolerance."""
-        return float(np.max(self.screen.predicted(chosen) + self.screen.remainder(chosen))) / self.tolerance
+        error = self.error + self.screen.predicted(chosen) + self.screen.remainder(chosen)
+        return float(np.max(error)) / self.tolerance
 
     def reach(self, chosen: Set) -> int:
         """Longest step, by the scene's own, that the predictions allow without these effects."""
         if chosen not in self._reach:
-            left = BUDGET * self.tolerance * (1.0 - min(1.0, self.share(chosen) / BUDGET))
-            low, high = 0, len(self.lengths)  # lengths[low] holds, lengths[high] does not
-            while high - low > 1:
-                middle = (low + high) // 2
-                holds = float(np.max(self.screen.of_step(chosen, self.lengths[middle]))) <= left
-                low, high = (middle, high) if holds else (low, middle)
-            self._reach[chosen] = self.lengths[low]
+            left = max(0.0, BUDGET - self.share(chosen)) * self.tolerance
+            self._reach[chosen], _ = self._longest(self.screen, chosen, self.lengths, left)
         return self._reach[chosen]
 
     def work(self, chosen: Set) -> float:
-        """CPU seconds of the first part of the run without these effects, at the longest step; infinite if it fails."""
-        run = self.screen.variants.of(chosen, self.reach(chosen))
+        """CPU seconds of a run without these effects, at the longest step; infinite if it fails."""
+        run = self.screen.variants.of(chosen, self.reach(chosen) // self.own)
         return math.inf if run is None else run.counts["calls"] * self.screen.variants.per_call(chosen)
 
     def confirm(self, chosen: Set) -> np.ndarray:
         """Relative changes (quantities,) over the whole run, at the longest step that holds or nearly so."""
         if chosen not in self._confirmed:
             longest = self.reach(chosen)
-            for times in [k for k in reversed(self.lengths) if k <= longest][: 1 + SHORTER]:
+            for times in [k for k in reversed(self.whole.variants.lengths()) if k <= longest][: 1 + SHORTER]:
                 self.rounds += 1
                 found = self.whole.shares(self.whole.between(self.whole.variants.of(chosen, times),
                                                              self.whole.variants.of()))  # fmt: skip
@@ -147,12 +164,15 @@ class Chooser:
                       self.rounds, spent)  # fmt: skip
 
     def told(self, chosen: Set, times: int) -> np.ndarray:
-        """Predicted changes (quantities,) of a set and a step together."""
-        screen = self.screen
-        step = screen.between(screen.variants.of(chosen, times), screen.variants.of(chosen))
-        change = screen.change(chosen)
-        if step is None or change is None:
-            return screen.shares(None)
+        """Predicted changes (quantities,) of a set and a step together: that of the step by a shorter one."""
+        screen, runs = self.screen, self.whole.variants
+        change = screen.change(chosen) if chosen else None
+        if times == 1:
+            return screen.predicted(chosen)
+        shorter = [k for k in reversed(runs.lengths()) if SHARPER * k <= times or k == 1]
+        step = screen.between(runs.of(chosen, times), next(filter(None, (runs.of(chosen, k) for k in shorter)), None))
+        if change is None or step is None or times % self.own:
+            return screen.predicted(chosen) + screen.shares(step)
         return screen.shares({name: added(change[name], step[name]) for name in screen.quantities})
 
     def further(self, chosen: Set) -> dict[str, float]:
