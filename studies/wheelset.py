@@ -194,7 +194,7 @@ def _motions(scene: WheelsetScene, paths: dict[str, dict[float, Motion]]) -> lis
 def _climbs(wheelset: Wheelset, motion: Motion) -> list[str]:
     """A line for a path on which a cone's flange is pushed harder than it would bear without climbing."""
     share, limit = flange_share(motion.contacts), nadal(wheelset.friction)
-    if wheelset.profiles is not None or share <= limit:
+    if wheelset.profiles is not None or share <= max(limit, 0.0):
         return []
     return [f"      DOUBT: a flange is pushed with {share:.2g} times its wheel's load; beyond {limit:.2g} (Nadal, 70 "
             "degrees) it may climb, which cones cannot show: use [profiles]"]  # fmt: skip

@@ -50,5 +50,5 @@ class EngineWheelset(Equations, ABC):
         for one, contact in zip(kept, contacts, strict=True):
             rates(one, *self.given, out, contact)
         found = Path(np.arange(len(kept)) * step * every, kept, contacts)
-        self._check_loads(found, step, self.ENGINE)
+        self._check(found, step, every, self.ENGINE)
         return found

@@ -10,8 +10,10 @@ from models.errors import RunFailed
 from models.handling import forces as at
 from models.handling.numbers import GRAVITY, Handling
 from models.handling.tyre import SLOW
+from models.resolved import check_resolved
 from models.vehicles.free_vehicle import SWAY, chassis_of
 from models.vehicles.spatial import FREEDOMS
+from models.vehicles.spatial_linear import mass
 
 LIMIT = 2.78
 """Step times rate up to which the classical Runge-Kutta method damps what is damped."""
@@ -70,7 +72,7 @@ def driven(engine: str, handling: Handling, speed: float, duration: float, step:
 
 
 def read(handling: Handling, run: SpatialRun, engine: str = "") -> Drive:
-    """Reports of a run; RunFailed where a tyre's force is not finite, or stiffer than the step can follow."""
+    """Reports of a run; RunFailed where a tyre's force is not finite, or the step cannot follow."""
     count, tyres = len(run.times), len(handling.vehicle.tyres)
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
     at.reports(handling.numbers, run.times, np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates),
@@ -79,6 +81,7 @@ def read(handling: Handling, run: SpatialRun, engine: str = "") -> Drive:
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
     _check_upright(handling, run.times, run.positions, engine)
     _check_step(handling, run, report, engine)
+    check_resolved(engine, run.times, run.positions, run.rates, mass(handling.vehicle))
     return Drive(handling, run, report, ledger)
 
 

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from models.errors import InputError
 from models.handling.numbers import Control, Controls, Handling, Tyres
-from models.handling.road import plane_waves
+from models.handling.road import SHORTEST, plane_waves
 from models.road.iso8608 import level_of_class
 from models.scene_file import SceneFile, checked
 from models.steps import MOST_STEPS, divides, fitting
@@ -106,6 +106,8 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
         _check_times(scene, place, own)
         for control in ("steer", "brake", "drive"):
             _check_knots(file, f"{place}.{control}", getattr(own, control), 1.2 if control == "steer" else None)
+            _check_pace(file, f"{place}.{control}", getattr(own, control), scene.run.step)
+        _check_way(scene, place, own)
     return scene
 
 
@@ -128,3 +130,21 @@ def _check_knots(file: str, place: str, knots: list[Pair], most: float | None) -
     if not ((values >= low) & (values <= high)).all():
         unit = "rad" if most is not None else "N m"
         raise InputError(file, place, values.tolist(), f"values must be from {low:g} to {high:g} {unit}")
+
+
+def _check_pace(file: str, place: str, knots: list[Pair], step: float) -> None:
+    """Refuse a control that goes to another value in less than a step."""
+    times, values = np.array(knots, float).T
+    shortest = float(np.diff(times)[np.diff(values) != 0.0].min(initial=np.inf))
+    if shortest < step * (1.0 - 1e-9):
+        allowed = f"changes within {shortest:.3g} s, which steps of {step:g} s do not see: run.step must not be longer"
+        raise InputError(file, place, None, allowed)
+
+
+def _check_way(scene: HandlingScene, place: str, own: Manoeuvre) -> None:
+    """Refuse steps within which a rough road has whole waves."""
+    way, fastest = own.speed * scene.run.step, SHORTEST / scene.run.step
+    if own.rough and way > SHORTEST:
+        allowed = f"goes {way:.3g} m in a step, over whole waves of the road, the shortest of {SHORTEST:g} m: at " \
+                  f"most {fastest:.4g} m/s, or a smaller run.step"
+        raise InputError(scene.file, f"{place}.speed", own.speed, allowed)

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.engines.hub_forces import HubModel, HubRun, build
+from models.engines.protocol import WAVE
+from models.errors import InputError
 from models.hub_forces.cut_vehicle import PITCH, ROLL, CutVehicle
 from models.hub_forces.table import Drive
 from models.noise import FORCES, PITCH_SENSOR, normal
@@ -49,7 +51,15 @@ class Angles:
 
 
 def two_tracks(vehicle: CutVehicle, left: Profile, right: Profile, speed: float, step: float, steps: int) -> Drive:
-    """The road under the wheels at half steps: the front axle at s = v t, those behind it their distance later."""
+    """The road under the wheels at half steps: the front axle at s = v t, those behind it their distance later.
+
+    Raises InputError for a speed at which a step passes whole waves of the road.
+    """
+    shortest = WAVE * min(left.finest, right.finest)
+    if speed * step > shortest * (1 + 1e-9):
+        allowed = f"goes {speed * step:.3g} m in a step of {step:g} s, over whole waves of the road, the shortest of " \
+                  f"{shortest:.3g} m: at most {shortest / step:.4g} m/s, or a smaller step"
+        raise InputError("", "road.speed", speed, allowed)
     times, front = 0.5 * step * np.arange(2 * steps + 1), max(vehicle.whole.axles)
     heights, rates = [], []
     for tyre in vehicle.whole.tyres:

@@ -29,6 +29,7 @@ from models.contact.inputs import number, quantity
 from models.errors import InputError, RunFailed
 from models.rail.wheel_forces import LAWS, LOAD, REPORTED, carried, net, numbers, patches, wheel_forces
 from models.rail.wheelset import GRAVITY, Wheelset
+from models.resolved import check_resolved
 from models.steps import divides
 
 STATES = 10
@@ -209,7 +210,7 @@ class Equations:
 
         Raises InputError for a state that is no wheelset's, a step too large for the fastest motion, or a duration that
         is no whole number of steps; RunFailed if the wheelset leaves the track, or if the step was too large for the
-        contacts' largest loads among the states that are kept.
+        contacts' largest loads among the states that are kept or, where all are, for the motion.
         """
         count = self._steps(state, duration, step, every)
         kept = count // every + 1
@@ -219,8 +220,16 @@ class Equations:
         if done < count:
             raise RunFailed("wheelset", "leaves the track", done * step)
         found = Path(np.arange(kept) * step * every, path, contacts)
-        self._check_loads(found, step, "wheelset")
+        self._check(found, step, every, "wheelset")
         return found
+
+    def _check(self, path: Path, step: float, every: int, engine: str) -> None:
+        """Raise RunFailed if the step was too large for the loads or, where every one is kept, for the motion."""
+        self._check_loads(path, step, engine)
+        if every == 1:
+            w, own = self.wheelset, path.states
+            inert = np.array([w.mass, w.mass, w.yaw_inertia, w.yaw_inertia])
+            check_resolved(engine, path.times, own[:, :ANGLE], own[:, Y_RATE:SPIN], inert)
 
     def _check_loads(self, path: Path, step: float, engine: str) -> None:
         """Raise RunFailed if the step was too large for a patch that carried more than at rest: all is wrong then."""

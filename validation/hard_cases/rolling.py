@@ -146,7 +146,7 @@ def frictions(implementation: str, folder: Path) -> float:
     found = []
     for mu in (0.0, 1e-6, 1e-3, 1.0):
         wheelset = built(implementation, CHOSEN.changed(friction=mu), 60.0)
-        found.append(beyond_friction(wheelset.run(off(wheelset, Y=3e-3, YAW=3e-3), 0.05, STEP), mu))
+        found.append(beyond_friction(wheelset.run(off(wheelset, Y=3e-3, YAW=3e-3), 0.05, STEP / 4.0), mu))
     return max(found)
 
 

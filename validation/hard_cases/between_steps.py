@@ -1,0 +1,157 @@
+"""What goes on between the steps of a run, or between the samples of a signal: springs, stops and drivers that are too
+fast for them, waves that are too short, filters that are too slow.
+
+Each was answered once by finite numbers that were wrong by a hundredth to all of themselves.
+"""
+
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.errors import InputError
+from models.handling.in_engines import driven
+from models.handling.scene import HandlingScene, build
+from models.hub_forces.cut_vehicle import cut
+from models.hub_forces.measurement import two_tracks
+from models.measured.counting import level_crossings
+from models.noise import normal
+from models.prescribed import smoothed
+from models.rail.wheelset import CHOSEN
+from models.road.iso8608 import iso8608_road
+from models.sensors.rotations import integrate
+from models.signals import sampled
+from models.vehicles.vehicle_file import load_vehicle
+from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from validation.hard_cases.rolling import STEP, built
+
+HANDLED: dict[str, Word] = {"reference": "refused"}
+"""Handling has two implementations."""
+
+
+def wheelset(speed: float = 60.0, yaw: float = 0.0, **changed: float) -> Callable[[str, Path], float]:
+    """A case of a wheelset that is let go 5 mm beside the middle, for a fifth of a second in the usual steps."""
+
+    def error(implementation: str, folder: Path) -> float:
+        own = built(implementation, CHOSEN.changed(**changed), speed)
+        start = own.displaced(5e-3)
+        start[3] = yaw
+        ends = [own.run(start, 0.2, step).states[-1] for step in (STEP, STEP / 4.0)]
+        return float(np.abs(ends[1] - ends[0])[[0, 3]].max())
+
+    return error
+
+
+def car(**manoeuvre: Any) -> HandlingScene:
+    """A car of 19 freedoms in a manoeuvre of a fifth of a second, in steps of a millisecond."""
+    own = {"speed": 20.0, "duration": 0.2} | manoeuvre
+    return build({"title": "hard", "system": "handling", "manoeuvres": {"hard": own}})
+
+
+def handled(**manoeuvre: Any) -> Callable[[str, Path], float]:
+    """A case of a car: difference of its places (m, rad) from those by a quarter of the step."""
+
+    def error(implementation: str, folder: Path) -> float:
+        scene = car(**manoeuvre)
+        if implementation == "reference":
+            raise InputError("", "engine", implementation, "handling is marched by engines")
+        own, of = scene.manoeuvres["hard"], scene.handling("hard")
+        ends = [driven(implementation, of, own.speed, own.duration, step).run.positions[-1]
+                for step in (scene.run.step, scene.run.step / 4.0)]
+        return float(np.abs(ends[1] - ends[0]).max())
+
+    return error
+
+
+def asked(answer: Callable[[], Any]) -> Callable[[str, Path], float]:
+    """A case that is to be refused; an answer is wrong."""
+
+    def error(implementation: str, folder: Path) -> float:
+        answer()
+        return np.inf
+
+    return error
+
+
+def short_waves() -> Any:
+    """Rows of a road of which every step passes two waves."""
+    road = iso8608_road("C", 1)
+    return two_tracks(cut(load_vehicle("r19_free"), "body"), road, road, 500.0, 2e-3, 10)
+
+
+def crossings(implementation: str, folder: Path) -> float:
+    """Counts of levels in any order against those counted one by one."""
+    load, levels = np.array([0.0, 3.0, 1.0, 5.0, 0.0, 2.0, 1.0, 4.0]), np.array([2.5, 0.5, 3.5, 1.5])
+    rises = [sum(a < level <= b for a, b in pairwise(load)) for level in levels]
+    return float(np.abs(level_crossings(load, levels) - rises).max())
+
+
+def far_seeds(implementation: str, folder: Path) -> float:
+    """How many of the seeds around 2^63 and at the end have a stream that another one has, too."""
+    seeds = (2**63 - 1, 2**63, 2**63 + 1, 2**64 - 2, 2**64 - 1)
+    return float(len(seeds) - len({float(normal(seed, 0, 1, 1)[0, 0]) for seed in seeds}))
+
+
+def line_through_a_low_pass(implementation: str, folder: Path) -> float:
+    """A straight line of 2 s through the slowest low-pass that it may have: change by its rise."""
+    line = np.linspace(0.0, 1.0, 2001)[:, None]
+    return float(np.abs(smoothed(line, 1e-3, 0.5, "", "bandwidth") - line).max())
+
+
+def slow_naive(folder: Path) -> str:
+    """The filter by itself with a fiftieth of a period in the record."""
+    from scipy.signal import butter, sosfiltfilt
+
+    line = np.linspace(0.0, 1.0, 2001)
+    found = sosfiltfilt(butter(4, 0.01 / 500.0, output="sos"), line, padlen=2000)
+    return f"a line from 0 to 1 comes out with an error of {np.abs(found - line).max():.2g}"
+
+
+LINE = np.arange(5.0)[:, None]
+SPUN = np.tile([0.0, 0.0, 400.0], (50, 1)) + np.sin(np.arange(50.0))[:, None]
+NOBODY = np.array([1.0, 0.0, 0.0, 0.0])
+REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
+RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
+CASES = (
+    *(Case(name, hard, "fails, and says when", "", 0.0, "exact", wheelset(**own), RAISED) for name, hard, own in (
+        ("suspension of 1e9 N/m on rails", "ten steps for a swing, which dies of them", {"stiffness_y": 1e9}),
+        ("suspension of 1e9 N/m, yawed", "ten steps for a swing, which dies of them",
+         {"yaw": 0.01, "stiffness_x": 1e9}),
+        ("flange of 1e12 N/m", "hit and left within a step", {"speed": 90.0, "flange_stiffness": 1e12}),
+    )),
+    Case("flange of 1e8 N/m", "hit within few steps", "a quarter of the step", "m, rad", 1e-6, "error of the step",
+         wheelset(speed=90.0, flange_stiffness=1e8)),
+    Case("brake of 100 kN m", "its friction turns round within every step", "fails, and says when", "", 0.0, "exact",
+         handled(brake=[[0.0, 0.0], [0.05, 1e5]]), HANDLED | dict.fromkeys(("exudyn", "mujoco"), "raised")),
+    Case("driver who steers within 1 ms", "to and fro from step to step", "fails, and says when", "", 0.0, "exact",
+         handled(steer=[[0.001 * i, 0.02 * (i % 2)] for i in range(1, 200)]),
+         HANDLED | dict.fromkeys(("exudyn", "mujoco"), "raised")),
+    Case("road at 300 m/s", "a wave in two steps", "a quarter of the step", "m, rad", 1e-4, "error of the step",
+         handled(speed=300.0, rough=True), HANDLED),
+    Case("levels in any order", "crossings are counted between sorted ones", "one by one", "", 0.0, "exact", crossings,
+         once=True),
+    Case("seeds beyond 2^63", "whole numbers become doubles", "a stream for each", "", 0.0, "exact", far_seeds,
+         once=True),
+    Case("low-pass of one period", "most of what it reads lies beyond the ends", "keeps a straight line", "of its rise",
+         0.02, "0.7 % found", line_through_a_low_pass, naive=slow_naive, once=True),
+    *(Case(name, hard, "refused", "", 0.0, "exact", asked(answer), REFUSED, once=True) for name, hard, answer in (
+        ("driver who steers within 0.5 ms", "steps of 1 ms see no change, or a constant one",
+         lambda: car(steer=[[0.0005 * i, 0.02 * (i % 2)] for i in range(1, 200)])),
+        ("rough road at 1000 m/s", "a step passes two waves", lambda: car(speed=1000.0, rough=True)),
+        ("hub forces of a road at 500 m/s", "a step passes two waves", short_waves),
+        ("low-pass slower than its record", "what is beyond the ends is all that is left",
+         lambda: smoothed(np.linspace(0.0, 1.0, 2001)[:, None], 1e-3, 0.01, "", "bandwidth")),
+        ("body that turns 4 rad from sample to sample", "nobody can tell the way it went",
+         lambda: integrate(SPUN, 1e-2, NOBODY)),
+        ("body that turns from an orientation of length 2", "its matrix would be four times a rotation",
+         lambda: integrate(0.1 * SPUN, 1e-2, 2.0 * NOBODY)),
+        ("seed of -1", "the stream of 2^64 - 1 would answer", lambda: normal(-1, 0, 1, 1)),
+        ("seed of 1.7", "the stream of 1 would answer", lambda: normal(1.7, 0, 1, 1)),  # type: ignore[arg-type]
+        ("level that is no number", "all counts behind it would shift",
+         lambda: level_crossings(LINE[:, 0], np.array([0.5, np.nan, 2.5]))),
+        ("samples with a period of -0.1 s", "time would run backwards", lambda: sampled(LINE, -0.1, "linear")),
+        ("three samples, smooth", "a cubic needs four", lambda: sampled(LINE[:3], 0.1, "smooth")),
+    )),
+)  # fmt: skip
