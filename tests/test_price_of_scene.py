@@ -22,7 +22,7 @@ STEPS = tuple(0.1 / 2**k for k in range(12))
 class Planted:
     """y = t^2 sin 5t with an error of scale h^order, and one method that lies."""
 
-    title, quantity, unit, cell, note = "planted", "y", "N", 0.0, ""
+    title, quantity, unit, cell, note, counted = "planted", "y", "N", 0.0, "", "force calls"
     whole: float = 2.0
     first: float = 1.0
     growing: float = 0.0
@@ -35,7 +35,7 @@ class Planted:
     def reference(self):
         return Ladder("reference", "exact", tuple(5e-3 / 2**k for k in range(6)), 4)
 
-    def second(self):
+    def second(self, last):
         return Setting("reference", "other", 1e-9, 0, adaptive=True)
 
     def solve(self, setting, duration):

@@ -18,8 +18,9 @@ from validation.price.problems import Setting
 class Ladder:
     """Settings of one engine's method, from coarse to fine.
 
-    values : steps in s, or relative tolerances where ``adaptive``; order : declared, 0 if it varies; default : what the
-    engine itself would take (a step in s), 0 where the method is not its default
+    values : steps in s, relative tolerances where ``adaptive``, or shares of a contact where ``cells``; order :
+    declared, 0 if it varies; default : what the engine itself, or the scene, would take, 0 where the method is not its
+    default; sure : a reference is known where a finer rung changes it by less than this part of the tolerance
     """
 
     engine: str
@@ -28,11 +29,25 @@ class Ladder:
     order: int
     adaptive: bool = False
     default: float = 0.0
+    cells: bool = False
+    sure: float = 20.0
 
     def setting(self, i: int) -> Setting:
         """The setting on a rung."""
-        owner = self.engine if self.default else ""
-        return Setting(self.engine, self.method, self.values[i], self.order, self.adaptive, default=owner)
+        owner, kind = self.engine if self.default else "", InCells if self.cells else Setting
+        return kind(self.engine, self.method, self.values[i], self.order, self.adaptive, default=owner)
+
+    def work(self, before: float, now: float) -> float:
+        """How many times the work of one value another one takes: cells lie along and across."""
+        return 1.0 if self.adaptive else (before / now) ** (2 if self.cells else 1)
+
+
+class InCells(Setting):
+    """One whose value is the share of a contact's length that a cell has."""
+
+    def label(self) -> str:
+        """How many cells lie along the contact."""
+        return f"{round(1.0 / self.value)} cells"
 
 
 @dataclass(frozen=True)
@@ -82,6 +97,11 @@ class OwnScene(Protocol):
         """What is left out, "" if nothing is."""
         ...
 
+    @property
+    def counted(self) -> str:
+        """Name among the counts of what work is counted in."""
+        ...
+
     def ladders(self) -> list[Ladder]:
         """Every method of every engine that was asked for."""
         ...
@@ -90,8 +110,8 @@ class OwnScene(Protocol):
         """Settings that are refined until the truth is known; each step is half the one before."""
         ...
 
-    def second(self) -> Setting | None:
-        """A setting of another family that must agree with the truth; None where there is none."""
+    def second(self, last: Setting) -> Setting | None:
+        """A setting of another family that must agree with the reference's last one; None where there is none."""
         ...
 
     def solve(self, setting: Setting, duration: float) -> Any:

@@ -75,6 +75,11 @@ class OwnPitchPlane:
         """What is left out."""
         return "adaptive methods are left out: they restart at every sample" if self.sampled else ""
 
+    @property
+    def counted(self) -> str:
+        """Every method's work is its force calls."""
+        return "force calls"
+
     def ladders(self) -> list[Ladder]:
         """Every method of the catalogue; generalised-alpha with Exudyn's own spectral radius and the recommended."""
         found = []
@@ -95,7 +100,7 @@ class OwnPitchPlane:
         most = max(1, math.ceil(self.base / 4e-3 * (1 - 1e-9)))
         return Ladder("reference", "RK4", tuple(self.base / most / 2**k for k in range(16)), 4)
 
-    def second(self) -> Setting | None:
+    def second(self, last: Setting) -> Setting | None:
         """LSODA, unless it would restart at every sample."""
         return None if self.sampled else Setting("reference", "LSODA", TIGHT, 0, adaptive=True)
 

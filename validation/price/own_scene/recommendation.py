@@ -13,12 +13,17 @@ from validation.price.own_scene.search import Search, Tried
 from validation.price.own_scene.truth import Truth, truth
 from validation.timing import interleave, paired_ratio
 
-SYSTEMS = {"pitch-plane": "validation.price.own_scene.pitch_plane"}
+SYSTEMS = {system: f"validation.price.own_scene.{module}" for system, module in (
+    ("pitch-plane", "pitch_plane"), ("wheelset", "wheelset"), ("handling", "handling"), ("braking", "braking"))}
 """Systems whose scenes have a price, and the modules that know them."""
 NEAR = 2.5
 """Settings that took up to so many times the least seconds in one run are timed beside one another."""
+FAR = 8.0
+"""The same for a default: it must never be given up because one run of it was disturbed."""
 ROUNDS, LEAST = 9, 0.005
 """Interleaved rounds of timing; a short run is repeated until its turn lasts this long (s)."""
+FEWEST, PATIENCE = 3, 10.0
+"""Of slow runs there are fewer rounds, for they take no longer together than this (s), yet at least so many."""
 SLOWER = 1.05
 """A ratio of seconds whose 95 % interval lies above this is slower beyond doubt."""
 ATTEMPTS = 6
@@ -80,7 +85,7 @@ def recommend(scene: OwnScene, tolerance: float) -> Recommendation:
     winners = {(engine, kind): best for engine in ("", *dict.fromkeys(one.engine for one in scene.ladders()))
                for kind in ("seconds", "calls") if (best := _cheapest(timed, engine, kind)) is not None}  # fmt: skip
     if scene.whole > scene.first * (1 + 1e-9) and winners:
-        known, winners = _confirmed(search, timed, winners)
+        known, timed, winners = _confirmed(search, timed, winners)
     defaults = {ladder.engine: found for ladder in scene.ladders()
                 if ladder.default and (found := _default(search, ladder, timed)) is not None}  # fmt: skip
     return Recommendation(scene, tolerance, searched, known, winners, defaults, tuple(search.tried))
@@ -98,13 +103,15 @@ def _timed(search: Search) -> list[Choice]:
         return []
     least = {one.setting.engine: min(o.seconds for o in found if o.setting.engine == one.setting.engine)
              for one in found}  # fmt: skip
-    near = [one for one in found if one.seconds <= NEAR * least[one.setting.engine]]
+    near = [one for one in found
+            if one.seconds <= (FAR if one.setting.default else NEAR) * least[one.setting.engine]]
     jobs = [partial(search.scene.solve, one.setting, search.duration) for one in near]
-    taken = dict(zip((one.setting for one in near), interleave(jobs, ROUNDS, LEAST), strict=True))
+    rounds = max(FEWEST, min(ROUNDS, int(PATIENCE / max(sum(one.seconds for one in near), 1e-9))))
+    taken = dict(zip((one.setting for one in near), interleave(jobs, rounds, LEAST), strict=True))
     longer = search.scene.whole / search.duration
-    rounds = {one.setting: tuple(longer * taken.get(one.setting, np.array([one.seconds]))) for one in found}
-    return [Choice(one, one.error, longer * one.calls, float(np.median(rounds[one.setting])), False,
-                   rounds[one.setting]) for one in found]  # fmt: skip
+    seconds = {one.setting: tuple(longer * taken.get(one.setting, np.array([one.seconds]))) for one in found}
+    return [Choice(one, one.error, longer * one.calls, float(np.median(seconds[one.setting])), False,
+                   seconds[one.setting]) for one in found]  # fmt: skip
 
 
 def _cheapest(timed: list[Choice], engine: str, kind: str) -> Choice | None:
@@ -125,17 +132,19 @@ def _slower(one: Choice, best: Choice) -> bool:
 
 
 def _confirmed(search: Search, timed: list[Choice],
-               winners: dict[tuple[str, str], Choice]) -> tuple[Truth, dict[tuple[str, str], Choice]]:  # fmt: skip
-    """The winners run over the whole scene, and refined until they meet the tolerance there."""
+               winners: dict[tuple[str, str], Choice]) -> (
+                   tuple[Truth, list[Choice], dict[tuple[str, str], Choice]]):  # fmt: skip
+    """The winners and the defaults run over the whole scene, and refined until they meet the tolerance there."""
     scene = search.scene
     known = truth(scene, search.tolerance, scene.whole, max(0, search.truth.rung - 1), twice=False)
     over = Search(scene, known, search.tolerance, scene.whole)
     ladders = {f"{one.engine} {one.method}": one for one in scene.ladders()}
-    found = {one.tried.setting: _over_all(over, ladders[one.tried.setting.curve], one) for one in winners.values()}
+    able = [*winners.values(), *(one for one in timed if one.tried.setting.default)]
+    found = {one.tried.setting: _over_all(over, ladders[one.tried.setting.curve], one) for one in able}
     search.tried += [one for one in over.tried if one.status != "ok"]
     held = [one for one in found.values() if one is not None]
     again = {key: _cheapest(held, *key) for key in winners}
-    return known, {key: one for key, one in again.items() if one is not None}
+    return known, held, {key: one for key, one in again.items() if one is not None}
 
 
 def _over_all(over: Search, ladder: Ladder, one: Choice) -> Choice | None:
@@ -143,8 +152,8 @@ def _over_all(over: Search, ladder: Ladder, one: Choice) -> Choice | None:
     i, first = ladder.values.index(one.tried.setting.value), one.tried
     for _ in range(ATTEMPTS):
         now = over.attempt(ladder.setting(i))
-        if now.error <= over.tolerance:
-            ratio = 1.0 if ladder.adaptive else first.setting.value / now.setting.value
+        if now.error <= over.held:
+            ratio = ladder.work(first.setting.value, now.setting.value)
             return Choice(now, now.error, now.calls, ratio * one.seconds, True, tuple(ratio * s for s in one.rounds))
         finer = (now.error / over.tolerance) ** (1 / (ladder.order or 1)) if np.isfinite(now.error) else 2.0
         wanted = ladder.values[i] / finer
@@ -168,9 +177,9 @@ def _default(search: Search, ladder: Ladder, timed: list[Choice]) -> Default | N
     if not clear:
         return Default(as_it_is, None, False)
     finest = min(clear, key=lambda one: one.setting.value)
-    finer = (finest.error / search.tolerance) ** (1 / ladder.order)
-    longer = finer * search.scene.whole / search.duration
+    finer = (finest.error / search.tolerance) ** (1 / (ladder.order or 1))
     setting = replace(finest.setting, value=finest.setting.value / finer)
-    guess = Tried(setting, "ok", "", search.tolerance, {}, 0.0)
+    longer = ladder.work(finest.setting.value, setting.value) * search.scene.whole / search.duration
+    guess = Tried(setting, "ok", "", search.tolerance)
     refined = Choice(guess, search.tolerance, longer * finest.calls, longer * finest.seconds, False)
     return Default(as_it_is, refined, True)

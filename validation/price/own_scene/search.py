@@ -13,6 +13,8 @@ from validation.price.runner import Status
 
 START = 2e-3
 """s: the step that is tried first; an engine's default method begins with its default step."""
+COARSE = 1 / 11
+"""Of a contact: the cells that are tried first."""
 LOOSE = 1e-3
 """The tolerance that an adaptive method is tried with first."""
 WORTH = 3.0
@@ -25,19 +27,14 @@ BEYOND = 10.0
 
 @dataclass(frozen=True)
 class Tried:
-    """One setting and what became of it: error in the quantity's unit, counts, seconds of one run."""
+    """One setting and what became of it: error in the quantity's unit, calls (or cells) and seconds of one run."""
 
     setting: Setting
     status: Status
     reason: str = ""
     error: float = float("inf")
-    counts: dict[str, int] = field(default_factory=dict)
+    calls: int = 0
     seconds: float = 0.0
-
-    @property
-    def calls(self) -> int:
-        """Force calls of the run."""
-        return self.counts.get("force calls", 0)
 
 
 @dataclass
@@ -49,6 +46,11 @@ class Search:
     tolerance: float
     duration: float
     tried: list[Tried] = field(default_factory=list)
+
+    @property
+    def held(self) -> float:
+        """Error that a setting may show beside a truth which is uncertain itself."""
+        return self.tolerance - self.truth.uncertainty
 
     def everything(self) -> "Search":
         """Every ladder, those of high order first: what they cost tells when others are given up."""
@@ -72,7 +74,8 @@ class Search:
             error_of = self.truth.error(answer)
             lies = not error_of <= BEYOND * max(self.truth.size, self.tolerance)
             why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result" if lies else ""
-            found = Tried(setting, "SILENT" if lies else "ok", why, error_of, answer.counts, seconds)
+            found = Tried(setting, "SILENT" if lies else "ok", why, error_of, answer.counts.get(self.scene.counted, 0),
+                          seconds)  # fmt: skip
         self.tried.append(found)
         return found
 
@@ -92,25 +95,28 @@ class Search:
             if i < low or self._hopeless(ladder, i, last):
                 return
             last = self.attempt(ladder.setting(i))
-            if last.error <= self.tolerance:
+            if last.error <= self.held:
                 high = i
+            elif ladder.cells and last.status in ("refused", "raised"):
+                return  # its step is too long, however many cells there are
             else:
                 low = i + 1
 
     def meeting(self, engine: str = "") -> list[Tried]:
         """Those that meet the tolerance, of one engine or of all."""
-        return [one for one in self.tried if one.error <= self.tolerance and one.setting.engine.startswith(engine)]
+        return [one for one in self.tried if one.error <= self.held and one.setting.engine.startswith(engine)]
 
     def _affordable(self, ladder: Ladder, last: Tried) -> int:
         """The finest rung whose run takes no longer than PATIENCE."""
-        least = last.setting.value * last.seconds / PATIENCE
-        return max(i for i, value in enumerate(ladder.values) if value >= least or i == 0)
+        most = PATIENCE / max(last.seconds, 1e-9)
+        return max(i for i, value in enumerate(ladder.values)
+                   if i == 0 or ladder.work(last.setting.value, value) <= most)  # fmt: skip
 
     def _hopeless(self, ladder: Ladder, i: int, last: Tried | None) -> bool:
         """Whether a rung would cost far more than what its engine has that meets the tolerance."""
         if last is None or not last.seconds:
             return False
-        finer = 1.0 if ladder.adaptive else last.setting.value / ladder.values[i]
+        finer = ladder.work(last.setting.value, ladder.values[i])
         seconds, calls, best = finer * last.seconds, finer * last.calls, self.meeting(ladder.engine)
         if ladder.default or not best:
             return False
@@ -121,7 +127,7 @@ class Search:
 def _next(ladder: Ladder, low: int, high: int, last: Tried | None, tolerance: float) -> int:
     """The rung to try: by the declared order from the last one, in the middle where that says nothing."""
     if last is None:
-        wanted = LOOSE if ladder.adaptive else ladder.default or START
+        wanted = LOOSE if ladder.adaptive else ladder.default or (COARSE if ladder.cells else START)
     elif last.status == "ok" and last.error > 0.0:
         wanted = last.setting.value * (tolerance / last.error) ** (1 / (1 if ladder.adaptive else ladder.order or 2))
     else:

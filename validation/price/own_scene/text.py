@@ -8,7 +8,7 @@ from validation.price.own_scene.recommendation import Choice, Recommendation
 from validation.price.own_scene.search import Tried
 from validation.price.problems import Setting
 
-HEAD = f"  {'':<24}{'setting':<36}{'error':>11}{'force calls':>14}{'seconds':>11}"
+HEAD = f"  {'':<24}{'setting':<36}{'error':>11}{{counted:>16}}{'seconds':>11}"
 
 
 def lines(found: Recommendation) -> list[str]:
@@ -25,11 +25,11 @@ def lines(found: Recommendation) -> list[str]:
 
 
 def _table(found: Recommendation) -> list[str]:
-    rows, unit = [HEAD], found.scene.unit
+    rows, unit = [HEAD.format(counted=found.scene.counted)], found.scene.unit
     for (engine, kinds), one in _merged(found.winners).items():
         who = f"{LABELS.get(engine, engine) if engine else 'all'}, by {kinds}"
         rows.append(f"  {who:<24}{_named(one.tried.setting, not engine):<36}{one.error:>9.2g} {unit}"
-                    f"{one.calls:>14,.0f}{one.seconds:>9.2g} s")  # fmt: skip
+                    f"{one.calls:>16,.0f}{one.seconds:>9.2g} s")  # fmt: skip
     how = "measured over the whole run" if all(one.confirmed or found.scene.whole == found.scene.first
                                                for one in found.winners.values()) else "measured"
     return [*rows, f"  errors are {how}, against the truth; seconds are those of this machine, model built anew"]

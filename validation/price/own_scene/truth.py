@@ -8,8 +8,6 @@ from models.errors import InputError, RunFailed
 from validation.price.own_scene import Answer, Ladder, OwnScene
 from validation.price.problems import Setting
 
-SURE = 20.0
-"""Halving the step of the reference changes less than this part of the tolerance."""
 AGREED = 4.0
 """A solver of another family differs by less than this part of the tolerance."""
 NEARLY = 1e-3
@@ -67,8 +65,9 @@ def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twi
     ladder = scene.reference()
     found, rung, change = _settled(scene, ladder, tolerance, duration, rung)
     said = f"{ladder.engine} {ladder.method} at {ladder.setting(rung).label()}"
-    other = scene.second() if twice else None
-    alone = Truth(found, change, f"{said}; halving its step changes", rung, scene.cell)
+    other = scene.second(ladder.setting(rung)) if twice else None
+    finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
+    alone = Truth(found, change, f"{said}; {finer}", rung, scene.cell)
     if other is None:
         return alone
     differs = alone.error(scene.answer(scene.solve(other, duration)))
@@ -91,7 +90,7 @@ def _named(setting: Setting) -> str:
 
 def _settled(scene: OwnScene, ladder: Ladder, tolerance: float, duration: float,
              rung: int) -> tuple[Answer, int, float]:  # fmt: skip
-    """The first answer that halving the step has not changed by more than SURE of the tolerance; its rung; the change.
+    """The first answer that the finer rung changed by no more than a part of the tolerance; its rung; the change.
     """
     before: Answer | None = None
     change, failure = float("inf"), ""
@@ -105,7 +104,7 @@ def _settled(scene: OwnScene, ladder: Ladder, tolerance: float, duration: float,
             continue
         if before is not None:
             last, change = change, _change(scene, before, now)
-            if change <= tolerance / SURE:
+            if change <= tolerance / ladder.sure:
                 return now, i, change
             if change > 0.7 * last and change < 1e-6 * float(np.abs(now.values).max()):
                 break  # rounding: finer steps no longer help
@@ -113,4 +112,4 @@ def _settled(scene: OwnScene, ladder: Ladder, tolerance: float, duration: float,
     if before is None:
         raise RunFailed("reference", failure or "no step is fine enough")
     raise InputError("--tolerance", "", tolerance, f"is finer than the scene's own reference can be known here: "
-                     f"at least {SURE * change:.2g} {scene.unit}")  # fmt: skip
+                     f"at least {ladder.sure * change:.2g} {scene.unit}")  # fmt: skip

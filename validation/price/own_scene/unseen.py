@@ -150,7 +150,7 @@ def judge(one: Drawn, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
     found = recommend(scene, one.tolerance)
     errors = true_errors(scene, [choice.tried.setting for choice in found.winners.values()])
     return [Verdict(one.scene.title, choice.tried.setting.curve, choice.tried.setting.label(), one.tolerance,
-                    choice.error, errors[choice.tried.setting], found.truth.uncertainty, _slower(found, key, choice))
+                    choice.error, errors[choice.tried.setting], found.truth.uncertainty, slower(found, key, choice))
             for key, choice in found.winners.items()]  # fmt: skip
 
 
@@ -177,7 +177,7 @@ def _exact(scene: OwnPitchPlane, spacing: float) -> Answer:
     return scene.answer((model, model.run()))
 
 
-def _slower(found: Recommendation, key: tuple[str, str], choice: Choice) -> bool:
+def slower(found: Recommendation, key: tuple[str, str], choice: Choice) -> bool:
     """Whether an engine's default that meets the tolerance would have cost less than the recommended setting."""
     engine, kind = key
     rivals = [one.refined for owner, one in found.defaults.items()
