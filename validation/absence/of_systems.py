@@ -75,12 +75,21 @@ def _more(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:
 
 def probed(systems: tuple[str, ...] = tuple(FILES)) -> dict[str, Any]:
     """To be run in a fresh process: what a bare scene imports, what effects import, whether the path stays."""
-    return {system: _probed(system) for system in systems}
+    own = {system: sorted({module for some in _modules(system).values() for module in some}) for system in systems}
+    for system in systems:
+        if file_of(system).ENGINES[0] == "reference":
+            with _removed(system, own[system]):
+                seen(system, bare(system), quick=True)
+    engines = _loaded(["exudyn", "mujoco"])
+    return {"engines": engines, "systems": {system: _probed(system, own[system]) for system in systems}}
 
 
-def _probed(system: str) -> dict[str, Any]:
-    modules = {name: getattr(module_of(system, name), "MODULES", ()) for name in names_of(system)}
-    own = sorted({module for some in modules.values() for module in some})
+def _modules(system: str) -> dict[str, tuple[str, ...]]:
+    return {name: getattr(module_of(system, name), "MODULES", ()) for name in names_of(system)}
+
+
+def _probed(system: str, own: list[str]) -> dict[str, Any]:
+    modules = _modules(system)
     with _removed(system, own):
         first = seen(system, bare(system))
     imported = _loaded(own)
@@ -121,7 +130,13 @@ def found() -> dict[str, Any]:
 def rows(quick: bool) -> list[Row]:
     """Absence of every effect of every system, and a positive control of each; quick: controls in one engine alone."""
     present = [row for system in FILES for row in _present(system, quick)]
-    return present if quick else present + [row for system, probe in found().items() for row in _absent(system, probe)]
+    if quick:
+        return present
+    seen_there = found()
+    engines = at_most("absent.references.engines", SYSTEM, "engines that bare scenes of braking, contact, wheelset and "
+                      "ride import by their references", len(seen_there["engines"]), "", 0, "a fresh process", "none")
+    return [*present, engines, *(row for system, probe in seen_there["systems"].items() for row in
+                                 _absent(system, probe))]  # fmt: skip
 
 
 def _absent(system: str, seen_there: dict[str, Any]) -> list[Row]:

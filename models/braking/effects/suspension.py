@@ -7,7 +7,7 @@ NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "every freedom of its file, and a step of an engine around the compiled tyres"
 COUNTS: dict[str, dict[str, int]] = {"all": {"freedoms on springs": 26}}
-MODULES = ("models.braking.sprung", "models.engines")
+MODULES = ("models.braking.sprung", "models.engines.braking_sprung")
 
 
 def named(scene: Any) -> bool:

@@ -1,4 +1,4 @@
 """Effects of scenes of hub forces, one file each: see ``models.scene_effects``.
 
-Counts are those of what the study prepares before its runs.
+No counts are kept of such scenes, so that no effect declares any.
 """

@@ -6,7 +6,7 @@ PLACE = "forces.interpolation"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "cubic pieces in place of straight ones"
-COUNTS = {"all": {"smooth signals": 1}}
+COUNTS: dict[str, dict[str, int]] = {}
 
 
 def named(scene: Any) -> bool:

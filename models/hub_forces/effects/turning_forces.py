@@ -6,7 +6,7 @@ PLACE = "forces.frame"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "a rotation per hub and call"
-COUNTS = {"all": {"turning frames": 1}}
+COUNTS: dict[str, dict[str, int]] = {}
 
 
 def named(scene: Any) -> bool:

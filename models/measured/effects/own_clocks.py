@@ -6,7 +6,7 @@ PLACE = "files.0.offset"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "signals are moved to one clock by interpolation"
-COUNTS = {"all": {"clocks": 1}}
+COUNTS: dict[str, dict[str, int]] = {}
 
 
 def named(scene: Any) -> bool:
