@@ -142,6 +142,18 @@ def test_a_sweep_killed_half_way_goes_on_to_the_same_bytes(whole):
 
 
 @pytest.mark.full
+def test_a_sweep_that_a_scheduler_ends_says_what_is_kept_and_leaves_nothing_half_done(whole):
+    out = whole[0] / "ended"
+    child = sweep_command(whole[0], "--out", str(out))
+    while child.poll() is None and len(finished(out)) < 2:
+        time.sleep(0.002)
+    child.terminate()
+    said = child.communicate(timeout=100)[0]
+    assert child.returncode == 130 and said.endswith(f"interrupted; finished results are kept in {out}\n")
+    assert swept(whole[0], out, "--resume", str(out)) == whole[1]
+
+
+@pytest.mark.full
 def test_a_sweep_killed_at_twenty_random_moments_goes_on_to_the_same_bytes(whole):
     for moment in np.random.default_rng(9).uniform(0.05, 1.0, 20) * whole[2]:
         kill_and_resume(whole[0], float(moment), whole[1])
