@@ -25,8 +25,8 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "planted_faults", "absent", "price", "recommendation", "ensemble", "contact_hertz",
          "contact_coefficients", "contact_exact",
          "contact_simplified", "contact_profiles", "manchester", "ride_road", "ride_covariance", "ride_engines",
-         "ride_varying_speed", "ride_nonlinear", "choice_linear", "hub_forces", "contact_price", "fastsim", "wheelset",
-         "contact_bridges", "handling", "braking_stop", "braking_port",
+         "ride_varying_speed", "ride_nonlinear", "choice_linear", "choice_nonlinear", "hub_forces",
+         "contact_price", "fastsim", "wheelset", "contact_bridges", "handling", "braking_stop", "braking_port",
          "braking_controllers", "braking_engines", "braking_suspension", "measured_formats", "measured_virtual",
          "measured_long", "measured_checks")  # fmt: skip
 """Case modules in the order of the report."""
@@ -128,6 +128,7 @@ def seeds() -> dict[str, int]:
         stabilisers,
         wheelset,
     )
+    from validation.choice import drawn_scenes
     from validation.contact import contact_set
     from validation.measured import long_recording
     from validation.price.own_scene import unseen
@@ -147,7 +148,8 @@ def seeds() -> dict[str, int]:
             "drawn wheelsets": wheelset.SEED, "rough road of handling": handling.SEED,
             "speeds on ice": braking_controllers.SEED, "measurement files": measured_formats.SEED,
             "virtual measurements": measured_virtual.SEED, "checks of recordings": measured_checks.SEED,
-            "long recordings": long_recording.SEED, "scenes never seen": unseen.SEED}  # fmt: skip
+            "long recordings": long_recording.SEED, "scenes never seen": unseen.SEED,
+            "drawn questions": drawn_scenes.SEED}  # fmt: skip
 
 
 def save(folder: Path, rows: list[Row], source: dict[str, Any], earlier: dict[str, Any] | None = None) -> None:

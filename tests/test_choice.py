@@ -1,0 +1,153 @@
+"""Effects of any system's scene priced and chosen by runs: differences, screen, choice, refusals."""
+
+import json
+
+import numpy as np
+import pytest
+
+from models.choice import choose
+from models.choice.answer import Answer, Quantity, added, less, relative, sizes
+from models.choice.choose import Chooser
+from models.choice.screen import Screen
+from models.choice.variants import Variants
+from models.errors import InputError
+from models.systems import SYSTEMS
+from validation.choice.drawn_scenes import drawn
+from validation.price.effects import price_list
+from validation.price.effects_text import as_dict, lines
+
+ROAD = {"source": "study", "speed": 20.0}
+
+
+def half_car(**more):
+    from models.scene import build
+
+    table = {"title": "t", "study": "choice", "quantities": ["pitch", "rms f1"], "tolerance": 0.02,
+             "run": {"duration": 0.96, "step": 1e-3},
+             "effects": {"road": ROAD, "pitch_spring": {"stiffness": 100.0}}}  # fmt: skip
+    return build(table | more, "t")
+
+
+def test_paths_are_compared_where_both_have_a_row_and_by_their_deviation():
+    full, half = np.array([0.0, 2.0, 4.0, 6.0, 8.0]), np.array([0.0, 4.0, 9.0])
+    change = less((half,), (full,))
+    assert change[0].tolist() == [0.0, 0.0, 1.0]
+    assert relative(change, sizes((full,))) == pytest.approx(np.sqrt(1.0 / 3.0) / np.sqrt(8.0))  # its deviation
+    assert added(change, (np.ones(5),))[0].tolist() == [1.0, 1.0, 2.0]
+    with pytest.raises(InputError):
+        less((np.zeros(4),), (full,))
+
+
+def test_a_case_that_does_not_move_is_held_to_a_share_of_the_others():
+    assert sizes((np.array([0.0]), np.array([-5.0]))).tolist() == [0.005, 5.0]
+
+
+class Made(Variants):
+    """Variants whose quantity is a given function of what is left out and of the step."""
+
+    def __init__(self, function, effects):
+        self.function, self.names, self.calls, self._kept, self._costs = function, effects, 0, {}, {}
+        self.scene, self.engine = type("Made", (), {"file": "t", "system": "made"}), ""
+        self.system = type("System", (), {"WINDOWED": False, "parts": staticmethod(lambda scene: 4),
+                                          "steps": staticmethod(lambda scene: 4)})  # fmt: skip
+
+    @property
+    def effects(self):
+        return self.names
+
+    def changed(self, left_out, times=1):
+        return self.scene
+
+    def _run(self, left_out, times):
+        value = np.array([self.function(left_out, times)])
+        return Answer({"q": Quantity("", (value,))}, {"calls": 100 // times}, 1.0)
+
+    def per_call(self, left_out):
+        return 1.0 / (1.0 + len(left_out))
+
+
+def chooser(monkeypatch, function, effects, tolerance=0.05):
+    monkeypatch.setattr(choose, "Variants", lambda scene, engine: Made(function, effects))
+    return Chooser(None, "", ["q"], tolerance)
+
+
+def test_the_second_order_is_exact_for_a_quadratic_and_tells_what_it_leaves_out():
+    def quantity(left_out, times):
+        x = sum({"a": 1.0, "b": 2.0, "c": 3.0}[name] for name in left_out)
+        return 100.0 + x + 0.1 * x**2
+
+    screen = Screen(Made(quantity, ("a", "b", "c")), ["q"])
+    assert screen.predicted(frozenset("abc"))[0] == pytest.approx((6.0 + 3.6) / 100.0)
+    assert screen.remainder(frozenset("ab"))[0] == 0.0  # run itself
+    second, first = 0.2 * (2.0 + 3.0 + 6.0), 6.0 + 0.1 * 14.0
+    assert screen.remainder(frozenset("abc"))[0] == pytest.approx(second**2 / first / 100.0)
+
+
+def test_a_pair_is_found_of_which_one_alone_ruins(monkeypatch):
+    ruined = {frozenset("a"): 300.0, frozenset("ab"): 101.0, frozenset("b"): 104.5, frozenset(): 100.0}
+    choice = chooser(monkeypatch, lambda left_out, times: ruined[left_out], ("a", "b")).choose()
+    assert choice.left_out == ("a", "b") and choice.kept and choice.confirmed[0] == pytest.approx(0.01)
+
+
+def test_what_the_confirmation_breaks_is_taken_back(monkeypatch):
+    """Longer steps hide what an effect does: the screen takes them, the whole run at its own step does not."""
+
+    def quantity(left_out, times):
+        return 100.0 + (0.5 if "a" in left_out else 0.0) + (30.0 if "b" in left_out and times == 1 else 0.0)
+
+    own = chooser(monkeypatch, quantity, ("a", "b"))
+    own.screen.variants._run = lambda left_out, times: Made._run(own.screen.variants, left_out, max(2, times))
+    own.screen.variants._kept.clear()
+    monkeypatch.setattr(own.whole.variants, "_run", lambda left_out, times: Made._run(own.whole.variants, left_out, 1))
+    choice = own.choose()
+    assert choice.left_out == ("a",) and choice.kept and choice.confirmed[0] == pytest.approx(0.005)
+
+
+def test_drawn_half_cars_keep_their_tolerance_by_runs_of_their_own():
+    asked = drawn("pitch-plane", 3)
+    choice = Chooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose()
+    assert choice.kept and (choice.confirmed <= asked.tolerance).all() and choice.calls[2] < choice.calls[0]
+
+
+def test_a_spring_that_hardly_pulls_goes_and_the_road_stays():
+    scene = half_car()
+    own = Chooser(scene, "reference", scene.quantities, scene.tolerance)
+    assert own.share(frozenset(["pitch_spring"])) < 1.0 < own.share(frozenset(["road"]))
+    assert "road" not in own.choose().left_out
+
+
+@pytest.mark.parametrize(("change", "place"), [
+    ({"quantities": []}, "quantities"), ({"tolerance": 2.0}, "tolerance"), ({"study": "single_run"}, "quantities"),
+    ({"effects": "auto", "study": "single_run"}, "quantities"), ({"effects": "all"}, "effects")])  # fmt: skip
+def test_half_a_question_is_refused_with_its_place(change, place):
+    with pytest.raises(InputError) as error:
+        half_car(**change)
+    assert error.value.place == place
+
+
+def test_auto_alone_names_the_study():
+    from models.rail.scene import build
+
+    scene = build({"title": "t", "system": "wheelset", "effects": "auto", "quantities": ["y"], "tolerance": 0.01,
+                   "speeds": {"values": [10.0]}}, "t")  # fmt: skip
+    assert scene.study == "choice" and scene.tolerance == 0.01
+
+
+def test_unknown_quantities_and_systems_without_runs_are_refused():
+    scene = half_car(quantities=["yaw"])
+    with pytest.raises(InputError, match="yaw"):
+        Chooser(scene, "reference", scene.quantities, scene.tolerance)
+    with pytest.raises(InputError, match="measured"):
+        Variants(type("Other", (), {"system": "measured", "file": "t"}), "reference")
+    assert "measured" in SYSTEMS
+
+
+def test_prices_name_costs_and_changes_and_why_there_is_none():
+    found = price_list(half_car(), "reference")
+    prices = {price.name: price for price in found.prices}
+    assert prices["road"].there and not prices["gyro"].there
+    assert "gyro" in prices["gyro"].gone and prices["gyro"].changes[0].relative == 0.0
+    assert prices["road"].changes[0].relative > 0.1 > max(c.relative for c in prices["pitch_spring"].changes)
+    assert "wheel_forces" in prices["contact_points"].why and not prices["contact_points"].counts[0]
+    text = "\n".join(lines(found, ["pitch"]))
+    assert "road" in text and "no price" in text and json.dumps(as_dict(found))

@@ -1,0 +1,165 @@
+"""Effects of scenes that are run in time, chosen within a tolerance: is the choice right, and what does it save?"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.choice.choose import Choice, Chooser
+from validation.choice.drawn_scenes import Asked, drawn
+from validation.rows import Row, System, Table, at_most, finding, within
+
+TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
+SYSTEM: System = "effects"
+COUNTS = {"pitch-plane": 40, "wheelset": 8, "braking": 4}
+"""Scenes drawn of each system."""
+ENGINES = {"pitch-plane": ("reference", "mujoco"), "wheelset": ("reference",), "braking": ("reference",)}
+"""Implementations that take turns."""
+QUICK = 3
+"""Scenes of the pitch plane alone in the quick share."""
+TOLD = (1e-4, 0.05)
+"""Confirmed changes whose predictions are judged: as for linear scenes."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A scene with its choice, and changes (quantities,) by two runs of its own, made after the choice."""
+
+    system: str
+    engine: str
+    asked: Asked
+    choice: Choice
+    again: np.ndarray
+
+    @property
+    def honest(self) -> bool:
+        """Whether no tolerance is broken that was reported as kept."""
+        return not self.choice.kept or bool((self.again <= self.asked.tolerance * (1 + 1e-9)).all())
+
+
+def judged(system: str, seed: int) -> Judged:
+    """Choose, and run the scene and what is left once more."""
+    asked, engine = drawn(system, seed), ENGINES[system][seed % len(ENGINES[system])]
+    chooser = Chooser(asked.scene(), engine, list(asked.quantities), asked.tolerance)
+    choice, runs = chooser.choose(), chooser.whole.variants
+    whole = runs.system.answer(asked.scene(), engine)
+    rest = runs.system.answer(runs.changed(frozenset(choice.left_out), choice.times), engine)
+    again = [_change(whole.of(name).cases, rest.of(name).cases) for name in asked.quantities]
+    return Judged(system, engine, asked, choice, np.array(again))
+
+
+def _change(whole: tuple[np.ndarray, ...], rest: tuple[np.ndarray, ...]) -> float:
+    """Worst case: rms of the difference where both have a row, by the path's deviation, or a number's by its size."""
+    worst = 0.0
+    for full, left in zip(whole, rest, strict=True):
+        rows = np.linspace(0, len(full) - 1, len(left)).round().astype(int)
+        size = full.std() if len(full) > 1 else abs(full[0])
+        largest = max(one.std() if len(one) > 1 else abs(one[0]) for one in whole)
+        worst = max(worst, float(np.sqrt(np.mean((left - full[rows]) ** 2)) / max(size, 1e-3 * largest)))
+    return worst
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Random scenes of three systems; the quick share has three of the pitch plane."""
+    counts = {"pitch-plane": QUICK} if quick else COUNTS
+    found = [judged(system, seed) for system, count in counts.items() for seed in range(count)]
+    rows = [*_kept(found), _predictions(found, quick), *(row for system in counts for row in _saving(found, system))]
+    return rows, {"scenes": [_shown(one) for one in found], "systems": list(counts)}
+
+
+def _kept(found: list[Judged]) -> list[Row]:
+    kept = float(np.mean([one.choice.kept and one.honest for one in found]))
+    return [within("choice_nonlinear.kept", SYSTEM, f"share of {len(found)} random scenes whose tolerance is kept",
+                   kept, "", 1.0, 0.05, "asked: at least 95 of 100", "none"),
+            at_most("choice_nonlinear.honest", SYSTEM, "choices reported as kept that two more runs find broken",
+                    float(sum(not one.honest for one in found)), "", 0.0, "asked: never", "none")]  # fmt: skip
+
+
+def _pairs(found: list[Judged]) -> np.ndarray:
+    """Predicted and confirmed changes (n, 2) of all quantities whose change is told from zero and below 5 %."""
+    pairs = [(p, c) for one in found for p, c in zip(one.choice.predicted, one.choice.confirmed, strict=True)]
+    return np.array([pair for pair in pairs if TOLD[0] < pair[1] < TOLD[1]]).reshape(-1, 2)
+
+
+def _predictions(found: list[Judged], quick: bool) -> Row:
+    ratios = np.divide(*_pairs(found).T)
+    share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0))) if len(ratios) else 1.0
+    name, asked = "choice_nonlinear.predictions", "asked: within a factor of 2"
+    said = f"share of {len(ratios)} predicted changes below 5 % within a factor of 2 of the confirmed ones"
+    if quick:  # too few for a share
+        return finding(name, SYSTEM, said, share, "", "1 within 0.05", f"{asked}; judged in the full share", "none")
+    return within(name, SYSTEM, said, share, "", 1.0, 0.05, asked, "none")
+
+
+def _saving(found: list[Judged], system: str) -> list[Row]:
+    own = [one for one in found if one.system == system]
+    calls = np.array([one.choice.calls for one in own], float)
+    seconds = np.array([one.choice.seconds for one in own])
+    name = f"choice_nonlinear.saving.{system}"
+    note = "steps within a sample alone may grow" if system == "braking" else "it depends on the step that a scene has"
+    return [
+        finding(name, SYSTEM, f"calls saved, median of {len(own)} scenes of {system}",
+                float(np.median(calls[:, 0] / calls[:, 2])), "times", "reach for 5", note, "none"),
+        finding(f"{name}.step", SYSTEM, "the same by longer steps alone, with all effects",
+                float(np.median(calls[:, 0] / calls[:, 1])), "times", "", "what is left is due to effects", "none"),
+        finding(f"{name}.seconds", SYSTEM, "CPU seconds saved, median",
+                float(np.median(seconds[:, 0] / seconds[:, 2])), "times", "", "of calls, and of what a call takes",
+                "none"),
+    ]  # fmt: skip
+
+
+def _shown(one: Judged) -> dict[str, Any]:
+    choice = one.choice
+    return {"system": one.system, "engine": one.engine, "tolerance": one.asked.tolerance,
+            "quantities": list(one.asked.quantities), "left out": list(choice.left_out), "times": choice.times,
+            "predicted": choice.predicted.tolist(), "confirmed": choice.confirmed.tolist(), "kept": choice.kept,
+            "calls": list(choice.calls), "seconds": list(choice.seconds)}  # fmt: skip
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Savings by system, and which effects went how often."""
+    rows = []
+    for system in data["systems"]:
+        own = [one for one in data["scenes"] if one["system"] == system]
+        saved = [one["calls"][0] / one["calls"][2] for one in own]
+        alone = [one["calls"][0] / one["calls"][1] for one in own]
+        faster = [one["seconds"][0] / one["seconds"][2] for one in own]
+        went = sorted({name for one in own for name in one["left out"]})
+        rows.append((system, str(len(own)), *(f"{np.median(values):.3g}" for values in (saved, alone, faster)),
+                     ", ".join(f"{name} {sum(name in one['left out'] for one in own)}" for name in went) or "none"))
+    heads = ("system", "scenes", "fewer calls", "by steps alone", "fewer CPU seconds", "effects left out, how often")
+    note = "Medians, times; tolerances are 0.5, 2 and 5 % in turn. Each choice is confirmed over the whole run."
+    return [Table("What choosing effects and steps saves", note, heads, tuple(rows))]
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Predicted against confirmed changes, and savings over tolerance."""
+    from studies.figures import plt
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
+    ends = np.array([1e-4, 6.0])
+    left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
+    for i, system in enumerate(data["systems"]):
+        own = [one for one in data["scenes"] if one["system"] == system]
+        predicted, confirmed = (100 * np.array([value for one in own for value in one[key]])
+                                for key in ("predicted", "confirmed"))  # fmt: skip
+        left.plot(confirmed.clip(ends[0]), predicted.clip(ends[0]), "os^"[i], ms=4, color=f"C{i}", label=system)
+        shift = 1.06 ** (i - 1)
+        right.plot([100 * one["tolerance"] * shift for one in own], [one["calls"][0] / one["calls"][2] for one in own],
+                   "os^"[i], ms=4, color=f"C{i}", label=system)  # fmt: skip
+    left.set(xscale="log", yscale="log", xlabel="confirmed change [%] (at the end: smaller)",
+             ylabel="predicted change [%]", title="All that was left out, and longer steps")  # fmt: skip
+    right.axhline(5.0, color="#222222", ls="--", lw=0.8, label="5 times")
+    right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls", title="What it saves")
+    left.legend(loc="upper left")
+    right.legend(loc="lower right")
+    return [(SAID, figure)]
+
+
+SAID = (
+    "Random scenes of half cars on roads, wheelsets and braked trucks: effects that the quantities can do without are "
+    "left out and steps lengthened as far as the tolerance allows, predicted from runs without one and two effects in "
+    "steps as long as hardly matters, and confirmed by the whole run."
+)
+"""Text of the figure."""

@@ -1,0 +1,1 @@
+"""What validation cases of choices of effects share."""
