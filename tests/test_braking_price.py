@@ -41,7 +41,7 @@ def test_every_scheme_comes_to_the_reference(short, method, bound):
 def test_the_reference_knows_itself_and_where_friction_changes(short, monkeypatch):
     assert short.uncertainty["stopping distance"] < 1e-6
     monkeypatch.setattr(braking_stop, "CHANGE", 0.31)
-    moved = abs(short._by("DOP853", 1e-8) - short._true)
+    moved = abs(short._by("DOP853", 1e-8) - short.true)
     assert moved > 1e-5, "ten times the bound of the exact wheel: that test sees a change that is 1 cm off"
 
 
@@ -50,7 +50,7 @@ def test_an_engine_that_carries_the_chassis_gives_the_digits_of_the_exact_wheel(
     """What the problem's note says: rounding of some hundred steps of 10 mm, 1e-14 m each."""
     stop = Braked(VEHICLE.plane, np.zeros(1, dtype=np.int64), stacked(short._tables), 1.0, short._road, short._brakes,
                   short._chambers, np.zeros(1), substeps=2, engine=Carried(engine, VEHICLE.plane))  # fmt: skip
-    path = stop.run(Played(short._valves), 2.0)
+    path = stop.run(Played(short.valves), 2.0)
     assert path.stands and path.states[-1, 0, 0] == pytest.approx(short._ours(2).distance, abs=1e-12)
 
 

@@ -124,16 +124,16 @@ class BrakingStop:
         self.units, self.bound = {"stopping distance": "m"}, 10.0
         self.tolerances: tuple[float, ...] = (1e-2, 1e-3) if quick else (1e-2, 1e-3, 1e-4)
         self._tables = [surface(name) for name in SURFACES]
-        self._slips = np.unique(np.concatenate([table.slips for table in self._tables]))
-        self._mu = np.array([np.interp(self._slips, table.slips, table.mu_x[0, 0]) for table in self._tables])
+        self.slips = np.unique(np.concatenate([table.slips for table in self._tables]))
+        self.mu = np.array([np.interp(self.slips, table.slips, table.mu_x[0, 0]) for table in self._tables])
         self._road = road([Stretch(0.0, 0, 0), Stretch(CHANGE, 1, 1)])
         self._chambers, self._brakes = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY), of_wheels(PAPER_FRONT)
-        self._valves = self._taped()
-        self.duration = self._valves.size * SAMPLE
+        self.valves = self._taped()
+        self.duration = self.valves.size * SAMPLE
         solvers = SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
-        self._true, other = (self._by(*one) for one in solvers)
-        self.uncertainty = {"stopping distance": abs(self._true - other)}
+        self.true, other = (self._by(*one) for one in solvers)
+        self.uncertainty = {"stopping distance": abs(self.true - other)}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """FULL, or its named share QUICK."""
@@ -154,7 +154,7 @@ class BrakingStop:
 
     def errors(self, solution: Result) -> dict[str, float]:
         """That of the stopping distance."""
-        return {"stopping distance": abs(solution.distance - self._true)}
+        return {"stopping distance": abs(solution.distance - self.true)}
 
     def _taped(self) -> np.ndarray:
         """Valves (n,) of the controller's own run, one a sample, and the last ones for a while."""
@@ -167,16 +167,16 @@ class BrakingStop:
     def _by(self, method: str, tolerance: float) -> float:
         """Distance (m) by scipy, with the change of friction, locking and release as events."""
         stretches = [(begin, partial(self._friction, i)) for i, begin in enumerate((0.0, CHANGE))]
-        return tight_distance(VEHICLE, PAPER_FRONT, stretches, Played(self._valves), SPEED, tolerance, method)
+        return tight_distance(VEHICLE, PAPER_FRONT, stretches, Played(self.valves), SPEED, tolerance, method)
 
     def _friction(self, i: int, slip: float) -> float:
-        return float(np.interp(slip, self._slips, self._mu[i]))
+        return float(np.interp(slip, self.slips, self.mu[i]))
 
     def _torques(self, substeps: int) -> np.ndarray:
         """Torque (N m) at the ends of all steps."""
         air, part = still(self._chambers, SAMPLE), np.zeros((substeps + 1, 1))
         found = [np.zeros(1)]
-        for valve in self._valves:
+        for valve in self.valves:
             by_valves(np.array([valve]), SAMPLE, air, self._chambers, self._brakes, part)
             found.append(part[1:, 0].copy())
         return np.concatenate(found)
@@ -190,7 +190,7 @@ class BrakingStop:
     def _others(self, method: str, substeps: int) -> Result:
         number = (EULER, RK4, LITERAL).index(method)
         way, steps = march(number, SPEED, SPEED / VEHICLE.radius, self._torques(substeps), CHANGE, VEHICLE.mass,
-                           VEHICLE.radius, VEHICLE.spin_inertia, self._slips, self._mu, SAMPLE / substeps)  # fmt: skip
+                           VEHICLE.radius, VEHICLE.spin_inertia, self.slips, self.mu, SAMPLE / substeps)  # fmt: skip
         if steps < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
         return Result(way, {"steps": steps, "force calls": WALKS[method] * steps})

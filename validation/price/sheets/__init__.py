@@ -1,0 +1,25 @@
+"""Problems as sheets that serve without twinrig: equations, numbers, inputs as CSV, end values of the reference.
+
+    python -m validation.price.sheets FOLDER
+
+One file per system; ``page`` is what they share.
+"""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+from validation.price.sheets import braking, inertial_unit, pitch_plane, ride, vehicle
+from validation.price.sheets.page import Value
+
+WRITERS: tuple[Callable[[Path], list[Value]], ...] = (pitch_plane.write, braking.write, vehicle.write, ride.write,
+                                                      inertial_unit.write)  # fmt: skip
+HEADS = ("problem", "quantity", "unit", "time [s]", "value", "uncertainty")
+
+
+def main(folder: Path, writers: tuple[Callable[[Path], list[Value]], ...] = WRITERS) -> None:
+    """Write a sheet and its inputs per problem, and ``reference_values.csv`` of all."""
+    values = [value for write in writers for value in write(folder)]
+    with open(folder / "reference_values.csv", "w", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerows([HEADS, *(value.cells() for value in values)])

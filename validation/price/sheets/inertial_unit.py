@@ -1,0 +1,47 @@
+"""Sheet of ten minutes of attitude."""
+
+from pathlib import Path
+
+from validation.price.problems import inertial_unit
+from validation.price.problems.inertial_unit import DURATION, SINES, TURN
+from validation.price.sheets.page import Value
+from validation.price.sheets.page import write as write_page
+
+NAMES = ("q1", "q2", "q3", "q4")
+
+
+def write(folder: Path) -> list[Value]:
+    """The sheet; the quaternion at the end."""
+    problem = inertial_unit.problem(False)
+    sure = problem.uncertainty["attitude"]
+    values = [Value("unit", name, "", DURATION, float(part), sure)
+              for name, part in zip(NAMES, problem.true[-1], strict=True)]  # fmt: skip
+    write_page(folder, "unit", problem.title, _body(), f"The quaternion at {DURATION:g} s ({problem.reference}); the "
+               "uncertainty is the largest angle between the two, rad. q and -q are the same attitude.",
+               values)  # fmt: skip
+    return values
+
+
+def _body() -> str:
+    angles = "\n".join(f"    {name:5s} = " + " + ".join(
+        ([f"{TURN:g} t"] if name == "yaw" else []) + [f"{size:g} sin({rate:g} t + {phase:g})"
+                                                      for size, rate, phase in sines])
+        for name, sines in SINES.items())  # fmt: skip
+    return f"""{inertial_unit.InertialUnit.note}
+
+A car turns by (rad, t in s)
+
+{angles}
+
+about its axes: S = Rz(yaw) Ry(pitch) Rx(roll) turns local components into global ones. Its local rates are
+
+    w1 = roll' - yaw' sin(pitch)
+    w2 = pitch' cos(roll) + yaw' sin(roll) cos(pitch)
+    w3 = -pitch' sin(roll) + yaw' cos(roll) cos(pitch)
+
+A gyro samples them n times a second, the first time at t = 0. From these samples alone, and the attitude at the start,
+S(0), find the unit quaternion q = (q1; q2, q3, q4), scalar first, of
+
+    q' = q (0, w) / 2        or        S' = S skew(w).
+
+Asked for: the largest angle between the attitude found and the true one at every full second up to {DURATION:g} s."""

@@ -1,0 +1,55 @@
+"""A problem sheet: a page of Markdown, its numbers as CSV beside it, and the end values of the reference."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Value(NamedTuple):
+    """One reference value: of which problem and quantity, its unit, when (s), and how far it is known."""
+
+    problem: str
+    quantity: str
+    unit: str
+    time: float
+    value: float
+    uncertainty: float
+
+    def cells(self) -> tuple[str, ...]:
+        """As a line of ``reference_values.csv`` has it, to all digits."""
+        return (*self[:3], f"{self.time:.17g}", f"{self.value:.16e}", f"{self.uncertainty:.1e}")
+
+
+def columns(folder: Path, name: str, heads: Sequence[str], values: np.ndarray) -> None:
+    """Write columns (n, c) to ``name``.csv, to all digits."""
+    np.savetxt(folder / f"{name}.csv", values, fmt="%.17g", delimiter=",", header=",".join(heads), comments="")
+
+
+def matrices(folder: Path, name: str, found: dict[str, np.ndarray]) -> None:
+    """Write the entries of matrices that are not 0 to ``name``.csv: matrix, row, column (from 1), value."""
+    lines = ["matrix,row,column,value"]
+    for key, values in found.items():
+        lines += [f"{key},{i + 1},{j + 1},{values[i, j]:.17g}" for i, j in np.argwhere(values != 0.0)]
+    (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
+
+
+def vector(values: Sequence[float] | np.ndarray) -> str:
+    """Numbers to all digits, in brackets."""
+    return "(" + ", ".join(f"{value:.17g}" for value in values) + ")"
+
+
+def write(folder: Path, key: str, title: str, body: str, known: str, values: Sequence[Value]) -> None:
+    """The page: what is to be solved, then how the reference was made and what it gives."""
+    lines = "\n".join(f"| {v.quantity} | {v.value:.16e} | {v.unit} | {v.uncertainty:.1e} |" for v in values)
+    (folder / f"{key}.md").write_text(f"""# {title}
+
+{body}
+
+{known}
+
+| quantity | value | unit | uncertainty |
+|---|---|---|---|
+{lines}
+""")

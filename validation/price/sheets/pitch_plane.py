@@ -1,0 +1,102 @@
+"""Sheets of the pitch-plane vehicle: on its road, under its wheel forces, with noise on them, its pitch prescribed."""
+
+from pathlib import Path
+
+import numpy as np
+
+from models.engines.protocol import Settings, build
+from models.road.study import WINDOW, study_road
+from validation.price.problems import force_excited, noisy_forces, prescribed_pitch, road_excited
+from validation.price.problems.force_excited import DURATION, FINE, PERIOD, ForceExcited
+from validation.price.problems.road_excited import SOLVERS, SPEED
+from validation.price.sheets.page import Value, columns
+from validation.price.sheets.page import write as write_page
+
+PROBLEMS = (force_excited.problem, noisy_forces.problem, prescribed_pitch.problem)
+NAMES = ("z1", "z2", "z3", "pitch", "z1_rate", "z2_rate", "z3_rate", "pitch_rate")
+UNITS = ("m", "m", "m", "rad", "m/s", "m/s", "m/s", "rad/s")
+EQUATIONS = r"""
+    m1 z1'' = m1 g + F3 - f1            F3 = k3 (z3 - z1 - b sin p) + d3 (z3' - z1' - b p' cos p)
+    m2 z2'' = m2 g + F4 - f2            F4 = k4 (z3 - z2 + a sin p) + d4 (z3' - z2' + a p' cos p)
+    m3 z3'' = m3 g - F3 - F4
+    I p''   = cos p (b F3 - a F4) + M
+
+z positive down, the pitch p positive nose up; f1, f2 are the wheel forces, positive up.
+"""
+ON_ROAD = f"""
+    f1 = k1 (z1 - r(s)) + d1 (z1' - v r'(s))                s = v t
+    f2 = k2 (z2 - r(s - l)) + d2 (z2' - v r'(s - l))        l = a + b
+    r(s) = -w(s / {WINDOW:g} m) sum_i A_i sin(W_i s + P_i)  for s > 0, else 0
+    w(x) = 10 x^3 - 15 x^4 + 6 x^5  for x < 1, else 1
+
+r is the road, positive down; A_i [m], W_i [rad/m], P_i [rad] are the lines of `road.csv`; v = {SPEED:g} m/s. M is zero.
+"""
+
+
+def write(folder: Path) -> list[Value]:
+    """All four sheets with their inputs; the values of their references."""
+    return [*on_road(folder), *(value for make in PROBLEMS for value in by_forces(make(False), folder))]
+
+
+def on_road(folder: Path) -> list[Value]:
+    """The sheet of the vehicle on the study road."""
+    problem, road = road_excited.problem(False), study_road()
+    columns(folder, "road", ("amplitude [m]", "wavenumber [rad/m]", "phase [rad]"),
+            np.column_stack([road.amplitude, road.wavenumber, road.phase]))  # fmt: skip
+    end = np.array([road_excited.DURATION])
+    true, *others = (road_excited._dense(problem.assembly, *solver)(end)[:, 0] for solver in SOLVERS[False])
+    sure = np.max([np.abs(other - true) for other in others], axis=0)
+    values = _values("road", problem.duration, true, sure)
+    body = f"{EQUATIONS}{ON_ROAD}\n{_numbers(problem)}"
+    write_page(folder, "road", problem.title, body, f"End values at {problem.duration:g} s ({problem.reference}); the "
+               "uncertainty is the largest difference of the three.", values)  # fmt: skip
+    return values
+
+
+def by_forces(problem: ForceExcited, folder: Path) -> list[Value]:
+    """The sheet and the input of a problem that forces drive."""
+    own, signal = problem.assembly, problem.assembly.input
+    assert signal is not None
+    guided = bool(own.guided)
+    heads = ["time [s]", "front [N]", "rear [N]", *(["pitch [rad]"] if guided else [])]
+    times = PERIOD * np.arange(round(DURATION / PERIOD) + 1)
+    inputs = signal.sample(0.0, PERIOD, len(times))[:, : len(heads) - 1]
+    columns(folder, problem.key, heads, np.column_stack([times, inputs]))
+    values = ends(problem)
+    write_page(folder, problem.key, problem.title, _body(problem, guided), f"End values at {DURATION:g} s "
+               f"({problem.reference}); the uncertainty is the largest difference of the two over the run.",
+               values)  # fmt: skip
+    return values
+
+
+def ends(problem: ForceExcited) -> list[Value]:
+    """Every state at the end, with the largest difference of the two reference solvers over the run."""
+    runs = [build("reference", problem.assembly, settings).run()
+            for settings in (Settings("RK4", FINE, DURATION), Settings("DOP853", PERIOD, DURATION, 1e-12))]  # fmt: skip
+    true, other = (run.states[:: (len(run.states) - 1) // round(DURATION / PERIOD)] for run in runs)
+    return _values(problem.key, DURATION, true[-1], np.abs(true - other).max(axis=0))
+
+
+def _values(key: str, time: float, states: np.ndarray, sure: np.ndarray) -> list[Value]:
+    return [Value(key, *one[:2], time, *map(float, one[2:])) for one in zip(NAMES, UNITS, states, sure, strict=True)]
+
+
+def _numbers(problem: ForceExcited | road_excited.RoadExcited) -> str:
+    """Parameters and the start."""
+    numbers = ", ".join(f"{name} = {value:.17g}" for name, value in problem.assembly.parameters)
+    start = ", ".join(f"{name} = {value:.16e}" for name, value in zip(NAMES, problem.assembly.initial, strict=True))
+    return f"Parameters (SI): {numbers}.\n\nStart: {start}."
+
+
+def _body(problem: ForceExcited, guided: bool) -> str:
+    pitch = (" The pitch is a quintic spline through its samples (not-a-knot at both ends), prescribed; M is the "
+             "moment that this takes." if guided else " M is zero.")  # fmt: skip
+    asked = ", ".join(f"largest error of the {name} [{unit}]" for name, unit in problem.units.items())
+    return f"""{problem.note}
+{EQUATIONS}
+{_numbers(problem)}
+
+Input: `{problem.key}.csv`; between samples, forces are linear.{pitch}
+
+Asked for: {asked}, at the samples up to {DURATION:g} s. Steps should end on the samples, where the
+input has kinks."""

@@ -1,0 +1,101 @@
+"""Sheet of the passenger car of 19 freedoms that is free on the road."""
+
+from pathlib import Path
+
+import numpy as np
+
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import preloads
+from validation.price.problems import free_vehicle
+from validation.price.problems.free_vehicle import (
+    DURATION,
+    GOLDEN,
+    GRAVITY,
+    HEIGHT,
+    LONGEST,
+    RISE,
+    SINES,
+    SOFT,
+    SPEED,
+    FreeVehicle,
+)
+from validation.price.sheets.page import Value, vector
+from validation.price.sheets.page import write as write_page
+
+LAWS = f"""Axes: x forward, y left, z up; every place is given where it lies at rest (m), where all coordinates are 0.
+
+**Bodies** move by Newton's and Euler's laws under weight, g = {GRAVITY:g} m/s^2 along -z. A body has the coordinates
+named as its freedoms and rides on its parent, or on the space:
+
+    c = c_parent + R_parent (place - place_parent + (x, y, z))        R = R_parent Rx(rx) Ry(ry) Rz(rz)
+
+with c its centre of mass, R its rotation, and 0 for a coordinate that it has not. Its inertia (kg m^2) is about c in
+its own axes.
+
+**Springs** act between p1 of body one and p2 of body two (or the ground): with a fixed in space and d = a . (p2 - p1)
+less its value at rest, F = F0 + k d + c d' acts as F a at p1 and -F a at p2.
+
+**Bars** act between the roll rx of a body without parent and two points: with e = rx - (h_left - h_right) / b, h how
+far each point has risen and b their distance along y, the moment M = M0 + k e + c e' acts as -M on the coordinate rx,
+as the force M / b up at the left point and down at the right one.
+
+**Tyres**: F = F0 + k (z - h) up at the centre of the wheel, h how far it has risen, z the height of the road under it.
+
+**Side forces** along y at a point of a body: F = C (rz - y' / v), y' the rate of that point along y and rz the yaw
+coordinate of the body. **Drag** along x at its centre: F = -c v x', x' the rate of its coordinate x.
+
+**Road**: at time t a tyre at (x, y) meets the height (m) at s = v t + x, v = {SPEED:g} m/s, of its track, n = 0 on the
+left (y > 0) and 1 on the right:
+
+    z = sum_k {HEIGHT:g} / k sin(2 pi (k s / {LONGEST:g} + {GOLDEN:.16g} k (k + {SINES} n)))
+        / (1 + exp(-(s - {RISE:g}) / {SOFT:g}))
+
+with k = 1 .. {SINES}. Start: all coordinates and rates are 0.
+"""
+
+
+def write(folder: Path) -> list[Value]:
+    """The sheet; every place and rate at the end."""
+    problem = free_vehicle.problem(False)
+    sure = np.abs(problem.states - problem.others).max(axis=0)
+    values = [Value("vehicle", name, unit, DURATION, *map(float, known)) for (name, unit), *known in
+              zip(_states(problem), problem.states[-1], sure, strict=True)]  # fmt: skip
+    asked = ("Asked for: the largest error of a tyre force and of an acceleration along z of body, engine or seats at "
+             f"every {1e3 * free_vehicle.GRID:g} ms.")  # fmt: skip
+    write_page(folder, "vehicle", problem.title, f"{LAWS}\n{_tables(problem.vehicle)}\n\n{asked}",
+               f"End values at {DURATION:g} s ({problem.reference}); the uncertainty is the largest difference of the "
+               "two over the run.", values)  # fmt: skip
+    return values
+
+
+def _states(problem: FreeVehicle) -> list[tuple[str, str]]:
+    """Names and units of positions, then of rates."""
+    places = [(f"{body} {freedom}", "rad" if freedom.startswith("r") else "m")
+              for body, freedom in problem.vehicle.coordinates()]  # fmt: skip
+    return places + [(f"{name} rate", f"{unit}/s") for name, unit in places]
+
+
+def _tables(vehicle: SpatialVehicle) -> str:
+    """Every number of the vehicle."""
+    held = preloads(vehicle)
+    parts = {
+        ("body", "mass [kg]", "place", "freedoms", "inertia, rows", "parent"): [
+            (b.name, f"{b.mass:.17g}", vector(b.position), " ".join(b.freedoms), " ".join(map(vector, b.inertia)),
+             b.parent or "space") for b in vehicle.bodies],
+        ("spring", "one", "two", "p1", "p2", "a", "k [N/m]", "c [N s/m]", "F0 [N]"): [
+            (s.name, s.one, s.two or "ground", vector(s.point_one), vector(s.point_two), vector(s.axis),
+             f"{s.stiffness:.17g}", f"{s.damping:.17g}", f"{held.parts[s.name]:.17g}") for s in vehicle.springs],
+        ("bar", "body", "left", "right", "left point", "right point", "k [N m/rad]", "c", "M0 [N m]"): [
+            (b.name, b.body, b.left, b.right, vector(b.point_left), vector(b.point_right), f"{b.stiffness:.17g}",
+             f"{b.damping:.17g}", f"{held.parts[b.name]:.17g}") for b in vehicle.bars],
+        ("tyre", "body", "place", "k [N/m]", "F0 [N]"): [
+            (t.name, t.body, vector(t.point), f"{t.stiffness:.17g}", f"{held.tyres[t.name]:.17g}")
+            for t in vehicle.tyres],
+        ("side force", "body", "point", "C [N/rad]"): [
+            (f.name, f.body, vector(f.point), f"{f.stiffness:.17g}") for f in vehicle.side_forces],
+        ("drag", "c [N s^2/m^2]"): [(d.body, f"{d.coefficient:.17g}") for d in vehicle.drags],
+    }  # fmt: skip
+    lines = []
+    for heads, rows in parts.items():
+        lines += ["| " + " | ".join(row) + " |" for row in (heads, ["---"] * len(heads), *rows)] + [""]
+    return "\n".join(lines)
