@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from models.assembly import Assembly
-from validation.price import ride, speed
+from validation.price import instructions, ride, speed, split
 from validation.price import runner as cost
 from validation.price.figure import draw as draw_figure
 from validation.price.force_calls import counted
@@ -65,9 +65,15 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         rows += rows_of(problem, points, quick)
     road = road_excited.problem(quick)
     ride_rows, ride_data = ride.measure(quick, ROUNDS[True], LEAST[True])
-    data = {"problems": saved, "ride": ride_data, **_speeds(road.assembly, 2 * ROUNDS[quick], 2 * LEAST[quick])}
+    rows += ride_rows
+    data = {"problems": saved, "ride": ride_data, "split": [], "instructions": {},
+            **_speeds(road.assembly, 2 * ROUNDS[quick], 2 * LEAST[quick])}  # fmt: skip
     settings = list(dict.fromkeys(_at_1_ms(one) for one in road.settings(quick) if one.method != "DVERK6"))
-    return rows + _road_rows(saved[0]) + _counts(settings, road.assembly) + _speed_rows(data) + ride_rows, data
+    if not quick:
+        data["split"] = split.measure(ROUNDS[quick], LEAST[quick])
+        counted_rows, data["instructions"] = instructions.measure(folder)
+        rows += split.rows(data["split"]) + counted_rows
+    return rows + _road_rows(saved[0]) + _counts(settings, road.assembly) + _speed_rows(data), data
 
 
 def _speeds(assembly: Assembly, rounds: int, least: float) -> dict[str, Any]:
@@ -135,9 +141,11 @@ def _speed_rows(data: dict[str, Any]) -> list[Row]:
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """Cheapest settings, losses, curves and failures of every problem; the routes of ride."""
-    return [*(table for one in data["problems"]
-              for table in cost_tables(one["problem"], [cost.point(saved) for saved in one["points"]])),
+    """Cheapest settings, losses, curves, failures and the parts of a step of every problem; the routes of ride."""
+    found = [table for one in data["problems"]
+             for table in (*cost_tables(one["problem"], [cost.point(saved) for saved in one["points"]]),
+                           *split.table(data["split"], one["problem"]["key"]))]  # fmt: skip
+    return [*found, *([instructions.table(data["instructions"])] if data["instructions"] else []),
             ride.table(data["ride"])]  # fmt: skip
 
 

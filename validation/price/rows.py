@@ -114,7 +114,8 @@ def _sweep(problem: Problem, points: list[Point]) -> Row:
     short = []
     for curve, own in cost.by_curve(points).items():
         wide = own[0].errors[quantity] >= 1e4 * own[-1].errors[quantity]
-        whole = tried[curve][0].status != "ok" and own[-1].errors[quantity] <= min(problem.tolerances)
+        ended = tried[curve][0].status != "ok" or own[0].setting.cells
+        whole = ended and own[-1].errors[quantity] <= min(problem.tolerances)
         settled = len(own) > 1 and own[-1].errors[quantity] >= SETTLED * own[-2].errors[quantity]
         uncut = own[0].setting.cells and len(tried[curve]) == 1
         if not uncut and (len(own) < 6 or not (wide or whole or settled or 0 < own[0].setting.order < 4)):

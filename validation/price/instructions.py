@@ -1,0 +1,88 @@
+"""Instructions per step of every method with fixed steps, counted by valgrind: a cost that does not wander.
+
+Two processes march the same, copies of one that has loaded everything; within each, two numbers of steps are
+differenced, so that the start of a run drops out.
+Counts compare the same code over time and between settings: valgrind offers the program another processor than this
+one, and its instructions are no time.
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.assembly import assemble
+from models.engines.stability import linearised
+from validation.price import instructions_run
+from validation.price.tables import named
+from validation.rows import Row, System, Table, at_most, not_run
+from validation.scenes import road_scene
+
+SYSTEM: System = "cost"
+METHODS = {
+    "exudyn": ("GeneralizedAlpha", "TrapezoidalIndex2", "RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler",
+               "VelocityVerlet"),
+    "mujoco": ("Euler", "implicit", "implicitfast", "discrete", "RK4"),
+}  # fmt: skip
+STEPS = (40, 120)
+"""Steps of the runs that are differenced."""
+BOUND = 1e-6
+PATIENCE = 900
+"""Seconds until a process is given up."""
+ID, WHAT = "price.instructions", f"instructions of {sum(map(len, METHODS.values()))} methods counted in two processes"
+
+
+def measure(folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """The row of how well counts repeat, and instructions per step by curve; not run where there is no valgrind."""
+    if shutil.which("valgrind") is None:
+        return [not_run(ID, SYSTEM, WHAT, "valgrind is not installed")], {}
+    try:
+        first, again = _counted(folder / "instructions")
+    except (subprocess.SubprocessError, OSError) as error:
+        return [not_run(ID, SYSTEM, WHAT, f"valgrind failed: {str(error).splitlines()[0][:120]}")], {}
+    off = float(np.abs(again / first - 1.0).max())
+    row = at_most(ID, SYSTEM, f"{WHAT}: largest difference of a run", off, "relative", BOUND,
+                  "the same instructions in the same order: seed of hashes and number of threads are set", "none")
+    per_step = np.diff(first, axis=1)[:, 0] / (STEPS[1] - STEPS[0])
+    curves = [f"{engine} {method}" for engine, methods in METHODS.items() for method in methods]
+    return [row], dict(zip(curves, per_step.tolist(), strict=True))
+
+
+def _counted(folder: Path) -> np.ndarray:
+    """Instructions (2 processes, methods, 2 numbers of steps), by the marks between the marches."""
+    folder.mkdir()
+    vehicle = assemble(road_scene()).vehicle
+    mass, damping, stiffness, *_ = linearised(vehicle)
+    given = {"masses": np.diag(mass).tolist(), "damping": damping.tolist(), "stiffness": stiffness.tolist(),
+             "methods": METHODS, "steps": STEPS}  # fmt: skip
+    settled = {**os.environ, "PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+    command = ["valgrind", "--tool=callgrind", f"--dump-before={instructions_run.MARK}",
+               f"--callgrind-out-file={folder}/count.%p", sys.executable, instructions_run.__file__, json.dumps(given)]
+    subprocess.run(command, env=settled, check=True, capture_output=True, timeout=PATIENCE)
+    marches = sum(map(len, METHODS.values())) * len(STEPS)
+    found = {path: [_total(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
+             for path in folder.glob("count.*") if path.with_name(f"{path.name}.{marches + 1}").exists()}
+    shutil.rmtree(folder)
+    return np.array([*found.values()], float).reshape(2, -1, len(STEPS))
+
+
+def _total(dump: Path) -> int:
+    """Instructions of one dump."""
+    found = re.search(r"^totals: (\d+)", dump.read_text(errors="replace"), re.MULTILINE)
+    assert found is not None
+    return int(found[1])
+
+
+def table(per_step: dict[str, float]) -> Table:
+    """Instructions per step."""
+    rows = tuple((named(curve), f"{count / 1e3:,.1f}") for curve, count in per_step.items())
+    note = (f"Linear pitch-plane vehicle, steps of {1e3 * instructions_run.STEP:g} ms, all forces from one Python "
+            "function, which they include: the engine, the way into Python and a law there. The start of a run is "
+            "differenced out.")  # fmt: skip
+    return Table("Instructions per step", note, ("method", "thousand instructions a step"), rows)

@@ -1,0 +1,111 @@
+"""Marches whose instructions ``instructions`` counts, by themselves in a process: no kernel that would be compiled.
+
+The linear pitch-plane vehicle with all forces from one Python function, in both engines, method after method. Once
+everything is loaded, two copies of the process march, one after the other: to load it all twice would take most of the
+time. Between two marches a copy asks for its own group, which is what valgrind is told to begin a new count at.
+"""
+
+import gc
+import json
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+STEP = 1e-3
+MARK = "getpgid"
+"""Function of the C library that no engine calls."""
+
+
+def law_of(damping: list[list[float]], stiffness: list[list[float]]) -> Callable[[Any, Any], list[float]]:
+    """Forces -K q - D q' of lists."""
+    rows = [(*k, *d) for k, d in zip(stiffness, damping, strict=True)]
+
+    def law(q: Any, v: Any) -> list[float]:
+        a, b, c, d = q
+        e, f, g, h = v
+        return [-(r[0] * a + r[1] * b + r[2] * c + r[3] * d + r[4] * e + r[5] * f + r[6] * g + r[7] * h) for r in rows]
+
+    return law
+
+
+def exudyn_marches(masses: list[float], law: Callable[[Any, Any], list[float]], methods: list[str]) -> list[Any]:
+    """A function of a number of steps for each method."""
+    import exudyn as exu
+    import exudyn.itemInterface as items
+    import numpy as np
+
+    exu.config.printToConsole = False
+    container = exu.SystemContainer()
+    mbs: Any = container.AddSystem()
+    node = mbs.AddNode(items.NodeGenericODE2(
+        numberOfODE2Coordinates=4, referenceCoordinates=[0.0] * 4, initialCoordinates=[1e-3] * 4,
+        initialCoordinates_t=[0.0] * 4))  # fmt: skip
+    mbs.AddObject(items.ObjectGenericODE2(nodeNumbers=[node], massMatrix=np.diag(masses),
+                                          forceUserFunction=lambda mbs, t, item, q, v: law(q, v)))  # fmt: skip
+    mbs.Assemble()
+    options = exu.SimulationSettings()
+    options.solution.file.write = options.solution.sensors.active = False
+    ti = options.timeIntegration
+    ti.adaptiveStep = ti.automaticStepSize = ti.explicit.computeEndOfStepAccelerations = False
+    ti.verboseMode = 0
+
+    def march(method: str, steps: int) -> None:
+        ti.numberOfSteps, ti.endTime = steps, steps * STEP
+        mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, method))
+
+    return [lambda steps, method=method: march(method, steps) for method in methods]
+
+
+def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], methods: list[str]) -> list[Any]:
+    """Likewise, in MuJoCo's own loop."""
+    import mujoco
+
+    bodies = "".join(f'<body><joint type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="{mass!r}" '
+                     'diaginertia="1 1 1"/></body>' for mass in masses)  # fmt: skip
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="{STEP}" gravity="0 0 0"><flag contact="disable" constraint="disable"/></option>'
+        f"<worldbody>{bodies}</worldbody></mujoco>")  # fmt: skip
+    data = mujoco.MjData(model)
+
+    def passive(model: Any, data: Any) -> None:
+        data.qfrc_passive[:] = law(data.qpos.tolist(), data.qvel.tolist())
+
+    def march(method: str, steps: int) -> None:
+        model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{method.upper()}")
+        mujoco.mj_resetData(model, data)
+        data.qpos[:] = 1e-3
+        mujoco.mj_step(model, data, steps)
+
+    mujoco.set_mjcb_passive(passive)
+    return [lambda steps, method=method: march(method, steps) for method in methods]
+
+
+def main(given: dict[str, Any]) -> None:
+    """Every march once for warmth, then all of them in two copies of the process."""
+    law = law_of(given["damping"], given["stiffness"])
+    marches = [march for engine, make in (("exudyn", exudyn_marches), ("mujoco", mujoco_marches))
+               for march in make(given["masses"], law, given["methods"][engine])]  # fmt: skip
+    gc.disable()
+    for march in marches:
+        march(given["steps"][0])
+    for _ in range(2):
+        copy = os.fork()
+        if copy == 0:
+            counted(marches, given["steps"])
+        if os.waitpid(copy, 0)[1] != 0:
+            raise SystemExit("a copy failed")
+
+
+def counted(marches: list[Callable[[int], None]], numbers: list[int]) -> None:
+    """Every march for each number of steps, with a mark before each and at the end; then the process is over."""
+    for march in marches:
+        for steps in numbers:
+            os.getpgid(0)
+            march(steps)
+    os.getpgid(0)
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main(json.loads(sys.argv[1]))

@@ -1,0 +1,177 @@
+"""What a step in an engine is made of: the engine, the bridge to the forces, and the forces' own kernel.
+
+Three runs tell, which differ in the callback alone: an empty one (the engine), a cheap one, which is handed all
+positions and rates and hands back a damper's forces (more than that by the bridge), and the real one (the kernel).
+"""
+
+import struct
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numba import carray
+
+from models.compiled import njit
+from models.contact.stack import at, beyond
+from models.engines.contact_bridge import Wheels, forces
+from models.engines.contact_bridge_exudyn import Forces, Rolling
+from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law
+from models.engines.mujoco_callback import installed
+from models.engines.protocol import Settings
+from models.engines.reference import derivative_of
+from studies.figures import LABELS
+from validation.price.compiled_forces import CompiledForces, law
+from validation.price.instructions_run import exudyn_marches
+from validation.price.problems import road_excited, wheelset
+from validation.price.problems.road_excited import STAGES
+from validation.rows import Row, System, Table, finding
+from validation.timing import interleave, interval, resamples
+
+SYSTEM: System = "cost"
+RUNS = ("empty", "cheap", "real")
+STEPS = {"road": 1000, "wheel-20": 400}
+"""Steps of a run, by the problem's key."""
+STEP = {"road": 1e-3, "wheel-20": 2.5e-4}
+"""s"""
+DAMPER = 1e-3
+"""N s/m of the cheap law, which moves next to nothing."""
+METHODS = {"exudyn": "RK44", "mujoco": "RK4"}
+Of = Callable[[Any, Any], list[float]]
+
+
+@njit(cache=True, error_model="numpy")
+def damper(numbers, q, v, f):
+    """Add a weak damper's forces on four coordinates to ``f``; all are pointers to doubles."""
+    rate, force = carray(v, (4,)), carray(f, (4,))
+    for i in range(4):
+        force[i] -= DAMPER * rate[i]
+
+
+@njit(cache=True, error_model="numpy")
+def handed_damper(block):
+    """Set the damper's forces in one block of doubles at an address, f, q and v (4,) each."""
+    f = at(block)
+    carray(f, (4,))[:] = 0.0
+    damper(f, beyond(f, 4), beyond(f, 8), f)
+
+
+def handed() -> Of:
+    """Forces of lists of positions and rates by ``handed_damper``, the way ``Forces`` hands them over."""
+    block = np.zeros(12)
+    pack, raw, address = struct.Struct("8d").pack_into, block.data.cast("B")[32:], block.ctypes.data
+    answer = block[:4].data.tolist
+
+    def of(positions: Any, rates: Any) -> list[float]:
+        pack(raw, 0, *positions, *rates)
+        handed_damper(address)
+        return answer()
+
+    return of
+
+
+def nothing(positions: Any, rates: Any) -> list[float]:
+    """No forces, whatever the state."""
+    return ZEROS
+
+
+ZEROS = [0.0] * 4
+
+
+def marches() -> dict[tuple[str, str], list[Callable[[], Any]]]:
+    """The three runs by problem and engine."""
+    return {("road", "exudyn"): _road_exudyn(), ("road", "mujoco"): _road_mujoco(),
+            ("wheel-20", "exudyn"): _wheel_exudyn(), ("wheel-20", "mujoco"): _wheel_mujoco()}  # fmt: skip
+
+
+def _road_exudyn() -> list[Callable[[], Any]]:
+    """The vehicle on a road that is flat: its forces by the reference's own right-hand side."""
+    assembly = road_excited.problem(True).assembly
+    p, y, road = assembly.parameters.array(), np.empty(8), np.zeros(4)
+    masses = [assembly.parameters.m1, assembly.parameters.m2, assembly.parameters.m3, assembly.parameters.I]
+    derivative, scale = derivative_of("road", assembly.vehicle.geometry), np.array(masses)
+
+    def of(positions: Any, rates: Any) -> list[float]:
+        y[:4], y[4:] = positions, rates
+        return (scale * derivative(y, road, p)[4:]).tolist()
+
+    return [partial(exudyn_marches(masses, one, [METHODS["exudyn"]])[0], STEPS["road"]) for one in
+            (nothing, handed(), of)]  # fmt: skip
+
+
+def _road_mujoco() -> list[Callable[[], Any]]:
+    settings = Settings(METHODS["mujoco"], STEP["road"], STEPS["road"] * STEP["road"])
+    compiled = CompiledForces(road_excited.problem(True).assembly, settings)
+    return [partial(_within, one, compiled.coast) for one in (empty_law(), native_law(damper), law())]
+
+
+def _wheel_exudyn() -> list[Callable[[], Any]]:
+    wheels, steps, step = _wheels()
+    return [partial(Rolling(wheels, of).run, *wheels.state(), steps, step, METHODS["exudyn"])
+            for of in (nothing, handed(), Forces(wheels).of)]  # fmt: skip
+
+
+def _wheel_mujoco() -> list[Callable[[], Any]]:
+    wheels, steps, step = _wheels()
+    marcher, start = Marcher(model(wheels, step, METHODS["mujoco"])), np.concatenate(wheels.state())[None]
+    return [partial(_within, one, partial(marcher.run, start, steps))
+            for one in (empty_law(), native_law(damper), native_law(forces))]  # fmt: skip
+
+
+def _wheels() -> tuple[Wheels, int, float]:
+    return Wheels(1, cells=wheelset.CELLS, speed=20.0), STEPS["wheel-20"], STEP["wheel-20"]
+
+
+def _within(callback: Any, run: Callable[[], Any]) -> None:
+    with installed(callback):
+        run()
+
+
+def measure(rounds: int, least: float) -> list[dict[str, Any]]:
+    """Seconds of the three runs in every round, by problem and engine."""
+    found = marches()
+    seconds = interleave([job for jobs in found.values() for job in jobs], rounds, least)
+    return [{"problem": problem, "engine": engine, "seconds": dict(zip(RUNS, own.tolist(), strict=True))}
+            for (problem, engine), own in zip(found, seconds.reshape(len(found), 3, -1), strict=True)]  # fmt: skip
+
+
+def parts(saved: dict[str, Any]) -> np.ndarray:
+    """Microseconds a step of engine, bridge and kernel (3,), by the least of all rounds: what else a machine does only
+    adds."""
+    empty, cheap, real = (1e6 * min(saved["seconds"][run]) / STEPS[saved["problem"]] for run in RUNS)
+    return np.array([empty, cheap - empty, real - cheap])
+
+
+def share(saved: dict[str, Any]) -> tuple[float, float, float]:
+    """The bridge's share of a step in % with its 95 % interval, by the medians of resampled rounds."""
+    empty, cheap, real = (np.array(saved["seconds"][run]) for run in RUNS)
+    ratio = 100.0 * (cheap - empty) / real
+    _, low, high = interval(np.median(ratio[resamples(ratio.size)], axis=1))
+    return float(np.median(ratio)), low, high
+
+
+def rows(data: list[dict[str, Any]]) -> list[Row]:
+    """The bridge's share, reported."""
+    found = []
+    for one in data:
+        middle, low, high = share(one)
+        what = f"{LABELS[one['engine']]} {METHODS[one['engine']]}, {one['problem']}: the bridge's share of a step"
+        found.append(finding(f"price.{one['problem']}.split.{one['engine']}", SYSTEM, what, middle, "%",
+                             f"95 % interval {low:.0f} to {high:.0f}", "seconds are reported and never gated",
+                             "none"))  # fmt: skip
+    return found
+
+
+def table(data: list[dict[str, Any]], problem: str) -> list[Table]:
+    """What a step of a problem is made of; nothing where it was not split."""
+    lines = []
+    for one in (one for one in data if one["problem"] == problem):
+        method, (_, low, high) = METHODS[one["engine"]], share(one)
+        lines.append((f"{LABELS[one['engine']]} {method}", str(STAGES[method]),
+                      *(f"{value:.2f}" for value in parts(one)), f"{low:.0f} to {high:.0f}"))
+    note = (f"Microseconds a step, least of all rounds, over {STEPS.get(problem, 0):,} steps; all forces in one "
+            "callback, compiled in MuJoCo, from Python in Exudyn. Engine: with an empty callback; bridge: what one "
+            "costs that is handed the state and hands back a damper's forces; kernel: what the real forces cost beyond "
+            "that.")  # fmt: skip
+    heads = ("method", "calls a step", "engine", "bridge", "kernel", "bridge's share, 95 % interval [%]")
+    return [Table("What a step is made of", note, heads, tuple(lines))] if lines else []
