@@ -74,6 +74,10 @@ class PriceList:
 def price_list(scene: Any, engine: str | None = None) -> PriceList:
     """Run the scene, and every scene that has one effect more or less. Raises InputError or RunFailed where the scene
     itself cannot be run."""
+    if scene.system == "ride":
+        from validation.price.effects_of_ride import price_list_of_ride
+
+        return price_list_of_ride(scene)
     system = system_of(scene)
     engine, whole = engine or system.ENGINE, system.steps(scene)
     short = Variants(scene, engine).window(STEPS).scene
@@ -89,7 +93,7 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
     micros = _turns(runs)
     prices = [_price(short, name, base, first.get(name), micros.get(name), micros[""], whys.get(name, ""))
               for name in (*named(short), *absent(short))]  # fmt: skip
-    return PriceList(scene.title, engine, system.steps(short), whole, base.counts, _spread(micros[""]), tuple(prices))
+    return PriceList(scene.title, engine, system.steps(short), whole, base.counts, spread(micros[""]), tuple(prices))
 
 
 def _turns(runs: dict[str, Callable[[], Answer]]) -> dict[str, np.ndarray]:
@@ -105,7 +109,8 @@ def _turns(runs: dict[str, Callable[[], Answer]]) -> dict[str, np.ndarray]:
     return {name: np.array(values) for name, values in found.items()}
 
 
-def _spread(values: np.ndarray) -> tuple[float, float]:
+def spread(values: np.ndarray) -> tuple[float, float]:
+    """Median and median absolute deviation."""
     told = describe(values.tolist())
     return told["median"], told["mad"]
 
@@ -119,7 +124,7 @@ def _price(scene: Any, name: str, base: Answer, other: Answer | None, took: np.n
     slow, fast = (own, took) if there else (took, own)
     seconds = np.maximum(slow, 1e-9), np.maximum(fast, 1e-9)
     gone = tuple(key for key in after.quantities if key not in before.quantities)
-    return Price(name, there, says, "", (before.counts, after.counts), _spread(slow - fast), paired_ratio(*seconds),
+    return Price(name, there, says, "", (before.counts, after.counts), spread(slow - fast), paired_ratio(*seconds),
                  _changes(base, other), gone)  # fmt: skip
 
 

@@ -9,6 +9,8 @@ from validation.price.effects import Changed, Price, PriceList
 
 SHOWN = 3
 """Quantities of an effect that are printed; JSON has all."""
+WIDTH = 26
+"""Of the column of names."""
 NOTHING = 1e-12
 """Relative change that is rounding."""
 
@@ -21,9 +23,13 @@ def lines(found: PriceList, quantities: list[str]) -> list[str]:
             f"  {found.engine}, {counts}{part}; {_micros(found.micros)} a step, CPU, median and its deviation",
             "", "  effects of the scene: what each adds to it, and what leaving it out changes",
             *(line for one in found.prices if one.there for line in _price(one, quantities)),
-            "", "  effects that it could have, at usual values: the same of putting it in",
-            *(line for one in found.prices if not one.there for line in _price(one, quantities)),
+            *_absent(found, quantities),
             "", "  changes: rms of the difference, largest of all cases; in ( ) by the quantity's own deviation"]
+
+
+def _absent(found: PriceList, quantities: list[str]) -> list[str]:
+    rows = [line for one in found.prices if not one.there for line in _price(one, quantities)]
+    return ["", "  effects that it could have, at usual values: the same of putting it in", *rows] if rows else []
 
 
 def _micros(spread: tuple[float, float]) -> str:
@@ -32,12 +38,13 @@ def _micros(spread: tuple[float, float]) -> str:
 
 def _price(one: Price, quantities: list[str]) -> list[str]:
     """One effect: its cost in one line, what it changes in another."""
+    name = f"    {one.name:<{WIDTH}} "
     if one.why:
-        return [f"    {one.name:<24}no price: {one.why}"]
+        return [f"{name}no price: {one.why}"]
     ratio = f"{one.ratio[0]:.3g} times ({one.ratio[1]:.3g} to {one.ratio[2]:.3g})"
-    cost = f"    {one.name:<24}{one.micros[0]:+.3g} +- {one.micros[1]:.1g} us a step, {ratio}{_counts(one)}"
+    cost = f"{name}{one.micros[0]:+.3g} +- {one.micros[1]:.1g} us a step, {ratio}{_counts(one)}"
     new = f"; there with it alone: {', '.join(one.gone[:SHOWN])}{', ...' if len(one.gone) > SHOWN else ''}"
-    return [cost, f"    {'':<24}{_changes(one, quantities)}{new if one.gone else ''}"]
+    return [cost, f"    {'':<{WIDTH}} {_changes(one, quantities)}{new if one.gone else ''}"]
 
 
 def _counts(one: Price) -> str:

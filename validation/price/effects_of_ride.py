@@ -1,0 +1,101 @@
+"""The price list of a linear stationary scene of ride, in closed form: states, calls at the step limit, deviations.
+
+Only microseconds are measured, those of a step of the classical Runge-Kutta method on the vehicle's own matrix.
+"""
+
+import time
+from typing import Any
+
+import numpy as np
+
+from models.errors import InputError
+from models.ride.choice.cost import cost
+from models.ride.choice.held import Effect, Held, effects_of, illegal, without
+from models.ride.choice.reduced import Reduced, Whole
+from models.ride.choice.screen import confirmed
+from models.ride.of_scene import check_linear, told_by, vehicle_of
+from validation.price.effects import ROUNDS, SEED, Changed, Price, PriceList, spread
+from validation.timing import paired_ratio
+
+STEPS = 500
+"""Steps that are timed in every turn."""
+
+
+def price_list_of_ride(scene: Any) -> PriceList:
+    """Prices at the scene's middle speed; InputError for what is neither linear nor at constant speed."""
+    if scene.speeds is None:
+        raise InputError(scene.file, "drive", None, "has no effects priced in closed form: give [speeds]")
+    held = Held(scene, vehicle_of(scene))
+    check_linear(scene, held.vehicle)
+    speeds = scene.speeds.all()
+    with told_by(scene):
+        whole = Whole(held, float(speeds[len(speeds) // 2]))
+        effects = effects_of(held)
+        rests = {effect.name: _rest(whole, effect) for effect in effects}
+    systems = {"": whole.full} | {name: rest for name, rest in rests.items() if isinstance(rest, Reduced)}
+    micros = _turns(systems)
+    prices = tuple(_price(whole, effect, rests[effect.name], micros) for effect in effects)
+    return PriceList(f"{scene.title}, at {whole.speed:g} m/s", "closed form", STEPS, STEPS, _counts(whole.full),
+                     spread(micros[""]), prices)  # fmt: skip
+
+
+def _rest(whole: Whole, effect: Effect) -> Reduced | str:
+    """The scene without an effect, or why there is none."""
+    why = illegal([effect])
+    if why:
+        return why
+    try:
+        return whole.reduced(without(whole.held, [effect]))
+    except InputError as error:
+        return error.allowed
+
+
+def _counts(system: Reduced) -> dict[str, int]:
+    """States, and calls per second of motion at the step limit."""
+    own = cost(system)
+    return {"states": own.states, "calls per second": round(own.calls) if np.isfinite(own.calls) else 0}
+
+
+def _turns(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
+    """CPU microseconds of a step (ROUNDS,) of every system, in a random order."""
+    found, names = {name: np.empty(ROUNDS) for name in systems}, list(systems)
+    order = np.random.default_rng(SEED)
+    for i in range(ROUNDS):
+        for j in order.permutation(len(names)):
+            system = systems[names[j]]
+            found[names[j]][i] = _timed(system.system.A[: system.states, : system.states])
+    return found
+
+
+def _timed(A: np.ndarray) -> float:
+    """Microseconds of a step."""
+    x, step = np.ones(len(A)), 1e-6
+    begun = time.process_time()
+    for _ in range(STEPS):
+        k1 = A @ x
+        k2 = A @ (x + step / 2 * k1)
+        k3 = A @ (x + step / 2 * k2)
+        x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + A @ (x + step * k3))
+    return 1e6 * (time.process_time() - begun) / STEPS
+
+
+def _price(whole: Whole, effect: Effect, rest: Reduced | str, micros: dict[str, np.ndarray]) -> Price:
+    if isinstance(rest, str):
+        return Price(effect.name, True, effect.says, rest)
+    own, without_it = micros[""], micros[effect.name]
+    return Price(effect.name, True, effect.says, "", (_counts(rest), _counts(whole.full)), spread(own - without_it),
+                 paired_ratio(own, without_it), _changes(whole, rest))  # fmt: skip
+
+
+def _changes(whole: Whole, rest: Reduced) -> tuple[Changed, ...]:
+    """Standard deviations, exact; infinite where white noise reaches a quantity."""
+    names = whole.full.system.names
+    rows = list(range(len(names)))
+    try:
+        with np.errstate(invalid="ignore"):
+            full, left = (np.sqrt(confirmed(system, rows)) for system in (whole.full, rest))
+    except InputError:
+        return ()
+    found = [Changed(name, "", float(abs(b - a)), float(abs(b / a - 1.0)))
+             for name, a, b in zip(names, full, left, strict=True) if np.isfinite(a) and a > 0.0]  # fmt: skip
+    return tuple(sorted(found, key=lambda one: -one.relative))
