@@ -47,11 +47,15 @@ def test_what_fails_now_comes_first():
 
 
 def test_the_report_tells_changes_and_is_drawn_again_from_its_results(tmp_path):
-    (tmp_path / "old.json").write_text(json.dumps({"provenance": {"quick": True, "commit": "abc"},
+    (tmp_path / "old.json").write_text(json.dumps({"provenance": {"quick": True, "commit": "abc", "python": "3.11",
+                                                                  "versions": {"numpy": "1", "scipy": "1"}},
                                                    "rows": [*table(VALUE, WORD).values()]}))  # fmt: skip
     rows = [*changed(VALUE, value=2.25).values()]
-    found = against(read(tmp_path / "old.json"), rows, quick=False)
-    assert found["note"] and "2 changes: 0 of status, 1 gone, 0 new, 0 judged otherwise, 1 of value" in lines(found)[0]
+    found = against(read(tmp_path / "old.json"), rows,
+                    {"quick": False, "versions": {"numpy": "2", "scipy": "1"}, "python": "3.12"})
+    assert found["note"] == ("the earlier report is the quick one and this the full one; version of numpy 1 -> 2; "
+                             "python 3.11 -> 3.12")
+    assert "2 changes: 0 of status, 1 gone, 0 new, 0 judged otherwise, 1 of value" in lines(found)[0]
     (tmp_path / "results.json").write_text(json.dumps({"provenance": {}, "rows": rows, "against": found}))
     first = write(tmp_path).read_bytes()
     assert b"What changed" in first and b"a.word" in first and write(tmp_path).read_bytes() == first

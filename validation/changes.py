@@ -34,13 +34,27 @@ def read(path: Path) -> dict[str, Any]:
         raise InputError("--against", "", str(file), allowed) from None
 
 
-def against(earlier: dict[str, Any], rows: list[dict[str, Any]], quick: bool) -> dict[str, Any]:
-    """What ``results.json`` keeps of the comparison: with what, a warning if that was another share, all changes."""
-    source = earlier["provenance"]
-    shares = [("quick" if one else "full") for one in (bool(source.get("quick")), quick)]
-    note = "" if shares[0] == shares[1] else f"the earlier report is the {shares[0]} one and this the {shares[1]} one"
-    return {"file": earlier["file"], "commit": str(source.get("commit", "unknown")), "note": note,
+def against(earlier: dict[str, Any], rows: list[dict[str, Any]], source: dict[str, Any]) -> dict[str, Any]:
+    """What ``results.json`` keeps of the comparison: with what, notes, all changes.
+
+    source : provenance of the rows; the notes say where that of the earlier report differs in what numbers depend on.
+    """
+    was = earlier["provenance"]
+    old, new = (("quick" if one.get("quick") else "full") for one in (was, source))
+    notes = [] if old == new else [f"the earlier report is the {old} one and this the {new} one"]
+    notes += [f"{name} {before} -> {now}" for name, before, now in _other(was, source)]
+    return {"file": earlier["file"], "commit": str(was.get("commit", "unknown")), "note": "; ".join(notes),
             "changes": changes(earlier["rows"], {row["id"]: row for row in rows})}  # fmt: skip
+
+
+def _other(was: dict[str, Any], source: dict[str, Any]) -> Iterator[tuple[str, Any, Any]]:
+    """Versions, seeds, Python, machine and system that are not the same, in the order of the earlier report."""
+    for name in ("versions", "seeds"):
+        old, new = was.get(name) or {}, source.get(name) or {}
+        yield from ((f"{name[:-1]} of {key}", old.get(key), new.get(key)) for key in {**old, **new}
+                    if old.get(key) != new.get(key))  # fmt: skip
+    yield from ((name, was.get(name), source.get(name)) for name in ("python", "machine", "system")
+                if was.get(name) != source.get(name))  # fmt: skip
 
 
 def changes(before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any]]) -> list[Change]:

@@ -157,7 +157,7 @@ def save(folder: Path, rows: list[Row], source: dict[str, Any], earlier: dict[st
     table = [row.as_dict() for row in rows]
     content: dict[str, Any] = {"provenance": source, "rows": table}
     if earlier is not None:
-        content["against"] = against(earlier, table, source["quick"])
+        content["against"] = against(earlier, table, source)
         print("\n".join(lines(content["against"])))
     write_whole(folder / "results.json", json.dumps(content, indent=1).encode())
     with (folder / "results.csv").open("w", newline="") as file:
