@@ -83,7 +83,7 @@ def _values(key: str, time: float, states: np.ndarray, sure: np.ndarray) -> list
 
 def _numbers(problem: ForceExcited | road_excited.RoadExcited) -> str:
     """Parameters and the start."""
-    numbers = ", ".join(f"{name} = {value:.17g}" for name, value in problem.assembly.parameters)
+    numbers = ", ".join(f"{name} = {value!r}" for name, value in problem.assembly.parameters)
     start = ", ".join(f"{name} = {value:.16e}" for name, value in zip(NAMES, problem.assembly.initial, strict=True))
     return f"Parameters (SI): {numbers}.\n\nStart: {start}."
 

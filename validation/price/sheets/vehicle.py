@@ -1,5 +1,6 @@
 """Sheet of the passenger car of 19 freedoms that is free on the road."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -78,7 +79,7 @@ def _states(problem: FreeVehicle) -> list[tuple[str, str]]:
 def _tables(vehicle: SpatialVehicle) -> str:
     """Every number of the vehicle."""
     held = preloads(vehicle)
-    parts = {
+    parts: dict[tuple[str, ...], Sequence[tuple[str, ...]]] = {
         ("body", "mass [kg]", "place", "freedoms", "inertia, rows", "parent"): [
             (b.name, f"{b.mass:.17g}", vector(b.position), " ".join(b.freedoms), " ".join(map(vector, b.inertia)),
              b.parent or "space") for b in vehicle.bodies],
@@ -95,7 +96,8 @@ def _tables(vehicle: SpatialVehicle) -> str:
             (f.name, f.body, vector(f.point), f"{f.stiffness:.17g}") for f in vehicle.side_forces],
         ("drag", "c [N s^2/m^2]"): [(d.body, f"{d.coefficient:.17g}") for d in vehicle.drags],
     }  # fmt: skip
-    lines = []
-    for heads, rows in parts.items():
-        lines += ["| " + " | ".join(row) + " |" for row in (heads, ["---"] * len(heads), *rows)] + [""]
-    return "\n".join(lines)
+    return "\n\n".join(_table(heads, rows) for heads, rows in parts.items())
+
+
+def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    return "\n".join(f"| {' | '.join(row)} |" for row in (heads, ("---",) * len(heads), *rows))
