@@ -1,5 +1,6 @@
 """Scenes of braking: a vehicle, the road under its tyres, brakes, a controller in the loop, and a test procedure."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -17,6 +18,8 @@ from models.strict import Strict, quantity
 
 LARGEST_SPEED = 100.0
 """m/s; no road vehicle brakes from more."""
+LONGEST_STEP = 0.02
+"""s: up to which light braking and braking from rolling were held to their closed forms."""
 Procedures = Literal["straight", "split", "turn", "j_turn"]
 
 
@@ -216,6 +219,10 @@ def _check_vehicle(scene: BrakingScene) -> None:
 def _check_run(scene: BrakingScene) -> None:
     if not 1e-4 <= scene.run.sample <= 0.1:
         raise InputError(scene.file, "run.sample", scene.run.sample, "must be from 0.0001 to 0.1 s")
+    if scene.run.sample / scene.run.substeps > LONGEST_STEP * (1.0 + 1e-9):
+        least = math.ceil(scene.run.sample / LONGEST_STEP - 1e-9)
+        raise InputError(scene.file, "run.substeps", scene.run.substeps, f"must be at least {least}: steps of more "
+                         f"than {LONGEST_STEP:g} s mistake stopping distances by percents")
     if scene.pressure is not None and scene.pressure.delay > 1.0:
         raise InputError(scene.file, "pressure.delay", scene.pressure.delay, "must be at most 1 s")
     if scene.run.duration < 2.0 * scene.run.sample:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from models.braking.controllers import CONTROLLERS
 from models.errors import InputError
 from models.handling.in_engines import driven
 from models.handling.scene import HandlingScene, build
@@ -24,6 +25,7 @@ from models.road.iso8608 import iso8608_road
 from models.sensors.rotations import integrate
 from models.signals import sampled
 from models.vehicles.vehicle_file import load_vehicle
+from validation.hard_cases.braking import braking_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 from validation.hard_cases.rolling import STEP, built
 
@@ -141,6 +143,9 @@ CASES = (
          lambda: car(steer=[[0.0005 * i, 0.02 * (i % 2)] for i in range(1, 200)])),
         ("rough road at 1000 m/s", "a step passes two waves", lambda: car(speed=1000.0, rough=True)),
         ("hub forces of a road at 500 m/s", "a step passes two waves", short_waves),
+        ("braking in steps of 0.1 s", "stops 3 % short", lambda: braking_scene(run={"sample": 0.1, "substeps": 1})),
+        ("controller with a share that is no number", "would spread to every pressure",
+         lambda: CONTROLLERS["slip_pi"](4, mix=float("nan"), period=5.5e-3)),
         ("low-pass slower than its record", "what is beyond the ends is all that is left",
          lambda: smoothed(np.linspace(0.0, 1.0, 2001)[:, None], 1e-3, 0.01, "", "bandwidth")),
         ("body that turns 4 rad from sample to sample", "nobody can tell the way it went",
