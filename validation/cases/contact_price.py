@@ -1,7 +1,9 @@
-"""What accuracy costs in rolling contact: every theory against the exact one, and whether stated errors hold."""
+"""Errors that are stated with creep forces: whether they hold, and what a table of contacts takes.
+
+What accuracy costs in rolling contact stands among the problems of ``price``.
+"""
 
 import time
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -12,17 +14,14 @@ from models.contact.cases_table import answer
 from models.contact.hertz import by_axes
 from models.contact.scene import Method
 from models.contact.theories import Fastsim
-from models.contact.work_precision import WAYS, Case, Point, cheapest_lines, duration, exact
-from models.contact.work_precision import measure as price
+from models.contact.work_precision import Case, exact
 from validation.contact.contact_bands import FASTSIM, SHARE, held, kept
 from validation.contact.contact_set import FRICTION, JUDGED, LOAD, PAIR, read, read_drawn
 from validation.contact.programs import compare, table
 from validation.rows import Row, System, Table, at_most, finding
 
-TITLE = "What accuracy costs in rolling contact"
+TITLE = "Stated errors of rolling contact"
 SYSTEM: System = "contact"
-EXACT_EVERY, SLOW = 23, ("theory of 1983", "exact theory")
-"""Every so many cases of the set stand for all of them where an evaluation takes milliseconds."""
 REPEATED = ((1.0, "x", 0.5), (1.0, "spin", 1.2), (0.5, "x+y", 0.8), (2.0, "y+spin", 0.8), (5.0, "x-y+spin", 0.5),
             (0.2, "y-spin", 1.2))  # fmt: skip
 """Cases of the set that are computed anew; a quick run takes the first two on coarser grids."""
@@ -35,21 +34,13 @@ ROWS, SEED = 100_000, 41
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Whether stated errors hold; in the full run also every theory's price and Kalker's two programs."""
+    """Whether stated errors hold; in the full run also Kalker's two programs and a long table."""
     cases = read()
     rows = _reference_rows(cases, quick) + _band_rows(cases, quick) + _cell_rows(cases[::9] if quick else cases)
     if quick:
         return rows, {}
-    points = measure_points(cases)
     programs = compare(cases[::2])
-    rows += [*_point_rows(points), *_program_rows(programs), _table_row(folder)]
-    return rows, {"points": [asdict(one) for one in points], "programs": programs}
-
-
-def measure_points(cases: list[Case]) -> list[Point]:
-    """All theories on all numbers of cells, the slow ones on a part of the cases."""
-    some = cases[::EXACT_EVERY]
-    return [price(way, cells, some if way.name in SLOW else cases) for way in WAYS for cells in way.cells]
+    return [*rows, *_program_rows(programs), _table_row(folder)], {"programs": programs}
 
 
 def _reference_rows(cases: list[Case], quick: bool) -> list[Row]:
@@ -102,17 +93,6 @@ def _cell_rows(cases: list[Case]) -> list[Row]:
                                               strict=True)]  # fmt: skip
 
 
-def _point_rows(points: list[Point]) -> list[Row]:
-    """Mean, 95 of 100 and largest error of every theory on its finest cells, reported."""
-    finest = {one.name: one for one in points}
-    why = "an error of the theory; that of its cells is smaller"
-    return [finding(f"contact_price.error.{name.replace(' ', '-').replace(',', '')}", SYSTEM,
-                    f"{name}, {one.cells} cells: mean error over {len(one.errors)} contacts ({100 * one.most:.2g} % in "
-                    f"95 of 100, {100 * max(one.errors):.2g} % at most), {duration(one.seconds)}",
-                    100 * one.mean, "% of mu N", "", why, "native")
-            for name, one in finest.items()]  # fmt: skip
-
-
 def _program_rows(found: dict[str, Any]) -> list[Row]:
     t, why = found["seconds"], "the paper's figure is of a computer and a Fortran program of 1983"
     what = "contact and forces by the program of 1983, by the time of the one of 1982"
@@ -138,29 +118,10 @@ def _table_row(folder: Path) -> Row:
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """The cheapest theory for each accuracy, and the paper's comparison."""
-    if not data:
-        return []
-    points = _points(data)
-    heads = ("asked for", "in the mean", "in 95 of 100 contacts")
-    note = (f"Fastest of all ways and numbers of cells; {len(points[0].errors)} contacts, for the slow ones "
-            f"{len(points[-1].errors)} of them. In brackets the error found.")  # fmt: skip
-    return [Table("Cheapest theory that meets an accuracy", note, heads, tuple(cheapest_lines(points))),
-            table(data["programs"])]  # fmt: skip
+    """The paper's comparison."""
+    return [table(data["programs"])] if data else []
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Work and precision of every theory."""
-    if not data:
-        return []
-    from studies.contact_figures import price_figure
-
-    points = _points(data)
-    title = f"What accuracy costs in rolling contact: {len(points[0].errors)} contacts"
-    return [("Error of the tangential force over time and over cells: mean (thick) and 95 of 100 contacts (thin), "
-             "against the exact theory with its cells' first order taken out.",
-             price_figure(points, title))]  # fmt: skip
-
-
-def _points(data: dict[str, Any]) -> list[Point]:
-    return [Point(**one) for one in data["points"]]
+    """None: what accuracy costs in contact is drawn beside the other problems of ``price``."""
+    return []

@@ -149,7 +149,8 @@ def _who(failed: list[Point], status: str) -> str:
     """Methods without an answer, those with none at all named."""
     own = [p for p in failed if p.status == status]
     unstable = [p for p in own if not p.setting.adaptive]
-    parts = [f"{len(unstable)} steps beyond stability (crosses)"] if unstable else []
+    what = "steps beyond stability" if status == "refused" else "settings"
+    parts = [f"{len(unstable)} {what} (crosses)"] if unstable else []
     parts += [f"{p.setting.method} ({'not implemented' if 'not implemented' in p.reason else 'see table'})"
               for p in own if p.setting.adaptive]  # fmt: skip
     return ", ".join(parts)

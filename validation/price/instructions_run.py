@@ -41,8 +41,8 @@ def exudyn_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
     node = mbs.AddNode(items.NodeGenericODE2(
         numberOfODE2Coordinates=4, referenceCoordinates=[0.0] * 4, initialCoordinates=[1e-3] * 4,
         initialCoordinates_t=[0.0] * 4))  # fmt: skip
-    mbs.AddObject(items.ObjectGenericODE2(nodeNumbers=[node], massMatrix=np.diag(masses),
-                                          forceUserFunction=lambda mbs, t, item, q, v: law(q, v)))  # fmt: skip
+    user: Any = lambda mbs, t, item, q, v: law(q, v)  # noqa: E731
+    mbs.AddObject(items.ObjectGenericODE2(nodeNumbers=[node], massMatrix=np.diag(masses), forceUserFunction=user))
     mbs.Assemble()
     options = exu.SimulationSettings()
     options.solution.file.write = options.solution.sensors.active = False
@@ -90,11 +90,16 @@ def main(given: dict[str, Any]) -> None:
     for march in marches:
         march(given["steps"][0])
     for _ in range(2):
-        copy = os.fork()
-        if copy == 0:
-            counted(marches, given["steps"])
-        if os.waitpid(copy, 0)[1] != 0:
-            raise SystemExit("a copy failed")
+        copied(marches, given["steps"])
+
+
+def copied(marches: list[Callable[[int], None]], numbers: list[int]) -> None:
+    """Count in a copy of the process, which leaves nothing behind in this one."""
+    copy = os.fork()
+    if copy == 0:
+        counted(marches, numbers)
+    if os.waitpid(copy, 0)[1] != 0:
+        raise SystemExit("a copy failed")
 
 
 def counted(marches: list[Callable[[int], None]], numbers: list[int]) -> None:

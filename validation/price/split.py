@@ -37,7 +37,7 @@ STEP = {"road": 1e-3, "wheel-20": 2.5e-4}
 DAMPER = 1e-3
 """N s/m of the cheap law, which moves next to nothing."""
 METHODS = {"exudyn": "RK44", "mujoco": "RK4"}
-Of = Callable[[Any, Any], list[float]]
+Of = Callable[[Any, Any], Any]
 
 
 @njit(cache=True, error_model="numpy")
@@ -62,7 +62,7 @@ def handed() -> Of:
     pack, raw, address = struct.Struct("8d").pack_into, block.data.cast("B")[32:], block.ctypes.data
     answer = block[:4].data.tolist
 
-    def of(positions: Any, rates: Any) -> list[float]:
+    def of(positions: Any, rates: Any) -> Any:
         pack(raw, 0, *positions, *rates)
         handed_damper(address)
         return answer()
@@ -70,7 +70,7 @@ def handed() -> Of:
     return of
 
 
-def nothing(positions: Any, rates: Any) -> list[float]:
+def nothing(positions: Any, rates: Any) -> Any:
     """No forces, whatever the state."""
     return ZEROS
 

@@ -234,7 +234,8 @@ class RollingWheels:
 
         def run() -> Result:
             calls[0] = 0
-            state = rolling.run(*np.split(self._start, 2), steps, DURATION / steps, method, tolerance)
+            q, v = np.split(self._start, 2)
+            state = rolling.run(q, v, steps, DURATION / steps, method, tolerance)
             return Result(state, {**counted(rolling.mbs), "force calls": calls[0] - AT_START.get(method, 0)})
 
         return Solver(run)
