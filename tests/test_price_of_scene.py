@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
+from models.engines.outside import register
 from models.errors import InputError, RunFailed
 from models.scene import build
 from validation.price.own_scene import Answer, Ladder
@@ -120,3 +122,22 @@ def test_a_tolerance_below_rounding_is_refused():
     scene = own(build(RELEASE), "z3", ("reference",))
     with pytest.raises((InputError, RunFailed), match=r"finer than|differ by"):
         recommend(scene, 1e-17)
+
+
+class Fixed:
+    """scipy's DOP853, whose work the tolerance alone decides."""
+
+    order, adaptive = 8, True
+
+    def integrate(self, f, times, start, tolerance):
+        return solve_ivp(f, times[[0, -1]], start, "DOP853", times, rtol=tolerance, atol=tolerance).y.T
+
+
+def test_an_integrator_of_ones_own_is_priced_by_its_tolerance():
+    name = f"{__name__}:Fixed"
+    register(name)
+    found = recommend(own(build(RELEASE), None, (name,)), 0.5)
+    best = found.winners["", "seconds"]
+    assert best.tried.setting.adaptive and 0.0 < best.error <= 0.5
+    assert len({one.setting.value for one in found.tried}) > 1
+    assert f"    # twinrig run SCENE --engine {name}" in lines(found)

@@ -78,6 +78,11 @@ def test_what_cannot_be_asked_is_one_message(table, quantity, message):
         price(scene_of(table), 1e-3, quantity, ("reference",))
 
 
+def test_a_tolerance_above_the_quantity_itself_is_doubted():
+    told, quiet = ("\n".join(lines(recommend(own(STOP, "turned.yaw"), tolerance))) for tolerance in (1e3, 1e-3))
+    assert "DOUBT: yaw is at most" in told and "DOUBT" not in quiet
+
+
 def test_a_vehicle_that_does_not_stop_has_no_price():
     with pytest.raises(RunFailed, match="does not stand after"):
         recommend(own({**STOP, "run": {"duration": 0.2}}), 1e-2)

@@ -131,7 +131,7 @@ def seeds() -> dict[str, int]:
     from validation.choice import drawn_scenes
     from validation.contact import contact_set
     from validation.measured import long_recording
-    from validation.price.own_scene import unseen
+    from validation.price.own_scene import unseen, unseen_systems
     from validation.ride import fitted_roads
 
     return {"random states": checks.SEED, "class C road": roads.SEED, "six runs": Options.model_fields["seed"].default,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.assembly import Assembly, assemble
-from models.engines.catalogue import CATALOGUE, MISSING
+from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE
 from models.engines.protocol import Settings, build
 from models.errors import InputError
 from models.scene import Scene
@@ -28,6 +28,8 @@ DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9"): 1e-2, ("mujoco", "Euler"): 2e-3}
 USUAL = {"free": "f1,f2", "road": "f1,f2", "force": "pitch", "force-body": "pitch", "pitch": "enforced_moment",
          "heave-pitch": "enforced_force"}  # fmt: skip
 """The quantity that is asked about where the user names none, by what drives the vehicle."""
+SPACING = 1e-3
+"""s: of the rows of an adaptive method from outside the tree."""
 TIGHT = 1e-10
 """Relative tolerance of the second solver, a multistep method beside the reference's Runge-Kutta."""
 
@@ -85,14 +87,15 @@ class OwnPitchPlane:
         found = []
         for engine in self.engines:
             for name, known in CATALOGUE[engine].items():
+                adaptive = known.adaptive or getattr(OUTSIDE.get(engine), "adaptive", False)
                 if known.adaptive and self.sampled and (engine, name) not in MISSING:
                     continue
                 for method in [m for m in RADII if m.startswith(name)] or [name]:
-                    values = TOLERANCES if known.adaptive else self._steps()
+                    values = TOLERANCES if adaptive else self._steps()
                     values = values[:1] if (engine, name) in MISSING else values
-                    order = 0 if known.adaptive else known.order
+                    order = 0 if adaptive else known.order
                     default = DEFAULTS.get((engine, method), 0.0)
-                    found.append(Ladder(engine, method, values, order, known.adaptive, default))
+                    found.append(Ladder(engine, method, values, order, adaptive, default))
         return found
 
     def reference(self) -> Ladder:
@@ -117,6 +120,8 @@ class OwnPitchPlane:
 
     def lines(self, setting: Setting) -> list[str]:
         """The setting as the scene file holds it."""
+        if setting.engine in OUTSIDE:
+            return _outside(setting)
         name, (_, _, radius) = setting.method.split()[0], setting.method.partition(" ")
         last = f"tolerance = {setting.value:.4g}" if setting.adaptive else f"step = {setting.value!r}"
         return [f"[engines.{setting.engine}]", f'integrator = "{name}"', last,
@@ -126,13 +131,20 @@ class OwnPitchPlane:
         if not setting.adaptive:
             return settings_of(setting, duration)
         signal = self.assembly.input
-        longest = min(ADAPTIVE_STEP[setting.engine], signal.resolution if signal is not None else 1.0)
+        longest = min(ADAPTIVE_STEP.get(setting.engine, SPACING), signal.resolution if signal is not None else 1.0)
         return Settings(setting.method, duration / math.ceil(duration / longest * (1 - 1e-9)), duration, setting.value)
 
     def _steps(self) -> tuple[float, ...]:
         """Parts of ``base``, from coarse to fine."""
         parts = np.unique(np.ceil(self.base / np.array(STEPS) * (1 - 1e-9)).astype(int))
         return tuple(self.base / int(k) for k in parts)
+
+
+def _outside(setting: Setting) -> list[str]:
+    """A class from outside the tree, which no scene names."""
+    asked = f"# twinrig run SCENE --engine {setting.engine}"
+    return [asked, f"# with the {setting.label()} in the class itself"] if setting.adaptive else [
+        "[run]", f"step = {setting.value!r}", asked]  # fmt: skip
 
 
 def own(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> OwnPitchPlane:

@@ -72,8 +72,8 @@ def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in the quantity's unit")
     if scene.system not in SYSTEMS:
-        raise InputError(scene.file, "system", scene.system, "has no price of accuracy in steps: its scenes can be "
-                         "asked", tuple(SYSTEMS))  # fmt: skip
+        raise InputError(scene.file, "system", scene.system, "has no price of accuracy in steps; scenes of other "
+                         "systems have one", tuple(SYSTEMS))  # fmt: skip
     return recommend(import_module(SYSTEMS[scene.system]).own(scene, quantity, engines), tolerance)
 
 

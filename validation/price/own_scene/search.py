@@ -20,7 +20,8 @@ LOOSE = 1e-3
 WORTH = 3.0
 """A method is given up once it takes this many times the seconds and the force calls of its engine's best."""
 PATIENCE = 0.5
-"""s: an engine's default method is refined for as long as a run takes no longer."""
+"""s: an engine's default method is refined for as long as a run takes no longer, if another one has met the tolerance.
+"""
 BEYOND = 10.0
 """An error of so many times the quantity's own size is no answer any more."""
 
@@ -90,7 +91,7 @@ class Search:
         low, high, last = 0, len(ladder.values), None
         while low < high:
             i = _next(ladder, low, high, last, self.tolerance)
-            if ladder.default and last is not None:
+            if ladder.default and last is not None and self.meeting(ladder.engine):
                 i = min(i, self._affordable(ladder, last))
             if i < low or self._hopeless(ladder, i, last):
                 return

@@ -19,9 +19,16 @@ def lines(found: Recommendation) -> list[str]:
             *([] if found.searched is found.truth else
               [f"  over the first {own.first:g} s, where all methods are tried: {found.searched.how} "
                f"{found.searched.uncertainty:.1e} {own.unit}"]),
-            *([f"  {own.note}"] if own.note else []), "",
+            *([f"  {own.note}"] if own.note else []), *_loose(found), "",
             *(_table(found) if found.winners else _none(found)), *_defaults(found), *_failures(found.tried),
             *_into_the_scene(found)]  # fmt: skip
+
+
+def _loose(found: Recommendation) -> list[str]:
+    """A doubt about a tolerance that no wrong answer would break."""
+    size, unit = found.truth.size, found.scene.unit
+    return [f"  DOUBT: {found.scene.quantity} is at most {size:.3g} {unit} itself: within {found.tolerance:g} {unit} "
+            "even zero would do"] if found.tolerance >= size else []  # fmt: skip
 
 
 def _table(found: Recommendation) -> list[str]:
@@ -57,7 +64,7 @@ def _none(found: Recommendation) -> list[str]:
 
 def _named(setting: Setting, whole: bool) -> str:
     engine = f"{LABELS.get(setting.engine, setting.engine)} " if whole else ""
-    return f"{engine}{setting.method}, {setting.label()}"
+    return f"{engine if setting.method != setting.engine else ''}{setting.method}, {setting.label()}"
 
 
 def _defaults(found: Recommendation) -> list[str]:

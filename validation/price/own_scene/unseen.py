@@ -75,7 +75,9 @@ class Verdict:
     def factor(self) -> float:
         """Predicted by true error, or its inverse, whichever is above 1; errors below the floor count as the floor."""
         one, other = max(self.predicted, self.floor), max(self.true, self.floor)
-        return max(one / other, other / one)
+        if one == other:
+            return 1.0
+        return max(one, other) / min(one, other) if min(one, other) > 0.0 else math.inf
 
 
 def drawn(number: int, folder: Path) -> Drawn:

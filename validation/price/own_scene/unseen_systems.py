@@ -1,7 +1,7 @@
 """Scenes of a wheelset, of handling and of braking that the price of accuracy has never seen, and a verdict on each.
 
-The verdict's truth has four times the cells that were recommended, or more, and steps of DOP853's own. A stop with valves in the
-loop has one method alone: its truth has thrice the steps of the search's.
+The verdict's truth has four times the cells that were recommended, or more, and steps of DOP853's own. A stop with
+valves in the loop has one method alone: its truth has thrice the steps of the search's.
 """
 
 from importlib import import_module
