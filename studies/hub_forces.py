@@ -11,12 +11,12 @@ from models.damage import damage_ratio
 from models.engines.hub_forces import HubRun, build
 from models.errors import RunFailed
 from models.hub_forces.cut_vehicle import ANGLES, PITCH, ROLL, CutVehicle, X, Y, Z
-from models.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
+from models.hub_forces.measurement import Angles, HubForces
+from models.hub_forces.of_scene import measured
 from models.hub_forces.scene import COMPONENTS, HubScene
 from models.hub_forces.table import Drive
 from models.hub_forces.tilt_filter import Tilt, estimate, held, pulled
 from models.prescribed import smoothed
-from models.road.iso8608 import iso8608_road
 from models.strict import Strict, read
 from models.time_series import write_time_series
 
@@ -66,7 +66,7 @@ def compute(scene: HubScene, engines: tuple[str, ...], progress: Progress = lamb
     even the filter cannot hold the vehicle."""
     vehicle, own, last = scene.cut_vehicle(), scene.run, engines[-1]
     progress("virtual measurement", 0.05)
-    true, forces, angles = _measured(scene, vehicle, last)
+    true, forces, angles = measured(scene, vehicle, last)
     deviations = (scene.angles.angle_deviation, scene.angles.rate_deviation)
     progress("Kalman filter", 0.2)
     tilt = estimate(vehicle, forces, angles, scene.deviations(vehicle), deviations, scene.stabilise.model, scene.file)
@@ -85,19 +85,6 @@ def compute(scene: HubScene, engines: tuple[str, ...], progress: Progress = lamb
                 raise
             failed[name] = str(error)
     return Found(vehicle, forces, angles, tilt, true, runs, failed)
-
-
-def _measured(scene: HubScene, vehicle: CutVehicle, engine: str) -> tuple[HubRun | None, HubForces, Angles]:
-    """What transducers say: of the files, or of a run on the road with noise."""
-    if scene.road is None:
-        return None, *scene.measured(vehicle)
-    own, road, steps = scene.run, scene.road, round(scene.run.duration / scene.run.step)
-    left, right = (iso8608_road(road.iso8608, road.seed + i) for i in range(2))
-    drive = two_tracks(vehicle, left, right, road.speed, own.step, steps)
-    true = truth(engine, vehicle, drive, scene.forces.frame, own.step, own.duration)
-    forces, angles = recorded(true, scene.forces.frame, round(1.0 / (scene.forces.sampling_rate * own.step)))
-    deviations = (scene.angles.angle_deviation, scene.angles.rate_deviation)
-    return true, forces.noisy(scene.deviations(vehicle), scene.seed), angles.noisy(deviations, scene.seed)
 
 
 def _start(vehicle: CutVehicle, drive: Drive, angles: Angles) -> np.ndarray:

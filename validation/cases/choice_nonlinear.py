@@ -153,7 +153,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     right.axhline(5.0, color="#222222", ls="--", lw=0.8, label="5 times")
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls", title="What it saves")
     left.legend(loc="upper left")
-    right.legend(loc="lower right")
+    right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return [(SAID, figure)]
 
 

@@ -84,7 +84,7 @@ def _price(whole: Whole, effect: Effect, rest: Reduced | str, micros: dict[str, 
         return Price(effect.name, True, effect.says, rest)
     own, without_it = micros[""], micros[effect.name]
     return Price(effect.name, True, effect.says, "", (_counts(rest), _counts(whole.full)), spread(own - without_it),
-                 paired_ratio(own, without_it), _changes(whole, rest))  # fmt: skip
+                 paired_ratio(own.tolist(), without_it.tolist()), _changes(whole, rest))  # fmt: skip
 
 
 def _changes(whole: Whole, rest: Reduced) -> tuple[Changed, ...]:

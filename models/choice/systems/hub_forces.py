@@ -1,0 +1,48 @@
+"""A vehicle cut at its wheels: quantities are the chassis' motion under its hub forces, and every element's force."""
+
+import time
+from typing import Any
+
+import numpy as np
+
+from models.choice.answer import Answer, Quantity
+from models.engines.hub_forces import build
+from models.hub_forces.cut_vehicle import ANGLES, X, Y, Z
+from models.hub_forces.of_scene import measured
+from models.hub_forces.scene import HubScene
+
+ENGINE, WINDOWED = "mujoco", True
+
+
+def answer(scene: HubScene, engine: str) -> Answer:
+    """Measure, and run free, without a stabiliser."""
+    vehicle, own = scene.cut_vehicle(), scene.run
+    _, forces, _ = measured(scene, vehicle, engine)
+    drive = forces.drive(own.step, steps(scene), scene.forces.interpolation)
+    model = build(engine, vehicle, drive, own.step, own.duration)
+    begun = time.process_time()
+    run = model.run(np.zeros(2 * vehicle.size))
+    seconds = time.process_time() - begun
+    places = {name: (i, "rad") for name, i in ANGLES.items()} | {"x": (X, "m"), "y": (Y, "m"), "z": (Z, "m")}
+    found = {name: Quantity(unit, (run.states[:, i],)) for name, (i, unit) in places.items()}
+    found |= {element.name: Quantity("N", (run.elements[:, i],)) for i, element in enumerate(vehicle.elements)}
+    count = len(run.times) - 1
+    return Answer(found, {"steps": count, "calls": 4 * count, "states": run.states.shape[1]}, seconds)
+
+
+def steps(scene: HubScene) -> int:
+    """Steps of a run."""
+    return round(scene.run.duration / scene.run.step)
+
+
+parts = steps
+
+
+def shorten(table: dict[str, Any], scene: HubScene, steps: int) -> None:
+    """So many steps of the scene's own."""
+    table.setdefault("run", {})["duration"] = steps * scene.run.step
+
+
+def coarsen(table: dict[str, Any], scene: HubScene, times: int) -> None:
+    """Steps so many times as long."""
+    table.setdefault("run", {})["step"] = times * scene.run.step
