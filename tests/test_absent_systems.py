@@ -5,7 +5,7 @@ import pytest
 from models.braking.scene import build
 from models.errors import InputError
 from models.scene_effects import absent, beside, listing, module_of, named, names_of, own_table, rebuilt, without
-from models.systems import SYSTEMS, load
+from models.systems import DEFAULT, SYSTEMS, load
 from studies.asked import SCENES, plan_of
 from validation.absence import of_systems
 from validation.absence.of_systems import FILES, added, bare, controlled, declared, file_of, seen
@@ -88,6 +88,7 @@ def test_every_effect_of_every_system_can_be_listed_and_judged(system):
         assert {*module.NEEDS, *module.EXCLUDES} <= {*names_of(system)} - {name} and module.COST
         assert {*module.COUNTS} <= {"all", *SYSTEMS[system].engines}
         assert hasattr(module, "extend") != hasattr(module, "leave_out")
+        assert system == DEFAULT or not module.COUNTS or name in controlled(system), "nobody checks what it declares"
 
 
 def test_a_plan_lists_effects_and_what_is_absent():

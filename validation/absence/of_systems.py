@@ -64,9 +64,14 @@ def declared(system: str, effect: str, engines: Iterable[str]) -> Counts:
 def added(system: str, effect: str, quick: bool = False) -> Counts:
     """What it does add to a bare scene, or to that with what it needs, in each engine that takes it."""
     needs = module_of(system, effect).NEEDS
-    without = beside(bare(system), *needs)
-    before, after = (seen(system, one, quick) for one in (without, beside(without, effect)))
-    return {engine: _more(before[engine][0], counts) for engine, (counts, _) in after.items()}
+    before, after = _before(system, needs, quick), seen(system, beside(bare(system), *needs, effect), quick)
+    return {engine: _more(before[engine], counts) for engine, (counts, _) in after.items()}
+
+
+@cache
+def _before(system: str, needs: tuple[str, ...], quick: bool) -> Counts:
+    """Counts of a bare scene with what an effect needs."""
+    return {engine: counts for engine, (counts, _) in seen(system, beside(bare(system), *needs), quick).items()}
 
 
 def _more(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:

@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from models.engines.wheelset_exudyn import ExudynWheelset
-from models.engines.wheelset_mujoco import MujocoWheelset
 from models.rail import equations as eq
 from models.rail import wheel_forces as forces
 from models.rail.eigenvalues import free
@@ -66,6 +64,9 @@ def without_net(law: Any) -> str:
 
 def springs(wheelset: Wheelset) -> tuple[int, int]:
     """Spring-dampers of Exudyn's system and actuators of MuJoCo's model."""
+    from models.engines.wheelset_exudyn import ExudynWheelset
+    from models.engines.wheelset_mujoco import MujocoWheelset
+
     mbs, _ = ExudynWheelset(wheelset, SPEED)._system
     items = [mbs.GetObject(k)["objectType"] for k in range(mbs.systemData.NumberOfObjects())]
     return sum("SpringDamper" in kind for kind in items), MujocoWheelset(wheelset, SPEED).model.nu

@@ -6,7 +6,7 @@ PLACE = "measured"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "a row of a table per sample"
-COUNTS = {"all": {"controllers": 1}}
+COUNTS: dict[str, dict[str, int]] = {}
 
 
 def named(scene: Any) -> bool:

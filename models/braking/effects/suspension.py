@@ -6,7 +6,7 @@ PLACE = "vehicle.file"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "every freedom of its file, and a step of an engine around the compiled tyres"
-COUNTS: dict[str, dict[str, int]] = {"all": {"freedoms on springs": 26}}
+COUNTS: dict[str, dict[str, int]] = {}
 MODULES = ("models.braking.sprung", "models.engines.braking_sprung")
 
 

@@ -8,7 +8,7 @@ PLACE = "vehicle.small_motion"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "runs in time by an engine in place of one covariance"
-COUNTS: dict[str, dict[str, int]] = {"all": {"curves": 3}}
+COUNTS: dict[str, dict[str, int]] = {}
 
 
 def named(scene: Any) -> bool:

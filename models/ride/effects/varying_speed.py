@@ -6,7 +6,7 @@ PLACE = "drive"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "a covariance that is marched, in place of one that is solved"
-COUNTS: dict[str, dict[str, int]] = {"all": {"marches": 1}}
+COUNTS: dict[str, dict[str, int]] = {}
 
 
 def named(scene: Any) -> bool:
