@@ -29,6 +29,8 @@ RULES: dict[str, tuple[Rule, int]] = {"held rates": ("held", 1), "mean rates": (
 """What ``models.sensors.rotations`` offers, and the order."""
 FIRST = {"ExplicitEuler", "Euler", "implicit", "implicitfast", "discrete"}
 """Methods of first order; all others are of second, because rates are linear between samples."""
+ADAPTIVE = ("DOPRI5", "ODE23")
+"""Methods that are there to be refused."""
 DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Euler", 2e-3): "MuJoCo"}
 _OWN, _FEW = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0), (5.0, 8.0, 10.0, 16.0, 20.0, 25.0)
 _NATIVE, _IMPLICIT = (5.0, 8.0, 10.0, 20.0, 50.0, 100.0), (10.0, 20.0, 25.0, 40.0, 50.0, 100.0)
@@ -37,7 +39,7 @@ FULL: dict[tuple[str, str], tuple[float, ...]] = {
     **{("exudyn", method): _FEW for method in ("RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler")},
     **{("exudyn", method): _IMPLICIT for method in ("GeneralizedAlpha 0.9", "TrapezoidalIndex2")},
     ("exudyn", "VelocityVerlet"): _IMPLICIT,
-    **{("exudyn", method): (100.0,) for method in ("DOPRI5", "ODE23")},
+    **{("exudyn", method): (100.0,) for method in ADAPTIVE},
     ("mujoco", "Euler"): (*_NATIVE, 500.0),
     **{("mujoco", method): _NATIVE for method in ("RK4", "implicit", "implicitfast", "discrete")},
 }
@@ -152,7 +154,7 @@ class InertialUnit:
         step = GRID / np.ceil(GRID / value * (1 - 1e-9))
         order = RULES[method][1] if engine == "reference" else 1 if method in FIRST else 2
         stages = 1 if engine == "reference" else STAGES.get(method, 0)
-        return Setting(engine, method, float(step), order, stages=stages,
+        return Setting(engine, method, float(step), order, method in ADAPTIVE, stages,
                        default=DEFAULTS.get((engine, method, float(step)), ""))  # fmt: skip
 
     def build(self, setting: Setting) -> Rules | InEngine:
