@@ -28,6 +28,7 @@ def own(table, quantity=None, engines=("reference",)):
     return import_module(PRICED[table["system"]]).own(scene_of(table), quantity, engines)
 
 
+@pytest.mark.full
 def test_a_stop_is_held_to_its_tolerance_with_as_few_steps_as_that_takes():
     found = recommend(own(STOP), 1e-5)
     best = found.winners["", "calls"]
@@ -78,6 +79,7 @@ def test_what_cannot_be_asked_is_one_message(table, quantity, message):
         price(scene_of(table), 1e-3, quantity, ("reference",))
 
 
+@pytest.mark.full
 def test_a_tolerance_above_the_quantity_itself_is_doubted():
     told, quiet = ("\n".join(lines(recommend(own(STOP, "turned.yaw"), tolerance))) for tolerance in (1e3, 1e-3))
     assert "DOUBT: yaw is at most" in told and "DOUBT" not in quiet
