@@ -12,7 +12,7 @@ from validation.rows import Row, System, Table, at_most, finding, within
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
 SYSTEM: System = "effects"
-COUNTS = {"pitch-plane": 36, "wheelset": 5, "braking": 3}
+COUNTS = {"pitch-plane": 30, "wheelset": 4, "braking": 3}
 """Scenes drawn of each system."""
 ENGINES = {"pitch-plane": ("reference", "mujoco"), "wheelset": ("reference",), "braking": ("reference",)}
 """Implementations that take turns."""
