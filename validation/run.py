@@ -148,8 +148,8 @@ def seeds() -> dict[str, int]:
             "drawn wheelsets": wheelset.SEED, "rough road of handling": handling.SEED,
             "speeds on ice": braking_controllers.SEED, "measurement files": measured_formats.SEED,
             "virtual measurements": measured_virtual.SEED, "checks of recordings": measured_checks.SEED,
-            "long recordings": long_recording.SEED, "scenes never seen": unseen.SEED, "scenes of other systems": unseen_systems.SEED,
-            "drawn questions": drawn_scenes.SEED}  # fmt: skip
+            "long recordings": long_recording.SEED, "scenes never seen": unseen.SEED,
+            "scenes of other systems": unseen_systems.SEED, "drawn questions": drawn_scenes.SEED}  # fmt: skip
 
 
 def save(folder: Path, rows: list[Row], source: dict[str, Any], earlier: dict[str, Any] | None = None) -> None:
