@@ -146,6 +146,41 @@ def test_a_lying_solver_fails_its_row(vice, row):
     assert "exudyn fourth 1 ms" in rows[f"price.planted.{row}"].quantity, "the row names the offender"
 
 
+def test_a_run_that_counts_otherwise_when_repeated_fails_its_row():
+    class Restless(PlantedProblem):
+        """Its finest first-order setting takes a call more each time."""
+
+        calls = 0
+
+        def build(self, setting):
+            planted = super().build(setting)
+            if setting.method == "first" and setting.value == STEPS[-1]:
+                self.calls += 1
+                solution = planted.run()
+                solution.counts["force calls"] += self.calls
+                planted.run = lambda: solution
+            return planted
+
+    for problem, expected in ((PlantedProblem(), "passed"), (Restless(), "failed")):
+        rows = {one.id: one for one in rows_of(problem, points_of(problem), quick=True)}
+        assert rows["price.planted.counts.repeat"].status == expected
+    assert "exudyn first 0.25 ms" in rows["price.planted.counts.repeat"].quantity
+
+
+def test_parts_of_a_step_from_three_runs():
+    """A step of 10 us: 4 in the engine, 1 over the bridge, 5 in the kernel, in the quietest round."""
+    from validation.price import split
+
+    noise, seconds = np.array([1.3, 1.0, 1.1]), 1e-6 * split.STEPS["road"]
+    runs = zip(split.RUNS, (4, 5, 10), strict=True)
+    saved = {"problem": "road", "engine": "mujoco",
+             "seconds": {run: (total * seconds * noise).tolist() for run, total in runs}}  # fmt: skip
+    assert split.parts(saved) == pytest.approx([4, 1, 5])
+    assert split.share(saved) == pytest.approx((10, 10, 10))
+    assert split.table([saved], "road")[0].rows[0][2:5] == ("4.00", "1.00", "5.00")
+    assert split.table([saved], "wheel") == []
+
+
 def test_a_wrong_order_fails_its_row():
     problem = PlantedProblem()
     points = [p if p.setting.method == "first" else
