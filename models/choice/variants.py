@@ -18,7 +18,7 @@ LONGEST = 128
 FINE = 60
 """Steps of which whole numbers make up a part of a run, so that it can be taken in longer steps, too."""
 REPEATS, ENOUGH = 3, 0.02
-"""Runs of which the shortest tells the seconds; two where they have taken so many (s): the first may load or compile."""
+"""Runs of which the shortest tells the seconds; two where they took so many (s), as the first may have to load."""
 
 
 def system_of(scene: Any) -> ModuleType:
