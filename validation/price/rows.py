@@ -108,20 +108,21 @@ def _runnable(problem: Problem, points: list[Point], curve: str, one: Reach) -> 
 
 
 def _sweep(problem: Problem, points: list[Point]) -> Row:
-    """Six settings of each method, and four decades of error from order 4 up where nothing else ends the curve."""
+    """Six settings of each method, and from order 4 up four decades of them, or of error where nothing ends a curve."""
     quantity, _ = _quantity(problem)
     tried = cost.by_curve(points, None)
     short = []
     for curve, own in cost.by_curve(points).items():
-        wide = own[0].errors[quantity] >= 1e4 * own[-1].errors[quantity]
+        ends = own[0], own[-1]
+        wide = any(a >= 1e4 * b for a, b in ([p.errors[quantity] for p in ends], [p.setting.value for p in ends]))
         ended = tried[curve][0].status != "ok" or own[0].setting.cells
         whole = ended and own[-1].errors[quantity] <= min(problem.tolerances)
         settled = len(own) > 1 and own[-1].errors[quantity] >= SETTLED * own[-2].errors[quantity]
         uncut = own[0].setting.cells and len(tried[curve]) == 1
         if not uncut and (len(own) < 6 or not (wide or whole or settled or 0 < own[0].setting.order < 4)):
             short.append(curve)
-    what = ("methods with fewer than 6 settings that answered, or from order 4 up with fewer than 4 decades of error "
-            "although coarser settings answer, or the finest tolerance is not met and the error still falls")
+    what = ("methods with fewer than 6 settings that answered, or from order 4 up with fewer than 4 decades of them or "
+            "of error although coarser settings answer, or the finest tolerance is not met and the error still falls")
     return _none_of(f"price.{problem.key}.sweep", what, short, "what the study was asked to cover")
 
 
