@@ -22,7 +22,7 @@ from validation.rows import REPORTED, Row
 CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "growth",
          "drift_off", "drift_solvers", "holding_spring", "point_mass",
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
-         "planted_faults", "absent", "price", "recommendation", "ensemble", "contact_hertz",
+         "planted_faults", "absent", "effect_prices", "price", "recommendation", "ensemble", "contact_hertz",
          "contact_coefficients", "contact_exact",
          "contact_simplified", "contact_profiles", "manchester", "ride_road", "ride_covariance", "ride_engines",
          "ride_varying_speed", "ride_nonlinear", "choice_linear", "choice_nonlinear", "hub_forces",
@@ -32,7 +32,7 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
 """Case modules in the order of the report."""
 
 
-TIMED = ("absent", "price", "recommendation")
+TIMED = ("effect_prices", "price", "recommendation")
 ALONE = {True: TIMED, False: (*TIMED, "ensemble", "fastsim", "contact_price", "contact_bridges", "handling")}
 """Cases that time what they run, by ``quick``: they begin when all others have ended, and have the machine alone."""
 WORKERS = 2

@@ -1,4 +1,4 @@
-"""An effect that a scene does not name is not there; one that it names adds what it says, at this price."""
+"""An effect that a scene does not name is not there; one that it names adds what it says."""
 
 import tempfile
 from functools import partial
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.assembly import assemble
-from models.engines.protocol import Model, build, guard, settings_of
+from models.engines.protocol import Model, build, settings_of
 from models.scene import Scene
 from models.scene import build as build_scene
 from models.scene_effects import module_of, names_of
@@ -16,17 +16,13 @@ from models.simulate import outputs
 from models.systems import DEFAULT
 from models.time_series import write_time_series
 from validation.absence import of_systems, ride, wheelset
-from validation.absence.hand_built import exudyn_run, mujoco_run
 from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, user_functions
-from validation.rows import Row, System, Table, at_most, behaves, finding
-from validation.timing import describe, interleave, paired_ratio
+from validation.rows import Row, System, at_most, behaves
 
-TITLE = "What is not named is not computed, and what the rest costs"
+TITLE = "What is not named is not computed"
 SYSTEM: System = "effects"
 ENGINES = ("reference", "exudyn", "mujoco")
 STEP = 1e-3
-STEPS = 8000
-"""Steps of the runs that are timed against hand-built ones: 8 s, less than half of the study scenes."""
 START = {"pitch": 0.1, "z3": -0.1}
 """m, rad: the vehicle moves, so that nothing is compared at rest."""
 
@@ -93,25 +89,16 @@ def declared(effect: str, engine: str) -> dict[str, int]:
     return {key: value for key, value in {**table.get("all", {}), **table.get(engine, {})}.items() if value}
 
 
-def hand_built(engine: str, own: Scene) -> Any:
-    """The bare vehicle written directly for an engine."""
-    assembly, settings = assemble(own), settings_of(own, engine)
-    run = {"exudyn": exudyn_run, "mujoco": mujoco_run}[engine]
-    return run(assembly.parameters, assembly.initial, settings.step, settings.steps)
-
-
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Counts of absence, the ratio to hand-built models, and the price list."""
+    """All counts of absence, with a positive control of every effect; a quick run takes those of the systems beside
+    the pitch-plane vehicle in one engine each, and leaves out the process in which their effects are not there.
+    """
     with tempfile.TemporaryDirectory() as name:
         place = Path(name)
         write_files(place)
         rows = [*_imports(), *(row for engine in ENGINES for row in _absence(engine, place))]
         rows += [_control(effect, place) for effect in EFFECTS]
-        ratios = {engine: _ratio(engine, place, 9 if quick else 40) for engine in ("exudyn", "mujoco")}
-        price = [line for effect in EFFECTS for line in _price(effect, place, 7 if quick else 25)]
-    rows += [row for engine, ratio in ratios.items() for row in _machinery(engine, ratio)]
-    rows += ride.rows() + wheelset.rows() + of_systems.rows(quick)
-    return rows, {"price": price, "ratios": ratios}
+    return rows + ride.rows() + wheelset.rows() + of_systems.rows(quick), {}
 
 
 def _imports() -> list[Row]:
@@ -156,73 +143,10 @@ def _control(effect: str, folder: Path) -> Row:
 
 
 def _text(table: dict[str, dict[str, int]]) -> str:
-    parts = [f"{engine} {_changes(own)}" for engine, own in table.items() if own]
+    parts = [f"{engine} {changes(own)}" for engine, own in table.items() if own]
     return "; ".join(parts) or "nothing"
 
 
-def _changes(own: dict[str, int]) -> str:
+def changes(own: dict[str, int]) -> str:
+    """Counts that an effect changes, in words."""
     return ", ".join(f"{value:+d} {key}" for key, value in sorted(own.items()))
-
-
-def _ratio(engine: str, folder: Path, rounds: int) -> dict[str, Any]:
-    """Seconds of the machinery without effects against the hand-built model, and whether they agree.
-
-    Every run of the machinery passes the guard; the hand-built model is timed with it and without it.
-    """
-    own = scene({}, STEPS, folder)
-    ours, theirs, times = model(own, engine), hand_built(engine, own), STEP * np.arange(STEPS + 1)
-    gap = float(np.abs(ours.run().states - theirs()).max())
-    seconds = interleave([ours.run, lambda: guard(engine, times, theirs(), own.run.duration), theirs], rounds)
-    return {"ratio": paired_ratio(seconds[0], seconds[1]), "unchecked": paired_ratio(seconds[0], seconds[2]),
-            "gap": gap, "seconds": [describe(one) for one in seconds]}
-
-
-def _machinery(engine: str, found: dict[str, Any]) -> list[Row]:
-    ways = {"ratio": "whose result passes the same guard", "unchecked": "whose result nobody checks"}
-    why = (f"interleaved runs of {STEPS:,} steps, median of paired ratios with a bootstrap interval: what the "
-           "machinery costs where no effect is named; seconds are reported, never judged")
-    return [
-        at_most(f"absent.same.{engine}", SYSTEM, f"{engine}: states of a bare scene against a hand-built model",
-                found["gap"], "m, rad, m/s, rad/s", 0.0, "the same items in the same order give the same numbers",
-                "native"),
-        *(finding(f"absent.{key}.{engine}", SYSTEM, f"{engine}: time of a bare scene by that of a hand-built model "
-                  f"{what}, 95 % interval {found[key][1]:.3f} to {found[key][2]:.3f}", found[key][0], "",
-                  "at most 1.03", why, "native") for key, what in ways.items()),
-    ]  # fmt: skip
-
-
-def _price(effect: str, folder: Path, rounds: int) -> list[dict[str, Any]]:
-    """One line of the price list per engine."""
-    lines = []
-    for engine in ENGINES:
-        scenes = pair(effect, 500, folder)
-        seconds = interleave([_job(own, engine) for own in scenes], rounds, 5e-3)
-        added = (seconds[1] - seconds[0]) / 500 * 1e6
-        lines.append({"effect": effect, "engine": engine, "adds": _changes(change(effect, engine, folder)) or "nothing",
-                      "step": float(np.median(seconds[0])) / 500 * 1e6, "us": describe(added),
-                      "ratio": paired_ratio(seconds[1], seconds[0])})
-    return lines
-
-
-def _job(own: Scene, engine: str) -> Any:
-    """A run with its channels, built beforehand."""
-    assembly = assemble(own)
-    built = build(engine, assembly, settings_of(own, engine))
-    return lambda: outputs(assembly, built.run(), built)
-
-
-def tables(data: dict[str, Any]) -> list[Table]:
-    """The price list of effects."""
-    note = ("Each effect is added to the scene without it: wheel_forces, road, pitch_spring and the sensors to the "
-            "bare vehicle, gyro_bias to one with a gyro, the others to one under wheel forces. Counts are exact; "
-            "microseconds per step of 1 ms, channels included, are the median of paired differences with their median "
-            "deviation, the factor is the median of paired ratios with a 95 % interval. An effect that is not named "
-            "costs nothing: see the rows above.")
-    headings = ("effect", "engine", "adds", "without it, us per step", "adds, us per step", "factor")
-    return [Table("Price list of effects", note, headings, tuple(_line(entry) for entry in data["price"]))]
-
-
-def _line(entry: dict[str, Any]) -> tuple[str, ...]:
-    value, low, high = entry["ratio"]
-    return (entry["effect"], entry["engine"], entry["adds"], f"{entry['step']:.2f}",
-            f"{entry['us']['median']:+.2f} +/- {entry['us']['mad']:.2f}", f"{value:.2f} ({low:.2f} to {high:.2f})")
