@@ -77,6 +77,25 @@ def test_an_error_that_grows_after_the_part_searched_is_found_and_met():
     assert wild.winners["", "calls"].error <= 1e-2 and wild.winners["", "calls"].confirmed
 
 
+@dataclass(frozen=True)
+class AsGood(Planted):
+    """One whose steps must be so short that they are those of the reference, which has the same error."""
+
+    def ladders(self):
+        return [Ladder("exudyn", "fourth", STEPS[5:], 4)]
+
+    def reference(self):
+        return Ladder("reference", "fourth", tuple(2 * STEPS[5] / 2**k for k in range(6)), 4)
+
+
+def test_an_error_is_told_against_a_truth_that_is_better_known():
+    """The reference of 3.1 ms would show no error of the setting of 3.1 ms; the true one is 1e3 h^4 = 9.5e-8."""
+    found = recommend(AsGood(), 1e-2)
+    assert found.winners["", "calls"].tried.setting.value == STEPS[5]
+    assert found.winners["", "calls"].error == pytest.approx(1e3 * STEPS[5] ** 4, rel=0.1)
+    assert found.truth.uncertainty < found.winners["", "calls"].error
+
+
 def test_two_families_that_differ_are_no_truth():
     with pytest.raises(RunFailed, match="differ by"):
         recommend(Planted(lies=5e-3), 1e-2)

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import InputError
-from validation.price.own_scene import Ladder, OwnScene
+from models.errors import InputError, RunFailed
+from validation.price.own_scene import Answer, Ladder, OwnScene
 from validation.price.own_scene.search import Search, Tried
 from validation.price.own_scene.truth import Truth, truth
+from validation.price.problems import Setting
 from validation.timing import interleave, paired_ratio
 
 SYSTEMS = {system: f"validation.price.own_scene.{module}" for system, module in (
@@ -28,12 +29,17 @@ SLOWER = 1.05
 """A ratio of seconds whose 95 % interval lies above this is slower beyond doubt."""
 ATTEMPTS = 6
 """Settings that are confirmed over the whole run, at most, for one recommendation."""
+RESOLVED = 3.0
+"""An error is told against a truth which is known that many times better, where one can be had within PATIENCE."""
+DEARER = 8.0
+"""A finer reference takes at most about so many times the seconds: twice the cells, half the step."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A setting with the error that it has (in the quantity's unit), its force calls, its seconds (median), and those
-    of the rounds in which it was timed beside others; ``confirmed`` : over the whole run."""
+    """A setting with the error that it has (in the quantity's unit; the truth's own uncertainty where that is more),
+    its force calls, its seconds (median), and those of the rounds in which it was timed beside others; ``confirmed`` :
+    over the whole run."""
 
     tried: Tried
     error: float
@@ -86,6 +92,7 @@ def recommend(scene: OwnScene, tolerance: float) -> Recommendation:
                for kind in ("seconds", "calls") if (best := _cheapest(timed, engine, kind)) is not None}  # fmt: skip
     if scene.whole > scene.first * (1 + 1e-9) and winners:
         known, timed, winners = _confirmed(search, timed, winners)
+    known, timed, winners = _resolved(scene, known, timed, winners)
     defaults = {ladder.engine: found for ladder in scene.ladders()
                 if ladder.default and (found := _default(search, ladder, timed)) is not None}  # fmt: skip
     return Recommendation(scene, tolerance, searched, known, winners, defaults, tuple(search.tried))
@@ -161,6 +168,33 @@ def _over_all(over: Search, ladder: Ladder, one: Choice) -> Choice | None:
         if i < 0:
             return None
     return None
+
+
+def _resolved(scene: OwnScene, known: Truth, timed: list[Choice],
+              winners: dict[tuple[str, str], Choice]) -> (
+                  tuple[Truth, list[Choice], dict[tuple[str, str], Choice]]):  # fmt: skip
+    """Errors of the winners and the defaults against a truth that is better known than they are small: a setting may
+    be far better than its tolerance asks, and as good as the reference that judged it."""
+    shown = [*winners.values(), *(one for one in timed if one.tried.setting.default)]
+    answers = {one.tried.setting: scene.answer(scene.solve(one.tried.setting, scene.whole)) for one in shown}
+    known, errors = _finer(scene, known, answers)
+    told = {one.tried.setting: replace(one, error=max(errors[one.tried.setting], known.uncertainty)) for one in shown}
+    return (known, [told.get(one.tried.setting, one) for one in timed],
+            {key: told[one.tried.setting] for key, one in winners.items()})  # fmt: skip
+
+
+def _finer(scene: OwnScene, known: Truth, answers: dict[Setting, Answer]) -> tuple[Truth, dict[Setting, float]]:
+    """A truth that resolves the errors of all answers, or the best that there is time for; those errors."""
+    errors = {setting: known.error(answer) for setting, answer in answers.items()}
+    while min(errors.values(), default=np.inf) < RESOLVED * known.uncertainty and DEARER * known.seconds < PATIENCE:
+        try:
+            finer = truth(scene, scene.reference().sure * known.uncertainty, scene.whole, known.rung, twice=False)
+        except (InputError, RunFailed):
+            break  # as well known as rounding and the reference's finest step let it be
+        if not finer.uncertainty < known.uncertainty:
+            break
+        known, errors = finer, {setting: finer.error(answer) for setting, answer in answers.items()}
+    return known, errors
 
 
 def _default(search: Search, ladder: Ladder, timed: list[Choice]) -> Default | None:

@@ -71,7 +71,9 @@ def _defaults(found: Recommendation) -> list[str]:
     rows = []
     for engine, one in found.defaults.items():
         tried, unit = one.as_it_is, found.scene.unit
-        as_it_is = f"{tried.error:.2g} {unit}" if tried.status == "ok" else f"{tried.status}"
+        known = max(tried.error, found.searched.uncertainty)
+        error = f"{'' if known == tried.error else 'below '}{known:.2g} {unit}"
+        as_it_is = error if tried.status == "ok" else f"{tried.status}"
         rows.append(f"  {LABELS.get(engine, engine)}'s default, {_named(tried.setting, False)}: {as_it_is}"
                     + _lost(found, engine, one.refined, one.extrapolated))  # fmt: skip
     return ["", *rows] if rows else []

@@ -1,6 +1,7 @@
 """What a scene's quantity really is: a reference refined until it no longer matters, and how well it is known."""
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,13 +20,14 @@ MOST_ROWS = 4_000_000
 @dataclass(frozen=True)
 class Truth:
     """answer : of the reference; uncertainty : in the unit of the quantity; rung : of the reference's ladder; cell : s
-    between kinks of the quantity, 0 where there are none."""
+    between kinks of the quantity, 0 where there are none; seconds : that the reference took."""
 
     answer: Answer
     uncertainty: float
     how: str
     rung: int
     cell: float = 0.0
+    seconds: float = 0.0
 
     def error(self, other: Answer) -> float:
         """Largest difference over the run, at the other's own instants; infinite for what is not finite."""
@@ -63,18 +65,18 @@ def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twi
     InputError where that cannot be reached, RunFailed where two families of solvers differ or none ends.
     """
     ladder = scene.reference()
-    found, rung, change = _settled(scene, ladder, tolerance, duration, rung)
+    found, rung, change, seconds = _settled(scene, ladder, tolerance, duration, rung)
     said = f"{ladder.engine} {ladder.method} at {ladder.setting(rung).label()}"
     other = scene.second(ladder.setting(rung)) if twice else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
-    alone = Truth(found, change, f"{said}; {finer}", rung, scene.cell)
+    alone = Truth(found, change, f"{said}; {finer}", rung, scene.cell, seconds)
     if other is None:
         return alone
     differs = alone.error(scene.answer(scene.solve(other, duration)))
     if differs > tolerance / AGREED:
         raise RunFailed("reference", f"{said} and {_named(other)} differ by {differs:.3g} {scene.unit}: the tolerance "
                         "cannot be judged")  # fmt: skip
-    return Truth(found, max(change, differs), f"{said} and {_named(other)}, which differ by", rung, scene.cell)
+    return replace(alone, uncertainty=max(change, differs), how=f"{said} and {_named(other)}, which differ by")
 
 
 def _change(scene: OwnScene, before: Answer, now: Answer) -> float:
@@ -89,14 +91,15 @@ def _named(setting: Setting) -> str:
 
 
 def _settled(scene: OwnScene, ladder: Ladder, tolerance: float, duration: float,
-             rung: int) -> tuple[Answer, int, float]:  # fmt: skip
-    """The first answer that the finer rung changed by no more than a part of the tolerance; its rung; the change.
-    """
+             rung: int) -> tuple[Answer, int, float, float]:  # fmt: skip
+    """The first answer that the finer rung changed by no more than a part of the tolerance; its rung; the change; the
+    seconds that it took."""
     before: Answer | None = None
     change, failure = float("inf"), ""
     for i in range(rung, len(ladder.values)):
         if duration / ladder.values[i] > MOST_ROWS:
             break
+        begun = time.perf_counter()
         try:
             now = scene.answer(scene.solve(ladder.setting(i), duration))
         except (InputError, RunFailed) as error:
@@ -105,7 +108,7 @@ def _settled(scene: OwnScene, ladder: Ladder, tolerance: float, duration: float,
         if before is not None:
             last, change = change, _change(scene, before, now)
             if change <= tolerance / ladder.sure:
-                return now, i, change
+                return now, i, change, time.perf_counter() - begun
             if change > 0.7 * last and change < 1e-6 * float(np.abs(now.values).max()):
                 break  # rounding: finer steps no longer help
         before = now
