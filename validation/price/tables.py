@@ -99,9 +99,9 @@ def losses(problem: dict[str, Any], points: list[Point]) -> Table:
         for target in problem["tolerances"]]  # fmt: skip
     heads = tuple(f"{owner} by best of {among}: {kind}"
                   for owner in owners for among in (owner, "all") for kind in cost.costs(points))  # fmt: skip
-    as_is = "; ".join(f"{owner}: {own.setting.method} at {own.setting.label()}, which by itself gives "
-                      f"{own.errors[quantity]:.3g} {problem['units'][quantity]}" for owner, own in owners.items()
-                      if own.status == "ok")  # fmt: skip
+    as_is = "; ".join(f"{owner}: {own.setting.method} at {own.setting.label()}, which by itself "
+                      + (f"gives {own.errors[quantity]:.3g} {problem['units'][quantity]}" if own.status == "ok"
+                         else f"is {STATUSES[own.status]}") for owner, own in owners.items())  # fmt: skip
     note = ("The default method, its step refined until it meets the tolerance, by the cheapest setting that does. "
             f"{as_is}. * means that no step tried was fine enough: extrapolated by the method's declared order. "
             "In brackets: 95 % interval, bootstrapped over rounds.")  # fmt: skip
