@@ -170,7 +170,7 @@ def _split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _outputs(vehicle: LinearVehicle, q: np.ndarray, A: np.ndarray, B: tuple[np.ndarray, ...], z: np.ndarray,
              rate: np.ndarray, noise: list[np.ndarray]) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:  # fmt: skip
-    """C (p, x) and D (p, k) per axle; what would see the derivative of white noise has an infinite D."""
+    """C (p, x) and D (p, k) per axle, without rounding; what would see the derivative of white noise has infinite D."""
     of = {key: np.array([getattr(output, key) for output in vehicle.outputs]) for key in
           ("acceleration", "rate", "displacement", "road", "road_rate")}  # fmt: skip
     v = q @ A
@@ -178,8 +178,10 @@ def _outputs(vehicle: LinearVehicle, q: np.ndarray, A: np.ndarray, B: tuple[np.n
     D = []
     for b, w in zip(B, noise, strict=True):
         direct = of["rate"] @ q @ b + of["acceleration"] @ v @ b + of["road_rate"] @ w
+        size = abs(of["rate"]) @ abs(q) @ abs(b) + abs(of["acceleration"]) @ abs(v) @ abs(b)
+        told = abs(direct) > NOTHING * (size + abs(of["road_rate"]) @ abs(w))
         worse = abs(of["acceleration"] @ (q @ b)) > NOTHING * (abs(of["acceleration"]) @ abs(q) @ abs(b))
-        D.append(np.where(worse, np.inf, direct))
+        D.append(np.where(worse, np.inf, np.where(told, direct, 0.0)))
     return C, tuple(D)
 
 
