@@ -16,13 +16,16 @@ SHOWN = 20
 """Quantities that are printed, those that differ most; ``compare.csv`` has them all."""
 KINDS = ("system", "mode")
 """Attributes of a result that must be the same."""
+NEAR = 1e-9
+"""Places so near, by the largest of them, are the same."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """values (n,) over ``grid`` (n,), which is a time or the first column of a table, or counts rows.
+    """values (n,) over ``grid`` (n,), which is a time, a coordinate or the first column of a table, or counts rows.
 
-    kind : system and mode of the run, where the file says them.
+    kind : system and mode of the run, where the file says them; labels (n,) : what names the rows of a table, if it is
+    no number.
     """
 
     unit: str
@@ -30,6 +33,7 @@ class Quantity:
     over: str
     grid: np.ndarray
     kind: str = ""
+    labels: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,7 @@ class Difference:
     one: np.ndarray
     two: np.ndarray
     note: str = ""
+    labels: tuple[str, ...] = ()
 
     @property
     def gap(self) -> np.ndarray:
@@ -66,6 +71,12 @@ class Difference:
     def at(self) -> float:
         """Where on the grid the difference is largest."""
         return float(self.grid[np.abs(self.gap).argmax()])
+
+    @property
+    def where(self) -> str:
+        """The same in words."""
+        label = self.labels[np.abs(self.gap).argmax()] if self.labels else f"{self.at:.9g}"
+        return f"{self.over.partition(' [')[0]} = {label}"
 
     @property
     def share(self) -> float:
@@ -138,10 +149,33 @@ def _netcdf(path: Path) -> Iterator[tuple[str, Quantity]]:
     for name, channel in data.data_vars.items():
         if channel.dtype.kind not in "fiu" or channel.size == 0:
             continue
-        values = channel.values.astype(float)
-        unit, time = str(channel.attrs.get("units", "")), channel.dims == ("time",)
-        grid = channel["time"].values.astype(float) if time else np.arange(values.size, dtype=float)
-        yield str(name), Quantity(unit, values.ravel(), "time [s]" if time else "entry", grid, kinds)
+        along = _along(channel)
+        over, grid = _grid(channel, along)
+        others = [dim for dim in channel.dims if dim != along]
+        for place in np.ndindex(*(channel.sizes[dim] for dim in others)):
+            at = dict(zip(others, place, strict=True))
+            own = ", ".join([str(name), *(_label(channel, dim, i) for dim, i in at.items())])
+            values = channel.isel(at).values.astype(float).reshape(-1)
+            yield own, Quantity(str(channel.attrs.get("units", "")), values, over, grid, kinds)
+
+
+def _along(channel: Any) -> Any:
+    """The dimension that a channel is read along: time, or the longest whose entries are numbers or have no names."""
+    numbered = [dim for dim in channel.dims if dim not in channel.coords or channel[dim].dtype.kind in "fiu"]
+    return "time" if "time" in numbered else max(numbered, key=lambda dim: channel.sizes[dim], default=None)
+
+
+def _grid(channel: Any, along: Any) -> tuple[str, np.ndarray]:
+    """Name and values of the coordinate along a dimension; entries are counted where it has none."""
+    if along is None or along not in channel.coords:
+        return "entry", np.arange(channel.sizes.get(along, 1), dtype=float)
+    unit = channel[along].attrs.get("units", "s" if along == "time" else "")
+    return f"{along} [{unit}]" if unit else str(along), channel[along].values.astype(float)
+
+
+def _label(channel: Any, dim: Any, i: int) -> str:
+    """What names an entry of another dimension."""
+    return str(channel[dim].values[i]) if dim in channel.coords else f"{dim} {i}"
 
 
 def _table(path: Path) -> Iterator[tuple[str, Quantity]]:
@@ -149,15 +183,26 @@ def _table(path: Path) -> Iterator[tuple[str, Quantity]]:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             heads, *rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
-        columns = dict(zip((head.strip() for head in heads), zip(*rows, strict=True), strict=True))
+        columns = dict(zip(_once(heads), zip(*rows, strict=True), strict=True)) if rows else {}
     except (OSError, ValueError, csv.Error) as error:
         raise InputError(path, "", None, f"is not a table of results: {error}") from None
+    if not columns:
+        raise InputError(path, "", None, "is not a table of results: it has no rows")
     numeric = {head: own for head, cells in columns.items() if (own := _numbers(cells)) is not None}
     over = next(iter(columns))
+    names = columns[over] if over not in numeric else ()
     grid = numeric.pop(over, np.arange(len(rows), dtype=float))
     for head, values in numeric.items():
         name, _, unit = head.partition(" [")
-        yield name, Quantity(unit.rstrip("]"), values, over, grid)
+        yield name, Quantity(unit.rstrip("]"), values, over, grid, labels=names)
+
+
+def _once(heads: list[str]) -> list[str]:
+    """Headings without blanks around them; ValueError for two that are the same."""
+    names = [head.strip() for head in heads]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise ValueError(f"two columns are called {twice[0]!r}")
+    return names
 
 
 def _numbers(cells: tuple[str, ...]) -> np.ndarray | None:
@@ -174,11 +219,14 @@ def _difference(name: str, one: Quantity, two: Quantity, file: Path) -> Differen
         raise InputError(file, name, two.kind, f"the other run is of {one.kind}: compare two runs of one kind")
     if one.unit != two.unit or one.over != two.over:
         raise InputError(file, name, f"{two.unit} over {two.over}", f"the other one is in {one.unit} over {one.over}")
-    if one.grid.shape == two.grid.shape and np.allclose(one.grid, two.grid, rtol=1e-9, atol=1e-9):
-        return Difference(name, one.unit, one.over, one.grid, one.values, two.values)
+    if other := next(((a, b) for a, b in zip(one.labels, two.labels, strict=False) if a != b), None):
+        raise InputError(file, name, other[1], f"has other rows than the first, which has {other[0]!r} there")
+    near = NEAR * np.abs(one.grid).max(initial=0.0)
+    if one.grid.shape == two.grid.shape and np.allclose(one.grid, two.grid, rtol=0.0, atol=near):
+        return Difference(name, one.unit, one.over, one.grid, one.values, two.values, labels=one.labels)
     if one.over != "time [s]":
-        raise InputError(file, name, None, f"has other rows ({one.over}) than the first: {len(two.grid)} instead of "
-                                           f"{len(one.grid)}, or at other places")  # fmt: skip
+        rows = "" if len(one.grid) == len(two.grid) else f", {len(two.grid)} instead of {len(one.grid)}"
+        raise InputError(file, name, None, f"has rows at other places ({one.over}) than the first{rows}")
     return _in_time(name, one, two, file)
 
 
@@ -187,8 +235,12 @@ def _in_time(name: str, one: Quantity, two: Quantity, file: Path) -> Difference:
     from scipy.interpolate import CubicSpline
 
     fine, coarse = (one, two) if len(one.grid) > len(two.grid) else (two, one)
+    if not (np.diff(fine.grid) > 0.0).all():
+        raise InputError(file, name, None, "cannot be read at other times: the times of the denser run do not increase")
+    if not np.isfinite(fine.values).all():
+        raise InputError(file, name, None, "cannot be read at other times: the denser run holds what is no number")
     inside = (coarse.grid >= fine.grid[0] - 1e-9) & (coarse.grid <= fine.grid[-1] + 1e-9)
-    if not (inside.sum() > 1 and np.isfinite(fine.values).all() and len(fine.grid) > 3):
+    if not (inside.sum() > 1 and len(fine.grid) > 3):
         raise InputError(file, name, None, "has no times in common with the first")
     read = CubicSpline(fine.grid, fine.values)(coarse.grid[inside])
     pair = (read, coarse.values[inside]) if fine is one else (coarse.values[inside], read)
@@ -212,7 +264,7 @@ def _save(path: Path, found: list[Difference]) -> None:
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("quantity", "unit", "largest difference", "at", "rms difference", "share of largest value"))
-        writer.writerows((d.name, d.unit, d.largest, f"{d.over.partition(' ')[0]} {d.at:.9g}", d.rms, d.share)
+        writer.writerows((d.name, d.unit, d.largest, d.where, d.rms, d.share)
                          for d in found)  # fmt: skip
 
 
@@ -222,7 +274,7 @@ def _lines(found: list[Difference]) -> list[str]:
         return [f"  all {len(found)} quantities are the same to the last bit"]
     lines = [f"  {'quantity':<44} {'largest':>11} {'rms':>11} {'unit':<9} {'share':>8}  where it is largest"]
     lines += [f"  {d.name:<44} {d.largest:>11.4g} {d.rms:>11.4g} {d.unit:<9} {d.share:>8.1e}  "
-              f"{d.over.partition(' ')[0]} = {d.at:.6g}" for d in found[:SHOWN] if d.largest > 0.0]  # fmt: skip
+              f"{d.where}" for d in found[:SHOWN] if d.largest > 0.0]  # fmt: skip
     more = sum(each.largest > 0.0 for each in found[SHOWN:])
     lines += [f"  {more} more that differ less: compare.csv"] if more else []
     lines += [f"  the same to the last bit: {len(same)} of {len(found)}"] if same else []
