@@ -27,8 +27,8 @@ class Options(Strict):
 
 @dataclass(frozen=True)
 class Alone:
-    """One effect: predicted changes (quantities,) if it alone is left out, inf where it cannot
-    be; seconds of that run, at the longest step that is then allowed, by those of the scene with longer steps alone."""
+    """One effect: predicted changes (quantities,) if it alone is left out, inf where it cannot be; what this saves: work
+    of the scene with longer steps alone, by that of what is left at the longest step that is then allowed."""
 
     effect: str
     changes: np.ndarray
@@ -128,7 +128,7 @@ def _save(one: Found, path: Path) -> None:
     with path.open("x", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         heads = [f"{name}, change [-]" for name in one.scene.quantities]
-        writer.writerow(["effect", "left out", *heads, "times faster alone [-]"])
+        writer.writerow(["effect", "left out", *heads, "times less work alone [-]"])
         for effect in one.alone:
             values = map(repr, effect.changes.tolist())
             writer.writerow([effect.effect, effect.effect in one.choice.left_out, *values, repr(effect.saved)])
@@ -160,7 +160,7 @@ def lines(one: Found, named: bool) -> list[str]:
         rows.append(f"    calls {saved}, by steps {choice.times} times as long; {before / step:.3g} times by longer "
                     f"steps with all effects; CPU seconds {faster:.3g} times fewer")  # fmt: skip
     rows += [f"    {name} would matter no more at a tolerance above {percent(change)}"
-             for name, change in sorted(one.further.items(), key=lambda item: item[1])[:3]]  # fmt: skip
+             for name, change in sorted(one.further.items(), key=lambda item: item[1])]  # fmt: skip
     rows += misled(one)
     worst = float(choice.confirmed.max())
     return [*rows, f"    the choice holds for tolerances down to {percent(worst)}"] if choice.left_out else rows

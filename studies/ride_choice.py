@@ -147,7 +147,7 @@ def _table(scene: RideScene, choice: Choice, alone: list[Alone], further: dict[E
     lines += ["  alone, what leaving it out changes (confirmed):"]
     lines += [f"    {one.effect.name}: {', '.join(map(percent, one.confirmed))}"
               + (f" ({one.illegal})" if one.illegal else "") for one in alone]  # fmt: skip
-    for effect, change in sorted(further.items(), key=lambda item: item[1])[:3]:
+    for effect, change in sorted(further.items(), key=lambda item: item[1]):
         lines.append(f"  {effect.name} would matter no more at a tolerance above {100 * change:.3g} %")
     worst = float(abs(choice.confirmed).max())
     return [*lines, f"  the choice holds for tolerances down to {100 * worst:.3g} %"] if choice.left_out else lines

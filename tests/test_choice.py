@@ -1,6 +1,8 @@
 """Effects of any system's scene priced and chosen by runs: differences, screen, choice, refusals."""
 
 import json
+import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,10 +62,7 @@ class Made(Variants):
 
     def _run(self, left_out, times):
         value = np.array([self.function(left_out, times)])
-        return Answer({"q": Quantity("", (value,))}, {"calls": 100 // times}, 1.0)
-
-    def per_call(self, left_out):
-        return 1.0 / (1.0 + len(left_out))
+        return Answer({"q": Quantity("", (value,))}, {"calls": 100 // times, "states": 2}, 1.0)
 
 
 def chooser(monkeypatch, function, effects, tolerance=0.05):
@@ -131,6 +130,22 @@ def test_auto_alone_names_the_study():
     scene = build({"title": "t", "system": "wheelset", "effects": "auto", "quantities": ["y"], "tolerance": 0.01,
                    "speeds": {"values": [10.0]}}, "t")  # fmt: skip
     assert scene.study == "choice" and scene.tolerance == 0.01
+
+
+def test_seconds_have_no_say_in_what_is_chosen(monkeypatch):
+    """A clock that runs wild changes the seconds that are reported, and nothing else of the choice."""
+    asked, draw, found = drawn("pitch-plane", 4), np.random.default_rng(1), []
+    for clock in (time.process_time, lambda: float(draw.exponential(1e3))):
+        monkeypatch.setattr("time.process_time", clock)
+        found.append(Chooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose())
+    one, two = (replace(choice, seconds=(), predicted=0, remainder=0, confirmed=0) for choice in found)
+    assert one == two and found[0].seconds != found[1].seconds
+    assert np.array_equal(found[0].confirmed, found[1].confirmed)
+
+
+def test_work_is_calls_times_what_each_goes_through():
+    own = Made(lambda left_out, times: 1.0, ("a", "b"))
+    assert own.work(frozenset()) == 100 * (2 + 2) and own.work(frozenset("a"), 4) == 25 * (2 + 1)
 
 
 def test_unknown_quantities_and_systems_without_runs_are_refused():

@@ -25,7 +25,8 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Answer:
-    """Quantities by name; counts: "steps", "calls" of the right-hand side, "states"; CPU seconds of the march alone."""
+    """Quantities by name; CPU seconds of the march alone; counts, which repeat: "steps", "calls" of the right-hand
+    side, "states", and "terms", where a call goes through any beside them (cells of contact nets, waves of roads)."""
 
     quantities: dict[str, Quantity]
     counts: dict[str, int]

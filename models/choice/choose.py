@@ -2,11 +2,11 @@
 
 Screened are cheap runs: with steps as much longer as costs a small share of the tolerance over the first part of the
 scene; without single effects, and without pairs. Of all that the screen keeps within the tolerance, the next to go is
-the effect, or the pair where no single one will do, that saves most (logarithm of seconds at the longest step that is
-then allowed) for what it adds to the error. What is left is run over the whole scene, beside the scene as it is. Where
-it is not within the tolerance, steps become shorter; if that does not help, the step of the path that breaks it is
-found by halving and taken back for good, and the choice goes on without it. So what is reported was confirmed, always;
-the scene as it is holds with no error at all.
+the effect, or the pair where no single one will do, that saves most (logarithm of work at the longest step that is then
+allowed) for what it adds to the error. Work is counted and not timed, so that the choice repeats on any machine. What
+is left is run over the whole scene, beside the scene as it is. Where it is not within the tolerance, steps become
+shorter; if that does not help, the step of the path that breaks it is found by halving and taken back for good, and the
+choice goes on without it. So what is reported was confirmed, always; the scene as it is holds with no error at all.
 """
 
 import math
@@ -28,8 +28,6 @@ SHARPER = 4
 """Steps so many times as short tell what the longest ones cost."""
 WINDOW = 0.25
 """Share of a run by which these steps are chosen."""
-WORTH = math.log(1.05)
-"""Least that an effect must save to be worth leaving out: seconds are known no better."""
 LEAST = 1e-3
 """Share of the tolerance below which an error counts as none."""
 SHORTER = 2
@@ -108,9 +106,8 @@ class Chooser:
         return self._reach[chosen]
 
     def work(self, chosen: Set) -> float:
-        """CPU seconds of a run without these effects, at the longest step; infinite if it fails."""
-        run = self.screen.variants.of(chosen, self.reach(chosen) // self.own)
-        return math.inf if run is None else run.counts["calls"] * self.screen.variants.per_call(chosen)
+        """Of a run without these effects, at the longest step; infinite if it fails."""
+        return self.screen.variants.work(chosen, self.reach(chosen) // self.own)
 
     def confirm(self, chosen: Set) -> np.ndarray:
         """Relative changes (quantities,) over the whole run, at the longest step that holds or nearly so."""
@@ -181,7 +178,7 @@ class Chooser:
         Only those that may go, and whose going would save anything."""
         found = {}
         for effect in self.effects:
-            if effect not in chosen and self.work(chosen | {effect}) * math.exp(WORTH) < self.work(chosen):
+            if effect not in chosen and self.work(chosen | {effect}) < self.work(chosen):
                 found[effect] = self.share(chosen | {effect}) * self.tolerance
         return {effect: change for effect, change in found.items() if math.isfinite(change)}
 
@@ -213,7 +210,7 @@ class Chooser:
                 continue
             share = self.share(further)
             saved = math.log(work / self.work(further)) if share <= BUDGET else 0.0
-            score = saved / max(share - now, LEAST) if saved > WORTH else 0.0
+            score = saved / max(share - now, LEAST) if saved > 0.0 else 0.0
             if score > most:
                 best, most = step - chosen, score
         return best

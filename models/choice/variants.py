@@ -35,7 +35,8 @@ def system_of(scene: Any) -> ModuleType:
 class Variants:
     """Runs of a ``scene`` by one implementation; a variant is the effects that are left out, and the step by its own.
 
-    None stands for one that cannot be, or whose run fails. ``calls`` : of all runs made so far.
+    None stands for one that cannot be, or whose run fails. ``calls`` : of all runs made so far, without those that were
+    repeated for their seconds.
     """
 
     scene: Any
@@ -57,7 +58,8 @@ class Variants:
         """The run without these effects, with steps so many times as long."""
         key = (frozenset(left_out), times)
         if key not in self._kept:
-            self._kept[key] = self._run(*key)
+            found = self._kept[key] = self._run(*key)
+            self.calls += found.counts["calls"] if found else 0
         return self._kept[key]
 
     def _run(self, left_out: Set, times: int) -> Answer | None:
@@ -65,7 +67,6 @@ class Variants:
             found: Answer = self.system.answer(self.changed(left_out, times), self.engine)
         except (InputError, RunFailed):
             return None
-        self.calls += found.counts["calls"]
         return found
 
     def changed(self, left_out: Set, times: int = 1) -> Any:
@@ -76,6 +77,15 @@ class Variants:
         table = own_table(scene)
         self.system.coarsen(table, scene, times)
         return rebuilt(table, scene)
+
+    def work(self, left_out: Set, times: int = 1) -> float:
+        """Of a run, by counts alone, so that it repeats: calls, times the states and terms that each goes through, and
+        one for each effect that is left; infinite where there is no run."""
+        run = self.of(left_out, times)
+        if run is None:
+            return math.inf
+        each = run.counts["states"] + run.counts.get("terms", 0) + len(set(self.effects) - left_out)
+        return float(run.counts["calls"] * max(each, 1))
 
     def per_call(self, left_out: Set) -> float:
         """CPU seconds of one call, the least of a few runs; infinite where there is none."""

@@ -33,7 +33,8 @@ def answer(scene: HandlingScene, engine: str) -> Answer:
                                          for column in drive.tyres[:, :, k].T))
               for name, (k, unit) in TYRES.items()}  # fmt: skip
     steps = sum(len(drive.run.times) - 1 for drive in drives)
-    counts = {"steps": steps, "calls": 4 * steps, "states": 2 * drives[0].run.positions.shape[1]}
+    counts = {"steps": steps, "calls": 4 * steps, "states": 2 * drives[0].run.positions.shape[1],
+              "terms": len(handling.waves) * len(handling.vehicle.tyres)}  # fmt: skip
     return Answer(found, counts, seconds)
 
 

@@ -33,7 +33,12 @@ def answer(scene: WheelsetScene, engine: str) -> Answer:
     found |= {name: Quantity(unit, tuple(path.contacts[:, i, k] for path in paths for i in patches))
               for name, (k, unit) in CONTACTS.items()}  # fmt: skip
     count = int(np.sum([len(path.times) - 1 for path in paths]))
-    return Answer(found, {"steps": count, "calls": 4 * count, "states": STATES}, seconds)
+    return Answer(found, {"steps": count, "calls": 4 * count, "states": STATES, "terms": _cells(scene)}, seconds)
+
+
+def _cells(scene: WheelsetScene) -> int:
+    """Of FASTSIM's nets under both wheels."""
+    return 2 * scene.contact.cells**2 if scene.contact.law == "fastsim" else 0
 
 
 def steps(scene: WheelsetScene) -> int:
