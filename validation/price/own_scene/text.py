@@ -8,6 +8,8 @@ from validation.price.own_scene.recommendation import Choice, Recommendation
 from validation.price.own_scene.search import Tried
 from validation.price.problems import Setting
 
+SAME = 0.005
+"""Ratios so near to one are not worth a word."""
 HEAD = f"  {'':<24}{'setting':<36}{'error':>11}{{counted:>16}}{'seconds':>11}"
 
 
@@ -16,12 +18,17 @@ def lines(found: Recommendation) -> list[str]:
     own = found.scene
     return [f"{own.title}: {own.quantity} within {found.tolerance:g} {own.unit} over {own.whole:g} s",
             f"  truth: {found.truth.how} {found.truth.uncertainty:.1e} {own.unit}",
-            *([] if found.searched is found.truth else
+            *([] if _whole(found) else
               [f"  over the first {own.first:g} s, where all methods are tried: {found.searched.how} "
                f"{found.searched.uncertainty:.1e} {own.unit}"]),
             *([f"  {own.note}"] if own.note else []), *_loose(found), "",
             *(_table(found) if found.winners else _none(found)), *_defaults(found), *_failures(found.tried),
             *_into_the_scene(found)]  # fmt: skip
+
+
+def _whole(found: Recommendation) -> bool:
+    """Whether all of the run was searched."""
+    return found.scene.whole <= found.scene.first * (1 + 1e-9)
 
 
 def _loose(found: Recommendation) -> list[str]:
@@ -37,9 +44,10 @@ def _table(found: Recommendation) -> list[str]:
         who = f"{LABELS.get(engine, engine) if engine else 'all'}, by {kinds}"
         rows.append(f"  {who:<24}{_named(one.tried.setting, not engine):<36}{one.error:>9.2g} {unit}"
                     f"{one.calls:>16,.0f}{one.seconds:>9.2g} s")  # fmt: skip
-    how = "measured over the whole run" if all(one.confirmed or found.scene.whole == found.scene.first
-                                               for one in found.winners.values()) else "measured"
-    return [*rows, f"  errors are {how}, against the truth; seconds are those of this machine, model built anew"]
+    how = "measured over the whole run" if _whole(found) or all(
+        one.confirmed for one in found.winners.values()) else "measured"
+    return [*rows, f"  errors are {how}, against the truth; seconds are those of this machine's processor, model built "
+            "anew"]
 
 
 def _merged(winners: dict[tuple[str, str], Choice]) -> dict[tuple[str, str], Choice]:
@@ -68,12 +76,13 @@ def _named(setting: Setting, whole: bool) -> str:
 
 
 def _defaults(found: Recommendation) -> list[str]:
-    rows = []
+    rows, own = [], found.scene
     for engine, one in found.defaults.items():
-        tried, unit = one.as_it_is, found.scene.unit
+        tried, unit = one.as_it_is, own.unit
         known = max(tried.error, found.searched.uncertainty)
         error = f"{'' if known == tried.error else 'below '}{known:.2g} {unit}"
-        as_it_is = error if tried.status == "ok" else f"{tried.status}"
+        over = "" if _whole(found) else f" over {own.first:g} s"
+        as_it_is = f"{error}{over}" if tried.status == "ok" else f"{tried.status}"
         rows.append(f"  {LABELS.get(engine, engine)}'s default, {_named(tried.setting, False)}: {as_it_is}"
                     + _lost(found, engine, one.refined, one.extrapolated))  # fmt: skip
     return ["", *rows] if rows else []
@@ -83,24 +92,25 @@ def _lost(found: Recommendation, engine: str, refined: Choice | None, extrapolat
     """What the default method costs beside the engine's cheapest and the cheapest of all, once refined."""
     if refined is None:
         return "; no step tried gives an answer"
-    parts = [f"{getattr(refined, kind) / max(getattr(best, kind), 1e-12):.3g} times the {kind} of {whose}"
+    parts = [f"{ratio:.3g} times the {kind} of {whose}"
              for whose, key in ((f"{LABELS.get(engine, engine)}'s cheapest", engine), ("the cheapest of all", ""))
-             for kind in ("calls", "seconds") if (best := found.winners.get((key, kind))) is not None]  # fmt: skip
+             for kind in ("calls", "seconds") if (best := found.winners.get((key, kind))) is not None
+             and abs((ratio := getattr(refined, kind) / max(getattr(best, kind), 1e-12)) - 1.0) > SAME]  # fmt: skip
     met = f"within the tolerance at {refined.tried.setting.label()}{' (extrapolated)' if extrapolated else ''}"
-    return f"; {met}" + (f": {', '.join(parts)}" if parts else "")
+    return f"; {met}: {', '.join(parts) or 'nothing is cheaper'}"
 
 
 def _failures(tried: tuple[Tried, ...]) -> list[str]:
-    """Settings without an answer, by method and reason."""
-    known: dict[tuple[str, str, str], list[str]] = defaultdict(list)
+    """Settings without an answer, by method, with the reason of the last one that was tried."""
+    known = defaultdict[tuple[str, str], list[Tried]](list)
     for one in tried:
         if one.status != "ok":
-            key = (one.status, f"{LABELS.get(one.setting.engine, one.setting.engine)} {one.setting.method}", one.reason)
-            known[key].append(one.setting.label())
+            known[one.status, f"{LABELS.get(one.setting.engine, one.setting.engine)} {one.setting.method}"].append(one)
     if not known:
         return []
-    return ["", "  without an answer", *(f"    {status:<9}{method}, {', '.join(labels)}: {reason}"
-                                         for (status, method, reason), labels in known.items())]  # fmt: skip
+    return ["", "  without an answer", *(
+        f"    {status:<9}{method}, {', '.join(dict.fromkeys(one.setting.label() for one in own))}: {own[-1].reason}"
+        for (status, method), own in known.items())]  # fmt: skip
 
 
 def _into_the_scene(found: Recommendation) -> list[str]:
