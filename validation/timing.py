@@ -13,34 +13,45 @@ import numpy as np
 
 SEED = 20
 RESAMPLES = 1000
+LONG = 10.0
+"""A job that took so many times the least turn needs no warm-up to tell that it fits in once."""
 
 
-def interleave(jobs: Sequence[Callable[[], Any]], rounds: int, least: float = 0.02, seed: int = SEED) -> np.ndarray:
+Clock = Callable[[], float]
+
+
+def interleave(jobs: Sequence[Callable[[], Any]], rounds: int, least: float = 0.02, seed: int = SEED,
+               lasted: Sequence[float] | np.ndarray | None = None,
+               clock: Clock = time.perf_counter) -> np.ndarray:  # fmt: skip
     """Seconds of every job in every round, shape (jobs, rounds); single thread, warmed up.
 
-    least : a job is repeated within its turn until it lasts about this long (s); seed : of the order.
+    least : a job is repeated within its turn until it lasts about this long (s); seed : of the order;
+    lasted : seconds of a run of each job that has been, where there was one; clock : that of the processor leaves out what else the
+    machine does.
     """
-    repeats = [_repeats(job, least) for job in jobs]
+    known = [0.0] * len(jobs) if lasted is None else lasted
+    repeats = [1 if one > LONG * least else _repeats(job, least, clock)
+               for job, one in zip(jobs, known, strict=True)]  # fmt: skip
     order = np.random.default_rng(seed)
     seconds = np.empty((len(jobs), rounds))
     for i in range(rounds):
         for j in order.permutation(len(jobs)):
-            seconds[j, i] = _timed(jobs[j], repeats[j])
+            seconds[j, i] = _timed(jobs[j], repeats[j], clock)
     return seconds
 
 
-def _repeats(job: Callable[[], Any], least: float) -> int:
+def _repeats(job: Callable[[], Any], least: float, clock: Clock) -> int:
     """How often a job fits into a turn: timed on the warm-up, or after it where that was short."""
-    if _timed(job, 1) >= least:
+    if _timed(job, 1, clock) >= least:
         return 1
-    return max(1, math.ceil(0.9 * least / max(_timed(job, 1), 1e-9)))
+    return max(1, math.ceil(0.9 * least / max(_timed(job, 1, clock), 1e-9)))
 
 
-def _timed(job: Callable[[], Any], repeats: int) -> float:
-    start = time.perf_counter()
+def _timed(job: Callable[[], Any], repeats: int, clock: Clock) -> float:
+    start = clock()
     for _ in range(repeats):
         job()
-    return (time.perf_counter() - start) / repeats
+    return (clock() - start) / repeats
 
 
 def describe(seconds: Sequence[float]) -> dict[str, float]:

@@ -23,8 +23,8 @@ from validation.timing import interleave, interval, resamples
 Status = Literal["ok", "raised", "refused", "SILENT"]
 WORK = ("contact cells", "force calls")
 """What work may be counted in: the first that a problem's points have."""
-PATIENCE = 10.0
-"""Seconds for all rounds of one problem together: long sweeps are timed in fewer."""
+PATIENCE = {True: 2.0, False: 8.0}
+"""Seconds for all rounds of one problem together, by ``quick``: long sweeps are timed in fewer."""
 DRAWS = 200
 """Bootstrapped sets of rounds behind the interval of an interpolated ratio."""
 
@@ -108,13 +108,16 @@ def measure(problem: Problem, quick: bool, rounds: int, least: float) -> list[Po
 
     Seconds are those of building the model and running it, input tables included, for every engine alike.
     """
-    start = time.perf_counter()
-    points = [attempt(problem, setting) for setting in problem.settings(quick)]
-    rounds = max(1, min(rounds, int(PATIENCE / (time.perf_counter() - start))))
+    points, ends = [], [time.perf_counter()]
+    for setting in problem.settings(quick):
+        points.append(attempt(problem, setting))
+        ends.append(time.perf_counter())
+    lasted = np.diff(ends)
+    rounds = max(1, min(rounds, int(PATIENCE[quick] / lasted.sum())))
     timed = [i for i, p in enumerate(points) if p.status == "ok"]
     last: dict[int, Any] = {}
     jobs = [lambda i=i: last.update({i: problem.build(points[i].setting).run()}) for i in timed]
-    for i, seconds in zip(timed, interleave(jobs, rounds, least), strict=True):
+    for i, seconds in zip(timed, interleave(jobs, rounds, least, lasted=lasted[timed]), strict=True):
         changed = _changed(problem, points[i], last[i])
         points[i] = replace(points[i], seconds=tuple(seconds), changed=changed)
     return points
