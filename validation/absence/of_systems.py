@@ -8,10 +8,12 @@ control; last the bare scene again, which must give the same path to the last bi
 import json
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 from unittest import mock
 
@@ -21,21 +23,39 @@ from models.systems import SYSTEMS
 from validation.rows import Row, System, at_most, behaves
 
 SYSTEM: System = "effects"
-FILES = {"braking": "braking", "contact": "contact", "wheelset": "wheelset", "handling": "handling", "ride": "ride"}
+FILES = {"braking": "braking", "contact": "contact", "wheelset": "wheelset", "handling": "handling", "ride": "ride",
+         "hub-forces": "hub_forces", "measured": "measured"}  # fmt: skip
 """System -> the file beside this one that has its bare scene and counts what a run of a scene is made of."""
 Counts = dict[str, dict[str, int]]
 """By engine; "all" where every engine agrees."""
 
 
 def file_of(system: str) -> Any:
-    """BARE, ENGINES and seen(scene, engine) -> counts and path of a system."""
+    """BARE, ENGINES and seen(scene, engine) -> counts and path of a system.
+
+    If its scenes read files there is also write(folder), and BY_HAND for effects without usual values: what the bare
+    scene has in place of its own tables without such an effect, and with it.
+    """
     return import_module(f"validation.absence.{FILES[system]}")
 
 
-def bare(system: str) -> Any:
-    """The bare scene of a system."""
-    file = file_of(system)
-    return import_module(SYSTEMS[system].scene).build(file.BARE)
+def bare(system: str, **instead: Any) -> Any:
+    """The bare scene of a system, with some tables in place of its own."""
+    table = {**file_of(system).BARE, **instead}
+    return import_module(SYSTEMS[system].scene).build(table, "bare", Path(_folder(system).name))
+
+
+@cache
+def _folder(system: str) -> tempfile.TemporaryDirectory[str]:
+    """Files that scenes of a system read, as long as this process lives."""
+    folder = tempfile.TemporaryDirectory()
+    getattr(file_of(system), "write", lambda place: None)(Path(folder.name))
+    return folder
+
+
+def by_hand(system: str) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
+    """Tables in place of those of the bare scene, without and with an effect that has no usual values."""
+    return getattr(file_of(system), "BY_HAND", {})
 
 
 def seen(system: str, scene: Any, quick: bool = False) -> dict[str, tuple[dict[str, int], bytes]]:
@@ -49,10 +69,19 @@ def seen(system: str, scene: Any, quick: bool = False) -> dict[str, tuple[dict[s
 
 
 def controlled(system: str) -> tuple[str, ...]:
-    """Effects that can be put into a bare scene by their usual values."""
+    """Effects that can be put into a bare scene, by their usual values or by hand."""
     modules = {name: module_of(system, name) for name in names_of(system)}
-    return tuple(name for name, module in modules.items()
-                 if hasattr(module, "put_in") or "file" not in getattr(module, "EXAMPLE", ("file",)))  # fmt: skip
+    return tuple(name for name, module in modules.items() if name in by_hand(system)
+                 or hasattr(module, "put_in") or "file" not in getattr(module, "EXAMPLE", ("file",)))  # fmt: skip
+
+
+def pair(system: str, effect: str) -> tuple[Any, Any]:
+    """The bare scene, or that with what an effect needs, and the same with the effect."""
+    if effect in by_hand(system):
+        less, more = (bare(system, **tables) for tables in by_hand(system)[effect])
+        return less, more
+    needs = module_of(system, effect).NEEDS
+    return beside(bare(system), *needs), beside(bare(system), *needs, effect)
 
 
 def declared(system: str, effect: str, engines: Iterable[str]) -> Counts:
@@ -62,16 +91,22 @@ def declared(system: str, effect: str, engines: Iterable[str]) -> Counts:
 
 
 def added(system: str, effect: str, quick: bool = False) -> Counts:
-    """What it does add to a bare scene, or to that with what it needs, in each engine that takes it."""
-    needs = module_of(system, effect).NEEDS
-    before, after = _before(system, needs, quick), seen(system, beside(bare(system), *needs, effect), quick)
-    return {engine: _more(before[engine], counts) for engine, (counts, _) in after.items()}
+    """What it does add to a bare scene, or to that with what it needs, in each engine that takes both."""
+    before, after = _before(system, effect, quick), seen(system, pair(system, effect)[1], quick)
+    return {engine: _more(before[engine], counts) for engine, (counts, _) in after.items() if engine in before}
+
+
+def _before(system: str, effect: str, quick: bool) -> Counts:
+    """Counts of the scene without an effect."""
+    own = by_hand(system).get(effect, ({},))[0]
+    return _counted(system, module_of(system, effect).NEEDS, json.dumps(own), quick)
 
 
 @cache
-def _before(system: str, needs: tuple[str, ...], quick: bool) -> Counts:
-    """Counts of a bare scene with what an effect needs."""
-    return {engine: counts for engine, (counts, _) in seen(system, beside(bare(system), *needs), quick).items()}
+def _counted(system: str, needs: tuple[str, ...], own: str, quick: bool) -> Counts:
+    """Counts of a bare scene with some effects, or with tables of its own, as text."""
+    scene = beside(bare(system, **json.loads(own)), *needs)
+    return {engine: counts for engine, (counts, _) in seen(system, scene, quick).items()}
 
 
 def _more(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:
@@ -100,7 +135,7 @@ def _probed(system: str, own: list[str]) -> dict[str, Any]:
     imported = _loaded(own)
     missing = []
     for name in controlled(system):
-        seen(system, beside(bare(system), *module_of(system, name).NEEDS, name))
+        seen(system, pair(system, name)[1])
         missing += [module for module in modules[name] if not _loaded([module])]
     last = seen(system, bare(system))
     return {"imported": imported, "missing": missing, "same": all(first[e][1] == last[e][1] for e in first)}

@@ -6,7 +6,7 @@ PLACE = "forces.interpolation"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "cubic pieces in place of straight ones"
-COUNTS: dict[str, dict[str, int]] = {}
+COUNTS = {"all": {"curves between samples": 1}}
 
 
 def named(scene: Any) -> bool:

@@ -6,7 +6,7 @@ PLACE = "forces.frame"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "a rotation per hub and call"
-COUNTS: dict[str, dict[str, int]] = {}
+COUNTS = {"all": {"turning hubs": 4}}
 
 
 def named(scene: Any) -> bool:

@@ -6,7 +6,7 @@ PLACE = "stabilise.method"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "two coordinates less, and derivatives of the smoothed angles"
-COUNTS: dict[str, dict[str, int]] = {}
+COUNTS = {"all": {"enforced angles": 2}}
 
 
 def named(scene: Any) -> bool:

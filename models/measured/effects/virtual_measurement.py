@@ -8,7 +8,7 @@ PLACE = "virtual"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "a run of the whole vehicle on its tyres, written as a file and read again"
-COUNTS: dict[str, dict[str, int]] = {}
+COUNTS = {"all": {"runs on tyres": 1}}
 
 
 def named(scene: Any) -> bool:
