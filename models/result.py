@@ -26,8 +26,8 @@ _version = cache(version)
 class Result:
     """One run: ``data`` is an xarray Dataset over ``time`` (s), each channel with its unit and meaning.
 
-    Its attributes hold engine, integrator, step, status, counts, seconds, the scene and the provenance, as text
-    (JSON) or numbers.
+    Its attributes hold engine, integrator, step, status, counts, the scene and the provenance, as text (JSON)
+    or numbers, and seconds until it is saved.
     """
 
     data: "xr.Dataset"
@@ -58,9 +58,10 @@ class Result:
         return Result(self.data.isel(time=slice(None, None, step)))
 
     def save(self, path: Path) -> None:
-        """Write netCDF whole or not at all."""
+        """Write netCDF whole or not at all, without the seconds: the same run gives the same bytes."""
         part = path.with_name(f".{path.name}.part")
-        self.data.to_netcdf(part, engine="h5netcdf")
+        kept = {name: value for name, value in self.data.attrs.items() if name != "seconds"}
+        self.data.drop_attrs(deep=False).assign_attrs(kept).to_netcdf(part, engine="h5netcdf")
         os.replace(part, path)
 
 

@@ -24,6 +24,16 @@ def test_every_channel_has_unit_and_meaning(tmp_path):
     assert list(tmp_path.iterdir()) == [tmp_path / "run.nc"]
 
 
+def test_two_runs_leave_the_same_bytes(tmp_path):
+    """Seconds differ by nature: they are told, not saved."""
+    for name in ("a.nc", "b.nc"):
+        result = simulate(build(ROAD), "reference")
+        assert result.data.attrs["seconds"] > 0.0
+        result.save(tmp_path / name)
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+    assert "seconds" not in load(tmp_path / "a.nc").data.attrs
+
+
 def test_the_saved_scene_gives_the_same_numbers(tmp_path):
     first = simulate(build(ROAD), "mujoco")
     table = json.loads(first.data.attrs["scene_table"])
