@@ -1,5 +1,12 @@
-"""Which setting to take: the cheapest that meets a tolerance, timed beside the engines' defaults, and confirmed."""
+"""Which setting to take: the cheapest that meets a tolerance, timed beside the engines' defaults, and confirmed.
 
+Counts are the same in every run, so the least count wins. Seconds wander: they are those of the processor, in rounds in
+which the rivals take turns, and an engine's default method that meets the tolerance is recommended unless the 95 %
+interval of its ratio to the fastest lies above SLOWER. So what is recommended in its place is faster beyond doubt, and
+what is recommended beside it is never slower than it by more than that.
+"""
+
+import time
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
@@ -17,14 +24,16 @@ from validation.timing import interleave, paired_ratio
 SYSTEMS = {system: f"validation.price.own_scene.{module}" for system, module in (
     ("pitch-plane", "pitch_plane"), ("wheelset", "wheelset"), ("handling", "handling"), ("braking", "braking"))}
 """Systems whose scenes have a price, and the modules that know them."""
-NEAR = 2.5
+NEAR = 2.0
 """Settings that took up to so many times the least seconds in one run are timed beside one another."""
-FAR = 8.0
+FAR = 4.0
 """The same for a default: it must never be given up because one run of it was disturbed."""
 ROUNDS, LEAST = 9, 0.005
 """Interleaved rounds of timing; a short run is repeated until its turn lasts this long (s)."""
-FEWEST, PATIENCE = 3, 10.0
+FEWEST, PATIENCE = 3, 5.0
 """Of slow runs there are fewer rounds, for they take no longer together than this (s), yet at least so many."""
+BEHIND = 1.5
+"""What took so many times the seconds of its engine's best in the first rounds is out of the race."""
 SLOWER = 1.05
 """A ratio of seconds whose 95 % interval lies above this is slower beyond doubt."""
 ATTEMPTS = 6
@@ -108,17 +117,41 @@ def _timed(search: Search) -> list[Choice]:
     found = list(curves.values())
     if not found:
         return []
-    least = {one.setting.engine: min(o.seconds for o in found if o.setting.engine == one.setting.engine)
-             for one in found}  # fmt: skip
-    near = [one for one in found
-            if one.seconds <= (FAR if one.setting.default else NEAR) * least[one.setting.engine]]
-    jobs = [partial(search.scene.solve, one.setting, search.duration) for one in near]
-    rounds = max(FEWEST, min(ROUNDS, int(PATIENCE / max(sum(one.seconds for one in near), 1e-9))))
-    taken = dict(zip((one.setting for one in near), interleave(jobs, rounds, LEAST), strict=True))
+    taken = _raced(search, _rivals(found))
     longer = search.scene.whole / search.duration
     seconds = {one.setting: tuple(longer * taken.get(one.setting, np.array([one.seconds]))) for one in found}
     return [Choice(one, one.error, longer * one.calls, float(np.median(seconds[one.setting])), False,
                    seconds[one.setting]) for one in found]  # fmt: skip
+
+
+def _rivals(found: list[Tried]) -> list[Tried]:
+    """Those that may be an engine's fastest, or the fastest of all, where there is more than one."""
+    rivals = dict[Tried, None]()
+    for engine in ("", *dict.fromkeys(one.setting.engine for one in found)):
+        own = [one for one in found if one.setting.engine.startswith(engine)]
+        least = min(one.seconds for one in own)
+        near = [one for one in own if one.seconds <= (FAR if one.setting.default else NEAR) * least]
+        rivals |= dict.fromkeys(near if len(near) > 1 else [])
+    return list(rivals)
+
+
+def _raced(search: Search, rivals: list[Tried]) -> dict[Setting, np.ndarray]:
+    """Seconds of each in a few rounds; of those that are not far behind by then, in more."""
+    seconds = _rounds(search, rivals, FEWEST)
+    middle = {one.setting: float(np.median(seconds[one.setting])) for one in rivals}
+    least = {engine: min(own for setting, own in middle.items() if setting.engine == engine)
+             for engine in dict.fromkeys(setting.engine for setting in middle)}  # fmt: skip
+    left = [one for one in rivals if middle[one.setting] <= BEHIND * least[one.setting.engine]]
+    more = min(ROUNDS, int(PATIENCE / max(sum(middle[one.setting] for one in left), 1e-9))) - FEWEST
+    further = _rounds(search, left, more) if more > 0 and len(left) > 1 else {}
+    return seconds | {setting: np.concatenate((seconds[setting], own)) for setting, own in further.items()}
+
+
+def _rounds(search: Search, rivals: list[Tried], rounds: int) -> dict[Setting, np.ndarray]:
+    jobs = [partial(search.scene.solve, one.setting, search.duration) for one in rivals]
+    lasted = [one.seconds for one in rivals]
+    taken = interleave(jobs, rounds, LEAST, lasted=lasted, clock=time.process_time)
+    return dict(zip((one.setting for one in rivals), taken, strict=True))
 
 
 def _cheapest(timed: list[Choice], engine: str, kind: str) -> Choice | None:
@@ -175,18 +208,26 @@ def _resolved(scene: OwnScene, known: Truth, timed: list[Choice],
                   tuple[Truth, list[Choice], dict[tuple[str, str], Choice]]):  # fmt: skip
     """Errors of the winners and the defaults against a truth that is better known than they are small: a setting may
     be far better than its tolerance asks, and as good as the reference that judged it."""
-    shown = [*winners.values(), *(one for one in timed if one.tried.setting.default)]
-    answers = {one.tried.setting: scene.answer(scene.solve(one.tried.setting, scene.whole)) for one in shown}
-    known, errors = _finer(scene, known, answers)
+    shown = list(dict.fromkeys([*winners.values(), *(one for one in timed if one.tried.setting.default)]))
+    errors = {one.tried.setting: one.error for one in shown}
+    if _blurred(known, errors):
+        known, errors = _finer(scene, known, {setting: scene.answer(scene.solve(setting, scene.whole))
+                                              for setting in errors})  # fmt: skip
     told = {one.tried.setting: replace(one, error=max(errors[one.tried.setting], known.uncertainty)) for one in shown}
     return (known, [told.get(one.tried.setting, one) for one in timed],
             {key: told[one.tried.setting] for key, one in winners.items()})  # fmt: skip
 
 
+def _blurred(known: Truth, errors: dict[Setting, float]) -> bool:
+    """Whether an error is as small as the truth is uncertain, and another truth takes seconds, not minutes."""
+    return (min(errors.values(), default=np.inf) < RESOLVED * known.uncertainty
+            and DEARER * known.seconds < PATIENCE)  # fmt: skip
+
+
 def _finer(scene: OwnScene, known: Truth, answers: dict[Setting, Answer]) -> tuple[Truth, dict[Setting, float]]:
     """A truth that resolves the errors of all answers, or the best that there is time for; those errors."""
     errors = {setting: known.error(answer) for setting, answer in answers.items()}
-    while min(errors.values(), default=np.inf) < RESOLVED * known.uncertainty and DEARER * known.seconds < PATIENCE:
+    while _blurred(known, errors):
         try:
             finer = truth(scene, scene.reference().sure * known.uncertainty, scene.whole, known.rung, twice=False)
         except (InputError, RunFailed):

@@ -19,16 +19,19 @@ LOOSE = 1e-3
 """The tolerance that an adaptive method is tried with first."""
 WORTH = 3.0
 """A method is given up once it takes this many times the seconds and the force calls of its engine's best."""
-PATIENCE = 0.5
+PATIENCE = 0.15
 """s: an engine's default method is refined for as long as a run takes no longer, if another one has met the tolerance.
 """
+TOO_LONG = 10.0
+"""s: a run that would take longer is not made where another engine meets the tolerance in a third of that, or less."""
 BEYOND = 10.0
 """An error of so many times the quantity's own size is no answer any more."""
 
 
 @dataclass(frozen=True)
 class Tried:
-    """One setting and what became of it: error in the quantity's unit, calls (or cells) and seconds of one run."""
+    """One setting and what became of it: error in the quantity's unit, calls (or cells) and seconds of one run, as the
+    processor counts them: other work on the machine is not in them."""
 
     setting: Setting
     status: Status
@@ -63,7 +66,7 @@ class Search:
 
     def attempt(self, setting: Setting) -> Tried:
         """Try one setting, and keep what became of it."""
-        begun = time.perf_counter()
+        begun = time.process_time()
         try:
             solution = self.scene.solve(setting, self.duration)
         except InputError as error:
@@ -71,7 +74,7 @@ class Search:
         except RunFailed as error:
             found = Tried(setting, "raised", str(error))
         else:
-            seconds, answer = time.perf_counter() - begun, self.scene.answer(solution)
+            seconds, answer = time.process_time() - begun, self.scene.answer(solution)
             error_of = self.truth.error(answer)
             lies = not error_of <= BEYOND * max(self.truth.size, self.tolerance)
             why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result" if lies else ""
@@ -87,13 +90,15 @@ class Search:
 
     def climb(self, ladder: Ladder) -> None:
         """Find a ladder's coarsest setting that meets the tolerance: each one tried halves what is left, at least
-        nearly always, and the declared order says where to try next."""
-        low, high, last = 0, len(ladder.values), None
+        nearly always, and the declared order says where to try next, or another engine with the same method."""
+        low, high, last, same = 0, len(ladder.values), None, self._elsewhere(ladder)
         while low < high:
             i = _next(ladder, low, high, last, self.tolerance)
+            if same and (last is not None or not ladder.default):
+                i, same = _rung(ladder, same, low, high), 0.0
             if ladder.default and last is not None and self.meeting(ladder.engine):
                 i = min(i, self._affordable(ladder, last))
-            if i < low or self._hopeless(ladder, i, last):
+            if i < low or self._hopeless(ladder, i, last) or self._too_long(ladder, i, last):
                 return
             last = self.attempt(ladder.setting(i))
             if last.error <= self.held:
@@ -106,6 +111,11 @@ class Search:
     def meeting(self, engine: str = "") -> list[Tried]:
         """Those that meet the tolerance, of one engine or of all."""
         return [one for one in self.tried if one.error <= self.held and one.setting.engine.startswith(engine)]
+
+    def _elsewhere(self, ladder: Ladder) -> float:
+        """The value that the method needs in another engine, 0 where none has it."""
+        return max((one.setting.value for one in self.meeting() if one.setting.method == ladder.method
+                    and one.setting.value in ladder.values), default=0.0)  # fmt: skip
 
     def _affordable(self, ladder: Ladder, last: Tried) -> int:
         """The finest rung whose run takes no longer than PATIENCE."""
@@ -124,6 +134,16 @@ class Search:
         return (seconds > WORTH * min(one.seconds for one in best)
                 and calls > WORTH * min(one.calls for one in best))  # fmt: skip
 
+    def _too_long(self, ladder: Ladder, i: int, last: Tried | None) -> bool:
+        """Whether a rung would take minutes where another engine has met the tolerance long since; said if so."""
+        best = min((one.seconds for one in self.meeting()), default=float("inf"))
+        seconds = 0.0 if last is None else ladder.work(last.setting.value, ladder.values[i]) * last.seconds
+        if seconds <= max(TOO_LONG, WORTH * best):
+            return False
+        self.tried.append(Tried(ladder.setting(i), "refused", f"not run: it would take about {seconds:.0f} s, and the "
+                                f"tolerance is met in {best:.2g} s"))  # fmt: skip
+        return True
+
 
 def _next(ladder: Ladder, low: int, high: int, last: Tried | None, tolerance: float) -> int:
     """The rung to try: by the declared order from the last one, in the middle where that says nothing."""
@@ -133,5 +153,10 @@ def _next(ladder: Ladder, low: int, high: int, last: Tried | None, tolerance: fl
         wanted = last.setting.value * (tolerance / last.error) ** (1 / (1 if ladder.adaptive else ladder.order or 2))
     else:
         return (low + high) // 2
+    return _rung(ladder, wanted, low, high)
+
+
+def _rung(ladder: Ladder, wanted: float, low: int, high: int) -> int:
+    """The coarsest rung that is no coarser than what is wanted, of those left."""
     i = bisect_left(ladder.values, -wanted * (1 + 1e-9), key=lambda value: -value)
     return min(max(i, low), high - 1)
