@@ -46,8 +46,8 @@ DEFAULTS = {(OURS, Braked.substeps): "twinrig", (LITERAL, 1): "paper"}
 SUBSTEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
 ORDERS = {EULER: 1, LITERAL: 1}
 FULL = {OURS: SUBSTEPS, EULER: SUBSTEPS, RK4: SUBSTEPS, LITERAL: SUBSTEPS}
-QUICK = {OURS: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 8, 64)}
-"""The named share of FULL that the quick report takes."""
+QUICK = {OURS: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 16, 64, 256)}
+"""The named share of FULL that the quick report takes; the paper's own single step is far from where its order shows."""
 SOLVERS = {True: (("DOP853", 1e-9), ("LSODA", 1e-9)), False: (("DOP853", 1e-12), ("LSODA", 1e-11))}
 """Reference solvers with their relative tolerances, by ``quick``: a Runge-Kutta method and a multistep one."""
 
