@@ -4,13 +4,15 @@ Another system that marches joins by a problem in ``validation/price/problems`` 
 which does not, has routes of its own beside them.
 """
 
+import os
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from models.assembly import Assembly
-from validation.price import instructions, ride, speed, split
+from models.ensemble.workers import processes
+from validation.price import ride, speed, split
 from validation.price import runner as cost
 from validation.price.figure import draw as draw_figure
 from validation.price.force_calls import counted
@@ -41,7 +43,7 @@ FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (noisy_forces.problem, prescr
                                                     partial(wheelset.problem, speed=1.0),
                                                     contact_alone.problem)  # fmt: skip
 """Problems that a quick run leaves out; it has those of PROBLEMS."""
-ROUNDS = {True: 5, False: 15}
+ROUNDS = {True: 3, False: 15}
 """Interleaved rounds of timing at most, by ``quick``."""
 LEAST = {True: 0.004, False: 0.01}
 """A short run is repeated until its turn lasts this long (s), by ``quick``."""
@@ -56,24 +58,35 @@ COUNTED = 0.2
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows of all problems, of the force calls, and of two claims about speed."""
-    rows, saved = [], []
-    for make in PROBLEMS if quick else PROBLEMS + FULL_ONLY:
-        problem = make(quick)
-        points = cost.measure(problem, quick, ROUNDS[quick], LEAST[quick])
-        saved.append({"problem": cost.describe(problem, points), "points": [p.as_dict() for p in points]})
-        rows += rows_of(problem, points, quick)
+    """Rows of all problems, of the force calls, and of two claims about speed; quick: five of the eleven problems, a
+    named share of their settings, and beside another case, where in full no more processes run than there are cores.
+    """
+    found = [_priced(quick, make) for make in PROBLEMS] if quick else _shared()
+    saved, rows = [own for own, _ in found], [row for _, own in found for row in own]
     road = road_excited.problem(quick)
     ride_rows, ride_data = ride.measure(quick, ROUNDS[True], LEAST[True])
     rows += ride_rows
-    data = {"problems": saved, "ride": ride_data, "split": [], "instructions": {},
+    data = {"problems": saved, "ride": ride_data, "split": [],
             **_speeds(road.assembly, 2 * ROUNDS[quick], 2 * LEAST[quick])}  # fmt: skip
     settings = list(dict.fromkeys(_at_1_ms(one) for one in road.settings(quick) if one.method != "DVERK6"))
     if not quick:
         data["split"] = split.measure(ROUNDS[quick], LEAST[quick])
-        counted_rows, data["instructions"] = instructions.measure(folder)
-        rows += split.rows(data["split"]) + counted_rows
+        rows += split.rows(data["split"])
     return rows + _road_rows(saved[0]) + _counts(settings, road.assembly) + _speed_rows(data), data
+
+
+def _priced(quick: bool, make: Callable[[bool], Problem]) -> tuple[dict[str, Any], list[Row]]:
+    """One problem: what is saved of it, and its rows."""
+    problem = make(quick)
+    points = cost.measure(problem, quick, ROUNDS[quick], LEAST[quick])
+    saved = {"problem": cost.describe(problem, points), "points": [p.as_dict() for p in points]}
+    return saved, rows_of(problem, points, quick)
+
+
+def _shared() -> list[tuple[dict[str, Any], list[Row]]]:
+    """All problems by as many processes as there are processors, two at most; the last ones, which are long, first."""
+    with processes(min(2, os.cpu_count() or 1)) as pool:
+        return [*pool.map(partial(_priced, False), (PROBLEMS + FULL_ONLY)[::-1])][::-1]
 
 
 def _speeds(assembly: Assembly, rounds: int, least: float) -> dict[str, Any]:
@@ -145,8 +158,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     found = [table for one in data["problems"]
              for table in (*cost_tables(one["problem"], [cost.point(saved) for saved in one["points"]]),
                            *split.table(data["split"], one["problem"]["key"]))]  # fmt: skip
-    return [*found, *([instructions.table(data["instructions"])] if data["instructions"] else []),
-            ride.table(data["ride"])]  # fmt: skip
+    return [*found, ride.table(data["ride"])]
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
