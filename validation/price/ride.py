@@ -4,8 +4,9 @@ All routes take the same linear vehicle on the paper's road at one speed. The re
 its panels until nothing changes, an integral over frequencies with the delay in closed form; it knows its own error.
 """
 
+import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -24,7 +25,7 @@ from models.road.two_track import CASES, excitation, half_track, road_of_level
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.rows import Row, System, Table, at_most, finding, within
-from validation.timing import describe, interleave
+from validation.timing import interleave
 
 SYSTEM: System = "cost"
 SPEED, LOWEST = 20.0, 1e-2
@@ -43,7 +44,7 @@ KINDS = {"accelerations": "acceleration", "tyre forces": "tyre force"}
 @dataclass(frozen=True)
 class Point:
     """One route. count : of what it is made, solves, points, frequencies or copies; errors : largest of each of KINDS,
-    relative; z : of the variances of a random one, largest; seconds : median."""
+    relative; z : of the variances of a random one, largest; seconds : median, of long ones those of the one run."""
 
     name: str
     unit: str
@@ -109,16 +110,18 @@ def measure(quick: bool, rounds: int, least: float) -> tuple[list[Row], dict[str
     jobs: list[Callable[[], Any]] = [partial(direct, ride), partial(fast, ride, swept)]
     for count, last, even in (*((*one, False) for one in GRIDS[quick]), (*UNIFORM, True)):
         name = f"{'uniform' if even else 'logarithmic'} grid to {last:g} Hz"
-        points.append(Point(name, "frequencies", count, ride.errors(grid(ride, count, last, even)), 0.0))
+        begun = time.perf_counter()
+        errors = ride.errors(grid(ride, count, last, even))
+        points.append(Point(name, "frequencies", count, errors, time.perf_counter() - begun))
         jobs.append(partial(grid, ride, count, last, even))
     for copies, lasting in COPIES[quick]:
-        points.append(_copies(ride, copies, lasting))
+        begun = time.perf_counter()
+        points.append(replace(_copies(ride, copies, lasting), seconds=time.perf_counter() - begun))
         jobs.append(partial(at_constant_speed, ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED))
+    taken = [p.seconds for p in points]
     few = [i for i, p in enumerate(points) if p.unit != "copies" and p.count < 10_000]
-    taken = {
-        i: float(np.median(s)) for i, s in zip(few, interleave([jobs[i] for i in few], rounds, least), strict=True)
-    }
-    taken |= {i: describe(interleave([jobs[i]], 1, 0.0)[0])["median"] for i in range(len(jobs)) if i not in taken}
+    for i, seconds in zip(few, interleave([jobs[i] for i in few], rounds, least), strict=True):
+        taken[i] = float(np.median(seconds))
     per = {1: 5 * swept}  # of the sweep a point
     points = [Point(**{**asdict(p), "seconds": taken[i] / per.get(i, 1)}) for i, p in enumerate(points)]
     return judged(ride, points), {"points": [asdict(p) for p in points], "uncertainty": ride.uncertainty}
