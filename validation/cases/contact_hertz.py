@@ -30,7 +30,9 @@ WHY = ("K and E by the arithmetic-geometric mean in 60 decimal digits, which lea
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows for axes, pressure, approach and load over all ratios of axes, for one published contact, for refusals."""
+    """Rows for axes, pressure, approach and load over all ratios of axes, for one published contact, for refusals;
+    the same in quick.
+    """
     errors = _errors((*RANGE, *NEAR_CIRCLE))
     rows = [at_most(f"contact_hertz.{name}", SYSTEM, f"{NAMES.get(name, name)}, axis ratios 1e-6 "
                     "to 1e6: worst relative error", max(found), "", BOUND, WHY, "closed form")

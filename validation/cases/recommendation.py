@@ -34,7 +34,7 @@ MET, FACTOR = 0.95, 3.0
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Verdicts on all recommendations for all scenes."""
+    """Verdicts on all recommendations for all scenes; quick: those of one engine for one scene."""
     both = [judged("pitch-plane", QUICK, folder, (ENGINE,))] if quick else _shared(folder)
     found, refused = [own for own, _ in both], [why for _, own in both for why in own]
     return _rows(found, refused), {"verdicts": [[asdict(one) for one in own] for own in found], "refused": refused}

@@ -23,7 +23,7 @@ SEED = 3
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Round trips, the sampling recurrence, a class's variance, and the measured course."""
+    """Round trips, the sampling recurrence, a class's variance, and the measured course; the same in quick."""
     with TemporaryDirectory() as name:
         rows = _round_trips(Path(name))
     return [*rows, _recurrence(), _class_variance(), *_measured()], {}
