@@ -1,0 +1,182 @@
+"""Faults of the recommendation of a setting, one at a time, and the checks that see them.
+
+The scene has a closed form, y' = y cos t, hence y = exp(sin t), so what each setting does is known without a search.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.patches import Patch, attribute
+from validation.price.own_scene import Answer, Ladder, recommendation
+from validation.price.own_scene.recommendation import Choice, Recommendation
+from validation.price.own_scene.truth import Truth, at
+from validation.price.problems import Setting
+
+STEPS = tuple(0.2 / n for n in (1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40, 64, 100, 160, 250))
+STAGES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
+    "Euler": ((0.0,), (1.0,)), "midpoint": ((0.0, 0.5), (0.0, 1.0)),
+    "RK4": ((0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
+}  # fmt: skip
+"""Places of stages within a step, each from the one before, and weights."""
+LOOSE, TIGHT = 0.03, 6e-7
+"""Tolerances: the first is met most cheaply by the default method as it comes, the second by another one."""
+TURN = 1e-3
+"""s: turns of the races, of runs as short as these."""
+
+
+@dataclass(frozen=True)
+class Swing:
+    """See ``validation.price.own_scene.OwnScene``. The error has grown by the end of the run, beyond what is searched.
+    """
+
+    title, quantity, unit, cell, note, counted = "y' = y cos t", "y", "", 0.0, "", "force calls"
+    whole, first = 8.0, 2.0
+
+    def ladders(self) -> list[Ladder]:
+        """Methods of one engine; the default is of order 2; one of them breaks down on the way."""
+        return [Ladder("mujoco", "RK4", STEPS, 4), Ladder("mujoco", "midpoint", STEPS, 2, default=STEPS[0]),
+                Ladder("mujoco", "Euler", STEPS, 1), Ladder("mujoco", "broken", STEPS, 1)]  # fmt: skip
+
+    def reference(self) -> Ladder:
+        """RK4, whose first rung is known to no better than some of the settings tried."""
+        return Ladder("reference", "RK4", tuple(0.1 / 2**k for k in range(8)), 4)
+
+    def second(self, last: Setting) -> None:
+        """None: the checks know the closed form."""
+
+    def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
+        """Times, values, calls."""
+        n = round(duration / setting.value)
+        places, weights = STAGES.get(setting.method, STAGES["Euler"])
+        values = [1.0]
+        for i in range(n):
+            values.append(_step(i * setting.value, values[-1], setting.value, places, weights))
+        times = setting.value * np.arange(n + 1)
+        found = np.where(times < 0.1, np.exp(np.sin(times)), np.nan) if setting.method == "broken" else values
+        return times, np.array(found), len(places) * n
+
+    def answer(self, solution: tuple[np.ndarray, np.ndarray, int]) -> Answer:
+        """y."""
+        times, values, calls = solution
+        return Answer(times, values[:, None], {"force calls": calls})
+
+    def lines(self, setting: Setting) -> list[str]:
+        """Its name."""
+        return [setting.label()]
+
+
+def _step(t: float, y: float, h: float, places: tuple[float, ...], weights: tuple[float, ...]) -> float:
+    slope = total = 0.0
+    for place, weight in zip(places, weights, strict=True):
+        slope = (y + place * h * slope) * math.cos(t + place * h)
+        total += weight * slope
+    return y + h * total
+
+
+@cache
+def _error(setting: Setting) -> float:
+    """True error over the whole run, infinite for what is no number."""
+    times, values, _ = Swing().solve(setting, Swing.whole)
+    worst = float(np.abs(values - np.exp(np.sin(times))).max())
+    return worst if math.isfinite(worst) else math.inf
+
+
+@cache
+def _least(tolerance: float) -> int:
+    """Fewest calls with which any setting holds the tolerance: all are run."""
+    own = Swing()
+    return min(own.solve(setting, own.whole)[2] for ladder in own.ladders() for setting in
+               map(ladder.setting, range(len(STEPS))) if _error(setting) <= tolerance)  # fmt: skip
+
+
+def _found(tolerance: float) -> Recommendation:
+    with patch.object(recommendation, "LEAST", TURN):
+        return recommendation.recommend(Swing(), tolerance)
+
+
+def _worst(size: Callable[[Choice, float], float], kind: str = "", asked: tuple[float, ...] = (TIGHT,)) -> float:
+    """Largest size of the winners by a cost, for each tolerance asked for; infinite where there is no winner."""
+    return max(max((size(choice, tolerance) for (_, by), choice in _found(tolerance).winners.items()
+                    if by.startswith(kind)), default=math.inf) for tolerance in asked)  # fmt: skip
+
+
+def _held(choice: Choice, tolerance: float) -> float:
+    return _error(choice.tried.setting) / tolerance
+
+
+def _told(choice: Choice, tolerance: float) -> float:
+    return abs(math.log(max(choice.error, 1e-300) / min(_error(choice.tried.setting), 1e300)))
+
+
+def _dear(choice: Choice, tolerance: float) -> float:
+    return choice.calls / _least(tolerance) - 1.0
+
+
+CHECKS = {
+    "held": Check("true error by the tolerance", "", 1.0, lambda: _worst(_held)),
+    "told": Check("logarithm of predicted by true error", "", 0.1, lambda: _worst(_told, "", (LOOSE, TIGHT))),
+    "calls": Check("force calls beyond the fewest that hold the tolerance", "", 1e-12,
+                   lambda: _worst(_dear, "calls", (LOOSE, TIGHT))),
+    "seconds": Check("the same of the setting recommended by seconds, where a call costs the same in all", "", 2.0,
+                     lambda: _worst(_dear, "seconds")),
+}  # fmt: skip
+
+
+def _in(name: str, change: Callable[[Any], Any], module: str = "recommendation") -> Patch:
+    return attribute(f"validation.price.own_scene.{module}:{name}", change)
+
+
+def _tenth(real: Any) -> Any:
+    """Errors of the winners by ten."""
+    def told(*own: Any) -> Any:
+        known, timed, winners = real(*own)
+        return known, timed, {key: replace(one, error=one.error / 10.0) for key, one in winners.items()}
+    return told
+
+
+def _by_error(timed: list[Choice], engine: str, kind: str) -> Choice | None:
+    return min(timed, key=lambda one: one.error, default=None)
+
+
+def _dearest(timed: list[Choice], engine: str, kind: str) -> Choice | None:
+    return max(timed, key=lambda one: one.calls, default=None)
+
+
+def _mean(self: Truth, other: Answer) -> float:
+    exact = at(self.answer, other.times, self.cell)
+    return float(np.abs(other.values - exact).mean()) if np.isfinite(other.values).all() else np.inf
+
+
+def _numbers_alone(self: Truth, other: Answer) -> float:
+    exact = at(self.answer, other.times, self.cell)
+    return float(np.nanmax(np.abs(other.values - exact)))
+
+
+def _first_rung(scene: Any, ladder: Ladder, tolerance: float, duration: float, rung: int) -> Any:
+    return scene.answer(scene.solve(ladder.setting(0), duration)), 0, 0.0, 0.0
+
+
+FAULTS = (
+    Fault("predicted error a tenth of what was measured", "recommendation", _in("_resolved", _tenth)),
+    Fault("the most accurate setting wins, not the cheapest", "recommendation", _in("_cheapest", lambda _: _by_error)),
+    Fault("the dearest setting wins", "recommendation", _in("_cheapest", lambda _: _dearest)),
+    Fault("the engine's default dropped from the race", "recommendation",
+          _in("_timed", lambda real: lambda search: [one for one in real(search) if not one.tried.setting.default])),
+    Fault("the default kept whatever it costs", "recommendation", _in("_slower", lambda _: lambda one, best: False)),
+    Fault("judged over the part that is searched alone", "recommendation",
+          _in("_confirmed", lambda _: lambda search, timed, winners: (search.truth, timed, winners))),
+    Fault("mean difference for the largest", "truth", _in("Truth.error", lambda _: _mean, "truth")),
+    Fault("what is no number left out of the error", "truth", _in("Truth.error", lambda _: _numbers_alone, "truth")),
+    Fault("the reference's first step taken for the truth", "truth", _in("_settled", lambda _: _first_rung, "truth")),
+    Fault("a tolerance three times too wide", "search",
+          _in("Search.held", lambda _: property(lambda self: 3.0 * self.tolerance), "search")),
+)
+
+CAMPAIGN = Campaign("planted.advice", "the recommendation of a setting", "cost", CHECKS, FAULTS)
