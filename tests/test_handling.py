@@ -8,7 +8,8 @@ import pytest
 from scipy.integrate import quad
 
 from models.errors import InputError, RunFailed
-from models.handling.in_engines import driven
+from models.handling import forces
+from models.handling.in_engines import Drive, driven
 from models.handling.numbers import Controls, Handling, Tyres
 from models.handling.road import plane_waves
 from models.handling.scene import build
@@ -138,6 +139,33 @@ def test_engines_agree_where_all_wheels_slide_and_lift() -> None:
     assert np.abs(one.run.positions - two.run.positions).max() < 1e-10
     assert one.tyres[:, :, at.PRESS].min() == 0.0
     assert one.tyres[:, :, at.POWER].max() <= 0.0
+
+
+@pytest.fixture(scope="module")
+def braked_turn() -> Drive:
+    """800 N m of braking, 7 parts of 10 in front, while the car begins to turn left, 0.2 s."""
+    controls = Controls(steer=((0.0, 0.0), (0.1, 0.03)), brake=((0.0, 0.0), (0.1, 800.0)), front_brake=0.7)
+    return driven("mujoco", Handling(R19, Tyres(cells=5), controls), 20.0, 0.2)
+
+
+def test_brakes_of_each_axle_have_their_share(braked_turn: Drive) -> None:
+    """At spins of 60 rad/s the torque is whole: tanh(60) is 1 to rounding."""
+    front = np.array([at.name.startswith("f") for at in braked_turn.handling.vehicle.tyres])
+    torque = braked_turn.tyres[-1, :, forces.SPIN_TORQUE]
+    assert front.sum() == 2 and np.allclose(torque, np.where(front, -280.0, -120.0), rtol=1e-9)
+
+
+def test_lateral_acceleration_is_that_of_the_place_below_the_chassis(braked_turn: Drive) -> None:
+    """Twice the difference of its path in the axes of the road, turned to the left: 1 ms of a manoeuvre of 0.1 s."""
+    x, y, yaw = braked_turn.path.T
+    place = next(body for body in R19.bodies if body.name == "body").position
+    path = np.stack([x + np.cos(yaw) * place[0] - np.sin(yaw) * place[1],
+                     y + np.sin(yaw) * place[0] + np.cos(yaw) * place[1]])  # fmt: skip
+    times = braked_turn.run.times
+    along, across = np.gradient(np.gradient(path, times, axis=1), times, axis=1)
+    found, expected = braked_turn.lateral_acceleration(), np.cos(yaw) * across - np.sin(yaw) * along
+    assert found[-10] > 0.5
+    assert np.allclose(found[5:-5], expected[5:-5], rtol=0, atol=1e-2 * found.max())
 
 
 @pytest.mark.full
