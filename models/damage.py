@@ -30,7 +30,10 @@ def turning_points(load: np.ndarray) -> np.ndarray:
 
 
 def checked(load: np.ndarray) -> np.ndarray:
-    """The load (n,) as doubles; InputError for none, for one that is not finite, for no row of them."""
+    """The load (n,) as doubles; InputError for none, for one that is masked or not finite, for no row of them."""
+    if np.ma.is_masked(load):
+        raise InputError("", "load", None, f"{np.ma.count_masked(load)} of {np.size(load)} samples are masked: leave "
+                         "them out or fill them")  # fmt: skip
     given = np.asarray(load)
     if given.ndim != 1 or given.dtype.kind not in "biuf":
         raise InputError("", "load", f"{given.ndim}-dimensional, {given.dtype}", "must be one row of real numbers")

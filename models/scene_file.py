@@ -150,8 +150,19 @@ def _entry(listed: list[Any], number: str, key: str, text: str) -> int:
 
 def _value(text: str) -> Any:
     """A value as in a scene file; text needs no quotes."""
-    try:
-        found = tomllib.loads(f"x = {text}")
-    except (ValueError, RecursionError):
-        return text
-    return found["x"] if len(found) == 1 else text
+    for written in (text,) if '"' in text or "'" in text else (text, BARE_POINT.sub(_with_digits, text)):
+        try:
+            found = tomllib.loads(f"x = {written}")
+        except (ValueError, RecursionError):
+            continue
+        return found["x"] if len(found) == 1 else text
+    return text
+
+
+BARE_POINT = re.compile(r"(?<![\w.])(?=\.?\d)(\d*)\.(\d*)(?=[eE][-+]?\d|(?![\w.]))")
+"""A number that may lack digits before or behind its point, which TOML does not take: 20. or .5"""
+
+
+def _with_digits(number: re.Match) -> str:
+    """The same number with both."""
+    return f"{number[1] or '0'}.{number[2] or '0'}"

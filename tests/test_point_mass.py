@@ -51,7 +51,7 @@ def test_paths_follow_the_scheme():
 def test_what_is_no_point_mass_is_refused():
     for own in ({"mass": 0.0}, {"damping": -1.0}, {"deviation": -1.0}, {"step": 0.0}, {"damping": np.nan}):
         values = {"deviation": 1.0, "step": 0.1, **own}
-        with pytest.raises(ValueError, match="no point mass"):
+        with pytest.raises(ValueError, match="point mass: none"):
             continuous(1.0, **values)
     with pytest.raises(ValueError, match="unstable"):
         discrete(5, 1.0, 0.1, 1.0, 20.0)

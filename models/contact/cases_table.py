@@ -11,7 +11,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from models.contact.accuracy import band, moment_band, spin_share, used_with_moment
+from models.contact.accuracy import band, moment_band, slenderness, spin_share, used_with_moment
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_load
 from models.contact.material import Pair
@@ -109,8 +109,9 @@ def _forces(values: dict[str, Any], pair: Pair, method: Method) -> np.ndarray:
     most, share = limit * np.maximum(a, b), spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu)
     used, turned = (np.divide(size, whole, out=np.zeros_like(limit), where=limit > 0)
                     for size, whole in ((np.hypot(fine.fx, fine.fy), limit), (fine.mz, most)))  # fmt: skip
-    theory = limit * band(method.band, used, share)
-    moment = most * moment_band(method.band, used_with_moment(used, turned), share)
+    wider = slenderness(a, b)
+    theory = wider * limit * band(method.band, used, share)
+    moment = wider * most * moment_band(method.band, used_with_moment(used, turned), share)
     return np.column_stack([fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation, left[0], theory, left[1],
                             moment]) + 0.0  # fmt: skip
 

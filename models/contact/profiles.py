@@ -16,6 +16,8 @@ from models.errors import InputError
 
 SPACING = 1e-4
 """Distance (m) of the points along a profile's contour."""
+SPIKE = 2e-4
+"""Distance (m) from both neighbours from which a point that turns back counts as one that was measured wrongly."""
 TURNING = 0.3
 """Largest way of a contour against its direction by the way along it: a rail with web and foot turns by 0.27."""
 
@@ -81,8 +83,19 @@ def _check(y: np.ndarray, z: np.ndarray, smoothing: float, file: object) -> None
     if min(there, back) > TURNING * max(there, back):
         raise InputError(file, "profile", None, f"runs {there:.3g} m along y and {back:.3g} m against it: points must "
                          "follow the contour, y before z")  # fmt: skip
+    _check_spikes(np.column_stack((y, z)), file)
     if not 0.0 <= smoothing <= 0.05:
         raise InputError(file, "smoothing", smoothing, "must be a wavelength from 0 to 0.05 m")
+
+
+def _check_spikes(points: np.ndarray, file: object) -> None:
+    """A point far off the way from its neighbour to the next is no part of a contour, which never turns back."""
+    way, straight = np.linalg.norm(np.diff(points, axis=0), axis=1), np.linalg.norm(points[2:] - points[:-2], axis=1)
+    spikes = np.minimum(way[:-1], way[1:]) > np.maximum(2.0 * straight, SPIKE)
+    if spikes.any():
+        y, z = points[1 + int(np.argmax(spikes))]
+        raise InputError(file, "profile", [float(y), float(z)], f"sticks out between its neighbours: {spikes.sum()} "
+                         "such points (m); take out what was measured wrongly")  # fmt: skip
 
 
 def _smoothed(length: np.ndarray, values: np.ndarray, even: np.ndarray, smoothing: float) -> np.ndarray:

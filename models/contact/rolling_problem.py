@@ -151,15 +151,16 @@ def _limited(traction: np.ndarray, bound: np.ndarray) -> np.ndarray:
 def _solve(operator: SlipOperator, rigid: np.ndarray, bound: np.ndarray) -> tuple[_State, int]:
     """Tractions that meet all conditions, and the rounds taken."""
     state, relaxation = _State(operator, rigid, bound, np.zeros_like(rigid)), RELAXATION
-    for done in range(MOST_ROUNDS):
-        if state.residual <= TOLERANCE:
-            return state, done
+    done = 0
+    while state.residual > TOLERANCE:
+        if done == MOST_ROUNDS:
+            raise RunFailed("rolling problem", f"conditions of stick and slip met to {state.residual:.2g} only "
+                            f"after {MOST_ROUNDS} rounds")  # fmt: skip
         swept = _swept(operator, rigid, state, relaxation)
         nearest = swept if swept.residual <= TOLERANCE else min(swept, _turned(operator, rigid, swept), key=_residual)
         relaxation *= 1.0 if nearest.residual < state.residual else SLOWER
-        state = nearest
-    raise RunFailed("rolling problem", f"conditions of stick and slip met to {state.residual:.2g} only "
-                    f"after {MOST_ROUNDS} rounds")  # fmt: skip
+        state, done = nearest, done + 1
+    return state, done
 
 
 def _swept(operator: SlipOperator, rigid: np.ndarray, state: _State, relaxation: float) -> _State:

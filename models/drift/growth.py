@@ -162,6 +162,17 @@ def drift_off_time(rate: float, intensity: float, angle: float) -> float:
     for name, value, least in (("rate", rate, 0.0), ("intensity", intensity, LEAST), ("angle", angle, LEAST)):
         if not (math.isfinite(value) and value >= least):
             raise InputError("", name, value, "must be finite, intensity and angle above 0 and the rate not below")
-    wanted = (angle / MEDIAN) ** 2
-    longest = (3 * wanted / intensity) ** (1 / 3)  # lambda = 0 is the slowest growth
-    return float(brentq(lambda t: float(pitch_variance(t, rate, intensity)) - wanted, 0.0, longest * (1 + 1e-9)))
+    longest = (math.log(3.0) + 2.0 * math.log(angle / MEDIAN) - math.log(intensity)) / 3.0  # without growth
+    if rate == 0.0:
+        return math.exp(longest)
+    most = math.log(2.0) + math.log(rate) + longest
+    ends = min(most, 0.0) - 1.0, min(most, math.log(3.0 * max(most, 0.0) + 3.0))
+    return math.exp(brentq(lambda x: 3.0 * (x - most) + _log_gain(x), *ends, xtol=1e-14)) / (2.0 * rate)
+
+
+def _log_gain(log_x: float) -> float:
+    """Logarithm of 6 (sinh x - x) / x^3 from that of x = 2 lambda t: neither need be a number itself."""
+    x = math.exp(log_x)
+    if x > LONGEST:
+        return math.log(3.0) + x - 3.0 * log_x
+    return float(np.log(pitch_variance(1.0, x / 2.0, 3.0)))

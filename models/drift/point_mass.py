@@ -14,6 +14,7 @@ import math
 import numpy as np
 from scipy.signal import lfilter
 
+from models.errors import InputError
 from models.noise import normal
 
 SMALL = 1.0
@@ -23,7 +24,7 @@ SMALL = 1.0
 def continuous(time: float, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0) -> np.ndarray:
     """Covariance after ``time`` (s) of eq. (4); ``damping`` eta in 1/s, zero or more.
 
-    Raises ValueError where the closed form does not hold (see ``_check``).
+    Raises InputError where the closed form does not hold (see ``_check``).
     """
     _check(deviation, step, mass, damping, time)
     intensity, decayed = deviation**2 * step / mass**2, damping * time
@@ -49,7 +50,7 @@ def discrete(steps: int, deviation: float, step: float, mass: float = 1.0, dampi
     """Covariance after ``steps`` steps of the explicit Euler scheme (3), exactly.
 
     With h = eta step, r = 1 - h and the sums S1, S2 of r^i and r^(2i): Var v = q S2, Cov = q step (S1 - S2) / h,
-    Var x = q step^2 (n - 2 S1 + S2) / h^2, where q = (deviation step / mass)^2. Raises ValueError where the
+    Var x = q step^2 (n - 2 S1 + S2) / h^2, where q = (deviation step / mass)^2. Raises InputError where the
     scheme is unstable, h >= 2.
     """
     _check(deviation, step, mass, damping, steps)
@@ -64,7 +65,7 @@ def discrete(steps: int, deviation: float, step: float, mass: float = 1.0, dampi
 def _stable(h: float) -> float:
     """Damping times step, which is below 2."""
     if h >= 2:
-        raise ValueError(f"damping times step is {h:g}: the explicit Euler scheme is unstable from 2 on")
+        raise InputError("", "damping", None, f"times step is {h:g}: the explicit Euler scheme is unstable from 2 on")
     return h
 
 
@@ -94,15 +95,15 @@ def _check(deviation: float, step: float, mass: float, damping: float, length: f
     """Deviation, damping and length are zero or more, step and mass above zero, and all finite."""
     finite = all(map(math.isfinite, (deviation, step, mass, damping, length)))
     if not finite or min(deviation, damping, length) < 0 or min(step, mass) <= 0:
-        raise ValueError(f"no point mass has deviation {deviation:g}, step {step:g}, mass {mass:g}, "
-                         f"damping {damping:g} over {length:g} s or steps")
+        raise InputError("", "point mass", None, f"none has deviation {deviation:g}, step {step:g}, mass {mass:g}, "
+                         f"damping {damping:g} over {length:g} s or steps")  # fmt: skip
 
 
 def paths(count: int, steps: int, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0,
           seed: int = 0) -> np.ndarray:  # fmt: skip
     """Monte Carlo: errors (count, 2) of position (m) and velocity (m/s) of Euler paths after ``steps`` steps.
 
-    Raises ValueError as ``discrete`` does.
+    Raises InputError as ``discrete`` does.
     """
     _check(deviation, step, mass, damping, steps)
     _stable(damping * step)

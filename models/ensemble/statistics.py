@@ -4,6 +4,9 @@ import math
 
 import numpy as np
 
+from models.errors import InputError
+
+FEWEST = 3
 ERRORS_95 = 1.959964
 """Standard errors on either side of a 95 % interval."""
 
@@ -12,8 +15,10 @@ def deviation(values: np.ndarray) -> tuple[float, float]:
     """Standard deviation of values (n,) and its standard error, for any law of finite fourth moment.
 
     By Var(s^2) = (mu4 - sigma^4) / n to first order; 1/sqrt(2 n) of it for a normal law. Not a number if any
-    value is none.
+    value is none. Raises InputError for fewer than ``FEWEST`` values, of which two have an error of 0 by this.
     """
+    if len(values) < FEWEST:
+        raise InputError("", "values", len(values), f"a standard deviation and its error need {FEWEST} values or more")
     centred = values - values.mean()
     second, fourth = np.mean(centred**2), np.mean(centred**4)
     spread = math.sqrt(second * len(values) / (len(values) - 1))
@@ -25,8 +30,13 @@ def deviation(values: np.ndarray) -> tuple[float, float]:
 def quantile(values: np.ndarray, level: float) -> tuple[float, float, float]:
     """Quantile of values (n,), some of which may be infinite, and the ends of its 95 % interval.
 
-    Order statistics, so no law is assumed; the ranks of the interval by the normal limit of the binomial.
+    Order statistics, so no law is assumed; the ranks of the interval by the normal limit of the binomial. Raises
+    InputError without a value, for one that is no number, and for a level that is not between 0 and 1.
     """
+    if not len(values) or np.isnan(values).any():
+        raise InputError("", "values", None, "must be numbers, one or more; infinite ones are allowed")
+    if not 0.0 < level < 1.0:
+        raise InputError("", "level", level, "must be between 0 and 1")
     ordered, count = np.sort(values), len(values)
     half = ERRORS_95 * math.sqrt(count * level * (1 - level))
     ranks = (math.ceil(count * level) - 1, math.floor(count * level - half) - 1, math.ceil(count * level + half) - 1)

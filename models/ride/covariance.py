@@ -115,10 +115,15 @@ def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, floa
     """P of A P + P A' + Q = 0 in extended precision, the last correction, and the residual by its largest term.
 
     python-control with its method named (left alone it takes another where slycot is installed), then refined: the
-    residual, in extended precision, is solved for what is missing.
+    residual, in extended precision, is solved for what is missing. Q may be indefinite. Raises InputError for a Q that
+    is askew, values that are not finite and shapes that do not fit; A is taken to be stable.
     """
     from control import lyap
 
+    if A.shape != Q.shape or not (np.isfinite(A).all() and np.isfinite(Q).all()):
+        raise InputError("", "A, Q", [list(A.shape), list(Q.shape)], "must be finite and of one shape (n, n)")
+    if not abs(Q - Q.T).max(initial=0.0) <= SKEW * abs(Q).max(initial=0.0):
+        raise InputError("", "Q", None, "must be symmetric")
     if len(A) == 0:
         return Q.astype(np.longdouble), Q.astype(np.longdouble), 0.0
     wide, right = A.astype(np.longdouble), ((Q + Q.T) / 2).astype(np.longdouble)
@@ -134,6 +139,8 @@ def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, floa
     return P, correction, float(left / max(abs(half).max(initial=0.0), np.finfo(float).tiny))
 
 
+SKEW = 1e-9
+"""Of a right side by its largest element: rounding."""
 UNCERTAIN = 1e-6
 """Relative error of a variance beyond which none is given."""
 

@@ -1,13 +1,17 @@
 """What engineers read from variances: how often a travel runs out, how much a wheel load moves about its mean.
 
-All for Gaussian processes of zero mean, which the linear vehicle makes of a Gaussian road.
+All for Gaussian processes of zero mean, which the linear vehicle makes of a Gaussian road. Deviations and limits below
+0, and what is not finite, are refused (InputError).
 """
 
 import math
 
+from models.errors import InputError
+
 
 def share_beyond(deviation: float, limit: float) -> float:
     """Share of time for which abs(x) > limit, from the standard deviation of x; the unit of both is that of x."""
+    _check(deviation=deviation, limit=limit)
     return 0.0 if deviation == 0.0 else math.erfc(limit / (math.sqrt(2.0) * deviation))
 
 
@@ -16,6 +20,7 @@ def exceedances(deviation: float, rate_deviation: float, limit: float) -> float:
 
     Rice's formula, both sides together: (sd x' / sd x) exp(-limit^2 / (2 sd^2)) / pi.
     """
+    _check(deviation=deviation, rate_deviation=rate_deviation, limit=limit)
     if deviation == 0.0:
         return 0.0
     return rate_deviation / (math.pi * deviation) * math.exp(-((limit / deviation) ** 2) / 2.0)
@@ -26,4 +31,14 @@ def dynamic_load_factor(deviation: float, static: float) -> float:
 
     At three standard deviations the load is then gone, which a linear vehicle does not notice.
     """
+    _check(deviation=deviation)
+    if not 0.0 < static < math.inf:
+        raise InputError("", "static", static, "must be a wheel's load above 0, in N")
     return deviation / static
+
+
+def _check(**given: float) -> None:
+    """Raise InputError for what is below 0 or no number."""
+    for name, value in given.items():
+        if not 0.0 <= value < math.inf:
+            raise InputError("", name, value, "must be 0 or more, and finite")

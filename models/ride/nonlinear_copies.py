@@ -104,6 +104,8 @@ def copies_in_time(vehicle: SpatialVehicle, excitation: Excitation, speed: float
     laws = _Laws(vehicle, plain, springs, speed)
     x, sums, seen = np.zeros((2 * len(plain.mass), copies)), np.zeros((4, len(plain.outputs), copies)), 0
     for number, portion in enumerate(road.blocks(BLOCK, copies, seed)):
+        if number == 0:
+            x[: len(plain.mass)] = _standing(plain, portion[0])
         for i in range(BLOCK):
             if (done := number * BLOCK + i) == settling + counted:
                 return Copies(tuple(o.name for o in plain.outputs), sums.swapaxes(1, 2) / seen, road.step,
@@ -114,6 +116,12 @@ def copies_in_time(vehicle: SpatialVehicle, excitation: Excitation, speed: float
                 seen += 1
             x = laws.stepped(x, rate, portion[2 * i + 1], portion[2 * i + 2], road.step)
     raise AssertionError("roads have no end")
+
+
+def _standing(plain: LinearVehicle, road: np.ndarray) -> np.ndarray:
+    """Positions (n, copies) at rest on a road (2 w, copies): vehicles dropped onto it from metres ring for long."""
+    heights = road[: plain.road_stiffness.shape[1]]
+    return np.linalg.lstsq(plain.stiffness, plain.road_stiffness @ heights, rcond=1e-12)[0]
 
 
 def _rates(linear: LinearVehicle) -> np.ndarray:

@@ -11,7 +11,7 @@ from validation.hard_cases.case import Case
 
 FAMILIES = ("stepping", "sampled_input", "contact_points", "prescribed_pitch", "stabilisers", "invariants", "extremes",
             "accelerometers", "random_input", "drift", "kalman", "covariance", "contact", "contact_limits", "ride",
-            "rolling", "rolling_contacts", "between_steps", "braking", "brake_loops", "recordings",
+            "rolling", "rolling_contacts", "between_steps", "odd_values", "braking", "brake_loops", "recordings",
             "measured_files")  # fmt: skip
 
 

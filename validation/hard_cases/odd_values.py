@@ -1,0 +1,107 @@
+"""Values at the edge of what an engineer would write: a road that begins metres above, slender contacts, tiny
+intensities, points and samples that are none.
+
+Each was answered once by finite numbers that were wrong, or by an error of the machinery.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.contact.accuracy import rolled
+from models.contact.hertz import by_axes
+from models.contact.material import Pair
+from models.contact.profiles import profile
+from models.contact.standard_profiles import built_in
+from models.contact.theories import ExactOnEllipse, Fastsim
+from models.damage import pseudo_damage
+from models.drift.growth import drift_off_time
+from models.drift.point_mass import discrete
+from models.ensemble.statistics import deviation, quantile
+from models.ride.covariance import lyapunov
+from models.ride.excitation import Excitation
+from models.ride.measures import dynamic_load_factor, share_beyond
+from models.ride.nonlinear_copies import copies_in_time
+from models.ride.of_scene import excitation_of, vehicle_of
+from models.ride.scene import build
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import wheels
+from validation.hard_cases.between_steps import REFUSED, asked
+from validation.hard_cases.case import Case
+
+FRICTION, CELLS = 0.3, 15
+
+
+def far_below(implementation: str, folder: Path) -> float:
+    """Bent quarter cars on two roads that differ in waves longer than 60 m alone: largest difference of deviations.
+
+    The longer waves reach up to 10 m, from which cars that began at 0 would fall.
+    """
+    ways = [_copies(corner).deviation for corner in (1e-6, 0.1)]
+    return float(np.abs(ways[0] / ways[1] - 1.0).max())
+
+
+def _copies(corner: float) -> Any:
+    vehicle, road = _bent(corner)
+    return copies_in_time(vehicle, road, 5.0, 1.0, copies=20, seed=1, longest=2e-3)
+
+
+def _bent(corner: float) -> tuple[SpatialVehicle, Excitation]:
+    scene = build({"title": "hard", "system": "ride", "vehicle": {"file": "quarter_car_nonlinear"},
+                   "road": {"level": 6.4e-5, "corner_mean": corner, "corner_roll": corner},
+                   "speeds": {"start": 5.0, "stop": 6.0}})  # fmt: skip
+    vehicle = vehicle_of(scene)
+    return vehicle, excitation_of(scene, wheels(vehicle))
+
+
+def slender(a: float, b: float) -> Callable[[str, Path], float]:
+    """A case of an ellipse under spin: FASTSIM's distance from the exact theory by the error that it states."""
+
+    def error(implementation: str, folder: Path) -> float:
+        pair = Pair()
+        hertz, motion = by_axes(a, b, pair, load=1e5), (0.0, 1e-3, 0.5)
+        choices: dict[str, Any] = {"flexibilities": "blended", "bound": "intermediate", "march": "second-order"}
+        (fast, told), (exact, rest) = (rolled(theory, motion, CELLS) for theory in (
+            Fastsim(hertz, FRICTION, pair, **choices), ExactOnEllipse(hertz, FRICTION, pair)))  # fmt: skip
+        force, moment = float(np.linalg.norm(fast.force - exact.force)), abs(fast.mz - exact.mz)
+        return max(force / (told.total + rest.cells), moment / (told.moment + rest.moment_cells))
+
+    return error
+
+
+def tiny_noise(implementation: str, folder: Path) -> float:
+    """Times to an angle for noise and angle that are both smaller: the same time, over 300 decades."""
+    own = drift_off_time(0.3, 1e-5, 1e-3)
+    scaled = [drift_off_time(0.3, 1e-5 * s * s, 1e-3 * s) for s in (1e-145, 1e-100, 1e145)]
+    return float(np.abs(np.array(scaled) / own - 1.0).max())
+
+
+def spiked() -> Any:
+    """A rail of which one point was measured 1 mm too low."""
+    own = built_in("UIC60")
+    return profile(own.y, own.z + 1e-3 * (np.arange(own.z.size) == own.z.size // 2))
+
+
+MASKED = np.ma.array([0.0, 100.0, 0.0, 1.0, 0.0], mask=np.arange(5) == 1)
+SKEW = np.array([[1.0, 2.0], [0.0, 1.0]])
+STABLE = np.array([[0.0, 1.0], [-4.0, -0.5]])
+CASES = (
+    Case("road that begins 10 m up", "vehicles let go at 0 fall onto it and ring for long",
+         "as on one without its long waves", "relative", 0.02, "waves of 60 m at 0.1 Hz", far_below, once=True),
+    Case("narrow contact", "an ellipse 20 times as wide as long: FASTSIM's moment is two and a half times too large",
+         "within its stated error of the exact theory", "of it", 1.0, "exact", slender(5e-4, 1e-2), once=True),
+    Case("drift-off time under tiny noise", "squares of angles underflow", "the same by scaling", "relative", 1e-12,
+         "rounding", tiny_noise, once=True),
+    *(Case(name, hard, "refused", "", 0.0, "exact", asked(answer), REFUSED, once=True) for name, hard, answer in (
+        ("profile with a spike", "a spline swings about it", spiked),
+        ("masked samples", "would be counted", lambda: pseudo_damage(MASKED)),
+        ("load below 0 under a wheel", "its factor would be negative", lambda: dynamic_load_factor(100.0, -4000.0)),
+        ("limit below 0", "a share of time above 1", lambda: share_beyond(1.0, -1.0)),
+        ("deviation of two values", "its error would be 0", lambda: deviation(np.array([1.0, 2.0]))),
+        ("quantile of what is no number", "would be sorted to the end", lambda: quantile(np.array([1.0, np.nan]), 0.5)),
+        ("right side that is askew", "another one would be solved", lambda: lyapunov(STABLE, SKEW)),
+        ("point mass of nothing", "divided by", lambda: discrete(10, 1.0, 1e-3, 0.0)),
+    )),
+)  # fmt: skip
