@@ -55,11 +55,13 @@ def rates(state, speed, body, p, strips, cells, middle, law, out, report):
     y, z, roll, yaw = state[Y], state[Z], state[ROLL], state[YAW]
     roll_rate, yaw_rate, spin = state[ROLL_RATE], state[YAW_RATE], state[SPIN]
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
-    force, moment = np.zeros(3), np.zeros(3)
-    velocity = np.array([speed, state[Y_RATE], state[Z_RATE]])
+    vectors = np.zeros((4, 3))  # made at once
+    force, moment, velocity, turning = vectors[0], vectors[1], vectors[2], vectors[3]
+    velocity[0], velocity[1], velocity[2] = speed, state[Y_RATE], state[Z_RATE]
     axle_x, axle_y, axle_z = -sy * cr, cy * cr, sr
     own = spin - yaw_rate * sr  # of the wheel against the axes that do not spin
-    turning = np.array([cy * roll_rate + axle_x * own, sy * roll_rate + axle_y * own, yaw_rate + axle_z * own])
+    turning[0], turning[1] = cy * roll_rate + axle_x * own, sy * roll_rate + axle_y * own
+    turning[2] = yaw_rate + axle_z * own
     wheel_forces(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, law, force, moment, report)
     for side in (1.0, -1.0):
         arm = side * body[ARM]

@@ -102,18 +102,15 @@ def carried(z, p):
 @njit(cache=True, error_model="numpy")
 def linear_creep(contacts, p, found):
     """Fill fx, fy, mz by Kalker's coefficients."""
-    c = np.empty(4)
     for k in range(len(contacts)):
         a, b = contacts[k, 0], contacts[k, 1]
         found[k] = 0.0
         if a > 0.0:
-            for kind in range(4):
-                c[kind] = coefficient_at(kind, a / b, p[POISSON])
             area, x, y, spin = a * b, contacts[k, XI_X], contacts[k, XI_X + 1], contacts[k, SPIN]
-            turn = area**1.5 * c[2]
-            found[k, 0] = -p[SHEAR] * area * c[0] * x
-            found[k, 1] = -p[SHEAR] * (area * c[1] * y + turn * spin)
-            found[k, 2] = p[SHEAR] * (turn * y - area**2 * c[3] * spin)
+            turn = area**1.5 * coefficient_at(2, a / b, p[POISSON])
+            found[k, 0] = -p[SHEAR] * area * coefficient_at(0, a / b, p[POISSON]) * x
+            found[k, 1] = -p[SHEAR] * (area * coefficient_at(1, a / b, p[POISSON]) * y + turn * spin)
+            found[k, 2] = p[SHEAR] * (turn * y - area**2 * coefficient_at(3, a / b, p[POISSON]) * spin)
 
 
 @njit(cache=True, error_model="numpy")
@@ -125,6 +122,9 @@ def creep(contacts, slip, speed, p, strips, cells, middle, law, found):
     forwards = min(1.0, max(0.0, 0.5 + 0.5 * speed / REGULAR))
     found[:] = 0.0
     some = np.empty((len(contacts), 4))
+    if law == FASTSIM:
+        for contact in contacts:
+            contact[7], contact[8], contact[9] = flexibilities_at(contact[0], contact[1], p[SHEAR], p[POISSON])
     for sign in (1.0, -1.0):
         share = forwards if sign > 0.0 else 1.0 - forwards
         if share == 0.0:
@@ -152,9 +152,11 @@ def wheel_forces(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, l
     p : ``numbers``; strips, cells, middle : ``net``; law : LINEAR or FASTSIM; report (patches, REPORTED) is filled.
     """
     n = patches(p)
-    touches, contacts, slip, found = np.zeros((n, TOUCH)), np.zeros((n, 10)), np.empty((n, 3)), np.empty((n, 4))
+    work, some = np.zeros((TOUCH + 18) * n), 0  # one array: to make it costs as much as a wheel's kinematics
+    touches, contacts = work[: TOUCH * n].reshape(n, TOUCH), work[TOUCH * n : (TOUCH + 10) * n].reshape(n, 10)
+    slip, found = work[(TOUCH + 10) * n : -5 * n].reshape(n, 3), work[-5 * n : -n].reshape(n, 4)
+    row = work[-n:]
     contact_points(y, z, roll, yaw, p, touches)
-    row, some = np.empty(n, np.int64), 0
     for k in range(n):
         report[k] = 0.0
         if touches[k, N_Z] == 0.0 and touches[k, N_Y] == 0.0:
@@ -166,7 +168,8 @@ def wheel_forces(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, l
         row[some], some = k, some + 1
     creep(contacts[:some], slip[:some], velocity[0], p, strips, cells, middle, law, found[:some])
     for i in range(some):
-        _act(touches[row[i]], slip[i], found[i], velocity[0], force, moment, report[row[i]])
+        k = int(row[i])
+        _act(touches[k], slip[i], found[i], velocity[0], force, moment, report[k])
 
 
 @njit(cache=True, error_model="numpy")
@@ -182,7 +185,6 @@ def _press(touch, velocity, turning, p, contact, slip, report):
     elastic, a, b = pressed(touch[DEEP], touch[ALONG], touch[ACROSS], p[MODULUS])
     load = elastic * max(0.0, 1.0 + p[DAMPING] * rate)
     contact[0], contact[1], contact[2], contact[3] = a, b, load, p[FRICTION]
-    contact[7], contact[8], contact[9] = flexibilities_at(a, b, p[SHEAR], p[POISSON])
     report[LOAD], report[A], report[B], report[DEPTH] = load, a, b, touch[DEEP]
     report[ANGLE] = math.atan2(-n_y, n_z)
     report[PLACE_X], report[PLACE_Y], report[PLACE_Z] = cx, cy, cz
