@@ -7,7 +7,7 @@ import pytest
 
 from validation.run import CASES, seeds
 
-QUICK = ("audit", "twin", "order", "tight", "enforced_moment", "roads", "guards", "motion", "score", "ensemble",
+QUICK = ("audit", "twin", "order", "tight", "enforced_moment", "roads", "motion", "score", "ensemble",
          "growth", "drift_off", "drift_solvers", "holding_spring")  # fmt: skip
 """Cases whose rows no other test file runs as a whole."""
 
