@@ -22,6 +22,7 @@ from models.time_series import write_time_series
 from validation.price.own_scene import Answer
 from validation.price.own_scene.pitch_plane import OwnPitchPlane, own
 from validation.price.own_scene.recommendation import SLOWER, Choice, Recommendation, recommend
+from validation.price.own_scene.search import Tried
 from validation.price.own_scene.truth import Truth
 from validation.price.problems import Setting
 from validation.timing import interleave, paired_ratio
@@ -183,16 +184,27 @@ def _exact(scene: OwnPitchPlane, spacing: float) -> Answer:
 def slower(found: Recommendation, key: tuple[str, str], choice: Choice) -> bool:
     """Whether an engine's default that meets the tolerance would have cost less than the recommended setting."""
     engine, kind = key
-    rivals = [one.refined for owner, one in found.defaults.items()
-              if owner.startswith(engine) and one.refined is not None and not one.extrapolated]  # fmt: skip
+    rivals = [one for one in _defaults(found) if one.setting.engine.startswith(engine)]
     if kind == "calls":
         return any(rival.calls < choice.calls for rival in rivals)
     return any(_loses(found, choice, rival) for rival in rivals)
 
 
-def _loses(found: Recommendation, choice: Choice, rival: Choice) -> bool:
-    if rival.tried.setting == choice.tried.setting or rival.seconds > CONTEST * choice.seconds:
+def _defaults(found: Recommendation) -> list[Tried]:
+    """The coarsest setting of each default method that meets the tolerance, of all that were tried where the whole run
+    was searched: what is recommended may have forgotten one."""
+    if found.scene.whole > found.scene.first * (1 + 1e-9):
+        return [one.refined.tried for one in found.defaults.values()
+                if one.refined is not None and not one.extrapolated]  # fmt: skip
+    held = found.tolerance - found.searched.uncertainty
+    able = sorted((one for one in found.tried if one.setting.default and one.error <= held),
+                  key=lambda one: one.setting.value)  # fmt: skip
+    return list({one.setting.curve: one for one in able}.values())
+
+
+def _loses(found: Recommendation, choice: Choice, rival: Tried) -> bool:
+    if rival.setting == choice.tried.setting or rival.seconds > CONTEST * choice.seconds:
         return False
-    jobs = [partial(found.scene.solve, one.tried.setting, found.scene.first) for one in (choice, rival)]
+    jobs = [partial(found.scene.solve, one.setting, found.scene.first) for one in (choice.tried, rival)]
     return all(paired_ratio(*interleave(jobs, rounds, LEAST, clock=time.process_time))[1] > SLOWER
                for rounds in ROUNDS)  # fmt: skip
