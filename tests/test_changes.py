@@ -67,3 +67,14 @@ def test_what_is_no_report_is_refused(tmp_path, content):
         (tmp_path / "results.json").write_text(content)
     with pytest.raises(InputError, match="--against"):
         read(tmp_path)
+
+
+@pytest.mark.parametrize(("rows", "provenance"), [
+    ([ERROR, ERROR], {}), ([ERROR], {"versions": "numpy 2"}), ([ERROR], {"seeds": [1, 2]}),
+    ([ERROR], "none")])  # fmt: skip
+def test_a_doctored_report_is_refused_before_anything_runs(tmp_path, rows, provenance):
+    """An id that stands there twice would hide one of two rows; versions that are no table would end the report."""
+    content = {"rows": [row.as_dict() for row in rows], "provenance": provenance}
+    (tmp_path / "results.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match="--against"):
+        read(tmp_path)

@@ -23,8 +23,7 @@ def read(path: Path) -> dict[str, Any]:
     file = path / "results.json" if path.is_dir() else path
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
-        rows = {row["id"]: {name: row[name] for name in Row.__dataclass_fields__} for row in content["rows"]}
-        return {"file": str(file), "provenance": dict(content["provenance"]), "rows": rows}
+        return {"file": str(file), "provenance": _provenance(content), "rows": _rows(content)}
     except FileNotFoundError:
         raise InputError("--against", "", str(file), "no such file: name the results.json of a report") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -32,6 +31,20 @@ def read(path: Path) -> dict[str, Any]:
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         allowed = f"is not the results of a validation ({type(error).__name__}: {error})"
         raise InputError("--against", "", str(file), allowed) from None
+
+
+def _rows(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Rows by id; ValueError for an id that stands there twice: of two rows only one would be compared."""
+    rows = {row["id"]: {name: row[name] for name in Row.__dataclass_fields__} for row in content["rows"]}
+    if len(rows) < len(content["rows"]):
+        raise ValueError("an id stands there twice")
+    return rows
+
+
+def _provenance(content: dict[str, Any]) -> dict[str, Any]:
+    """Where the rows are from, its tables as tables."""
+    found = dict(content["provenance"])
+    return found | {name: dict(found.get(name) or {}) for name in ("versions", "seeds")}
 
 
 def against(earlier: dict[str, Any], rows: list[dict[str, Any]], source: dict[str, Any]) -> dict[str, Any]:
