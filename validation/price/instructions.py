@@ -35,7 +35,7 @@ STEPS = (40, 120)
 BOUND = 1e-6
 PATIENCE = 900
 """Seconds until a process is given up."""
-ID, WHAT = "price.instructions", f"instructions of {sum(map(len, METHODS.values()))} methods counted in two processes"
+ID, WHAT = "instruction_counts", f"instructions of {sum(map(len, METHODS.values()))} methods counted in two processes"
 
 
 def measure(folder: Path) -> tuple[list[Row], dict[str, Any]]:
