@@ -4,6 +4,7 @@ Two absences are none of code: a brake without hysteresis runs the same torque l
 a chamber without dynamics the same law with time constants of none.
 """
 
+from pathlib import Path
 from typing import Any
 from unittest import mock
 
@@ -13,6 +14,15 @@ ENGINES = ("reference", "exudyn", "mujoco")
 STOP = "stop"
 BARE: dict[str, Any] = {"title": "bare", "system": "braking", "road": {"stretches": [{"left": "snow"}]},
                         "procedures": {STOP: {"kind": "j_turn", "speed": 3.0, "steer": 0.02}}}  # fmt: skip
+BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {"measured_pressures": ({}, {
+    "measured": {"file": "pressures.csv"}})}
+
+
+def write(folder: Path) -> None:
+    """Pressures that rise in all brakes."""
+    rows = (f"{time},{','.join([str(10.0 * time)] * 4)}" for time in (0.0, 0.5, 1.0))
+    names = ",".join(f"pressure_{wheel} [bar]" for wheel in ("fl", "fr", "rl", "rr"))
+    (folder / "pressures.csv").write_text("\n".join([f"time [s],{names}", *rows, ""]))
 
 
 def seen(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int], bytes]:
@@ -34,21 +44,24 @@ def seen(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int]
 def _counts(vehicle: Any, controller: Any) -> dict[str, int]:
     """What a run is made of."""
     from models.braking.controllers import CONTROLLERS
+    from models.braking.measured_pressures import MeasuredPressures
     from models.braking.pressure import still
 
     plane, brakes, chambers = vehicle.plane, vehicle.brakes, vehicle.chambers
     chain = [controller]
     while hasattr(chain[-1], "inner"):
         chain.append(chain[-1].inner)
+    last = chain[-1]
     return {
-        "coordinates": 2 + plane.masses.size, "wheels": plane.wheels,
+        "coordinates": len(vehicle.coordinates), "wheels": plane.wheels,
         "lags": 0 if vehicle.relaxation is None else vehicle.relaxation.size,
         "moving loads": int(((plane.by_x != 0.0) | (plane.by_y != 0.0)).sum()),
         "time constants": int((chambers.fill > 0.0).sum() + (chambers.empty > 0.0).sum()),
         "kept commands": (len(still(chambers, vehicle.sample).commands) - 2) * plane.wheels,
         "volumes": chambers.volumes.size, "push-outs": int((brakes.push_out > 0.0).sum()),
         "loops": int(((brakes.release != brakes.push_out) | (brakes.falling != brakes.rising)).sum()),
-        "asked": len(chain) - 1, "controllers": int(not isinstance(chain[-1], CONTROLLERS["none"])),
+        "asked": len(chain) - 1, "files": int(isinstance(last, MeasuredPressures)),
+        "controllers": int(not isinstance(last, (CONTROLLERS["none"], MeasuredPressures))),
         "surfaces": int(max(vehicle.road.left.max(), vehicle.road.right.max())) + 1,
         "tables": len(vehicle.tables.mu_x),
     }  # fmt: skip

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 from unittest import mock
 
@@ -21,6 +22,7 @@ from models.ride.scene import RideScene
 from models.ride.sweep import sweep
 from models.ride.weighting import weighted
 from models.road.two_track import excitation, half_track, on_track, road_of_level
+from models.tables import write_table
 from models.vehicles.spatial_linear import linearise, wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.absence.probes import user_functions
@@ -34,22 +36,51 @@ FOREIGN = ("exudyn", "mujoco", "numba", "pyopencrg", "slycot", "models.engines",
 """What a linear ride of the reference at constant speeds does without."""
 
 ENGINES = ("reference",)
+SPEED = 20.0
 BARE: dict[str, Any] = {"title": "bare", "system": "ride", "vehicle": {"file": "seven_freedoms"},
                         "road": {"left_right": "equal", "front_rear": "equal"},
-                        "speeds": {"values": [20.0]}}  # fmt: skip
+                        "speeds": {"values": [SPEED]}}  # fmt: skip
+NARROW: dict[str, Any] = {"left_right": "equal", "front_rear": "equal"}
+BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "curves": ({"vehicle": {"file": "quarter_car_nonlinear", "small_motion": True}},
+               {"vehicle": {"file": "quarter_car_nonlinear"}}),
+    "varying_speed": ({}, {"speeds": None, "drive": {"time": [0.0, 0.5], "speed": [18.0, 22.0]}}),
+    "measured_road": ({}, {"road": {**NARROW, "file": "road.csv", "track_width": 1.5}}),
+}
+
+
+def write(folder: Path) -> None:
+    """Two tracks of a kilometre, of waves with amplitudes as their lengths."""
+    s = 0.5 * np.arange(2001)
+    bends = 2.0 * np.pi / np.geomspace(1.5, 100.0, 60)
+    turns = np.random.default_rng(1).uniform(0.0, 2.0 * np.pi, (2, 60))
+    tracks = [(np.cos(np.outer(s, bends) + turn) / bends).sum(axis=1) * 1e-3 for turn in turns]
+    write_table(folder / "road.csv", {"s": ("m", s), "left": ("m", tracks[0]), "right": ("m", tracks[1])})
 
 
 def seen(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Counts of the linear system that a scene makes, and the variances of its outputs."""
+    """Counts of the linear system that a scene makes, and what is found of its outputs."""
     vehicle = of_scene.vehicle_of(scene)
-    assert scene.speeds is not None
-    road, speeds = of_scene.excitation_of(scene, wheels(vehicle)), scene.speeds.all()
+    with mock.patch.object(of_scene, "fitted_road", wraps=of_scene.fitted_road) as fitted:
+        road = of_scene.excitation_of(scene, wheels(vehicle))
     linear = of_scene.linear_vehicle(vehicle, engine)
-    system = weighted(excited(linear(speeds[0]), road, speeds[0]), scene.weighting)
-    counts = {"states": len(system.A), "preloads": int(vehicle.gravity > 0.0),
-              "delays": sum(length > 0.0 for length in road.lengths),
-              "heights": len(np.unique(sum(road.heights), axis=0))}
-    return counts, sweep(linear, {"own": road}, speeds, scene.weighting).variance.tobytes()
+    system = weighted(excited(linear(SPEED), road, SPEED), scene.weighting)
+    counts = {"states": len(system.A), "preloads": int(vehicle.gravity > 0.0), "fits": min(fitted.call_count, 1),
+              "delays": sum(length > 0.0 for length in road.lengths), "drives": int(scene.drive is not None),
+              "heights": len(np.unique(sum(road.heights), axis=0)), "bent springs": 0}  # fmt: skip
+    if scene.drive is not None:
+        from models.ride.varying_speed import varying_speed
+
+        return counts, varying_speed(linear(SPEED), road, scene.drive.profile()).deviation.tobytes()
+    from models.ride.effects import curves
+
+    if curves.named(scene):
+        from models.ride.statistical_linearisation import bent, statistically_linear
+
+        counts["bent springs"] = len(bent(vehicle))
+        return counts, statistically_linear(vehicle, road, SPEED).covariance.variance.tobytes()
+    assert scene.speeds is not None
+    return counts, sweep(linear, {"own": road}, scene.speeds.all(), scene.weighting).variance.tobytes()
 
 
 PROBE = """
@@ -57,6 +88,7 @@ import json, sys
 from models.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
 from models.ride.scene import build
 from models.ride.sweep import sweep
+from models.tables import write_table
 from models.vehicles.spatial_linear import wheels
 scene = build({"title": "probe", "system": "ride", "vehicle": {"file": "r19_ride"},
                "speeds": {"start": 10.0, "stop": 20.0, "count": 2}})

@@ -6,7 +6,7 @@ PLACE = "measured"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "a row of a table per sample"
-COUNTS: dict[str, dict[str, int]] = {}
+COUNTS = {"all": {"files": 1}}
 
 
 def named(scene: Any) -> bool:

@@ -8,7 +8,8 @@ PLACE = "vehicle.small_motion"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "runs in time by an engine in place of one covariance"
-COUNTS: dict[str, dict[str, int]] = {}
+COUNTS = {"all": {"bent springs": 1}}
+MODULES = ("models.ride.statistical_linearisation",)
 
 
 def named(scene: Any) -> bool:

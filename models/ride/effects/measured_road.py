@@ -6,7 +6,8 @@ PLACE = "road.file"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "a fit before all, no more in the runs"
-COUNTS: dict[str, dict[str, int]] = {}
+COUNTS = {"all": {"fits": 1}}
+MODULES = ("models.road.fitted",)
 
 
 def named(scene: Any) -> bool:

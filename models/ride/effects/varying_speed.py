@@ -6,7 +6,8 @@ PLACE = "drive"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "a covariance that is marched, in place of one that is solved"
-COUNTS: dict[str, dict[str, int]] = {}
+COUNTS = {"all": {"drives": 1}}
+MODULES = ("models.ride.varying_speed",)
 
 
 def named(scene: Any) -> bool:
