@@ -12,9 +12,10 @@ from validation.rows import Row, System, Table, at_most, finding, within
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
 SYSTEM: System = "effects"
-COUNTS = {"pitch-plane": 30, "wheelset": 4, "braking": 3}
+COUNTS = {"pitch-plane": 28, "wheelset": 4, "braking": 3}
 """Scenes drawn of each system."""
-ENGINES = {"pitch-plane": ("reference", "mujoco"), "wheelset": ("reference",), "braking": ("reference",)}
+ENGINES = {"pitch-plane": ("reference", "mujoco"), "wheelset": ("reference", "mujoco", "exudyn", "reference"),
+           "braking": ("mujoco", "reference", "reference")}  # fmt: skip
 """Implementations that take turns."""
 QUICK = 3
 """Scenes of the pitch plane alone in the quick share."""
@@ -39,8 +40,12 @@ class Judged:
 
 
 def judged(system: str, seed: int) -> Judged:
+    """The scene of a seed."""
+    return judged_of(drawn(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
+
+
+def judged_of(asked: Asked, system: str, engine: str) -> Judged:
     """Choose, and run the scene and what is left once more."""
-    asked, engine = drawn(system, seed), ENGINES[system][seed % len(ENGINES[system])]
     chooser = Chooser(asked.scene(), engine, list(asked.quantities), asked.tolerance)
     choice, runs = chooser.choose(), chooser.whole.variants
     whole = runs.system.answer(asked.scene(), engine)

@@ -7,14 +7,14 @@ other systems, beside all runs without a fault that these need.
 from pathlib import Path
 from typing import Any
 
-from validation.faults import advice, braking, contact, hubs, measuring, pitch_plane, ride, tyres, wheelset
+from validation.faults import advice, braking, choosing, contact, hubs, measuring, pitch_plane, ride, tyres, wheelset
 from validation.faults.campaign import SYSTEM
 from validation.faults.planting import CLEAN, DESCRIPTION, EQUATIONS
 from validation.rows import Row, Table, at_most
 
 TITLE = "Planted faults: what each check sees"
 CAMPAIGNS = (contact.CAMPAIGN, ride.CAMPAIGN, wheelset.CAMPAIGN, tyres.CAMPAIGN, hubs.CAMPAIGN, braking.CAMPAIGN,
-             measuring.CAMPAIGN, advice.CAMPAIGN)  # fmt: skip
+             measuring.CAMPAIGN, choosing.CAMPAIGN, advice.CAMPAIGN)  # fmt: skip
 FEW = (DESCRIPTION[0], EQUATIONS[0])
 EVERY, LEAST = 8, 40
 """Quick share of the campaigns; faults that there must be in all."""

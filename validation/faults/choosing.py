@@ -1,0 +1,156 @@
+"""Faults of the choice among effects, planted one at a time, and the checks that see them.
+
+The linear scene is one whose first choice the confirmation refuses, so that a choice without it is wrong.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from models.choice.choose import Chooser
+from models.choice.screen import Screen
+from models.ride.choice.choose import Choice
+from models.ride.choice.choose import Chooser as LinearChooser
+from models.ride.choice.screen import Screen as LinearScreen
+from validation.cases import choice_linear as linear
+from validation.cases import choice_nonlinear as nonlinear
+from validation.choice.drawn_scenes import Asked
+from validation.choice.drawn_scenes import drawn as drawn_run
+from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.patches import attribute
+from validation.ride.drawn_rides import Drawn, drawn
+
+SEED, RUN = 65, 4
+"""Of the linear scene, and of the half car that is run."""
+
+
+TOLERANCE = 1e-3
+"""Asked of that run: its gyro and its pitch spring change more."""
+
+
+@cache
+def _linear() -> Drawn:
+    return drawn(SEED)
+
+
+@cache
+def _run() -> Asked:
+    asked = drawn_run("pitch-plane", RUN)
+    return replace(asked, table={**asked.table, "run": {**asked.table["run"], "duration": 0.5}}, tolerance=TOLERANCE)
+
+
+def _by_frequency() -> tuple[Choice, np.ndarray]:
+    """The linear scene's choice by the functions that are in place now, and its changes (quantities,) by frequency."""
+    return _linear_by(LinearChooser.__init__, LinearChooser.confirm, LinearScreen.predicted)
+
+
+def _by_runs() -> nonlinear.Judged:
+    """The same of the half car."""
+    return _runs_by(Chooser.__init__, Chooser.confirm, Screen.shares)
+
+
+@cache
+def _linear_by(*functions: Any) -> tuple[Choice, np.ndarray]:
+    found = linear.judged(_linear(), True)
+    assert found.by_frequency is not None
+    return found.choice, found.by_frequency
+
+
+@cache
+def _runs_by(*functions: Any) -> nonlinear.Judged:
+    return nonlinear.judged_of(_run(), "pitch-plane", "reference")
+
+
+def _variances() -> float:
+    """Reported changes against sums over frequencies."""
+    choice, own = _by_frequency()
+    return float(np.abs(own - choice.confirmed).max())
+
+
+def _kept() -> float:
+    """Change by frequency of what is reported as kept, by the tolerance that was asked for."""
+    choice, own = _by_frequency()
+    return choice.kept * float(np.abs(own).max()) / _linear().tolerance
+
+
+def _predicted() -> float:
+    """Octaves between predictions and changes by frequency; infinite for another sign."""
+    choice, own = _by_frequency()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        octaves = np.abs(np.log2(choice.predicted / own)).max()
+    return float(np.nan_to_num(octaves, nan=np.inf))
+
+
+def _runs() -> float:
+    """Reported changes of a half car against two runs more."""
+    found = _by_runs()
+    return float(np.abs(found.again - found.choice.confirmed).max())
+
+
+def _runs_kept() -> float:
+    """Change by two runs more of what is reported as kept, by the tolerance that was asked for."""
+    found = _by_runs()
+    return found.choice.kept * float(found.again.max()) / _run().tolerance
+
+
+CHECKS = {
+    "frequencies": Check("quarter car: confirmed changes, spectra summed", "of a deviation", 1e-3, _variances),
+    "tolerance": Check("quarter car: its change by the tolerance asked for", "times", 1.01, _kept),
+    "predictions": Check("quarter car: predictions by the changes", "octaves", 1.0, _predicted),
+    "two runs": Check("half car: confirmed changes, run once more", "of a deviation", 1e-9, _runs),
+    "tolerance of runs": Check("half car: its change by the tolerance asked for", "times", 1.0, _runs_kept),
+}
+
+
+def _other_sign(real: Any) -> Any:
+    def predicted(screen: LinearScreen, reduced: Any) -> np.ndarray:
+        C = screen.base.system.C[screen.rows]
+        full = np.einsum("ki,ij,kj->k", C, screen.P, C)
+        return np.asarray(np.maximum(2 * full - real(screen, reduced), 0.0))
+
+    return predicted
+
+
+def _any_tolerance(real: Any) -> Any:
+    def init(chooser: Any, one: Any, two: Any, quantities: Any, tolerance: float, *more: Any) -> None:
+        real(chooser, one, two, quantities, 0.9, *more)
+
+    return init
+
+
+def _reported(change: Callable[[Chooser, frozenset[str], int], np.ndarray]) -> Callable[[Any], Any]:
+    """Changes that are taken as confirmed without a run."""
+
+    def confirm(chooser: Chooser, chosen: frozenset[str]) -> np.ndarray:
+        times = chooser.reach(chosen)
+        chooser._confirmed[chosen] = times, change(chooser, chosen, times)
+        return chooser._confirmed[chosen][1]
+
+    return lambda real: confirm
+
+
+LINEAR, RUNS = "models.ride.choice", "models.choice"
+FAULTS = (
+    Fault("sign of the predicted change", "screen of linear scenes",
+          attribute(f"{LINEAR}.screen:Screen.predicted", _other_sign)),
+    Fault("predictions reported as confirmed", "choice of linear scenes",
+          attribute(f"{LINEAR}.choose:Chooser.confirm", lambda real: lambda own, chosen: own.predicted(chosen))),
+    Fault("confirmed against itself", "choice of linear scenes",
+          attribute(f"{LINEAR}.choose:Chooser.confirm", lambda real: lambda own, chosen: 0.0 * own.full[0])),
+    Fault("tolerance ignored", "choice of linear scenes",
+          attribute(f"{LINEAR}.choose:Chooser.__init__", _any_tolerance)),
+    Fault("predictions reported as confirmed", "choice by runs",
+          attribute(f"{RUNS}.choose:Chooser.confirm", _reported(lambda own, chosen, times: own.told(chosen, times)))),
+    Fault("confirmed against itself", "choice by runs",
+          attribute(f"{RUNS}.choose:Chooser.confirm", _reported(lambda own, *_: np.zeros(len(own.whole.quantities))))),
+    Fault("tolerance ignored", "choice by runs", attribute(f"{RUNS}.choose:Chooser.__init__", _any_tolerance)),
+    Fault("the least change of all quantities taken for each", "screen by runs",
+          attribute(f"{RUNS}.screen:Screen.shares",
+                    lambda real: lambda own, change: np.full(len(own.quantities), real(own, change).min()))),
+)  # fmt: skip
+
+
+CAMPAIGN = Campaign("planted.choice", "the choice of effects", "effects", CHECKS, FAULTS)
