@@ -14,7 +14,7 @@ from models.ride.choice.activity import activity
 from models.ride.choice.choose import Choice, Chooser
 from models.ride.choice.held import Effect, Held, illegal, without
 from models.ride.choice.reduced import Reduced, Whole
-from models.ride.of_scene import check_linear, told_by, vehicle_of
+from models.ride.of_scene import LINEAR_ALONE, check_linear, told_by, vehicle_of
 from models.ride.scene import RideScene
 from models.strict import Strict, read
 
@@ -43,7 +43,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     if scene.effects is None:
         raise InputError(scene.file, "effects", None, 'is missing: this study chooses them, effects = "auto"')
     read(Options, scene.options, scene.file, "options")
-    check_linear(scene, vehicle_of(scene))
+    check_linear(scene, vehicle_of(scene), LINEAR_ALONE)
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:

@@ -151,3 +151,19 @@ def test_rounding_is_not_taken_for_white_noise():
     choice = own.choose()
     assert {"mass of all wheels", "bushings: fl bush"} <= {effect.name for effect in choice.left_out}
     assert choice.predicted == pytest.approx(choice.confirmed, rel=0.2) and choice.kept
+
+
+def test_effects_of_vehicles_with_curves_are_neither_priced_nor_chosen(twinrig, capsys):
+    nonlinear = ("--set", "vehicle.file=quarter_car_nonlinear", "--set", "quantities=['body front']")
+    assert twinrig("run", "ride_choice", *nonlinear, "--out", "out") == 2
+    assert "for linear vehicles alone" in capsys.readouterr().err
+    assert twinrig("show", "ride_nonlinear", "--price") == 2
+    assert "for linear vehicles alone" in capsys.readouterr().err
+
+
+def test_a_tolerance_that_nothing_keeps_leaves_everything_and_says_what_would_change_that(twinrig, capsys):
+    """Parts that change nothing at all may go even so; whatever stays says from which tolerance it would not matter."""
+    assert twinrig("run", "ride_choice", "--set", "tolerance=1e-12", "--out", "out", "--json") == 0
+    found = json.loads(capsys.readouterr().out)["answer"]
+    assert found["kept"] and all(abs(error["confirmed"]) <= 1e-12 for error in found["errors"].values())
+    assert set(found["would matter no more above"]) <= set(found["stay"]) and found["would matter no more above"]

@@ -27,7 +27,8 @@ def system_of(scene: Any) -> ModuleType:
     names = {path.stem.replace("_", "-"): path.stem for path in sorted(folder.glob("*.py")) if path.stem != "__init__"}
     if scene.system not in names:
         raise InputError(scene.file, "system", scene.system, "has no runs in time that effects could be priced or "
-                         "chosen by: scenes of these systems have", tuple(names))  # fmt: skip
+                         "chosen by: linear scenes of ride have closed forms, and scenes of these systems have runs",
+                         tuple(names))  # fmt: skip
     return import_module(f"models.choice.systems.{names[scene.system]}")
 
 
