@@ -23,9 +23,12 @@ FILE: dict[str, Any] = {"file": "recording.csv", "channels": CHANNELS}
 BARE: dict[str, Any] = {"title": "bare", "system": "measured", "vehicle": {"file": "r19_free"}, "files": [FILE],
                         "stabilise": {"method": "none", "smoothing": 20.0}}  # fmt: skip
 VIRTUAL = {"duration": PERIOD * (SAMPLES - 1), "format": "csv"}
+ON_ROAD: dict[str, Any] = {"files": [], "virtual": VIRTUAL}
+NOISY = {"noise": {"force": 8.0, "moment": 1.0}}
 BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "own_clocks": ({}, {"files": [FILE | {"drift": 1e-4}]}),
-    "virtual_measurement": ({}, {"files": [], "virtual": VIRTUAL}),
+    "virtual_measurement": ({}, ON_ROAD),
+    "transducer_faults": (ON_ROAD, {**ON_ROAD, "virtual": VIRTUAL | {"faults": NOISY}}),
 }
 
 
@@ -50,30 +53,34 @@ def seen(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:
         return model
 
     with tempfile.TemporaryDirectory() as name, mock.patch.object(section_run, "build", watched):
-        vehicle, own = scene.rig().vehicle, _recorded(scene, engine, Path(name))
+        vehicle, (own, faulty) = scene.rig().vehicle, _recorded(scene, engine, Path(name))
         assert vehicle is not None
         hold = section_run.Hold(said.method, smoothing=said.smoothing)
         job = section_run.SectionRun(vehicle, own, Sections(vehicle), engine, hold)
         found = section_run.run(job, Path(name) / "run")
         path = b"".join(found.samples(answer).tobytes() for answer in found.answers)
     guides = {int(table[kernel.GUIDE]) for table in tables}
-    counts = {"runs on tyres": int(scene.virtual is not None), "pulled angles": 2 * (guides == {kernel.PULLED}),
+    counts = {"runs on tyres": int(scene.virtual is not None), "faulty channels": faulty,
+              "pulled angles": 2 * (guides == {kernel.PULLED}),
               "enforced angles": 2 * (guides == {kernel.HELD}),
               "moved clocks": sum(bool(file.offset or file.drift) for file in scene.files)}  # fmt: skip
     return counts, path
 
 
-def _recorded(scene: MeasuredScene, engine: str, folder: Path) -> Recording:
-    """The scene's files, or those of its virtual measurement, on one clock."""
+def _recorded(scene: MeasuredScene, engine: str, folder: Path) -> tuple[Recording, int]:
+    """The scene's files, or those of its virtual measurement, on one clock; channels that do not tell the truth."""
     from models.measured import plan
     from models.measured.clock import record
+    from models.measured.faults_of_measurement import Faults
     from models.measured.pattern import write_pattern
     from models.measured.virtual import virtual_measurement
 
-    rig, own = scene.rig(), scene.virtual
+    rig, own, faulty = scene.rig(), scene.virtual, 0
     if own is not None and rig.vehicle is not None:
         true = virtual_measurement(rig.vehicle, own, engine)
-        write_pattern(scene, true, true.samples(own.faults, own.seed), folder)
+        samples = true.samples(own.faults, own.seed)
+        faulty = int((samples != true.samples(Faults(), own.seed)).any(axis=0).sum())
+        write_pattern(scene, true, samples, folder)
         scene = load(folder / "scene.toml")
     sources = plan.opened(scene)
-    return record(scene, sources, plan.mapped(scene, sources, rig), rig.hubs, folder)
+    return record(scene, sources, plan.mapped(scene, sources, rig), rig.hubs, folder), faulty

@@ -98,8 +98,9 @@ def added(system: str, effect: str, quick: bool = False) -> Counts:
 
 def _before(system: str, effect: str, quick: bool) -> Counts:
     """Counts of the scene without an effect."""
-    own = by_hand(system).get(effect, ({},))[0]
-    return _counted(system, module_of(system, effect).NEEDS, json.dumps(own), quick)
+    if effect in by_hand(system):
+        return _counted(system, (), json.dumps(by_hand(system)[effect][0]), quick)
+    return _counted(system, module_of(system, effect).NEEDS, "{}", quick)
 
 
 @cache
