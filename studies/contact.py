@@ -12,7 +12,7 @@ from pydantic import Field
 from models.contact.accuracy import Error, rolled
 from models.contact.of_scene import contact, creepages, touches
 from models.contact.scene import ContactScene, Method
-from models.contact.theories import Contact, ExactOnEllipse, Fastsim, Motion, OnEllipse, Rolled
+from models.contact.theories import Contact, ExactOnEllipse, Fastsim, Linear, Motion, OnEllipse, Rolled
 from models.contact.work_precision import duration
 from models.errors import InputError
 from models.strict import Strict, read
@@ -86,7 +86,25 @@ def _answer(body: Contact, motions: list[Motion], found: list[tuple[Rolled, Erro
     rows = [{**dict(zip(("xi_x", "xi_y", "spin"), motion, strict=True)), **{name: getattr(one, name) for name in UNITS},
              **{name: getattr(error, key) for name, (_, key) in ERRORS.items()}}
             for motion, (one, error) in zip(motions, found, strict=True)]  # fmt: skip
-    return {**asdict(body.pressing), "friction": body.friction, "forces": rows}
+    return {**asdict(body.pressing), "friction": body.friction, "forces": rows, "doubt": _doubt(body, found)}
+
+
+def _doubt(body: Contact, found: list[tuple[Rolled, Error]]) -> str:
+    """What is to be said against the forces: of the linear theory alone, which has no bound of its own."""
+    if not isinstance(body, Linear):
+        return ""
+    with np.errstate(divide="ignore", invalid="ignore"):  # no friction carries nothing
+        return doubted(np.array([np.linalg.norm(one.force) for one, _ in found])
+                       / (body.friction * body.pressing.load))  # fmt: skip
+
+
+def doubted(used: np.ndarray) -> str:
+    """What is said against the linear theory's forces ``used`` (n,) by mu N; "" where friction can carry them all."""
+    beyond = used[used > 1.0]
+    if not beyond.size:
+        return ""
+    return (f"the linear theory's force is more than friction can carry at {beyond.size} of {used.size} creepages, up "
+            f"to {beyond.max():.3g} mu N: it knows no slip")  # fmt: skip
 
 
 def _table(scene: ContactScene, body: Contact, motions: list[Motion], found: list[tuple[Rolled, Error]],
@@ -109,7 +127,9 @@ def _table(scene: ContactScene, body: Contact, motions: list[Motion], found: lis
                      f"{round(one.fy):>10,}{one.mz:>10.3f}{one.stick:>7.0%}{one.dissipation:>10.3g}"
                      f"   {_percent(error.cells, limit):>6}{_percent(error.theory, limit):>8}"
                      f"{error.moment:>9.2g}")  # fmt: skip
-    return [*lines, "  loss: power by the rolling speed; errors are of the force, that of Mz has both together"]
+    lines.append("  loss: power by the rolling speed; errors are of the force, that of Mz has both together")
+    doubt = _doubt(body, found)
+    return [*lines, f"  warning: {doubt}"] if doubt else lines
 
 
 NAMES = {"fastsim": "FASTSIM", "linear": "the linear theory", "simplified": "the theory of 1983",

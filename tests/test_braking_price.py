@@ -23,10 +23,10 @@ from validation.price.problems.braking_stop import (
 
 @pytest.fixture(scope="module")
 def short():
-    """The problem from a low speed, its reference loose."""
+    """The quick problem from a low speed, of which it takes half, its reference loose."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(braking_stop, "SPEED", 2.0)
-        patch.setattr(braking_stop, "CHANGE", 0.3)
+        patch.setattr(braking_stop, "SPEED", 4.0)
+        patch.setattr(braking_stop, "CHANGE", 1.2)
         patch.setattr(braking_stop, "SOLVERS", {True: (("DOP853", 1e-8), ("LSODA", 1e-8))})
         yield BrakingStop(True)
 
@@ -40,7 +40,7 @@ def test_every_scheme_comes_to_the_reference(short, method, bound):
 
 def test_the_reference_knows_itself_and_where_friction_changes(short, monkeypatch):
     assert short.uncertainty["stopping distance"] < 1e-6
-    monkeypatch.setattr(braking_stop, "CHANGE", 0.31)
+    monkeypatch.setattr(short, "change", 0.31)
     moved = abs(short._by("DOP853", 1e-8) - short.true)
     assert moved > 1e-5, "ten times the bound of the exact wheel: that test sees a change that is 1 cm off"
 

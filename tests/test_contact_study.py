@@ -22,6 +22,8 @@ from studies import contact_table
 from studies.contact_table import told
 from validation.cases import contact_price
 from validation.contact.contact_set import FRICTION, JUDGED, LOAD, read, read_drawn
+from validation.price import runner as cost
+from validation.price.problems import contact_alone
 
 CASES = "a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [-],spin [1/mm]\n"
 ROW = "5,4,80,0.3,0.1,-2e-4,4e-4\n"
@@ -106,6 +108,25 @@ def test_bands_are_zero_without_creepage_and_those_of_the_table_at_the_knots():
     one = np.array(5e-3)
     assert spin_share(one, one, np.array([1e-3, 0.0, 0.0]), 0.28) == 0.0 == spin_share(one, one, np.zeros(3), 0.28)
     assert spin_share(one, one, np.array([0.0, 0.0, 0.1]), 0.28) == 1.0
+
+
+def test_forces_that_friction_cannot_carry_are_told(twinrig, capsys):
+    """The linear theory knows no slip: of five creepages up to 1 %, those whose force is beyond mu N."""
+    sweep = "sweep={of='xi_x', start=0.0, stop=1e-2, count=5}"
+    told = {}
+    for name in ("linear", "fastsim"):
+        assert twinrig("run", "contact_ellipse", "--set", f"method.name={name}", "--set", sweep, "--set",
+                       "options.exact=0", "--out", name, "--json") == 0  # fmt: skip
+        told[name] = json.loads(capsys.readouterr().out)["answer"]
+    beyond = [one for one in told["linear"]["forces"] if np.hypot(one["fx"], one["fy"]) > 0.3 * told["linear"]["load"]]
+    assert 0 < len(beyond) < 5 and f"at {len(beyond)} of 5 creepages" in told["linear"]["doubt"]
+    assert told["fastsim"]["doubt"] == ""
+
+
+def test_the_linear_theory_is_flagged_on_the_work_precision_page():
+    problem = contact_alone.problem(True)
+    linear, other = (cost.attempt(problem, one) for one in problem.settings(True)[:2])
+    assert (linear.status, other.status) == ("flagged", "ok") and linear.errors["mean creep force"] > problem.bound
 
 
 def test_the_linear_theory_states_how_far_it_is_beyond_friction():

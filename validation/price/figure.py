@@ -37,7 +37,7 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
         timed = kind == "seconds"
         label = "seconds for the run, model built anew (median)" if timed else f"{kind} in the run"
         ax.set(xscale="log", yscale="log", xlabel=label)
-        measured = f"{problem['rounds']} interleaved rounds" if timed else "exact"
+        measured = f"up to {problem['rounds']} interleaved rounds" if timed else "exact"
         ax.set_title(f"by {kind}, {measured}")
     _failures(axes[0], points, top)
     quantity = quantity_of(problem)

@@ -118,8 +118,8 @@ def _sweep(problem: Problem, points: list[Point]) -> Row:
         ended = tried[curve][0].status != "ok" or own[0].setting.cells
         whole = ended and own[-1].errors[quantity] <= min(problem.tolerances)
         settled = len(own) > 1 and own[-1].errors[quantity] >= SETTLED * own[-2].errors[quantity]
-        uncut = own[0].setting.cells and len(tried[curve]) == 1
-        if not uncut and (len(own) < 6 or not (wide or whole or settled or 0 < own[0].setting.order < 4)):
+        low = 0 < (own[0].setting.order or own[0].setting.nominal) < 4
+        if len(own) < 6 or not (wide or whole or settled or low):
             short.append(curve)
     what = ("methods with fewer than 6 settings that answered, or from order 4 up with fewer than 4 decades of them or "
             "of error although coarser settings answer, or the finest tolerance is not met and the error still falls")

@@ -20,11 +20,14 @@ from validation.price import curves
 from validation.price.problems import Problem, Setting
 from validation.timing import interleave, interval, resamples
 
-Status = Literal["ok", "raised", "refused", "SILENT"]
+Status = Literal["ok", "raised", "refused", "flagged", "SILENT"]
 WORK = ("contact cells", "force calls")
 """What work may be counted in: the first that a problem's points have."""
-PATIENCE = {True: 2.0, False: 8.0}
-"""Seconds for all rounds of one problem together, by ``quick``: long sweeps are timed in fewer."""
+SLOW = 0.1
+"""A setting that takes longer (s) is timed in rounds among its like, so that the others have more of them."""
+PATIENCE = {True: 0.5, False: 2.0}
+"""Seconds for all rounds of a problem's slow settings, and for those of the others, by ``quick``; one round at least.
+"""
 DRAWS = 200
 """Bootstrapped sets of rounds behind the interval of an interpolated ratio."""
 
@@ -64,7 +67,9 @@ def costs(points: list[Point]) -> tuple[str, str]:
 
 
 def attempt(problem: Problem, setting: Setting) -> Point:
-    """Try one setting: ok, raised (the run failed and said so), refused (it was not run), or SILENT."""
+    """Try one setting: ok, raised (the run failed and said so), refused (it was not run), flagged (an answer came with
+    a doubt, the solution's ``doubt``), or SILENT.
+    """
     try:
         solution = problem.build(setting).run()
     except InputError as error:
@@ -72,7 +77,8 @@ def attempt(problem: Problem, setting: Setting) -> Point:
     except RunFailed as error:
         return Point(setting, "raised", str(error))
     errors, counts = problem.errors(solution), dict(solution.counts)
-    return Point(setting, *_judged(problem, errors), errors, counts)
+    doubt = getattr(solution, "doubt", "")
+    return Point(setting, *(("flagged", doubt) if doubt else _judged(problem, errors)), errors, counts)
 
 
 def _judged(problem: Problem, errors: dict[str, float]) -> tuple[Status, str]:
@@ -112,15 +118,21 @@ def measure(problem: Problem, quick: bool, rounds: int, least: float) -> list[Po
     for setting in problem.settings(quick):
         points.append(attempt(problem, setting))
         ends.append(time.perf_counter())
-    lasted = np.diff(ends)
-    rounds = max(1, min(rounds, int(PATIENCE[quick] / lasted.sum())))
-    timed = [i for i, p in enumerate(points) if p.status == "ok"]
-    last: dict[int, Any] = {}
-    jobs = [lambda i=i: last.update({i: problem.build(points[i].setting).run()}) for i in timed]
-    for i, seconds in zip(timed, interleave(jobs, rounds, least, lasted=lasted[timed]), strict=True):
-        changed = _changed(problem, points[i], last[i])
-        points[i] = replace(points[i], seconds=tuple(seconds), changed=changed)
+    lasted, fine = np.diff(ends), np.array([p.status == "ok" for p in points])
+    for chosen in (np.flatnonzero(fine & (lasted <= SLOW)), np.flatnonzero(fine & (lasted > SLOW))):
+        most = max(1, min(rounds, int(PATIENCE[quick] / max(lasted[chosen].sum(), least * chosen.size, 1e-9))))
+        for i, again in zip(chosen, _timed(problem, [points[i] for i in chosen], most, least, lasted[chosen]),
+                            strict=True):  # fmt: skip
+            points[i] = again
     return points
+
+
+def _timed(problem: Problem, points: list[Point], rounds: int, least: float, lasted: np.ndarray) -> list[Point]:
+    """The points with their seconds, and whether their last run was as their first, which ``lasted`` (n,) s."""
+    last: dict[int, Any] = {}
+    jobs = [lambda i=i, p=p: last.update({i: problem.build(p.setting).run()}) for i, p in enumerate(points)]
+    return [replace(p, seconds=tuple(seconds), changed=_changed(problem, p, last[i]))
+            for i, (p, seconds) in enumerate(zip(points, interleave(jobs, rounds, least, lasted=lasted), strict=True))]
 
 
 def _changed(problem: Problem, p: Point, again: Any) -> bool:
@@ -207,8 +219,7 @@ def loss(points: list[Point], quantity: str, target: float, kind: str, default: 
 
 def _resampled(own: list[Point], quantity: str, target: float) -> np.ndarray:
     """Seconds that one curve needs, once per bootstrapped set of rounds."""
-    seconds = np.array([p.seconds for p in own])
-    medians = np.median(seconds[:, resamples(seconds.shape[1], DRAWS)], axis=2)
+    medians = np.array([np.median(np.array(p.seconds)[resamples(len(p.seconds), DRAWS)], axis=1) for p in own])
     found = [_reach(own, quantity, target, costs, extrapolate=True) for costs in medians.T]
     return np.array([one.cost for one in found if one is not None])
 

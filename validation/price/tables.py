@@ -162,12 +162,13 @@ def outcomes(points: list[Point]) -> Table:
     engines = dict.fromkeys(p.setting.engine for p in points)
     rows = tuple((LABELS.get(engine, engine), *(_ended(points, engine, status) for status in ("", *STATUSES)))
                  for engine in engines)  # fmt: skip
-    note = ("Fine: an answer; raised: the run failed and said so; flagged: refused before the run, with the reason; "
-            "silent: a wrong answer that came back as a result, of which there must be none.")  # fmt: skip
+    note = ("Fine: an answer; raised: the run failed and said so; refused: not run, with the reason; flagged: "
+            "an answer came with a doubt; silent: a wrong answer that came back as a result, of which there must be "
+            "none.")  # fmt: skip
     return Table("Settings by how they ended", note, ("engine", "settings", *STATUSES.values()), rows)
 
 
-STATUSES = {"ok": "fine", "raised": "raised", "refused": "flagged", "SILENT": "silent"}
+STATUSES = {"ok": "fine", "raised": "raised", "refused": "refused", "flagged": "flagged", "SILENT": "silent"}
 
 
 def _ended(points: list[Point], engine: str, status: str) -> str:
@@ -175,11 +176,11 @@ def _ended(points: list[Point], engine: str, status: str) -> str:
 
 
 def failures(points: list[Point]) -> Table:
-    """Everything that gave no answer, with what was said."""
+    """Everything that gave no answer to rely on, with what was said."""
     found: dict[tuple[str, str, str], list[str]] = defaultdict(list)
     for p in points:
         if p.status != "ok":
             found[_plain(p.setting.curve), STATUSES[p.status], p.reason].append(p.setting.label())
     rows = tuple((curve, ", ".join(labels), status, reason) for (curve, status, reason), labels in found.items())
-    return Table("Settings that gave no answer", "What was said, by how the setting ended.",
+    return Table("Settings that gave no answer to rely on", "What was said, by how the setting ended.",
                  ("curve", "setting", "status", "what was said"), rows)  # fmt: skip

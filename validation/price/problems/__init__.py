@@ -14,7 +14,8 @@ class Setting:
 
     engine, method : together the name of a work-precision curve
     value : step in s, relative tolerance where ``adaptive``, or 1 by the number of cells where ``cells``
-    order : declared order of the method, 0 if it varies
+    order : declared order of the method, 0 if it varies or is not kept on this problem; then
+    nominal : what it is on smooth ones
     stages : force evaluations per step, 0 where they are not fixed
     default : whose default setting this is, "" for no one's
     """
@@ -27,6 +28,7 @@ class Setting:
     stages: int = 0
     default: str = ""
     cells: bool = False
+    nominal: int = 0
 
     @property
     def curve(self) -> str:

@@ -47,7 +47,8 @@ SUBSTEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
 ORDERS = {EULER: 1, LITERAL: 1}
 FULL = {OURS: SUBSTEPS, EULER: SUBSTEPS, RK4: SUBSTEPS, LITERAL: SUBSTEPS}
 QUICK = {OURS: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 16, 64, 256)}
-"""The named share of FULL that the quick report takes; the paper's own single step is far from where its order shows."""
+"""The named share of FULL that the quick report takes, from half the speed; the paper's own single step is far from
+where its order shows."""
 SOLVERS = {True: (("DOP853", 1e-9), ("LSODA", 1e-9)), False: (("DOP853", 1e-12), ("LSODA", 1e-11))}
 """Reference solvers with their relative tolerances, by ``quick``: a Runge-Kutta method and a multistep one."""
 
@@ -119,14 +120,15 @@ class BrakingStop:
             "leaves wheel and tyre with the exact step, and gives its digits.")  # fmt: skip
 
     def __init__(self, quick: bool) -> None:
-        self.title = (f"Anti-lock stop of a quarter vehicle from {SPEED:g} m/s, {SURFACES[0]} and from {CHANGE:g} m on "
-                      f"{SURFACES[1]}, valves replayed")  # fmt: skip
+        self.speed, self.change = (SPEED / 2, CHANGE / 4) if quick else (SPEED, CHANGE)
+        self.title = (f"Anti-lock stop of a quarter vehicle from {self.speed:.4g} m/s, {SURFACES[0]} and from "
+                      f"{self.change:g} m on {SURFACES[1]}, valves replayed")  # fmt: skip
         self.units, self.bound = {"stopping distance": "m"}, 10.0
         self.tolerances: tuple[float, ...] = (1e-2, 1e-3) if quick else (1e-2, 1e-3, 1e-4)
         self._tables = [surface(name) for name in SURFACES]
         self.slips = np.unique(np.concatenate([table.slips for table in self._tables]))
         self.mu = np.array([np.interp(self.slips, table.slips, table.mu_x[0, 0]) for table in self._tables])
-        self._road = road([Stretch(0.0, 0, 0), Stretch(CHANGE, 1, 1)])
+        self._road = road([Stretch(0.0, 0, 0), Stretch(self.change, 1, 1)])
         self._chambers, self._brakes = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY), of_wheels(PAPER_FRONT)
         self.valves = self._taped()
         self.duration = self.valves.size * SAMPLE
@@ -161,13 +163,13 @@ class BrakingStop:
         tape = Tape(CONTROLLERS["slip_bang_bang"](1), [])
         kind, slope = np.zeros(1, dtype=np.int64), max(table.cornering for table in self._tables)
         Braked(VEHICLE.plane, kind, stacked(self._tables), slope, self._road, self._brakes, self._chambers,
-               np.zeros(1), substeps=FINE).run(tape, SPEED)  # fmt: skip
+               np.zeros(1), substeps=FINE).run(tape, self.speed)  # fmt: skip
         return np.array(tape.valves + [tape.valves[-1]] * MORE)
 
     def _by(self, method: str, tolerance: float) -> float:
         """Distance (m) by scipy, with the change of friction, locking and release as events."""
-        stretches = [(begin, partial(self._friction, i)) for i, begin in enumerate((0.0, CHANGE))]
-        return tight_distance(VEHICLE, PAPER_FRONT, stretches, Played(self.valves), SPEED, tolerance, method)
+        stretches = [(begin, partial(self._friction, i)) for i, begin in enumerate((0.0, self.change))]
+        return tight_distance(VEHICLE, PAPER_FRONT, stretches, Played(self.valves), self.speed, tolerance, method)
 
     def _friction(self, i: int, slip: float) -> float:
         return float(np.interp(slip, self.slips, self.mu[i]))
@@ -182,15 +184,17 @@ class BrakingStop:
         return np.concatenate(found)
 
     def _ours(self, substeps: int) -> Result:
-        stop = braked(VEHICLE, stacked(self._tables), self._road, self._torques(substeps), SAMPLE / substeps, SPEED)
+        stop = braked(VEHICLE, stacked(self._tables), self._road, self._torques(substeps), SAMPLE / substeps,
+                      self.speed)  # fmt: skip
         if stop.rest < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
         return Result(stop.distance, {"steps": stop.rest, "force calls": WALKS[OURS] * stop.rest})
 
     def _others(self, method: str, substeps: int) -> Result:
         number = (EULER, RK4, LITERAL).index(method)
-        way, steps = march(number, SPEED, SPEED / VEHICLE.radius, self._torques(substeps), CHANGE, VEHICLE.mass,
-                           VEHICLE.radius, VEHICLE.spin_inertia, self.slips, self.mu, SAMPLE / substeps)  # fmt: skip
+        way, steps = march(number, self.speed, self.speed / VEHICLE.radius, self._torques(substeps), self.change,
+                           VEHICLE.mass, VEHICLE.radius, VEHICLE.spin_inertia, self.slips, self.mu,
+                           SAMPLE / substeps)  # fmt: skip
         if steps < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
         return Result(way, {"steps": steps, "force calls": WALKS[method] * steps})

@@ -23,13 +23,13 @@ CHOSEN = {
     ("exudyn", "GeneralizedAlpha 0.9"): (10 * MS, *STEPS),
     ("exudyn", "GeneralizedAlpha 0.6"): (10 * MS, *STEPS),
     ("exudyn", "RK44"): (1 * MS,),
-    ("mujoco", "RK4"): STEPS,
-    ("mujoco", "Euler"): STEPS,
-    ("mujoco", "implicit"): STEPS,
-    ("mujoco", "implicitfast"): STEPS,
-    ("mujoco", "discrete"): STEPS,
+    ("mujoco", "RK4"): STEPS[:-1],
+    ("mujoco", "Euler"): STEPS[:-1],
+    ("mujoco", "implicit"): STEPS[:-1],
+    ("mujoco", "implicitfast"): STEPS[:-1],
+    ("mujoco", "discrete"): STEPS[:-1],
 }
-"""RK44 is there to be refused: it does not solve for a prescribed pitch."""
+"""RK44 is there to be refused: it does not solve for a prescribed pitch. MuJoCo calls Python in every step."""
 
 
 class PrescribedPitch(ForceExcited):

@@ -56,8 +56,8 @@ _LONG = (10 * MS, 5 * MS, 4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * M
          0.03125 * MS, 0.0125 * MS)
 _TIGHT = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 OTHERS: dict[tuple[str, str], tuple[float, ...]] = {
-    ("reference", "DOP853"): _TIGHT,
-    ("reference", "Radau"): _TIGHT[:7],
+    ("reference", "DOP853"): _TIGHT[:6],
+    ("reference", "Radau"): _TIGHT[:6],
     ("reference", "LSODA"): _TIGHT,
     ("exudyn", "GeneralizedAlpha 0.9"): _LONG,
     ("exudyn", f"GeneralizedAlpha {WITH_SLOPES}"): _LONG,
@@ -160,7 +160,8 @@ class RollingWheels:
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting of this problem by its curve and its step (s) or tolerance."""
         made = setting(engine, method, value)
-        return made if made.order <= (2 if self.wheels.speed >= SMOOTH else 1) else replace(made, order=0)
+        kept = made.order <= (2 if self.wheels.speed >= SMOOTH else 1)
+        return made if kept else replace(made, order=0, nominal=made.order)
 
     def build(self, setting: Setting) -> Solver:
         """The wheel in one engine; Refused for a step that the method cannot take, or a method that is not there."""
