@@ -7,6 +7,7 @@ the body's axes, as is right for tilts of a few degrees. What was not measured, 
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import get_args
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from models.errors import InputError
 from models.hub_forces.cut_vehicle import CutVehicle
 from models.hub_forces.measurement import Angles, HubForces
 from models.hub_forces.rigid import rigid
+from models.hub_forces.scene import Frame
 from models.hub_forces.table import Drive
 from models.hub_forces.tilt_march import march
 from models.signals import Sampled, Smooth
@@ -61,6 +63,7 @@ class TiltFilter:
 
     def __init__(self, vehicle: CutVehicle, frame: str, period: float, force_deviation: np.ndarray,
                  angle_deviations: tuple[float, float], model: float, file: str = "") -> None:  # fmt: skip
+        _check(frame, period, angle_deviations, model)
         self.rigid, self.frame, self.period, self.file = rigid(vehicle), frame, period, file
         self.forces_noise = self.rigid.turning(force_deviation)[:2, :2]
         push = np.vstack([np.eye(2) * period**2 / 2, np.eye(2) * period])
@@ -120,6 +123,16 @@ class TiltFilter:
                                  f"(at most {UNEXPLAINED:.0%}): {REMEDY}")  # fmt: skip
 
 
+def _check(frame: str, period: float, angle_deviations: tuple[float, float], model: float) -> None:
+    """Refuse what is no frame, no period and no deviation; a value without any error is none, either."""
+    if frame not in get_args(Frame):
+        raise InputError("", "frame", frame, "is none", get_args(Frame))
+    for name, value in (("period", period), ("angle_deviations", min(angle_deviations)), ("model", model),
+                        ("angle_deviations", max(angle_deviations))):  # fmt: skip
+        if not 0.0 < value < math.inf:
+            raise InputError("", name, value, "must be above 0, and finite")
+
+
 def _level_line(values: np.ndarray) -> np.ndarray:
     """Values (n, k) without their straight lines."""
     line = np.linspace(-1.0, 1.0, len(values))
@@ -128,7 +141,12 @@ def _level_line(values: np.ndarray) -> np.ndarray:
 
 def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, force_deviation: np.ndarray,
              angle_deviations: tuple[float, float], model: float, file: str = "") -> Tilt:  # fmt: skip
-    """Filter angles sampled with the forces, see ``TiltFilter``."""
+    """Filter angles sampled with the forces, see ``TiltFilter``; raises InputError also where nothing was measured."""
+    if len(forces.samples) != len(angles.samples):
+        raise InputError(file, "angles", len(angles.samples), f"must be as many samples as the forces', "
+                         f"{len(forces.samples)}")  # fmt: skip
+    if np.isnan(angles.samples).all():
+        raise InputError(file, "angles", None, "hold no number: there is nothing to follow")
     own = TiltFilter(vehicle, forces.frame, forces.period, force_deviation, angle_deviations, model, file)
     states, spread = own.advance(forces.samples, angles.samples)
     return Tilt(states, spread, forces.period, own.surprise)

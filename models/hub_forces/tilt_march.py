@@ -27,11 +27,33 @@ def march(x, p, turning, measured, dt, noise, variances, states, spread):
                     gain[k] = p[k, j] / s
                 for k in range(4):
                     x[k] += gain[k] * off
-                    for m in range(4):
-                        p[k, m] -= gain[k] * s * gain[m]
+                _learn(p, gain, j, variances[j], variances[j] / s)
         for k in range(4):
             states[i, k], spread[i, k] = x[k], np.sqrt(p[k, k])
     return surprise, used
+
+
+@njit(cache=True, error_model="numpy")
+def _learn(p, gain, j, variance, kept):
+    """Covariance after value j, in Joseph's form: what is subtracted from itself might leave less than nothing.
+
+    kept : variance by the innovation's, which is 1 - gain[j] without its cancellation.
+    """
+    for m in range(4):
+        own = p[j, m]
+        for k in range(4):
+            p[k, m] -= gain[k] * own
+        p[j, m] = kept * own
+    for k in range(4):
+        own = p[k, j]
+        for m in range(4):
+            p[k, m] -= gain[m] * own
+        p[k, j] = kept * own
+        for m in range(4):
+            p[k, m] += gain[k] * variance * gain[m]
+    for k in range(4):
+        for m in range(k):
+            p[k, m] = p[m, k] = 0.5 * (p[k, m] + p[m, k])
 
 
 @njit(cache=True, error_model="numpy")

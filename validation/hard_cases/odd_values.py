@@ -20,6 +20,9 @@ from models.damage import pseudo_damage
 from models.drift.growth import drift_off_time
 from models.drift.point_mass import discrete
 from models.ensemble.statistics import deviation, quantile
+from models.hub_forces.cut_vehicle import cut
+from models.hub_forces.measurement import Angles, HubForces
+from models.hub_forces.tilt_filter import estimate
 from models.ride.covariance import lyapunov
 from models.ride.excitation import Excitation
 from models.ride.measures import dynamic_load_factor, share_beyond
@@ -28,6 +31,7 @@ from models.ride.of_scene import excitation_of, vehicle_of
 from models.ride.scene import build
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
+from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases.between_steps import REFUSED, asked
 from validation.hard_cases.case import Case
 
@@ -78,6 +82,15 @@ def tiny_noise(implementation: str, folder: Path) -> float:
     return float(np.abs(np.array(scaled) / own - 1.0).max())
 
 
+def sure(implementation: str, folder: Path) -> float:
+    """A filter of tilts told of angles and rates to 1e-12: its own deviations, by those told."""
+    vehicle = cut(load_vehicle("r19_free"), "body")
+    forces = HubForces(np.zeros((5000, 6 * len(vehicle.hubs))), 2e-3, "hub")
+    found = estimate(vehicle, forces, Angles(np.zeros((5000, 4)), 2e-3), np.ones(forces.samples.shape[1]),
+                     (1e-12, 1e-12), 10.0)  # fmt: skip
+    return float(np.nan_to_num(found.deviations / 1e-12, nan=np.inf).max())
+
+
 def spiked() -> Any:
     """A rail of which one point was measured 1 mm too low."""
     own = built_in("UIC60")
@@ -94,6 +107,8 @@ CASES = (
          "within its stated error of the exact theory", "of it", 1.0, "exact", slender(5e-4, 1e-2), once=True),
     Case("drift-off time under tiny noise", "squares of angles underflow", "the same by scaling", "relative", 1e-12,
          "rounding", tiny_noise, once=True),
+    Case("filter of tilts told of them to 1e-12", "subtracted covariances leave less than nothing",
+         "surer than each value, never less", "of the deviations told", 1.0 + 1e-9, "rounding", sure, once=True),
     *(Case(name, hard, "refused", "", 0.0, "exact", asked(answer), REFUSED, once=True) for name, hard, answer in (
         ("profile with a spike", "a spline swings about it", spiked),
         ("masked samples", "would be counted", lambda: pseudo_damage(MASKED)),
