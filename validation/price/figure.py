@@ -1,5 +1,6 @@
 """The work-precision figure: error over what work is counted in and over seconds, a curve per integrator."""
 
+from textwrap import fill
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -44,8 +45,10 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
     axes[0].set_ylabel(f"error of the {quantity} [{problem['units'][quantity]}]")
     axes[0].set_ylim(0.3 * problem["uncertainty"][quantity], 12 * top)
     alike = "; ".join(named(group[0], [group]) for group in groups_of(problem, points))
-    figure.suptitle(f"What accuracy costs. {problem['title']}\n", x=0.01, ha="left", fontsize=12)
-    figure.text(0.011, 0.95, f"Same error at the same step: {alike}." if alike else "", fontsize=9, color="#333333")
+    title = fill(f"What accuracy costs. {problem['title']}", 120)
+    same = fill(f"Same error at the same setting: {alike}.", 165) if alike else ""
+    figure.suptitle(title + "\n" * (1 + same.count("\n")), x=0.01, ha="left", fontsize=12)
+    figure.text(0.011, 0.98 - 0.026 * (1 + title.count("\n")), same, va="top", fontsize=9, color="#333333")
     figure.legend(handles=_legend(points, styles), loc="outside lower center", ncols=5, fontsize=8.5, handlelength=3.2)
     return figure
 
@@ -91,8 +94,8 @@ def _floor(ax: Axes, problem: dict[str, Any]) -> None:
     unit = problem["units"][quantity_of(problem)]
     ax.axhspan(1e-30, own, color="#bbbbbb", alpha=0.6, zorder=0, linewidth=0)
     ax.axhspan(own, curves.HOLLOW * own, color="#bbbbbb", alpha=0.25, zorder=0, linewidth=0)
-    ax.text(0.015, curves.HOLLOW * own, f"reference known to {own:.1g} {unit} (dark);\nbelow ten times that: hollow",
-            transform=ax.get_yaxis_transform(), ha="left", va="bottom", fontsize=8, color="#555555")  # fmt: skip
+    ax.text(0.015, 0.012, f"reference known to {own:.1g} {unit} (dark);\nbelow ten times that: hollow",
+            transform=ax.transAxes, ha="left", va="bottom", fontsize=8, color="#555555")  # fmt: skip
 
 
 def _front(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> None:
@@ -109,19 +112,19 @@ def _front(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) ->
 def _defaults(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> None:
     """Ring and name each engine's default setting."""
     found = [(owner, p) for owner, p in cost.defaults(points).items() if p.status == "ok"]
-    for (owner, p), text in zip(found, PLACES[kind == "seconds"], strict=False):
+    for (owner, p), text in zip(found, PLACES[kind], strict=False):
         place = (p.cost(kind), p.errors[quantity_of(problem)])
         ax.plot(*place, "o", markersize=15, markerfacecolor="none", markeredgecolor="#111111", markeredgewidth=1.4,
                 zorder=5)  # fmt: skip
         ax.annotate(f"{owner} default:\n{p.setting.method},\n{p.setting.label()}", place, fontsize=8.5,
                     xytext=text, textcoords="axes fraction", ha="left", va="center", zorder=6,
                     arrowprops={"arrowstyle": "-", "color": "#111111", "linewidth": 0.7, "shrinkB": 7,
-                                "relpos": (1, 0.5) if kind == "seconds" else (0.12, 1)})  # fmt: skip
+                                "relpos": (0.12, 1) if kind == "force calls" else (1, 0.5)})  # fmt: skip
 
 
-PLACES = {False: ((0.015, 0.36), (0.17, 0.46)), True: ((0.015, 0.85), (0.015, 0.95))}
-"""Where the defaults are named, by whether it is over seconds, in fractions of the panel: the corner that accuracy
-leaves empty."""
+PLACES = {"force calls": ((0.015, 0.36), (0.17, 0.46)), "contact cells": ((0.4, 0.75), (0.6, 0.75)),
+          "seconds": ((0.015, 0.85), (0.015, 0.95))}  # fmt: skip
+"""Where the defaults are named, by what work is counted in, in fractions of the panel: a corner that is left empty."""
 
 
 def _failures(ax: Axes, points: list[Point], top: float) -> None:
@@ -138,8 +141,10 @@ def _failures(ax: Axes, points: list[Point], top: float) -> None:
 
 
 def _expected(p: Point, points: list[Point]) -> float:
-    """Force calls that a failed fixed-step setting would have cost, from its neighbours on the curve."""
+    """What a failed setting cost, or one with fixed steps would have, from its neighbours on the curve."""
     own = by_curve(points).get(p.setting.curve)
+    if p.counts:
+        return p.cost(cost.costs(points)[0])
     if not own or p.setting.adaptive:
         return 0.0
     return own[0].cost(cost.costs(points)[0]) * own[0].setting.value / p.setting.value
@@ -148,6 +153,8 @@ def _expected(p: Point, points: list[Point]) -> float:
 def _who(failed: list[Point], status: str) -> str:
     """Methods without an answer, those with none at all named."""
     own = [p for p in failed if p.status == status]
+    if status == "flagged":
+        return ", ".join(dict.fromkeys(f"{p.setting.curve} (cross, see table)" for p in own))
     unstable = [p for p in own if not p.setting.adaptive]
     what = "steps beyond stability" if status == "refused" else "settings"
     parts = [f"{len(unstable)} {what} (crosses)"] if unstable else []
@@ -163,6 +170,6 @@ def _legend(points: list[Point], styles: dict[str, dict[str, Any]]) -> list[Line
     front = "no other setting is better (Pareto)"
     handles.append(Line2D([], [], color="#f0c808", linewidth=9, alpha=0.45, label=front))
     if any(p.status != "ok" for p in points):
-        failed = "no answer (refused or raised)"
+        failed = "no answer to rely on"
         handles.append(Line2D([], [], color="#777777", marker="x", linestyle="none", label=failed))
     return handles
