@@ -26,14 +26,14 @@ SYSTEMS = {system: f"validation.price.own_scene.{module}" for system, module in 
 """Systems whose scenes have a price, and the modules that know them."""
 NEAR = 2.0
 """Settings that took up to so many times the least seconds in one run are timed beside one another."""
-FAR = 4.0
+FAR = 8.0
 """The same for a default: it must never be given up because one run of it was disturbed."""
 ROUNDS, LEAST = 9, 0.005
 """Interleaved rounds of timing; a short run is repeated until its turn lasts this long (s)."""
 FEWEST, PATIENCE = 3, 5.0
 """Of slow runs there are fewer rounds, for they take no longer together than this (s), yet at least so many."""
-BEHIND = 1.5
-"""What took so many times the seconds of its engine's best in the first rounds is out of the race."""
+BEHIND, USUAL_BEHIND = 1.5, 3.0
+"""What took so many times the seconds of its engine's best in the first rounds is out of the race; a default later."""
 SLOWER = 1.05
 """A ratio of seconds whose 95 % interval lies above this is slower beyond doubt."""
 ATTEMPTS = 6
@@ -141,7 +141,8 @@ def _raced(search: Search, rivals: list[Tried]) -> dict[Setting, np.ndarray]:
     middle = {one.setting: float(np.median(seconds[one.setting])) for one in rivals}
     least = {engine: min(own for setting, own in middle.items() if setting.engine == engine)
              for engine in dict.fromkeys(setting.engine for setting in middle)}  # fmt: skip
-    left = [one for one in rivals if middle[one.setting] <= BEHIND * least[one.setting.engine]]
+    left = [one for one in rivals if middle[one.setting]
+            <= (USUAL_BEHIND if one.setting.default else BEHIND) * least[one.setting.engine]]  # fmt: skip
     more = min(ROUNDS, int(PATIENCE / max(sum(middle[one.setting] for one in left), 1e-9))) - FEWEST
     further = _rounds(search, left, more) if more > 0 and len(left) > 1 else {}
     return seconds | {setting: np.concatenate((seconds[setting], own)) for setting, own in further.items()}
@@ -166,9 +167,10 @@ def _cheapest(timed: list[Choice], engine: str, kind: str) -> Choice | None:
 
 def _slower(one: Choice, best: Choice) -> bool:
     """Whether a choice takes longer than another one, beyond doubt where both were timed in the same rounds."""
-    if len(one.rounds) != len(best.rounds) or len(one.rounds) == 1:
+    both = min(len(one.rounds), len(best.rounds))
+    if both < FEWEST:
         return one.seconds > best.seconds
-    return paired_ratio(one.rounds, best.rounds)[1] > SLOWER
+    return paired_ratio(one.rounds[:both], best.rounds[:both])[1] > SLOWER
 
 
 def _confirmed(search: Search, timed: list[Choice],
