@@ -18,6 +18,9 @@ SPACING = 1e-4
 """Distance (m) of the points along a profile's contour."""
 SPIKE = 2e-4
 """Distance (m) from both neighbours from which a point that turns back counts as one that was measured wrongly."""
+BACK = 1e-3
+"""Step (m) against y up to which a contour that turns back is rough, and not the end of what can be touched; more of y
+than that may not be lost beyond it."""
 TURNING = 0.3
 """Largest way of a contour against its direction by the way along it: a rail with web and foot turns by 0.27."""
 
@@ -66,6 +69,7 @@ def profile(y: np.ndarray, z: np.ndarray, smoothing: float = 0.0, file: object =
     even = np.linspace(0.0, length[-1], max(round(length[-1] / SPACING), 10) + 1)
     y, z = (_smoothed(length, values, even, smoothing) for values in (y, z))
     keep = _ascending(y)
+    _check_rough(y, keep, file)
     return Profile(y[keep], z[keep], smoothing)
 
 
@@ -96,6 +100,18 @@ def _check_spikes(points: np.ndarray, file: object) -> None:
         y, z = points[1 + int(np.argmax(spikes))]
         raise InputError(file, "profile", [float(y), float(z)], f"sticks out between its neighbours: {spikes.sum()} "
                          "such points (m); take out what was measured wrongly")  # fmt: skip
+
+
+def _check_rough(y: np.ndarray, keep: slice, file: object) -> None:
+    """Refuse a contour that turns back for a moment, as rough or coarsely rounded points do: the rest would be lost."""
+    for beyond, last in ((y[keep.stop :], y[keep.stop - 1]), (-y[: keep.start][::-1], -y[keep.start])):
+        highest = np.maximum.accumulate(np.append(last, beyond))[1:]
+        rough = np.logical_and.accumulate(highest - beyond < BACK)
+        lost = float(np.max(beyond[rough], initial=last) - last)
+        if lost > BACK:
+            raise InputError(file, "profile", float(abs(last)), f"is |y| (m) where the contour turns back by less than "
+                             f"{BACK:g} m, as noise or rounding makes it, and {lost:.2g} m beyond it would be lost: "
+                             "give a smoothing, from 0.002 m on")  # fmt: skip
 
 
 def _smoothed(length: np.ndarray, values: np.ndarray, even: np.ndarray, smoothing: float) -> np.ndarray:

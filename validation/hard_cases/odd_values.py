@@ -97,6 +97,12 @@ def spiked() -> Any:
     return profile(own.y, own.z + 1e-3 * (np.arange(own.z.size) == own.z.size // 2))
 
 
+def rounded() -> Any:
+    """A rail whose points were written to 0.1 mm, so that its steep sides turn back from point to point."""
+    own = built_in("UIC60")
+    return profile(own.y.round(4), own.z.round(4))
+
+
 MASKED = np.ma.array([0.0, 100.0, 0.0, 1.0, 0.0], mask=np.arange(5) == 1)
 SKEW = np.array([[1.0, 2.0], [0.0, 1.0]])
 STABLE = np.array([[0.0, 1.0], [-4.0, -0.5]])
@@ -111,6 +117,7 @@ CASES = (
          "surer than each value, never less", "of the deviations told", 1.0 + 1e-9, "rounding", sure, once=True),
     *(Case(name, hard, "refused", "", 0.0, "exact", asked(answer), REFUSED, once=True) for name, hard, answer in (
         ("profile with a spike", "a spline swings about it", spiked),
+        ("profile rounded to 0.1 mm", "the half beyond the first step back would be lost", rounded),
         ("masked samples", "would be counted", lambda: pseudo_damage(MASKED)),
         ("load below 0 under a wheel", "its factor would be negative", lambda: dynamic_load_factor(100.0, -4000.0)),
         ("limit below 0", "a share of time above 1", lambda: share_beyond(1.0, -1.0)),
