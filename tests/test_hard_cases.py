@@ -11,6 +11,7 @@ from models import signals
 from models.effects import contact_points as contact_effect
 from models.engines import exudyn as exudyn_engine
 from models.engines import protocol, stability
+from models.rail import equations
 from models.rail.equations import Equations
 from models.ride import covariance, marginal
 from models.vehicles import pitch_plane
@@ -131,8 +132,10 @@ def test_without_sizes_of_their_own_road_states_hide_an_undamped_motion(monkeypa
 
 
 @pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
-def test_without_the_check_of_loads_a_hard_landing_is_silent(implementation, monkeypatch, tmp_path):
+def test_a_hard_landing_is_silent_without_both_checks_that_see_it(implementation, monkeypatch, tmp_path):
     monkeypatch.setattr(Equations, "_check_loads", lambda *_: None)
+    assert found(rolling, "step too large for a landing", implementation, tmp_path) == "raised"
+    monkeypatch.setattr(equations, "check_resolved", lambda *_: None)
     assert found(rolling, "step too large for a landing", implementation, tmp_path) == "SILENT"
 
 
