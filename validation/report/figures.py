@@ -22,9 +22,11 @@ def inline(figure: Any, caption: str, key: str) -> Markup:
 
 
 def _svg(figure: Any, caption: str, key: str) -> str:
-    """SVG element without prologue, metadata and superfluous digits."""
+    """SVG element without prologue, metadata and superfluous digits; drawn once, where ``savefig`` draws twice."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
     buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None})
+    FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
