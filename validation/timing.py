@@ -26,8 +26,8 @@ def interleave(jobs: Sequence[Callable[[], Any]], rounds: int, least: float = 0.
     """Seconds of every job in every round, shape (jobs, rounds); single thread, warmed up.
 
     least : a job is repeated within its turn until it lasts about this long (s); seed : of the order;
-    lasted : seconds of a run of each job that has been, where there was one; clock : that of the processor leaves out what else the
-    machine does.
+    lasted : seconds of a run of each job that has been, where there was one; clock : that of the processor leaves
+    out what else the machine does.
     """
     known = [0.0] * len(jobs) if lasted is None else lasted
     repeats = [1 if one > LONG * least else _repeats(job, least, clock)

@@ -19,11 +19,11 @@ SYSTEM: System = "hard-cases"
 LEAST = 80
 """Cases that there must be, without measurement files, which are many of a kind."""
 FILES = ("measured_files",)
-EVERY = 12
+EVERY = 24
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """A row per case and implementation; quick: the last case of each family and every twelfth before it."""
+    """A row per case and implementation; quick: the last case of each family and every twenty-fourth before it."""
     rows: list[Row] = []
     data: list[dict[str, Any]] = []
     known = cases_by_family()
