@@ -10,7 +10,7 @@ from pydantic import Field
 
 from models.engines.catalogue import CATALOGUE, MISSING, RECOMMENDED
 from models.errors import InputError
-from models.scene_effects import names_of, read_tables
+from models.scene_effects import read_tables
 from models.scene_file import SceneFile, checked, existing, parse
 from models.steps import MOST_STEPS, divides, fitting
 from models.strict import Strict, quantity, read
@@ -19,11 +19,6 @@ from models.vehicles import pitch_plane
 from models.vehicles.description import Geometry
 
 FOLDER = Path(__file__).parent
-
-
-def effect_names() -> tuple[str, ...]:
-    """Names of all effects that a scene may call for."""
-    return names_of(DEFAULT)
 
 
 def parameter_sets() -> tuple[str, ...]:

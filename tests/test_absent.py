@@ -10,8 +10,7 @@ import pytest
 
 import models
 from models.assembly import assemble
-from models.scene import effect_names
-from models.scene_effects import module_of
+from models.scene_effects import module_of, names_of
 from models.systems import DEFAULT
 from validation.absence import ride
 from validation.absence.hand_built import mujoco_model
@@ -124,7 +123,7 @@ def test_the_same_numbers_with_the_other_effects_files_removed(kept, bare, force
     copy = tmp_path / "models"
     shutil.copytree(Path(models.__file__).parent, copy)
     shutil.rmtree(copy / "road")
-    for name in {*effect_names()} - {*kept}:
+    for name in {*names_of(DEFAULT)} - {*kept}:
         (copy / "effects" / f"{name}.py").unlink()
     for name in ("mujoco_callback", "mujoco_layout"):
         (copy / "engines" / f"{name}.py").unlink()

@@ -1,7 +1,7 @@
 """Work-precision runner: its analysis on curves whose answer is known, and planted solvers that lie."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -200,6 +200,15 @@ def test_what_a_default_loses():
     assert found.how == "extrapolated"
     assert found.factor == pytest.approx(125_000 / (500 * 1000**0.25), rel=1e-9)
     assert found.low == found.high == found.factor, "counts have no interval"
+
+
+def test_an_interval_needs_rounds():
+    """One round has a factor, but nothing to tell how sure it is: its interval would be of width 0, as if exact."""
+    points = [replace(p, seconds=(p.counts["force calls"] * 1e-6,)) for p in points_of(PlantedProblem())]
+    one = cost.loss(points, "force", 1e-3, "seconds", "exudyn first")
+    assert one.factor > 1 and math.isnan(one.low) and math.isnan(one.high)
+    five = [replace(p, seconds=p.seconds * cost.FEWEST[False]) for p in points]
+    assert cost.loss(five, "force", 1e-3, "seconds", "exudyn first").low == pytest.approx(one.factor)
 
 
 def test_tables_come_from_saved_points():

@@ -32,11 +32,12 @@ def test_every_study_is_listed_with_its_duration_and_run_by_ci():
 
 def test_every_effect_that_is_listed_is_one_and_every_folder_is_listed():
     """An effect need not be listed: its file is all that it takes, and `twinrig list` reads that."""
-    from models.scene import effect_names
+    from models.scene_effects import names_of
+    from models.systems import DEFAULT
 
     table = README.partition("\n## Effects\n")[2].partition("\n## ")[0]
     rows = set(re.findall(r"^\| `(\w+)` \|", table, flags=re.MULTILINE))
-    assert len(rows) > 10 and rows <= {*effect_names()}
+    assert len(rows) > 10 and rows <= {*names_of(DEFAULT)}
     for folder in ("models", "studies", "validation", "tests"):
         assert f"| `{folder}/` |" in README and (ROOT / folder).is_dir()
 

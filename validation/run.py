@@ -15,7 +15,7 @@ from models.ensemble.store import locked, write_whole
 from models.ensemble.workers import processes
 from models.result import provenance
 from validation.changes import against, lines
-from validation.measured_cases import Cases, Outcomes, measured
+from validation.kept_cases import Cases, Outcomes, measured
 from validation.report.shares import full
 from validation.rows import REPORTED, Row
 

@@ -143,7 +143,8 @@ def _loss(problem: Problem, points: list[Point], owner: str, p: Point, target: f
         return []
     how = ", extrapolated by its order" if one.how == "extrapolated" else ""
     name = f"price.{problem.key}.default.{p.setting.engine}.{'own' if among else 'all'}.{kind}".replace(" ", "-")
-    bounds = f"95 % interval {one.low:.3g} to {one.high:.3g}" if kind == "seconds" else "exact"
+    told = f"95 % interval {one.low:.3g} to {one.high:.3g}" if one.low <= one.high else "too few rounds to tell"
+    bounds = told if kind == "seconds" else "exact"
     what = f"{owner}'s default, {p.setting.method}, refined to {target:g} {unit}{how}, by {words}: {kind}"
     why = f"at its default {p.setting.label()} its error is {p.errors[quantity]:.3g} {unit}"
     return [finding(name, SYSTEM, what, one.factor, "times", bounds, why, "none")]

@@ -26,8 +26,10 @@ WORK = ("contact cells", "force calls")
 SLOW = 0.1
 """A setting that takes longer (s) is timed in rounds among its like, so that the others have more of them."""
 PATIENCE = {True: 0.5, False: 2.0}
-"""Seconds for all rounds of a problem's slow settings, and for those of the others, by ``quick``; one round at least.
-"""
+"""Seconds for all rounds of a problem's slow settings, and for those of the others, by ``quick``."""
+FEWEST = {True: 1, False: 5}
+"""Rounds there are at least, however long they take; with fewer than in full no interval is told, for that of one round
+would look exact."""
 DRAWS = 200
 """Bootstrapped sets of rounds behind the interval of an interpolated ratio."""
 
@@ -120,7 +122,8 @@ def measure(problem: Problem, quick: bool, rounds: int, least: float) -> list[Po
         ends.append(time.perf_counter())
     lasted, fine = np.diff(ends), np.array([p.status == "ok" for p in points])
     for chosen in (np.flatnonzero(fine & (lasted <= SLOW)), np.flatnonzero(fine & (lasted > SLOW))):
-        most = max(1, min(rounds, int(PATIENCE[quick] / max(lasted[chosen].sum(), least * chosen.size, 1e-9))))
+        once = max(lasted[chosen].sum(), least * chosen.size, 1e-9)
+        most = max(FEWEST[quick], min(rounds, int(PATIENCE[quick] / once)))
         for i, again in zip(chosen, _timed(problem, [points[i] for i in chosen], most, least, lasted[chosen]),
                             strict=True):  # fmt: skip
             points[i] = again
@@ -195,7 +198,8 @@ def cheapest(found: dict[str, curves.Reach], among: str = "") -> tuple[str, curv
 class Loss:
     """How many times the cheapest setting's cost a default method takes for the same error.
 
-    factor with its 95 % interval (equal to it for counts); ``how`` as in ``Reach``, for the default's side.
+    factor with its 95 % interval (equal to it for counts, NaN after too few rounds); ``how`` as in ``Reach``, for the
+    default's side.
     """
 
     factor: float
@@ -212,7 +216,10 @@ def loss(points: list[Point], quantity: str, target: float, kind: str, default: 
         return None
     factor = low = high = own.cost / best[1].cost
     if kind == "seconds" and best[0] != default:
-        sides = [_resampled(by_curve(points)[curve], quantity, target) for curve in (default, best[0])]
+        pair = [by_curve(points)[curve] for curve in (default, best[0])]
+        if min(len(p.seconds) for curve in pair for p in curve) < FEWEST[False]:
+            return Loss(factor, math.nan, math.nan, own.how)
+        sides = [_resampled(curve, quantity, target) for curve in pair]
         _, low, high = interval(sides[0] / sides[1])
     return Loss(factor, low, high, own.how)
 

@@ -104,7 +104,7 @@ def losses(problem: dict[str, Any], points: list[Point]) -> Table:
                          else f"is {STATUSES[own.status]}") for owner, own in owners.items())  # fmt: skip
     note = ("The default method, its step refined until it meets the tolerance, by the cheapest setting that does. "
             f"{as_is}. * means that no step tried was fine enough: extrapolated by the method's declared order. "
-            "In brackets: 95 % interval, bootstrapped over rounds.")  # fmt: skip
+            "In brackets: 95 % interval, bootstrapped over rounds; none after fewer than five.")  # fmt: skip
     return Table("Factor that a default setting loses", note, (f"{quantity} error at most", *heads), tuple(rows))
 
 
@@ -112,7 +112,7 @@ def _lost(found: Loss | None) -> str:
     if found is None:
         return "-"
     mark = "*" if found.how == "extrapolated" else ""
-    if found.low == found.high:
+    if not found.low < found.high:  # a count, or too few rounds
         return f"{_short(found.factor)}{mark}"
     return f"{_short(found.factor)}{mark} [{_short(found.low)}, {_short(found.high)}]"
 

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from models.errors import InputError
-from validation.measured_cases import Cases, measured
+from validation.kept_cases import Cases, measured
 from validation.rows import within
 
 NAMES = ("a_case", "bad_case", "one_more")
