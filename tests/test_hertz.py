@@ -5,6 +5,8 @@ import pytest
 
 from models.contact.hertz import aspect, by_approach, by_axes, by_load, integrals
 from models.contact.material import STEEL, Material, Pair
+from models.contact.of_scene import interpenetrating
+from models.contact.simplified_theory import roll
 from models.errors import InputError
 from models.strict import read
 from validation.cases.contact_hertz import ellipse, measure
@@ -133,6 +135,9 @@ def test_unlike_pairs_are_refused_only_where_they_rub():
     assert near.quasi_identity_error(0.3) == Pair(near.two, near.one).quasi_identity_error(0.3)
     with pytest.raises(InputError, match=r"too unlike .*K = -0.07"):
         unlike.require_likeness()
+    pressed = interpenetrating(by_load(1.0, 1.0, 1e4, unlike), unlike)  # the simplified theory, too, leaves K out
+    with pytest.raises(InputError, match=r"too unlike .*K = -0.07"):
+        roll(pressed, 0.3, 1e-3, 0.0, 0.0)
 
 
 def test_a_material_in_a_file_is_read_as_strictly():

@@ -35,7 +35,7 @@ def answer(path: Path, out: Path, pair: Pair, method: Method, progress: Progress
 
     Raises InputError for a file or a header that cannot be used; a wrong row gets a status and stops nothing.
     """
-    _ = pair.G  # too unlike a pair is the scene's mistake, not that of every row
+    pair.require_likeness()  # the scene's mistake, not that of every row
     counts = {"rows": 0, "wrong": 0}
     reading = blocks(path, (BY_AXES, BY_CURVATURES))
     first = next(reading, None)

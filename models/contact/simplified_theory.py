@@ -268,8 +268,10 @@ def roll(pressed: NormalContact, friction: float, xi_x: float, xi_y: float, spin
 
     friction : coefficient. xi_x, xi_y : creepages. spin : 1/m. cells : strips, and cells in each, 3 or more. Spin and
     moment are about x = y = 0 of the distance, where patches lean of each patch; roll these one by one if their
-    creepages differ. Raises InputError for what is not one finite number, a friction below zero or too few cells.
+    creepages differ. Raises InputError for what is not one finite number, a friction below zero, too few cells, or
+    bodies too unlike for the slip that their pressure makes to be left out.
     """
+    pressed.pair.require_likeness()
     friction = number("friction", friction, "a coefficient of friction from 0 to 10", 0.0, 10.0)
     xi_x, xi_y, spin = creepages(xi_x, xi_y, spin, number).values()
     cells = whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
