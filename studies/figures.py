@@ -9,6 +9,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
+import studies.log_axis  # noqa: F401  the scale "log" of every figure
+
 
 class _Colours(dict[str, str]):
     def __missing__(self, engine: str) -> str:
