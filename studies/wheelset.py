@@ -154,6 +154,8 @@ def _stability(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
     """The critical speed of every implementation, with the frequency there; or that there is none."""
     two, why = critical(wheelset, _two_motions)
     lines = ["  critical speed with linear creep", f"    {'lateral and yaw motion alone':<34}" + _speed(two, why)]
+    if wheelset.friction == 0.0:
+        lines.append("    DOUBT: without friction nothing creeps: what follows from creep forces is no wheelset's")
     first = next((one.critical for one in linear.values()), None)
     return lines + [f"    {f'eigenvalues of {engine}':<34}" + _speed(one.critical, one.why, first if k else None)
                     for k, (engine, one) in enumerate(linear.items())]  # fmt: skip
@@ -181,7 +183,7 @@ def _motions(scene: WheelsetScene, paths: dict[str, dict[float, Motion]]) -> lis
         lines.append(f"    {speed:g} m/s: {_ending(own)}")
         lines += [f"      {engine}: within {np.abs(other[speed].states - own.states).max():.1e} of {name} (m, rad, s)"
                   for engine, other in paths.items() if engine != name]  # fmt: skip
-        lines += _climbs(wheelset_of(scene), own)
+        lines += _climbs(wheelset_of(scene), own) + _slides(scene, own)
         power = own.contacts[:, :, wf.POWER]
         book = ledger(equations_of(scene, "reference", speed), own)
         lines.append(f"      power of the creep forces: from {power.min():,.3g} to {power.max():.3g} W at a patch; "
@@ -198,6 +200,18 @@ def _climbs(wheelset: Wheelset, motion: Motion) -> list[str]:
         return []
     return [f"      DOUBT: a flange is pushed with {share:.2g} times its wheel's load; beyond {limit:.2g} (Nadal, 70 "
             "degrees) it may climb, which cones cannot show: use [profiles]"]  # fmt: skip
+
+
+def _slides(scene: WheelsetScene, motion: Motion) -> list[str]:
+    """A line for a path whose linear creep forces are more than friction carries."""
+    force, own = np.hypot(motion.contacts[:, :, wf.FX], motion.contacts[:, :, wf.FY]), wheelset_of(scene)
+    bound = own.friction * motion.contacts[:, :, wf.LOAD]
+    if scene.contact.law != "linear" or not (force > bound).any():
+        return []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        most = np.nanmax(force / bound)
+    return [f"      DOUBT: the linear law's creep forces are up to {most:.3g} times what friction carries: it knows no "
+            "slip; use fastsim"]  # fmt: skip
 
 
 def _ending(motion: Motion) -> str:

@@ -168,3 +168,18 @@ def test_limit_of_climbing() -> None:
     assert flange_share(reports) == 2.0
     reports[1, 0, wf.LOAD] = 0.0
     assert flange_share(reports) == np.inf
+
+
+def test_the_flange_of_a_cone_is_not_silently_unread_beside_profiles() -> None:
+    with pytest.raises(InputError, match="profiles, which have flanges of their own") as told:
+        wheelset_of(scene(wheelset={"override": {"flange_stiffness": 1e6}}, profiles={}))
+    assert told.value.place == "wheelset.override.flange_stiffness"
+
+
+@pytest.mark.parametrize(("law", "friction", "doubt"), [("linear", 0.0, True), ("linear", 0.3, False),
+                                                        ("fastsim", 0.0, False)])  # fmt: skip
+def test_creep_forces_beyond_friction_are_told(law, friction, doubt) -> None:
+    short = {"duration": 0.02, "displacement": 1e-3}
+    own = scene(contact={"law": law}, wheelset={"override": {"friction": friction}}, run=short)
+    told = wheelset._slides(own, wheelset.path(own, "reference", 20.0))
+    assert bool(told) == doubt and all("inf times what friction carries" in line for line in told)

@@ -20,6 +20,8 @@ IMPLEMENTATIONS = {
     "exudyn": "models.engines.wheelset_exudyn.ExudynWheelset",
     "mujoco": "models.engines.wheelset_mujoco.MujocoWheelset",
 }
+FLANGE = "flange_stiffness"
+"""The only parameter that profiles leave nothing to do: cones stand for them where motions are small."""
 BESIDE = (0.9, 1.1)
 """Speeds of the paths by the critical one, where the scene names none."""
 
@@ -34,7 +36,11 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
     if base is None:
         path = existing(name, Path(scene.folder), scene.file, "wheelset.parameters")
         base = _judged(parse(path), path.name, "")
-    values = {key: getattr(base, key) for key in Wheelset.model_fields} | {"profiles": _profiles(scene, base)}
+    profiles = _profiles(scene, base)
+    if profiles is not None and FLANGE in override:
+        raise InputError(scene.file, f"wheelset.override.{FLANGE}", override[FLANGE], "has no meaning beside profiles, "
+                         "which have flanges of their own: drop one of them")  # fmt: skip
+    values = {key: getattr(base, key) for key in Wheelset.model_fields} | {"profiles": profiles}
     return _judged(values | override, scene.file, "wheelset.override")
 
 
