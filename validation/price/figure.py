@@ -38,7 +38,8 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
         timed = kind == "seconds"
         label = "seconds for the run, model built anew (median)" if timed else f"{kind} in the run"
         ax.set(xscale="log", yscale="log", xlabel=label)
-        measured = f"up to {problem['rounds']} interleaved rounds" if timed else "exact"
+        rounds = problem["rounds"]
+        measured = "exact" if not timed else "one round" if rounds == 1 else f"up to {rounds} interleaved rounds"
         ax.set_title(f"by {kind}, {measured}")
     _failures(axes[0], points, top)
     quantity = quantity_of(problem)
@@ -83,9 +84,11 @@ def _curve(ax: Axes, problem: dict[str, Any], own: list[Point], kind: str, style
     costs, errors = [p.cost(kind) for p in own], [p.errors[quantity] for p in own]
     floor = curves.HOLLOW * problem["uncertainty"][quantity]
     ax.plot(costs, errors, **{**style, "marker": "none"}, alpha=0.75)
-    for x, y in zip(costs, errors, strict=True):
-        face = style["color"] if y >= floor else "white"
-        ax.plot(x, y, **{**style, "linestyle": "none"}, markerfacecolor=face, markeredgewidth=0.9)
+    for face, hollow in ((style["color"], False), ("white", True)):
+        some = [pair for pair in zip(costs, errors, strict=True) if (pair[1] < floor) is hollow]
+        if some:
+            ax.plot(*zip(*some, strict=True), **{**style, "linestyle": "none"}, markerfacecolor=face,
+                    markeredgewidth=0.9)  # fmt: skip
 
 
 def _floor(ax: Axes, problem: dict[str, Any]) -> None:
