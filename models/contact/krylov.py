@@ -18,16 +18,33 @@ def solve(apply: Map, precondition: Map, wanted: np.ndarray, tolerance: float, m
     size = float(np.linalg.norm(wanted))
     if size == 0.0:
         return np.zeros_like(wanted)
-    basis, images = np.empty((most + 1, wanted.size)), np.zeros((most + 1, most))
+    basis, triangle, turns = np.empty((most + 1, wanted.size)), np.zeros((most, most)), np.empty((most, 2))
+    left = np.append(size, np.zeros(most))
     basis[0] = wanted / size
     for count in range(1, most + 1):
-        images[: count + 1, count - 1] = _orthogonalise(basis, count, apply(precondition(basis[count - 1])))
-        part = images[: count + 1, :count]
-        weights = np.linalg.lstsq(part, size * np.eye(count + 1)[0], rcond=None)[0]
-        left = np.linalg.norm(part @ weights - size * np.eye(count + 1)[0])
-        if left <= tolerance * size:
-            return precondition(weights @ basis[:count])
-    raise RunFailed("linear solver", f"residual {left / size:.2g} after {most} products")
+        triangle[:count, count - 1] = _turned(_orthogonalise(basis, count, apply(precondition(basis[count - 1]))),
+                                              turns, left)  # fmt: skip
+        if abs(left[count]) <= tolerance * size:
+            return precondition(np.linalg.solve(triangle[:count, :count], left[:count]) @ basis[:count])
+    raise RunFailed("linear solver", f"residual {abs(left[most]) / size:.2g} after {most} products")
+
+
+@njit(cache=True, nogil=True)
+def _turned(column, turns, left):
+    """The image's components (count + 1,) by Givens' rotations that leave a triangle, (count,).
+
+    turns (most, 2) : cosine and sine of the rotations, of which the last is added; left (most + 1,) : what the residual
+    was turned to, its last component the residual's size.
+    """
+    count = len(column) - 1
+    for i in range(count - 1):
+        low, high = column[i], column[i + 1]
+        column[i], column[i + 1] = turns[i, 0] * low + turns[i, 1] * high, turns[i, 0] * high - turns[i, 1] * low
+    size = np.hypot(column[count - 1], column[count])
+    turns[count - 1, 0], turns[count - 1, 1] = column[count - 1] / size, column[count] / size
+    column[count - 1] = size
+    left[count], left[count - 1] = -turns[count - 1, 1] * left[count - 1], turns[count - 1, 0] * left[count - 1]
+    return column[:count]
 
 
 @njit(cache=True, fastmath=True, nogil=True)
@@ -39,13 +56,16 @@ def _orthogonalise(basis, count, vector):
     components = np.zeros(count + 1)
     left = vector.copy()
     for row in range(count):
+        part = 0.0
         for i in range(len(left)):
-            components[row] += basis[row, i] * left[i]
+            part += basis[row, i] * left[i]
         for i in range(len(left)):
-            left[i] -= components[row] * basis[row, i]
+            left[i] -= part * basis[row, i]
+        components[row] = part
+    square = 0.0
     for i in range(len(left)):
-        components[count] += left[i] * left[i]
-    components[count] = np.sqrt(components[count])
+        square += left[i] * left[i]
+    components[count] = np.sqrt(square)
     for i in range(len(left)):
         basis[count, i] = left[i] / max(components[count], 1e-300)
     return components

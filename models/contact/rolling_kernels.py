@@ -54,33 +54,37 @@ def answer(slip_x, slip_y, own_x, own_y, bound):
 
 
 @njit(cache=True, fastmath=True, nogil=True)
-def factor(systems):
+def factor(systems, spans):
     """Each of the matrices (many, n, n) to its factors L (unit diagonal) and U, in place.
 
-    Without pivoting, which a matrix with a positive definite symmetric part does not need.
+    spans (many, 2) : first row of each that is not the unit matrix's, and one beyond its last. Without pivoting, which
+    a matrix with a positive definite symmetric part does not need.
     """
-    many, n, _ = systems.shape
-    for which in range(many):
-        for pivot in range(n - 1):
-            for row in range(pivot + 1, n):
+    for which in range(len(systems)):
+        start, stop = spans[which]
+        for pivot in range(start, stop - 1):
+            for row in range(pivot + 1, stop):
                 part = systems[which, row, pivot] / systems[which, pivot, pivot]
                 if part != 0.0:
                     systems[which, row, pivot] = part
-                    for column in range(pivot + 1, n):
+                    for column in range(pivot + 1, stop):
                         systems[which, row, column] -= part * systems[which, pivot, column]
 
 
 @njit(cache=True, fastmath=True, nogil=True)
-def substitute(factors, values):
+def substitute(factors, spans, values):
     """Solutions (many, n) of the systems in ``factors`` for right-hand sides (many, n)."""
-    many, n = values.shape
     solution = values.copy()
-    for which in range(many):
-        for row in range(1, n):
-            for column in range(row):
-                solution[which, row] -= factors[which, row, column] * solution[which, column]
-        for row in range(n - 1, -1, -1):
-            for column in range(row + 1, n):
-                solution[which, row] -= factors[which, row, column] * solution[which, column]
-            solution[which, row] /= factors[which, row, row]
+    for which in range(len(factors)):
+        start, stop = spans[which]
+        for row in range(start + 1, stop):
+            part = 0.0
+            for column in range(start, row):
+                part += factors[which, row, column] * solution[which, column]
+            solution[which, row] -= part
+        for row in range(stop - 1, start - 1, -1):
+            part = 0.0
+            for column in range(row + 1, stop):
+                part += factors[which, row, column] * solution[which, column]
+            solution[which, row] = (solution[which, row] - part) / factors[which, row, row]
     return solution

@@ -61,27 +61,32 @@ class SlipOperator:
         return self.kernel[self.rows - 1][index[:, None] - index + self.columns - 1].transpose(0, 2, 1, 3)
 
 
-def solve_on(operator: SlipOperator, free: np.ndarray, stiff: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Change of traction d within the free directions with free (C d + stiff d) = free wanted.
+class FreeSystem:
+    """The system free (C + stiff) d = free wanted for changes d of traction within the free directions.
 
-    free : (ny, nx, 2, 2) projection of each cell's traction onto its free directions. stiff : (ny, nx) added stiffness.
-    wanted : (ny, nx, 2) change of slip. GMRES, preconditioned by the exact inverse of every strip by itself.
+    GMRES, preconditioned by the exact inverse of every strip by itself, whose factors serve any number of right sides.
     """
-    shape = wanted.shape
-    scale = 1.0 / (operator.own.max() + stiff[..., None])  # a cell near the edge is many times stiffer than the others
-    factors = _strip_systems(operator, free, stiff)
-    factor(factors)
 
-    def apply(flat: np.ndarray) -> np.ndarray:
-        change = flat.reshape(shape)
-        return (scale * _times(free, operator(change) + stiff[..., None] * change)).ravel()
+    def __init__(self, operator: SlipOperator, free: np.ndarray, stiff: np.ndarray) -> None:
+        """free : (ny, nx, 2, 2) projection of each cell's traction onto its free directions. stiff : (ny, nx)."""
+        self.operator, self.free, self.stiff = operator, free, stiff[..., None]
+        self.scale = 1.0 / (operator.own.max() + self.stiff)  # a cell near the edge is many times stiffer than others
+        self.factors, self.spans = _strip_systems(operator, free, stiff), _spans(np.any(free, axis=(2, 3)))
+        factor(self.factors, self.spans)
 
-    def precondition(flat: np.ndarray) -> np.ndarray:
-        return substitute(factors, (flat.reshape(shape) / scale).reshape(shape[0], -1)).ravel()
+    def solve(self, wanted: np.ndarray, tolerance: float = INNER_TOLERANCE) -> np.ndarray:
+        """Change of traction (ny, nx, 2) for a change of slip (ny, nx, 2), to a relative residual."""
+        # twice: of a large slip all but normal to a free direction, the first projection leaves rounding aside of it
+        right = (self.scale * _times(self.free, _times(self.free, wanted))).ravel()
+        return krylov.solve(self._apply, self._precondition, right, tolerance, MOST_PRODUCTS).reshape(wanted.shape)
 
-    # twice: of a large slip all but normal to a free direction, the first projection leaves rounding aside of it
-    right = (scale * _times(free, _times(free, wanted))).ravel()
-    return krylov.solve(apply, precondition, right, INNER_TOLERANCE, MOST_PRODUCTS).reshape(shape)
+    def _apply(self, flat: np.ndarray) -> np.ndarray:
+        change = flat.reshape(*self.scale.shape[:2], 2)
+        return (self.scale * _times(self.free, self.operator(change) + self.stiff * change)).ravel()
+
+    def _precondition(self, flat: np.ndarray) -> np.ndarray:
+        scaled = flat.reshape(*self.scale.shape[:2], 2) / self.scale
+        return substitute(self.factors, self.spans, scaled.reshape(len(scaled), -1)).ravel()
 
 
 def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -99,3 +104,9 @@ def _strip_systems(operator: SlipOperator, free: np.ndarray, stiff: np.ndarray) 
     index = np.arange(columns)
     system[:, index, :, index, :] += np.moveaxis((1.0 + stiff[..., None, None]) * np.eye(2) - free, 1, 0)
     return np.ascontiguousarray(system.reshape(rows, 2 * columns, 2 * columns))
+
+
+def _spans(free: np.ndarray) -> np.ndarray:
+    """Component of every strip's first free cell, and one beyond that of its last, (ny, 2), of cells (ny, nx)."""
+    first, last = free.argmax(axis=1), free.shape[1] - free[:, ::-1].argmax(axis=1)
+    return 2 * np.stack([first, np.where(free.any(axis=1), last, first)], axis=1)

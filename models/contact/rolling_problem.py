@@ -28,7 +28,7 @@ import numpy as np
 from models.contact.inputs import NOTHING, creepages, number
 from models.contact.normal_problem import Pressed
 from models.contact.rolling_kernels import sweep
-from models.contact.rolling_operator import IN_PLACE, UPSTREAM, SlipOperator, solve_on
+from models.contact.rolling_operator import IN_PLACE, UPSTREAM, FreeSystem, SlipOperator
 from models.errors import RunFailed
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ def _newton(operator: SlipOperator, rigid: np.ndarray, state: _State) -> np.ndar
     free = free * (bound > 0)[..., None, None]
     against = np.maximum(-np.sum(slip * opposite, axis=-1), 0.0)
     stiff = np.where(slips, against / np.where(slips, bound, 1.0), 0.0)
-    moved = traction + solve_on(operator, free, stiff, -slip)
+    moved = traction + FreeSystem(operator, free, stiff).solve(-slip)
     size = np.linalg.norm(moved, axis=-1)
     onto = np.where(slips | (size > bound), bound / np.where(size > 0, size, 1.0), 1.0)
     return moved * onto[..., None]

@@ -6,6 +6,7 @@ after solving with the full mass matrix, which couples them.) What Exudyn has no
 curves and friction, inclined axes between two bodies that turn, anti-roll bars, side forces, the road.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -203,7 +204,7 @@ def _law(spring: SpringDamper, axis: np.ndarray, rest: np.ndarray, held: float) 
         if rate_force is not None:
             force += rate_force(rate)
         if dry:
-            force += dry * float(np.tanh(rate / dry_rate))
+            force += dry * math.tanh(rate / dry_rate)
         return [force * ax, force * ay, force * az]
 
     return law

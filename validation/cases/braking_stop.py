@@ -143,9 +143,9 @@ def _sweep_row(surfaces: tuple[str, ...], levels: np.ndarray, steps: tuple[float
     some = f" (below {1e3 * STEP:g} ms every fifth level, but on {', '.join(ASKED)} all)"
     some = "" if set(surfaces) <= set(ASKED) else some
     what = (f"{runs} stops from 11.11 m/s, in steps below 1 ms from {SLOW:g}: {len(surfaces)} surfaces, "
-            f"brakes from 0 to 1.5 of lock, steps of {1e3 * min(steps):g} to {1e3 * max(steps):g} ms{some}, watched for "
-            f"{AFTER:g} s of standstill: those with no number, a wheel speed outside 0 to v / r, no stop, or any "
-            f"motion after it: {'; '.join(wrong[:3])}")
+            f"brakes from 0 to 1.5 of lock, steps of {1e3 * min(steps):g} to {1e3 * max(steps):g} ms{some}, "
+            f"watched for {AFTER:g} s of standstill: those with no number, a wheel speed outside 0 to v / r, no stop, "
+            f"or any motion after it: {'; '.join(wrong[:3])}")
     return within("braking_stop.sweep", SYSTEM, what.removesuffix(": "), len(wrong), "runs", 0, 0,
                   "asked for: v = 0 exactly at the end, and less than 1 mm/s after it", "none")  # fmt: skip
 
@@ -157,8 +157,8 @@ def _locked_row() -> Row:
         torque = 2.0 * FRONT.mass * GRAVITY * FRONT.radius * float(tyre[0].mu_x.max())
         way = stop(FRONT, tyre, torque, 11.11, turning=0.0).distance
         errors.append(abs(way * 2.0 * GRAVITY * float(tyre[0].mu_x[0, 0, -1]) / 11.11**2 - 1.0))
-    return at_most("braking_stop.locked", SYSTEM, f"locked wheels on {len(SURFACES)} surfaces: stopping distance against "
-                   "v^2 / (2 mu g)", max(errors), "", 1e-9, "asked for", "closed form")  # fmt: skip
+    return at_most("braking_stop.locked", SYSTEM, f"locked wheels on {len(SURFACES)} surfaces: stopping distance "
+                   "against v^2 / (2 mu g)", max(errors), "", 1e-9, "asked for", "closed form")  # fmt: skip
 
 
 def _release_row() -> Row:
@@ -169,8 +169,8 @@ def _release_row() -> Row:
         times = step * np.arange(math.ceil(0.8 / step) + 1)
         found = braked(FRONT, tables, EVEN, np.maximum(sliding * (1.5 - times / 0.8037), 0.0), step, 20.0, 0.0)
         errors.append(abs(found.released - 0.5 * 0.8037))
-    return at_most("braking_stop.release", SYSTEM, f"locked wheels on {len(SURFACES)} surfaces under a torque that falls, steps "
-                   "of 1, 5.5 and 20 ms: time at which they turn again", max(errors), "s", 1e-3,
+    return at_most("braking_stop.release", SYSTEM, f"locked wheels on {len(SURFACES)} surfaces under a torque that "
+                   "falls, steps of 1, 5.5 and 20 ms: time at which they turn again", max(errors), "s", 1e-3,
                    "asked for: the time at which torque falls to that of sliding", "closed form")  # fmt: skip
 
 
