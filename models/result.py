@@ -58,11 +58,18 @@ class Result:
         return Result(self.data.isel(time=slice(None, None, step)))
 
     def save(self, path: Path) -> None:
-        """Write netCDF whole or not at all, without the seconds: the same run gives the same bytes."""
-        part = path.with_name(f".{path.name}.part")
+        """Write netCDF without the seconds: the same run gives the same bytes."""
         kept = {name: value for name, value in self.data.attrs.items() if name != "seconds"}
-        self.data.drop_attrs(deep=False).assign_attrs(kept).to_netcdf(part, engine="h5netcdf")
-        os.replace(part, path)
+        write(self.data.drop_attrs(deep=False).assign_attrs(kept), path)
+
+
+def write(data: "xr.Dataset", path: Path) -> None:
+    """Write netCDF whole or not at all; numbers with checksums, so that whoever reads a damaged file is told."""
+    part = path.with_name(f".{path.name}.part")
+    checked = {name: {"fletcher32": True} for name, own in data.variables.items() if own.size and own.ndim
+               and own.dtype.kind in "fiu"}  # fmt: skip
+    data.to_netcdf(part, engine="h5netcdf", encoding=checked)
+    os.replace(part, path)
 
 
 def load(path: Path) -> Result:
@@ -73,7 +80,8 @@ def load(path: Path) -> Result:
         with xr.open_dataset(path, engine="h5netcdf") as data:
             return Result(data.load())
     except (OSError, ValueError, KeyError) as error:
-        raise InputError(path, "", None, f"not a saved result: {str(error).splitlines()[0]}") from None
+        reason = str(error).splitlines()[0]
+        raise InputError(path, "", None, f"not a saved result, or a damaged one: {reason}") from None
 
 
 def provenance(command: str = "") -> dict[str, Any]:

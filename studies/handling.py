@@ -86,7 +86,7 @@ REPORTS = {"load": (at.PRESS, "N"), "fx": (at.FX, "N"), "fy": (at.FY, "N"), "mz"
 def _save(scene: HandlingScene, drives: dict[str, Drive], path: Path) -> None:
     import xarray as xr
 
-    from models.result import provenance
+    from models.result import provenance, write
 
     first = next(iter(drives.values()))
     axes = ("engine", "time")
@@ -100,7 +100,7 @@ def _save(scene: HandlingScene, drives: dict[str, Drive], path: Path) -> None:
          "tyre": [tyre.name for tyre in first.handling.vehicle.tyres]},
     )  # fmt: skip
     data.attrs = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
-    data.to_netcdf(path, engine="h5netcdf")
+    write(data, path)
 
 
 if __name__ == "__main__":

@@ -102,7 +102,7 @@ def _cycles(scene: WheelsetScene, engines: tuple[str, ...], speed: float) -> tup
 
 def _save(scene: WheelsetScene, orbits: list[Orbit], cycles: dict[str, Orbit], folder: Path) -> None:
     """The branch as a table, one period of every engine's cycle as netCDF."""
-    from models.result import provenance
+    from models.result import provenance, write
     from models.tables import write_table
     from studies.wheelset import dataset
 
@@ -114,7 +114,7 @@ def _save(scene: WheelsetScene, orbits: list[Orbit], cycles: dict[str, Orbit], f
     origin = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
     for engine, orbit in cycles.items():
         data = dataset({engine: {orbit.speed: orbit.path()}}).assign_attrs(origin)
-        data.to_netcdf(folder / f"cycle_{engine}.nc", engine="h5netcdf")
+        write(data, folder / f"cycle_{engine}.nc")
 
 
 def _answer(orbits: list[Orbit], cycles: dict[str, Orbit]) -> dict[str, Any]:

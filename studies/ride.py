@@ -137,7 +137,7 @@ def _save(scene: RideScene, vehicle: SpatialVehicle, linear: Linear, found: dict
     """Deviations of every engine over case, speed and output; the system at one speed for other programs."""
     import xarray as xr
 
-    from models.result import provenance
+    from models.result import provenance, write
     from models.ride.covariance import stationary
     from models.ride.export import save
 
@@ -148,7 +148,7 @@ def _save(scene: RideScene, vehicle: SpatialVehicle, linear: Linear, found: dict
     data["speed"].attrs["units"] = "m/s"
     data["unit"] = ("output", list(units(vehicle, linear(speed), one)))
     data.attrs = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
-    data.to_netcdf(folder / "deviations.nc", engine="h5netcdf")
+    write(data, folder / "deviations.nc")
     data["deviation"].to_dataframe().to_csv(folder / "deviations.csv")
     at = linear(speed)
     system = weighted(excited(at, excitation_of(scene, at.wheels), speed), scene.weighting)

@@ -83,7 +83,7 @@ def _units(scene: RideScene) -> list[tuple[Any, str]]:
 def _save(scene: RideScene, found: VaryingSpeed, alone: np.ndarray, units: list[str], path: Path) -> None:
     import xarray as xr
 
-    from models.result import provenance
+    from models.result import provenance, write
 
     axes = ("time", "output")
     data = xr.Dataset(
@@ -93,7 +93,7 @@ def _save(scene: RideScene, found: VaryingSpeed, alone: np.ndarray, units: list[
     )  # fmt: skip
     data["unit"] = ("output", units)
     data.attrs = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
-    data.to_netcdf(path, engine="h5netcdf")
+    write(data, path)
 
 
 def _gaps(found: VaryingSpeed, alone: np.ndarray) -> np.ndarray:

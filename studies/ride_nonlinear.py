@@ -133,7 +133,7 @@ def _in_engines(vehicle: SpatialVehicle, road: Excitation, speed: float, engines
 def _save(scene: RideScene, answer: Answer, path: Path) -> None:
     import xarray as xr
 
-    from models.result import provenance
+    from models.result import provenance, write
 
     axes, few = ("speed", "output"), ("speed_of_copies", "output")
     copies = list(answer.copies.values())
@@ -148,7 +148,7 @@ def _save(scene: RideScene, answer: Answer, path: Path) -> None:
     )  # fmt: skip
     data["unit"] = ("output", [output.unit for output in answer.found[0].vehicle.outputs])
     data.attrs = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
-    data.to_netcdf(path, engine="h5netcdf")
+    write(data, path)
 
 
 def _answer(answer: Answer) -> dict[str, Any]:

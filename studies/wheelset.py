@@ -87,7 +87,7 @@ def _save(scene: WheelsetScene, linear: dict[str, Linear], paths: dict[str, dict
     """Eigenvalues over the speeds and every step of the paths as netCDF; damping and frequency as a table."""
     import xarray as xr
 
-    from models.result import provenance
+    from models.result import provenance, write
 
     origin = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
     if linear:
@@ -96,10 +96,10 @@ def _save(scene: WheelsetScene, linear: dict[str, Linear], paths: dict[str, dict
         data = xr.Dataset({name: (("engine", "speed", "eigenvalue"), part, {"units": "1/s"})
                            for name, part in (("real", values.real), ("imag", values.imag))}, axes, origin)  # fmt: skip
         data["speed"].attrs["units"] = "m/s"
-        data.to_netcdf(folder / "eigenvalues.nc", engine="h5netcdf")
+        write(data, folder / "eigenvalues.nc")
         _save_table(linear, folder)
     if paths:
-        dataset(paths).assign_attrs(origin).to_netcdf(folder / "paths.nc", engine="h5netcdf")
+        write(dataset(paths).assign_attrs(origin), folder / "paths.nc")
 
 
 def dataset(paths: dict[str, dict[float, Motion]]) -> Any:

@@ -4,9 +4,10 @@ import json
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from models.errors import InputError
-from models.result import load
+from models.result import Result, load
 from models.scene import build
 from models.simulate import simulate
 
@@ -65,3 +66,16 @@ def test_a_file_that_is_no_result_is_named(tmp_path):
     (tmp_path / "x.nc").write_text("hello")
     with pytest.raises(InputError, match="not a saved result"):
         load(tmp_path / "x.nc")
+
+
+def test_a_result_with_one_bit_flipped_is_refused(tmp_path):
+    """Every so often among the numbers: nothing that was changed is read."""
+    data = xr.Dataset({"z1": ("time", np.linspace(1.0, 2.0, 64))}, {"time": ("time", np.arange(64.0))})
+    Result(data).save(tmp_path / "x.nc")
+    whole = (tmp_path / "x.nc").read_bytes()
+    for name in ("z1", "time"):
+        begin = whole.index(data[name].values.tobytes())
+        for place in range(begin, begin + 512, 101):
+            (tmp_path / "x.nc").write_bytes(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
+            with pytest.raises(InputError, match="damaged"):
+                load(tmp_path / "x.nc")
