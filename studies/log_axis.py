@@ -1,4 +1,4 @@
-"""Logarithmic axes of decades labelled in plain text, 10⁻³, with marks between them only where they are few.
+"""Logarithmic axes of decades labelled in plain text, 10⁻³, or of few decades by numbers, with marks between them.
 
 Formulas in labels and eight marks to every decade are half of what drawing a figure of many panels takes.
 """
@@ -15,13 +15,20 @@ MANY = 2.0
 """Decades on an axis from which on only whole powers of ten are marked."""
 
 
+def _narrow(low: float, high: float) -> bool:
+    return 0 < low < high and bool(np.log10(high / low) < MANY)
+
+
 class _Powers(LogFormatterSciNotation):
-    """Labels as matplotlib's own, 10⁻³ or 2 × 10⁻³, in plain text."""
+    """Labels where matplotlib has its own: 10⁻³ or 2 × 10⁻³ in plain text, 20 on an axis of few decades."""
 
     def __call__(self, x: float, pos: int | None = None) -> str:
+        """The label of a mark, as matplotlib asks for it."""
         found = re.search(r"(?:([\d.]+)\\times)?10\^\{(-?\d+)\}", text := super().__call__(x, pos))
         if not found:
             return text
+        if _narrow(*sorted(self.axis.get_view_interval())) and 1e-3 <= x < 1e5:
+            return f"{x:g}"
         return f"{found[1] + ' × ' if found[1] else ''}10{found[2].translate(RAISED)}"
 
 
@@ -29,9 +36,8 @@ class _Between(LogLocator):
     """Marks between powers of ten, none on an axis of many decades."""
 
     def tick_values(self, vmin: float, vmax: float) -> Any:
-        if 0 < vmin < vmax and np.log10(vmax / vmin) >= MANY:
-            return np.array([])
-        return super().tick_values(vmin, vmax)
+        """Marks of an axis, as matplotlib asks for them."""
+        return super().tick_values(vmin, vmax) if _narrow(vmin, vmax) else np.array([])
 
 
 class PlainLogScale(LogScale):
