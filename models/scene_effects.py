@@ -104,11 +104,17 @@ def legal(there: Iterable[str], scene: Any) -> None:
         for other in module.NEEDS:
             if other not in there:
                 raise InputError(scene.file, _place(module, name), None, f"needs the effect {other!r}{why}: name it "
-                                 f"too{_at(scene, other)}")  # fmt: skip
+                                 f"too{_instead(scene, other, there)}{_at(scene, other)}")  # fmt: skip
         for other in module.EXCLUDES:
             if other in there:
                 raise InputError(scene.file, _place(module, name), None, f"cannot stand beside {other!r}{why}: drop "
                                  f"one of them{_at(scene, other)}")  # fmt: skip
+
+
+def _instead(scene: Any, name: str, there: tuple[str, ...]) -> str:
+    """What must be dropped for an effect's sake."""
+    clash = [other for other in module_of(scene.system, name).EXCLUDES if other in there]
+    return f" in place of {' and '.join(map(repr, clash))}, beside which it cannot stand" if clash else ""
 
 
 def _place(module: Any, name: str) -> str:

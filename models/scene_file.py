@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from models.errors import InputError, similar_file
 from models.strict import Strict, read
@@ -26,6 +26,14 @@ class SceneFile(Strict):
     tolerance: float | None = Field(default=None, gt=0, lt=1, description="relative, of their standard deviations")
     file: str = Field(default="", exclude=True)
     folder: str = Field(default=".", exclude=True)
+
+    @field_validator("quantities")
+    @classmethod
+    def _once(cls, names: list[str]) -> list[str]:
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"names {name!r} twice")
+        return names
 
     def table(self) -> dict[str, Any]:
         """The scene as nested tables of plain values, defaults included: enough to run it again."""
@@ -54,7 +62,7 @@ def checked(model: type[Model], table: Mapping[str, Any], file: str, folder: Pat
     for key in ("file", "folder"):
         if key in table:
             raise InputError(file, key, table[key], "unknown key", tuple(set(model.model_fields) - {"file", "folder"}))
-    found = read(model, {**_automatic(model, table), "file": file, "folder": str(folder)}, file)
+    found = read(model, {**_automatic(model, table, file), "file": file, "folder": str(folder)}, file)
     found.check_choice()
     return found
 
@@ -63,12 +71,13 @@ CHOOSING, AUTO = "choice", "auto"
 """The study that chooses among the effects of a scene, and what a scene says in their place to ask for it."""
 
 
-def _automatic(model: type[SceneFile], table: Mapping[str, Any]) -> dict[str, Any]:
+def _automatic(model: type[SceneFile], table: Mapping[str, Any], file: str) -> dict[str, Any]:
     """The table with ``effects = "auto"`` as the study that makes the choice, but where a system reads it itself."""
     plain = dict(table)
     if plain.get("effects") == AUTO and not model.READS_AUTO:
         del plain["effects"]
-        plain.setdefault("study", CHOOSING)
+        if plain.setdefault("study", CHOOSING) != CHOOSING:
+            raise InputError(file, "study", plain["study"], f'with effects = "auto" the study is {CHOOSING}')
     return plain
 
 

@@ -4,7 +4,8 @@ import pytest
 
 from models.braking.scene import build
 from models.errors import InputError
-from models.scene_effects import absent, beside, listing, module_of, named, names_of, own_table, rebuilt, without
+from models.scene import build as build_half_car
+from models.scene_effects import absent, beside, check, listing, module_of, named, names_of, own_table, rebuilt, without
 from models.systems import DEFAULT, SYSTEMS, load
 from studies.asked import SCENES, plan_of
 from validation.absence import of_systems
@@ -71,6 +72,14 @@ def test_effects_that_cannot_be_together_are_told_with_the_remedy():
         without(beside(bare("contact"), "saturation", "falling_friction"), "saturation")
     with pytest.raises(InputError, match=r"effects.trailer: has another place in a scene: trailer"):
         build({**file_of("braking").BARE, "effects": {"trailer": {}}}, "s.toml")
+
+
+def test_a_remedy_that_would_break_another_law_says_so():
+    effects = {"road": {"source": "study", "speed": 20.0}, "force_noise": {"deviation": 8.0}}
+    scene = build_half_car({"title": "t", "run": {"duration": 1.0, "step": 1e-3}, "effects": effects}, "s")
+    with pytest.raises(InputError, match=r"force_noise: needs the effect 'wheel_forces': name it too in place of "
+                       "'road', beside which it cannot stand"):  # fmt: skip
+        check(scene)
 
 
 def test_what_cannot_be_put_in_is_refused():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.choice import choose
-from models.choice.answer import Answer, Quantity, added, less, relative, sizes
+from models.choice.answer import Answer, Quantity, added, less, relative, rounding, sizes
 from models.choice.choose import Chooser
 from models.choice.screen import Screen
 from models.choice.variants import Variants
@@ -102,6 +102,27 @@ def test_what_the_confirmation_breaks_is_taken_back(monkeypatch):
     assert choice.left_out == ("a",) and choice.kept and choice.confirmed[0] == pytest.approx(0.005)
 
 
+def test_steps_of_the_screen_are_shorter_where_a_run_fails_late(monkeypatch):
+    """Steps that do for the first part of a scene, and fail after it, are neither taken nor told as the scene's."""
+    own = Made(lambda left_out, times: 100.0 + len(left_out), ("a",))
+    run, own._run = own._run, lambda left_out, times: None if times > 2 else run(left_out, times)
+    part = Made(own.function, ("a",))
+    monkeypatch.setattr(own, "window", lambda steps: part)
+    own.system.WINDOWED = True
+    monkeypatch.setattr(choose, "Variants", lambda scene, engine: own)
+    found = Chooser(None, "", ["q"], 0.05)
+    assert found._longest(Screen(part, ["q"]), frozenset(), part.lengths(), 0.05)[0] == 4 and found.own == 2
+
+
+def test_what_only_rounds_does_not_move():
+    scene = half_car(effects={}, quantities=["z1_rate"])  # 2e-17 m/s at rest
+    with pytest.raises(InputError, match="does not move"):
+        Chooser(scene, "reference", scene.quantities, scene.tolerance)
+    answer = Answer({"a": Quantity("N", (np.array([5e4, 5e4 + 1e-7]),)), "b": Quantity("m", (np.zeros(2),))}, {}, 0.0)
+    assert sizes(answer.of("a").cases)[0] < rounding(answer, "N") == pytest.approx(5e-6)
+    assert rounding(answer, "m") == 1e-15
+
+
 def test_drawn_half_cars_keep_their_tolerance_by_runs_of_their_own():
     asked = drawn("pitch-plane", 3)
     choice = Chooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose()
@@ -117,7 +138,8 @@ def test_a_spring_that_hardly_pulls_goes_and_the_road_stays():
 
 @pytest.mark.parametrize(("change", "place"), [
     ({"quantities": []}, "quantities"), ({"tolerance": 2.0}, "tolerance"), ({"study": "single_run"}, "quantities"),
-    ({"effects": "auto", "study": "single_run"}, "quantities"), ({"effects": "all"}, "effects")])  # fmt: skip
+    ({"effects": "auto", "study": "single_run"}, "study"), ({"effects": "all"}, "effects"),
+    ({"quantities": ["pitch", "f1", "pitch"]}, "quantities")])  # fmt: skip
 def test_half_a_question_is_refused_with_its_place(change, place):
     with pytest.raises(InputError) as error:
         half_car(**change)

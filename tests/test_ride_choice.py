@@ -14,9 +14,11 @@ from models.ride.choice.reduced import Whole
 from models.ride.choice.screen import Screen, confirmed
 from models.ride.covariance import stationary
 from models.ride.excitation import excited
+from models.ride.of_scene import vehicle_of
 from models.ride.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
+from studies.asked import SCENES
 from validation.ride.drawn_rides import drawn
 
 SPEED = 20.0
@@ -120,6 +122,16 @@ def test_the_published_pair_is_found_and_reported(twinrig, capsys):
     assert found["calls"][0] / found["calls"][1] == pytest.approx(28.8, abs=0.5)  # the published 691 and 24 1/s
 
 
+def test_a_quantity_that_symmetry_silences_is_refused_not_held_to_its_rounding():
+    """Both axles of a symmetric half car meet the same at once: it does not pitch."""
+    scene = build({"title": "t", "system": "ride", "vehicle": {"file": str(SCENES / "vehicles/pitch_plane.toml")},
+                   "road": {"front_rear": "equal"}, "speeds": {"values": [SPEED]}}, "t")  # fmt: skip
+    own = Held(scene, vehicle_of(scene))
+    with pytest.raises(InputError, match="finite standard deviation above zero"):
+        Chooser(own, [SPEED], ["pitch acceleration"], 0.02)
+    assert Chooser(own, [SPEED], ["body centre"], 0.02).choose().kept
+
+
 ASKING = {"title": "t", "system": "ride", "study": "ride_choice", "vehicle": {"file": "half_car"}, "effects": "auto",
           "quantities": ["body front"], "tolerance": 0.02, "speeds": {"values": [SPEED]}}  # fmt: skip
 
@@ -127,6 +139,7 @@ ASKING = {"title": "t", "system": "ride", "study": "ride_choice", "vehicle": {"f
 @pytest.mark.parametrize(("change", "said"), [
     ({"quantities": []}, "quantities"), ({"tolerance": None}, "tolerance"), ({"study": "ride"}, "ride_choice"),
     ({"effects": None}, "quantities"), ({"tolerance": 1.5}, "below 1"),
+    ({"quantities": ["body front", "body front"]}, "names 'body front' twice"),
 ])  # fmt: skip
 def test_scenes_that_ask_half_a_question(change, said):
     table = {key: value for key, value in {**ASKING, **change}.items() if value is not None}

@@ -11,6 +11,8 @@ Cases = tuple[np.ndarray, ...]
 """One quantity in every case of a scene (procedure, manoeuvre, speed, creepage): its path (n,), or one number (1,)."""
 HARDLY = 1e-3
 """Of the largest case: changes of a smaller one are relative to this share."""
+ROUNDING, NOTHING = 1e-10, 1e-15
+"""Of the largest value in a unit, and in SI units: what moves less does not move at all, but for rounding."""
 SCALARS = {"rms": lambda path: np.sqrt(np.mean(path**2)), "max": lambda path: np.abs(path).max()}
 """Words that make a number of a path, as in "rms f1"."""
 
@@ -51,6 +53,12 @@ def sizes(full: Sequence[np.ndarray]) -> np.ndarray:
     """
     own = np.array([np.std(one) if len(one) > 1 else abs(float(one[0])) for one in full])
     return np.maximum(own, HARDLY * own.max(initial=0.0))
+
+
+def rounding(answer: Answer, unit: str) -> float:
+    """Size up to which a quantity of a unit does not move, but for rounding."""
+    alike = [abs(case).max(initial=0.0) for one in answer.quantities.values() if one.unit == unit for case in one.cases]
+    return max(NOTHING, ROUNDING * float(max(alike, default=0.0)))
 
 
 def less(one: Cases, full: Cases) -> Cases:

@@ -82,7 +82,10 @@ class Chooser:
         part = whole.window(steps) if whole.system.WINDOWED else whole
         screen = self.whole if part is whole else Screen(part, self.whole.quantities)
         lengths = [k for k in whole.lengths() if k in part.lengths()]
-        return self._longest(screen, frozenset(), lengths, FINE * self.tolerance)
+        longest, error = self._longest(screen, frozenset(), lengths, FINE * self.tolerance)
+        while whole.of(times=longest) is None:  # its run fails after that part
+            longest = max(k for k in lengths if k < longest)
+        return longest, error
 
     def _longest(self, screen: Screen, chosen: Set, lengths: list[int], allowed: float) -> tuple[int, np.ndarray]:
         """Longest of ``lengths`` whose changes are allowed, and these (quantities,); by halving, the first always."""

@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from models.choice.answer import Answer, Cases, added, less, relative, sizes
+from models.choice.answer import Answer, Cases, added, less, relative, rounding, sizes
 from models.choice.variants import Set, Variants
 from models.errors import InputError
 
@@ -25,10 +25,11 @@ class Screen:
         full = variants.of()
         if full is None:  # tells why
             full = variants.system.answer(variants.scene, variants.engine)
-        self.full = {name: full.of(name, variants.scene.file).cases for name in quantities}
+        found = {name: full.of(name, variants.scene.file) for name in quantities}
+        self.full = {name: one.cases for name, one in found.items()}
         self.sizes = {name: sizes(cases) for name, cases in self.full.items()}
         for name, size in self.sizes.items():
-            if not (np.isfinite(size).all() and (size > 0.0).any()):
+            if not (np.isfinite(size).all() and (size > rounding(full, found[name].unit)).any()):
                 raise InputError(variants.scene.file, f"quantities.{name}", None, "does not move in this scene, so "
                                  "that there is nothing to hold it to")  # fmt: skip
 

@@ -65,7 +65,7 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
         P, correction, V = _with_marginal(split, B, delays, system.independent, P, correction)
     C = system.C @ V
     variance, change = _seen(C, P).clip(0.0), _seen(C, correction)
-    floor = SILENT * (abs(C) ** 2).max(axis=1) * abs(P).max(initial=0.0)
+    floor = silence(C, P)
     grown = growth(split, B, delays, system.C, system.independent, variance + floor, accuracy)
     status, reason = verdicts(D, variance, floor, grown, float(np.linalg.norm(split.S)), accuracy, split)
     finite = np.array([found == FINITE for found in status])
@@ -76,6 +76,11 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
     V, P = V.astype(float), P.astype(float)
     return Covariance(system.names, V @ P @ V.T, np.where(finite, variance, np.inf), status, reason,
                       grown.rate, grown.power, residual, error)  # fmt: skip
+
+
+def silence(C: np.ndarray, P: np.ndarray) -> np.ndarray:
+    """Variances (p,) of y = C x up to which an output counts as silent, its variance as rounding."""
+    return np.asarray(SILENT * (abs(C) ** 2).max(axis=1) * abs(P).max(initial=0.0))
 
 
 def hits(system: DelayedSystem) -> tuple[list[np.ndarray], list[np.ndarray], list[float]]:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import matrix_balance
 from scipy.sparse.csgraph import connected_components
 
-from models.ride.covariance import SILENT, hits
+from models.ride.covariance import hits, silence
 from models.ride.delayed_system import DelayedSystem
 
 
@@ -138,6 +138,6 @@ def _summed(s: np.ndarray, C: np.ndarray, inputs: list[np.ndarray], delays: list
     size = ((abs(C) @ abs(P)) * abs(C)).sum(axis=1)
     if not np.isfinite(size).all():
         return "two eigenvalues of vehicle, road and weighting meet"
-    floor = SILENT * (abs(C) ** 2).max(axis=1) * abs(P).max()
+    floor = silence(C, P)
     loss = EPS * condition * np.divide(size, abs(variance), out=np.full(len(C), np.inf), where=variance != 0)
     return Modal(variance.clip(0.0), floor, np.where(size > floor, loss, 0.0), float(abs(s).max()))

@@ -17,7 +17,7 @@ from models.errors import InputError
 from models.ride.choice.cost import Cost, cost
 from models.ride.choice.held import Effect, Held, effects_of, illegal, without
 from models.ride.choice.reduced import Reduced, Whole
-from models.ride.choice.screen import Screen, confirmed
+from models.ride.choice.screen import Screen, confirmed, silent
 
 BUDGET = 1.0
 """Share of the tolerance that predictions may use."""
@@ -70,9 +70,9 @@ class Chooser:
         self._promising: list[Set] | None = None
 
     def _check(self, quantities: Sequence[str]) -> None:
-        for variances in self.full:
-            for name, own in zip(quantities, variances, strict=True):
-                if not 0.0 < own < inf:
+        for whole, variances in zip(self.wholes, self.full, strict=True):
+            for name, own, least in zip(quantities, variances, silent(whole.full, self.rows), strict=True):
+                if not least < own < inf:
                     said = "has no finite standard deviation above zero in this scene, so nothing to hold it to"
                     raise InputError("", f"quantities.{name}", None, said)
 

@@ -18,7 +18,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from models.errors import InputError
 from models.ride.choice.reduced import Reduced
-from models.ride.covariance import FINITE, Covariance, hits, intensity, lyapunov, stationary
+from models.ride.covariance import FINITE, Covariance, hits, intensity, lyapunov, silence, stationary
 from models.ride.delayed_system import DelayedSystem
 from models.ride.marginal import parts
 
@@ -101,3 +101,8 @@ def confirmed(reduced: Reduced, rows: list[int]) -> np.ndarray:
     """Variances (quantities,) by the exact solve of the reduced system, inf where it has none. Raises InputError."""
     found: Covariance = stationary(reduced.system)
     return np.array([found.variance[row] if found.status[row] == FINITE else np.inf for row in rows])
+
+
+def silent(reduced: Reduced, rows: list[int]) -> np.ndarray:
+    """Variances (quantities,) up to which there is nothing but rounding."""
+    return silence(reduced.system.C[rows], stationary(reduced.system).P)
