@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from models.errors import InputError, RunFailed
+from models.ride.copies_kernel import march, rates
 from models.ride.covariance import stationary
 from models.ride.excitation import excited
 from models.ride.gaussian_laws import of_curve, of_friction
 from models.ride.in_engines import ridden
-from models.ride.nonlinear_copies import _Laws, copies_in_time
+from models.ride.nonlinear_copies import copies_in_time, laws_of
 from models.ride.road_path import road_path
 from models.ride.statistical_linearisation import GRADES, bent, promised, statistically_linear
 from models.ride.time_averages import standard_errors
@@ -172,15 +173,16 @@ def test_a_copy_goes_where_an_engine_goes():
     run, table = ridden("mujoco", vehicle, road, 0.3, seed=5).run, road.table(300, 5)
     springs = bent(vehicle)
     plain = linearise(vehicle, SPEED, {s.name: (s.stiffness, s.damping) for s in springs})
-    laws, x = _Laws(vehicle, plain, springs, SPEED), np.zeros((4, 1))
-    for i in range(300):
-        rate, _ = laws.rate(x, table[2 * i, :, None])
-        x = laws.stepped(x, rate, table[2 * i + 1, :, None], table[2 * i + 2, :, None], road.step)
+    laws, x = laws_of(vehicle, plain, springs, SPEED), np.zeros((4, 1))
+    sums, force, rate = np.zeros((4, 3, 1)), np.empty(1), np.empty(4)
+    march(x, table[:, :, None], road.step, 300, 1, laws, sums)
+    assert not sums.any(), "nothing is read before its time"
     assert np.abs(x[:, 0] - [*run.positions[-1], *run.rates[-1]]).max() < 1e-12
-    rate, force = laws.rate(x, table[-1, :, None])
-    strut = laws.outputs(x, rate, table[-1, :, None], force)[2, 0]
-    assert strut == pytest.approx(vehicle.bodies[0].mass * rate[2, 0], rel=1e-12), "all that pulls at the body"
-    assert abs(force[0, 0]) > 100.0, "N: the bent laws are at work"
+    rates(x[:, 0].copy(), table[-1], laws, force, rate)
+    assert abs(force[0]) > 100.0, "N: the bent laws are at work"
+    march(x, np.repeat(table[-1:, :, None], 3, axis=0), 0.0, 0, 1, laws, sums)
+    strut = vehicle.bodies[0].mass * rate[2]  # all that pulls at the body
+    assert sums[:, 2, 0] == pytest.approx(strut ** np.arange(1, 5), rel=1e-12)
 
 
 def test_standard_errors_of_a_run():

@@ -4,10 +4,12 @@ Motion is small, as in ``spatial_linear``, but for the bent springs, whose force
 Runge-Kutta method reads the road at half steps; curves have corners, so its error falls with the square of the step.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from models.ride.copies_kernel import POWERS, Laws, march
 from models.ride.excitation import Excitation
 from models.ride.linear_vehicle import LinearVehicle
 from models.ride.road_path import check_rates, road_path
@@ -23,8 +25,6 @@ BLOCK = 200
 """Steps between two portions of road."""
 EVERY = 4
 """Steps from one reading of the outputs to the next, which know of each other anyway."""
-POWERS = np.arange(1, 5)[:, None, None]
-"""Of the outputs that are averaged."""
 SETTLE = 9.0
 """Slowest rate times the time that copies, begun at rest, run before they count."""
 HELD = 1e-6
@@ -101,21 +101,22 @@ def copies_in_time(vehicle: SpatialVehicle, excitation: Excitation, speed: float
     slowest = decay[decay > HELD * decay.max()].min()
     road = road_path(excitation, speed, longest or min(REACH / abs(own).max(), STEEPEST / abs(steepest).max()))
     settling, counted = int(np.ceil(SETTLE / slowest / road.step)), int(np.ceil(duration / road.step))
-    laws = _Laws(vehicle, plain, springs, speed)
-    x, sums, seen = np.zeros((2 * len(plain.mass), copies)), np.zeros((4, len(plain.outputs), copies)), 0
+    laws = laws_of(vehicle, plain, springs, speed)
+    x, sums = np.zeros((2 * len(plain.mass), copies)), np.zeros((POWERS, len(plain.outputs), copies))
     for number, portion in enumerate(road.blocks(BLOCK, copies, seed)):
         if number == 0:
             x[: len(plain.mass)] = _standing(plain, portion[0])
-        for i in range(BLOCK):
-            if (done := number * BLOCK + i) == settling + counted:
-                return Copies(tuple(o.name for o in plain.outputs), sums.swapaxes(1, 2) / seen, road.step,
-                              counted * road.step)  # fmt: skip
-            rate, force = laws.rate(x, portion[2 * i])
-            if done >= settling and (done - settling) % EVERY == 0:
-                sums += laws.outputs(x, rate, portion[2 * i], force) ** POWERS
-                seen += 1
-            x = laws.stepped(x, rate, portion[2 * i + 1], portion[2 * i + 2], road.step)
-    raise AssertionError("roads have no end")
+        left = settling + counted - number * BLOCK
+        march(x, portion[: 2 * left + 1], road.step, _first(settling, number * BLOCK), EVERY, laws, sums)
+        if left <= BLOCK:
+            break
+    return Copies(tuple(o.name for o in plain.outputs), sums.swapaxes(1, 2) / len(range(0, counted, EVERY)), road.step,
+                  counted * road.step)  # fmt: skip
+
+
+def _first(settling: int, done: int) -> int:
+    """Steps from those that are done to the first one before which outputs are read."""
+    return settling - done if done <= settling else (settling - done) % EVERY
 
 
 def _standing(plain: LinearVehicle, road: np.ndarray) -> np.ndarray:
@@ -144,58 +145,28 @@ def _slopes(curve: Curve | None) -> np.ndarray:
     return slope + np.cumsum([0.0, *bends])
 
 
-class _Laws:
-    """Motion of many copies at once; states (2 n, copies) are positions, then rates."""
-
-    def __init__(self, vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[SpringDamper, ...],
-                 speed: float) -> None:  # fmt: skip
-        n = len(plain.mass)
-        watched = replace(vehicle, outputs=tuple(PartOutput(s.name, "travel", s.name) for s in springs))
-        self.rows = np.array([o.displacement for o in linearise(watched, speed).outputs]).reshape(-1, n)
-        forced = (-plain.stiffness, -plain.damping, plain.road_stiffness, plain.road_damping, -self.rows.T)
-        self.motion = np.linalg.solve(plain.mass, np.hstack(forced))
-        read = np.array([[float(isinstance(o, PartOutput) and o.kind == "force" and o.part == s.name) for s in springs]
-                         for o in vehicle.outputs]).reshape(len(plain.outputs), -1)  # fmt: skip
-        self.read = np.hstack([[np.concatenate([o.displacement, o.rate, o.road, o.road_rate, o.acceleration])
-                                for o in plain.outputs], read])  # fmt: skip
-        self.by_travel = _Hinges([s.travel_force for s in springs])
-        self.by_rate = _Hinges([s.rate_force for s in springs])
-        self.friction, self.friction_rate = np.array([(s.friction, s.friction_rate) for s in springs]).reshape(-1, 2).T
-
-    def rate(self, x: np.ndarray, road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rates (2 n, copies) of the state on a road (2 w, copies), and the bent forces (springs, copies), N."""
-        q, v = x[: len(x) // 2], x[len(x) // 2 :]
-        slip = self.rows @ v
-        force = self.by_travel(self.rows @ q) + self.by_rate(slip)
-        if self.friction.any():
-            force += self.friction[:, None] * np.tanh(slip / self.friction_rate[:, None])
-        return np.concatenate([v, self.motion @ np.concatenate([x, road, force])]), force
-
-    def stepped(self, x: np.ndarray, k1: np.ndarray, half: np.ndarray, whole: np.ndarray, h: float) -> np.ndarray:
-        """The state after a step h (s) of the classical Runge-Kutta method with the road at its half and its end."""
-        k2 = self.rate(x + h / 2 * k1, half)[0]
-        k3 = self.rate(x + h / 2 * k2, half)[0]
-        k4 = self.rate(x + h * k3, whole)[0]
-        return np.asarray(x + h / 6 * (k1 + 2 * (k2 + k3) + k4))
-
-    def outputs(self, x: np.ndarray, rate: np.ndarray, road: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Outputs (p, copies)."""
-        return np.asarray(self.read @ np.concatenate([x, road, rate[len(x) // 2 :], force]))
+def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[SpringDamper, ...], speed: float) -> Laws:
+    """Motion of the vehicle for compiled loops: ``plain`` is the one without what bends these springs."""
+    n = len(plain.mass)
+    watched = replace(vehicle, outputs=tuple(PartOutput(s.name, "travel", s.name) for s in springs))
+    rows = np.array([o.displacement for o in linearise(watched, speed).outputs]).reshape(-1, n)
+    forced = (-plain.stiffness, -plain.damping, plain.road_stiffness, plain.road_damping, -rows.T)
+    motion = np.linalg.solve(plain.mass, np.hstack(forced))
+    read = np.array([[float(isinstance(o, PartOutput) and o.kind == "force" and o.part == s.name) for s in springs]
+                     for o in vehicle.outputs]).reshape(len(plain.outputs), -1)  # fmt: skip
+    read = np.hstack([[np.concatenate([o.displacement, o.rate, o.road, o.road_rate, o.acceleration])
+                       for o in plain.outputs], read])  # fmt: skip
+    friction = np.array([(s.friction, s.friction_rate) for s in springs]).reshape(-1, 2)
+    return Laws(rows, motion, read, *_hinges([[s.travel_force, s.rate_force] for s in springs]), friction)
 
 
-class _Hinges:
-    """Curves as offset, first slope, corners and bends, filled up with bends of 0."""
-
-    def __init__(self, curves: list[Curve | None]) -> None:
-        known = [curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in curves]
-        most = max((len(corners) for _, _, corners, _ in known), default=0)
-        self.offset, self.slope = np.zeros((2, len(known), 1))
-        self.corners, self.bends = np.zeros((2, most, len(known), 1))
-        for i, (offset, slope, corners, bends) in enumerate(known):
-            self.offset[i], self.slope[i] = offset, slope
-            self.corners[: len(corners), i, 0], self.bends[: len(bends), i, 0] = corners, bends
-
-    def __call__(self, x: np.ndarray) -> np.ndarray:
-        """Forces (springs, copies) at arguments of this shape."""
-        bent = (self.bends * np.maximum(x - self.corners, 0.0)).sum(axis=0)
-        return np.asarray(self.offset + self.slope * x + bent)
+def _hinges(curves: Sequence[Sequence[Curve | None]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """lines, corners and bends of ``Laws`` for the two curves of every spring, filled up with bends of 0."""
+    known = [[curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in both] for both in curves]
+    most = max((len(corners) for both in known for _, _, corners, _ in both), default=0)
+    lines, corners, bends = (np.zeros((2, len(known), size)) for size in (2, most, most))
+    for i, both in enumerate(known):
+        for kind, (offset, slope, at, bent_by) in enumerate(both):
+            lines[kind, i] = offset, slope
+            corners[kind, i, : len(at)], bends[kind, i, : len(at)] = at, bent_by
+    return lines, corners, bends
