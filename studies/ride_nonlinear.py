@@ -13,7 +13,7 @@ from models.errors import InputError
 from models.ride.covariance import stationary
 from models.ride.excitation import Excitation, excited
 from models.ride.in_engines import Ride, ridden
-from models.ride.nonlinear_copies import Copies, copies_in_time
+from models.ride.nonlinear_copies import Copies, copies_in_time, followed
 from models.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
 from models.ride.road_path import check_rates, road_path
 from models.ride.scene import RideScene
@@ -26,7 +26,7 @@ from models.vehicles.spatial_linear import wheels
 SYSTEM = "ride"
 Progress = Callable[[str, float], None]
 STEP = 2e-3
-"""Longest step (s) of the engines' runs."""
+"""Longest step (s) of the engines' runs; steep springs want a shorter one."""
 
 
 class Options(Strict):
@@ -122,11 +122,11 @@ def _swept(vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, option
 def _in_engines(vehicle: SpatialVehicle, road: Excitation, speed: float, engines: tuple[str, ...], options: Options,
                 progress: Progress) -> dict[str, Ride]:  # fmt: skip
     """One path of the road through each engine that runs in time."""
-    path, runs = road_path(road, speed, STEP), {}
+    path, runs = road_path(road, speed, min(STEP, followed(vehicle, speed))), {}
     for engine in (engine for engine in engines if engine in INTEGRATORS):
         progress(f"{engine} in time", 0.8)
         runs[engine] = ridden(engine, vehicle, path, options.driven, seed=options.seed, skipped=options.skipped,
-                              every=2)  # fmt: skip
+                              every=max(1, round(2.0 * STEP / path.step)))  # fmt: skip
     return runs
 
 

@@ -96,10 +96,9 @@ def copies_in_time(vehicle: SpatialVehicle, excitation: Excitation, speed: float
     springs = bent(vehicle)
     plain = linearise(vehicle, speed, {s.name: (s.stiffness, s.damping) for s in springs})
     own = _rates(statistically_linear(vehicle, excitation, speed).vehicle)
-    steepest = _rates(linearise(vehicle, speed, {s.name: _steepest(s) for s in springs}))
     decay = abs(own.real)
     slowest = decay[decay > HELD * decay.max()].min()
-    road = road_path(excitation, speed, longest or min(REACH / abs(own).max(), STEEPEST / abs(steepest).max()))
+    road = road_path(excitation, speed, longest or min(REACH / abs(own).max(), followed(vehicle, speed)))
     settling, counted = int(np.ceil(SETTLE / slowest / road.step)), int(np.ceil(duration / road.step))
     laws = laws_of(vehicle, plain, springs, speed)
     x, sums = np.zeros((2 * len(plain.mass), copies)), np.zeros((POWERS, len(plain.outputs), copies))
@@ -112,6 +111,12 @@ def copies_in_time(vehicle: SpatialVehicle, excitation: Excitation, speed: float
             break
     return Copies(tuple(o.name for o in plain.outputs), sums.swapaxes(1, 2) / len(range(0, counted, EVERY)), road.step,
                   counted * road.step)  # fmt: skip
+
+
+def followed(vehicle: SpatialVehicle, speed: float) -> float:
+    """Longest step (s) that follows the vehicle with its springs as steep as they get."""
+    steepest = linearise(vehicle, speed, {s.name: _steepest(s) for s in bent(vehicle)})
+    return STEEPEST / float(abs(_rates(steepest)).max())
 
 
 def _first(settling: int, done: int) -> int:
