@@ -35,7 +35,7 @@ from models.measured.section_run import run as march
 from models.measured.sections import Answer, Sections, points
 from models.measured.signal import Quantity, Signal
 from models.measured.trust import Drift, Level, drift
-from models.measured.verdict import judge
+from models.measured.verdict import judge, surprised
 from models.measured.virtual import VirtualMeasurement, virtual_measurement
 from models.strict import Strict, read
 from models.systems import load
@@ -135,6 +135,7 @@ def compute(scene: MeasuredScene, engine: str, folder: Path, progress: Progress 
         if found.held is not None:
             said = {(finding.check, finding.signals, finding.place) for finding in found.findings}
             found.findings += tuple(f for f in found.held.findings if (f.check, f.signals, f.place) not in said)
+            found.findings += surprised(found.held)
             progress("files", 0.95)
             _handed(found, folder)
             watch.lap("files")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.hub_forces.rigid import rigid
-from models.measured.checks import check, clipped, drift, findings, gaps, gravity, noise, turning, weight
+from models.measured.checks import check, clipped, drift, findings, gaps, gravity, noise, spikes, turning, weight
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.means import mean
 from models.measured.checks.place import Place
@@ -18,7 +18,9 @@ from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults
 from models.measured.finding import Finding
 from models.measured.recording import Recording
+from models.measured.section_run import Outcome
 from models.measured.signal import Quantity, Signal
+from models.measured.verdict import surprised
 from models.measured.virtual import VirtualMeasurement
 from validation.cases import measured_checks as case
 from validation.cases.hub_forces import r19
@@ -146,6 +148,23 @@ def test_a_held_value_and_a_dead_channel_are_named(tmp_path):
     assert dead.weight == stuck.weight == "error"
 
 
+def test_a_value_held_no_longer_than_a_bridged_gap_is_a_doubt(tmp_path):
+    held, rounded = white(), np.round(white(seed=4), 1)
+    held[1000:1030] = held[1000]
+    (found,) = said(clipped.check, made(tmp_path, force_x=held, force_y=rounded))
+    assert (found.place, found.weight) == ("force_x", "doubt")
+    assert found.size == pytest.approx(0.06, abs=2 * PERIOD)
+
+
+@pytest.mark.parametrize("width", [1, 2])
+def test_a_spike_is_named_with_its_height_and_noise_is_none(width, tmp_path):
+    spiky, slow = white(), np.round(np.sin(np.arange(5000) / 100), 2)
+    spiky[1000 : 1000 + width] += 50.0
+    (found,) = said(spikes.check, made(tmp_path, force_x=spiky, force_y=white(seed=4), force_z=slow))
+    assert (found.place, found.times) == ("force_x", pytest.approx((999 * PERIOD, 1002 * PERIOD)))
+    assert found.size == pytest.approx(50.0, rel=0.1)  # noise of 1 on both neighbours
+
+
 @pytest.mark.parametrize(("level", "kind", "size"), [(0.0, "gravity", 9.81), (-9.81, "sign", -1.0),
                          (1.0, "unit", 0.102), (8.9, "gravity", -0.91), (9.7, "", 0.0)])  # fmt: skip
 def test_a_vertical_accelerometer_feels_gravity(level, kind, size, tmp_path):
@@ -214,6 +233,14 @@ def test_without_a_vehicle_every_check_says_what_it_would_need(tmp_path):
     found = check(made(tmp_path, force_z=1000 + white()), None)
     assert {one.weight for one in found} == {"note"}
     assert any("a vehicle in space" in one.text for one in found)
+
+
+def test_a_filter_that_is_surprised_by_its_measurements_is_a_doubt(tmp_path):
+    """NaN is a run without a filter."""
+    columns = made(tmp_path, force_z=white()).columns
+    told = [surprised(Outcome(columns, (), PERIOD, 2, surprise, ())) for surprise in (1.2, np.nan, 2.5)]
+    assert told[:2] == [(), ()]
+    assert [(one.weight, one.size) for one in told[2]] == [("doubt", 2.5)]
 
 
 def test_what_was_noticed_while_reading_is_carried_and_errors_come_first(ridden, tmp_path):

@@ -18,6 +18,7 @@ from models.drift.score import Errors, Limits, Own, Verdict, low_pass, rms
 from models.hub_forces.cut_vehicle import PITCH, ROLL, CutVehicle, Z
 from models.hub_forces.rigid import rigid
 from models.measured.comparison import Compared
+from models.measured.finding import Finding
 from models.measured.section_run import DAMPING, Hold, Outcome
 from models.measured.virtual import VirtualMeasurement
 
@@ -29,6 +30,10 @@ DISAGREES = 0.15
 wrong by 5 % and a delay of 2 ms at 10 Hz together stay below it."""
 LOUD = 1 / 3
 """Part of a check channel that may be noise."""
+SURPRISED = 2.0
+"""Mean of the normalised innovation squared from which on a filter's measurements are doubted: 1 is right, and noise
+that is estimated is right to a third. An axle force 0.5 % too large, which takes a third off the damage along the
+vehicle, makes 2."""
 WORDS = {"I pitch''": "what turns the chassis", "the measured pitch": "measured roll and pitch",
          "pitch wrong": "roll or pitch wrong", "pitch known": "roll or pitch known", "pitch of": "roll or pitch of"}
 """What ``score`` says of the pitch plane, and what it means here."""
@@ -52,6 +57,16 @@ def judge(run: Outcome, vehicle: CutVehicle, hold: Hold, sampled: float, limits:
         return _in_space(found)
     told = ", ".join(f"{name} by {share:.0%}" for name, share in off.items())
     return Verdict("rejected", f"channels that were not put in disagree (at most {DISAGREES:.0%}): {told}")
+
+
+def surprised(run: Outcome) -> tuple[Finding, ...]:
+    """A doubt where the filter that held a run was surprised by its measurements."""
+    if not run.surprise > SURPRISED:
+        return ()
+    text = (f"The filter's innovations squared are {run.surprise:.3g} times what the noise of forces and angles "
+            "allows: a channel is off by a little (gain, offset, delay, a spike, a held value, a load that is not in "
+            "the vehicle file), and forces along the vehicle, which small angles make, may be wrong by much.")
+    return (Finding("filter", "doubt", "recording", text, run.surprise, "1"),)
 
 
 def judge_beside_truth(run: Outcome, true: VirtualMeasurement, hold: Hold, limits: Limits = LIMITS,

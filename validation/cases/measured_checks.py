@@ -97,6 +97,16 @@ def _held(name: str, begin: float, length: float) -> Samples:
     return change
 
 
+def _spiked(name: str, time: float, height: float) -> Samples:
+    """One sample of a channel too high."""
+
+    def change(found: VirtualMeasurement, samples: np.ndarray) -> np.ndarray:
+        samples[round(time / found.period), _columns(found, name)] += height
+        return samples
+
+    return change
+
+
 def _clipped(name: str, part: float) -> Samples:
     """The largest samples of a channel cut off."""
 
@@ -142,6 +152,8 @@ FULL = (
             _exchanged(("fl", "fr"), ("rl", "rr"))),
     Planted("clipped, 0.5 % of samples", "clipped", "fl_fz", 0.5, "%", {}, _clipped("fl_fz", 0.005)),
     Planted("value held for 0.3 s", "clipped", "rl_mx", 0.3, "s", {}, _held("rl_mx", 4.0, 0.3)),
+    Planted("value held for 0.06 s", "clipped", "fl_fz", 0.06, "s", {}, _held("fl_fz", 4.0, 0.06)),
+    Planted("spike of one sample", "spikes", "rl_my", 2e3, "N m", {}, _spiked("rl_my", 4.0, 2e3)),
     Planted("dead channel", "clipped", "rl_mx", 15.0, "s", {}, _times(0.0, "rl_mx")),
     Planted("noise four times as stated", "noise", "rr_fy", 32.0, "N", {"noise": {"rr_fy": 32.0}}),
 )  # fmt: skip

@@ -8,21 +8,34 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping
 
 from models.hub_forces.cut_vehicle import CutVehicle
-from models.measured.checks import clipped, drift, factor, gaps, gravity, noise, rigid, shift, swapped, turning, weight
+from models.measured.checks import (
+    clipped,
+    drift,
+    factor,
+    gaps,
+    gravity,
+    noise,
+    rigid,
+    shift,
+    spikes,
+    swapped,
+    turning,
+    weight,
+)
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.place import Place
 from models.measured.finding import Finding, Weight
 from models.measured.recording import Recording
 
 CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
-    gaps.check, clipped.check, gravity.check, swapped.check, weight.check, factor.check, drift.check, shift.check,
-    turning.check, rigid.check, noise.check,
+    gaps.check, clipped.check, spikes.check, gravity.check, swapped.check, weight.check, factor.check, drift.check,
+    shift.check, turning.check, rigid.check, noise.check,
 )  # fmt: skip
 """In this order: what an earlier one has named, a later one does not name again."""
 FAMILIES = defaultdict(frozenset[str], {
     **dict.fromkeys(("sign", "unit", "gain", "offset", "weight", "gravity"), frozenset({"size"})),
     **dict.fromkeys(("drift", "shift"), frozenset({"time"})),
-    "clipped": frozenset({"value"}), "noise": frozenset({"size", "value"}),
+    "clipped": frozenset({"value"}), "spikes": frozenset({"size", "value"}), "noise": frozenset({"size", "value"}),
     "rigid": frozenset({"size", "time", "value"}),
 })  # fmt: skip
 """What the findings of a check are about: two of one kind about one channel say the same thing twice."""

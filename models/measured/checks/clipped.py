@@ -5,6 +5,7 @@ import numpy as np
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.runs import runs
 from models.measured.finding import Finding
+from models.measured.inputs import BRIDGED
 from models.measured.signal import UNITS, Signal
 
 NAME = "clipped"
@@ -12,8 +13,9 @@ LEAST = 6
 """Samples at the extreme value below which nothing is said."""
 PILE = 5
 """Times as many as at the next value below it: the tail of a rounded channel has more of them farther in, not less."""
-STUCK = 0.1
-"""s: a channel that gives one value for longer stands still, if this is also USUAL times longer than is usual."""
+STUCK = 0.02
+"""s: a channel that gives one value for longer stands still, if this is also USUAL times longer than is usual. What is
+not longer than a gap that would be bridged is a doubt."""
 USUAL = 20
 
 
@@ -64,5 +66,6 @@ def _stuck(signal: Signal, values: np.ndarray, period: float) -> list[Finding]:
     held = f"{values[same[longest, 0]]:.5g} {UNITS[signal.quantity]}"
     text = (f"{signal.name} stands still at {held} for {end - first:.4g} s from {first:.4g} s on: its last value was "
             "held over a gap; leave these times out.")  # fmt: skip
-    return [Finding(NAME, "doubt" if signal.check else "error", signal.name, text, end - first, "s", (signal.name,),
+    doubtful = signal.check or end - first <= BRIDGED
+    return [Finding(NAME, "doubt" if doubtful else "error", signal.name, text, end - first, "s", (signal.name,),
                     (first, end))]  # fmt: skip

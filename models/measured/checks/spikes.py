@@ -1,0 +1,49 @@
+"""Spikes: one or two samples that stand out from those before and after them as no vehicle moves."""
+
+import numpy as np
+
+from models.measured.checks.evidence import Evidence
+from models.measured.finding import Finding
+from models.measured.signal import UNITS, Signal
+
+NAME = "spikes"
+WIDTHS = 1, 2
+"""Samples of a spike: one of a transducer or a converter, two where a jittering clock was put right."""
+STEEP, HIGH = 6.0, 3.0
+"""Times the step from sample to sample that 99 % do not exceed, and times the channel's standard deviation: both sides
+of a spike are higher. Gaussian noise comes to a third of the first; what is lower than the second adds no damage."""
+USUAL = 0.99
+
+
+def check(evidence: Evidence) -> list[Finding]:
+    """Sizes are those of the highest spike, in the channel's unit."""
+    own = evidence.recording
+    found = [_finding(signal, own.samples(signal), own.period) for signal in own.signals]
+    return [one for one in found if one] or [Finding(NAME, "note", "", "No sample of any channel stands out alone.")]
+
+
+def spikes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First samples (k,) of the spikes in values (n,), NaN where not measured, and their heights (k,), with sign."""
+    steps = np.diff(values)
+    known = np.abs(steps[np.isfinite(steps)])
+    if not len(known):
+        return np.empty(0, np.int64), np.empty(0)
+    least = max(STEEP * float(np.quantile(known, USUAL)), HIGH * float(np.nanstd(values)))
+    heights = np.zeros(len(values))
+    for width in WIDTHS:
+        up, down = steps[: len(steps) - width], -steps[width:]
+        height = np.where(up * down > 0, np.sign(up) * np.minimum(np.abs(up), np.abs(down)), 0.0)
+        heights[1 : 1 + len(height)] += np.where(np.abs(height) > least, height, 0.0)
+    return np.flatnonzero(heights), heights[heights != 0.0]
+
+
+def _finding(signal: Signal, values: np.ndarray, period: float) -> Finding | None:
+    at, heights = spikes(values)
+    if not len(at):
+        return None
+    worst, unit = int(np.abs(heights).argmax()), UNITS[signal.quantity]
+    text = (f"{signal.name} has {len(at)} spike(s) of one or two samples, the highest by {heights[worst]:+.4g} {unit} "
+            f"at {period * at[worst]:.6g} s: no vehicle moves so, and its damage is that of a transducer. Repair the "
+            "file, or leave these times out.")  # fmt: skip
+    return Finding(NAME, "doubt", signal.name, text, float(heights[worst]), unit, (signal.name,),
+                   (period * (at[worst] - 1), period * (at[worst] + 2)))  # fmt: skip
