@@ -66,8 +66,9 @@ def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) 
     found = list[Found]()
     for i, own in enumerate(scenes):
         progress(own.title, i / len(scenes))
-        plan_of(own).check(own, ())
-        found.append(_linear(own) if own.study == "ride_choice" else chosen(own, engines if own is scene else ()))
+        linear, asked = own.study == "ride_choice", engines if own is scene else ()
+        plan_of(own).check(own, () if linear else (engine_of(own, asked),))
+        found.append(_linear(own) if linear else chosen(own, asked))
         _save(found[-1], folder / f"{i + 1}_{own.system.replace('-', '_')}.csv")
     progress("figure", 1.0)
     choice_figure(found, folder / "choice.png")
@@ -75,10 +76,15 @@ def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) 
             "table": [line for one in found for line in lines(one, len(found) > 1)]}  # fmt: skip
 
 
-def chosen(scene: Any, engines: tuple[str, ...]) -> Found:
-    """A scene's choice by one implementation: the one that was asked for, or the system's usual one."""
+def engine_of(scene: Any, engines: tuple[str, ...]) -> str:
+    """The implementation that was asked for, or the system's usual one."""
     usual: str = system_of(scene).ENGINE
-    engine = usual if not engines or usual in engines else engines[0]
+    return usual if not engines or usual in engines else engines[0]
+
+
+def chosen(scene: Any, engines: tuple[str, ...]) -> Found:
+    """A scene's choice by one implementation."""
+    engine = engine_of(scene, engines)
     chooser = Chooser(scene, engine, scene.quantities, scene.tolerance)
     choice, none = chooser.choose(), chooser.work(frozenset())
     alone = [Alone(one, chooser.screen.predicted(frozenset([one])), none / chooser.work(frozenset([one])))

@@ -14,6 +14,8 @@ from models.choice.screen import Screen
 from models.choice.variants import Variants
 from models.errors import InputError
 from models.systems import SYSTEMS
+from studies import choice as study
+from studies.asked import ready
 from validation.choice.drawn_scenes import drawn
 from validation.price.effects import price_list
 from validation.price.effects_text import as_dict, lines
@@ -112,6 +114,29 @@ def test_steps_of_the_screen_are_shorter_where_a_run_fails_late(monkeypatch):
     monkeypatch.setattr(choose, "Variants", lambda scene, engine: own)
     found = Chooser(None, "", ["q"], 0.05)
     assert found._longest(Screen(part, ["q"]), frozenset(), part.lengths(), 0.05)[0] == 4 and found.own == 2
+
+
+def hub_forces(**more):
+    from models.hub_forces.scene import build
+
+    table = {"title": "t", "system": "hub-forces", "effects": "auto", "quantities": ["rms z"], "tolerance": 0.05,
+             "vehicle": {"file": "r19_free", "chassis": "body"}, "road": {"iso8608": "B", "speed": 20.0}}  # fmt: skip
+    return build(table | {"run": {"duration": 0.5, "step": 1e-3}, "forces": {"sampling_rate": 500.0}} | more, "t")
+
+
+def test_a_part_of_a_run_has_a_length_that_the_scene_may_have():
+    """125 steps of 500 are whole steps of the run, and no whole samples of 2 ms."""
+    variants = Variants(hub_forces(), "mujoco")
+    assert variants.system.steps(variants.window(125).scene) == 180
+    assert variants.system.steps(Variants(hub_forces(forces={"sampling_rate": 1000.0}), "").window(125).scene) == 125
+
+
+def test_the_study_chooses_where_a_plan_must_know_the_engine(tmp_path, monkeypatch):
+    monkeypatch.setattr("studies.choice_figure.choice_figure", lambda found, path: None)
+    scene = hub_forces(run={"duration": 0.04, "step": 1e-3})
+    ready(scene, ("exudyn", "mujoco"))
+    (found,) = study.run(scene, ("exudyn", "mujoco"), tmp_path, lambda said, share: None)["answer"]
+    assert found["implementation"] == "mujoco" and found["kept"]
 
 
 def test_what_only_rounds_does_not_move():

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -105,11 +106,13 @@ class Variants:
         return [times for times in range(1, min(count, LONGEST) + 1) if count % times == 0]
 
     def window(self, steps: int) -> "Variants":
-        """The first part of the run, of at least so many steps, or all of it if it has not many more."""
+        """The first part of the run, of at least so many steps, or all of it if it has not many more.
+
+        Of a length that the scene may have: whole samples of what it measures, for one."""
         count = self.system.steps(self.scene)
-        few = next((n for n in range(steps, count) if n % FINE == 0 or count % n == 0), count)
-        if few == count:
-            return self
-        table = own_table(self.scene)
-        self.system.shorten(table, self.scene, few)
-        return Variants(rebuilt(table, self.scene), self.engine)
+        for few in (n for n in range(steps, count) if n % FINE == 0 or count % n == 0):
+            table = own_table(self.scene)
+            self.system.shorten(table, self.scene, few)
+            with suppress(InputError):
+                return Variants(rebuilt(table, self.scene), self.engine)
+        return self
