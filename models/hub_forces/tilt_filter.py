@@ -76,8 +76,9 @@ class TiltFilter:
         """Estimates (n, 4) and deviations at samples of hub forces (n, 6 h) and angles (n, 4), NaN where not measured.
 
         The first sample is the last one of the block before. Raises InputError where angles and forces contradict
-        one another.
+        one another, or are infinite.
         """
+        _check_numbers(wrenches, angles, self.file)
         own, count = self.state, len(angles)
         if np.isnan(own.x[0]):
             own.x, own.p = np.nan_to_num(angles[0]), np.diag(np.where(np.isnan(angles[0]), UNKNOWN, self.variances))
@@ -131,6 +132,14 @@ def _check(frame: str, period: float, angle_deviations: tuple[float, float], mod
                         ("angle_deviations", max(angle_deviations))):  # fmt: skip
         if not 0.0 < value < math.inf:
             raise InputError("", name, value, "must be above 0, and finite")
+
+
+def _check_numbers(wrenches: np.ndarray, angles: np.ndarray, file: str) -> None:
+    """Refuse forces that are no numbers, and infinite angles; an angle of NaN was not measured."""
+    for name, wrong in (("forces", ~np.isfinite(wrenches)), ("angles", np.isinf(angles))):
+        if wrong.any():
+            row = int(np.flatnonzero(wrong.any(axis=1))[0])
+            raise InputError(file, name, None, f"hold what is no number in sample {row} of this stretch")
 
 
 def _level_line(values: np.ndarray) -> np.ndarray:

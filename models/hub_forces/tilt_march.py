@@ -37,7 +37,8 @@ def march(x, p, turning, measured, dt, noise, variances, states, spread):
 def _learn(p, gain, j, variance, kept):
     """Covariance after value j, in Joseph's form: what is subtracted from itself might leave less than nothing.
 
-    kept : variance by the innovation's, which is 1 - gain[j] without its cancellation.
+    kept : variance by the innovation's, which is 1 - gain[j] without its cancellation. What the value's own error
+    leaves in another state, gain^2 variance, is left there even where rounding is larger than that.
     """
     for m in range(4):
         own = p[j, m]
@@ -54,6 +55,7 @@ def _learn(p, gain, j, variance, kept):
     for k in range(4):
         for m in range(k):
             p[k, m] = p[m, k] = 0.5 * (p[k, m] + p[m, k])
+        p[k, k] = max(p[k, k], gain[k] * gain[k] * variance)
 
 
 @njit(cache=True, error_model="numpy")
