@@ -11,7 +11,7 @@ from validation.price import curves
 from validation.price import runner as cost
 from validation.price.problems import Setting
 from validation.price.rows import rows_of
-from validation.price.tables import tables
+from validation.price.tables import rounds_of, tables
 from validation.timing import describe, interleave, paired_ratio
 
 STEPS = (8e-3, 4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)
@@ -207,8 +207,61 @@ def test_an_interval_needs_rounds():
     points = [replace(p, seconds=(p.counts["force calls"] * 1e-6,)) for p in points_of(PlantedProblem())]
     one = cost.loss(points, "force", 1e-3, "seconds", "exudyn first")
     assert one.factor > 1 and math.isnan(one.low) and math.isnan(one.high)
-    five = [replace(p, seconds=p.seconds * cost.FEWEST[False]) for p in points]
+    five = [replace(p, seconds=p.seconds * cost.FEWEST) for p in points]
     assert cost.loss(five, "force", 1e-3, "seconds", "exudyn first").low == pytest.approx(one.factor)
+
+
+def timed(factor=1.0, once=()):
+    """Both curves at 1 us a call, the first-order one ``factor`` times that, 15 rounds with 5 % noise of their own;
+    those with a step in ``once`` with the first of them alone."""
+    random, found = np.random.default_rng(11), []
+    for p in [cost.attempt(PlantedProblem(), setting) for setting in PlantedProblem().settings(False)]:
+        slow = factor if p.setting.method == "first" else 1.0
+        seconds = slow * 1e-6 * p.counts["force calls"] * np.exp(random.normal(0, 0.05, 15))
+        kept = seconds[:1] if p.setting.value in once else seconds
+        found.append(replace(p, seconds=tuple(kept.tolist()), changed=False))
+    return found
+
+
+def test_a_slowed_setting_is_noticed():
+    """1 N takes 125 calls of first order and 500 of fourth: slowed fourfold they take the same seconds, sixfold half as
+    many again, by the interval of 15 rounds of 5 % noise, which is 4 % each way."""
+    for factor, slower in ((4.0, False), (6.0, True)):
+        found = cost.loss(timed(factor), "force", 1.0, "seconds", "exudyn first")
+        assert found.factor == pytest.approx(factor / 4, rel=0.1)
+        assert (found.low > 1.05) == slower, "slower beyond doubt, or not"
+
+
+def test_rounds_are_for_settings_that_decide_something():
+    """A method with ten times the seconds of the fourth-order one wins nothing; with 1.2 times it may."""
+    problem, points = PlantedProblem(), timed()
+    fourth = [p for p in points if p.setting.method == "fourth"]
+    for longer, expected in ((10.0, False), (1.2, True)):
+        third = [replace(p, setting=replace(p.setting, method="third"), seconds=(longer * p.cost("seconds"),))
+                 for p in fourth]  # fmt: skip
+        chosen = {p.setting.curve for p in cost.racing(problem, points + third)}
+        assert {"exudyn fourth", "exudyn first"} <= chosen
+        assert ("exudyn third" in chosen) == expected
+
+
+def test_no_interval_from_one_run():
+    found = cost.loss(timed(once=STEPS[-1:]), "force", 1e-3, "seconds", "exudyn first")
+    assert found.factor > 10 and math.isnan(found.low), "its finest step has one run alone"
+
+
+def test_a_job_takes_part_in_some_rounds():
+    calls = []
+    jobs = [lambda i=i: calls.append(i) for i in range(2)]
+    seconds = interleave(jobs, 15, 0.0, lasted=[1.0, 1.0], every=[1, 3])
+    assert (calls.count(0), calls.count(1)) == (15, 5)
+    assert np.flatnonzero(np.isfinite(seconds[0])).size == 15
+    assert np.flatnonzero(np.isfinite(seconds[1])).tolist() == [0, 3, 6, 9, 12]
+
+
+def test_rounds_are_told():
+    points = [replace(p, changed=None, seconds=p.seconds[:1]) if p.setting.method == "first" else p for p in timed()]
+    assert rounds_of(points).startswith("Seconds are medians of 15 interleaved rounds for 6 settings")
+    assert "one run for 6" in rounds_of(points)
 
 
 def test_tables_come_from_saved_points():

@@ -13,7 +13,7 @@ import numpy as np
 
 SEED = 20
 RESAMPLES = 1000
-LONG = 10.0
+LONG = 2.0
 """A job that took so many times the least turn needs no warm-up to tell that it fits in once."""
 
 
@@ -21,21 +21,24 @@ Clock = Callable[[], float]
 
 
 def interleave(jobs: Sequence[Callable[[], Any]], rounds: int, least: float = 0.02, seed: int = SEED,
-               lasted: Sequence[float] | np.ndarray | None = None,
+               lasted: Sequence[float] | np.ndarray | None = None, every: Sequence[int] | None = None,
                clock: Clock = time.perf_counter) -> np.ndarray:  # fmt: skip
-    """Seconds of every job in every round, shape (jobs, rounds); single thread, warmed up.
+    """Seconds of every job in every round, shape (jobs, rounds), NaN in those that it is not in; single thread, warmed
+    up.
 
     least : a job is repeated within its turn until it lasts about this long (s); seed : of the order;
-    lasted : seconds of a run of each job that has been, where there was one; clock : that of the processor leaves
-    out what else the machine does.
+    lasted : seconds of a run of each job that has been, where there was one; every : a job is in the first of so many
+    rounds; clock : that of the processor leaves out what else the machine does.
     """
     known = [0.0] * len(jobs) if lasted is None else lasted
     repeats = [1 if one > LONG * least else _repeats(job, least, clock)
                for job, one in zip(jobs, known, strict=True)]  # fmt: skip
     order = np.random.default_rng(seed)
-    seconds = np.empty((len(jobs), rounds))
+    seconds = np.full((len(jobs), rounds), np.nan)
     for i in range(rounds):
         for j in order.permutation(len(jobs)):
+            if every is not None and i % every[j] != 0:
+                continue
             seconds[j, i] = _timed(jobs[j], repeats[j], clock)
     return seconds
 

@@ -44,8 +44,8 @@ FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (noisy_forces.problem, prescr
                                                     contact_alone.problem)  # fmt: skip
 """Problems that a quick run leaves out; it has those of PROBLEMS."""
 ROUNDS = {True: 3, False: 15}
-"""Interleaved rounds of timing at most, by ``quick``."""
-LEAST = {True: 0.004, False: 0.01}
+"""Interleaved rounds of timing, by ``quick``, of settings whose seconds decide something."""
+LEAST = {True: 0.004, False: 0.005}
 """A short run is repeated until its turn lasts this long (s), by ``quick``."""
 CALLBACKS = {
     "all compiled to no forces": "every force in one compiled callback, by the same model without forces",

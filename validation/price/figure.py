@@ -1,5 +1,6 @@
 """The work-precision figure: error over what work is counted in and over seconds, a curve per integrator."""
 
+from collections import defaultdict
 from textwrap import fill
 from typing import Any
 
@@ -22,6 +23,8 @@ MORE = ("#999999", "#0072b2", "#009e73", "#cc79a7", "#d55e00", "#56b4e9")
 """Colours of families that are no implementation."""
 SIZES = {"reference": 8.5, "exudyn": 6.5, "mujoco": 4.5}
 """Coinciding curves show as rings within each other."""
+ONCE = 0.5
+"""Size of a marker whose seconds are those of one run, by that of the others."""
 
 
 def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
@@ -38,8 +41,8 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
         timed = kind == "seconds"
         label = "seconds for the run, model built anew (median)" if timed else f"{kind} in the run"
         ax.set(xscale="log", yscale="log", xlabel=label)
-        rounds = problem["rounds"]
-        measured = "exact" if not timed else "one round" if rounds == 1 else f"up to {rounds} interleaved rounds"
+        rounds = max(len(p.seconds) for p in points)
+        measured = f"up to {rounds} interleaved rounds (small: one run)" if timed else "exact"
         ax.set_title(f"by {kind}, {measured}")
     _failures(axes[0], points, top)
     quantity = quantity_of(problem)
@@ -84,11 +87,13 @@ def _curve(ax: Axes, problem: dict[str, Any], own: list[Point], kind: str, style
     costs, errors = [p.cost(kind) for p in own], [p.errors[quantity] for p in own]
     floor = curves.HOLLOW * problem["uncertainty"][quantity]
     ax.plot(costs, errors, **{**style, "marker": "none"}, alpha=0.75)
-    for face, hollow in ((style["color"], False), ("white", True)):
-        some = [pair for pair in zip(costs, errors, strict=True) if (pair[1] < floor) is hollow]
-        if some:
-            ax.plot(*zip(*some, strict=True), **{**style, "linestyle": "none"}, markerfacecolor=face,
-                    markeredgewidth=0.9)  # fmt: skip
+    alike = defaultdict(list)
+    for p, place in zip(own, zip(costs, errors, strict=True), strict=True):
+        alike[place[1] < floor, kind == "seconds" and p.changed is None].append(place)
+    for (hollow, once), some in alike.items():
+        look = {**style, "linestyle": "none", "markersize": style["markersize"] * (ONCE if once else 1.0)}
+        ax.plot(*zip(*some, strict=True), **look, markerfacecolor="white" if hollow else style["color"],
+                markeredgewidth=0.9)  # fmt: skip
 
 
 def _floor(ax: Axes, problem: dict[str, Any]) -> None:
@@ -104,12 +109,9 @@ def _floor(ax: Axes, problem: dict[str, Any]) -> None:
 def _front(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> None:
     """The settings that no other one beats, as a broad pale line behind the curves."""
     quantity = quantity_of(problem)
-    floor = curves.HOLLOW * problem["uncertainty"][quantity]
-    clear = [p for p in points if p.status == "ok" and p.errors[quantity] >= floor]
-    costs, errors = [p.cost(kind) for p in clear], [p.errors[quantity] for p in clear]
-    front = curves.pareto(costs, errors)
-    ax.plot([costs[i] for i in front], [errors[i] for i in front], color="#f0c808", linewidth=9, alpha=0.45,
-            solid_capstyle="round", zorder=1)  # fmt: skip
+    front = cost.front(points, quantity, problem["uncertainty"][quantity], kind)
+    ax.plot([p.cost(kind) for p in front], [p.errors[quantity] for p in front], color="#f0c808", linewidth=9,
+            alpha=0.45, solid_capstyle="round", zorder=1)  # fmt: skip
 
 
 def _defaults(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> None:

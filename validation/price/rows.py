@@ -76,8 +76,9 @@ def _counts(problem: Problem, points: list[Point]) -> Row:
 def _repeat(problem: Problem, points: list[Point]) -> Row:
     """A run that is repeated counts the same and errs by the same."""
     changed = [f"{p.setting.curve} {p.setting.label()}" for p in points if p.changed]
-    return _none_of(f"price.{problem.key}.counts.repeat", f"settings of {len(points)} that count or err otherwise when "
-                    "they are run again", changed, "exact: all counts, and errors to the last digit")  # fmt: skip
+    again = sum(p.changed is not None for p in points)
+    return _none_of(f"price.{problem.key}.counts.repeat", "settings that count or err otherwise in the last round, of "
+                    f"{again} that have rounds", changed, "exact: all counts, and errors to the last digit")
 
 
 def _none_of(name: str, what: str, found: list[str], why: str) -> Row:

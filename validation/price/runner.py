@@ -23,22 +23,23 @@ from validation.timing import interleave, interval, resamples
 Status = Literal["ok", "raised", "refused", "flagged", "SILENT"]
 WORK = ("contact cells", "force calls")
 """What work may be counted in: the first that a problem's points have."""
-SLOW = 0.1
-"""A setting that takes longer (s) is timed in rounds among its like, so that the others have more of them."""
-PATIENCE = {True: 0.5, False: 2.0}
-"""Seconds for all rounds of a problem's slow settings, and for those of the others, by ``quick``."""
-FEWEST = {True: 1, False: 5}
-"""Rounds there are at least, however long they take; with fewer than in full no interval is told, for that of one round
-would look exact."""
+RIVALS = ("exudyn", "mujoco")
+"""Engines whose own cheapest setting is told, where a problem has them."""
+NEAR = 1.25
+"""A curve that takes up to so many times the least seconds in one run may be the cheapest: rounds tell."""
+SLOW, EVERY = 0.05, 3
+"""A setting that takes longer (s) is timed in every third round alone: a long run wanders less."""
+FEWEST = 5
+"""With fewer rounds no interval is told: that of one would look exact."""
 DRAWS = 200
 """Bootstrapped sets of rounds behind the interval of an interpolated ratio."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """One setting and what became of it: errors by quantity, counts, seconds of every round.
+    """One setting and what became of it: errors by quantity, counts, seconds of every round, or of the one run.
 
-    changed : whether the last of those rounds counted, or erred by, anything else.
+    changed : whether the last of those rounds counted, or erred by, anything else; None without rounds.
     """
 
     setting: Setting
@@ -47,7 +48,7 @@ class Point:
     errors: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     seconds: tuple[float, ...] = ()
-    changed: bool = False
+    changed: bool | None = None
 
     def cost(self, kind: str) -> float:
         """A count, or the median of the seconds."""
@@ -72,15 +73,16 @@ def attempt(problem: Problem, setting: Setting) -> Point:
     """Try one setting: ok, raised (the run failed and said so), refused (it was not run), flagged (an answer came with
     a doubt, the solution's ``doubt``), or SILENT.
     """
+    begun = time.perf_counter()
     try:
         solution = problem.build(setting).run()
     except InputError as error:
         return Point(setting, "refused", str(error))
     except RunFailed as error:
         return Point(setting, "raised", str(error))
-    errors, counts = problem.errors(solution), dict(solution.counts)
+    seconds, errors, counts = time.perf_counter() - begun, problem.errors(solution), dict(solution.counts)
     doubt = getattr(solution, "doubt", "")
-    return Point(setting, *(("flagged", doubt) if doubt else _judged(problem, errors)), errors, counts)
+    return Point(setting, *(("flagged", doubt) if doubt else _judged(problem, errors)), errors, counts, (seconds,))
 
 
 def _judged(problem: Problem, errors: dict[str, float]) -> tuple[Status, str]:
@@ -96,7 +98,7 @@ def _judged(problem: Problem, errors: dict[str, float]) -> tuple[Status, str]:
 def describe(problem: Problem, points: list[Point]) -> dict[str, Any]:
     """What tables and figures need to know of a problem, as JSON keeps it."""
     names = ("key", "title", "note", "units", "reference", "uncertainty", "bound", "tolerances", "duration")
-    return {**{name: getattr(problem, name) for name in names}, "rounds": max(len(p.seconds) for p in points)}
+    return {name: getattr(problem, name) for name in names}
 
 
 def miscounted(points: list[Point], duration: float) -> list[str]:
@@ -112,30 +114,60 @@ def miscounted(points: list[Point], duration: float) -> list[str]:
 
 
 def measure(problem: Problem, quick: bool, rounds: int, least: float) -> list[Point]:
-    """All points of a problem, with the seconds of up to ``rounds`` interleaved rounds for those that are ok.
+    """All points of a problem: with the seconds of ``rounds`` interleaved rounds where they decide something, else with
+    those of one run.
 
     Seconds are those of building the model and running it, input tables included, for every engine alike.
     """
-    points, ends = [], [time.perf_counter()]
-    for setting in problem.settings(quick):
-        points.append(attempt(problem, setting))
-        ends.append(time.perf_counter())
-    lasted, fine = np.diff(ends), np.array([p.status == "ok" for p in points])
-    for chosen in (np.flatnonzero(fine & (lasted <= SLOW)), np.flatnonzero(fine & (lasted > SLOW))):
-        once = max(lasted[chosen].sum(), least * chosen.size, 1e-9)
-        most = max(FEWEST[quick], min(rounds, int(PATIENCE[quick] / once)))
-        for i, again in zip(chosen, _timed(problem, [points[i] for i in chosen], most, least, lasted[chosen]),
-                            strict=True):  # fmt: skip
-            points[i] = again
-    return points
+    points = [attempt(problem, setting) for setting in problem.settings(quick)]
+    again = _timed(problem, racing(problem, points), rounds, least)
+    return [again.get(p.setting, p) for p in points]
 
 
-def _timed(problem: Problem, points: list[Point], rounds: int, least: float, lasted: np.ndarray) -> list[Point]:
-    """The points with their seconds, and whether their last run was as their first, which ``lasted`` (n,) s."""
+def racing(problem: Problem, points: list[Point]) -> list[Point]:
+    """Points whose seconds decide something, by one run of each: the defaults; what the cheapest settings rest on, and
+    what those may that take little longer, of all and of each engine; what a default rests on that is refined; the
+    front of the figure. Work is counted, so what wins by it needs no rounds.
+    """
+    quantity, own, usual = next(iter(problem.units)), by_curve(points), defaults(points).values()
+    chosen = [p for p in usual if p.status == "ok"] + front(points, quantity, problem.uncertainty[quantity], "seconds")
+    for target in problem.tolerances:
+        met, all_of = (reaches(points, quantity, target, "seconds", extrapolate) for extrapolate in (False, True))
+        near = {curve: one for engine in ("", *RIVALS, *(p.setting.engine for p in usual))
+                for curve, one in _near(met, engine).items()}  # fmt: skip
+        near |= {p.setting.curve: all_of[p.setting.curve] for p in usual if p.setting.curve in all_of}
+        chosen += [p for curve, one in near.items() for p in resting(own[curve], one)]
+    return list({p.setting: p for p in chosen}.values())
+
+
+def _near(found: dict[str, curves.Reach], among: str) -> dict[str, curves.Reach]:
+    """The cheapest curve among those of one engine, or of all, and those that take little longer."""
+    best = cheapest(found, among)
+    return {curve: one for curve, one in found.items()
+            if best and curve.startswith(among) and one.cost <= NEAR * best[1].cost}  # fmt: skip
+
+
+def resting(own: list[Point], one: curves.Reach) -> list[Point]:
+    """The one or two points of a curve that a reach is made of."""
+    coarser = [p for p in own if p.setting.value >= one.value * (1 - 1e-12)]
+    finer = [p for p in own if p.setting.value <= one.value * (1 + 1e-12)]
+    return [*coarser[-1:], *(p for p in finer[:1] if p is not coarser[-1])] if coarser else finer[:1]
+
+
+def front(points: list[Point], quantity: str, uncertainty: float, kind: str) -> list[Point]:
+    """The points that stand clear of the reference's uncertainty and that no other one beats, by rising cost."""
+    clear = [p for p in points if p.status == "ok" and p.errors[quantity] >= curves.HOLLOW * uncertainty]
+    return [clear[i] for i in curves.pareto([p.cost(kind) for p in clear], [p.errors[quantity] for p in clear])]
+
+
+def _timed(problem: Problem, points: list[Point], rounds: int, least: float) -> dict[Setting, Point]:
+    """The points with the seconds of their rounds, and whether their last run was as their first."""
     last: dict[int, Any] = {}
     jobs = [lambda i=i, p=p: last.update({i: problem.build(p.setting).run()}) for i, p in enumerate(points)]
-    return [replace(p, seconds=tuple(seconds), changed=_changed(problem, p, last[i]))
-            for i, (p, seconds) in enumerate(zip(points, interleave(jobs, rounds, least, lasted=lasted), strict=True))]
+    lasted = [p.cost("seconds") for p in points]
+    found = interleave(jobs, rounds, least, lasted=lasted, every=[EVERY if one > SLOW else 1 for one in lasted])
+    return {p.setting: replace(p, seconds=tuple(own[np.isfinite(own)].tolist()), changed=_changed(problem, p, last[i]))
+            for i, (p, own) in enumerate(zip(points, found, strict=True))}  # fmt: skip
 
 
 def _changed(problem: Problem, p: Point, again: Any) -> bool:
@@ -216,18 +248,20 @@ def loss(points: list[Point], quantity: str, target: float, kind: str, default: 
         return None
     factor = low = high = own.cost / best[1].cost
     if kind == "seconds" and best[0] != default:
-        pair = [by_curve(points)[curve] for curve in (default, best[0])]
-        if min(len(p.seconds) for curve in pair for p in curve) < FEWEST[False]:
+        pair = [resting(by_curve(points)[curve], one) for curve, one in ((default, own), best)]
+        rounds = min(len(p.seconds) for side in pair for p in side)
+        if rounds < FEWEST:
             return Loss(factor, math.nan, math.nan, own.how)
-        sides = [_resampled(curve, quantity, target) for curve in pair]
+        sides = [_resampled(side, quantity, target, rounds) for side in pair]
         _, low, high = interval(sides[0] / sides[1])
     return Loss(factor, low, high, own.how)
 
 
-def _resampled(own: list[Point], quantity: str, target: float) -> np.ndarray:
-    """Seconds that one curve needs, once per bootstrapped set of rounds."""
-    medians = np.array([np.median(np.array(p.seconds)[resamples(len(p.seconds), DRAWS)], axis=1) for p in own])
-    found = [_reach(own, quantity, target, costs, extrapolate=True) for costs in medians.T]
+def _resampled(side: list[Point], quantity: str, target: float, rounds: int) -> np.ndarray:
+    """Seconds that a curve needs by the points it rests on, once per bootstrapped set of the rounds that both have."""
+    kept = [np.array(p.seconds)[:: len(p.seconds) // rounds][:rounds] for p in side]
+    medians = np.array([np.median(own[resamples(rounds, DRAWS)], axis=1) for own in kept])
+    found = [_reach(side, quantity, target, costs, extrapolate=True) for costs in medians.T]
     return np.array([one.cost for one in found if one is not None])
 
 

@@ -1,7 +1,7 @@
 """Tables of a work-precision run: cheapest settings, what defaults lose, all curves, and what failed."""
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from dataclasses import replace
 from typing import Any
 
@@ -14,9 +14,6 @@ from validation.price.problems import Setting
 from validation.price.runner import Loss, Point, by_curve
 from validation.rows import Table
 from validation.timing import describe
-
-RIVALS = ("exudyn", "mujoco")
-"""Engines that have a column of their own, where a problem has them."""
 
 
 def tables(problem: dict[str, Any], points: list[Point]) -> list[Table]:
@@ -51,7 +48,7 @@ def cheapest(problem: dict[str, Any], points: list[Point]) -> Table:
     """The cheapest setting that meets each tolerance."""
     quantity, groups = quantity_of(problem), groups_of(problem, points)
     unit, work = problem["units"][quantity], cost.costs(points)[0]
-    rivals = [engine for engine in RIVALS if any(p.setting.engine == engine for p in points)]
+    rivals = [engine for engine in cost.RIVALS if any(p.setting.engine == engine for p in points)]
     rows = []
     for target in problem["tolerances"]:
         calls = cost.reaches(points, quantity, target, work)
@@ -60,18 +57,23 @@ def cheapest(problem: dict[str, Any], points: list[Point]) -> Table:
             _won(points, seconds, among, "ms") for among in ("", *rivals))))  # fmt: skip
     note = ("Fixed steps are interpolated log-log between neighbouring settings; methods without one order count at "
             "the loosest setting tried that does; 'coarsest' is the coarsest setting tried. Nothing is extrapolated. "
-            f"{work.capitalize()} are exact and the same on every machine; seconds are those of one run on this one, "
-            "everything built anew, and wander (median absolute deviation "
-            f"{100 * _spread(points):.0f} %).")  # fmt: skip
+            f"{work.capitalize()} are exact and the same on every machine; seconds are those of this one, everything "
+            f"built anew. {rounds_of(points)}")  # fmt: skip
     heads = (f"{quantity} error at most [{unit}]", f"fewest {work}", "fewest seconds",
              *(f"fewest in {LABELS[engine]}" for engine in rivals))  # fmt: skip
     return Table("Cheapest setting that meets the tolerance", note, heads, tuple(rows))
 
 
-def _spread(points: list[Point]) -> float:
-    """Median over all settings of the relative median absolute deviation of the seconds."""
-    found = [describe(p.seconds) for p in points if p.seconds]
-    return float(np.median([one["mad"] / one["median"] for one in found]))
+def rounds_of(points: list[Point]) -> str:
+    """How many settings have how many rounds, and how far these wander."""
+    in_rounds = [p.seconds for p in points if p.status == "ok" and p.changed is not None]
+    numbers = Counter(map(len, in_rounds))
+    told = " and ".join(f"{n} interleaved rounds for {count}" for n, count in sorted(numbers.items(), reverse=True))
+    spread = float(np.median([one["mad"] / one["median"] for one in map(describe, in_rounds)]))
+    once = sum(p.status == "ok" for p in points) - len(in_rounds)
+    return (f"Seconds are medians of {told} settings whose seconds decide something (fewer where a run is longer than "
+            f"{1e3 * cost.SLOW:g} ms; median absolute deviation {100 * spread:.0f} %), and of one run for {once} that "
+            "are far from the cheapest.")  # fmt: skip
 
 
 def _won(points: list[Point], found: dict[str, Reach], among: str, unit: str,
@@ -104,7 +106,8 @@ def losses(problem: dict[str, Any], points: list[Point]) -> Table:
                          else f"is {STATUSES[own.status]}") for owner, own in owners.items())  # fmt: skip
     note = ("The default method, its step refined until it meets the tolerance, by the cheapest setting that does. "
             f"{as_is}. * means that no step tried was fine enough: extrapolated by the method's declared order. "
-            "In brackets: 95 % interval, bootstrapped over rounds; none after fewer than five.")  # fmt: skip
+            "In brackets: 95 % interval, bootstrapped over the rounds that both have; none after fewer than "
+            f"{cost.FEWEST}.")  # fmt: skip
     return Table("Factor that a default setting loses", note, (f"{quantity} error at most", *heads), tuple(rows))
 
 
@@ -130,17 +133,23 @@ def every_curve(problem: dict[str, Any], points: list[Point]) -> Table:
     rows = tuple(
         (_plain(curve), str(len(own)), f"{own[0].setting.label()} to {own[-1].setting.label()}",
          f"{own[0].errors[quantity]:.2g} to {own[-1].errors[quantity]:.2g}", _order(orders[curve]),
-         _declared(own[0].setting), _number(calls.get(curve), 1, ",.0f"), _number(seconds.get(curve), 1e3, ".3g"),
+         _declared(own[0].setting), _number(calls.get(curve), 1, ",.0f"),
+         _once(own, seconds.get(curve)) + _number(seconds.get(curve), 1e3, ".3g"),
          named(curve, groups).partition(" = ")[2] or "-")
         for curve, own in by_curve(points).items())  # fmt: skip
     unit = problem["units"][quantity]
     note = (f"Order: slope of the error over the step on the three finest settings whose error exceeds {HOLLOW:g} "
             "times the uncertainty of the reference; for adaptive methods over 1 / calls, where loose tolerances "
             "are still ruled by stability. Curves coincide if their errors agree to 1 % at every common "
-            "setting.")  # fmt: skip
+            "setting. ~: seconds of one run.")  # fmt: skip
     heads = ("curve", "settings", "from, to", f"{quantity} error [{unit}]", "observed order", "declared",
              f"{work} for {middle:g} {unit}", f"ms for {middle:g} {unit}", "coincides with")  # fmt: skip
     return Table("Every integrator that each engine offers", note, heads, rows)
+
+
+def _once(own: list[Point], one: Reach | None) -> str:
+    """A mark for what rests on a setting that has no rounds."""
+    return "~" if one is not None and any(p.changed is None for p in cost.resting(own, one)) else ""
 
 
 def _order(found: float) -> str:

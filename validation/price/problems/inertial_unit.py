@@ -37,8 +37,8 @@ _NATIVE, _IMPLICIT = (5.0, 8.0, 10.0, 20.0, 50.0, 100.0), (10.0, 20.0, 25.0, 40.
 FULL: dict[tuple[str, str], tuple[float, ...]] = {
     **{("reference", rule): _OWN for rule in RULES},
     **{("exudyn", method): _FEW for method in ("RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler")},
-    **{("exudyn", method): _IMPLICIT for method in ("GeneralizedAlpha 0.9", "TrapezoidalIndex2")},
-    ("exudyn", "VelocityVerlet"): _IMPLICIT,
+    **{("exudyn", method): _IMPLICIT for method in ("GeneralizedAlpha 0.9", "VelocityVerlet")},
+    ("exudyn", "TrapezoidalIndex2"): (8.0, *_IMPLICIT[:-1]),
     **{("exudyn", method): (100.0,) for method in ADAPTIVE},
     ("mujoco", "Euler"): (*_NATIVE, 500.0),
     **{("mujoco", method): _NATIVE for method in ("RK4", "implicit", "implicitfast", "discrete")},

@@ -24,10 +24,10 @@ CHOSEN = {
     ("exudyn", "GeneralizedAlpha 0.6"): (10 * MS, *STEPS),
     ("exudyn", "RK44"): (1 * MS,),
     ("mujoco", "RK4"): STEPS[:-1],
-    ("mujoco", "Euler"): STEPS[:-1],
-    ("mujoco", "implicit"): STEPS[:-1],
-    ("mujoco", "implicitfast"): STEPS[:-1],
-    ("mujoco", "discrete"): STEPS[:-1],
+    ("mujoco", "Euler"): STEPS[:-2],
+    ("mujoco", "implicit"): STEPS[:-2],
+    ("mujoco", "implicitfast"): STEPS[:-2],
+    ("mujoco", "discrete"): STEPS[:-2],
 }
 """RK44 is there to be refused: it does not solve for a prescribed pitch. MuJoCo calls Python in every step."""
 
