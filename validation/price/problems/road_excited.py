@@ -76,7 +76,8 @@ QUICK: dict[tuple[str, str], tuple[float, ...]] = {
 adaptive solver, one that is unstable, one that is refused."""
 
 SOLVERS = {True: (("DOP853", 1e-11), ("LSODA", 1e-12)), False: (("DOP853", 1e-13), ("LSODA", 1e-13))}
-"""Reference solvers with their relative tolerances, by ``quick``: an explicit Runge-Kutta method and a multistep one."""
+"""Reference solvers with their relative tolerances, by ``quick``: an explicit Runge-Kutta method and a multistep
+one."""
 
 
 def scene(duration: float = DURATION):
