@@ -36,7 +36,8 @@ COUNTS = (1, 4, 8)
 EVALUATIONS = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
 """Calls of the callback per step."""
 ENGINES = {"mujoco": ("Euler", "RK4"), "exudyn": ("ExplicitEuler", "RK44")}
-ROUNDS = 24
+ROUNDS, SELDOM = 24, 4
+"""Rounds, and of how many what no row judges is in the first."""
 LEAST = 0.001
 WHY = "median of the ratios within interleaved rounds; start of a run taken out"
 
@@ -59,6 +60,16 @@ class Setup:
             return "no contact" if self.bridge == "none" else "empty callback"
         theory, cells = self.law
         return f"FASTSIM, {cells} cells" if theory == "fastsim" else NAMES[theory]
+
+    @property
+    def judged(self) -> bool:
+        """Whether a row judges what it costs."""
+        return (self.law, self.count) == (MAIN, 4) and self.bridge in ("native", ROUTES[0])
+
+    @property
+    def without(self) -> "Setup":
+        """The same without contact."""
+        return replace(self, bridge="none", law=None)
 
     def wheels(self) -> Wheels:
         """What is marched."""
@@ -104,19 +115,24 @@ class Prices:
         kernels = sorted({(one.law, one.count) for one in setups if one.law is not None})
         runs, loops = [_job(one) for one in setups], [_kernel_job(law, count) for law, count in kernels]
         jobs = [part for march, steps in runs for part in (partial(march, steps), partial(march, 1))]
-        seconds = interleave([*jobs, *(job for job, _ in loops)], rounds, LEAST)
+        judged = [one for one in setups if one.judged]
+        often = {*judged, *(one.without for one in judged), *((one.law, one.count) for one in judged)}
+        turns = [one for one in setups for _ in range(2)] + kernels
+        seconds = interleave([*jobs, *(job for job, _ in loops)], rounds, LEAST,
+                             every=[1 if one in often else SELDOM for one in turns])  # fmt: skip
         whole, first, alone = seconds[: len(jobs) : 2], seconds[1 : len(jobs) : 2], seconds[len(jobs) :]
         self._steps = {one: (a, b, steps - 1) for one, a, b, (_, steps) in zip(setups, whole, first, runs, strict=True)}
         self._calls = {kernel: one / calls for kernel, one, (_, calls) in zip(kernels, alone, loops, strict=True)}
 
     def step(self, one: Setup, rounds: bool = False) -> Any:
-        """Seconds per step: of each round, or by the least of all, as whatever else a machine does only adds."""
+        """Seconds per step: of each round, NaN of those without it, or by the least of all, as whatever else a machine
+        does only adds."""
         whole, first, steps = self._steps[one]
-        return (whole - first) / steps if rounds else float(whole.min() - first.min()) / steps
+        return (whole - first) / steps if rounds else float(np.nanmin(whole) - np.nanmin(first)) / steps
 
     def own(self, one: Setup, rounds: bool = False) -> Any:
         """The same without contact: the engine's own."""
-        return self.step(replace(one, bridge="none", law=None), rounds)
+        return self.step(one.without, rounds)
 
     def kernel(self, one: Setup, rounds: bool = False) -> Any:
         """Seconds of the kernel in a step, likewise."""
@@ -124,10 +140,11 @@ class Prices:
             return 0.0
         calls = 1 if one.bridge == "before each step" else EVALUATIONS[one.method]
         found = calls * self._calls[one.law, one.count]
-        return found if rounds else float(found.min())
+        return found if rounds else float(np.nanmin(found))
 
     def interval(self, ratios: Array) -> tuple[float, float, float]:
         """Median of the ratios of the rounds with its 95 % interval, bootstrapped."""
+        ratios = ratios[np.isfinite(ratios)]
         _, low, high = interval(np.median(ratios[resamples(len(ratios))], axis=1))
         return float(np.median(ratios)), low, high
 
@@ -226,7 +243,7 @@ def _motion(wheels: Wheels, q: Array, v: Array, k: int) -> tuple[float, float, f
 def _price_rows(prices: Prices) -> list[Row]:
     rows = []
     for one in prices.setups:
-        if (one.law, one.count) != (MAIN, 4) or one.bridge not in ("native", ROUTES[0]):
+        if not one.judged:
             continue
         step, own, kernel = (part(one, True) for part in (prices.step, prices.own, prices.kernel))
         name, calls = f"contact_bridges.{one.engine}.{one.method}", EVALUATIONS[one.method]
@@ -237,8 +254,8 @@ def _price_rows(prices: Prices) -> list[Row]:
             value, low, high = prices.interval((step - own - kernel) / step)
             what, bound = "share of the bridge", 0.25
         what = (f"{ENGINE_NAMES[one.engine]}, {one.method}: step with FASTSIM at four wheels (21 x 21, native, "
-                f"{1e6 * prices.step(one):.1f} us), {what}: lower end of the 95 % interval {low:.3f} to {high:.3f} about "
-                f"{value:.3f}")  # fmt: skip
+                f"{1e6 * prices.step(one):.1f} us), {what}: lower end of the 95 % interval {low:.3f} to {high:.3f} "
+                f"about {value:.3f}")  # fmt: skip
         why = f"{WHY}; too dear only where all of the interval is, which a busy machine widens"
         rows.append(at_most(name, SYSTEM, what, max(low, 0.0), "", bound, why, "none"))
     return rows
@@ -277,7 +294,8 @@ def tables(data: dict[str, Any]) -> list[Table]:
     note = ("Microseconds per step, least of interleaved rounds, as whatever else a machine does only adds to a time; "
             "start of a run taken out. Kernel: the forces of all wheels in a compiled loop, times the calls per step. "
             "Bridge: what the step takes beyond the engine's own and the kernel, for plain Python its slower kernel "
-            "too. Share: of the bridge in the step, median of the rounds with its 95 % interval.")  # fmt: skip
+            "too. Share: of the bridge in the step, median of the rounds with its 95 % interval; what is judged is in "
+            f"{ROUNDS} rounds, the rest in {ROUNDS // SELDOM}.")  # fmt: skip
     heads = ("engine", "method", "wheels", "bridge", "law", "step", "engine's own", "kernel", "bridge's", "share [%]")
     rows = tuple((p["engine"], p["method"], str(p["wheels"]), p["bridge"], p["law"],
                   *(f"{1e6 * p[part]:.2f}" for part in ("step", "own", "kernel", "over")),
