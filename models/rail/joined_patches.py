@@ -67,13 +67,14 @@ def _pressed(patches: Sequence[Patch], near: Sequence[PatchPressure], load: floa
     heights = np.array([_height(patch, x, y) for patch in patches])
     leading = float(np.cos(max(near, key=lambda part: part.load).patch.lean))
     cell, whole = (x[1] - x[0]) * (y[1] - y[0]), load / leading
+    alike = bool((cosines == leading).all())  # the heights are then the same at any approach
     for _ in range(ITERATIONS):
         lowered = heights + approach * (leading - cosines)[:, None, None]
         owner = np.argmin(lowered, axis=0)
         solved = solve_normal(lowered.min(axis=0), x[1] - x[0], y[1] - y[0], pair, load=whole)
         forces = np.array([solved.pressure[owner == k].sum() * cell for k in range(len(patches))])
         vertical, reached = float(forces @ cosines), solved.approach / leading
-        close = abs(vertical / load - 1.0) < PRECISION and abs(reached / approach - 1.0) < PRECISION
+        close = abs(vertical / load - 1.0) < PRECISION and (alike or abs(reached / approach - 1.0) < PRECISION)
         whole, approach = whole * load / vertical, reached
         if close:
             pieces, _ = label(solved.contact, np.ones((3, 3)))

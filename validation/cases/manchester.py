@@ -135,8 +135,8 @@ def _file_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
     rail = laid(read_profile(folder / RAIL_FILE, "rail"), Track(inclination=0.0))
     side = Side(read_profile(folder / WHEEL_FILE, "wheel"), rail, Wheelset())
     other = Contact(side, contact.load, contact.speed, contact.friction)
-    chosen = [one for one in placed if round(1e3 * one.shift, 6) in FILES]
-    pairs = [(sums(one, wheel), sums(other.at(one.shift, one.yaw), wheel)) for one in chosen for wheel in WHEELS]
+    chosen = [(one, other.at(one.shift, one.yaw)) for one in placed if round(1e3 * one.shift, 6) in FILES]
+    pairs = [(sums(one, wheel), sums(theirs, wheel)) for one, theirs in chosen for wheel in WHEELS]
     off = [(abs(a[0] - b[0]), 100.0 * abs(a[1] / b[1] - 1.0)) for a, b in pairs]
     return [at_most(f"manchester.files.{name}", SYSTEM, f"{name}: {words}, largest difference",
                     max(one[k] for one in off), unit, bound, "the bound asked for", "published")

@@ -6,8 +6,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from models.compiled import njit
 from models.contact.fastsim import Ellipse, fastsim
 from models.contact.fastsim_grid import grid
 from models.contact.fastsim_kernels import LANES, ROWS, march_plain, march_second_order
@@ -75,7 +75,7 @@ def _least(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, float]
     return least
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _bound(values, repeats):
     """A root and a division per element, each independent of all others, in vector registers."""
     total = 0.0
@@ -86,13 +86,13 @@ def _bound(values, repeats):
     return total
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _plain(lanes, cells, repeats):
     for _ in range(repeats):
         march_plain(lanes, cells)
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _second(lanes, cells, repeats):
     for _ in range(repeats):
         march_second_order(lanes, cells)

@@ -45,6 +45,8 @@ PLANE = (5.0e-3, 727.0855e-3, -0.2905)
 """Shift (m) at which CONTACT joins two patches, and its plane there: place across the track (m), angle (rad)."""
 CELL, DEEPEST = 1e-4, 1e-3
 """m: of the exact theory on this plane, and more than the bodies reach into each other."""
+SETTLED, SUNK = 1e-5, 2e-9
+"""Of the load, to which two patches that sink each other are followed; m, to which their approach is found."""
 SEARCHED, GRID, HALVINGS, STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3e-4
 """Reach of the search along the profile (m) and round the axle (rad), its grid, how often it shrinks to a quarter; step
 (m) over which the rail's angle is taken."""
@@ -84,17 +86,19 @@ def apart(contact: Contact, placed: Placed) -> list[float]:
     side = contact.side
     touches = touches_of(side, _lowered(side, placed))[: len(placed.right)]
     away = abs(touches[0].patch.place - touches[1].patch.place)
-    forces, vertical = np.zeros(2), sum(one.vertical for one in placed.right)
-    low, high = 0.0, 4e-5
-    for _ in range(14):
-        approach = (low + high) / 2.0
-        for _ in range(6):
-            sunk = forces[::-1] / (math.pi * contact.pair.modulus * away)
-            forces = np.array([_alone(touch.patch.distance, approach * math.cos(touch.angle) - by, contact.pair)
-                               for touch, by in zip(touches, sunk, strict=True)])  # fmt: skip
-        enough = sum(f * math.cos(t.angle) for f, t in zip(forces, touches, strict=True)) > vertical
-        low, high = (low, approach) if enough else (approach, high)
-    return [float(force) for force in forces]
+    vertical, cosines = sum(one.vertical for one in placed.right), [math.cos(touch.angle) for touch in touches]
+
+    def pressed(approach: float) -> np.ndarray:
+        forces = np.zeros(2)
+        while True:
+            before, sunk = forces, forces[::-1] / (math.pi * contact.pair.modulus * away)
+            forces = np.array([_alone(touch.patch.distance, approach * cosine - by, contact.pair)
+                               for touch, cosine, by in zip(touches, cosines, sunk, strict=True)])  # fmt: skip
+            if np.abs(forces - before).max() < SETTLED * vertical:
+                return forces
+
+    approach = brentq(lambda approach: float(pressed(approach) @ cosines) - vertical, 0.0, 4e-5, xtol=SUNK)
+    return [float(force) for force in pressed(approach)]
 
 
 def _alone(distance: Distance, approach: float, pair: Pair) -> float:
