@@ -19,6 +19,9 @@ TITLE = "What the machinery costs, and each effect"
 SYSTEM: System = "effects"
 STEPS = {True: 2000, False: 8000}
 """Steps of the runs that are timed against hand-built ones, by ``quick``: 8 s are less than half of a study scene."""
+ROUNDS, PRICED = {True: 7, False: 16}, {True: 5, False: 15}
+"""Rounds of these runs, and of those that tell what an effect adds, by ``quick``: of fewer than 15 there is no
+interval to judge by."""
 DEAREST = 1.03
 """Ratio of the time of a bare scene to that of a hand-built model."""
 SHORT = 500
@@ -26,18 +29,18 @@ SHORT = 500
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """The ratio to hand-built models and the price list; a quick run has runs of 2 s instead of 8 s, a quarter of the
-    rounds, and each effect in one of the three engines, in turn.
+    """The ratio to hand-built models and the price list; a quick run has runs of 2 s instead of 8 s, less than half of
+    the rounds, and each effect in one of the three engines, in turn.
     """
     with tempfile.TemporaryDirectory() as name:
         place = Path(name)
         write_files(place)
-        ratios = {engine: _ratio(engine, place, STEPS[quick], 7 if quick else 40) for engine in ("exudyn", "mujoco")}
-        price = [_price(effect, engine, place, 5 if quick else 25)
+        ratios = {engine: _ratio(engine, place, STEPS[quick], ROUNDS[quick]) for engine in ("exudyn", "mujoco")}
+        price = [_price(effect, engine, place, PRICED[quick])
                  for i, effect in enumerate(EFFECTS) for j, engine in enumerate(ENGINES)
                  if not quick or i % len(ENGINES) == j]  # fmt: skip
     rows = [row for engine, ratio in ratios.items() for row in _machinery(engine, ratio, STEPS[quick], quick)]
-    return rows + _wheelset(STEPS[quick] // 4, 7 if quick else 40), {"price": price, "ratios": ratios}
+    return rows + _wheelset(STEPS[quick] // 4, ROUNDS[quick]), {"price": price, "ratios": ratios}
 
 
 def hand_built(engine: str, own: Scene) -> Any:
