@@ -12,14 +12,11 @@ from models.contact.fastsim_grid import POWERS
 from models.contact.linear_theory import coefficients
 from models.contact.linear_theory import forces as linear_forces
 from models.contact.material import Pair
-from models.contact.normal_problem import Pressed, centres
-from models.contact.rolling_problem import solve_rolling
-from models.errors import RunFailed
 from validation.contact.contact_bands import held
-from validation.contact.contact_set import JUDGED, read_drawn
+from validation.contact.contact_set import JUDGED, read, read_drawn
 from validation.contact.fastsim_speed import speed
 from validation.contact.fuzzed_creepage import OPTIONS, ROUNDING, contacts, worst
-from validation.rows import Row, System, Table, at_most, not_run
+from validation.rows import Row, System, Table, at_most
 
 TITLE = "FASTSIM"
 SYSTEM: System = "contact"
@@ -30,8 +27,6 @@ KINDS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "spin": (0.0, 0.0, 1.0), "y
          "y-spin": (0.0, 0.7071, -0.7071), "y-spin 30": (0.0, 0.866, -0.5), "x+spin": (0.7071, 0.0, 0.7071),
          "x-y+spin": (0.5774, -0.5774, 0.5774)}  # fmt: skip
 LEVELS = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
-MODEL_KINDS = ("x", "y", "spin", "y+spin", "y-spin", "y-spin 30", "x-y+spin")
-MODEL_LEVELS = (0.05, 0.3, 1.0, 2.0, 4.0, 10.0)
 SLIDING = (5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 50.0, 200.0)
 """Levels from where all begins to slide."""
 LOAD, FRICTION, MEAN_AXIS = 80e3, 0.3, 5e-3
@@ -39,9 +34,8 @@ PAIR = Pair()
 Contacts = dict[str, Any]
 """Arrays by the names of the parameters of ``fastsim``."""
 CELLS = (11, 21, 41, 81)
-FINE = 321
-EXACT_CELLS = 24
-"""Cells of the exact theory by sqrt(ab): its own error at these is near 1 % of mu N."""
+CONVERGED, FINE = 161, 321
+"""Of the model beside the exact theory, and of what cells are measured by."""
 EXACT = (0.0, "exact in floating point")
 ALLOWED = {"finite": EXACT, "reversal": EXACT, "zero": EXACT, "similarity": EXACT,
            "power coarse": (1e-5, "a slender strip that sticks to its end, in the last half cell")}  # fmt: skip
@@ -195,45 +189,18 @@ def _drawn() -> list[Row]:
 
 
 def _model() -> tuple[list[Row], list[list[Any]]]:
-    """Error of the model at a converged grid against the exact theory on its own."""
-    given = creepages(MODEL_KINDS, MODEL_LEVELS)
-    exact = np.array([_exact({name: float(values[i]) for name, values in given.items()})
-                      for i in range(len(given["a"]))])  # fmt: skip
-    solved = np.isfinite(exact[:, 0])
-    table: list[list[Any]] = []
+    """Error of the model at a converged grid against the exact theory, by every bound and kind of flexibility."""
+    table, known = list[list[Any]](), read()
     for bound in POWERS:
         for kind in KINDS_OF_FLEXIBILITY:
-            options: dict[str, Any] = {"bound": bound, "flexibilities": kind}
-            found = fastsim(**given, pair=PAIR, cells=161, **options)
-            off = (np.stack([found.fx, found.fy, found.mz], axis=1) - exact)[solved] / _units()
-            force = np.hypot(off[:, 0], off[:, 1])
-            table.append([bound, kind, float(force.mean()), float(force.max()), float(np.abs(off[:, 2]).mean()),
-                          float(np.abs(off[:, 2]).max())])  # fmt: skip
-    why = f"exact theory with {EXACT_CELLS} cells by sqrt(ab); {solved.sum()} of {len(solved)} cases"
-    rows = [
-        at_most("fastsim.model.mean", SYSTEM, "mean error of the model against the exact theory", table[0][2], "mu N",
-                0.02, why, "native"),
-        at_most("fastsim.model.max", SYSTEM, "largest error of the model against the exact theory", table[0][3], "mu N",
-                0.09, why, "native"),
-    ]  # fmt: skip
-    if not solved.all():
-        rows.append(not_run("fastsim.model.unsolved", SYSTEM, f"{(~solved).sum()} cases of the exact theory",
-                            "its solver did not meet its own tolerance there"))  # fmt: skip
-    return rows, table
-
-
-def _exact(case: dict[str, float]) -> tuple[float, float, float]:
-    """Forces and moment by the exact theory on cells that are square, NaN where it gives up."""
-    a, b, step = case["a"], case["b"], 2.0 * MEAN_AXIS / EXACT_CELLS
-    nx, ny = round(2.0 * a / step), round(2.0 * b / step)
-    x, y = centres(nx, 2.0 * a / nx), centres(ny, 2.0 * b / ny)
-    pressure = np.sqrt(np.maximum(1.0 - (x / a) ** 2 - (y[:, None] / b) ** 2, 0.0))
-    pressure *= LOAD / (pressure.sum() * 4.0 * a * b / (nx * ny))
-    try:
-        found = solve_rolling(Pressed(pressure, x, y), FRICTION, case["xi_x"], case["xi_y"], case["spin"], PAIR)
-    except RunFailed:
-        return np.nan, np.nan, np.nan
-    return found.fx, found.fy, found.mz
+            one = held(f"{kind} {bound}", known, CONVERGED)
+            errors = one.error, one.moment_error
+            table.append([bound, kind, *(float(value) for e in errors for value in (e.mean(), e.max()))])
+    why = "exact theory with its cells' first order taken out, kept; the case of the price solves some of them anew"
+    what = f"error of the model against the exact theory, {len(one.error)} contacts of five ellipses"
+    return [at_most("fastsim.model.mean", SYSTEM, f"mean {what}", table[0][2], "mu N", 0.02, why, "native"),
+            at_most("fastsim.model.max", SYSTEM, f"largest {what}", table[0][3], "mu N", 0.09, why,
+                    "native")], table  # fmt: skip
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
@@ -245,7 +212,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
                    ("bound, march", *(f"{n} cells" for n in CELLS)), rows)]  # fmt: skip
     if "model" in data:
         found.append(Table("FASTSIM: error of the model", "Converged, against the exact theory: force in % of mu N, "
-                           "moment in % of mu N sqrt(ab).",
+                           "moment in % of mu N and the longer semi-axis.",
                            ("bound", "flexibilities", "mean", "largest", "moment, mean", "moment, largest"),
                            tuple((*row[:2], *(f"{100 * v:.2f}" for v in row[2:]))
                                                      for row in data["model"])))  # fmt: skip
