@@ -10,6 +10,7 @@ number from one that was cut off.
 import math
 import re
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,9 @@ RADIANS_PER_SECOND = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
 
 GAPS = ("", "nan")
 """Cells that say that nothing was measured, where that is allowed."""
+
+KEPT = 4
+"""Texts whose numbers are kept: every engine and every method of a comparison reads the same few files."""
 
 Columns = Mapping[str, Mapping[str, float]]
 Lines = list[tuple[int, str]]
@@ -58,10 +62,10 @@ def read_table(
     ------
     InputError : naming file, line (counted from 1), column, value, what is allowed and the nearest match
     """
-    header, rows = _header_and_rows(path)
+    text = whole_text(path)
+    header, rows = _header_and_rows(path, text)
     names, factors = headings(path, header, columns)
-    free = [gaps and name != increasing for name in names]
-    raw = _numbers(path, rows, header[1].split(","), free)
+    raw = _numbers(path, text, tuple(gaps and name != increasing for name in names))
     if len(rows) < least:
         raise InputError(path, "rows", len(rows), f"at least {least} rows of numbers are needed")
     table = {name: raw[:, i] * factors[i] for i, name in enumerate(names)}
@@ -73,8 +77,9 @@ def read_table(
 def write_table(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]]) -> None:
     """Write columns name -> (unit, values) with every digit, so that reading gives back the same numbers."""
     names = [f"{name} [{unit}]" for name, (unit, _) in columns.items()]
-    values = np.column_stack([values for _, values in columns.values()])
-    np.savetxt(path, values, fmt="%.17g", delimiter=",", header=",".join(names), comments="")
+    line = ",".join(["%.17g"] * len(names)) + "\n"
+    rows = zip(*(np.asarray(values).tolist() for _, values in columns.values()), strict=True)
+    Path(path).write_text(",".join(names) + "\n" + "".join([line % row for row in rows]), encoding="utf-8")
 
 
 def whole_text(path: str | Path) -> str:
@@ -87,9 +92,9 @@ def whole_text(path: str | Path) -> str:
         raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
 
 
-def _header_and_rows(path: str | Path) -> tuple[tuple[int, str], Lines]:
+@lru_cache(KEPT)
+def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Lines]:
     """Numbered header line and numbered rows, without comments and empty lines."""
-    text = whole_text(path)
     lines = [(i, line.strip()) for i, line in enumerate(text.split("\n"), start=1)]
     used = [(i, line) for i, line in lines if line and not line.startswith("#")]
     if not used:
@@ -134,8 +139,11 @@ def _wanted(columns: Columns) -> str:
     return ", ".join(f"{name} [{next(iter(units))}]" for name, units in columns.items())
 
 
-def _numbers(path: str | Path, rows: Lines, headings: list[str], free: list[bool]) -> np.ndarray:
+@lru_cache(KEPT)
+def _numbers(path: str | Path, text: str, free: tuple[bool, ...]) -> np.ndarray:
     """All cells as an array of shape (rows, columns), in the units of the file; NaN for gaps in ``free`` columns."""
+    header, rows = _header_and_rows(path, text)
+    headings = header[1].split(",")
     values = np.empty((len(rows), len(headings)))
     for i, (line, row) in enumerate(rows):
         cells = row.split(",")
