@@ -21,6 +21,7 @@ from models.rail.of_scene import path_speeds, wheelset_of
 from models.rail.orbit import beginning, branch, refined, solved
 from models.rail.scene import build
 from models.rail.wheelset import CHOSEN
+from models.scene_effects import named, without
 from studies import limit_cycle, wheelset
 from validation.absence import wheelset as absence
 
@@ -174,6 +175,16 @@ def test_the_flange_of_a_cone_is_not_silently_unread_beside_profiles() -> None:
     with pytest.raises(InputError, match="profiles, which have flanges of their own") as told:
         wheelset_of(scene(wheelset={"override": {"flange_stiffness": 1e6}}, profiles={}))
     assert told.value.place == "wheelset.override.flange_stiffness"
+
+
+def test_profiles_of_a_parameter_file_are_an_effect_that_its_file_has_to_drop(tmp_path) -> None:
+    values = CHOSEN.model_dump(exclude={"material", "profiles"})
+    lines = "\n".join(f"{key} = {value!r}" for key, value in values.items())
+    (tmp_path / "own.toml").write_text(f"{lines}\n[profiles]\nwheel = 'S1002'\n")
+    own = scene(wheelset={"parameters": str(tmp_path / "own.toml")})
+    assert "profiles" in named(own) and "flange" not in named(own)
+    with pytest.raises(InputError, match=r"wheelset.parameters = .*has profiles: name a file without them"):
+        without(own, "profiles")
 
 
 @pytest.mark.parametrize(("law", "friction", "doubt"), [("linear", 0.0, True), ("linear", 0.3, False),

@@ -59,6 +59,22 @@ def _profiles(scene: WheelsetScene, base: Wheelset) -> Profiles | None:
     return found
 
 
+def any_of(scene: WheelsetScene, *keys: str) -> bool:
+    """Whether any of these parameters of the scene's wheelset is above zero."""
+    wheelset = wheelset_of(scene)
+    return any(getattr(wheelset, key) > 0.0 for key in keys)
+
+
+def override(table: dict[str, Any], values: dict[str, float]) -> None:
+    """Put parameters into a scene's table in place of its set's own."""
+    table.setdefault("wheelset", {}).setdefault("override", {}).update(values)
+
+
+def usual(*keys: str) -> dict[str, float]:
+    """Parameters of the chosen wheelset."""
+    return {key: getattr(CHOSEN, key) for key in keys}
+
+
 def _judged(values: dict[str, Any], file: str, table: str) -> Wheelset:
     """The wheelset of these values; a fault is told by file and table."""
     try:

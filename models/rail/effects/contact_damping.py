@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from models.rail.of_scene import any_of, override, usual
+
 PLACE = "wheelset.override.contact_damping"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
@@ -11,18 +13,14 @@ COUNTS = {"all": {"contact damping": 1}}
 
 def named(scene: Any) -> bool:
     """Whether a scene has it."""
-    from models.rail.of_scene import wheelset_of
-
-    return bool(wheelset_of(scene).contact_damping > 0.0)
+    return any_of(scene, "contact_damping")
 
 
 def leave_out(table: dict[str, Any], scene: Any) -> None:
     """Contacts are springs alone."""
-    table.setdefault("wheelset", {}).setdefault("override", {})["contact_damping"] = 0.0
+    override(table, {"contact_damping": 0.0})
 
 
 def put_in(table: dict[str, Any], scene: Any) -> None:
     """That of the chosen wheelset."""
-    from models.rail.wheelset import CHOSEN
-
-    table.setdefault("wheelset", {}).setdefault("override", {})["contact_damping"] = CHOSEN.contact_damping
+    override(table, usual("contact_damping"))

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from models.rail.of_scene import any_of, override, usual, wheelset_of
+
 PLACE = "wheelset.override.flange_stiffness"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("profiles",)
@@ -12,18 +14,14 @@ COUNTS = {"all": {"flanges": 1}}
 
 def named(scene: Any) -> bool:
     """Whether a scene has it."""
-    from models.rail.of_scene import wheelset_of
-
-    return bool(scene.profiles is None and wheelset_of(scene).flange_stiffness > 0.0)
+    return wheelset_of(scene).profiles is None and any_of(scene, "flange_stiffness")
 
 
 def leave_out(table: dict[str, Any], scene: Any) -> None:
     """Wheels roll on cones however far they move."""
-    table.setdefault("wheelset", {}).setdefault("override", {})["flange_stiffness"] = 0.0
+    override(table, {"flange_stiffness": 0.0})
 
 
 def put_in(table: dict[str, Any], scene: Any) -> None:
     """That of the chosen wheelset."""
-    from models.rail.wheelset import CHOSEN
-
-    table.setdefault("wheelset", {}).setdefault("override", {})["flange_stiffness"] = CHOSEN.flange_stiffness
+    override(table, usual("flange_stiffness"))

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from models.rail.of_scene import any_of, override, usual
+
 PLACE = "wheelset.override.damping_x"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
@@ -12,18 +14,14 @@ KEYS = ("damping_x", "damping_y", "damping_z")
 
 def named(scene: Any) -> bool:
     """Whether a scene has it."""
-    from models.rail.of_scene import wheelset_of
-
-    return any(getattr(wheelset_of(scene), key) > 0.0 for key in KEYS)
+    return any_of(scene, *KEYS)
 
 
 def leave_out(table: dict[str, Any], scene: Any) -> None:
     """The axle is free but for its springs."""
-    table.setdefault("wheelset", {}).setdefault("override", {}).update(dict.fromkeys(KEYS, 0.0))
+    override(table, dict.fromkeys(KEYS, 0.0))
 
 
 def put_in(table: dict[str, Any], scene: Any) -> None:
     """Those of the chosen wheelset."""
-    from models.rail.wheelset import CHOSEN
-
-    table.setdefault("wheelset", {}).setdefault("override", {}).update({key: getattr(CHOSEN, key) for key in KEYS})
+    override(table, usual(*KEYS))

@@ -2,6 +2,9 @@
 
 from typing import Any
 
+from models.errors import InputError
+from models.rail.of_scene import wheelset_of
+
 PLACE = "profiles"
 NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
@@ -11,11 +14,14 @@ COUNTS = {"all": {"profiles": 1}}
 
 def named(scene: Any) -> bool:
     """Whether a scene has it."""
-    return scene.profiles is not None
+    return wheelset_of(scene).profiles is not None
 
 
 def leave_out(table: dict[str, Any], scene: Any) -> None:
-    """Cones, heads of one radius, and flanges that are springs."""
+    """Cones, heads of one radius, and flanges that are springs; InputError where the parameters have profiles."""
+    if scene.profiles is None:
+        raise InputError(scene.file, "wheelset.parameters", scene.wheelset.parameters, "has profiles: name a file "
+                         "without them")  # fmt: skip
     del table["profiles"]
 
 

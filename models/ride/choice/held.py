@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from models.errors import InputError
 from models.ride.excitation import Excitation
@@ -67,10 +68,10 @@ def holds(scene: RideScene, found: Callable[[Held], list[Effect]]) -> bool:
     return bool(found(Held(scene, vehicle_of(scene))))
 
 
-def of_vehicle(scene: RideScene) -> InputError:
-    """Why a scene cannot leave out what its vehicle has."""
-    return InputError(scene.file, "vehicle.file", scene.vehicle.file, "has it: name a file without it, or let effects "
-                      '= "auto" leave it out')  # fmt: skip
+def of_vehicle(table: dict[str, Any], scene: RideScene) -> None:
+    """The ``leave_out`` of what a vehicle has: InputError, for it stands in no table of the scene."""
+    raise InputError(scene.file, "vehicle.file", scene.vehicle.file, "has it: name a file without it, or let effects "
+                     '= "auto" leave it out')  # fmt: skip
 
 
 def illegal(chosen: Iterable[Effect]) -> str:

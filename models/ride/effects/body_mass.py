@@ -16,6 +16,7 @@ NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "two states per freedom of a light body"
 COUNTS: dict[str, dict[str, int]] = {}
+leave_out = of_vehicle
 
 
 def found(held: Held) -> list[Effect]:
@@ -48,8 +49,3 @@ def _without(held: Held, bodies: list[str]) -> Held:
 def named(scene: Any) -> bool:
     """Whether a scene's vehicle has it."""
     return holds(scene, found)
-
-
-def leave_out(table: dict[str, Any], scene: Any) -> None:
-    """InputError: it is the vehicle's."""
-    raise of_vehicle(scene)

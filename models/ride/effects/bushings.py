@@ -17,6 +17,7 @@ NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "a product per bushing, and the fastest modes of the vehicle"
 COUNTS: dict[str, dict[str, int]] = {}
+leave_out = of_vehicle
 
 
 def found(held: Held) -> list[Effect]:
@@ -57,8 +58,3 @@ def _without(held: Held, springs: list[str]) -> Held:
 def named(scene: Any) -> bool:
     """Whether a scene's vehicle has it."""
     return holds(scene, found)
-
-
-def leave_out(table: dict[str, Any], scene: Any) -> None:
-    """InputError: it is the vehicle's."""
-    raise of_vehicle(scene)

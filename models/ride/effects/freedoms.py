@@ -13,6 +13,7 @@ NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "two states per freedom"
 COUNTS: dict[str, dict[str, int]] = {}
+leave_out = of_vehicle
 
 
 def found(held: Held) -> list[Effect]:
@@ -40,8 +41,3 @@ def _without(held: Held, freedoms: list[tuple[str, Freedom]]) -> Held:
 def named(scene: Any) -> bool:
     """Whether a scene's vehicle has it."""
     return holds(scene, found)
-
-
-def leave_out(table: dict[str, Any], scene: Any) -> None:
-    """InputError: it is the vehicle's."""
-    raise of_vehicle(scene)

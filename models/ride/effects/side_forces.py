@@ -10,13 +10,9 @@ NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "a linear vehicle of its own at every speed"
 COUNTS: dict[str, dict[str, int]] = {}
+leave_out = of_vehicle
 
 
 def named(scene: Any) -> bool:
     """Whether a scene has it."""
     return bool(vehicle_of(scene).side_forces)
-
-
-def leave_out(table: dict[str, Any], scene: Any) -> None:
-    """InputError: they are the vehicle's."""
-    raise of_vehicle(scene)

@@ -12,6 +12,7 @@ NEEDS: tuple[str, ...] = ()
 EXCLUDES: tuple[str, ...] = ()
 COST = "a product per tyre; without a second corner white noise at the outputs"
 COUNTS: dict[str, dict[str, int]] = {}
+leave_out = of_vehicle
 
 
 def found(held: Held) -> list[Effect]:
@@ -28,8 +29,3 @@ def _without(held: Held) -> Held:
 def named(scene: Any) -> bool:
     """Whether a scene's vehicle has it."""
     return holds(scene, found)
-
-
-def leave_out(table: dict[str, Any], scene: Any) -> None:
-    """InputError: it is the vehicle's."""
-    raise of_vehicle(scene)
