@@ -34,7 +34,7 @@ LEVELS = (1.0, 4.0, 16.0)
 """Times the level of the paper: class C or so, E, and G, where the stops are met all the time."""
 COPIES, LASTING = (60, 400), (1.5, 10.0)
 """Monte Carlo in the quick and in the full share; its length in s."""
-STEP, DRIVEN, SKIPPED = 2.5e-3, 32.0, 4.0
+STEP, DRIVEN, SKIPPED = 2.5e-3, 24.0, 4.0
 """Of the engines' runs with 19 freedoms (s): longest step, length, and what is left out at the beginning."""
 NONLINEAR_STEP, NONLINEAR_DRIVEN = 2e-3, (1.0, 60.0)
 MILD = 1500.0
