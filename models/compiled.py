@@ -21,16 +21,25 @@ COMMON = tuple(Path(__file__).parent / name for name in ("vehicles", "engines", 
 
 
 def njit(**options: Any) -> Callable[[Callable], Any]:
-    """``numba.njit`` with these options; with ``cache=True`` its files are safe from other processes."""
-    return lambda function: _kept_apart(numba.njit(**options)(function))
+    """``numba.njit`` with these options; with ``cache=True`` its files are safe from other processes.
+
+    What may make arrays says so (``_nrt``), or it would be compiled like whoever calls it first, who may be ``lean``.
+    """
+    return lambda function: _kept_apart(numba.njit(**{"_nrt": True, **options})(function))
 
 
 def lean(function: Callable) -> Any:
     """``njit`` for a function that makes no array: it counts no references to those it gets, and is kept on disk.
 
-    Counting costs functions of a microsecond as much as their work. An array made in one is an error as it compiles.
+    Counting costs functions of a microsecond as much as their work. An array made in one is an error as it compiles;
+    what it calls may make some.
     """
     return njit(cache=True, error_model="numpy", _nrt=False)(function)
+
+
+def inlined(function: Callable) -> Any:
+    """``lean``, and written out in whatever calls it: an array given as an argument costs as much as ten numbers."""
+    return njit(cache=True, error_model="numpy", _nrt=False, inline="always")(function)
 
 
 def _kept_apart(compiled: Any) -> Any:

@@ -1,10 +1,11 @@
 """One sample of the laboratory method: the vehicle's steps under the torques that its brakes have meanwhile."""
 
-import numpy as np
+from numba import carray
 
 from models.braking.plane_step import step_on
 from models.braking.surfaces import under_wheels
 from models.compiled import njit
+from models.on_stack import doubles
 
 FINE, AT_REST, NOT_FOUND, LIFTED = range(4)
 """How a sample ended: still moving; standing; loads not found; a wheel without load, which the plane cannot have."""
@@ -17,7 +18,7 @@ def advance(state, turning, torques, step, steer, slope, plane, kind, road, tabl
     state (2, 2 + U), turning (W,): of ``step_on``; steer (W,): rad; slope: largest cornering coefficient of the tables
     (1/rad); found (2 + U,), report (W, 7): of ``step_on``. Returns how it ended and the time (s) that passed.
     """
-    surface, time = np.empty((turning.size, 3)), 0.0
+    surface, time = carray(doubles(3 * turning.size), (turning.size, 3)), 0.0
     for n in range(torques.shape[0] - 1):
         under_wheels(state, step, plane, kind, road, surface)
         used = step_on(state, turning, torques[n], torques[n + 1], step, steer, surface, slope * 9.81 * step, plane,

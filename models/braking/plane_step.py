@@ -10,11 +10,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import carray
 
 from models.braking.plane_chain import factor, inertia, rows, solve
 from models.braking.tyre_table import across, place
 from models.braking.wheel_step import wheel_step
 from models.compiled import lean, njit
+from models.on_stack import doubles
 
 CLOSE = 1e-7
 """What is left of the accelerations' error (m/s^2, and rad/s^2 times 1 m) when the loads are taken to be found."""
@@ -200,10 +202,15 @@ def step_on(state, turning, torque0, torque1, step, steer, surface, regular, pla
     comes to rest, ``step`` if it does not, -1 if the loads were not found.
     """
     wheels, size = turning.size, found.size
-    frame = Frame(np.empty((wheels, size)), np.empty((wheels, size)), np.empty((wheels, size)),
-                  np.empty((wheels, KNOWN)), np.empty((size, size)), np.empty(size),
-                  np.zeros((3, size)), 2 if plane.hooked else 0)  # fmt: skip
-    place0, rate0, middle = state[0].copy(), state[1].copy(), 0.5 * (torque0 + torque1)
+    ways = carray(doubles(3 * wheels * size), (3, wheels, size))
+    known, mass = carray(doubles(wheels * KNOWN), (wheels, KNOWN)), carray(doubles(size * size), (size, size))
+    some, middle = carray(doubles(6 * size), (6, size)), carray(doubles(wheels), (wheels,))
+    frame = Frame(ways[0], ways[1], ways[2], known, mass, some[0], some[1:4], 2 if plane.hooked else 0)
+    frame.tried[:] = 0.0
+    place0, rate0 = some[4], some[5]
+    place0[:], rate0[:] = state[0], state[1]
+    for i in range(wheels):
+        middle[i] = 0.5 * (torque0[i] + torque1[i])
     begin(turning, surface, plane, frame.known)
     for half in (True, False):
         settle(state[0], state[1], steer, regular, half, plane, tables[0], frame, found)

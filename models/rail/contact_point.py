@@ -8,12 +8,12 @@ cylinder's axis, seen along the normal, at the place of contact, which is taken 
 
 import math
 
-from models.compiled import njit
+from models.compiled import inlined
 
 RIGHT, LEFT = 1.0, -1.0
 
 
-@njit(cache=True, error_model="numpy")
+@inlined
 def cone_on_rail(side, y, z, roll, yaw, radius, half_gauge, conicity, head):
     """Contact of one wheel: (penetration, rolling radius, n_y, n_z, x, y, z).
 

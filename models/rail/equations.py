@@ -24,19 +24,20 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import brentq, root
 
-from models.compiled import njit
+from models.compiled import inlined, lean, njit
 from models.contact.inputs import number, quantity
 from models.errors import InputError, RunFailed
-from models.rail.wheel_forces import LAWS, LOAD, REPORTED, carried, net, numbers, patches, wheel_forces
+from models.rail.wheel_forces import LAWS, LOAD, REPORTED, carried, net, numbers, patches, room_for, wheel_forces
 from models.rail.wheelset import GRAVITY, Wheelset
 from models.resolved import check_resolved
 from models.steps import divides
 
 STATES = 10
 Y, Z, ROLL, YAW, ANGLE, Y_RATE, Z_RATE, ROLL_RATE, YAW_RATE, SPIN = range(STATES)
-MASS, ALONG, ACROSS, ARM, KX, KY, KZ, DX, DY, DZ, CARRIED, SUNK, LEAN = range(13)
+MASS, ALONG, ACROSS, ARM, KX, KY, KZ, DX, DY, DZ, CARRIED, SUNK, LEAN, HELD = range(14)
 """Numbers of the body and its suspension (SI): inertia along and across the axle, half spacing, springs and dampers of
-one side, weight that each side carries, height at which the springs bear no more than that, lean of the track."""
+one side, weight that each side carries, height at which the springs bear no more than that, lean of the track; 1 where
+there is a spring or a damper, else 0."""
 STIFF, LIMIT_OF_RK4 = 2.5, 2.785
 """Steps times the fastest motion's rate up to which a step is allowed, with a margin, and up to which RK4 is stable."""
 MOVED = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-6, 3e-5])
@@ -52,31 +53,28 @@ DEEPEST = 5e-3
 @njit(cache=True, error_model="numpy")
 def rates(state, speed, body, p, strips, cells, middle, law, out, report):
     """Fill ``out`` with the rates of a state (10,), and ``report`` (patches, REPORTED) with the contacts."""
+    set_rates(state, speed, body, p, strips, cells, middle, law, out, report, room_for(p))
+
+
+@inlined
+def set_rates(state, speed, body, p, strips, cells, middle, law, out, report, room):
+    """The same with ``Room`` made beforehand; a report of no rows where nobody asks."""
     y, z, roll, yaw = state[Y], state[Z], state[ROLL], state[YAW]
     roll_rate, yaw_rate, spin = state[ROLL_RATE], state[YAW_RATE], state[SPIN]
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
-    vectors = np.zeros((4, 3))  # made at once
-    force, moment, velocity, turning = vectors[0], vectors[1], vectors[2], vectors[3]
+    force, moment, velocity, turning = room.vectors[0], room.vectors[1], room.vectors[2], room.vectors[3]
+    for k in range(3):
+        force[k] = moment[k] = 0.0
     velocity[0], velocity[1], velocity[2] = speed, state[Y_RATE], state[Z_RATE]
     axle_x, axle_y, axle_z = -sy * cr, cy * cr, sr
     own = spin - yaw_rate * sr  # of the wheel against the axes that do not spin
     turning[0], turning[1] = cy * roll_rate + axle_x * own, sy * roll_rate + axle_y * own
     turning[2] = yaw_rate + axle_z * own
-    wheel_forces(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, law, force, moment, report)
-    for side in (1.0, -1.0):
-        arm = side * body[ARM]
-        ax, ay, az = arm * axle_x, arm * axle_y, arm * axle_z
-        turn_x, turn_y = cy * roll_rate, sy * roll_rate
-        vx, vy, vz = turn_y * az - yaw_rate * ay, yaw_rate * ax - turn_x * az, turn_x * ay - turn_y * ax
-        fx = -body[KX] * ax - body[DX] * vx
-        fy = body[CARRIED] * body[LEAN] - body[KY] * (y + ay - arm) - body[DY] * (state[Y_RATE] + vy)
-        fz = body[CARRIED] - body[KZ] * (z + az - body[SUNK]) - body[DZ] * (state[Z_RATE] + vz)
-        force[0] += fx
-        force[1] += fy
-        force[2] += fz
-        moment[0] += ay * fz - az * fy
-        moment[1] += az * fx - ax * fz
-        moment[2] += ax * fy - ay * fx
+    wheel_forces(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, law, force, moment, report, room)
+    force[1] += 2.0 * body[CARRIED] * body[LEAN]
+    force[2] += 2.0 * body[CARRIED]
+    if body[HELD] > 0.0:
+        _hold(state, body, cy * roll_rate, sy * roll_rate, axle_x, axle_y, axle_z, force, moment)
     m1 = cy * moment[0] + sy * moment[1]
     across = cy * moment[1] - sy * moment[0]
     m2, m3 = cr * across + sr * moment[2], cr * moment[2] - sr * across
@@ -90,23 +88,46 @@ def rates(state, speed, body, p, strips, cells, middle, law, out, report):
     out[YAW_RATE] = ((m3 - whirl * roll_rate) / body[ACROSS] + 2.0 * roll_rate * yaw_rate * sr) / cr
 
 
+@lean
+def _hold(state, body, turn_x, turn_y, axle_x, axle_y, axle_z, force, moment):
+    """Add springs and dampers of both ends; turn_x, turn_y : of the axle's own axes (rad/s)."""
+    for side in (1.0, -1.0):
+        arm, turn_z = side * body[ARM], state[YAW_RATE]
+        ax, ay, az = arm * axle_x, arm * axle_y, arm * axle_z
+        vx, vy, vz = turn_y * az - turn_z * ay, turn_z * ax - turn_x * az, turn_x * ay - turn_y * ax
+        fx = -body[KX] * ax - body[DX] * vx
+        fy = -body[KY] * (state[Y] + ay - arm) - body[DY] * (state[Y_RATE] + vy)
+        fz = -body[KZ] * (state[Z] + az - body[SUNK]) - body[DZ] * (state[Z_RATE] + vz)
+        force[0] += fx
+        force[1] += fy
+        force[2] += fz
+        moment[0] += ay * fz - az * fy
+        moment[1] += az * fx - ax * fz
+        moment[2] += ax * fy - ay * fx
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def march(state, speed, step, count, every, body, p, strips, cells, middle, law, path, reports):
     """RK4: ``count`` steps (s) from ``state``, which is moved; every so many steps one goes into path and reports."""
-    some, total, rate, here = np.empty((patches(p), REPORTED)), np.empty(STATES), np.empty(STATES), np.empty(STATES)
+    total, rate, here, none = np.empty(STATES), np.empty(STATES), np.empty(STATES), np.empty((0, REPORTED))
+    room = room_for(p)
     for i in range(count + 1):
-        total[:] = 0.0
+        row = i // every
         for stage in range(4):  # one call of the rates, or it is compiled four times
-            here[:] = state
-            if stage > 0:
-                here += (step if stage == 3 else 0.5 * step) * rate
-            rates(here, speed, body, p, strips, cells, middle, law, rate, some)
-            total += (1.0 if stage % 3 == 0 else 2.0) * rate
-            if stage == 0 and i % every == 0:
-                path[i // every], reports[i // every] = state, some
+            kept = stage == 0 and row * every == i
+            report = reports[row] if kept else none
+            ahead = step if stage == 3 else 0.5 * step
+            for k in range(STATES):  # a sum of whole arrays would make one
+                here[k] = state[k] + ahead * rate[k] if stage > 0 else state[k]
+            set_rates(here, speed, body, p, strips, cells, middle, law, rate, report, room)
+            for k in range(STATES):
+                total[k] = total[k] + (1.0 if stage == 3 else 2.0) * rate[k] if stage > 0 else rate[k]
+            if kept:
+                path[row] = state
             if stage == 0 and i == count:
                 return i
-        state += step / 6.0 * total
+        for k in range(STATES):
+            state[k] += step / 6.0 * total[k]
         if not abs(state[Y]) + abs(state[YAW]) + abs(state[ROLL]) + abs(state[Z]) < LIMIT:
             return i
     return count
@@ -142,12 +163,13 @@ class Equations:
 
     @cached_property
     def body(self) -> np.ndarray:
-        """Numbers of the body and its suspension (13,)."""
+        """Numbers of the body and its suspension (14,)."""
         w = self.wheelset
         carried = (w.load - w.mass * GRAVITY) / 2.0
         sunk = self._static_height() if w.profiles else float(w.ellipse.approach) / w.slant[1]
-        return np.array([w.mass, w.spin_inertia, w.yaw_inertia, w.half_spacing, w.stiffness_x, w.stiffness_y,
-                         w.stiffness_z, w.damping_x, w.damping_y, w.damping_z, carried, sunk, self.lean])  # fmt: skip
+        held = [w.stiffness_x, w.stiffness_y, w.stiffness_z, w.damping_x, w.damping_y, w.damping_z]
+        return np.array([w.mass, w.spin_inertia, w.yaw_inertia, w.half_spacing, *held, carried, sunk, self.lean,
+                         any(held)])  # fmt: skip
 
     @cached_property
     def given(self) -> tuple:
@@ -207,6 +229,11 @@ class Equations:
         """A (9, 9) about rest, the angle of spin left out."""
         return slopes(self.rates, self.rest)
 
+    @cached_property
+    def _fastest(self) -> float:
+        """Largest rate (1/s) of the motions about rest."""
+        return float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
+
     def run(self, state: np.ndarray, duration: float, step: float, every: int = 1) -> Path:
         """RK4 from a state (10,) over a duration (s) with a step (s); every so many steps are kept.
 
@@ -246,10 +273,9 @@ class Equations:
         """Number of steps of a run that is possible."""
         if quantity("state", state, "ten finite numbers").shape != (STATES,):
             raise InputError("", "state", None, f"must be {STATES} finite numbers")
-        fastest = float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
-        if not 0.0 < number("step", step, "a step in s") * fastest <= STIFF:
-            raise InputError("", "step", step, f"must be above 0 and at most {STIFF / fastest:.3g} s: the fastest "
-                             f"motion has a rate of {fastest:.4g} 1/s")  # fmt: skip
+        if not 0.0 < number("step", step, "a step in s") * self._fastest <= STIFF:
+            raise InputError("", "step", step, f"must be above 0 and at most {STIFF / self._fastest:.3g} s: the "
+                             f"fastest motion has a rate of {self._fastest:.4g} 1/s")  # fmt: skip
         if not divides(step, number("duration", duration, "a time in s")):
             raise InputError("", "duration", duration, f"must be a whole number of steps of {step:g} s, 1 or more")
         count = round(duration / step)

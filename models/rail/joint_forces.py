@@ -15,7 +15,7 @@ from numba import carray
 from models.compiled import njit
 from models.contact.stack import at, beyond
 from models.rail.equations import ANGLE, LIMIT, ROLL, ROLL_RATE, SPIN, STATES, Y_RATE, YAW, YAW_RATE, Z_RATE, Y, Z
-from models.rail.wheel_forces import REPORTED, patches, wheel_forces
+from models.rail.wheel_forces import REPORTED, room_for, wheel_forces
 
 JOINTS = 5
 SPEED, LAW, MIDDLE, NUMBERS, STRIPS, CELLS, HEADER = range(7)
@@ -78,9 +78,9 @@ def joint_forces(numbers, q, v, f):
     axle_x, axle_y, axle_z = -sy * cr, cy * cr, sr
     velocity = np.array([head[SPEED], y_rate, z_rate])
     turning = np.array([cy * roll_rate + axle_x * spin, sy * roll_rate + axle_y * spin, yaw_rate + axle_z * spin])
-    force, moment, report = np.zeros(3), np.zeros(3), np.empty((patches(contact), REPORTED))
+    force, moment = np.zeros(3), np.zeros(3)
     wheel_forces(y, z, roll, yaw, velocity, turning, contact, net, along, head[MIDDLE], int(head[LAW]), force, moment,
-                 report)  # fmt: skip
+                 np.empty((0, REPORTED)), room_for(contact))  # fmt: skip
     out[0] += force[1]
     out[1] += force[2]
     out[2] += moment[2]

@@ -25,7 +25,7 @@ import math
 
 import numpy as np
 
-from models.compiled import njit
+from models.compiled import lean, njit
 from models.contact.hertz import aspect
 
 ZONES, NODES, KNOTS, SPACING, ARM, LEVEL, HEADER = range(7)
@@ -79,7 +79,7 @@ def profile_on_rail(side, y, z, roll, yaw, p, modulus, touches):
         settled(touches, modulus)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _pose(y, z, roll, yaw):
     """Place, cosines and sines of roll and yaw, and what the nearest point of a circle needs."""
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
@@ -88,7 +88,7 @@ def _pose(y, z, roll, yaw):
     return y, z, cr, sr, cy, sy, lead, level, cr * sy / cy * level
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _node(j, pose, p, knot):
     """Depth of a node's circle along the rail's normal (m), place x, y, z from the centre, slope of the rail, knot."""
     y, z, cr, sr, cy, sy, lead, level, steer = pose
@@ -116,7 +116,7 @@ def _node(j, pose, p, knot):
     return over / math.sqrt(1.0 + slope * slope), place_x, place_y, place_z, slope, knot
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _add(j, node, p, sums):
     """Add a node in contact to the sums of its zone, or of the two that pass into each other there."""
     depth, place_x, place_y, place_z, slope, _ = node
@@ -139,7 +139,7 @@ def _add(j, node, p, sums):
             to[RADIUS] += weight * p[at + 1]
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _patch(side, sums, pose, touch):
     """One touch from its zone's sums."""
     touch[:] = 0.0
@@ -178,14 +178,14 @@ def settled(touches, modulus):
             load[i] = stiff[i] * (max(0.0, touches[i, DEPTH]) / own[i]) ** 1.5 if stiff[i] > 0.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _alike(one, other, squares):
     """Cosine between the normals of two touches by their distance (1/m)."""
     apart = (one[X_] - other[X_]) ** 2 + (one[Y_] - other[Y_]) ** 2 + (one[Z_] - other[Z_]) ** 2
     return (one[N_Y] * other[N_Y] + one[N_Z] * other[N_Z]) / math.sqrt(apart + squares / 5.0)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def pressed(penetration, along, across, modulus):
     """Elastic normal force (N) and semi-axes (m) at a penetration (m), curvatures 1/m, E* (Pa); zeros for a gap."""
     if penetration <= 0.0:

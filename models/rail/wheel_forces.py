@@ -18,10 +18,11 @@ Flange
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from models.compiled import njit
+from models.compiled import inlined, lean, njit
 from models.contact.fastsim import KINDS, MARCHES
 from models.contact.fastsim_grid import grid, strips_of
 from models.contact.fastsim_many import SPIN, XI_X, forces
@@ -46,7 +47,25 @@ the profiles, if the wheelset has some."""
 spin, semi-axes, penetration, power of the creep forces (W), angle of the rail's surface (rad), place from the
 wheelset's centre in the track's axes (m), lateral force of a cone's flange (N), powers of the elastic normal force and
 flange and of the contact's damping (W)."""
+VX, ASIDE, TURN, RATE, VY, ELASTIC, PUSH, PATCH, MOVED = range(9)
+"""Columns of a patch's motion: slip along, across (m/s) and about the normal (1/s); speed of approach and velocity
+across the track (m/s), elastic normal force (N), lateral force of a cone's flange (N), number of the patch."""
 BLEND, ORDER = KINDS["blended"], MARCHES["second-order"]
+
+
+class Room(NamedTuple):
+    """Arrays that are written over in every call: to make one costs as much as a wheel's kinematics.
+
+    vectors (4, 3): of ``equations.set_rates``; of ``wheel_forces``: touches (patches, TOUCH), and of those in contact,
+    first to last, contacts (patches, 10), motion (patches, MOVED), creep forces found (patches, 4) and other ones.
+    """
+
+    vectors: np.ndarray
+    touches: np.ndarray
+    contacts: np.ndarray
+    motion: np.ndarray
+    other: np.ndarray
+    found: np.ndarray
 
 
 def numbers(wheelset: Wheelset) -> np.ndarray:
@@ -66,13 +85,21 @@ def net(wheelset: Wheelset, cells: int = 21) -> tuple[np.ndarray, np.ndarray, fl
     return found.strips, found.cells, found.middle
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def patches(p):
     """How many contacts both wheels together can have: one each of cones, one for each zone of profiles."""
     return 2 if p.size == NUMBERS else 2 * int(p[NUMBERS + ZONES])
 
 
 @njit(cache=True, error_model="numpy")
+def room_for(p):
+    """``Room`` for the contacts of these numbers."""
+    n = patches(p)
+    return Room(np.empty((4, 3)), np.empty((n, TOUCH)), np.empty((n, 10)), np.empty((n, MOVED)), np.empty((n, 4)),
+                np.empty((n, 4)))  # fmt: skip
+
+
+@inlined
 def contact_points(y, z, roll, yaw, p, touches):
     """Fill ``touches`` (patches, TOUCH), the right wheel's first; without a normal where nothing is near."""
     each = len(touches) // 2
@@ -85,8 +112,7 @@ def contact_points(y, z, roll, yaw, p, touches):
                                                             p[CONICITY], p[HEAD])  # fmt: skip
         touch = own[0]
         touch[DEEP], touch[N_Y], touch[N_Z], touch[X_], touch[Y_], touch[Z_] = depth, n_y, n_z, cx, cy, cz
-        touch[ALONG] = 0.5 / (rolling * math.sqrt(1.0 + p[CONICITY] * p[CONICITY]))
-        touch[ACROSS] = 0.5 / p[HEAD]
+        touch[ALONG], touch[ACROSS] = _along(rolling, p[CONICITY]), 0.5 / p[HEAD]
 
 
 @njit(cache=True, error_model="numpy")
@@ -99,113 +125,173 @@ def carried(z, p):
     return whole
 
 
-@njit(cache=True, error_model="numpy")
-def linear_creep(contacts, p, found):
-    """Fill fx, fy, mz by Kalker's coefficients."""
+@inlined
+def _linear(a, b, x, y, spin, shear, poisson):
+    """Creep forces and moment of one patch by Kalker's coefficients."""
+    if a <= 0.0:
+        a, b, x, y, spin = 1.0, 1.0, 0.0, 0.0, 0.0
+    area, ratio = a * b, a / b
+    turn = area**1.5 * coefficient_at(2, ratio, poisson)
+    fx = -shear * area * coefficient_at(0, ratio, poisson) * x
+    fy = -shear * (area * coefficient_at(1, ratio, poisson) * y + turn * spin)
+    return fx, fy, shear * (turn * y - area**2 * coefficient_at(3, ratio, poisson) * spin)
+
+
+@inlined
+def _one_way(sign, contacts, slip, speed, p, strips, cells, middle, law, found):
+    """Fill fx, fy, mz of wheels that roll forwards (sign 1), or of the mirror image of those that roll backwards."""
     for k in range(len(contacts)):
-        a, b = contacts[k, 0], contacts[k, 1]
-        found[k] = 0.0
-        if a > 0.0:
-            area, x, y, spin = a * b, contacts[k, XI_X], contacts[k, XI_X + 1], contacts[k, SPIN]
-            turn = area**1.5 * coefficient_at(2, a / b, p[POISSON])
-            found[k, 0] = -p[SHEAR] * area * coefficient_at(0, a / b, p[POISSON]) * x
-            found[k, 1] = -p[SHEAR] * (area * coefficient_at(1, a / b, p[POISSON]) * y + turn * spin)
-            found[k, 2] = p[SHEAR] * (turn * y - area**2 * coefficient_at(3, a / b, p[POISSON]) * spin)
+        contacts[k, XI_X] = sign * slip[k, VX] / max(abs(speed), REGULAR)
+        contacts[k, XI_X + 1] = slip[k, ASIDE] / max(abs(speed), REGULAR)
+        contacts[k, SPIN] = sign * slip[k, TURN] / max(abs(speed), REGULAR)
+    if law == FASTSIM:
+        forces(contacts, strips, cells, middle, BLEND, ORDER, found)
+    else:
+        for k in range(len(contacts)):
+            found[k, 0], found[k, 1], found[k, 2] = _linear(
+                contacts[k, 0], contacts[k, 1], contacts[k, XI_X], contacts[k, XI_X + 1], contacts[k, SPIN], p[SHEAR],
+                p[POISSON])  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
-def creep(contacts, slip, speed, p, strips, cells, middle, law, found):
-    """Fill fx, fy, mz of contacts (n, 10) from their slip (n, 3): velocities along x, along y (m/s), turning (1/s).
-
-    The creepages are written into the contacts; for a wheel that rolls backwards those of its mirror image.
-    """
-    forwards = min(1.0, max(0.0, 0.5 + 0.5 * speed / REGULAR))
+@lean
+def _both_ways(forwards, contacts, slip, speed, p, strips, cells, middle, law, some, found):
+    """Fill fx, fy, mz of wheels that roll forwards by a share, with ``some`` as room."""
     found[:] = 0.0
-    some = np.empty((len(contacts), 4))
+    for sign in (1.0, -1.0):
+        share = forwards if sign > 0.0 else 1.0 - forwards
+        if share > 0.0:
+            _one_way(sign, contacts, slip, speed, p, strips, cells, middle, law, some)
+            for k in range(len(contacts)):
+                found[k, 0] += share * sign * some[k, 0]
+                found[k, 1] += share * some[k, 1]
+                found[k, 2] += share * sign * some[k, 2]
+
+
+@inlined
+def creep(contacts, slip, speed, p, strips, cells, middle, law, some, found):
+    """Fill fx, fy, mz of contacts (n, 10) from their slip, the first columns of their motion (n, MOVED).
+
+    The creepages are written into the contacts; for a wheel that rolls backwards those of its mirror image. ``some``,
+    of the shape of ``found`` (n, 4), is written over.
+    """
     if law == FASTSIM:
         for contact in contacts:
             contact[7], contact[8], contact[9] = flexibilities_at(contact[0], contact[1], p[SHEAR], p[POISSON])
-    for sign in (1.0, -1.0):
-        share = forwards if sign > 0.0 else 1.0 - forwards
-        if share == 0.0:
-            continue
-        for k in range(len(contacts)):
-            for i in range(3):
-                mirrored = sign if i != 1 else 1.0
-                contacts[k, XI_X + i] = mirrored * slip[k, i] / max(abs(speed), REGULAR)
-        if law == FASTSIM:
-            forces(contacts, strips, cells, middle, BLEND, ORDER, some)
-        else:
-            linear_creep(contacts, p, some)
-        for k in range(len(contacts)):
-            found[k, 0] += share * sign * some[k, 0]
-            found[k, 1] += share * some[k, 1]
-            found[k, 2] += share * sign * some[k, 2]
+    if speed >= REGULAR:
+        _one_way(1.0, contacts, slip, speed, p, strips, cells, middle, law, found)
+    else:
+        forwards = max(0.0, 0.5 + 0.5 * speed / REGULAR)
+        _both_ways(forwards, contacts, slip, speed, p, strips, cells, middle, law, some, found)
 
 
-@njit(cache=True, error_model="numpy")
-def wheel_forces(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, law, force, moment, report):
+@inlined
+def wheel_forces(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, law, force, moment, report, room):
     """Add what both rails do to the wheelset to ``force`` and ``moment`` (3,), about its centre, in the track's axes.
 
     y, z : of the wheelset's centre (m), roll, yaw : rad; velocity (3,) : of the centre in the track, the speed of
     travel first (m/s); turning (3,) : angular velocity, spin about the axle included, in the track's axes (rad/s);
-    p : ``numbers``; strips, cells, middle : ``net``; law : LINEAR or FASTSIM; report (patches, REPORTED) is filled.
+    p : ``numbers``; strips, cells, middle : ``net``; law : LINEAR or FASTSIM; report (patches, REPORTED) is filled, or
+    has no rows where nobody asks; room : written over.
     """
-    n = patches(p)
-    work, some = np.zeros((TOUCH + 18) * n), 0  # one array: to make it costs as much as a wheel's kinematics
-    touches, contacts = work[: TOUCH * n].reshape(n, TOUCH), work[TOUCH * n : (TOUCH + 10) * n].reshape(n, 10)
-    slip, found = work[(TOUCH + 10) * n : -5 * n].reshape(n, 3), work[-5 * n : -n].reshape(n, 4)
-    row = work[-n:]
+    if law == LINEAR and p.size == NUMBERS and velocity[0] >= REGULAR:
+        _linear_cones(y, z, roll, yaw, velocity, turning, p, force, moment, report)
+    else:
+        _patch_by_patch(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, law, force, moment, report, room)
+
+
+@inlined
+def _linear_cones(y, z, roll, yaw, velocity, turning, p, force, moment, report):
+    """``_patch_by_patch`` of cones with the linear law, rolling forwards: nothing is written down in between."""
+    speed, radius, gauge, cone, head = velocity[0], p[RADIUS], p[HALF_GAUGE], p[CONICITY], p[HEAD]  # read once
+    modulus, shear, poisson, damping = p[MODULUS], p[SHEAR], p[POISSON], p[DAMPING]
+    for side in (RIGHT, LEFT):
+        depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, y, z, roll, yaw, radius, gauge, cone, head)
+        vx, vy, aside, turn, rate = _moving(n_y, n_z, cx, cy, cz, velocity, turning)
+        elastic, a, b = pressed(depth, _along(rolling, cone), 0.5 / head, modulus)
+        fx, fy, mz = _linear(a, b, vx / speed, aside / speed, turn / speed, shear, poisson)
+        load, push = elastic * max(0.0, 1.0 + damping * rate), _flange(side, y, p)
+        _act(n_y, n_z, cx, cy, cz, load, push, fx, fy, mz, force, moment)
+        if len(report) > 0:
+            _tell(n_y, n_z, cx, cy, cz, depth, a, b, load, push, vx, vy, aside, turn, rate, elastic, fx, fy, mz, speed,
+                  report[0 if side == RIGHT else 1])  # fmt: skip
+
+
+@lean
+def _patch_by_patch(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, law, force, moment, report, room):
+    """``wheel_forces`` of all patches, laws and directions."""
+    touches, contacts, motion, n, some = room.touches, room.contacts, room.motion, len(room.touches), 0
     contact_points(y, z, roll, yaw, p, touches)
     for k in range(n):
-        report[k] = 0.0
-        if touches[k, N_Z] == 0.0 and touches[k, N_Y] == 0.0:
-            continue
-        side = RIGHT if 2 * k < n else LEFT
-        if p.size == NUMBERS:
-            report[k, FLANGE_FORCE] = -side * p[FLANGE] * max(0.0, side * y - p[CLEARANCE])
-        _press(touches[k], velocity, turning, p, contacts[some], slip[some], report[k])
-        row[some], some = k, some + 1
-    creep(contacts[:some], slip[:some], velocity[0], p, strips, cells, middle, law, found[:some])
+        if touches[k, N_Z] != 0.0 or touches[k, N_Y] != 0.0:
+            push = _flange(RIGHT if 2 * k < n else LEFT, y, p) if p.size == NUMBERS else 0.0
+            _press(touches[k], velocity, turning, p, push, contacts[some], motion[some])
+            motion[some, PATCH], some = k, some + 1
+    creep(contacts[:some], motion[:some], velocity[0], p, strips, cells, middle, law, room.other[:some],
+          room.found[:some])  # fmt: skip
+    report[:] = 0.0
     for i in range(some):
-        k = int(row[i])
-        _act(touches[k], slip[i], found[i], velocity[0], force, moment, report[k])
+        k = int(motion[i, PATCH])
+        n_y, n_z, cx, cy, cz = touches[k, N_Y], touches[k, N_Z], touches[k, X_], touches[k, Y_], touches[k, Z_]
+        a, b, load, push = contacts[i, 0], contacts[i, 1], contacts[i, 2], motion[i, PUSH]
+        fx, fy, mz = room.found[i, 0], room.found[i, 1], room.found[i, 2]
+        _act(n_y, n_z, cx, cy, cz, load, push, fx, fy, mz, force, moment)
+        if len(report) > 0:
+            _tell(n_y, n_z, cx, cy, cz, touches[k, DEEP], a, b, load, push, motion[i, VX], motion[i, VY],
+                  motion[i, ASIDE], motion[i, TURN], motion[i, RATE], motion[i, ELASTIC], fx, fy, mz, velocity[0],
+                  report[k])  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
-def _press(touch, velocity, turning, p, contact, slip, report):
-    """Kinematics and normal force of one patch: its contact (10,) for the creep law, its slip (3,), its report."""
-    n_y, n_z, cx, cy, cz = touch[N_Y], touch[N_Z], touch[X_], touch[Y_], touch[Z_]
+@inlined
+def _along(rolling, conicity):
+    """Curvature (1/m) of a cone along the track."""
+    return 0.5 / (rolling * math.sqrt(1.0 + conicity * conicity))
+
+
+@inlined
+def _flange(side, y, p):
+    """Lateral force (N) of a cone's flange."""
+    return -side * p[FLANGE] * max(0.0, side * y - p[CLEARANCE])
+
+
+@inlined
+def _moving(n_y, n_z, cx, cy, cz, velocity, turning):
+    """Slip along, velocity across the track, slip across, turning about the normal, speed of approach of a patch."""
     vx = velocity[0] + turning[1] * cz - turning[2] * cy
     vy = velocity[1] + turning[2] * cx - turning[0] * cz
     vz = velocity[2] + turning[0] * cy - turning[1] * cx
-    slip[0], slip[1] = vx, n_z * vy - n_y * vz
-    slip[2] = turning[1] * n_y + turning[2] * n_z
-    rate = n_y * vy + n_z * vz
+    return vx, vy, n_z * vy - n_y * vz, turning[1] * n_y + turning[2] * n_z, n_y * vy + n_z * vz
+
+
+@inlined
+def _press(touch, velocity, turning, p, push, contact, motion):
+    """Kinematics and normal force of one patch: its contact (10,) for the creep law, its motion (MOVED,)."""
+    vx, vy, aside, turn, rate = _moving(touch[N_Y], touch[N_Z], touch[X_], touch[Y_], touch[Z_], velocity, turning)
     elastic, a, b = pressed(touch[DEEP], touch[ALONG], touch[ACROSS], p[MODULUS])
-    load = elastic * max(0.0, 1.0 + p[DAMPING] * rate)
-    contact[0], contact[1], contact[2], contact[3] = a, b, load, p[FRICTION]
-    report[LOAD], report[A], report[B], report[DEPTH] = load, a, b, touch[DEEP]
-    report[ANGLE] = math.atan2(-n_y, n_z)
-    report[PLACE_X], report[PLACE_Y], report[PLACE_Z] = cx, cy, cz
-    report[ELASTIC_POWER] = report[FLANGE_FORCE] * vy - elastic * rate
-    report[DAMPING_POWER] = (elastic - load) * rate
+    motion[VX], motion[ASIDE], motion[TURN] = vx, aside, turn
+    motion[RATE], motion[VY], motion[ELASTIC], motion[PUSH] = rate, vy, elastic, push
+    contact[0], contact[1], contact[3] = a, b, p[FRICTION]
+    contact[2] = elastic * max(0.0, 1.0 + p[DAMPING] * rate)
 
 
-@njit(cache=True, error_model="numpy")
-def _act(touch, slip, found, speed, force, moment, report):
-    """Add one patch's forces to force and moment; the rest of its report."""
-    n_y, n_z, cx, cy, cz = touch[N_Y], touch[N_Z], touch[X_], touch[Y_], touch[Z_]
-    fx, fy, mz = found[0], found[1], found[2]
-    across = n_z * fy - n_y * report[LOAD] + report[FLANGE_FORCE]
-    down = -n_y * fy - n_z * report[LOAD]
+@inlined
+def _act(n_y, n_z, cx, cy, cz, load, push, fx, fy, mz, force, moment):
+    """Add one patch's forces to force and moment."""
+    across, down = n_z * fy - n_y * load + push, -n_y * fy - n_z * load
     force[0] += fx
     force[1] += across
     force[2] += down
     moment[0] += cy * down - cz * across
     moment[1] += cz * fx - cx * down + n_y * mz
     moment[2] += cx * across - cy * fx + n_z * mz
-    report[FX], report[FY], report[MZ] = fx, fy, mz
-    for i in range(3):
-        report[XI_1 + i] = slip[i] / max(abs(speed), REGULAR)
-    report[POWER] = fx * slip[0] + fy * slip[1] + mz * slip[2]
+
+
+@lean
+def _tell(n_y, n_z, cx, cy, cz, depth, a, b, load, push, vx, vy, aside, turn, rate, elastic, fx, fy, mz, speed, report):
+    """Fill one patch's report."""
+    report[LOAD], report[FX], report[FY], report[MZ] = load, fx, fy, mz
+    by = max(abs(speed), REGULAR)
+    report[XI_1], report[XI_2], report[XI_3] = vx / by, aside / by, turn / by
+    report[A], report[B], report[DEPTH], report[ANGLE] = a, b, depth, math.atan2(-n_y, n_z)
+    report[POWER] = fx * vx + fy * aside + mz * turn
+    report[PLACE_X], report[PLACE_Y], report[PLACE_Z], report[FLANGE_FORCE] = cx, cy, cz, push
+    report[ELASTIC_POWER], report[DAMPING_POWER] = push * vy - elastic * rate, (elastic - load) * rate

@@ -1,7 +1,8 @@
 """A free wheelset on cones written out for that alone: Kalker's linear creep forces and Hertz' load, nothing else.
 
 No suspension, flange, contact damping, profiles or FASTSIM, and no way to have them; the equations are those in the
-head of ``models.rail.equations``. Where cones touch rails, Hertz' theory and Kalker's coefficients are the contact's.
+head of ``models.rail.equations``, and what it tells of its contacts are the columns of ``models.rail.wheel_forces``.
+Where cones touch rails, Hertz' theory and Kalker's coefficients are the contact's.
 """
 
 from collections.abc import Callable
@@ -9,73 +10,83 @@ from typing import Any
 
 import numpy as np
 
-from models.compiled import njit
+from models.compiled import lean, njit
 from models.contact.linear_theory import coefficient_at
 from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
 from models.rail.profile_contact import pressed
 
-STATES = 10
+STATES, COLUMNS = 10, 18
 
 
-@njit(cache=True, error_model="numpy")
-def rates(state, speed, p, out):
-    """Rates (10,) of y, z, roll, yaw, angle of spin and of their rates; p: mass, inertias along and across, weight of
-    each side, radius, half gauge, conicity, head radius, modulus, shear modulus, Poisson's ratio."""
+@lean
+def rates(state, speed, p, told, out, report):
+    """Rates (10,) of y, z, roll, yaw, angle of spin and of their rates; report (2, 18) of the contacts, if it is told;
+    p: mass, inertias along and across, weight of each side, radius, half gauge, conicity, head radius, modulus, shear
+    modulus, Poisson's ratio."""
     mass, along, across, carried, radius, gauge, cone, head, modulus, shear, poisson = p
     y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = state
     cr, sr, cy, sy = np.cos(roll), np.sin(roll), np.cos(yaw), np.sin(yaw)
     own = spin - yaw_rate * sr
     wx, wy, wz = cy * roll_rate - sy * cr * own, sy * roll_rate + cy * cr * own, yaw_rate + sr * own
-    fy, fz, mx, my, mz = 0.0, 2.0 * carried, 0.0, 0.0, 0.0
+    fy = fz = mx = my = mz = 0.0
     for side in (RIGHT, LEFT):
         depth, rolling, n_y, n_z, px, py, pz = cone_on_rail(side, y, z, roll, yaw, radius, gauge, cone, head)
         load, a, b = pressed(depth, 0.5 / (rolling * np.sqrt(1.0 + cone * cone)), 0.5 / head, modulus)
-        if a == 0.0:
-            continue
         vx, vy, vz = speed + wy * pz - wz * py, y_rate + wz * px - wx * pz, z_rate + wx * py - wy * px
-        xi_x, xi_y, xi_spin = vx / speed, (n_z * vy - n_y * vz) / speed, (wy * n_y + wz * n_z) / speed
-        area, ratio = a * b, a / b
-        turn = area**1.5 * coefficient_at(2, ratio, poisson)
-        ahead = -shear * area * coefficient_at(0, ratio, poisson) * xi_x
-        aside = -shear * (area * coefficient_at(1, ratio, poisson) * xi_y + turn * xi_spin)
-        moment = shear * (turn * xi_y - area**2 * coefficient_at(3, ratio, poisson) * xi_spin)
+        slip, turning = n_z * vy - n_y * vz, wy * n_y + wz * n_z
+        xi_x, xi_y, xi_spin, ahead, aside, moment = vx / speed, slip / speed, turning / speed, 0.0, 0.0, 0.0
+        if a > 0.0:
+            area, ratio = a * b, a / b
+            turn = area**1.5 * coefficient_at(2, ratio, poisson)
+            ahead = -shear * area * coefficient_at(0, ratio, poisson) * xi_x
+            aside = -shear * (area * coefficient_at(1, ratio, poisson) * xi_y + turn * xi_spin)
+            moment = shear * (turn * xi_y - area**2 * coefficient_at(3, ratio, poisson) * xi_spin)
         left, down = n_z * aside - n_y * load, -n_y * aside - n_z * load
         fy, fz = fy + left, fz + down
-        mx, my, mz = (mx + py * down - pz * left, my + pz * ahead - px * down + n_y * moment,
-                      mz + px * left - py * ahead + n_z * moment)  # fmt: skip
+        mx, my, mz = (mx + (py * down - pz * left), my + (pz * ahead - px * down + n_y * moment),
+                      mz + (px * left - py * ahead + n_z * moment))  # fmt: skip
+        if told:
+            power = ahead * vx + aside * slip + moment * turning
+            line = (load, ahead, aside, moment, xi_x, xi_y, xi_spin, a, b, depth, power, np.arctan2(-n_y, n_z),
+                    px, py, pz, 0.0, -load * (n_y * vy + n_z * vz), 0.0)  # fmt: skip
+            for k in range(COLUMNS):
+                report[0 if side == RIGHT else 1, k] = line[k]
     m1, level = cy * mx + sy * my, cy * my - sy * mx
     m2, m3 = cr * level + sr * mz, cr * mz - sr * level
     out[0], out[1], out[2], out[3], out[4] = y_rate, z_rate, roll_rate, yaw_rate, own
-    out[5], out[6], out[9] = fy / mass, fz / mass + 9.81, m2 / along
+    out[5], out[6], out[9] = fy / mass, (fz + 2.0 * carried) / mass + 9.81, m2 / along
     out[7] = (m1 + along * spin * yaw_rate * cr) / across - yaw_rate**2 * sr * cr
     out[8] = ((m3 - along * spin * roll_rate) / across + 2.0 * roll_rate * yaw_rate * sr) / cr
 
 
 @njit(cache=True, error_model="numpy")
-def march(state, speed, step, p, path):
-    """The classical Runge-Kutta method from a state (10,); fills the path (steps + 1, 10)."""
+def march(state, speed, step, p, path, reports):
+    """The classical Runge-Kutta method from a state (10,); fills path (steps + 1, 10), reports (steps + 1, 2, 18)."""
     total, rate, here = np.empty(STATES), np.empty(STATES), np.empty(STATES)
     path[0] = state
-    for i in range(len(path) - 1):
-        total[:] = 0.0
+    for i in range(len(path)):
         for stage in range(4):
-            here[:] = path[i]
-            if stage > 0:
-                here += (step if stage == 3 else 0.5 * step) * rate
-            rates(here, speed, p, rate)
-            total += (1.0 if stage % 3 == 0 else 2.0) * rate
-        path[i + 1] = path[i] + step / 6.0 * total
+            for k in range(STATES):
+                here[k] = path[i, k] + (step if stage == 3 else 0.5 * step) * rate[k] if stage > 0 else path[i, k]
+            rates(here, speed, p, stage == 0, rate, reports[i])
+            for k in range(STATES):
+                total[k] = total[k] + (1.0 if stage == 3 else 2.0) * rate[k] if stage > 0 else rate[k]
+            if i == len(path) - 1:
+                return
+        for k in range(STATES):
+            path[i + 1, k] = path[i, k] + step / 6.0 * total[k]
 
 
-def run(wheelset: Any, state: np.ndarray, speed: float, step: float, steps: int) -> Callable[[], np.ndarray]:
-    """One run of a free wheelset (``models.rail.wheelset``) that gives its states (steps + 1, 10)."""
+def run(wheelset: Any, state: np.ndarray, speed: float, step: float, steps: int) -> Callable[[], Any]:
+    """One run of a free wheelset (``models.rail.wheelset``) that gives its states (steps + 1, 10) and its contacts
+    (steps + 1, 2, 18)."""
     w, pair = wheelset, wheelset.pair
     p = (w.mass, w.spin_inertia, w.yaw_inertia, (w.load - w.mass * 9.81) / 2.0, w.radius, w.half_gauge, w.conicity,
          w.head_radius, pair.modulus, pair.G, pair.nu)  # fmt: skip
-    path = np.empty((steps + 1, STATES))
 
-    def marched() -> np.ndarray:
-        march(state, speed, step, p, path)
-        return path
+    def marched() -> tuple[np.ndarray, np.ndarray]:
+        path, reports = np.empty((steps + 1, STATES)), np.empty((steps + 1, 2, COLUMNS))
+        march(state, speed, step, p, path, reports)
+        return path, reports
 
     return marched

@@ -16,7 +16,7 @@ from models.scene_effects import module_of, names_of
 from models.simulate import outputs
 from models.systems import DEFAULT
 from models.time_series import write_time_series
-from validation.absence import of_systems, ride, wheelset
+from validation.absence import machinery, of_systems, ride, wheelset
 from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, user_functions
 from validation.rows import Row, System, at_most, behaves
 
@@ -100,7 +100,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         rows = [*_imports(), *(row for engine in ENGINES for row in _absence(engine, place))]
         rows += [_control(effect, place, ENGINES[i % len(ENGINES) :][:1] if quick else ENGINES)
                  for i, effect in enumerate(EFFECTS)]  # fmt: skip
-    return rows + ride.rows(quick) + wheelset.rows() + of_systems.rows(quick), {}
+    return rows + ride.rows(quick) + wheelset.rows() + machinery.rows() + of_systems.rows(quick), {}
 
 
 def _imports() -> list[Row]:

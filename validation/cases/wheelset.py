@@ -1,11 +1,10 @@
 """A wheelset on straight track in three implementations: wave, critical speed, paths, limit cycles, power, faults."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import numpy as np
 from scipy.optimize import brentq
@@ -20,7 +19,7 @@ from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
 from models.rail.of_scene import IMPLEMENTATIONS, implementation
 from models.rail.orbit import Orbit, beside, refined, solved
 from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
-from validation.faults.patches import with_globals
+from validation.faults import wheelset as faults
 from validation.rows import Row, System, Table, at_most, behaves, within
 
 TITLE = "A wheelset on straight track"
@@ -284,19 +283,14 @@ def _open(equations: Equations, step: float) -> float:
     return float(np.abs(book.residual).max() / book.creep[-1])
 
 
-@contextmanager
-def spin_reversed() -> Iterator[None]:
+def spin_reversed() -> AbstractContextManager[None]:
     """The written equations with the sign of the spin creepage turned, run as plain Python."""
 
     def faulty(contacts: np.ndarray, slip: np.ndarray, *others: Any) -> None:
         slip[:, 2] *= -1.0
         wf.creep(contacts, slip, *others)
 
-    source = wf.wheel_forces.py_func
-    with mock.patch.object(eq, "wheel_forces", with_globals(source, creep=faulty)), mock.patch.object(
-        eq, "rates", eq.rates.py_func
-    ):
-        yield
+    return faults.written(creep=faulty)()()
 
 
 def _fault_rows() -> list[Row]:

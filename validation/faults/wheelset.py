@@ -123,13 +123,14 @@ CHECKS = {
 
 
 def written(**functions: Any) -> Patch:
-    """The equations as plain Python, the forces of both rails with functions replaced."""
+    """The equations as plain Python, the forces of both rails patch by patch with functions replaced."""
 
     def prepare() -> Context:
         @contextmanager
         def context() -> Iterator[None]:
-            faulty = with_globals(wf.wheel_forces.py_func, **functions)
-            with mock.patch.object(eq, "wheel_forces", faulty), mock.patch.object(eq, "rates", eq.rates.py_func):
+            each = with_globals(wf._patch_by_patch.py_func, **functions)
+            faulty = with_globals(wf.wheel_forces.py_func, LINEAR=None, _patch_by_patch=each)
+            with mock.patch.multiple(eq, wheel_forces=faulty, rates=eq.rates.py_func, set_rates=eq.set_rates.py_func):
                 yield
 
         return context

@@ -1,0 +1,88 @@
+"""What the loop of a bare scene costs beside one that was written for that scene alone: seconds, and arrays made."""
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numba.core.runtime import _nrt_python, rtsys
+
+from models.rail.equations import Path
+from models.rail.of_scene import equations_of
+from models.rail.wheel_forces import LOAD, MZ
+from validation.absence import braking, hand_built_wheelset, wheelset
+from validation.absence.of_systems import bare
+from validation.rows import Row, System, at_most
+from validation.timing import interleave, paired_ratio
+
+SYSTEM: System = "effects"
+STEP, SHORT = 5e-4, 40
+"""Step of the wheelset's runs (s); steps of the shorter one of two that are counted."""
+
+
+def arrays(job: Callable[[], Any]) -> int:
+    """Arrays that compiled code makes in a job, by numba's own count."""
+    _nrt_python.memsys_enable_stats()
+    try:
+        before = rtsys.get_allocation_stats().alloc
+        job()
+        return int(rtsys.get_allocation_stats().alloc - before)
+    finally:
+        _nrt_python.memsys_disable_stats()
+
+
+def wheelsets(steps: int) -> tuple[Callable[[], Path], Callable[[], Path]]:
+    """Runs of a bare wheelset and of one written out for linear creep on cones alone, whose path passes the same
+    checks: both give states and contacts."""
+    own, times = equations_of(bare("wheelset"), "reference", wheelset.SPEED), STEP * np.arange(steps + 1)
+    start = own.displaced(1e-3)
+    theirs = hand_built_wheelset.run(own.wheelset, start, wheelset.SPEED, STEP, steps)
+
+    def written() -> Path:
+        found = Path(times, *theirs())
+        own._check(found, STEP, 1, "written")
+        return found
+
+    return lambda: own.run(start, steps * STEP, STEP), written
+
+
+def ratio_of_wheelsets(steps: int, rounds: int) -> tuple[float, tuple[float, float, float]]:
+    """Largest difference of states and contact forces (m, rad, m/s, rad/s; shares of the load), ratio of seconds."""
+    jobs = wheelsets(steps)
+    ours, theirs = (job() for job in jobs)
+    forces = slice(LOAD, MZ + 1)
+    apart = np.abs(ours.contacts - theirs.contacts)[..., forces].max() / theirs.contacts[..., LOAD].max()
+    gap = max(np.abs(ours.states - theirs.states).max(), apart)
+    return float(gap), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))
+
+
+def made_by_wheelset(which: int) -> int:
+    """Arrays that more steps of the bare wheelset (0) or the written one (1) make."""
+    short, long = (wheelsets(steps)[which] for steps in (SHORT, 10 * SHORT))
+    short(), long()
+    return arrays(long) - arrays(short)
+
+
+def made_by_braking() -> int:
+    """Arrays that more samples of a bare manoeuvre of a braked vehicle make."""
+    from models.braking.procedures import drive
+
+    slow, fast = (bare("braking", procedures={braking.STOP: {"kind": "j_turn", "speed": speed, "steer": 0.02}})
+                  for speed in (1.0, 3.0))  # fmt: skip
+    counts = []
+    for scene in (slow, fast):
+        drive(scene, braking.STOP, "reference")
+        counts.append(arrays(partial(drive, scene, braking.STOP, "reference")))
+    return counts[1] - counts[0]
+
+
+def rows() -> list[Row]:
+    """Arrays made in the loops of bare scenes."""
+    why = "a short run against a long one, by the count of numba's own memory; no effect is there that could make one"
+    return [
+        at_most("absent.wheelset.arrays", SYSTEM, "arrays that 360 more steps of a bare wheelset make",
+                made_by_wheelset(0), "", 0, why, "none"),
+        at_most("absent.braking.arrays", SYSTEM, "arrays that 180 more samples of a bare braked vehicle make, in four "
+                "steps each", made_by_braking(), "", 0, why, "none"),
+    ]  # fmt: skip
