@@ -1,9 +1,11 @@
 """The work-precision figure: error over what work is counted in and over seconds, a curve per integrator."""
 
 from collections import defaultdict
+from itertools import pairwise
 from textwrap import fill
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -37,7 +39,6 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
         _front(ax, problem, points, kind)
         for curve, own in by_curve(points).items():
             _curve(ax, problem, own, kind, styles[curve])
-        _defaults(ax, problem, points, kind)
         timed = kind == "seconds"
         label = "seconds for the run, model built anew (median)" if timed else f"{kind} in the run"
         ax.set(xscale="log", yscale="log", xlabel=label)
@@ -48,6 +49,8 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
     quantity = quantity_of(problem)
     axes[0].set_ylabel(f"error of the {quantity} [{problem['units'][quantity]}]")
     axes[0].set_ylim(0.3 * problem["uncertainty"][quantity], 12 * top)
+    for ax, kind in zip(axes, cost.costs(points), strict=True):
+        _defaults(ax, problem, points, kind)
     alike = "; ".join(named(group[0], [group]) for group in groups_of(problem, points))
     title = fill(f"What accuracy costs. {problem['title']}", 120)
     same = fill(f"Same error at the same setting: {alike}.", 165) if alike else ""
@@ -115,21 +118,48 @@ def _front(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) ->
 
 
 def _defaults(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> None:
-    """Ring and name each engine's default setting."""
+    """Ring and name each engine's default setting, where the panel is emptiest."""
+    quantity = quantity_of(problem)
     found = [(owner, p) for owner, p in cost.defaults(points).items() if p.status == "ok"]
-    for (owner, p), text in zip(found, PLACES[kind], strict=False):
-        place = (p.cost(kind), p.errors[quantity_of(problem)])
+    taken = _drawn(ax, problem, points, kind)
+    for owner, p in found:
+        place = (p.cost(kind), p.errors[quantity])
         ax.plot(*place, "o", markersize=15, markerfacecolor="none", markeredgecolor="#111111", markeredgewidth=1.4,
                 zorder=5)  # fmt: skip
+        corner = _emptiest(taken, _within(ax, [place])[0])
+        taken = np.vstack([taken, corner + LABEL * np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]])])
         ax.annotate(f"{owner} default:\n{p.setting.method},\n{p.setting.label()}", place, fontsize=8.5,
-                    xytext=text, textcoords="axes fraction", ha="left", va="center", zorder=6,
-                    arrowprops={"arrowstyle": "-", "color": "#111111", "linewidth": 0.7, "shrinkB": 7,
-                                "relpos": (0.12, 1) if kind == "force calls" else (1, 0.5)})  # fmt: skip
+                    xytext=(float(corner[0]), float(corner[1])), textcoords="axes fraction", ha="left", va="center",
+                    zorder=6, arrowprops={"arrowstyle": "-", "color": "#111111", "linewidth": 0.7, "shrinkB": 7})
 
 
-PLACES = {"force calls": ((0.015, 0.36), (0.17, 0.46)), "contact cells": ((0.4, 0.75), (0.6, 0.75)),
-          "seconds": ((0.015, 0.85), (0.015, 0.95))}  # fmt: skip
-"""Where the defaults are named, by what work is counted in, in fractions of the panel: a corner that is left empty."""
+LABEL = np.array([0.27, 0.09])
+"""Width and height of a default's name, in fractions of the panel."""
+CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.74, 13) for y in np.linspace(0.2, 0.92, 17)])
+"""Where a name may stand: the middle of its left side, clear of the bands below and of what is told above."""
+
+
+def _within(ax: Axes, places: list[tuple[float, float]]) -> np.ndarray:
+    """Fractions of the panel (n, 2)."""
+    return np.asarray((ax.transData - ax.transAxes).transform(np.array(places, float).reshape(-1, 2)))
+
+
+def _drawn(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> np.ndarray:
+    """Places along all curves of a panel, in its fractions (n, 2)."""
+    along = [np.empty((0, 2))]
+    for own in by_curve(points).values():
+        ends = _within(ax, [(p.cost(kind), p.errors[quantity_of(problem)]) for p in own])
+        along += [one + (two - one) * np.linspace(0.0, 1.0, 9)[:, None] for one, two in pairwise(ends)] + [ends]
+    return np.vstack(along)
+
+
+def _emptiest(taken: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Of CORNERS, one whose name keeps off what is taken, near its own place where several do."""
+    middles = CORNERS + LABEL * np.array([0.5, 0.0])
+    apart = np.abs(middles[:, None] - taken) / (0.5 * LABEL)
+    clear = np.minimum(apart.max(axis=2).min(axis=1), 1.8)
+    far = np.hypot(*(middles - own).T)
+    return np.asarray(CORNERS[np.argmax(clear - 0.3 * far)])
 
 
 def _failures(ax: Axes, points: list[Point], top: float) -> None:
@@ -161,8 +191,8 @@ def _who(failed: list[Point], status: str) -> str:
     if status == "flagged":
         return ", ".join(dict.fromkeys(f"{p.setting.curve} (cross, see table)" for p in own))
     unstable = [p for p in own if not p.setting.adaptive]
-    what = "steps beyond stability" if status == "refused" else "settings"
-    parts = [f"{len(unstable)} {what} (crosses)"] if unstable else []
+    what = "beyond stability, steps" if status == "refused" else "settings"
+    parts = [f"{what}: {len(unstable)} (crosses)"] if unstable else []
     parts += [f"{p.setting.method} ({'not implemented' if 'not implemented' in p.reason else 'see table'})"
               for p in own if p.setting.adaptive]  # fmt: skip
     return ", ".join(parts)

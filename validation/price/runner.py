@@ -28,7 +28,8 @@ RIVALS = ("exudyn", "mujoco")
 NEAR = 1.25
 """A curve that takes up to so many times the least seconds in one run may be the cheapest: rounds tell."""
 SLOW, EVERY = 0.05, 3
-"""A setting that takes longer (s) is timed in every third round alone: a long run wanders less."""
+"""A setting that takes longer (s) is timed in every third round alone, its first run as the first: a long run wanders
+less."""
 FEWEST = 5
 """With fewer rounds no interval is told: that of one would look exact."""
 DRAWS = 200

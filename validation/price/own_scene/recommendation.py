@@ -24,6 +24,13 @@ from validation.timing import interleave, paired_ratio
 SYSTEMS = {system: f"validation.price.own_scene.{module}" for system, module in (
     ("pitch-plane", "pitch_plane"), ("wheelset", "wheelset"), ("handling", "handling"), ("braking", "braking"))}
 """Systems whose scenes have a price, and the modules that know them."""
+WITHOUT = {
+    "ride": "answers by covariances, which have no step; what its effects cost is told by `show SCENE --price`",
+    "hub-forces": 'takes whole parts of its samples for steps, the longest of which a choice, study = "choice", finds',
+    "contact": "has cells in place of steps, which the study contact_price prices",
+    "measured": "takes the samples of its files for steps",
+}
+"""Why others have none, and what there is instead."""
 NEAR = 2.0
 """Settings that took up to so many times the least seconds in one run are timed beside one another."""
 FAR = 8.0
@@ -87,8 +94,9 @@ def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in the quantity's unit")
     if scene.system not in SYSTEMS:
-        raise InputError(scene.file, "system", scene.system, "has no price of accuracy in steps; scenes of other "
-                         "systems have one", tuple(SYSTEMS))  # fmt: skip
+        why = WITHOUT.get(scene.system, "has no steps to choose")
+        raise InputError(scene.file, "system", scene.system, f"{why}; accuracy is priced in scenes of other systems",
+                         tuple(SYSTEMS))  # fmt: skip
     return recommend(import_module(SYSTEMS[scene.system]).own(scene, quantity, engines), tolerance)
 
 
