@@ -127,11 +127,12 @@ def measure(problem: Problem, quick: bool, rounds: int, least: float) -> list[Po
 
 def racing(problem: Problem, points: list[Point]) -> list[Point]:
     """Points whose seconds decide something, by one run of each: the defaults; what the cheapest settings rest on, and
-    what those may that take little longer, of all and of each engine; what a default rests on that is refined; the
-    front of the figure. Work is counted, so what wins by it needs no rounds.
+    what those may that take little longer, of all and of each engine; what a default rests on that is refined; of the
+    front of the figure what is not slow. Work is counted, so what wins by it needs no rounds.
     """
     quantity, own, usual = next(iter(problem.units)), by_curve(points), defaults(points).values()
-    chosen = [p for p in usual if p.status == "ok"] + front(points, quantity, problem.uncertainty[quantity], "seconds")
+    best = front(points, quantity, problem.uncertainty[quantity], "seconds")
+    chosen = [p for p in usual if p.status == "ok"] + [p for p in best if p.cost("seconds") <= SLOW]
     for target in problem.tolerances:
         met, all_of = (reaches(points, quantity, target, "seconds", extrapolate) for extrapolate in (False, True))
         near = {curve: one for engine in ("", *RIVALS, *(p.setting.engine for p in usual))
