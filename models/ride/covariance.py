@@ -121,7 +121,8 @@ def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, floa
 
     python-control with its method named (left alone it takes another where slycot is installed), then refined: the
     residual, in extended precision, is solved for what is missing. Q may be indefinite. Raises InputError for a Q that
-    is askew, values that are not finite and shapes that do not fit; A is taken to be stable.
+    is askew, values that are not finite, shapes that do not fit, and an A that is not stable: its equation has a
+    solution, which is no covariance.
     """
     from control import lyap
 
@@ -131,6 +132,8 @@ def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, floa
         raise InputError("", "Q", None, "must be symmetric")
     if len(A) == 0:
         return Q.astype(np.longdouble), Q.astype(np.longdouble), 0.0
+    if (rate := float(np.linalg.eigvals(A).real.max())) >= 0.0:
+        raise InputError("", "A", rate, "must be stable: the growth rate (1/s) of a motion that does not die out")
     wide, right = A.astype(np.longdouble), ((Q + Q.T) / 2).astype(np.longdouble)
     P = np.zeros_like(right)
     for _ in range(1 + REFINEMENTS):

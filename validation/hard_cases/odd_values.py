@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from models.contact.accuracy import rolled
 from models.contact.hertz import by_axes
@@ -23,6 +24,7 @@ from models.ensemble.statistics import deviation, quantile
 from models.hub_forces.cut_vehicle import cut
 from models.hub_forces.measurement import Angles, HubForces
 from models.hub_forces.tilt_filter import estimate
+from models.result import Result, load
 from models.ride.covariance import lyapunov
 from models.ride.excitation import Excitation
 from models.ride.measures import dynamic_load_factor, share_beyond
@@ -91,6 +93,16 @@ def sure(implementation: str, folder: Path) -> float:
     return max(float(np.nan_to_num(each.deviations / 1e-12, nan=np.inf).max()) for each in found)
 
 
+def flipped(implementation: str, folder: Path) -> float:
+    """A saved result of which one bit turned round on the disk."""
+    heave = np.linspace(1.0, 2.0, 64)
+    Result(xr.Dataset({"z3": ("time", heave)}, {"time": ("time", np.arange(64.0))})).save(folder / "run.nc")
+    content = bytearray((folder / "run.nc").read_bytes())
+    content[content.index(heave.tobytes()) + 100] ^= 4
+    (folder / "run.nc").write_bytes(content)
+    return float(np.abs(load(folder / "run.nc")["z3"] - heave).max())
+
+
 def spiked() -> Any:
     """A rail of which one point was measured 1 mm too low."""
     own = built_in("UIC60")
@@ -115,6 +127,8 @@ CASES = (
          "rounding", tiny_noise, once=True),
     Case("filter of tilts told of them to 1e-12", "subtracted covariances leave less than nothing",
          "surer than each value, never less", "of the deviations told", 1.0 + 1e-9, "rounding", sure, once=True),
+    Case("saved result with a flipped bit", "every number of it is plausible", "refused", "", 0.0, "exact", flipped,
+         REFUSED, once=True),
     *(Case(name, hard, "refused", "", 0.0, "exact", asked(answer), REFUSED, once=True) for name, hard, answer in (
         ("profile with a spike", "a spline swings about it", spiked),
         ("profile rounded to 0.1 mm", "the half beyond the first step back would be lost", rounded),
@@ -123,6 +137,8 @@ CASES = (
         ("limit below 0", "a share of time above 1", lambda: share_beyond(1.0, -1.0)),
         ("deviation of two values", "its error would be 0", lambda: deviation(np.array([1.0, 2.0]))),
         ("quantile of what is no number", "would be sorted to the end", lambda: quantile(np.array([1.0, np.nan]), 0.5)),
+        ("covariance of what grows", "Lyapunov's equation has an answer, which is none",
+         lambda: lyapunov(-STABLE, np.eye(2))),
         ("right side that is askew", "another one would be solved", lambda: lyapunov(STABLE, SKEW)),
         ("point mass of nothing", "divided by", lambda: discrete(10, 1.0, 1e-3, 0.0)),
     )),
