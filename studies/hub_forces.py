@@ -11,6 +11,7 @@ from models.damage import damage_ratio
 from models.engines.hub_forces import HubRun, build
 from models.errors import RunFailed
 from models.hub_forces.cut_vehicle import ANGLES, PITCH, ROLL, CutVehicle, X, Y, Z
+from models.hub_forces.halved import check_halved
 from models.hub_forces.measurement import Angles, HubForces
 from models.hub_forces.of_scene import measured
 from models.hub_forces.scene import COMPONENTS, HubScene
@@ -63,17 +64,23 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
 
 def compute(scene: HubScene, engines: tuple[str, ...], progress: Progress = lambda text, part: None) -> Found:
     """All runs: free in every engine, with stabilisers in the last one, which is the fastest. Raises RunFailed where
-    even the filter cannot hold the vehicle."""
+    even the filter cannot hold the vehicle, or where the step is too long for its springs."""
     vehicle, own, last = scene.cut_vehicle(), scene.run, engines[-1]
     progress("virtual measurement", 0.05)
     true, forces, angles = measured(scene, vehicle, last)
     deviations = (scene.angles.angle_deviation, scene.angles.rate_deviation)
     progress("Kalman filter", 0.2)
     tilt = estimate(vehicle, forces, angles, scene.deviations(vehicle), deviations, scene.stabilise.model, scene.file)
-    drive = forces.drive(own.step, round(own.duration / own.step), scene.forces.interpolation)
+
+    def filtered(step: float, steps: int) -> Drive:
+        held_on = forces.drive(step, steps, scene.forces.interpolation)
+        return pulled(held_on, vehicle, tilt, step, scene.stabilise.bandwidth)
+
+    steps = round(own.duration / own.step)
+    drive = forces.drive(own.step, steps, scene.forces.interpolation)
     quiet = smoothed(angles.samples[:, :2], angles.period, scene.stabilise.smoothing, scene.file, "stabilise.smoothing")
     drives = {f"{FREE}, {engine}": (engine, drive) for engine in engines}
-    drives[FILTER] = last, pulled(drive, vehicle, tilt, own.step, scene.stabilise.bandwidth)
+    drives[FILTER] = last, filtered(own.step, steps)
     drives[PRESCRIBED] = last, held(drive, quiet, angles.period, own.step)
     runs, failed = dict[str, HubRun](), dict[str, str]()
     for i, (name, (engine, driven)) in enumerate(drives.items()):
@@ -84,6 +91,8 @@ def compute(scene: HubScene, engines: tuple[str, ...], progress: Progress = lamb
             if name == FILTER:  # what the others are compared with
                 raise
             failed[name] = str(error)
+    check_halved(last, runs[FILTER], [element.name for element in vehicle.elements], lambda step, steps: build(
+        last, vehicle, filtered(step, steps), step, step * steps).run())  # fmt: skip
     return Found(vehicle, forces, angles, tilt, true, runs, failed)
 
 

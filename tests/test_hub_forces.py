@@ -1,5 +1,6 @@
 """A vehicle cut at its wheels: engines, closed forms of its drift, the filter, scenes and their faults."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -126,6 +127,17 @@ def test_inputs_of_a_wrong_length_are_refused_and_a_vehicle_that_tumbles_is_told
     start[19 + PITCH] = 3.0
     with pytest.raises(RunFailed, match="pitches by more than"):
         build("mujoco", car, case.static(car, 1201), 1e-3, 0.6).run(start)
+
+
+def test_steps_that_the_road_is_too_fast_for_are_told():
+    """Steps of 4 ms at 60 m/s on class F mistake the bushes' forces by a tenth, on class C at 20 m/s by nothing."""
+    from models.hub_forces.of_scene import measured
+
+    for road, held_true in (({}, True), ({"speed": 60.0, "iso8608": "F"}, False)):
+        own = scene_of({**ALL, "road": road, "run": {"duration": 1.0, "step": 4e-3},
+                        "forces": {"sampling_rate": 250.0}}, "s.toml")  # fmt: skip
+        with nullcontext() if held_true else pytest.raises(RunFailed, match=r"bush' by 0\.1 of its largest"):
+            measured(own, case.r19(), "mujoco")
 
 
 def test_a_file_of_ones_own(tmp_path, measured):

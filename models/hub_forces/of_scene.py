@@ -2,19 +2,25 @@
 
 from models.engines.hub_forces import HubRun
 from models.hub_forces.cut_vehicle import CutVehicle
+from models.hub_forces.halved import check_halved
 from models.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
 from models.hub_forces.scene import HubScene
 from models.road.iso8608 import iso8608_road
 
 
 def measured(scene: HubScene, vehicle: CutVehicle, engine: str) -> tuple[HubRun | None, HubForces, Angles]:
-    """What transducers say: of the files, or of a run on the road with noise."""
+    """What transducers say: of the files, or of a run on the road with noise; RunFailed for too long a step."""
     if scene.road is None:
         return None, *scene.measured(vehicle)
     own, road, steps = scene.run, scene.road, round(scene.run.duration / scene.run.step)
     left, right = (iso8608_road(road.iso8608, road.seed + i) for i in range(2))
-    drive = two_tracks(vehicle, left, right, road.speed, own.step, steps)
-    true = truth(engine, vehicle, drive, scene.forces.frame, own.step, own.duration)
+
+    def on_road(step: float, steps: int) -> HubRun:
+        drive = two_tracks(vehicle, left, right, road.speed, step, steps)
+        return truth(engine, vehicle, drive, scene.forces.frame, step, step * steps)
+
+    true = on_road(own.step, steps)
+    check_halved(engine, true, [element.name for element in vehicle.elements], on_road)
     forces, angles = recorded(true, scene.forces.frame, round(1.0 / (scene.forces.sampling_rate * own.step)))
     deviations = (scene.angles.angle_deviation, scene.angles.rate_deviation)
     return true, forces.noisy(scene.deviations(vehicle), scene.seed), angles.noisy(deviations, scene.seed)
