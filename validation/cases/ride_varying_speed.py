@@ -54,8 +54,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows = [*_limits("half_car", SHORT_STOPS), _adjoint(), _damped()]
     if quick:
         return rows, {}
-    for name in ("r19_ride", "three_axle_truck"):
-        rows += _limits(name, STOPS)
+    rows += [*_limits("r19_ride", STOPS), *_limits("three_axle_truck", SHORT_STOPS)]
     data = {name: _drive(profile) for name, profile in DRIVES.items()}
     for name, found in data.items():
         rows += _copies(name, found)
