@@ -81,6 +81,21 @@ def read_tables(tables: Mapping[str, Any], system: str, file: str) -> Table:
     return {name: _read(name, values, system, file) for name, values in tables.items()}
 
 
+def with_own(scene: Any) -> Any:
+    """The scene with its tables [effects.NAME] read; refuses what is no effect, and what cannot be together."""
+    found = scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, scene.file)})
+    if found.effects:
+        check(found)
+    return found
+
+
+def extended(built: Any, scene: Any) -> Any:
+    """What a system built of a scene, with the scene's tables [effects.NAME] in it."""
+    for name, own in tables_of(scene).items():
+        built = module_of(scene.system, name).extend(built, own)
+    return built
+
+
 def _read(name: str, values: Any, system: str, file: str) -> Any:
     if name not in names_of(system):
         raise InputError(file, f"effects.{name}", None, "no such effect", names_of(system))

@@ -20,7 +20,7 @@ from models.braking.trailer import train
 from models.braking.tyre_source import NAMES, SCALES, from_file, named
 from models.braking.tyre_table import TyreTable, stacked
 from models.errors import InputError
-from models.scene_effects import module_of
+from models.scene_effects import extended
 from models.scene_file import parse
 from models.strict import read
 
@@ -42,7 +42,7 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
     engine = None if own is None else on_springs(SPRUNG_ENGINE, own)
     if engine is not None:
         engine.check_step(scene.run.sample / scene.run.substeps)
-    vehicle = Braked(
+    return extended(Braked(
         plane=plane, kind=np.where(np.arange(plane.wheels) < 2, 0, len(kinds_of(scene)) - 1), tables=stacked(tyres),
         slope=max(table.cornering for table in tyres), road=road_of(scene, procedure, names),
         brakes=of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
@@ -50,10 +50,7 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
         steer=np.zeros(plane.wheels), substeps=scene.run.substeps, sample=scene.run.sample,
         speed_given=scene.controller.true_speed, relaxation=lags_of(scene, plane.wheels), sprung=own,
         engine=engine,
-    )  # fmt: skip
-    for name, own_values in scene.effects.items():
-        vehicle = module_of(scene.system, name).extend(vehicle, own_values)
-    return vehicle
+    ), scene)  # fmt: skip
 
 
 def plane_of(scene: BrakingScene) -> Plane:

@@ -11,6 +11,7 @@ from models.errors import InputError
 from models.handling.numbers import Control, Controls, Handling, Tyres
 from models.handling.road import SHORTEST, plane_waves
 from models.road.iso8608 import level_of_class
+from models.scene_effects import extended, with_own
 from models.scene_file import SceneFile, checked
 from models.steps import MOST_STEPS, divides, fitting
 from models.strict import Strict, quantity
@@ -85,13 +86,15 @@ class HandlingScene(SceneFile):
     road: RoadTable = RoadTable()
     run: RunTable = RunTable()
     manoeuvres: dict[str, Manoeuvre] = Field(min_length=1, description="driven one by one, a table each")
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     def handling(self, name: str) -> Handling:
         """Vehicle, tyres, road and controls of one manoeuvre."""
         own, road = self.manoeuvres[name], self.road
         waves = plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if own.rough else np.empty((0, 4))
         vehicle = load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
-        return Handling(vehicle, Tyres(**self.tyres.model_dump()), own.controls(), waves)
+        built = Handling(vehicle, Tyres(**self.tyres.model_dump()), own.controls(), waves)
+        return extended(built, self)
 
 
 def _control(knots: list[Pair]) -> Control:
@@ -108,7 +111,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
             _check_knots(file, f"{place}.{control}", getattr(own, control), 1.2 if control == "steer" else None)
             _check_pace(file, f"{place}.{control}", getattr(own, control), scene.run.step)
         _check_way(scene, place, own)
-    return scene
+    return with_own(scene)
 
 
 def _check_times(scene: HandlingScene, place: str, own: Manoeuvre) -> None:

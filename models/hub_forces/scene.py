@@ -10,6 +10,7 @@ from pydantic import Field
 from models.errors import InputError
 from models.hub_forces.cut_vehicle import CutVehicle, cut
 from models.hub_forces.measurement import Angles, HubForces
+from models.scene_effects import extended, with_own
 from models.scene_file import SceneFile, checked
 from models.steps import divides, fitting
 from models.strict import Strict, quantity
@@ -86,10 +87,12 @@ class HubScene(SceneFile):
     angles: Measured = Measured()
     stabilise: Stabilise = Stabilise()
     seed: int = Field(default=1, ge=0, le=2**62, description="of the noise")
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     def cut_vehicle(self) -> CutVehicle:
         """The vehicle without its tyres; raises InputError."""
-        return cut(load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file"), self.vehicle.chassis)
+        vehicle = load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
+        return cut(extended(vehicle, self), self.vehicle.chassis)
 
     def deviations(self, vehicle: CutVehicle) -> np.ndarray:
         """Standard deviations (6 h,) of the samples, N and N m."""
@@ -123,7 +126,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Hu
     if scene.forces.file is not None and "sampling_rate" in scene.forces.model_fields_set:
         raise InputError(file, "forces.sampling_rate", scene.forces.sampling_rate, "is that of forces.file: drop it")
     _check_steps(file, scene)
-    return scene
+    return with_own(scene)
 
 
 def _check_steps(file: str, scene: HubScene) -> None:

@@ -11,6 +11,7 @@ from models.rail.laid_profiles import Profiles
 from models.rail.linear import NoCriticalSpeed, critical_speed
 from models.rail.scene import WheelsetScene
 from models.rail.wheelset import CHOSEN, Wheelset
+from models.scene_effects import extended
 from models.scene_file import existing, parse
 
 BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
@@ -41,7 +42,7 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
         raise InputError(scene.file, f"wheelset.override.{FLANGE}", override[FLANGE], "has no meaning beside profiles, "
                          "which have flanges of their own: drop one of them")  # fmt: skip
     values = {key: getattr(base, key) for key in Wheelset.model_fields} | {"profiles": profiles}
-    return _judged(values | override, scene.file, "wheelset.override")
+    return extended(_judged(values | override, scene.file, "wheelset.override"), scene)
 
 
 def _profiles(scene: WheelsetScene, base: Wheelset) -> Profiles | None:

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from models.errors import InputError
 from models.rail.laid_profiles import Profiles
+from models.scene_effects import with_own
 from models.scene_file import SceneFile, checked
 from models.speeds import Speeds, check_speeds
 from models.steps import MOST_STEPS, divides, fitting
@@ -54,6 +55,7 @@ class WheelsetScene(SceneFile):
     contact: Creep = Creep()
     speeds: Speeds = Field(description="table with a range of speeds, or a list of them")
     run: RunTable = RunTable()
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> WheelsetScene:
@@ -63,7 +65,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Wh
     _check_run(scene)
     if scene.contact.law == "linear" and "cells" in scene.contact.model_fields_set:
         raise InputError(file, "contact.cells", scene.contact.cells, "has no meaning for the linear law: drop it")
-    return scene
+    return with_own(scene)
 
 
 def _check_speeds(scene: WheelsetScene) -> None:
