@@ -23,6 +23,8 @@ MARKERS = "s^v<>PXhp*d"
 STYLES = {1: ":", 2: "--", 3: "-.", 4: "-"}
 MORE = ("#999999", "#0072b2", "#009e73", "#cc79a7", "#d55e00", "#56b4e9")
 """Colours of families that are no implementation."""
+LONGEST = 26
+"""Letters of a curve's name of which five stand beside each other."""
 SIZES = {"reference": 8.5, "exudyn": 6.5, "mujoco": 4.5}
 """Coinciding curves show as rings within each other."""
 ONCE = 0.5
@@ -43,8 +45,8 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
         label = "seconds for the run, model built anew (median)" if timed else f"{kind} in the run"
         ax.set(xscale="log", yscale="log", xlabel=label)
         rounds = max(len(p.seconds) for p in points)
-        measured = f"up to {rounds} interleaved rounds (small: one run)" if timed else "exact"
-        ax.set_title(f"by {kind}, {measured}")
+        several = f"up to {rounds} interleaved rounds (small: one run)" if rounds > 1 else "one run"
+        ax.set_title(f"by {kind}, {several if timed else 'exact'}")
     _failures(axes[0], points, top)
     quantity = quantity_of(problem)
     axes[0].set_ylabel(f"error of the {quantity} [{problem['units'][quantity]}]")
@@ -56,7 +58,10 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
     same = fill(f"Same error at the same setting: {alike}.", 165) if alike else ""
     figure.suptitle(title + "\n" * (1 + same.count("\n")), x=0.01, ha="left", fontsize=12)
     figure.text(0.011, 0.98 - 0.026 * (1 + title.count("\n")), same, va="top", fontsize=9, color="#333333")
-    figure.legend(handles=_legend(points, styles), loc="outside lower center", ncols=5, fontsize=8.5, handlelength=3.2)
+    handles = _legend(points, styles)
+    longest = max(len(str(handle.get_label())) for handle in handles[: len(styles)])
+    figure.legend(handles=handles, loc="outside lower center", ncols=5 if longest <= LONGEST else 4, fontsize=8.5,
+                  handlelength=3.2)  # fmt: skip
     return figure
 
 
@@ -121,7 +126,7 @@ def _defaults(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str)
     """Ring and name each engine's default setting, where the panel is emptiest."""
     quantity = quantity_of(problem)
     found = [(owner, p) for owner, p in cost.defaults(points).items() if p.status == "ok"]
-    taken = _drawn(ax, problem, points, kind)
+    taken = _drawn(ax)
     for owner, p in found:
         place = (p.cost(kind), p.errors[quantity])
         ax.plot(*place, "o", markersize=15, markerfacecolor="none", markeredgecolor="#111111", markeredgewidth=1.4,
@@ -139,18 +144,18 @@ CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.74, 13) for y in np.lin
 """Where a name may stand: the middle of its left side, clear of the bands below and of what is told above."""
 
 
-def _within(ax: Axes, places: list[tuple[float, float]]) -> np.ndarray:
-    """Fractions of the panel (n, 2)."""
-    return np.asarray((ax.transData - ax.transAxes).transform(np.array(places, float).reshape(-1, 2)))
+def _within(ax: Axes, places: Any) -> np.ndarray:
+    """Fractions of the panel (n, 2) of places in its units (n, 2)."""
+    return np.asarray((ax.transData - ax.transAxes).transform(np.asarray(places, float)))
 
 
-def _drawn(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> np.ndarray:
-    """Places along all curves of a panel, in its fractions (n, 2)."""
-    along = [np.empty((0, 2))]
-    for own in by_curve(points).values():
-        ends = _within(ax, [(p.cost(kind), p.errors[quantity_of(problem)]) for p in own])
-        along += [one + (two - one) * np.linspace(0.0, 1.0, 9)[:, None] for one, two in pairwise(ends)] + [ends]
-    return np.vstack(along)
+def _drawn(ax: Axes) -> np.ndarray:
+    """Places along all lines of a panel, in its fractions (n, 2)."""
+    found = [np.empty((0, 2))]
+    for line in ax.get_lines():
+        ends = _within(ax, line.get_xydata())
+        found += [one + (two - one) * np.linspace(0.0, 1.0, 9)[:, None] for one, two in pairwise(ends)] + [ends]
+    return np.vstack(found)
 
 
 def _emptiest(taken: np.ndarray, own: np.ndarray) -> np.ndarray:
