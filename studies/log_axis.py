@@ -27,7 +27,7 @@ class _Powers(LogFormatterSciNotation):
         found = re.search(r"(?:([\d.]+)\\times)?10\^\{(-?\d+)\}", text := super().__call__(x, pos))
         if not found:
             return text
-        if _narrow(*sorted(self.axis.get_view_interval())) and 1e-3 <= x < 1e5:
+        if self.axis and _narrow(*sorted(self.axis.get_view_interval())) and 1e-3 <= x < 1e5:
             return f"{x:g}"
         return f"{found[1] + ' × ' if found[1] else ''}10{found[2].translate(RAISED)}"
 
@@ -43,12 +43,15 @@ class _Between(LogLocator):
 class PlainLogScale(LogScale):
     """The scale called "log" in every figure; with another base than ten it is matplotlib's."""
 
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+
     def set_default_locators_and_formatters(self, axis: Any) -> None:
         """As matplotlib asks of a scale; called for every axis that takes it."""
         super().set_default_locators_and_formatters(axis)
         if self.base == 10:
             axis.set_major_formatter(_Powers())
-            axis.set_minor_locator(_Between(subs=self.subs))
+            axis.set_minor_locator(_Between(subs=None if self.subs is None else list(self.subs)))
             axis.set_minor_formatter(_Powers(labelOnlyBase=self.subs is not None))
 
 
