@@ -48,7 +48,8 @@ NOISE, NOISY_RATE, NOISY = 30.7, 1000.0, 8.0
 CUTOFFS = (5.0, 15.0, 50.0)
 """Of the low-pass before the run, Hz."""
 SCHEMES = (("ExplicitEuler", 1, 2.5e-4), ("ExplicitMidpoint", 2, 1e-3), ("RK44", 4, 1e-3))
-"""Methods of Exudyn, their order and step (s)."""
+"""Methods of Exudyn, their order and step (s). What is smoothed before the run goes through the reference's RK4, which
+is Exudyn's RK44 to rounding."""
 PATHS = 20
 WINDOW = (4.0, 8.0)
 """Times (s) between which the growth of the spread is measured: after the start, before the pitch tumbles."""
@@ -109,22 +110,23 @@ def _smoothing(folder: Path) -> list[dict[str, Any]]:
     """Each way to treat one set of noise files: growth of the pitch's spread, and what the section forces lose."""
     true = _truth(folder, NOISY, NOISY_RATE)
     quiet = assemble(force_scene(folder, step=1e-3, duration=NOISY))
-    found = [_treated(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "RK44", 1e-3) for cutoff in CUTOFFS]
-    return found + [_treated(f"not smoothed, order {order}", true, quiet, None, method, step)
+    found = [_treated(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "reference", "RK4", 1e-3)
+             for cutoff in CUTOFFS]  # fmt: skip
+    return found + [_treated(f"not smoothed, order {order}", true, quiet, None, "exudyn", method, step)
                     for method, order, step in SCHEMES]  # fmt: skip
 
 
-def _treated(name: str, true: Result, quiet: Assembly, cutoff: float | None, method: str,
+def _treated(name: str, true: Result, quiet: Assembly, cutoff: float | None, engine: str, method: str,
              step: float) -> dict[str, Any]:  # fmt: skip
     forces = quiet.input
     assert isinstance(forces, Sampled)
     settings = Settings(method, step, NOISY)
-    clean = _run(quiet, forces.values, cutoff, settings)
+    clean = _run(engine, quiet, forces.values, cutoff, settings)
     rows = np.rint(np.array(WINDOW) / step).astype(int)
     spread = np.zeros(2)
     for path in range(PATHS):
         noise = NOISE * _white(path, len(forces.values))
-        spread += (_run(quiet, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]) ** 2
+        spread += (_run(engine, quiet, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]) ** 2
     spread, law = np.sqrt(spread / PATHS), _law(_low_pass(forces.values, cutoff), quiet)
     growth, expected = (float(np.log(one[1] / one[0]) / np.diff(WINDOW)[0]) for one in (spread, law))
     return {"name": name, "law": expected, "growth": growth, "spread": float(spread[1]),
@@ -137,10 +139,11 @@ def _white(path: int, count: int) -> np.ndarray:
     return normal(SEED, path, count, 2)
 
 
-def _run(assembly: Assembly, values: np.ndarray, cutoff: float | None, settings: Settings) -> np.ndarray:
+def _run(engine: str, assembly: Assembly, values: np.ndarray, cutoff: float | None,
+         settings: Settings) -> np.ndarray:  # fmt: skip
     """States (n, 8) under these samples (n, 2), smoothed before the run."""
     forces = Sampled(_low_pass(values, cutoff), 1 / NOISY_RATE, held=False)
-    return build("exudyn", replace(assembly, input=forces), settings).run().states
+    return build(engine, replace(assembly, input=forces), settings).run().states
 
 
 def _low_pass(values: np.ndarray, cutoff: float | None) -> np.ndarray:
