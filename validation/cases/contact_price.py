@@ -58,18 +58,18 @@ def _reference_rows(cases: list[Case], quick: bool) -> list[Row]:
 def _band_rows(cases: list[Case], quick: bool) -> list[Row]:
     """Stated errors on the contacts of the set, and on drawn ones that the bands have never seen."""
     unseen, rows = read_drawn(JUDGED), []
-    against = [case for case in unseen if case.parts[1] * case.parts[2] < 0]
+    against = np.array([case.parts[1] * case.parts[2] < 0 for case in unseen])
     for name in ["blended intermediate"] if quick else [*FASTSIM, "simplified"]:
+        drawn = held(name, unseen)
         for some, place, which, most in (
-            (cases, "", "of the set", BEYOND),
-            (unseen, "drawn.", "drawn", 1 - SHARE),
-            (against, "against.", "drawn with lateral creepage against spin", BEYOND),
+            (held(name, cases), "", "of the set", BEYOND),
+            (drawn, "drawn.", "drawn", 1 - SHARE),
+            (drawn.of(against), "against.", "drawn with lateral creepage against spin", BEYOND),
         ):
-            for what, kind, within in zip(("force", "moment"), ("band", "moment"), kept(name, held(name, some)),
-                                          strict=True):  # fmt: skip
+            for what, kind, within in zip(("force", "moment"), ("band", "moment"), kept(name, some), strict=True):
                 rows.append(at_most(f"contact_price.{place}{kind}.{name.replace(' ', '-')}", SYSTEM, f"{name}: share "
-                                    f"of {len(some)} contacts {which} beyond the band of error that is stated with the "
-                                    f"{what}", 1 - within, "", most, f"the band is meant to hold {SHARE:.0%}",
+                                    f"of {some.error.size} contacts {which} beyond the band of error that is stated "
+                                    f"with the {what}", 1 - within, "", most, f"the band is meant to hold {SHARE:.0%}",
                                     "native"))  # fmt: skip
     return rows
 

@@ -5,7 +5,7 @@ Those contacts are the set and one of the two parts of the drawn ones; the other
 ``python -m validation.contact.contact_bands`` prints what ``models.contact.accuracy`` keeps.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -50,6 +50,10 @@ class Held:
     def used_with_moment(self) -> np.ndarray:
         """Size of force and moment, (n,)."""
         return used_with_moment(self.used, self.moment)
+
+    def of(self, which: np.ndarray) -> "Held":
+        """Some of the contacts, by a mask (n,)."""
+        return Held(*(getattr(self, part.name)[which] for part in fields(self)))
 
 
 def forces(name: str, cases: list[Case], cells: int) -> np.ndarray:
