@@ -118,8 +118,8 @@ def worst(wheelset, speed, law, shift, step, duration):
 
 @pytest.mark.parametrize("wheelset", [CHOSEN, ON_PROFILES], ids=["cones", "profiles"])
 def test_ledger_closes_to_the_order_of_rk4(wheelset):
-    (one, _), (two, found) = (worst(wheelset, 40.0, "linear", 2e-3, step, 0.1) for step in (2e-4, 1e-4))
-    assert math.log2(one / two) > 3.7
+    (one, _), (two, found) = (worst(wheelset, 40.0, "linear", 2e-3, step, 0.1) for step in (4e-4, 2e-4))
+    assert math.log2(one / two) > 3.7  # 4.02 on cones; steps of 1e-4 leave 3e-9 J, half of it rounding
     assert two < 1e-4 * np.ptp(found.creep)
 
 
