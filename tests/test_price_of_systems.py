@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from models.errors import InputError, RunFailed
-from models.systems import SYSTEMS
+from models.systems import SYSTEMS, load
+from studies.asked import SCENES
 from validation.price.own_scene.meshed import Meshed, first_part
 from validation.price.own_scene.recommendation import SYSTEMS as PRICED
 from validation.price.own_scene.recommendation import price, recommend
@@ -88,3 +89,11 @@ def test_a_tolerance_above_the_quantity_itself_is_doubted():
 def test_a_vehicle_that_does_not_stop_has_no_price():
     with pytest.raises(RunFailed, match="does not stand after"):
         recommend(own({**STOP, "run": {"duration": 0.2}}), 1e-2)
+
+
+@pytest.mark.parametrize(("name", "why"), [
+    ("ride", "covariances, which have no step"), ("hub_forces", r"study = .choice."),
+    ("contact_ellipse", "contact_price"), ("recording", "samples of its files")])  # fmt: skip
+def test_systems_without_a_price_of_steps_say_why(name, why):
+    with pytest.raises(InputError, match=why):
+        price(load(SCENES / f"{name}.toml"), 1.0, None, ("reference",))
