@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from models.drift.score import Verdict
+from models.drift.score import Verdict, rms
 from models.drift.trust import ANGLE, Trust
 from models.errors import RunFailed
 from models.hub_forces.cut_vehicle import CutVehicle
@@ -110,6 +110,7 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
     found = compute(scene, engines[-1], folder, progress)
     page = write(found, folder / "recording.html")
     return {"scene": found.scene.title, "folder": str(folder), "failed": _failed(found), "page": str(page),
+            "doubts": sum(finding.weight == "doubt" for finding in found.findings), "channels": _sizes(found),
             "table": [*_told(found), f"  the page: {page}"]}  # fmt: skip
 
 
@@ -301,6 +302,15 @@ def handed_on(found: Found, run: Outcome) -> list[Answer]:
     """Forces and moments of the sections that the scene names, all if none."""
     wanted = found.scene.hand_on.sections
     return [answer for answer in forces(run.answers) if wanted is None or answer.section in wanted]
+
+
+def _sizes(found: Found) -> dict[str, Any]:
+    """Largest magnitude and rms of what is handed on: what a sweep draws."""
+    if found.held is None:
+        return {}
+    answers = {answer: found.held.samples(answer) for answer in handed_on(found, found.held)}
+    return {answer.name: {"unit": answer.unit, "max": float(np.abs(values).max()), "rms": rms(values)}
+            for answer, values in answers.items()}  # fmt: skip
 
 
 def _left(name: str, progress: Progress, begin: float, share: float) -> Callable[[float, float], None]:

@@ -20,6 +20,7 @@ from models.measured.scene import build
 from models.measured.timing import timing
 from models.measured.units import conversion
 from studies.recording import run
+from studies.summary_numbers import numbers
 
 HUBS = ("fl", "fr")
 PLACES = Places(HUBS, ("body",), ("front left",), ("dash",))
@@ -208,6 +209,8 @@ def test_from_the_road_to_the_page(tmp_path):
     assert "http" not in page.replace("http-equiv", "")  # one file, that fetches nothing
     handed = open_source(tmp_path / "section_forces.csv")
     assert {channel.name for channel in handed.channels} == {"front left F", *(f"fl hub {axis}" for axis in AXES)}
+    (block,) = handed.blocks(["front left F"])
+    assert numbers(summary)["front left F, max [N]"] == np.abs(block.values).max()  # what a sweep draws
 
 
 AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
@@ -224,4 +227,5 @@ def test_an_error_stops_the_run_and_the_page_says_so(tmp_path):
     summary = run(own, ("mujoco",), tmp_path / "out", lambda text, part: None)
     page = (tmp_path / "out" / "recording.html").read_text()
     assert "checks" in summary["failed"] and "Stopped: nothing was run" in page and "kN" in page
+    assert summary["channels"] == {}
     assert not (tmp_path / "out" / "section_forces.csv").exists()
