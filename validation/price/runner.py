@@ -25,6 +25,8 @@ WORK = ("contact cells", "force calls")
 """What work may be counted in: the first that a problem's points have."""
 RIVALS = ("exudyn", "mujoco")
 """Engines whose own cheapest setting is told, where a problem has them."""
+CLOCK = time.process_time
+"""Seconds of the processor: what else the machine does is not in them, nor in which settings have rounds."""
 NEAR = 1.25
 """A curve that takes up to so many times the least seconds in one run may be the cheapest: rounds tell."""
 SLOW, EVERY = 0.05, 3
@@ -74,14 +76,14 @@ def attempt(problem: Problem, setting: Setting) -> Point:
     """Try one setting: ok, raised (the run failed and said so), refused (it was not run), flagged (an answer came with
     a doubt, the solution's ``doubt``), or SILENT.
     """
-    begun = time.perf_counter()
+    begun = CLOCK()
     try:
         solution = problem.build(setting).run()
     except InputError as error:
         return Point(setting, "refused", str(error))
     except RunFailed as error:
         return Point(setting, "raised", str(error))
-    seconds, errors, counts = time.perf_counter() - begun, problem.errors(solution), dict(solution.counts)
+    seconds, errors, counts = CLOCK() - begun, problem.errors(solution), dict(solution.counts)
     doubt = getattr(solution, "doubt", "")
     return Point(setting, *(("flagged", doubt) if doubt else _judged(problem, errors)), errors, counts, (seconds,))
 
@@ -167,7 +169,8 @@ def _timed(problem: Problem, points: list[Point], rounds: int, least: float) -> 
     last: dict[int, Any] = {}
     jobs = [lambda i=i, p=p: last.update({i: problem.build(p.setting).run()}) for i, p in enumerate(points)]
     lasted = [p.cost("seconds") for p in points]
-    found = interleave(jobs, rounds, least, lasted=lasted, every=[EVERY if one > SLOW else 1 for one in lasted])
+    every = [EVERY if one > SLOW else 1 for one in lasted]
+    found = interleave(jobs, rounds, least, lasted=lasted, every=every, clock=CLOCK)
     return {p.setting: replace(p, seconds=tuple(own[np.isfinite(own)].tolist()), changed=_changed(problem, p, last[i]))
             for i, (p, own) in enumerate(zip(points, found, strict=True))}  # fmt: skip
 

@@ -57,8 +57,8 @@ def cheapest(problem: dict[str, Any], points: list[Point]) -> Table:
             _won(points, seconds, among, "ms") for among in ("", *rivals))))  # fmt: skip
     note = ("Fixed steps are interpolated log-log between neighbouring settings; methods without one order count at "
             "the loosest setting tried that does; 'coarsest' is the coarsest setting tried. Nothing is extrapolated. "
-            f"{work.capitalize()} are exact and the same on every machine; seconds are those of this one, everything "
-            f"built anew. {rounds_of(points)}")  # fmt: skip
+            f"{work.capitalize()} are exact and the same on every machine; seconds are those of this processor, "
+            f"everything built anew. {rounds_of(points)}")  # fmt: skip
     heads = (f"{quantity} error at most [{unit}]", f"fewest {work}", "fewest seconds",
              *(f"fewest in {LABELS[engine]}" for engine in rivals))  # fmt: skip
     return Table("Cheapest setting that meets the tolerance", note, heads, tuple(rows))
