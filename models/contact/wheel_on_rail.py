@@ -129,7 +129,8 @@ class Side:
         over = (points[:, 1] >= self.rail.y[0]) & (points[:, 1] <= self.rail.y[-1])
         over &= np.concatenate([np.diff(points[:, 1]) > 0.0, [True]])
         if np.count_nonzero(over) < 10:
-            raise InputError("", "lateral_shift", pose.shift, "leaves no part of the wheel above the rail")
+            raise InputError("", "lateral_shift", pose.shift, "leaves no part of the wheel above the rail: profiles, "
+                             "radius, back_to_back, gauge and shift do not fit")  # fmt: skip
         return points[over], self.rail.curve(points[over, 1]) - points[over, 2]
 
     def clearance(self, pose: Pose) -> float:

@@ -156,8 +156,8 @@ UNCERTAIN = 1e-6
 def _refuse(name: str, error: float) -> None:
     raise InputError(
         "", f"output {name}", None, f"its variance would be known to {error:.1g} of itself only: the rates of the "
-        "vehicle's motions lie too many decades apart, or one hardly dies out; look for a stiffness, damping or mass "
-        "that is far off"
+        "vehicle and of the road lie too many decades apart, or a motion hardly dies out; look for a stiffness, "
+        "damping or mass, or a corner of the road, that is far off"
     )  # fmt: skip
 
 
