@@ -15,7 +15,7 @@ from models.rail.eigenvalues import free, growth, wavelength
 from models.rail.energy import ledger
 from models.rail.equations import Equations
 from models.rail.limit_cycle import attained
-from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
+from models.rail.linear import LOWEST_SPEED, NoCriticalSpeed, critical_speed, klingel
 from models.rail.of_scene import IMPLEMENTATIONS, implementation
 from models.rail.orbit import Orbit, beside, refined, solved
 from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
@@ -43,15 +43,15 @@ LIVELY = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0, 1.0, 10.0])
 ABOVE = 1.1
 """Speed of paths and cycles by the critical one."""
 ENGINES = tuple(name for name in IMPLEMENTATIONS if name != "reference")
-AROUND = 0.02
-"""Half the bracket of a critical speed that is only looked up again, by the speed."""
+AROUND, BELOW = 0.02, 5
+"""Half the bracket of a critical speed that is only looked up again, by the speed; lower speeds that are tried."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All rows; quick: the chosen wheelset alone, without the faults."""
     wheelsets = {"chosen": CHOSEN} | ({} if quick else drawn())
     rows = _wave_rows(wheelsets)
-    speeds = {name: criticals(one, quick) for name, one in wheelsets.items()}
+    speeds = {name: criticals(one, quick or name != "chosen") for name, one in wheelsets.items()}
     rows += _critical_rows(speeds)
     rows += _acceleration_rows(wheelsets)
     rows += _path_rows(wheelsets, speeds, 11 if quick else 21)
@@ -75,21 +75,25 @@ def drawn() -> dict[str, Wheelset]:
     return found
 
 
-def criticals(wheelset: Wheelset, quick: bool) -> dict[str, float | None]:
-    """Critical speed (m/s) of each implementation; None where there is none. Quick: engines look near the first."""
+def criticals(wheelset: Wheelset, near: bool) -> dict[str, float | None]:
+    """Critical speed (m/s) of each implementation; None where there is none. near : engines look about the first."""
     found: dict[str, float | None] = {}
     for engine in IMPLEMENTATIONS:
         of, first = partial(growth, implementation(engine)), found.get("reference")
         try:
-            found[engine] = _near(partial(of, wheelset), first) if quick and first else critical_speed(wheelset, of)
+            found[engine] = _near(partial(of, wheelset), first) if near and first else critical_speed(wheelset, of)
         except NoCriticalSpeed:
             found[engine] = None
     return found
 
 
 def _near(growth: Callable[[float], float], speed: float) -> float:
-    """The critical speed (m/s) within AROUND of another."""
-    return float(brentq(growth, (1.0 - AROUND) * speed, (1.0 + AROUND) * speed, xtol=1e-12 * speed, rtol=1e-12))
+    """The critical speed (m/s) within AROUND of another; an end of that, or a lower speed, where it is not in it."""
+    low, high = (1.0 - AROUND) * speed, (1.0 + AROUND) * speed
+    for below in np.geomspace(LOWEST_SPEED, low, BELOW):
+        if growth(float(below)) >= 0.0:
+            return float(below)
+    return high if growth(high) < 0.0 else float(brentq(growth, low, high, xtol=1e-12 * speed, rtol=1e-12))
 
 
 def _spread(values: dict[str, float]) -> float:
@@ -125,7 +129,8 @@ def _critical_rows(speeds: dict[str, dict[str, float | None]]) -> list[Row]:
     there = {name: {engine: v for engine, v in own.items() if v is not None} for name, own in speeds.items()}
     agreed = all(len(own) in (0, len(IMPLEMENTATIONS)) for own in there.values())
     having = [own for own in there.values() if len(own) == len(IMPLEMENTATIONS)]
-    why = "each linearises its own equations of motion around the same contact forces, and looks for itself"
+    why = ("each linearises its own equations of motion around the same contact forces, and looks for itself: at all "
+           "speeds for the chosen wheelset, for drawn ones near the first's and below")
     return [
         at_most("wheelset.critical.engines", SYSTEM, f"critical speed of {len(having)} wheelsets: three "
                 "implementations", max(map(_spread, having)), "", 1e-6, why, "shared kernel"),
