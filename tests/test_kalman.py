@@ -15,7 +15,6 @@ from models.scene import build as build_scene
 from models.simulate import simulate
 from models.tables import NEWTONS
 from models.time_series import read_time_series, write_time_series
-from validation.drift import filterpy_filter
 
 PERIOD, DURATION = 5e-3, 2.0
 ENGINES = ("reference", "exudyn", "mujoco")
@@ -121,7 +120,7 @@ def test_the_smoother_is_the_conditional_mean_of_everything(folder):
     n, own = 12, assemble(scene(folder, duration=0.06, geometry="linear", interpolation="held"))
     measured = Measurement(angles(folder), PERIOD, (PITCH,), (ANGLE,))
     step = PitchStep(own, PERIOD, n)
-    mean, start = pitch_filter.start(own, 0.05, 0.0)
+    mean, start = pitch_filter._start(own, 0.05, 0.0)
     means, roots = [mean], [np.linalg.cholesky(start)]
     for i in range(n):
         after, transition, first, _ = step.advance(means[-1], i)
@@ -219,26 +218,16 @@ def test_a_measurement_at_its_own_rate_lies_at_its_own_times(folder):
     np.testing.assert_allclose(fast.states[:, PITCH], fine[:, 3], atol=1e-9)
 
 
-@pytest.mark.parametrize("columns", [(PITCH,), (PITCH, RATE)])
-def test_the_compiled_filter_is_filterpys(folder, columns):
-    """Step by step, with gaps in one column and in both, and a start that is unknown; of a deviation each."""
-    own, states = assemble(scene(folder)), free(folder)
-    noise = np.random.default_rng(3).standard_normal((len(states), 2)) * [ANGLE, 0.05]
-    values = (states[:, [3, 7]] + noise)[:, : len(columns)]
-    values[50:70, 0] = values[60:80, -1] = np.nan
-    measured = Measurement(values, PERIOD, columns, (ANGLE, 0.05)[: len(columns)])
-    step = PitchStep(own, PERIOD, len(states) - 1)
-    assert filterpy_filter.difference(step, *pitch_filter.start(own, 0.02, 0.05), 256.0, measured) < 1e-8
-
-
 def test_what_is_no_number_in_the_estimate_fails_the_run(folder, monkeypatch):
-    made = PitchStep.__post_init__
+    advance = PitchStep.advance
 
-    def broken(self):
-        made(self)
-        self._inputs[50 * len(self._inputs) // self.count] = np.nan
+    def broken(self, x, number):
+        found = advance(self, x, number)
+        if number == 50:
+            found[0][PITCH] = np.nan
+        return found
 
-    monkeypatch.setattr(PitchStep, "__post_init__", broken)
+    monkeypatch.setattr(PitchStep, "advance", broken)
     with pytest.raises(RunFailed, match="kalman filter: the estimate"):
         simulate(scene(folder, drawn(folder)), "reference")
 

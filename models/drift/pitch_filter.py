@@ -1,6 +1,6 @@
 """An extended Kalman filter beside a force-excited vehicle: its pitch from measured angle and rate, gaps and all.
 
-filterpy's extended filter (Joseph form), compiled, over the samples of the wheel forces. The prediction is the
+filterpy's ``ExtendedKalmanFilter`` (Joseph form) over the samples of the wheel forces. The prediction is the
 vehicle's own nonlinear step (the reference's Runge-Kutta), its Jacobians are that same step's, and the process
 noise is the exact response of a step to the noise of its force samples: no exponential of a stiff matrix is taken.
 
@@ -14,18 +14,18 @@ measurement's noise or lacks as much of every fast motion as the inertia is wron
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from filterpy.kalman import KalmanFilter
+from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter
 
 from models.assembly import Assembly
-from models.drift.kalman_recursion import STATES, Trace, blank
 from models.drift.pitch_step import RELATIVE, PitchStep
 from models.errors import RunFailed
 from models.vehicles.pitch_plane_equations import suspension
 
-PITCH, RATE, INERTIA = 2, 5, 6
-"""Where pitch, its rate and the inertia's share stand in the filter's state."""
+PITCH, RATE, INERTIA, STATES = 2, 5, 6, 7
+"""Where pitch, its rate and the inertia's share stand in the filter's state, and how long it is."""
 KNOWN = 1e-6
 """Deviation (m, rad, m/s, rad/s, share) of what is known at the start: nothing beside any measurement, but not 0."""
 
@@ -69,6 +69,57 @@ class Estimate:
         return self.covariances + self.pending @ self.pending.transpose(0, 2, 1)
 
 
+@dataclass(frozen=True)
+class _Steps:
+    """Of the step that ends at each time: its prediction (n, 7), transition and noise (n, 7, 7)."""
+
+    predictions: np.ndarray
+    transitions: np.ndarray
+    noises: np.ndarray
+
+
+class PitchFilter(ExtendedKalmanFilter):
+    """The vehicle over one step after the other; ``x`` (7,), ``P`` (7, 7) as filterpy names them."""
+
+    def __init__(self, step: PitchStep, start: np.ndarray, covariance: np.ndarray, intensity: float,
+                 measured: Measurement) -> None:  # fmt: skip
+        """start (7,), covariance (7, 7); intensity: variance (N^2) of a force sample, per step of the filter."""
+        super().__init__(dim_x=STATES, dim_z=1)
+        self.step, self.intensity, self.measured = step, intensity, measured
+        self.x, self.P = start.copy(), covariance.copy()
+        self.late = np.zeros((STATES, 2))
+        self._seen: dict[tuple[int, ...], tuple[list[int], np.ndarray, np.ndarray]] = {}
+
+    def predict_x(self, u: Any = 0) -> None:
+        """State and Jacobians over step number ``u``.
+
+        A force sample that is read linearly acts on the step before it, too. That part, ``late``, is not in P: it
+        joins one step later, with what the same sample does then. So the noise that joins is white, and the
+        covariance of the error is P with the part that is late.
+        """
+        self.x, self.F, early, late = self.step.advance(self.x, u)
+        push = early + self.F @ self.late
+        self.Q, self.late = self.intensity * (push @ push.T), late
+
+    def measure(self, number: int) -> tuple[int, float]:
+        """Take in what is a number in a row of the measurement: how many, and the normalised innovation squared."""
+        values = self.measured.values[number]
+        there = tuple(i for i, value in enumerate(values.tolist()) if math.isfinite(value))
+        if not there:
+            return 0, math.nan
+        chosen, rows, own = self._of(there)
+        late = rows @ self.late
+        self.update(values[chosen], lambda x: rows, rows.dot, R=own + self.intensity * (late @ late.T))
+        return len(there), float(self.y @ self.SI @ self.y)
+
+    def _of(self, there: tuple[int, ...]) -> tuple[list[int], np.ndarray, np.ndarray]:
+        """Measured columns, what each sees of the state (m, 7) and its noise (m, m); few patterns, so they are kept."""
+        if there not in self._seen:
+            rows = self._I[[self.measured.columns[i] for i in there]]
+            self._seen[there] = list(there), rows, np.diag([self.measured.deviations[i] ** 2 for i in there])
+        return self._seen[there]
+
+
 def estimate(assembly: Assembly, measured: Measurement, deviation: float, *, start_deviation: float = 0.0,
              inertia_deviation: float = 0.0, smoother: bool = False) -> Estimate:  # fmt: skip
     """Filter the pitch of a force-excited assembly over its run.
@@ -85,42 +136,34 @@ def estimate(assembly: Assembly, measured: Measurement, deviation: float, *, sta
     assert assembly.input is not None and assembly.input.period is not None
     period = min(assembly.input.period, measured.period)
     step = PitchStep(assembly, period, math.ceil(assembly.scene.run.duration / period - 1e-9))
-    intensity = deviation**2 * assembly.input.period / period
-    trace = march(step, *start(assembly, start_deviation, inertia_deviation), intensity, measured)
-    found = _estimate(trace, period, intensity, measured)
-    return _smoothed(found, trace) if smoother else found
+    start = _start(assembly, start_deviation, inertia_deviation)
+    found, steps = _march(PitchFilter(step, *start, deviation**2 * assembly.input.period / period, measured))
+    return _smoothed(found, steps) if smoother else found
 
 
-def march(step: PitchStep, x: np.ndarray, covariance: np.ndarray, intensity: float,
-          measured: Measurement) -> Trace:  # fmt: skip
-    """Predict over each step, take in what was measured at its end, and keep everything.
-
-    x (7,), covariance (7, 7) : state at the start; intensity : variance (N^2) of a force sample, per step of the
-    filter. Raises RunFailed.
-    """
-    trace = blank(step.count + 1)
-    values = np.ascontiguousarray(measured.values)  # other layouts would be compiled anew
-    rows = (values, np.array(measured.columns), np.square(measured.deviations), _every(measured, step.period))
-    failed = step.filtered(x.copy(), covariance.copy(), intensity, rows, trace)
-    if failed >= 0:
-        raise RunFailed("kalman filter", "the estimate became infinite or not a number", failed * step.period)
-    return trace
-
-
-def _every(measured: Measurement, period: float) -> int:
-    """Steps of the filter from one row of the measurement to the next."""
-    return round(measured.period / period)
-
-
-def _estimate(trace: Trace, period: float, intensity: float, measured: Measurement) -> Estimate:
-    missed = np.zeros_like(trace.used)
-    rows = np.arange(0, len(missed), _every(measured, period))[: len(measured.values)]
-    missed[rows] = len(measured.columns) - trace.used[rows]
-    return Estimate(period, trace.states, trace.covariances, math.sqrt(intensity) * trace.pending, trace.used, missed,
-                    trace.surprises)  # fmt: skip
+def _march(own: PitchFilter) -> tuple[Estimate, _Steps]:
+    """Predict over each step, take in what was measured at its end, and keep everything."""
+    n, period, measured = own.step.count + 1, own.step.period, own.measured
+    every, width = round(measured.period / period), len(measured.columns)
+    states, pending, predictions = np.empty((n, 7)), np.empty((n, 7, 2)), np.empty((n, 7))
+    covariances, transitions, noises = (np.empty((n, 7, 7)) for _ in range(3))
+    used, missed, surprises = np.zeros(n, dtype=int), np.zeros(n, dtype=int), np.full(n, np.nan)
+    for i in range(n):
+        if i:
+            own.predict(i - 1)
+        if not math.isfinite(own.x @ own.P @ own.x):
+            raise RunFailed("kalman filter", "the estimate became infinite or not a number", i * period)
+        predictions[i], transitions[i], noises[i] = own.x, own.F, own.Q
+        if i % every == 0 and i // every < len(measured.values):
+            used[i], surprises[i] = own.measure(i // every)
+            missed[i] = width - used[i]
+        states[i], covariances[i], pending[i] = own.x, own.P, own.late
+    pending *= math.sqrt(own.intensity)
+    found = Estimate(period, states, covariances, pending, used, missed, surprises)
+    return found, _Steps(predictions, transitions, noises)
 
 
-def _smoothed(found: Estimate, steps: Trace) -> Estimate:
+def _smoothed(found: Estimate, steps: _Steps) -> Estimate:
     """The same by filterpy's Rauch-Tung-Striebel smoother.
 
     It knows linear steps alone, x -> F x. An eighth state that is always 1 carries the rest of the nonlinear one.
@@ -153,7 +196,7 @@ def suspension_moment(assembly: Assembly, states: np.ndarray) -> np.ndarray:
     return cosine * (p.b * f3 - p.a * f4)
 
 
-def start(assembly: Assembly, turn: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:
+def _start(assembly: Assembly, turn: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:
     """State and covariance at the start: the vehicle turned as a whole by ``turn`` (rad), its inertia's share."""
     p = assembly.parameters
     turned = turn * np.array([-p.b, p.a, 1.0, 0.0, 0.0, 0.0, 0.0])

@@ -7,14 +7,12 @@ They are good to 1e-9, because states differ by 1e-5 about values near one, and 
 
 import math
 from dataclasses import dataclass, field
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
 
 from models.assembly import Assembly
-from models.drift.kalman_recursion import Trace, recursion
 from models.engines.reference import compiled, march_of
 from models.engines.stability import first_order, linearised
 
@@ -30,6 +28,7 @@ NUDGES = np.array([1.0, *[1e-5] * 6, 1e-2, *[1e3] * 4])
 REACH = 0.7
 """Longest substep by the time constant of the fastest pole: RK4 then errs by 1e-3 of that mode a step."""
 
+_RESPONDING: dict[tuple, Any] = {}
 
 
 @dataclass
@@ -52,7 +51,7 @@ class PitchStep:
         falling = np.ones(per_step) if signal.held else np.linspace(1.0, 0.0, per_step + 1)
         self._hats = np.column_stack([falling, 1.0 - falling])
         self._p = own.parameters.array()
-        self._key = own.mode, own.vehicle.geometry
+        self._respond = responding(own.mode, own.vehicle.geometry)
 
     def advance(self, x: np.ndarray, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Over one step from x (7,): x after it, and its derivatives.
@@ -62,19 +61,11 @@ class PitchStep:
         A held sample acts on the step after it alone; a spline counts as the polyline through its samples.
         """
         first = number * self._substeps * self._rows[2]
-        found = responding(*self._key)(x, *self._arguments(self._inputs[first : first + len(self._hats)]))
+        inputs = self._inputs[first : first + len(self._hats)]
+        found = self._respond(x, self.period / self._substeps, self._substeps, inputs, self._rows, self._p, self._hats)
         return found[:, 0].copy(), found[:, 1:8], found[:, 8:10], found[:, 10:]
 
-    def filtered(self, x: np.ndarray, covariance: np.ndarray, intensity: float, measured: tuple,
-                 trace: Trace) -> int:  # fmt: skip
-        """All steps with the filter's between them, see ``kalman_recursion.recursion``: fills the trace."""
-        return filtering(*self._key)(x, covariance, intensity, self._arguments(self._inputs), measured, trace)
 
-    def _arguments(self, inputs: np.ndarray) -> tuple:
-        return self.period / self._substeps, self._substeps, inputs, self._rows, self._p, self._hats
-
-
-@cache
 def responding(mode: str, geometry: str) -> Any:
     """The compiled step of one mode with its derivatives, made when first asked for.
 
@@ -82,18 +73,13 @@ def responding(mode: str, geometry: str) -> Any:
     and d/d(last one) (2). step to p are those of the reference's march; hats (rows, 2) say how the first and the
     last sample share in each row of the inputs.
     """
-    return compiled(_respond(mode, geometry), ("pitch_step", mode, geometry))
+    key = (mode, geometry)  # the march goes in as Python: numba cannot cache what encloses compiled code
+    if key not in _RESPONDING:
+        _RESPONDING[key] = _compile(register_jitable(march_of(*key).py_func), key)
+    return _RESPONDING[key]
 
 
-@cache
-def filtering(mode: str, geometry: str) -> Any:
-    """The compiled loop of a filter over the steps of one mode, made when first asked for."""
-    return compiled(recursion(register_jitable(_respond(mode, geometry))), ("pitch_filter", mode, geometry))
-
-
-def _respond(mode: str, geometry: str) -> Any:
-    march = register_jitable(march_of(mode, geometry).py_func)  # numba cannot cache what encloses compiled code
-
+def _compile(march: Any, key: tuple) -> Any:
     def respond(x, step, count, inputs, rows, p, hats):
         states, found, own = np.empty((count + 1, 8)), np.zeros((7, 12)), p.copy()
         for column in range(12):
@@ -114,4 +100,4 @@ def _respond(mode: str, geometry: str) -> Any:
         found[6, 0], found[6, 7] = x[6], 1.0
         return found
 
-    return respond
+    return compiled(respond, ("pitch_step", *key))

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("pitch_spring", "high_pass", "prescribed_pitch", "prescribed_heave_and_pitch")
 AFTER = ("wheel_forces", "force_noise")
-COST = "a filter over all samples before the run, about 0.02 ms each; one native spring-damper and one moment over time"
+COST = "a filter over all samples before the run, about 0.1 ms each; one native spring-damper and one moment over time"
 EXAMPLE = {"file": "pitch.csv", "force_deviation": 8.0, "pitch_deviation": 0.5}
 COUNTS = {"exudyn": {"native items": 2, "callbacks": 1},
           "mujoco": {"native items": 1, "callbacks": 1}, "all": {"channels": 10}}  # fmt: skip
@@ -183,8 +183,7 @@ def _check_surprise(assembly: Assembly, p: Parameters, guide: Guide) -> None:
     if mean > SURPRISE:
         raise InputError(assembly.scene.file, "effects.kalman_filter", None,
                          f"{p.file} contradicts forces and model: the squares of the innovations are {mean:.3g} times "
-                         f"what the deviations allow (at most {SURPRISE:g}): check signs, units, delays and which "
-                         "axle is which, or state larger ones")
+                         f"what the deviations allow (at most {SURPRISE:g}): check sign and unit, or state larger ones")
 
 
 def _check_bandwidth(assembly: Assembly, p: Parameters, guide: Guide) -> None:

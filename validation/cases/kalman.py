@@ -23,8 +23,6 @@ SAMPLES, DURATION = 20, 60.0
 LOOP_RUNS, LOOP = 6, 60.0
 OUTAGE, LOST = (20.0, 25.0), 0.3
 """s without any measurement, and share of all other samples that are lost."""
-BESIDE = 5.0
-"""s, of the run that filterpy's own filter goes through as well."""
 FILTERS = {"right": (1.0, 1.0), "Q": (4.0, 1.0), "R": (1.0, 4.0)}
 """Factors on the variances of force noise and measurement noise that a filter is told."""
 SENSORS = {"angle": (PITCH,), "rate": (RATE,), "angle and rate": (PITCH, RATE)}
@@ -44,7 +42,6 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     damage = [runs.stabilised(place, DURATION, SEED + i, ENGINES) for i in range(SAMPLES)]
     right = [runs.stabilised(place, DURATION, SEED + i, ENGINES[:1], wrong=False)["reference"] for i in range(2)]
     rows += loop_rows + _gyro_rows(gyro) + _damage_rows(damage) + _moment_rows(damage, right)
-    rows.append(_filterpy_row(place))
     return rows, {"damage": damage, "deviations": deviations, "gyro": gyro}
 
 
@@ -104,14 +101,6 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
         rows.append(at_most(f"{id}.count", SYSTEM, f"cells without a number that were not counted, {name}",
                             found["miscounted"], "", 0.0, f"{found['missed']:.0f} were written", "closed form"))
     return rows
-
-
-def _filterpy_row(folder: Path) -> Row:
-    found = runs.beside_filterpy(folder, BESIDE, SEED, LOST)
-    return at_most("kalman.filterpy", SYSTEM, f"states, covariances and innovations of the compiled filter beside "
-                   f"filterpy's own, {BESIDE:g} s at 1 kHz, largest difference by the stated deviations", found, "",
-                   1e-8, f"the same formulas in another order of sums; angle and rate, {LOST:.0%} of each lost",
-                   "native")  # fmt: skip
 
 
 def _short_rows(folder: Path) -> list[Row]:

@@ -11,8 +11,8 @@ from scipy.signal import butter, sosfiltfilt
 
 from models.assembly import Assembly, assemble
 from models.damage import damage_ratio
-from models.drift.pitch_filter import PITCH, RATE, Estimate, Measurement, estimate, start
-from models.drift.pitch_step import KEPT, RELATIVE, PitchStep
+from models.drift.pitch_filter import PITCH, RATE, Estimate, Measurement, estimate
+from models.drift.pitch_step import KEPT, RELATIVE
 from models.effects.kalman_filter import pull
 from models.engines.protocol import Settings, build
 from models.engines.stability import first_order, linearised
@@ -24,7 +24,6 @@ from models.section_forces import CHANNELS, section_forces
 from models.simulate import simulate
 from models.strict import read
 from models.time_series import write_time_series
-from validation.drift import filterpy_filter
 from validation.scenes import road_scene, write_forces
 
 ANGLE = float(np.deg2rad(0.1))
@@ -238,19 +237,6 @@ def _scored(true: Result, run: Result) -> dict[str, float]:
     found["pitch"] = float(np.abs(run["pitch"] - true["pitch"]).max())
     found["inertia"] = float(run["inertia_share"][-1])
     return found
-
-
-def beside_filterpy(folder: Path, duration: float, seed: int, lost: float) -> float:
-    """Largest difference between the compiled filter and filterpy's on noisy angle and rate, each with gaps."""
-    true, period = measured(folder, duration, 1e-3), 1e-3
-    noise = normal(seed, 0, len(true.times), 4, source=PITCH_SENSOR)
-    values = true.states[:, [3, 7]] + noise[:, :2] * [ANGLE, GYRO]
-    values[np.abs(noise[:, 2:]) < lost] = np.nan
-    force = force_deviation(true)
-    assembly = assemble(driven(folder, duration, noise_of(force, seed), wrong=True))
-    step = PitchStep(assembly, period, len(values) - 1)
-    own = Measurement(values, period, (PITCH, RATE), (ANGLE, GYRO))
-    return filterpy_filter.difference(step, *start(assembly, START, INERTIA), force**2, own)
 
 
 def rms(values: np.ndarray) -> float:
