@@ -30,7 +30,7 @@ FULL: dict[tuple[str, str], tuple[float, ...]] = {
     ("reference", "RK4"): STEPS,
     ("exudyn", "RK44"): STEPS[:-1],
     ("exudyn", "ExplicitMidpoint"): STEPS,
-    ("exudyn", "ExplicitEuler"): STEPS[:-1],
+    ("exudyn", "ExplicitEuler"): STEPS,
     ("exudyn", "GeneralizedAlpha 0.9"): (10 * MS, *STEPS),
     ("exudyn", "GeneralizedAlpha 0.6"): STEPS[:-1],
     ("exudyn", "TrapezoidalIndex2"): STEPS[:-1],
@@ -40,7 +40,7 @@ FULL: dict[tuple[str, str], tuple[float, ...]] = {
     ("mujoco", "implicitfast"): STEPS[:-1],
     ("mujoco", "discrete"): STEPS[:-1],
 }
-"""Steps (s) of every method; the finest is for the engines' defaults and one whose order shows late."""
+"""Steps (s) of every method; the finest is for the engines' defaults and those whose order shows late."""
 QUICK: dict[tuple[str, str], tuple[float, ...]] = {
     ("reference", "RK4"): (0.5 * MS, 0.25 * MS, 0.125 * MS),
     ("exudyn", "ExplicitEuler"): (1 * MS, 0.5 * MS, 0.25 * MS),

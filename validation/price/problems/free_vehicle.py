@@ -37,7 +37,7 @@ GRAVITY = 9.81
 MS = 1e-3
 _LONG = (20 * MS, 10 * MS, 20 / 3 * MS, 5 * MS, 4 * MS, 2 * MS)
 _MIDDLE = (10 * MS, 5 * MS, 4 * MS, 2.5 * MS, 2 * MS, 1 * MS)
-_SHORT = (20 / 7 * MS, 2.5 * MS, 2 * MS, 4 / 3 * MS, 1 * MS, 0.5 * MS)
+_SHORT = (20 / 7 * MS, 2.5 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.3125 * MS)
 _NATIVE = (20 * MS, 10 * MS, 5 * MS, 4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS)
 FULL: dict[tuple[str, str], tuple[float, ...]] = {
     ("exudyn", "RK44"): _LONG,
