@@ -244,6 +244,15 @@ def test_rounds_are_for_settings_that_decide_something():
         assert ("exudyn third" in chosen) == expected
 
 
+def test_a_slow_run_is_not_repeated_in_few_rounds(monkeypatch):
+    """Three rounds, of which a slow setting is in the first: that is the run that has been."""
+    monkeypatch.setattr(cost, "SLOW", 0.0)
+    points = cost.measure(PlantedProblem(), True, cost.EVERY, 0.0)
+    assert {(len(p.seconds), p.changed) for p in points} == {(1, None)}
+    points = cost.measure(PlantedProblem(), False, 5 * cost.EVERY, 0.0)
+    assert {len(p.seconds) for p in points if p.changed is False} == {cost.FEWEST}
+
+
 def test_no_interval_from_one_run():
     found = cost.loss(timed(once=STEPS[-1:]), "force", 1e-3, "seconds", "exudyn first")
     assert found.factor > 10 and math.isnan(found.low), "its finest step has one run alone"

@@ -175,7 +175,7 @@ def _timed(problem: Problem, points: list[Point], rounds: int, least: float) -> 
     every = [EVERY if one > SLOW else 1 for one in lasted]
     found = interleave(jobs, rounds, least, lasted=lasted, every=every, clock=CLOCK)
     return {p.setting: replace(p, seconds=tuple(own[np.isfinite(own)].tolist()), changed=_changed(problem, p, last[i]))
-            for i, (p, own) in enumerate(zip(points, found, strict=True))}  # fmt: skip
+            for i, (p, own) in enumerate(zip(points, found, strict=True)) if i in last}  # fmt: skip
 
 
 def _changed(problem: Problem, p: Point, again: Any) -> bool:

@@ -69,6 +69,8 @@ def rounds_of(points: list[Point]) -> str:
     in_rounds = [p.seconds for p in points if p.status == "ok" and p.changed is not None]
     numbers = Counter(map(len, in_rounds))
     told = " and ".join(f"{n} interleaved rounds for {count}" for n, count in sorted(numbers.items(), reverse=True))
+    if not in_rounds:
+        return "Seconds are those of one run each."
     spread = float(np.median([one["mad"] / one["median"] for one in map(describe, in_rounds)]))
     once = sum(p.status == "ok" for p in points) - len(in_rounds)
     return (f"Seconds are medians of {told} settings whose seconds decide something (fewer where a run is longer than "
