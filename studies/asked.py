@@ -13,9 +13,9 @@ ANY = "any"
 """System of a study that runs scenes of all systems."""
 NOT_STUDIES = ("__init__", "asked", "braking_figures", "choice_figure", "command_line", "comparison",
                "contact_figures", "figures", "folders", "handling_figures", "hub_forces_figures",
-               "manchester_figure", "recording_figures", "recording_page", "recording_runs", "ride_choice_figure",
-               "ride_figures", "ride_nonlinear_figures", "stabiliser_figures", "summary_numbers", "sweep",
-               "sweep_figure", "tyre_figure", "virtual_measurement", "wheelset_figures")  # fmt: skip
+               "log_axis", "manchester_figure", "recording_figures", "recording_page", "recording_runs",
+               "ride_choice_figure", "ride_figures", "ride_nonlinear_figures", "stabiliser_figures", "summary_numbers",
+               "sweep", "sweep_figure", "tyre_figure", "virtual_measurement", "wheelset_figures")  # fmt: skip
 """Modules beside the studies that are none."""
 
 
