@@ -35,10 +35,11 @@ def seen(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], bytes]:
 
     own = equations_of(scene, engine, SPEED)
     _, body, contact, *_, law = own.given
+    profiles = contact.size > forces.NUMBERS  # they have flanges of their own
     counts = {
         "springs": int((body[eq.KX : eq.KZ + 1] > 0.0).sum()), "dampers": int((body[eq.DX : eq.DZ + 1] > 0.0).sum()),
-        "creep nets": int(law == forces.FASTSIM), "flanges": int(contact[forces.FLANGE] > 0.0),
-        "contact damping": int(contact[forces.DAMPING] > 0.0), "profiles": int(contact.size > forces.NUMBERS),
+        "creep nets": int(law == forces.FASTSIM), "flanges": int(contact[forces.FLANGE] > 0.0 and not profiles),
+        "contact damping": int(contact[forces.DAMPING] > 0.0), "profiles": int(profiles),
         **_built(own, engine),
     }  # fmt: skip
     path = own.run(own.displaced(scene.run.displacement), scene.run.duration, scene.run.step)

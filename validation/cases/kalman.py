@@ -18,7 +18,7 @@ SEED = 2000
 LEVEL = 0.999
 """Of every band."""
 ENGINES = ("reference", "exudyn", "mujoco")
-SAMPLES, DURATION = 20, 60.0
+SAMPLES, DURATION = 20, 30.0
 """Noise samples and length (s) of the runs that are judged by damage."""
 LOOP_RUNS, LOOP = 6, 60.0
 OUTAGE, LOST = (20.0, 25.0), 0.3
