@@ -267,6 +267,11 @@ def test_a_job_takes_part_in_some_rounds():
     assert np.flatnonzero(np.isfinite(seconds[1])).tolist() == [0, 3, 6, 9, 12]
 
 
+def test_a_job_that_has_not_been_is_timed_in_its_first_round():
+    seconds = interleave([lambda: sum(range(100))], 8, 1e-5, every=[4])
+    assert (seconds[0, [0, 4]] > 0.0).all(), "no run of no seconds, which would be the least"
+
+
 def test_rounds_are_told():
     points = [replace(p, changed=None, seconds=p.seconds[:1]) if p.setting.method == "first" else p for p in timed()]
     assert rounds_of(points).startswith("Seconds are medians of 15 interleaved rounds for 6 settings")

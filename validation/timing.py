@@ -27,8 +27,8 @@ def interleave(jobs: Sequence[Callable[[], Any]], rounds: int, least: float = 0.
     up.
 
     least : a job is repeated within its turn until it lasts about this long (s); seed : of the order;
-    lasted : seconds of a run of each job that has been, where there was one; every : a job is in one of so many
-    rounds, the run that has been its first; clock : that of the processor leaves out what else the machine does.
+    lasted : seconds of a run of each job that has been, 0 where there was none; every : a job is in one of so many
+    rounds, a run that has been its first; clock : that of the processor leaves out what else the machine does.
     """
     known = [0.0] * len(jobs) if lasted is None else lasted
     repeats = [1 if one > LONG * least else _repeats(job, least, clock)
@@ -38,7 +38,7 @@ def interleave(jobs: Sequence[Callable[[], Any]], rounds: int, least: float = 0.
     for i in range(rounds):
         for j in order.permutation(len(jobs)):
             each = 1 if every is None else every[j]
-            if i == 0 and each > 1:
+            if i == 0 and each > 1 and known[j] > 0.0:
                 seconds[j, i] = known[j]
             elif i % each == 0:
                 seconds[j, i] = _timed(jobs[j], repeats[j], clock)
