@@ -165,6 +165,15 @@ def test_a_spike_is_named_with_its_height_and_noise_is_none(width, tmp_path):
     assert found.size == pytest.approx(50.0, rel=0.1)  # noise of 1 on both neighbours
 
 
+def test_a_spike_does_not_hide_an_error_of_its_channel(ridden, tmp_path):
+    """One sample, of which a doubt is told, in a channel in kN that stops the run."""
+    samples = ridden.samples(Faults(noise=case.NOISE), 5)
+    samples[1000, case._columns(ridden, "rr_fz")] += 5e4
+    samples[:, case._columns(ridden, "rr_fz")] *= 1e-3
+    assert {(one.check, one.weight) for one in case.findings(ridden, samples, tmp_path)} >= {
+        ("spikes", "doubt"), ("unit", "error")}  # fmt: skip
+
+
 @pytest.mark.parametrize(("level", "kind", "size"), [(0.0, "gravity", 9.81), (-9.81, "sign", -1.0),
                          (1.0, "unit", 0.102), (8.9, "gravity", -0.91), (9.7, "", 0.0)])  # fmt: skip
 def test_a_vertical_accelerometer_feels_gravity(level, kind, size, tmp_path):

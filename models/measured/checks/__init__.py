@@ -61,7 +61,7 @@ def findings(evidence: Evidence) -> tuple[Finding, ...]:
 
 
 def _named(finding: Finding, before: list[Finding]) -> bool:
-    """Whether what is wrong with one of these channels is what an earlier finding has said."""
+    """Whether what is wrong with one of these channels is what an earlier finding of no less weight has said."""
     return finding.weight != "note" and any(
-        other.weight != "note" and FAMILIES[other.check] & FAMILIES[finding.check]
+        ORDER.index(other.weight) <= ORDER.index(finding.weight) and FAMILIES[other.check] & FAMILIES[finding.check]
         and set(other.signals) & set(finding.signals) for other in before)  # fmt: skip
