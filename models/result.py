@@ -79,7 +79,7 @@ def load(path: Path) -> Result:
     try:
         with xr.open_dataset(path, engine="h5netcdf") as data:
             return Result(data.load())
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, RuntimeError) as error:  # the last: what HDF5 finds in its own headers
         reason = str(error).splitlines()[0]
         raise InputError(path, "", None, f"not a saved result, or a damaged one: {reason}") from None
 

@@ -79,3 +79,14 @@ def test_a_result_with_one_bit_flipped_is_refused(tmp_path):
             (tmp_path / "x.nc").write_bytes(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
             with pytest.raises(InputError, match="damaged"):
                 load(tmp_path / "x.nc")
+
+
+def test_headers_that_HDF5_finds_damaged_are_refused_as_well(tmp_path):
+    """Many attributes lie in a heap, whose checksum HDF5 reads late and tells as another error."""
+    many = {f"a{i}": "words" for i in range(12)}
+    Result(xr.Dataset({"z1": ("time", np.zeros(8))}, attrs=many)).save(tmp_path / "x.nc")
+    content = bytearray((tmp_path / "x.nc").read_bytes())
+    content[content.index(b"FRHP") + 6] ^= 4
+    (tmp_path / "x.nc").write_bytes(content)
+    with pytest.raises(InputError, match="damaged"):
+        load(tmp_path / "x.nc")
