@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.engines.hub_forces import build
+from models.engines.hub_forces import HubRun, build
 from models.errors import InputError, Refused, RunFailed
 from models.hub_forces.cut_vehicle import PITCH, ROLL, cut
 from models.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
@@ -138,6 +138,13 @@ def test_steps_that_the_road_is_too_fast_for_are_told():
                         "forces": {"sampling_rate": 250.0}}, "s.toml")  # fmt: skip
         with nullcontext() if held_true else pytest.raises(RunFailed, match=r"bush' by 0\.1 of its largest"):
             measured(own, case.r19(), "mujoco")
+
+
+def test_no_step_is_too_long_for_a_vehicle_without_springs():
+    from models.hub_forces.halved import check_halved
+
+    run = HubRun(np.arange(3.0), np.zeros((3, 12)), np.empty((3, 0)), np.zeros((3, 4, 6)), np.zeros((3, 2)))
+    check_halved("mujoco", run, [], lambda step, steps: run)
 
 
 def test_a_file_of_ones_own(tmp_path, measured):

@@ -20,7 +20,12 @@ LEAST = 1e-3
 
 
 def check_halved(engine: str, run: HubRun, names: list[str], again: Callable[[float, int], HubRun]) -> None:
-    """Raise RunFailed where the steps were too long; again : (step in s, steps) -> the same run with these."""
+    """Raise RunFailed where the steps were too long; again : (step in s, steps) -> the same run with these.
+
+    A vehicle that has no springs, mounts or bars has nothing that a step could be too long for.
+    """
+    if not names:
+        return
     step = float(run.times[1] - run.times[0])
     rows = min(len(run.times) - 1, max(2, round(WINDOW / step)))
     fine = again(step / 2.0, 2 * rows).elements[::2]
