@@ -308,9 +308,9 @@ def _sizes(found: Found) -> dict[str, Any]:
     """Largest magnitude and rms of what is handed on: what a sweep draws."""
     if found.held is None:
         return {}
-    answers = {answer: found.held.samples(answer) for answer in handed_on(found, found.held)}
+    answers = handed_on(found, found.held)  # of an hour only one at a time is in memory
     return {answer.name: {"unit": answer.unit, "max": float(np.abs(values).max()), "rms": rms(values)}
-            for answer, values in answers.items()}  # fmt: skip
+            for answer, values in zip(answers, map(found.held.samples, answers), strict=True)}  # fmt: skip
 
 
 def _left(name: str, progress: Progress, begin: float, share: float) -> Callable[[float, float], None]:

@@ -37,7 +37,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows = [*_guides(quick), *_counting()]
     if quick:
         return [*rows, _blocks(folder, "mujoco", "kalman", 0.3)], {}
-    lasting = {"mujoco": 0.5, "exudyn": 0.25, "reference": 0.15}
+    lasting = {"mujoco": 0.5, "exudyn": 0.25, "reference": 0.2}
     rows += [_blocks(folder, engine, method, seconds) for engine, seconds in lasting.items()
              for method in ("none", "kalman", "prescribed")]  # fmt: skip
     return [*rows, _killed(folder), *_memory(folder), *_handed_on(folder)], {}
