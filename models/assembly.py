@@ -1,15 +1,15 @@
 """Scene -> what will be computed: the vehicle, its input, its effects, and nothing else."""
 
 from dataclasses import dataclass, replace
-from importlib import import_module
 from typing import Any, Literal
 
 import numpy as np
 
 from models.errors import InputError
 from models.scene import Scene
-from models.scene_effects import legal
+from models.scene_effects import legal, module_of
 from models.signals import Signal
+from models.systems import DEFAULT
 from models.vehicles import pitch_plane
 from models.vehicles.description import Vehicle
 
@@ -72,8 +72,7 @@ def assemble(scene: Scene) -> Assembly:
     vehicle = pitch_plane.describe(p, scene.vehicle.geometry)
     assembly = Assembly(scene, vehicle, p, "free", None, _initial(scene, p))
     for name in ordered(scene):
-        module = import_module(f"models.effects.{name}")
-        assembly = module.extend(assembly, scene.effects[name])
+        assembly = module_of(DEFAULT, name).extend(assembly, scene.effects[name])
     return assembly
 
 
@@ -90,7 +89,7 @@ def _initial(scene: Scene, p: pitch_plane.Parameters) -> np.ndarray:
 
 def ordered(scene: Scene) -> list[str]:
     """The scene's effects, each after those that it needs; refuses illegal combinations."""
-    modules = {name: import_module(f"models.effects.{name}") for name in scene.effects}
+    modules = {name: module_of(DEFAULT, name) for name in scene.effects}
     legal(modules, scene)
     done: list[str] = []
     waiting = list(modules)

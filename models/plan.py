@@ -1,7 +1,5 @@
 """What a scene will compute: printed by ``twinrig show``, checked before any run."""
 
-from importlib import import_module
-
 from models.assembly import Assembly, assemble
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build, settings_of
@@ -9,7 +7,9 @@ from models.engines.protocol import check as check_engine
 from models.errors import Refused
 from models.scene import Scene
 from models.scene_effects import lines as effect_lines
+from models.scene_effects import module_of
 from models.simulate import state_names
+from models.systems import DEFAULT
 
 MODES = {
     "free": "free motion on the flat road",
@@ -74,8 +74,7 @@ def _channels(assembly: Assembly) -> list[str]:
     names += ["zeta1", "zeta2"] if assembly.mode == "road" else []
     names += ["enforced_force"] if assembly.mode == "heave-pitch" else []
     names += ["inertia_term", "enforced_moment"] if assembly.guided else []
-    modules = [import_module(f"models.effects.{name}") for name in assembly.scene.effects]
-    return names + [channel for module in modules for channel in getattr(module, "CHANNELS", ())]
+    return names + [channel for name in assembly.scene.effects for channel in module_of(DEFAULT, name).CHANNELS]
 
 
 def trust_line(assembly: Assembly) -> list[str]:

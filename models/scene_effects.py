@@ -3,31 +3,57 @@
 A system's ``effects`` is the package that holds them. An effect's file has
 
 - a docstring, whose first sentence is its line in every list;
-- ``COST``, one sentence on what it takes, and ``COUNTS``, {"all" or an engine: {count: change}}, what it adds to the
-  counts of a scene; the proof of absence finds these and no others;
-- ``NEEDS`` and ``EXCLUDES``, names of other effects of its system, with ``WHY``, a phrase for both, if it has one;
-- ``MODULES``, those that are imported for its sake alone, if there are any.
+- ``COST``, one sentence on what it takes;
+- what ``Effect`` names, as far as there is any.
 
 A scene names it in one of two ways. Either by a table [effects.NAME]: then the file has ``Parameters``, ``EXAMPLE``, a
-table of usual values, and ``extend(built, parameters)``, which puts it into what its system builds; also ``BESIDE``,
-tables of effects that it needs, if those with usual values do not serve. Or by the system's own tables: then the file
-has ``PLACE``, the key that names it, ``named(scene)``, and two edits of the scene's table, ``leave_out(table, scene)``
-and, if there are usual values, ``put_in(table, scene)``; both raise InputError with the remedy where it cannot be.
-Where an effect is a choice of method, to leave it out is the next cheaper one.
+table of usual values, and ``extend(built, parameters)``, which puts it into what its system builds. Or by the system's
+own tables: then the file has ``PLACE``, the key that names it, ``named(scene)``, and two edits of the scene's table,
+``leave_out(table, scene)`` and, if there are usual values, ``put_in(table, scene)``; both raise InputError with the
+remedy where it cannot be. Where an effect is a choice of method, to leave it out is the next cheaper one.
 """
 
 import ast
+import re
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
+from functools import cache
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from models.errors import InputError
 from models.strict import read
-from models.systems import DEFAULT, SYSTEMS
+from models.systems import SYSTEMS
 
 Table = dict[str, Any]
+
+
+class Effect:
+    """The file of an effect: its own names, and nothing for those of these that it does not have.
+
+    Attributes
+    ----------
+    NEEDS, EXCLUDES : names of other effects of its system; WHY : a phrase for both
+    AFTER : effects that come first where both are named, beside those that it needs
+    COUNTS : {"all" or an engine: {count: change}}, what it adds to a scene; the proof of absence finds no others
+    MODULES : those that are imported for its sake alone
+    CHANNELS : names of further results of a run
+    BESIDE : tables of effects that it needs, if those with usual values do not serve
+    """
+
+    NEEDS: tuple[str, ...] = ()
+    EXCLUDES: tuple[str, ...] = ()
+    WHY = ""
+    AFTER: tuple[str, ...] = ()
+    COUNTS: Mapping[str, Mapping[str, int]] = {}
+    MODULES: tuple[str, ...] = ()
+    CHANNELS: tuple[str, ...] = ()
+    BESIDE: Mapping[str, Table] = {}
+
+    def __init__(self, file: ModuleType) -> None:
+        vars(self).update(vars(file))
 
 
 def names_of(system: str) -> tuple[str, ...]:
@@ -48,13 +74,14 @@ def listing(system: str) -> dict[str, str]:
 
 
 def module_of(system: str, name: str) -> Any:
-    """The file of an effect."""
-    return import_module(f"{SYSTEMS[system].effects}.{name}")
+    """``Effect`` of a name; any other attribute is its file's own."""
+    return Effect(import_module(f"{SYSTEMS[system].effects}.{name}"))
 
 
 def named(scene: Any) -> tuple[str, ...]:
-    """Effects that a scene names; of the pitch plane none is imported to know it."""
-    return tuple(name for name in names_of(scene.system) if name in tables_of(scene) or _says(scene, name))
+    """Effects that a scene names; none that it could name by a table alone is imported to know it."""
+    return tuple(name for name, file in sorted(_files(scene.system).items())
+                 if name in tables_of(scene) or (_placed(file) and module_of(scene.system, name).named(scene)))
 
 
 def absent(scene: Any) -> tuple[str, ...]:
@@ -69,11 +96,10 @@ def tables_of(scene: Any) -> Mapping[str, Any]:
     return own if isinstance(own, Mapping) else {}
 
 
-def _says(scene: Any, name: str) -> bool:
-    if scene.system == DEFAULT:  # which names its effects by tables alone
-        return False
-    module = module_of(scene.system, name)
-    return hasattr(module, "named") and bool(module.named(scene))
+@cache
+def _placed(file: Path) -> bool:
+    """Whether an effect is named by its system's own tables, as its file says, read and not imported."""
+    return re.search(r"^def named\(", file.read_text(), re.MULTILINE) is not None
 
 
 def read_tables(tables: Mapping[str, Any], system: str, file: str) -> Table:
@@ -115,7 +141,7 @@ def legal(there: Iterable[str], scene: Any) -> None:
     there = tuple(there)
     for name in there:
         module = module_of(scene.system, name)
-        why = f", {module.WHY}" if hasattr(module, "WHY") else ""
+        why = f", {module.WHY}" if module.WHY else ""
         for other in module.NEEDS:
             if other not in there:
                 raise InputError(scene.file, _place(module, name), None, f"needs the effect {other!r}{why}: name it "
@@ -207,5 +233,4 @@ def lines(scene: Any, width: int = 10) -> list[str]:
     """What ``twinrig show`` says: a line per effect of the scene with what it takes, and one of all that are absent."""
     said = {name: module_of(scene.system, name).COST for name in named(scene)}
     there = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in said.items()]
-    imported = "not imported, not computed" if scene.system == DEFAULT else "not computed"
-    return [*there, f"  {'absent':<{width}} {', '.join(absent(scene)) or 'nothing'} ({imported})"]
+    return [*there, f"  {'absent':<{width}} {', '.join(absent(scene)) or 'nothing'} (not computed)"]

@@ -14,7 +14,15 @@ from models.scene_effects import module_of, names_of
 from models.systems import DEFAULT
 from validation.absence import ride
 from validation.absence.hand_built import mujoco_model
-from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, user_functions
+from validation.absence.probes import (
+    belongs_to_effects,
+    installed,
+    march,
+    probe,
+    quietest,
+    registered,
+    user_functions,
+)
 from validation.cases import absent, effect_prices
 from validation.cases.absent import EFFECTS, ENGINES, FORCES, added_to, change, declared, model, scene
 from validation.cases.effect_prices import hand_built
@@ -96,7 +104,17 @@ def test_user_functions_are_counted(folder):
     built = model(scene(guided, 50, folder, guided=True), "exudyn")
     assert user_functions(built) == built.plan()["callbacks"] == 4
     built = model(scene(FORCES, 50, folder), "exudyn")
-    assert user_functions(built) + 1 == built.plan()["callbacks"] == 3  # and the step's own, which is not an item
+    assert user_functions(built) == built.plan()["callbacks"] == 3  # the step's own among them
+
+
+@pytest.mark.parametrize(("engine", "most"), [("exudyn", 4), ("mujoco", 1)])
+def test_callbacks_are_seen_while_a_run_lasts(engine, most, folder):
+    """Positive control of the rows of other systems: those of a road, however the run comes about."""
+    with registered(engine) as callbacks:
+        model(scene({}, 20, folder), engine).run()
+        assert max(callbacks, default=0) == 0
+        model(scene({"road": ROAD}, 20, folder), engine).run()
+    assert max(callbacks) == most and installed() == 0
 
 
 def test_a_bare_scene_has_the_states_of_the_vehicle_and_no_others(folder):

@@ -24,7 +24,6 @@ from dataclasses import replace
 from models.strict import Strict, quantity
 from models.vehicles.description import PitchSpring
 
-NEEDS = EXCLUDES = AFTER = ()
 COST = "one native spring, and one product after the run"
 EXAMPLE = {"stiffness": 2e4}
 COUNTS = {"exudyn": {"native items": 1}, "mujoco": {"native items": 1}, "all": {"channels": 1}}
@@ -51,7 +50,6 @@ import numpy as np
 from dataclasses import replace
 from models.strict import Strict, quantity
 
-NEEDS = EXCLUDES = ()
 COST = "two exponentials per wheel and sample"
 EXAMPLE = {"time": 0.2}
 COUNTS = {"all": {"time constants": 8}}
@@ -72,7 +70,7 @@ from dataclasses import replace
 
 from models.strict import Strict, quantity
 
-NEEDS, EXCLUDES = (), {excludes}
+EXCLUDES = {excludes}
 COST = "one number more"
 EXAMPLE = {{"share": 0.5}}
 

@@ -1,7 +1,6 @@
 """Effects of the pitch-plane vehicle: one file each, named as in a scene and imported only when a scene names it.
 
-What every effect holds is told in ``models.scene_effects``. Here a scene names each by its table, ``extend(assembly,
-parameters)`` returns the assembly with the effect in it, and a file holds two things more: ``AFTER`` (effects that come
-first where both are named) and ``CHANNELS`` (names of further results, if it has any). There is no switch: an effect
-that is not named is not there.
+What every effect holds is told in ``models.scene_effects``. Here a scene names each by its table, and
+``extend(assembly, parameters)`` returns the assembly with the effect in it. There is no switch: an effect that is not
+named is not there.
 """

@@ -18,9 +18,6 @@ from models.strict import Strict, quantity
 if TYPE_CHECKING:
     from models.engines.protocol import Model, Trajectory
 
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
-AFTER: tuple[str, ...] = ()
 COST = "one acceleration of the engine per sample after the run; no state in any engine"
 EXAMPLE = {"sampling_rate": 200.0, "sensors": {"one": {"x": 1.0, "z": 0.2}}}
 COUNTS = {"all": {"channels": 3}}

@@ -16,10 +16,8 @@ from models.strict import Strict, quantity
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("road",)
-AFTER = ("wheel_forces",)
 COST = "nothing during the run: the samples are drawn before it"
 EXAMPLE = {"deviation": 8.0}
-COUNTS: dict[str, dict[str, int]] = {}
 
 
 class Parameters(Strict):

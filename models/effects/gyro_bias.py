@@ -16,8 +16,6 @@ from models.sensors.sampling import numbers
 from models.strict import Strict, quantity
 
 NEEDS = ("gyro",)
-EXCLUDES: tuple[str, ...] = ()
-AFTER = ("gyro",)
 COST = "one filter over the gyro's samples after the run; no state in any engine"
 EXAMPLE = {"turn_on": 1.0}
 COUNTS = {"all": {"channels": 1}}

@@ -17,7 +17,6 @@ from models.vehicles.pitch_plane import Parameters as Vehicle
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("pitch_spring", "prescribed_pitch", "prescribed_heave_and_pitch")
-AFTER = ("wheel_forces",)
 COST = "one native spring-damper"
 EXAMPLE = {"cut_off": 0.5}
 COUNTS = {"exudyn": {"native items": 1}, "mujoco": {"native items": 1}}

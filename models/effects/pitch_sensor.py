@@ -15,9 +15,6 @@ from models.noise import PITCH_SENSOR, normal
 from models.sensors.sampling import check_rate, numbers, read
 from models.strict import Strict, quantity
 
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
-AFTER: tuple[str, ...] = ()
 COST = "one reading after the run; no state in any engine"
 EXAMPLE = {"sampling_rate": 200.0, "deviation": 0.01}
 COUNTS = {"all": {"channels": 1}}

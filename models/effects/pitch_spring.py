@@ -7,9 +7,7 @@ from models.assembly import Assembly
 from models.strict import Strict, quantity
 from models.vehicles.description import PitchSpring
 
-NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("prescribed_pitch", "prescribed_heave_and_pitch")
-AFTER: tuple[str, ...] = ()
 COST = "one native spring-damper; with a dead band a law of its own, compiled in MuJoCo and in Python in Exudyn"
 EXAMPLE = {"stiffness": 2e4, "damping": 1e3}
 COUNTS = {"exudyn": {"native items": 1}, "mujoco": {"native items": 1}}

@@ -8,9 +8,7 @@ from models.assembly import Assembly
 from models.errors import InputError
 from models.strict import Strict, quantity
 
-NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("wheel_forces", "prescribed_pitch", "contact_points")
-AFTER: tuple[str, ...] = ()
 COST = "height and slope under each wheel, read from a table of half steps"
 EXAMPLE = {"source": "study", "speed": 20.0}
 COUNTS = {"exudyn": {"native items": 4, "callbacks": 4}, "mujoco": {"callbacks": 1}, "all": {"channels": 2}}

@@ -10,9 +10,7 @@ from models.signals import Interpolation, sampled
 from models.strict import Strict
 from models.tables import NEWTONS
 
-NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("road",)
-AFTER: tuple[str, ...] = ()
 COST = "one force per wheel, read from a table; no tyre"
 EXAMPLE = {"file": "forces.csv", "interpolation": "held"}
 COUNTS = {"exudyn": {"callbacks": 3}}

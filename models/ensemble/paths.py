@@ -8,7 +8,6 @@ noise.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,9 @@ from models.ensemble.runner import PathFailed
 from models.ensemble.store import Arrays
 from models.errors import InputError, RunFailed
 from models.scene import Scene
+from models.scene_effects import module_of
 from models.steps import divides
+from models.systems import DEFAULT
 
 DRIFT = 0.05
 """A path has drifted off when its pitch is this far (rad) from the true one, unless the job says otherwise."""
@@ -52,7 +53,7 @@ class NoisePaths:
         assembly = self.base
         for name, p in self.rest:
             own = p.model_copy(update={"path": path}) if "path" in type(p).model_fields else p
-            assembly = import_module(f"models.effects.{name}").extend(assembly, own)
+            assembly = module_of(DEFAULT, name).extend(assembly, own)
         return assembly
 
     def trajectory(self, path: int) -> Trajectory:
@@ -126,7 +127,7 @@ def _split(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
     """The part of a scene that all paths share, and the effects that have a path or follow one that has."""
     names, own = ordered(scene), list[str]()
     for name in names:
-        module = import_module(f"models.effects.{name}")
+        module = module_of(DEFAULT, name)
         if "path" in type(scene.effects[name]).model_fields or set(own) & {*module.NEEDS, *module.AFTER}:
             own.append(name)
     shared = scene.model_copy(update={"effects": {name: scene.effects[name] for name in names if name not in own}})

@@ -20,6 +20,7 @@ from unittest import mock
 from models.errors import Refused
 from models.scene_effects import beside, module_of, names_of
 from models.systems import SYSTEMS
+from validation.absence.probes import registered
 from validation.rows import Row, System, at_most, behaves
 
 SYSTEM: System = "effects"
@@ -59,12 +60,13 @@ def by_hand(system: str) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
 
 
 def seen(system: str, scene: Any, quick: bool = False) -> dict[str, tuple[dict[str, int], bytes]]:
-    """Counts and path of a scene in each engine that does not refuse it, or in the first one."""
-    file = file_of(system)
-    found = {}
+    """Counts and path of a scene in each engine that does not refuse it, or in the first one; the counts of Exudyn and
+    MuJoCo with the callbacks that were there while it ran."""
+    file, found = file_of(system), dict[str, tuple[dict[str, int], bytes]]()
     for engine in file.ENGINES[:1] if quick else file.ENGINES:
-        with suppress(Refused):
-            found[engine] = file.seen(scene, engine)
+        with suppress(Refused), registered(engine) as callbacks:
+            counts, path = file.seen(scene, engine)
+            found[engine] = {**counts, **({"callbacks": max(callbacks)} if callbacks else {})}, path
     return found
 
 
@@ -126,7 +128,7 @@ def probed(systems: tuple[str, ...] = tuple(FILES)) -> dict[str, Any]:
 
 
 def _modules(system: str) -> dict[str, tuple[str, ...]]:
-    return {name: getattr(module_of(system, name), "MODULES", ()) for name in names_of(system)}
+    return {name: module_of(system, name).MODULES for name in names_of(system)}
 
 
 def _probed(system: str, own: list[str]) -> dict[str, Any]:
@@ -139,7 +141,8 @@ def _probed(system: str, own: list[str]) -> dict[str, Any]:
         adds[name] = added(system, name)
         missing += [module for module in modules[name] if not _loaded([module])]
     last = seen(system, bare(system))
-    return {"imported": imported, "missing": missing, "adds": adds,
+    callbacks = {engine: counts["callbacks"] for engine, (counts, _) in first.items() if engine != "reference"}
+    return {"imported": imported, "missing": missing, "adds": adds, "callbacks": callbacks,
             "same": all(first[e][1] == last[e][1] for e in first)}  # fmt: skip
 
 
@@ -191,6 +194,10 @@ def _absent(system: str, seen_there: dict[str, Any]) -> list[Row]:
         behaves(f"absent.{system}.bits", SYSTEM, f"{system}: path of a bare scene, once without the files of effects, "
                 "once after all of them ran", "the same" if seen_there["same"] else "not the same", "the same",
                 "to the last bit, in every implementation"),
+        *(at_most(f"absent.{system}.callbacks.{engine}", SYSTEM, f"{system}: callbacks that a bare scene has in "
+                  f"{engine} beyond the one whose forces no engine has", count - 1, "", 0, "counted over all items of "
+                  "the system that marches, or in the engine's globals; no effect adds any but what its file says",
+                  "none") for engine, count in seen_there["callbacks"].items()),
     ]  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tracemalloc
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 from unittest import mock
@@ -142,15 +142,59 @@ def _size(result: Any) -> int:
 
 
 def user_functions(model: Any) -> int:
-    """Number of user functions of an Exudyn model, counted over all items of its system.
+    """Number of user functions of an Exudyn model, counted over all items of its system and its own.
 
     It takes the model and not the system, which is empty without a word once its container is gone.
     """
-    mbs = model.built.mbs
+    return _user_functions(model.built.mbs)
+
+
+def _user_functions(mbs: Any) -> int:
     system = mbs.systemData
     kinds = (("Node", system.NumberOfNodes()), ("Object", system.NumberOfObjects()),
              ("Marker", system.NumberOfMarkers()), ("Load", system.NumberOfLoads()),
              ("Sensor", system.NumberOfSensors()))  # fmt: skip
     items = [getattr(mbs, f"Get{kind}")(i) for kind, count in kinds for i in range(count)]
     assert items, "the system is empty"
-    return sum("UserFunction" in key and bool(value) for item in items for key, value in item.items())
+    own = [getattr(mbs, name)() for name in dir(mbs) if name.startswith("Get") and name.endswith("UserFunction")]
+    told = [value for item in items for key, value in item.items() if "UserFunction" in key]
+    return sum(bool(value) for value in (*told, *own))
+
+
+@contextmanager
+def registered(engine: str) -> Iterator[list[int]]:
+    """Callbacks in a block: of every Exudyn system that marches, or of MuJoCo whenever one is set or taken away."""
+    found, patches = list[int](), list[Any]()
+    if engine == "mujoco":
+        import mujoco
+
+        patches = [mock.patch.object(mujoco, name, _setting(getattr(mujoco, name), found))
+                   for name in (f"set_mjcb_{callback}" for callback in CALLBACKS)]  # fmt: skip
+    elif engine == "exudyn":
+        import exudyn as exu
+
+        patches = [mock.patch.object(exu.MainSystem, "SolveDynamic", _marching(exu.MainSystem.SolveDynamic, found))]
+    with ExitStack() as stack:
+        for patch in patches:
+            stack.enter_context(patch)
+        yield found
+
+
+def _setting(function: Callable[..., Any], found: list[int]) -> Callable[..., Any]:
+    def call(law: Any) -> None:
+        function(law)
+        found.append(installed())
+
+    return call
+
+
+def _marching(function: Callable[..., Any], found: list[int]) -> Callable[..., Any]:
+    seen = dict[int, Any]()
+
+    def call(mbs: Any, *args: Any, **options: Any) -> Any:
+        if id(mbs) not in seen:  # which keeps it, so that no other one has its number
+            seen[id(mbs)] = mbs
+            found.append(_user_functions(mbs))
+        return function(mbs, *args, **options)
+
+    return call

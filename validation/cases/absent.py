@@ -12,7 +12,7 @@ from models.assembly import assemble
 from models.engines.protocol import Model, build, settings_of
 from models.scene import Scene
 from models.scene import build as build_scene
-from models.scene_effects import module_of, names_of
+from models.scene_effects import module_of, names_of, without
 from models.simulate import outputs
 from models.systems import DEFAULT
 from models.time_series import write_time_series
@@ -37,7 +37,7 @@ EFFECTS = names_of(DEFAULT)
 def added_to(effect: str) -> dict[str, Any]:
     """Tables of the effects that one needs."""
     module = module_of(DEFAULT, effect)
-    return {name: module_of(DEFAULT, name).EXAMPLE for name in module.NEEDS} | getattr(module, "BESIDE", {})
+    return {name: module_of(DEFAULT, name).EXAMPLE for name in module.NEEDS} | module.BESIDE
 
 
 def scene(effects: dict[str, Any], steps: int, folder: Path, guided: bool = False) -> Scene:
@@ -66,9 +66,11 @@ def model(own: Scene, engine: str) -> Model:
 
 def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
     """The same scene without and with one effect."""
-    base, values = added_to(effect), module_of(DEFAULT, effect).EXAMPLE
-    guided = effect.startswith("prescribed")
-    return scene(base, steps, folder, guided), scene({**base, effect: values}, steps, folder, guided)
+    base, guided, module = added_to(effect), effect.startswith("prescribed"), module_of(DEFAULT, effect)
+    less = scene(base, steps, folder, guided)
+    if hasattr(module, "leave_out"):  # the vehicle has it unless the scene says otherwise
+        return without(less, effect), less
+    return less, scene({**base, effect: module.EXAMPLE}, steps, folder, guided)
 
 
 def counts(own: Scene, engine: str) -> dict[str, int]:

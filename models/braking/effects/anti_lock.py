@@ -3,7 +3,6 @@
 from typing import Any
 
 PLACE = "controller"
-NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("measured_pressures",)
 WHY = "which leave nothing to a controller"
 COST = "one answer of the controller per sample"

@@ -4,7 +4,6 @@ from typing import Any
 
 PLACE = "port.faults"
 NEEDS = ("port",)
-EXCLUDES: tuple[str, ...] = ()
 COST = "one look at each fault per sample"
 COUNTS = {"all": {"asked": 1}}
 

@@ -5,8 +5,6 @@ from typing import Any
 from models.braking.effects.push_out import AXLES, brake_in
 
 PLACE = "brakes.front.release"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "nothing: the same law of torque by pressure, its two lines apart"
 COUNTS = {"all": {"loops": 4}}
 KEYS = ("release", "falling")

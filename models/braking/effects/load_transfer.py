@@ -3,7 +3,6 @@
 from typing import Any
 
 PLACE = "load_transfer"
-NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("suspension",)
 WHY = "whose springs carry the loads"
 COST = "two products per wheel and step"

@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "measured"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a row of a table per sample"
 COUNTS = {"all": {"files": 1}}
 

@@ -3,7 +3,6 @@
 from typing import Any
 
 PLACE = "port"
-NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("measured_pressures",)
 WHY = "which leave nothing to ask"
 COST = "one exchange per sample, and what stands behind it"

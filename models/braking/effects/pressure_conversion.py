@@ -4,7 +4,6 @@ from typing import Any
 
 PLACE = "port.pressures"
 NEEDS = ("port",)
-EXCLUDES: tuple[str, ...] = ()
 COST = "a few operations per pressure and sample"
 COUNTS = {"all": {"asked": 1}}
 

@@ -3,7 +3,6 @@
 from typing import Any
 
 PLACE = "pressure"
-NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("measured_pressures",)
 WHY = "which are the chambers'"
 COST = "two exponentials per wheel and sample"

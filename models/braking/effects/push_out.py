@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "brakes.front.push_out"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "nothing: the same law of torque by pressure"
 COUNTS = {"all": {"push-outs": 4}}
 AXLES = ("front", "rear", "trailer")

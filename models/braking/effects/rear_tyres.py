@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "tyres.own_rear"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a second table of friction per surface"
 COUNTS = {"all": {"tables": 1}}
 

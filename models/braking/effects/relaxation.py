@@ -3,7 +3,6 @@
 from typing import Any
 
 PLACE = "relaxation"
-NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("suspension",)
 WHY = "whose tyres answer at once"
 COST = "a state per wheel, exact within a step"

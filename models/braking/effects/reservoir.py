@@ -4,7 +4,6 @@ from typing import Any
 
 PLACE = "pressure.reservoir"
 NEEDS = ("pressure_dynamics",)
-EXCLUDES: tuple[str, ...] = ()
 COST = "a sum over the chambers per sample"
 COUNTS = {"all": {"volumes": 4}}
 

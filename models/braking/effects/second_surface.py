@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "road.stretches"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "the surface under each wheel is looked up at every step"
 COUNTS = {"all": {"surfaces": 1, "tables": 1}}
 

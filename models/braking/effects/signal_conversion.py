@@ -4,7 +4,6 @@ from typing import Any
 
 PLACE = "port.signals"
 NEEDS = ("port",)
-EXCLUDES: tuple[str, ...] = ()
 COST = "a few operations per signal and sample"
 COUNTS = {"all": {"asked": 1}}
 

@@ -3,10 +3,7 @@
 from typing import Any
 
 PLACE = "vehicle.file"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "every freedom of its file, and a step of an engine around the compiled tyres"
-COUNTS: dict[str, dict[str, int]] = {}
 MODULES = ("models.braking.sprung", "models.engines.braking_sprung")
 
 

@@ -4,7 +4,6 @@ from typing import Any
 
 PLACE = "port.teeth"
 NEEDS = ("port",)
-EXCLUDES: tuple[str, ...] = ()
 COST = "the edges of every wheel within each sample"
 COUNTS = {"all": {"asked": 1}}
 

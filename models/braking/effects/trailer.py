@@ -3,7 +3,6 @@
 from typing import Any
 
 PLACE = "trailer"
-NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("suspension",)
 WHY = "whose springs carry that vehicle, alone"
 COST = "two coordinates and four wheels more"

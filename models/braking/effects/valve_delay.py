@@ -4,7 +4,6 @@ from typing import Any
 
 PLACE = "pressure.delay"
 NEEDS = ("pressure_dynamics",)
-EXCLUDES: tuple[str, ...] = ()
 COST = "commands that are kept for as many samples"
 COUNTS = {"all": {"kept commands": 8}}
 

@@ -4,7 +4,6 @@ from typing import Any
 
 PLACE = "falling_friction"
 NEEDS = ("saturation",)
-EXCLUDES: tuple[str, ...] = ()
 COST = "an exponential per cell, and a march of its own"
 COUNTS = {"all": {"laws of friction": 1}}
 MODULES = ("models.contact.fastsim_falling",)

@@ -5,8 +5,6 @@ from typing import Any
 from models.errors import InputError
 
 PLACE = "method.name"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "some microseconds per contact, where the linear theory multiplies by a matrix"
 COUNTS = {"all": {"bounded": 1}}
 

@@ -5,8 +5,6 @@ from typing import Any
 from models.errors import InputError
 
 PLACE = "creepage.spin"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "nothing: the third column of the same creepages"
 COUNTS = {"all": {"motions with spin": 1}}
 

@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "manoeuvres.NAME.brake"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a look into a table of times per call"
 COUNTS = {"all": {"controls": 1}}
 

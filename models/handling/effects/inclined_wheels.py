@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "tyres.inclination"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "nothing: the same forces at an angle, with spin"
 COUNTS = {"all": {"leaning wheels": 4}}
 

@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "manoeuvres.NAME.rough"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a cosine per wave, tyre and call"
 COUNTS = {"all": {"waves": 48}}
 

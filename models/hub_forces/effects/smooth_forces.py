@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "forces.interpolation"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "cubic pieces in place of straight ones"
 COUNTS = {"all": {"curves between samples": 1}}
 

@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "forces.frame"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a rotation per hub and call"
 COUNTS = {"all": {"turning hubs": 4}}
 

@@ -5,8 +5,6 @@ from typing import Any
 from models.errors import InputError
 
 PLACE = "road"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a run of the whole vehicle on its tyres before the others"
 COUNTS = {"all": {"runs on tyres": 1}}
 

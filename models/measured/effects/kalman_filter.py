@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "stabilise.method"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a filter over all samples before the run, and a moment over time"
 COUNTS = {"all": {"pulled angles": 2}}
 

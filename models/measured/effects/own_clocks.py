@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "files.0.offset"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "signals are moved to one clock by interpolation"
 COUNTS = {"all": {"moved clocks": 1}}
 

@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "stabilise.method"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "two coordinates less, and derivatives of the smoothed angles"
 COUNTS = {"all": {"enforced angles": 2}}
 

@@ -4,7 +4,6 @@ from typing import Any
 
 PLACE = "virtual.faults"
 NEEDS = ("virtual_measurement",)
-EXCLUDES: tuple[str, ...] = ()
 WHY = "for files have the faults that they have"
 COST = "a random number per sample and channel before the run, no more in it"
 COUNTS = {"all": {"faulty channels": 24}}

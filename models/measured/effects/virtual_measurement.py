@@ -5,8 +5,6 @@ from typing import Any
 from models.errors import InputError
 
 PLACE = "virtual"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a run of the whole vehicle on its tyres, written as a file and read again"
 COUNTS = {"all": {"runs on tyres": 1}}
 

@@ -5,8 +5,6 @@ from typing import Any
 from models.rail.of_scene import any_of, override, usual
 
 PLACE = "wheelset.override.contact_damping"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "one product per wheel and call"
 COUNTS = {"all": {"contact damping": 1}}
 

@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "contact.law"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a net of cells per strip and call, about 20 microseconds"
 COUNTS = {"all": {"creep nets": 1}}
 

@@ -5,7 +5,6 @@ from typing import Any
 from models.rail.of_scene import any_of, override, usual, wheelset_of
 
 PLACE = "wheelset.override.flange_stiffness"
-NEEDS: tuple[str, ...] = ()
 EXCLUDES = ("profiles",)
 WHY = "which have flanges of their own"
 COST = "one comparison per wheel and call"

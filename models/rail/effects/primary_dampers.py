@@ -5,8 +5,6 @@ from typing import Any
 from models.rail.of_scene import any_of, override, usual
 
 PLACE = "wheelset.override.damping_x"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a product per direction; actuators in MuJoCo, spring-dampers in Exudyn"
 COUNTS = {"all": {"dampers": 3}, "exudyn": {"spring-dampers": 2}, "mujoco": {"actuators": 4}}
 KEYS = ("damping_x", "damping_y", "damping_z")

@@ -5,8 +5,6 @@ from typing import Any
 from models.rail.of_scene import any_of, override, usual
 
 PLACE = "wheelset.override.stiffness_x"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a product per direction; actuators in MuJoCo, spring-dampers in Exudyn"
 COUNTS = {"all": {"springs": 3}, "exudyn": {"spring-dampers": 2}, "mujoco": {"actuators": 4}}
 KEYS = ("stiffness_x", "stiffness_y", "stiffness_z")

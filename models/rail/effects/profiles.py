@@ -6,8 +6,6 @@ from models.errors import InputError
 from models.rail.of_scene import wheelset_of
 
 PLACE = "profiles"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "tables of contact places by lateral displacement, made once"
 COUNTS = {"all": {"profiles": 1}}
 

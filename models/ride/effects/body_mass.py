@@ -12,10 +12,7 @@ LIGHT = 0.2
 ALL = "mass of all wheels"
 
 PLACE = "vehicle.file"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "two states per freedom of a light body"
-COUNTS: dict[str, dict[str, int]] = {}
 leave_out = of_vehicle
 
 

@@ -13,10 +13,7 @@ ALIKE = 2.0
 """Stiffnesses apart by no more than this factor are of one sort of bushing."""
 
 PLACE = "vehicle.file"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a product per bushing, and the fastest modes of the vehicle"
-COUNTS: dict[str, dict[str, int]] = {}
 leave_out = of_vehicle
 
 

@@ -5,8 +5,6 @@ from typing import Any
 from models.ride.of_scene import vehicle_of
 
 PLACE = "vehicle.small_motion"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "runs in time by an engine in place of one covariance"
 COUNTS = {"all": {"bent springs": 1}}
 MODULES = ("models.ride.statistical_linearisation",)

@@ -5,10 +5,8 @@ from typing import Any
 from models.ride.choice.held import Effect, Held, holds
 
 PLACE = "road.front_rear"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a filter of the road per axle"
-COUNTS: dict[str, dict[str, int]] = {"all": {"delays": 1}}
+COUNTS = {"all": {"delays": 1}}
 
 
 def found(held: Held) -> list[Effect]:

@@ -9,10 +9,7 @@ from models.ride.choice.held import Effect, Held, holds, of_vehicle
 from models.vehicles.spatial import Freedom
 
 PLACE = "vehicle.file"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "two states per freedom"
-COUNTS: dict[str, dict[str, int]] = {}
 leave_out = of_vehicle
 
 

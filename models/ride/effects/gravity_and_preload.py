@@ -3,10 +3,8 @@
 from typing import Any
 
 PLACE = "vehicle.operating_point"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a stiffness per preloaded spring"
-COUNTS: dict[str, dict[str, int]] = {"all": {"preloads": 1}}
+COUNTS = {"all": {"preloads": 1}}
 
 
 def named(scene: Any) -> bool:

@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "road.file"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a fit before all, no more in the runs"
 COUNTS = {"all": {"fits": 1}}
 MODULES = ("models.road.fitted",)

@@ -8,10 +8,7 @@ from typing import Any
 from models.ride.choice.held import Effect, Held, holds, of_vehicle
 
 PLACE = "vehicle.file"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a product per mount, and the freedoms of what it carries"
-COUNTS: dict[str, dict[str, int]] = {}
 leave_out = of_vehicle
 
 

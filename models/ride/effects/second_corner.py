@@ -6,10 +6,8 @@ from models.ride.choice.held import Effect, Held, holds
 from models.ride.effects import tyre_damping
 
 PLACE = "road.cutoff"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a state more per filter of the road"
-COUNTS: dict[str, dict[str, int]] = {"all": {"states": 4}}
+COUNTS = {"all": {"states": 4}}
 
 
 def found(held: Held) -> list[Effect]:

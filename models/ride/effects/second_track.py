@@ -5,10 +5,8 @@ from typing import Any
 from models.ride.choice.held import Effect, Held, holds
 
 PLACE = "road.left_right"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a second filter of the road per axle"
-COUNTS: dict[str, dict[str, int]] = {"all": {"heights": 2}}
+COUNTS = {"all": {"heights": 2}}
 
 
 def found(held: Held) -> list[Effect]:

@@ -6,10 +6,7 @@ from models.ride.choice.held import of_vehicle
 from models.ride.of_scene import vehicle_of
 
 PLACE = "vehicle.file"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a linear vehicle of its own at every speed"
-COUNTS: dict[str, dict[str, int]] = {}
 leave_out = of_vehicle
 
 

@@ -8,10 +8,7 @@ from models.ride.choice.held import Effect, Held, holds, of_vehicle
 NAME = "tyre damping"
 
 PLACE = "vehicle.file"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a product per tyre; without a second corner white noise at the outputs"
-COUNTS: dict[str, dict[str, int]] = {}
 leave_out = of_vehicle
 
 

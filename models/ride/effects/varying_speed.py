@@ -3,8 +3,6 @@
 from typing import Any
 
 PLACE = "drive"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a covariance that is marched, in place of one that is solved"
 COUNTS = {"all": {"drives": 1}}
 MODULES = ("models.ride.varying_speed",)

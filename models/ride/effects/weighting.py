@@ -5,10 +5,8 @@ from typing import Any
 from models.ride.of_scene import vehicle_of
 
 PLACE = "weighting"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "eight states per weighted output by Wk, six by Wd"
-COUNTS: dict[str, dict[str, int]] = {"all": {"states": 8}}
+COUNTS = {"all": {"states": 8}}
 
 
 def named(scene: Any) -> bool:
