@@ -18,8 +18,9 @@ BLOCK = 4096
 """Sources of noise; a new one takes the next number."""
 
 
-def normal_block(seed: int, path: int, block: int, channels: int, source: int = FORCES) -> np.ndarray:
-    """Standard normal samples (BLOCK, channels) of one block: samples BLOCK block and following of a stream.
+def normal_block(seed: int, path: int, block: int, channels: int, source: int = FORCES,
+                 rows: int = BLOCK) -> np.ndarray:  # fmt: skip
+    """Standard normal samples (rows, channels) of one block, its first: samples BLOCK block and following of a stream.
 
     seed : 0 to 2**64 - 1; path : 0 to 2**64 - 1; block : 0 to 2**64 - 1; InputError for others, which would name the
     stream of another one. Philox with the key (seed, path), the block in the counter's third word and the source in
@@ -27,7 +28,7 @@ def normal_block(seed: int, path: int, block: int, channels: int, source: int = 
     """
     key = np.array([_word("seed", seed), _word("path", path)], dtype=np.uint64)
     bits = np.random.Philox(key=key, counter=np.array([0, 0, _word("block", block), source], dtype=np.uint64))
-    return np.random.Generator(bits).standard_normal((BLOCK, channels))
+    return np.random.Generator(bits).standard_normal((rows, channels))
 
 
 def _word(name: str, value: int) -> int:
@@ -42,5 +43,6 @@ def normal(seed: int, path: int, count: int, channels: int, first: int = 0, sour
     if min(count, first) < 0:
         raise InputError("", "count, first", (count, first), "must be 0 or more")
     start, end = first // BLOCK, -(-(first + count) // BLOCK)
-    blocks = [normal_block(seed, path, block, channels, source) for block in range(start, end)]
-    return np.concatenate(blocks)[first - start * BLOCK :][:count] if blocks else np.empty((0, channels))
+    blocks = [normal_block(seed, path, block, channels, source, rows=min(BLOCK, first + count - block * BLOCK))
+              for block in range(start, end)]  # what lies behind the last sample is never drawn
+    return np.concatenate(blocks)[first - start * BLOCK :] if blocks else np.empty((0, channels))

@@ -153,8 +153,8 @@ CHECKS = {
 def _normal(change: Callable[..., tuple[int, ...]]) -> Patch:
     """Blocks of noise drawn for another (seed, path, block, channels, source)."""
     return attribute("models.noise:normal_block",
-                     lambda real: lambda seed, path, block, channels, source=0: real(
-                         *change(seed, path, block, channels, source)))  # fmt: skip
+                     lambda real: lambda seed, path, block, channels, source=0, **rows: real(
+                         *change(seed, path, block, channels, source), **rows))  # fmt: skip
 
 
 def _onto(late: float = 0.0, change: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Patch:
@@ -191,7 +191,7 @@ FAULTS = (
     Fault("paths share one stream", "noise", _normal(lambda s, p, b, c, o: (s, 0, b, c, o))),
     Fault("gyro and forces share one stream", "noise", _normal(lambda s, p, b, c, o: (s, p, b, c, 0))),
     Fault("deviation for variance", "noise",
-          attribute("models.noise:normal_block", lambda real: lambda *own: real(*own) * 2.0**0.5)),
+          attribute("models.noise:normal_block", lambda real: lambda *own, **rows: real(*own, **rows) * 2.0**0.5)),
     Fault("stream begins anew at every call", "noise",
           attribute("models.noise:normal",
                     lambda real: lambda s, p, n, c, first=0, source=0: real(s, p, n, c, source=source))),
