@@ -1,6 +1,6 @@
 """Effects of linear stationary ride scenes chosen within a tolerance: is the choice right, and what does it save?"""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +9,9 @@ import numpy as np
 from models.ride.choice.activity import activity
 from models.ride.choice.choose import Choice, Chooser
 from models.ride.choice.held import Held, without
-from models.ride.choice.reduced import Reduced
+from models.ride.choice.reduced import Reduced, Whole
 from models.ride.choice.screen import Screen, confirmed
-from models.ride.frequency import spectra
+from models.ride.frequency import road, transfer
 from models.ride.of_scene import vehicle_of
 from models.systems import load
 from studies.asked import SCENES
@@ -51,18 +51,40 @@ def judged(scene: Drawn, second: bool) -> Judged:
     """Choose, then certify by the identity and, where asked, by frequency."""
     chooser = Chooser(scene.held, [scene.speed], scene.quantities, scene.tolerance)
     choice, whole = chooser.choose(), chooser.wholes[0]
-    rest = whole.reduced(without(scene.held, choice.left_out))
+    left = without(scene.held, choice.left_out)
+    rest = whole.reduced(left)
     two, one = Screen(whole.full, chooser.rows).identity(rest)
     changes = None
     if second:
-        changes = np.sqrt(_by_frequency(rest, scene, chooser.rows) / _by_frequency(whole.full, scene, chooser.rows)) - 1
+        changes = np.sqrt(_by_frequency(whole, left, chooser.rows) / _by_frequency(whole, scene.held, chooser.rows)) - 1
     return Judged(scene, choice, float(abs(two / one - 1).max()), changes)
 
 
-def _by_frequency(reduced: Reduced, scene: Drawn, rows: list[int]) -> np.ndarray:
-    """Variances (quantities,) as sums over frequencies, from M, D, K as they are: singular ones need no state."""
-    density = spectra(reduced.vehicle, reduced.excitation, scene.speed, OMEGA)[:, rows]
-    return np.asarray(2 * np.trapezoid(density, OMEGA, axis=0))
+def _by_frequency(whole: Whole, held: Held, rows: list[int]) -> np.ndarray:
+    """Variances (quantities,) as sums over frequencies, from M, D, K as they are: singular ones need no state.
+
+    Of motions that follow at once, what sets each apart from following at once is taken away, mode by mode.
+    """
+    rest = whole.reduced(replace(held, fastest=np.inf))
+    parts = transfer(rest.vehicle, OMEGA) @ road(rest.excitation, whole.speed, OMEGA)
+    if held.fastest < np.inf:
+        parts = parts - _lagging(rest, whole.speed, held.fastest)
+    delays = np.array(rest.excitation.lengths) / whole.speed
+    turned = (parts * np.exp(-1j * delays[:, None] * OMEGA)[:, :, None, None]).sum(axis=0)[:, rows]
+    return np.asarray(2 * np.trapezoid((abs(turned) ** 2).sum(axis=2) / (2 * np.pi), OMEGA, axis=0))
+
+
+def _lagging(rest: Reduced, speed: float, fastest: float) -> np.ndarray:
+    """Outputs by the noise of each axle (a, w, p, k) of the modes faster than ``fastest`` (1/s), less what they would
+    be if they followed at once."""
+    A, F, axles = rest.system.A, rest.excitation.F, len(rest.excitation.heights)
+    n = rest.states - axles * len(F)
+    rates, V = np.linalg.eig(A[:n, :n])
+    fast, s = abs(rates) > fastest, 1j * OMEGA[:, None]
+    seen = (rest.system.C[:, :n] @ V[:, fast]) * (1 / (s - rates[fast]) + 1 / rates[fast])[:, None]
+    filtered = np.linalg.solve(s[:, :, None] * np.eye(len(F)) - speed * F, speed**0.5 * rest.excitation.G[None] + 0j)
+    driven = np.split(np.linalg.inv(V)[fast] @ A[:n, n:], axles, axis=1)
+    return np.array([seen @ (own @ filtered) for own in driven])
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:

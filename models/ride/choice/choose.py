@@ -1,9 +1,10 @@
 """Which effects a scene's quantities can do without: screened one by one and in pairs, chosen by what they save.
 
 A greedy choice: of all single effects, and of all pairs where no single one will do, the next to be left out is the
-one that saves most (logarithm of calls times states) for the error that the screen predicts for the whole set. The
-set is then confirmed by the exact solve at every speed. Where it is not kept, the step of the path that breaks it is
-found by halving, taken back for good, and the choice goes on without it. So what is reported was confirmed, always.
+one that saves most calls (their logarithm) for the error that the screen predicts for the whole set; where no step
+saves calls, the one that saves most of calls times states, if calls do not rise. The set is then confirmed by the
+exact solve at every speed. Where it is not kept, the step of the path that breaks it is found by halving, taken back
+for good, and the choice goes on without it. So what is reported was confirmed, always.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,6 +28,8 @@ HOPELESS = 20.0
 """A single effect that breaks the tolerance so many times is not tried in pairs, unless it is singular."""
 ROUNDS = 30
 """Choices that are confirmed at most."""
+WORTH, EVEN = 0.05, 1e-3
+"""Logarithm of calls below which none are saved; by how much, relative, they may rise where states are saved."""
 
 Set = frozenset[Effect]
 
@@ -179,21 +182,39 @@ class Chooser:
     def path(self, kept: list[Set], banned: set[Set]) -> list[Set]:
         """The path that goes on from a kept one, step by step, as far as predictions allow."""
         path = list(kept)
-        while True:
-            step = self._next(path[-1], banned, self._singles()) or self._next(path[-1], banned, self._pairs())
-            if not step:
-                return path
+        while step := self._next(path[-1], banned):
             path.append(path[-1] | step)
+        return path
+
+    def _next(self, chosen: Set, banned: set[Set]) -> Set:
+        """The next step: one that saves calls, or else one that saves work at no more calls; a pair only if no single
+        one does. Empty where none is within the budget."""
+        for saved in (self._calls_saved, self._work_saved):
+            for steps in (self._singles, self._pairs):
+                if step := self._best(chosen, banned, steps(), saved):
+                    return step
+        return frozenset()
+
+    def _calls_saved(self, chosen: Set, further: Set) -> float:
+        """Logarithm, of savings worth the tolerance they take."""
+        saved = log(self.cost(chosen).calls / self.cost(further).calls)
+        return saved if saved > WORTH else 0.0
+
+    def _work_saved(self, chosen: Set, further: Set) -> float:
+        now, then = self.cost(chosen), self.cost(further)
+        return log(now.work / then.work) if then.calls <= now.calls * (1 + EVEN) else 0.0
 
     def _singles(self) -> list[Set]:
-        """Every effect with those that it needs."""
+        """Every effect with those that it needs or that go before it."""
         named = {effect.name: effect for effect in self.effects}
-        return [frozenset([effect, *(named[name] for name in effect.needs)]) for effect in self.effects]
+        return [frozenset([effect, *(named[name] for name in (*effect.needs, *effect.after))])
+                for effect in self.effects]  # fmt: skip
 
     def _pairs(self) -> list[Set]:
-        """Pairs of which at least one breaks the tolerance alone, while both together hold it."""
+        """Pairs of which at least one breaks the tolerance alone, while both together hold it; of effects that others
+        go before, the first only."""
         if self._promising is None:
-            alone = {one: self._share(one) for one in self._singles()}
+            alone = {one: self._share(one) for one in self._singles() if not any(effect.after for effect in one)}
             tried = [one for one, share in alone.items() if share < HOPELESS or any(effect.singular for effect in one)]
             found = [one | two for one, two in combinations(tried, 2) if max(alone[one], alone[two]) > BUDGET
                      and not illegal(one | two) and not (one <= two or two <= one)]  # fmt: skip
@@ -205,20 +226,24 @@ class Chooser:
         at = self.screened[len(self.screened) // 2]
         return float(abs(self._worst([at], chosen, self._predict)).max()) / self.tolerance
 
-    def _next(self, chosen: Set, banned: set[Set], steps: list[Set]) -> Set:
+    def _best(self, chosen: Set, banned: set[Set], steps: list[Set], saved: Callable[[Set, Set], float]) -> Set:
         """The step that saves most for what it adds to the predicted error; empty where none is within the budget."""
-        best, most = frozenset[Effect](), 0.0
-        now, work = self._share(chosen), self.cost(chosen).work
+        best, most, now = frozenset[Effect](), 0.0, self._share(chosen)
         for step in steps:
             further = chosen | step
             if further == chosen or step - chosen in banned or step in banned or illegal(further):
                 continue
-            share = self._share(further)
-            saved = log(work / self.cost(further).work) if share <= BUDGET else 0.0
-            score = saved / max(share - now, LEAST)
+            share = self._on_the_way(chosen, further)
+            score = saved(chosen, further) / max(share - now, LEAST) if share <= BUDGET else 0.0
             if score > most:
                 best, most = step - chosen, score
         return best
+
+    def _on_the_way(self, chosen: Set, further: Set) -> float:
+        """Share of a set, or a larger one on the way to it, effect after effect: none that cancel later are kept."""
+        share = self._share(further)
+        last = max((effect for effect in further - chosen if effect.after), key=lambda e: len(e.after), default=None)
+        return share if last is None or share > BUDGET else max(share, self._on_the_way(chosen, further - {last}))
 
     def _share(self, chosen: Set) -> float:
         """Largest predicted change by the tolerance."""

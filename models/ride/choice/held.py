@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from importlib import import_module
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +19,15 @@ FOLDER = Path(__file__).parents[1] / "effects"
 
 @dataclass(frozen=True)
 class Held:
-    """Scene and vehicle, less what is left out: ``massless`` bodies, ``rigid`` springs, ``locked`` freedoms."""
+    """Scene and vehicle, less what is left out: ``massless`` bodies, ``rigid`` springs, ``locked`` freedoms, and the
+    vehicle's motions faster than ``fastest`` (1/s), which follow at once."""
 
     scene: RideScene
     vehicle: SpatialVehicle
     massless: frozenset[str] = frozenset()
     rigid: frozenset[str] = frozenset()
     locked: frozenset[tuple[str, Freedom]] = frozenset()
+    fastest: float = inf
 
     def on_road(self, **changes: object) -> "Held":
         """With other values in [road]."""
@@ -43,8 +46,9 @@ class Held:
 class Effect:
     """One thing that may be left out: its name, what leaving it out means, and with what it goes.
 
-    needs : effects that must be left out, too; excludes : effects that may not be left out beside it; ``why``, a
-    phrase for both. singular : no small change in any respect, so that it is solved and not screened.
+    needs : effects that must be left out, too, and go with it; after : ones that must be left out, too, and go before;
+    excludes : effects that may not be left out beside it; ``why``, a phrase for all three. singular : no small change
+    in any respect, so that it is solved and not screened.
     """
 
     name: str
@@ -54,6 +58,7 @@ class Effect:
     excludes: tuple[str, ...] = ()
     why: str = ""
     singular: bool = False
+    after: tuple[str, ...] = ()
 
 
 def effects_of(held: Held) -> tuple[Effect, ...]:
@@ -79,7 +84,7 @@ def illegal(chosen: Iterable[Effect]) -> str:
     chosen = tuple(chosen)
     names = {effect.name for effect in chosen}
     for effect in chosen:
-        missing = [name for name in effect.needs if name not in names]
+        missing = [name for name in (*effect.needs, *effect.after) if name not in names]
         if missing:
             return f"{effect.name} cannot be left out alone: leave out {' and '.join(missing)}, too, {effect.why}"
         clashing = [name for name in effect.excludes if name in names]

@@ -16,6 +16,7 @@ from scipy.linalg import block_diag, null_space
 
 from models.errors import InputError
 from models.ride.choice.held import Held
+from models.ride.choice.slow import slow
 from models.ride.delayed_system import DelayedSystem
 from models.ride.excitation import Excitation
 from models.ride.linear_vehicle import LinearVehicle
@@ -67,10 +68,13 @@ class Whole:
         left[:inert, :n], left[inert : 2 * inert, n : 2 * n] = back[0] @ behind, back[0] @ behind
         left[2 * inert : x - Tf.shape[1], :n] = back[1] @ behind
         left[x - Tf.shape[1] :, 2 * n :] = left_f
+        T = np.vstack([q, q @ system.A, f])
+        if held.fastest < np.inf:
+            system, G, rest = slow(system, x - Tf.shape[1], held.fastest)
+            T, left = T @ G, rest @ left
         out = weighted(system, self.held.scene.weighting)
-        more = np.eye(len(out.A) - x)
-        return Reduced(constrained, N, excitation, out, block_diag(np.vstack([q, q @ system.A, f]), more),
-                       block_diag(left, more), x)  # fmt: skip
+        more = np.eye(len(out.A) - len(system.A))
+        return Reduced(constrained, N, excitation, out, block_diag(T, more), block_diag(left, more), len(system.A))
 
 
 def constrain(held: Held, speed: float) -> tuple[LinearVehicle, np.ndarray]:
