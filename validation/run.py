@@ -32,8 +32,8 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
 """Case modules in the order of the report."""
 
 
-ALONE = {True: ("recommendation",), False: ("effect_prices", "price", "recommendation", "ensemble", "fastsim",
-                                            "contact_price", "contact_bridges", "handling")}  # fmt: skip
+ALONE = {True: ("recommendation",), False: ("effect_prices", "price", "recommendation", "ensemble", "contact_price",
+                                            "contact_bridges")}  # fmt: skip
 """Cases that begin when all others have ended, and have the machine alone, by ``quick``: in full those that time what
 they run, in quick the one that judges by seconds; what others time there is told as it comes."""
 WORKERS = 2

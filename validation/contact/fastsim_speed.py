@@ -63,15 +63,15 @@ def _call(one: Ellipse, values: tuple[float, ...]) -> None:
 
 
 def _least(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, float]:
-    """Least seconds per unit of every job, in interleaved rounds."""
+    """Least seconds of the processor per unit of every job, in interleaved rounds."""
     least = dict.fromkeys(jobs, np.inf)
     for job, _ in jobs.values():
         job()
     for _ in range(ROUNDS):
         for name, (job, units) in jobs.items():
-            start = time.perf_counter()
+            start = time.process_time()
             job()
-            least[name] = min(least[name], (time.perf_counter() - start) / units)
+            least[name] = min(least[name], (time.process_time() - start) / units)
     return least
 
 
