@@ -11,7 +11,10 @@ _intrinsic: Any = intrinsic
 
 @_intrinsic
 def doubles(typing_context, count):
-    """Pointer to so many doubles; they last until the function returns, and hold anything at first."""
+    """Pointer to so many doubles; they last until the function returns, and hold anything at first.
+
+    Ask outside of loops: every asking takes more of the stack. (``contact.stack`` has room of a size written out.)
+    """
 
     def generate(context, builder, signature, arguments):
         return builder.alloca(ir.DoubleType(), size=arguments[0])
