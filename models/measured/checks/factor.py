@@ -3,18 +3,19 @@
 from models.measured.checks.agreement import Fault
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.ratios import sentence
-from models.measured.finding import Finding
+from models.measured.checks.spikes import spikes
+from models.measured.finding import Finding, Weight
 
 TOLD = 0.02, 0.1
 """Errors of a factor of which it is said in how many channels they would be seen."""
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """Sizes are shares in %, or recorded by true value where sign or unit is wrong."""
+    """Sizes are shares in %, or recorded by true value where sign or unit is wrong: a doubt if a spike may say so."""
     if evidence.lacking:
         return [Finding("factor", "note", "", "Signs, units and factors were not checked by the motion of the vehicle: "
                         f"this needs {evidence.lacking}.")]  # fmt: skip
-    return [_finding(fault) for fault in evidence.faults if fault.kind == "factor"] + [_told(evidence)]
+    return [_finding(evidence, fault) for fault in evidence.faults if fault.kind == "factor"] + [_told(evidence)]
 
 
 def _told(evidence: Evidence) -> Finding:
@@ -26,7 +27,7 @@ def _told(evidence: Evidence) -> Finding:
     return Finding("gain", "note", "", text)
 
 
-def _finding(fault: Fault) -> Finding:
+def _finding(evidence: Evidence, fault: Fault) -> Finding:
     signal, names = fault.signals[0], tuple(s.name for s in fault.signals)
     against = "what the motion of the vehicle and all other channels tell"
     kind, text = sentence(fault.size, signal, against)
@@ -36,4 +37,6 @@ def _finding(fault: Fault) -> Finding:
         size, unit = 100 * (fault.size - 1), "%"
         text += f" The factor is {fault.size:.4g} +- {2 * fault.error:.2g} (95 %), if the vehicle file is right."
         return Finding("gain", "doubt", fault.name, text, size, unit, names)
-    return Finding(kind, "error", fault.name, text, fault.size, "1", names)
+    spiky = any(len(spikes(evidence.recording.samples(s))[0]) for s in fault.signals)
+    weight: Weight = "doubt" if spiky else "error"
+    return Finding(kind, weight, fault.name, text, fault.size, "1", names)
