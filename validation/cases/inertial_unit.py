@@ -198,20 +198,20 @@ def _ten_minutes(paths: int) -> tuple[list[Row], dict[str, Any]]:
     if not paths:
         return rows, {}
     every = round(RATE)
-    found = np.array([_path(path, every) for path in range(paths)])
+    t = np.arange(round(TEN_MINUTES * RATE)) / RATE
+    rates = np.column_stack([0.05 * np.sin(5 * t), 0.08 * np.sin(7 * t), 0.1 * np.sin(0.2 * t)])  # a car on a road
+    true = unit.true_attitude(rates, 1 / RATE, START)[::every]
+    found = np.array([_path(path, rates, true) for path in range(paths)])
     rows.append(mean_square("inertial_unit.ten_minutes", SYSTEM, "its mean square angle per axis by Monte Carlo",
                             float(np.mean(found[:, -1] ** 2)), axis**2, 3 * paths, "deg^2",
                             f"{paths} paths of 600,000 steps, seed {SEED}"))  # fmt: skip
     return rows, {"paths": found[:8].tolist(), "rms": np.sqrt(np.mean(found**2, axis=(0, 2))).tolist(), "count": paths}
 
 
-def _path(path: int, every: int) -> np.ndarray:
-    """Error angles (601, 3) in degrees about the global axes, each second, of one noisy path."""
-    t = np.arange(round(TEN_MINUTES * RATE)) / RATE
-    rates = np.column_stack([0.05 * np.sin(5 * t), 0.08 * np.sin(7 * t), 0.1 * np.sin(0.2 * t)])  # a car on a road
-    true = unit.true_attitude(rates, 1 / RATE, START)[::every]
+def _path(path: int, rates: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Error angles (601, 3) in degrees about the global axes of one noisy path, at the times of ``true`` (601, 4)."""
     found = unit.measured_attitude(rates, 1 / RATE, DEVIATION * np.ones(3), START, range(path, path + 1), SEED)
-    return np.degrees(logarithm(unit.error_rotation(found[::every, 0], true)))
+    return np.degrees(logarithm(unit.error_rotation(found[:: len(rates) // (len(true) - 1), 0], true)))
 
 
 def _bias(paths: int) -> list[Row]:
