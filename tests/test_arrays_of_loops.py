@@ -1,5 +1,7 @@
 """Loops of bare scenes make no arrays, and the count that says so sees one that is made."""
 
+import pytest
+
 from models.rail.wheel_forces import Room, numbers, room_for
 from models.rail.wheelset import CHOSEN
 from validation.absence.machinery import arrays, ratio_of_wheelsets, rows
@@ -14,6 +16,7 @@ def test_an_array_that_is_made_is_counted():
     assert arrays(lambda: [room_for(p) for _ in range(10)]) >= 10 * len(Room._fields)  # each call has six
 
 
+@pytest.mark.full
 def test_the_wheelset_written_by_hand_moves_as_the_bare_one():
     gap, _ = ratio_of_wheelsets(200, 1)
     assert gap < 1e-11  # the same operations in the same order give 0
