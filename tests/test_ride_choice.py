@@ -19,6 +19,7 @@ from models.ride.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from studies.asked import SCENES
+from validation.choice.all_subsets import fewest_calls
 from validation.ride.drawn_rides import drawn
 
 SPEED = 20.0
@@ -86,6 +87,35 @@ def test_roads_without_delay_and_second_corner():
     alike = held(front_rear="equal")
     assert deviations(held(), "delay front to rear") == pytest.approx(deviations(alike), rel=1e-9)
     assert deviations(held(cutoff=50.0), "second corner of the road") == pytest.approx(deviations(held()), rel=1e-9)
+
+
+def test_fast_motions_follow_at_once_and_slow_ones_keep_their_rates():
+    scene = held("seven_freedoms")
+    whole = Whole(scene, SPEED)
+    own = [effect for effect in effects_of(scene) if effect.name.startswith("motions")]
+    assert "cannot be left out alone" in illegal(own[1:2]) and not illegal(own[:2])
+    rest = whole.reduced(without(scene, own[:1]))
+    roads = len(whole.excitation.heights) * len(whole.excitation.F)
+    full, left = whole.full.system, rest.system
+    rates, slow = (np.linalg.eigvals(s.A[: len(s.A) - roads, : len(s.A) - roads]) for s in (full, left))
+    assert len(slow) < len(rates)
+    assert np.sort(abs(slow)) == pytest.approx(np.sort(abs(rates))[: len(slow)], rel=1e-9)
+    still, also = (s.C[:, -roads:] - s.C[:, :-roads] @ np.linalg.solve(s.A[:-roads, :-roads], s.A[:-roads, -roads:])
+                   for s in (full, left))  # fmt: skip
+    assert also == pytest.approx(still, rel=1e-9, abs=1e-9 * abs(still).max())  # at rest nothing is missing
+    assert rest.left @ rest.T == pytest.approx(np.eye(len(left.A)), abs=1e-9)
+    two, one = Screen(whole.full, [0, 4]).identity(rest)
+    assert np.abs(two / one - 1).max() < 1e-12
+
+
+def test_calls_never_rise_and_small_vehicles_reach_the_best_of_all_subsets():
+    """A wheel without mass is a slower call than the hop that it saves: two states less, but 35 % more calls."""
+    scene = held("quarter_car")
+    mass = named(scene)["mass of all wheels"]
+    chooser = Chooser(scene, [SPEED], ["travel front left"], 0.3)
+    choice = chooser.choose()
+    assert chooser.cost(frozenset([mass])).calls > choice.before.calls >= choice.after.calls
+    assert choice.after.calls <= fewest_calls(chooser) * (1 + 1e-9)
 
 
 def test_identity_and_screen_of_a_small_change():
