@@ -56,7 +56,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         rows = [_path_row(forces, duration, found), *_scale_rows(large)]
         rows += [_workers_row(job, found), _killed_row(job, found, forces / "killed")]
         with processes(2) as pool:
-            engines, prices = _engines(scene, truth, times, found, 8, pool)
+            engines, prices = _engines(scene, truth, times, found, 4, pool)
         prices = {"reference, 2 processes": large["seconds"] / large["path-steps"], **prices}
         rows += [*engines, _half_step_row(forces), *_price_rows(prices)]
         return rows, _data(measured.states, times, found, large, prices)
