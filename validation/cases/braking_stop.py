@@ -33,13 +33,15 @@ FURTHER = {"snow": ("snow", 0.04, 13.9, 1.0, 1.0), "snow, light": ("snow", 0.004
 """The same with factors of mass and spin inertia."""
 BOUND = 5e-4
 STEPS = {True: (STEP, 2e-2), False: (1e-4, 5e-4, 1e-3, 2e-3, STEP, 1e-2, 2e-2)}
-"""Steps (s) of the sweep and the figure, by ``quick``."""
+"""Steps (s) of the sweep, by ``quick``."""
+FINE = 5e-4
+"""Least of them (s) in the figure."""
 ASKED = ("dry", "wet", "snow", "ice")
 """Surfaces of the sweep that take every level of the brake in every step."""
 LEVELS, SOME = np.linspace(0.0, 1.5, 16), slice(None, None, 5)
 """Torque of the brake by that of locking, and those of the other surfaces in steps below the paper's, which are many
 (and all that the quick share takes)."""
-SLOW = 2.0
+SLOW = 0.5
 """Speed (m/s) of the sweep in steps below 1 ms, which are many."""
 AFTER = 2.0
 """Time (s) for which a vehicle that stands is watched."""
@@ -48,13 +50,14 @@ EVEN = road([Stretch(0.0, 0, 0)])
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All rows; quick: the four headline cases, two steps, two surfaces."""
-    curves = {name: _curve(*one, STEPS[quick]) for name, one in HEADLINE.items()}
+    steps = tuple(step for step in STEPS[quick] if step >= FINE)
+    curves = {name: _curve(*one, steps) for name, one in HEADLINE.items()}
     rows = [row for name, curve in curves.items() for row in _headline_rows(name, curve)]
     if not quick:
         rows += [_further_row(name, *one) for name, one in FURTHER.items()]
     rows += [_sweep_row(("ice", "dry") if quick else tuple(SURFACES), LEVELS[SOME] if quick else LEVELS, STEPS[quick]),
              _locked_row(), _release_row(), _friction_row(9 if quick else 25)]  # fmt: skip
-    return rows, {"curves": curves, "steps": STEPS[quick]}
+    return rows, {"curves": curves, "steps": steps}
 
 
 @cache
