@@ -247,9 +247,9 @@ def test_rounds_are_for_settings_that_decide_something():
 def test_a_slow_run_is_not_repeated_in_few_rounds(monkeypatch):
     """Three rounds, of which a slow setting is in the first: that is the run that has been."""
     monkeypatch.setattr(cost, "SLOW", 0.0)
-    points = cost.measure(PlantedProblem(), True, cost.EVERY, 0.0)
+    points = cost.measure(PlantedProblem(), True, cost.FEWEST - 2, 0.0)
     assert {(len(p.seconds), p.changed) for p in points} == {(1, None)}
-    points = cost.measure(PlantedProblem(), False, 5 * cost.EVERY, 0.0)
+    points = cost.measure(PlantedProblem(), False, 2 * cost.FEWEST - 1, 0.0)
     assert {len(p.seconds) for p in points if p.changed is False} == {cost.FEWEST}
 
 

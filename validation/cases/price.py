@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from models.assembly import Assembly
+from models.assembly import Assembly, assemble
 from models.ensemble.workers import processes
 from validation.price import ride, speed, split
 from validation.price import runner as cost
@@ -43,7 +43,7 @@ FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (noisy_forces.problem, prescr
                                                     partial(wheelset.problem, speed=1.0),
                                                     contact_alone.problem)  # fmt: skip
 """Problems that a quick run leaves out; it has those of PROBLEMS."""
-ROUNDS = {True: 3, False: 15}
+ROUNDS = {True: 3, False: 9}
 """Interleaved rounds of timing, by ``quick``, of settings whose seconds decide something."""
 LEAST = {True: 0.004, False: 0.005}
 """A short run is repeated until its turn lasts this long (s), by ``quick``."""
@@ -61,21 +61,25 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of all problems, of the force calls, and of two claims about speed; quick: five of the eleven problems, a
     named share of their settings, and beside another case, where in full no more processes run than there are cores.
     """
-    found = [_priced(quick, make) for make in PROBLEMS] if quick else _shared()
-    saved, rows = [own for own, _ in found], [row for _, own in found for row in own]
-    road = road_excited.problem(quick)
-    ride_rows, ride_data = ride.measure(quick, ROUNDS[True], LEAST[True])
-    rows += ride_rows
-    data = {"problems": saved, "ride": ride_data, "split": [],
-            **_speeds(road.assembly, 2 * ROUNDS[quick], 2 * LEAST[quick])}  # fmt: skip
-    settings = list(dict.fromkeys(_at_1_ms(one) for one in road.settings(quick) if one.method != "DVERK6"))
-    if not quick:
-        data["split"] = split.measure(ROUNDS[quick], LEAST[quick])
-        rows += split.rows(data["split"])
-    return rows + _road_rows(saved[0]) + _counts(settings, road.assembly) + _speed_rows(data), data
+    found, (beside, data) = ([_priced(True, make) for make in PROBLEMS], _beside(True)) if quick else _shared()
+    rows = [row for _, own in found for row in own]
+    return rows + _road_rows(found[0][0]) + beside, {"problems": [own for own, _ in found], **data}
 
 
-def _priced(quick: bool, make: Callable[[bool], Problem]) -> tuple[dict[str, Any], list[Row]]:
+Priced = tuple[dict[str, Any], list[Row]]
+
+
+def _beside(quick: bool) -> tuple[list[Row], dict[str, Any]]:
+    """What is not a problem of the runner: ride, the parts of a step, force calls, claims about speed."""
+    road = assemble(road_excited.scene())
+    rows, found = ride.measure(quick, ROUNDS[True], LEAST[True])
+    data = {"ride": found, "split": [] if quick else split.measure(ROUNDS[quick], LEAST[quick]),
+            **_speeds(road, 2 * ROUNDS[quick], 2 * LEAST[quick])}  # fmt: skip
+    settings = dict.fromkeys(_at_1_ms(one) for one in road_excited.settings(quick) if one.method != "DVERK6")
+    return rows + split.rows(data["split"]) + _counts([*settings], road) + _speed_rows(data), data
+
+
+def _priced(quick: bool, make: Callable[[bool], Problem]) -> Priced:
     """One problem: what is saved of it, and its rows."""
     problem = make(quick)
     points = cost.measure(problem, quick, ROUNDS[quick], LEAST[quick])
@@ -83,10 +87,14 @@ def _priced(quick: bool, make: Callable[[bool], Problem]) -> tuple[dict[str, Any
     return saved, rows_of(problem, points, quick)
 
 
-def _shared() -> list[tuple[dict[str, Any], list[Row]]]:
-    """All problems by as many processes as there are processors, two at most; the last ones, which are long, first."""
+def _shared() -> tuple[list[Priced], tuple[list[Row], dict[str, Any]]]:
+    """All problems, and what is beside them, by as many processes as there are processors, two at most; the first of
+    the problems last, but for the road, which is long."""
     with processes(min(2, os.cpu_count() or 1)) as pool:
-        return [*pool.map(partial(_priced, False), (PROBLEMS + FULL_ONLY)[::-1])][::-1]
+        first, *others = PROBLEMS + FULL_ONLY
+        road, beside = pool.submit(_priced, False, first), pool.submit(_beside, False)
+        found = [*pool.map(partial(_priced, False), others[::-1])][::-1]
+        return [road.result(), *found], beside.result()
 
 
 def _speeds(assembly: Assembly, rounds: int, least: float) -> dict[str, Any]:

@@ -129,7 +129,7 @@ def _sweep(problem: Problem, points: list[Point]) -> Row:
 
 def _losses(problem: Problem, points: list[Point]) -> list[Row]:
     """What each default loses at the middle tolerance."""
-    target = sorted(problem.tolerances)[len(problem.tolerances) // 2]
+    target = cost.middle(problem.tolerances)
     return [row for owner, p in cost.defaults(points).items() if p.status == "ok"
             for among, words in ((p.setting.engine, f"{owner}'s own cheapest"), ("", "the cheapest of all"))
             for kind in cost.costs(points)

@@ -29,9 +29,10 @@ CLOCK = time.process_time
 """Seconds of the processor: what else the machine does is not in them, nor in which settings have rounds."""
 NEAR = 1.25
 """A curve that takes up to so many times the least seconds in one run may be the cheapest: rounds tell."""
-SLOW, EVERY = 0.05, 3
-"""A setting that takes longer (s) is timed in every third round alone, its first run as the first: a long run wanders
-less."""
+SLOW = 0.05
+"""A setting that takes longer (s) has FEWEST rounds, its first run as the first of them: a long run wanders less."""
+LONG = 0.25
+"""A setting that takes longer (s) has rounds for the tolerance in the middle alone, which the rows are about."""
 FEWEST = 5
 """With fewer rounds no interval is told: that of one would look exact."""
 DRAWS = 200
@@ -133,7 +134,8 @@ def measure(problem: Problem, quick: bool, rounds: int, least: float) -> list[Po
 def racing(problem: Problem, points: list[Point]) -> list[Point]:
     """Points whose seconds decide something, by one run of each: the defaults; what the cheapest settings rest on, and
     what those may that take little longer, of all and of each engine; what a default rests on that is refined; of the
-    front of the figure what is not slow. Work is counted, so what wins by it needs no rounds.
+    front of the figure what is not slow; what takes LONG, for the middle tolerance alone. Work is counted, so what wins
+    by it needs no rounds.
     """
     quantity, own, usual = next(iter(problem.units)), by_curve(points), defaults(points).values()
     best = front(points, quantity, problem.uncertainty[quantity], "seconds")
@@ -143,8 +145,14 @@ def racing(problem: Problem, points: list[Point]) -> list[Point]:
         near = {curve: one for engine in ("", *RIVALS, *(p.setting.engine for p in usual))
                 for curve, one in _near(met, engine).items()}  # fmt: skip
         near |= {p.setting.curve: all_of[p.setting.curve] for p in usual if p.setting.curve in all_of}
-        chosen += [p for curve, one in near.items() for p in resting(own[curve], one)]
+        chosen += [p for curve, one in near.items() for p in resting(own[curve], one)
+                   if target == middle(problem.tolerances) or p.cost("seconds") <= LONG]  # fmt: skip
     return list({p.setting: p for p in chosen}.values())
+
+
+def middle(tolerances: Sequence[float]) -> float:
+    """The tolerance that rows are about, the looser of two."""
+    return sorted(tolerances)[len(tolerances) // 2]
 
 
 def _near(found: dict[str, curves.Reach], among: str) -> dict[str, curves.Reach]:
@@ -172,7 +180,8 @@ def _timed(problem: Problem, points: list[Point], rounds: int, least: float) -> 
     last: dict[int, Any] = {}
     jobs = [lambda i=i, p=p: last.update({i: problem.build(p.setting).run()}) for i, p in enumerate(points)]
     lasted = [p.cost("seconds") for p in points]
-    every = [EVERY if one > SLOW else 1 for one in lasted]
+    apart = -(-rounds // FEWEST) if rounds >= FEWEST else rounds
+    every = [apart if one > SLOW else 1 for one in lasted]
     found = interleave(jobs, rounds, least, lasted=lasted, every=every, clock=CLOCK)
     return {p.setting: replace(p, seconds=tuple(own[np.isfinite(own)].tolist()), changed=_changed(problem, p, last[i]))
             for i, (p, own) in enumerate(zip(points, found, strict=True)) if i in last}  # fmt: skip

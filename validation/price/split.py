@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numba import carray
 
+from models.assembly import assemble
 from models.compiled import njit
 from models.contact.stack import at, beyond
 from models.engines.contact_bridge import Wheels, forces
@@ -86,7 +87,7 @@ def marches() -> dict[tuple[str, str], list[Callable[[], Any]]]:
 
 def _road_exudyn() -> list[Callable[[], Any]]:
     """The vehicle on a road that is flat: its forces by the reference's own right-hand side."""
-    assembly = road_excited.problem(True).assembly
+    assembly = assemble(road_excited.scene())
     p, y, road = assembly.parameters.array(), np.empty(8), np.zeros(4)
     masses = [assembly.parameters.m1, assembly.parameters.m2, assembly.parameters.m3, assembly.parameters.I]
     derivative, scale = derivative_of("road", assembly.vehicle.geometry), np.array(masses)
@@ -101,7 +102,7 @@ def _road_exudyn() -> list[Callable[[], Any]]:
 
 def _road_mujoco() -> list[Callable[[], Any]]:
     settings = Settings(METHODS["mujoco"], STEP["road"], STEPS["road"] * STEP["road"])
-    compiled = CompiledForces(road_excited.problem(True).assembly, settings)
+    compiled = CompiledForces(assemble(road_excited.scene()), settings)
     return [partial(_within, one, compiled.coast) for one in (empty_law(), native_law(damper), law())]
 
 

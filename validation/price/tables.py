@@ -75,7 +75,8 @@ def rounds_of(points: list[Point]) -> str:
     once = sum(p.status == "ok" for p in points) - len(in_rounds)
     return (f"Seconds are medians of {told} settings whose seconds decide something (fewer where a run is longer than "
             f"{1e3 * cost.SLOW:g} ms; median absolute deviation {100 * spread:.0f} %), and of one run for {once} that "
-            "are far from the cheapest.")  # fmt: skip
+            f"are far from the cheapest, or longer than {1e3 * cost.LONG:g} ms and not for the middle "
+            "tolerance.")  # fmt: skip
 
 
 def _won(points: list[Point], found: dict[str, Reach], among: str, unit: str,
@@ -130,7 +131,7 @@ def every_curve(problem: dict[str, Any], points: list[Point]) -> Table:
     """A row per curve: settings, errors, observed order, what an error of 1 costs."""
     quantity, groups = quantity_of(problem), groups_of(problem, points)
     orders = cost.orders(points, quantity, problem["uncertainty"][quantity])
-    work, middle = cost.costs(points)[0], sorted(problem["tolerances"])[len(problem["tolerances"]) // 2]
+    work, middle = cost.costs(points)[0], cost.middle(problem["tolerances"])
     calls, seconds = (cost.reaches(points, quantity, middle, kind) for kind in (work, "seconds"))
     rows = tuple(
         (_plain(curve), str(len(own)), f"{own[0].setting.label()} to {own[-1].setting.label()}",

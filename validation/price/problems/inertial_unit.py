@@ -32,8 +32,8 @@ FIRST = {"ExplicitEuler", "Euler", "implicit", "implicitfast", "discrete"}
 ADAPTIVE = ("DOPRI5", "ODE23")
 """Methods that are there to be refused."""
 DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Euler", 2e-3): "MuJoCo"}
-_OWN, _FEW = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0), (5.0, 8.0, 10.0, 16.0, 20.0, 25.0)
-_NATIVE, _IMPLICIT = (5.0, 8.0, 10.0, 20.0, 50.0, 100.0), (10.0, 20.0, 25.0, 40.0, 50.0, 100.0)
+_OWN, _FEW = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0), (5.0, 8.0, 10.0, 16.0, 20.0, 25.0)
+_NATIVE, _IMPLICIT = (5.0, 8.0, 10.0, 20.0, 50.0, 100.0), (10.0, 12.0, 16.0, 20.0, 25.0, 100.0)
 FULL: dict[tuple[str, str], tuple[float, ...]] = {
     **{("reference", rule): _OWN for rule in RULES},
     **{("exudyn", method): _FEW for method in ("RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler")},

@@ -23,7 +23,7 @@ CHOSEN = {
     ("exudyn", "GeneralizedAlpha 0.9"): (10 * MS, *STEPS),
     ("exudyn", "GeneralizedAlpha 0.6"): (10 * MS, *STEPS),
     ("exudyn", "RK44"): (1 * MS,),
-    ("mujoco", "RK4"): STEPS[:-1],
+    ("mujoco", "RK4"): STEPS[:-2],
     ("mujoco", "Euler"): STEPS[:-2],
     ("mujoco", "implicit"): STEPS[:-2],
     ("mujoco", "implicitfast"): STEPS[:-2],

@@ -38,8 +38,8 @@ _STEPS = (5 * MS, 4 * MS, 2.5 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 *
 _TIGHT = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 FULL: dict[tuple[str, str], tuple[float, ...]] = {
     ("reference", "RK4"): _STEPS,
-    ("reference", "DOP853"): _TIGHT,
-    ("reference", "Radau"): (1e-2, *_TIGHT[:-1]),
+    ("reference", "DOP853"): (1e-2, *_TIGHT[:-1]),
+    ("reference", "Radau"): (1e-1, 1e-2, *_TIGHT[:-2]),
     ("reference", "LSODA"): _TIGHT,
     ("exudyn", "RK44"): _STEPS,
     ("exudyn", "RK67"): (5 * MS, 4 * MS, 2.5 * MS, 2 * MS, 1.25 * MS, 1 * MS, 0.625 * MS),
@@ -105,6 +105,12 @@ def setting(engine: str, method: str, value: float) -> Setting:
     return Setting(engine, method, value, order, known.adaptive, STAGES.get(method, 0), default)
 
 
+def settings(quick: bool) -> tuple[Setting, ...]:
+    """FULL, or its named share QUICK."""
+    chosen = QUICK if quick else FULL
+    return tuple(setting(*curve, value) for curve, values in chosen.items() for value in values)
+
+
 def _dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
     """A scipy solution of the paper's equations at any time, restarted where the road is only C2."""
     derivative, p = derivative_of("road", assembly.vehicle.geometry), assembly.parameters.array()
@@ -148,8 +154,7 @@ class RoadExcited:
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """FULL, or its named share QUICK."""
-        chosen = QUICK if quick else FULL
-        return tuple(setting(*curve, value) for curve, values in chosen.items() for value in values)
+        return settings(quick)
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting of this problem by its curve and its step (s) or tolerance."""
