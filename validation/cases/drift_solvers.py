@@ -26,7 +26,7 @@ TITLE = "What drift depends on: samples and noise, not solvers"
 SYSTEM: System = "drift"
 SEED = 14
 ANGLE = 0.05
-RATE, DURATION = 50.0, 16.0
+RATE, DURATION = 50.0, 15.0
 """Sampling rate (Hz) of the runs by solver and their length (s): few samples, as adaptive solvers restart at each."""
 SOLVERS = (
     ("reference", "RK4", 1e-3), ("reference", "RK4", 5e-4),
