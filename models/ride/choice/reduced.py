@@ -61,6 +61,8 @@ class Whole:
         behind = np.linalg.solve(N.T @ self.linear.mass @ N, N.T @ self.linear.mass)
         Tf, left_f = _of_road(self.held, self.excitation, held, excitation)
         n, m, x = len(self.linear.mass), len(Tf), len(system.A)
+        if x == Tf.shape[1]:
+            raise InputError("", "effects", None, "nothing is left that could move")
         q = N @ Tq
         f = np.hstack([np.zeros((m, x - Tf.shape[1])), Tf])
         left = np.zeros((x, 2 * n + m))
