@@ -165,7 +165,7 @@ def _proved(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, 
 def _same(one: np.ndarray, two: np.ndarray) -> bool:
     """Whether two recordings differ by nothing but the rounding of a unit, so that one run stands for both."""
     largest = np.maximum(np.nanmax(np.abs(one), axis=0), 1e-300)
-    return bool(np.allclose(one / largest, two / largest, rtol=0.0, atol=1e-14, equal_nan=True))
+    return bool(np.allclose(one / largest, two / largest, rtol=0.0, atol=1e-12, equal_nan=True))
 
 
 def _changed(recording: Recording, true: VirtualMeasurement, samples: np.ndarray) -> float:

@@ -45,7 +45,7 @@ PLANE = (5.0e-3, 727.0855e-3, -0.2905)
 """Shift (m) at which CONTACT joins two patches, and its plane there: place across the track (m), angle (rad)."""
 CELL, DEEPEST = 1e-4, 1e-3
 """m: of the exact theory on this plane, and more than the bodies reach into each other."""
-SETTLED, SUNK = 1e-5, 2e-9
+SETTLED, SUNK = 1e-4, 1e-8
 """Of the load, to which two patches that sink each other are followed; m, to which their approach is found."""
 SEARCHED, GRID, HALVINGS, STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3e-4
 """Reach of the search along the profile (m) and round the axle (rad), its grid, how often it shrinks to a quarter; step
