@@ -35,7 +35,7 @@ NEAR = 2.0
 """Settings that took up to so many times the least seconds in one run are timed beside one another."""
 FAR = 8.0
 """The same for a default: it must never be given up because one run of it was disturbed."""
-ROUNDS, LEAST = 9, 0.005
+ROUNDS, LEAST = 9, 0.002
 """Interleaved rounds of timing; a short run is repeated until its turn lasts this long (s)."""
 FEWEST, PATIENCE = 3, 5.0
 """Of slow runs there are fewer rounds, for they take no longer together than this (s), yet at least so many."""

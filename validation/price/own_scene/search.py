@@ -17,13 +17,14 @@ COARSE = 1 / 11
 """Of a contact: the cells that are tried first."""
 LOOSE = 1e-3
 """The tolerance that an adaptive method is tried with first."""
-WORTH = 3.0
+WORTH = 2.0
 """A method is given up once it takes this many times the seconds and the force calls of its engine's best."""
-PATIENCE = 0.15
-"""s: an engine's default method is refined for as long as a run takes no longer, if another one has met the tolerance.
+PATIENCE = 0.05
+"""s: an engine's default method is refined for as long as a run takes no longer than this, or than the engine's best
+that has met the tolerance, if one has.
 """
 TOO_LONG = 10.0
-"""s: a run that would take longer is not made where another engine meets the tolerance in a third of that, or less."""
+"""s: a run that would take longer is not made where another engine meets the tolerance in half of that, or less."""
 BEYOND = 10.0
 """An error of so many times the quantity's own size is no answer any more."""
 
@@ -118,8 +119,9 @@ class Search:
                     and one.setting.value in ladder.values), default=0.0)  # fmt: skip
 
     def _affordable(self, ladder: Ladder, last: Tried) -> int:
-        """The finest rung whose run takes no longer than PATIENCE."""
-        most = PATIENCE / max(last.seconds, 1e-9)
+        """The finest rung whose run takes no longer than PATIENCE, or than what the engine has that meets."""
+        best = min(one.seconds for one in self.meeting(ladder.engine))
+        most = max(PATIENCE, best) / max(last.seconds, 1e-9)
         return max(i for i, value in enumerate(ladder.values)
                    if i == 0 or ladder.work(last.setting.value, value) <= most)  # fmt: skip
 

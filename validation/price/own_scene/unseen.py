@@ -21,7 +21,7 @@ from models.scene import Scene, build
 from models.time_series import write_time_series
 from validation.price.own_scene import Answer
 from validation.price.own_scene.pitch_plane import OwnPitchPlane, own
-from validation.price.own_scene.recommendation import SLOWER, Choice, Recommendation, recommend
+from validation.price.own_scene.recommendation import LEAST, SLOWER, Choice, Recommendation, recommend
 from validation.price.own_scene.search import Tried
 from validation.price.own_scene.truth import Truth
 from validation.price.problems import Setting
@@ -32,9 +32,8 @@ ENGINES = ("reference", "exudyn", "mujoco")
 TIGHT = 1e-11
 LONGEST, SHORTEST = 5e-5, 2e-5
 """Spacing (s) of the verdict's truth."""
-ROUNDS, LEAST = (9, 25), 0.005
-"""Interleaved rounds of a contest, and of the one that must say the same again; a short run is repeated until its turn
-lasts this long (s)."""
+ROUNDS = 9, 25
+"""Interleaved rounds of a contest, and of the one that must say the same again; turns are as long as in the race."""
 CONTEST = 3.0
 """A default that took so many times the seconds is not timed again: that is beyond what seconds wander."""
 SCALES = {"f1,f2": 1e3, "pitch": 1e-2, "z3": 1e-2, "f3,f4": 1e3, "suspension_moment": 1e3, "enforced_moment": 1e3}
