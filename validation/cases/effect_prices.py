@@ -121,8 +121,8 @@ def _job(own: Scene, engine: str) -> Any:
 def tables(data: dict[str, Any]) -> list[Table]:
     """The price list of effects."""
     note = ("Each effect is added to the scene without it: wheel_forces, road, pitch_spring and the sensors to the "
-            "bare vehicle, geometry to one of small angles, gyro_bias to one with a gyro, the others to one under wheel "
-            "forces. Counts are exact; "
+            "bare vehicle, geometry to one of small angles, gyro_bias to one with a gyro, the others to one under "
+            "wheel forces. Counts are exact; "
             "microseconds per step of 1 ms, channels included, are the median of paired differences with their median "
             "deviation, the factor is the median of paired ratios with a 95 % interval. An effect that is not named "
             "costs nothing.")
