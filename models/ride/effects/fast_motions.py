@@ -16,10 +16,7 @@ APART = 1.15
 """Motions whose rates differ by less than this factor go together."""
 
 PLACE = "vehicle.file"
-NEEDS: tuple[str, ...] = ()
-EXCLUDES: tuple[str, ...] = ()
 COST = "a state or two per motion, and the step limit, which is that of the fastest one"
-COUNTS: dict[str, dict[str, int]] = {}
 leave_out = of_vehicle
 
 
