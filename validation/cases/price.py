@@ -43,7 +43,7 @@ FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (noisy_forces.problem, prescr
                                                     partial(wheelset.problem, speed=1.0),
                                                     contact_alone.problem)  # fmt: skip
 """Problems that a quick run leaves out; it has those of PROBLEMS."""
-ROUNDS = {True: 3, False: 9}
+ROUNDS = {True: 1, False: 9}
 """Interleaved rounds of timing, by ``quick``, of settings whose seconds decide something."""
 LEAST = {True: 0.004, False: 0.005}
 """A short run is repeated until its turn lasts this long (s), by ``quick``."""
@@ -72,7 +72,7 @@ Priced = tuple[dict[str, Any], list[Row]]
 def _beside(quick: bool) -> tuple[list[Row], dict[str, Any]]:
     """What is not a problem of the runner: ride, the parts of a step, force calls, claims about speed."""
     road = assemble(road_excited.scene())
-    rows, found = ride.measure(quick, ROUNDS[True], LEAST[True])
+    rows, found = ride.measure(quick, ROUNDS[quick], LEAST[True])
     data = {"ride": found, "split": [] if quick else split.measure(ROUNDS[quick], LEAST[quick]),
             **_speeds(road, 2 * ROUNDS[quick], 2 * LEAST[quick])}  # fmt: skip
     settings = dict.fromkeys(_at_1_ms(one) for one in road_excited.settings(quick) if one.method != "DVERK6")
