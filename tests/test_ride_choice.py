@@ -210,3 +210,11 @@ def test_a_tolerance_that_nothing_keeps_leaves_everything_and_says_what_would_ch
     found = json.loads(capsys.readouterr().out)["answer"]
     assert found["kept"] and all(abs(error["confirmed"]) <= 1e-12 for error in found["errors"].values())
     assert set(found["would matter no more above"]) <= set(found["stay"]) and found["would matter no more above"]
+
+
+def test_a_choice_whose_identity_is_not_exact_is_not_taken(monkeypatch):
+    scene, exact = held(tyre_damping=100.0), Screen.identity
+    name = excited(linearise(scene.vehicle), scene.excitation(), SPEED).names[0]
+    assert Chooser(scene, [SPEED], [name], 0.5).choose().left_out
+    monkeypatch.setattr(Screen, "identity", lambda own, rest: (exact(own, rest)[0] * (1 + 3e-12), exact(own, rest)[1]))
+    assert not Chooser(scene, [SPEED], [name], 0.5).choose().left_out

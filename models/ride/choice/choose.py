@@ -4,7 +4,7 @@ A greedy choice: of all single effects, and of all pairs where no single one wil
 one that saves most for the error that the screen predicts for the whole set: calls (their logarithm) and, where no step
 saves any, calls times states, if calls do not rise; or the latter throughout, if that ends with fewer calls. The set is
 confirmed by the exact solve at every speed. Where it is not kept, the step of the path that breaks it is found by
-halving, taken back for good, and the choice goes on without it. So what is reported was confirmed, always.
+halving, taken back for good, and the choice goes on without it. What is reported was confirmed and certified, always.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,6 +28,8 @@ HOPELESS = 20.0
 """A single effect that breaks the tolerance so many times is not tried in pairs, unless it is singular."""
 ROUNDS = 30
 """Choices that are confirmed at most."""
+CERTAIN = 1e-12
+"""Relative error of the identity that certifies a choice; beyond it, rounding has eaten the certificate."""
 WORTH, EVEN = 0.05, 1e-3
 """Logarithm of calls below which none are saved; by how much, relative, they may rise where states are saved."""
 
@@ -117,6 +119,20 @@ class Chooser:
         """The same by the exact solve, of all speeds."""
         return self._worst(self.wholes, chosen, lambda whole, chosen, reduced: confirmed(reduced, self.rows))
 
+    def certified(self, chosen: Set) -> np.ndarray:
+        """What ``confirm`` finds; inf where it holds the tolerance, but the identity of covariance and adjoint, which
+        certifies it, is not exact at a screened speed."""
+        found = self.confirm(chosen)
+        exact = not self.holds(found) or all(self._exact(whole, chosen) for whole in self.screened)
+        return found if exact else np.full(len(found), inf)
+
+    def _exact(self, whole: Whole, chosen: Set) -> bool:
+        screen, reduced = self.screen(whole, frozenset()), self.system(whole, chosen)
+        if screen is None or reduced is None:
+            return False
+        two, one = screen.identity(reduced)
+        return bool((abs(two / one - 1.0) <= CERTAIN).all())
+
     def _predict(self, whole: Whole, chosen: Set, reduced: Reduced) -> np.ndarray:
         screen = self.screen(whole, chosen)
         return np.full(len(self.rows), inf) if screen is None else screen.predicted(reduced)
@@ -157,14 +173,14 @@ class Chooser:
             if path == kept:
                 break
             rounds += 1
-            last = self.confirm(path[-1])
+            last = self.certified(path[-1])
             if self.holds(last):
                 kept, found = path, last
                 continue
             low, high = len(kept) - 1, len(path) - 1  # path[low] is kept, path[high] is not
             while high - low > 1:
                 middle = (low + high) // 2
-                rounds, tried = rounds + 1, self.confirm(path[middle])
+                rounds, tried = rounds + 1, self.certified(path[middle])
                 low, high, found = (middle, high, tried) if self.holds(tried) else (low, middle, found)
             banned.add(path[high] - path[low])
             kept = path[: low + 1]
