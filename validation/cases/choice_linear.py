@@ -31,7 +31,7 @@ SMALL, SPEED = ("quarter_car", "half_car"), 20.0
 """Vehicles of so few effects that all subsets can be looked at; m/s."""
 TOLD = (1e-4, 0.05)
 """Confirmed changes whose predictions are judged: larger than rounding could be blamed for, below 5 %."""
-OMEGA = np.geomspace(1e-2, 3e4, 1500)
+OMEGA = np.geomspace(1e-2, 3e5, 3000)
 """rad/s of the frequency route: its sums are good to 1e-3 of a change, being the same grid for both."""
 
 
