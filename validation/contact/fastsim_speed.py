@@ -86,10 +86,11 @@ def _bound(values, repeats):
     return total
 
 
-@njit(cache=True, error_model="numpy")
-def _zeros(count):
-    """Made in compiled code, as FASTSIM's own: numpy's may begin within a register, which costs half as much again."""
-    return np.zeros(count)
+def _zeros(count: int) -> np.ndarray:
+    """Zeros that begin with a vector register: inside one, the march costs half as much again."""
+    room = np.zeros(count + 8)
+    first = -room.ctypes.data % 64 // 8
+    return room[first : first + count]
 
 
 @njit(cache=True, error_model="numpy")
