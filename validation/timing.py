@@ -77,7 +77,7 @@ def resamples(rounds: int, count: int = RESAMPLES, seed: int = SEED) -> np.ndarr
     return np.random.default_rng(seed).integers(rounds, size=(count, rounds))
 
 
-def paired_ratio(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:
+def paired_ratio(a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
     """Ratio a / b as the median of the paired log ratios, with its bootstrap 95 % interval."""
     logs = np.log(np.asarray(a) / np.asarray(b))
     _, low, high = interval(np.median(logs[resamples(len(logs))], axis=1))
