@@ -43,7 +43,7 @@ FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (noisy_forces.problem, prescr
                                                     partial(wheelset.problem, speed=1.0),
                                                     contact_alone.problem)  # fmt: skip
 """Problems that a quick run leaves out; it has those of PROBLEMS."""
-ROUNDS = {True: 1, False: 9}
+ROUNDS = {True: 1, False: 15}
 """Interleaved rounds of timing, by ``quick``, of settings whose seconds decide something."""
 LEAST = {True: 0.004, False: 0.005}
 """A short run is repeated until its turn lasts this long (s), by ``quick``."""
