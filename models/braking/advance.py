@@ -2,10 +2,10 @@
 
 from numba import carray
 
-from models.braking.on_stack import doubles
 from models.braking.plane_step import step_on
 from models.braking.surfaces import under_wheels
 from models.compiled import njit
+from models.contact.stack import doubles
 
 FINE, AT_REST, NOT_FOUND, LIFTED = range(4)
 """How a sample ended: still moving; standing; loads not found; a wheel without load, which the plane cannot have."""

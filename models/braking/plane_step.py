@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import carray
 
-from models.braking.on_stack import doubles
 from models.braking.plane_chain import factor, inertia, rows, solve
 from models.braking.tyre_table import across, place
 from models.braking.wheel_step import wheel_step
 from models.compiled import lean, njit
+from models.contact.stack import doubles
 
 CLOSE = 1e-7
 """What is left of the accelerations' error (m/s^2, and rad/s^2 times 1 m) when the loads are taken to be found."""

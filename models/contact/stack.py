@@ -13,11 +13,15 @@ _intrinsic: Any = intrinsic
 
 @_intrinsic(prefer_literal=True)
 def doubles(typing_context, count):
-    """Pointer to ``count`` doubles, a number written out; they last until the function returns, and hold anything."""
-    size = count.literal_value
+    """Pointer to ``count`` doubles; they last until the function returns, and hold anything at first.
+
+    A number written out takes its room once. Ask for any other outside of loops: every asking takes more of the stack.
+    """
 
     def generate(context, builder, signature, arguments):
-        return cgutils.alloca_once(builder, ir.DoubleType(), size=size)
+        if isinstance(count, types.IntegerLiteral):
+            return cgutils.alloca_once(builder, ir.DoubleType(), size=count.literal_value)
+        return builder.alloca(ir.DoubleType(), size=arguments[0])
 
     return DOUBLES(count), generate
 
