@@ -15,8 +15,8 @@ from models.strict import Strict, read
 class SceneFile(Strict):
     """What the scenes of all systems have in common; ``options`` is checked by the study that owns it."""
 
-    READS_AUTO: ClassVar[bool] = False
-    """Whether ``effects = "auto"`` is a key of the system's own."""
+    CHOOSING: ClassVar[str] = "choice"
+    """The study that chooses among the effects of a scene of this system."""
 
     title: str = Field(description="what the scene shows")
     system: str
@@ -43,11 +43,12 @@ class SceneFile(Strict):
         """Quantities and a tolerance belong to a choice of effects, and to nothing else."""
         given = {"quantities": self.quantities or None, "tolerance": self.tolerance}
         for key, value in given.items():
-            if self.study == CHOOSING and value is None:
+            if self.study == self.CHOOSING and value is None:
                 asks = "which quantities must stay right" if key == "quantities" else "how wrong they may be, as 0.02"
                 raise InputError(self.file, key, None, f"is missing: a choice of effects asks {asks}")
-            if self.study != CHOOSING and value is not None:
-                raise InputError(self.file, key, value, f'is read by effects = "auto", of the study {CHOOSING!r}, only')
+            if self.study != self.CHOOSING and value is not None:
+                allowed = f'is read by effects = "auto", of the study {self.CHOOSING!r}, only'
+                raise InputError(self.file, key, value, allowed)
 
     def path(self, name: str, place: str = "") -> Path:
         """A file that the scene names at ``place``: beside the scene, or else in the folder of the command."""
@@ -67,17 +68,17 @@ def checked(model: type[Model], table: Mapping[str, Any], file: str, folder: Pat
     return found
 
 
-CHOOSING, AUTO = "choice", "auto"
-"""The study that chooses among the effects of a scene, and what a scene says in their place to ask for it."""
+AUTO = "auto"
+"""What a scene says in place of effects to have them chosen."""
 
 
 def _automatic(model: type[SceneFile], table: Mapping[str, Any], file: str) -> dict[str, Any]:
-    """The table with ``effects = "auto"`` as the study that makes the choice, but where a system reads it itself."""
+    """The table with ``effects = "auto"`` as the study that makes the choice."""
     plain = dict(table)
-    if plain.get("effects") == AUTO and not model.READS_AUTO:
+    if plain.get("effects") == AUTO:
         del plain["effects"]
-        if plain.setdefault("study", CHOOSING) != CHOOSING:
-            raise InputError(file, "study", plain["study"], f'with effects = "auto" the study is {CHOOSING}')
+        if plain.setdefault("study", model.CHOOSING) != model.CHOOSING:
+            raise InputError(file, "study", plain["study"], f'with effects = "auto" the study is {model.CHOOSING}')
     return plain
 
 

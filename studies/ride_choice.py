@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import InputError
 from models.ride.choice.activity import activity
 from models.ride.choice.choose import Choice, Chooser
 from models.ride.choice.held import Effect, Held, illegal, without
@@ -40,8 +39,6 @@ class Alone:
 
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     """Refuse scenes that ask no question, and vehicles that are not linear."""
-    if scene.effects is None:
-        raise InputError(scene.file, "effects", None, 'is missing: this study chooses them, effects = "auto"')
     read(Options, scene.options, scene.file, "options")
     check_linear(scene, vehicle_of(scene), LINEAR_ALONE)
 

@@ -168,7 +168,7 @@ ASKING = {"title": "t", "system": "ride", "study": "ride_choice", "vehicle": {"f
 
 @pytest.mark.parametrize(("change", "said"), [
     ({"quantities": []}, "quantities"), ({"tolerance": None}, "tolerance"), ({"study": "ride"}, "ride_choice"),
-    ({"effects": None}, "quantities"), ({"tolerance": 1.5}, "below 1"),
+    ({"effects": None, "study": "ride"}, "quantities"), ({"tolerance": 1.5}, "below 1"),
     ({"quantities": ["body front", "body front"]}, "names 'body front' twice"),
 ])  # fmt: skip
 def test_scenes_that_ask_half_a_question(change, said):

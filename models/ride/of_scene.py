@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import copysign
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from models.ride.scene import RideScene
 from models.road.iso8608 import level_of_class
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad, excitation, half_track, on_track, road_of_level
+from models.scene_effects import extended
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
@@ -28,17 +29,32 @@ BESIDE = 1.0
 """Where (m) the one track of a vehicle without a width lies: its level is the same wherever that is."""
 
 
+@dataclass(frozen=True)
+class Built:
+    """What effects extend: the vehicle, and what becomes of the road under its wheels, one change after another.
+
+    A change keeps the noise; states that it adds to those of the road's own filters come last.
+    """
+
+    vehicle: SpatialVehicle
+    road: tuple[Callable[[Excitation], Excitation], ...] = ()
+
+
 def vehicle_of(scene: RideScene) -> SpatialVehicle:
-    """The scene's vehicle, with gravity where its operating point is the loaded one.
+    """The scene's vehicle with its effects, and with gravity where its operating point is the loaded one.
 
     InputError for a loaded vehicle that may yaw: its preloaded springs keep their directions in space, not in it, so
     that their moments about z would pull it back or push it on.
     """
-    vehicle = load_vehicle(scene.vehicle.file, scene.folder, scene.file, "vehicle.file")
+    vehicle = _built(scene).vehicle
     if scene.vehicle.operating_point == "loaded" and vehicle.side_forces:
         allowed = "a vehicle with side forces may yaw, while preloads keep their directions in space: use unloaded"
         raise InputError(scene.file, "vehicle.operating_point", "loaded", allowed)
     return replace(vehicle, gravity=GRAVITY if scene.vehicle.operating_point == "loaded" else 0.0)
+
+
+def _built(scene: RideScene) -> Built:
+    return extended(Built(load_vehicle(scene.vehicle.file, scene.folder, scene.file, "vehicle.file")), scene)
 
 
 LINEAR_ALONE = "effects are priced and chosen in closed form, for linear vehicles alone: name one"
@@ -101,15 +117,18 @@ def half_track_of(scene: RideScene, wheels: tuple[Wheel, ...]) -> float:
 
 
 def excitation_of(scene: RideScene, wheels: tuple[Wheel, ...], case: tuple[str, str] | None = None) -> Excitation:
-    """The road under the wheels, in the scene's case of correlation or another one."""
+    """The road under the wheels with the scene's effects, in its case of correlation or another one."""
     left_right, front_rear = case or (scene.road.left_right, scene.road.front_rear)
     placed = placed_wheels(scene, wheels)
     try:
-        return excitation(road_of(scene, wheels), placed, left_right, front_rear)
+        found = excitation(road_of(scene, wheels), placed, left_right, front_rear)
     except InputError as error:
         if error.file:
             raise
         raise InputError(scene.file, f"road.{error.place}", error.value, error.allowed) from None
+    for change in _built(scene).road if scene.effects else ():
+        found = change(found)
+    return found
 
 
 @contextmanager

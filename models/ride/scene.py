@@ -10,6 +10,7 @@ from models.errors import InputError
 from models.ride.speed_profile import SpeedProfile
 from models.road import TRACK_WIDTH
 from models.road.two_track import LEVEL, MEAN_CORNER, ROLL_CORNER
+from models.scene_effects import with_own
 from models.scene_file import SceneFile, checked
 from models.speeds import Speeds, check_speeds
 from models.strict import Strict, quantity
@@ -63,7 +64,7 @@ class Drive(Strict):
 class RideScene(SceneFile):
     """One scene of ride; it has either [speeds] or a [drive]."""
 
-    READS_AUTO: ClassVar[bool] = True
+    CHOOSING: ClassVar[str] = "ride_choice"
 
     system: Literal["ride"] = "ride"
     study: str = Field(default="ride", description="the study that runs the scene")
@@ -72,24 +73,13 @@ class RideScene(SceneFile):
     speeds: Speeds | None = Field(default=None, description="constant speeds")
     drive: Drive | None = Field(default=None, description="a speed that varies")
     weighting: dict[str, Literal["Wk", "Wd"]] = Field(default_factory=dict, description="ISO 2631-1, output by output")
-    effects: Literal["auto"] | None = Field(default=None, description="auto: only those that the quantities call for")
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     def check_choice(self) -> None:
-        """A choice of effects wants quantities, a tolerance and constant speeds, and a study that makes it."""
-        if self.effects is None:
-            for name in ("quantities", "tolerance"):
-                if name in self.model_fields_set:
-                    raise InputError(self.file, name, getattr(self, name), 'is read beside effects = "auto" only')
-            return
-        missing = 'is missing: effects = "auto" asks'
-        if not self.quantities:
-            raise InputError(self.file, "quantities", None, f"{missing} which outputs must stay right")
-        if self.tolerance is None:
-            raise InputError(self.file, "tolerance", None, f"{missing} how wrong they may be, as 0.02")
-        if self.speeds is None:
-            raise InputError(self.file, "drive", None, 'with effects = "auto" speeds are constant: give [speeds]')
-        if self.study != CHOOSING:
-            raise InputError(self.file, "study", self.study, f'with effects = "auto" the study is {CHOOSING}')
+        """A choice of effects wants quantities, a tolerance and constant speeds."""
+        super().check_choice()
+        if self.study == self.CHOOSING and self.speeds is None:
+            raise InputError(self.file, "drive", None, "effects are chosen at constant speeds: give [speeds]")
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> RideScene:
@@ -102,11 +92,8 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ri
     if scene.drive is not None:
         scene.drive.profile(file)
     _check_road(file, scene.road)
-    return scene
+    return with_own(scene)
 
-
-CHOOSING = "ride_choice"
-"""The study that chooses effects."""
 
 OF_FILE = ("track_width", "first", "last")
 """Keys of [road] that belong to its file."""

@@ -2,25 +2,25 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from importlib import import_module
+from functools import partial
 from math import inf
-from pathlib import Path
 from typing import Any
 
 from models.errors import InputError
 from models.ride.excitation import Excitation
 from models.ride.of_scene import excitation_of, vehicle_of
 from models.ride.scene import RideScene
+from models.scene_effects import module_of, names_of, tables_of
+from models.scene_effects import without as without_own
 from models.vehicles.spatial import Freedom, SpatialVehicle
 from models.vehicles.spatial_linear import wheels
-
-FOLDER = Path(__file__).parents[1] / "effects"
 
 
 @dataclass(frozen=True)
 class Held:
-    """Scene and vehicle, less what is left out: ``massless`` bodies, ``rigid`` springs, ``locked`` freedoms, and the
-    vehicle's motions faster than ``fastest`` (1/s), which follow at once."""
+    """Scene and vehicle, less what is left out: ``massless`` bodies, ``rigid`` springs, ``locked`` freedoms, the
+    vehicle's motions faster than ``fastest`` (1/s), which follow at once, and laws of bent springs, of which ``straight``
+    ones go by the gains that stand for them."""
 
     scene: RideScene
     vehicle: SpatialVehicle
@@ -28,6 +28,7 @@ class Held:
     rigid: frozenset[str] = frozenset()
     locked: frozenset[tuple[str, Freedom]] = frozenset()
     fastest: float = inf
+    straight: frozenset[str] = frozenset()
 
     def on_road(self, **changes: object) -> "Held":
         """With other values in [road]."""
@@ -48,7 +49,8 @@ class Effect:
 
     needs : effects that must be left out, too, and go with it; after : ones that must be left out, too, and go before;
     excludes : effects that may not be left out beside it; ``why``, a phrase for all three. singular : no small change
-    in any respect, so that it is solved and not screened.
+    in any respect, so that it is solved and not screened. own : a table [effects.NAME], which goes before all others,
+    for without it the vehicle is another one.
     """
 
     name: str
@@ -59,13 +61,29 @@ class Effect:
     why: str = ""
     singular: bool = False
     after: tuple[str, ...] = ()
+    own: bool = False
 
 
 def effects_of(held: Held) -> tuple[Effect, ...]:
-    """Every effect that the scene's vehicle and road hold, file by file."""
-    names = sorted(path.stem for path in FOLDER.glob("*.py") if path.stem != "__init__")
-    modules = (import_module(f"models.ride.effects.{name}") for name in names)
-    return tuple(effect for module in modules if hasattr(module, "found") for effect in module.found(held))
+    """Every effect that the scene's vehicle, road and own tables hold, file by file."""
+    modules = {name: module_of(held.scene.system, name) for name in names_of(held.scene.system)}
+    own = tuple(tables_of(held.scene))
+    found = {name: module.found(held) for name, module in modules.items() if hasattr(module, "found")}
+    found |= {name: [Effect(name, partial(_without, name=name), modules[name].COST, singular=True, own=True)]
+              for name in own}  # fmt: skip
+    return tuple(_with_needy(effect, tuple(other for other in own if name in modules[other].NEEDS))
+                 for name in sorted(found) for effect in found[name])  # fmt: skip
+
+
+def _without(held: Held, name: str) -> Held:
+    """Less one of the scene's own tables."""
+    scene = without_own(held.scene, name)
+    return replace(held, scene=scene, vehicle=vehicle_of(scene))
+
+
+def _with_needy(effect: Effect, needy: tuple[str, ...]) -> Effect:
+    """Goes with those of the scene's own tables that need it."""
+    return replace(effect, needs=(*effect.needs, *needy), why=effect.why or "for it needs it") if needy else effect
 
 
 def holds(scene: RideScene, found: Callable[[Held], list[Effect]]) -> bool:
@@ -95,6 +113,6 @@ def illegal(chosen: Iterable[Effect]) -> str:
 
 def without(held: Held, chosen: Iterable[Effect]) -> Held:
     """The scene less these effects."""
-    for effect in chosen:
+    for effect in sorted(chosen, key=lambda effect: not effect.own):
         held = effect.without(held)
     return held

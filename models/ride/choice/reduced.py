@@ -192,13 +192,14 @@ def _outputs(vehicle: LinearVehicle, q: np.ndarray, A: np.ndarray, B: tuple[np.n
 
 
 def _of_road(full: Held, whole: Excitation, held: Held, rest: Excitation) -> tuple[np.ndarray, np.ndarray]:
-    """States of the whole road's filters by those that are left, axle by axle, and back."""
-    order = 1 if full.scene.road.cutoff is None else 2
-    one: np.ndarray = np.eye(len(whole.F))
+    """States of the whole road's filters by those that are left, axle by axle, and back; what effects add is last."""
+    count, cutoff = whole.G.shape[1], full.scene.road.cutoff
+    one: np.ndarray = np.eye(count if cutoff is None else 2 * count)
     back: np.ndarray = one
-    if order == 2 and held.scene.road.cutoff is None:
-        one = np.kron(np.eye(len(rest.F)), [[1.0], [0.0]])
-        back = np.kron(np.eye(len(rest.F)), [[1.0, 1.0 / (full.scene.road.cutoff or 1.0)]])
+    if cutoff is not None and held.scene.road.cutoff is None:
+        one, back = np.kron(np.eye(count), [[1.0], [0.0]]), np.kron(np.eye(count), [[1.0, 1.0 / cutoff]])
+    added = np.eye(len(whole.F) - len(one), len(rest.F) - len(back))
+    one, back = block_diag(one, added), block_diag(back, added.T)
     axles, left = len(whole.heights), len(rest.heights)
     if left == axles:
         return np.kron(np.eye(axles), one), np.kron(np.eye(axles), back)
