@@ -111,8 +111,8 @@ def _linear(scene: Any) -> Found:
     before, after = round(found.before.calls), round(found.after.calls)
     work = tuple(cost.work for cost in (found.before, found.before, found.after))
     choice = Choice(tuple(one.name for one in found.candidates), tuple(one.name for one in found.left_out),
-                    1, abs(found.predicted), 0.0 * found.predicted, abs(found.confirmed), found.kept,
-                    (before, before, after), work, found.rounds, 0)  # fmt: skip
+                    1, abs(found.predicted), 0.0 * found.predicted, abs(found.confirmed), 0.0 * found.predicted,
+                    found.kept, (before, before, after), work, found.rounds, 0)  # fmt: skip
     return Found(scene, "closed form", choice, alone, further, watts)
 
 

@@ -185,7 +185,7 @@ def test_seconds_have_no_say_in_what_is_chosen(monkeypatch):
     for clock in (time.process_time, lambda: float(draw.exponential(1e3))):
         monkeypatch.setattr("time.process_time", clock)
         found.append(Chooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose())
-    one, two = (replace(choice, seconds=(), predicted=0, remainder=0, confirmed=0) for choice in found)
+    one, two = (replace(choice, seconds=(), predicted=0, remainder=0, confirmed=0, chance=0) for choice in found)
     assert one == two and found[0].seconds != found[1].seconds
     assert np.array_equal(found[0].confirmed, found[1].confirmed)
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.special import stdtrit
 
 from models.errors import InputError
 
@@ -19,10 +20,19 @@ SCALARS = {"rms": lambda path: np.sqrt(np.mean(path**2)), "max": lambda path: np
 
 @dataclass(frozen=True)
 class Quantity:
-    """Its unit and its values in every case."""
+    """Its unit and its values in every case.
+
+    sampled : cases are mean squares (m,) of samples that know nothing of each other; it is the root of their mean.
+    """
 
     unit: str
     cases: Cases
+    sampled: bool = False
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """What its changes are relative to, case by case."""
+        return np.sqrt([case.mean() for case in self.cases]) if self.sampled else sizes(self.cases)
 
 
 @dataclass(frozen=True)
@@ -37,8 +47,8 @@ class Answer:
     def of(self, name: str, file: str = "") -> Quantity:
         """A quantity, or "rms" or "max" of one; InputError for what there is not."""
         word, _, rest = name.partition(" ")
-        if name not in self.quantities and word in SCALARS and rest in self.quantities:
-            path = self.quantities[rest]
+        path = self.quantities.get(rest)
+        if name not in self.quantities and word in SCALARS and path is not None and not path.sampled:
             return Quantity(path.unit, tuple(np.array([SCALARS[word](one)]) for one in path.cases))
         if name not in self.quantities:
             raise InputError(file, "quantities", name, "no such quantity in this scene, whose own are, each also with "
@@ -57,8 +67,30 @@ def sizes(full: Sequence[np.ndarray]) -> np.ndarray:
 
 def rounding(answer: Answer, unit: str) -> float:
     """Size up to which a quantity of a unit does not move, but for rounding."""
-    alike = [abs(case).max(initial=0.0) for one in answer.quantities.values() if one.unit == unit for case in one.cases]
+    alike = [np.sqrt(case.max()) if one.sampled else abs(case).max(initial=0.0)
+             for one in answer.quantities.values() if one.unit == unit for case in one.cases]  # fmt: skip
     return max(NOTHING, ROUNDING * float(max(alike, default=0.0)))
+
+
+SURE = 0.9985
+"""Probability that chance adds no more to either side than is said of it."""
+
+
+def by_chance(change: Cases, full: Cases) -> tuple[float, float]:
+    """Largest relative change of a sampled quantity, and what chance may add to it, where that is largest.
+
+    The ratio of two means over m samples that met the same roads, and its standard error by what each sample differs
+    from it, times Student's t for m - 1.
+    """
+    worst = 0.0, 0.0
+    for moved, own in zip(change, full, strict=True):
+        ratio = 1.0 + moved.mean() / own.mean()
+        if not ratio > 0.0:
+            return np.inf, np.inf
+        rest, m = moved - (ratio - 1.0) * own, len(own)
+        error = float(stdtrit(m - 1, SURE)) * rest.std(ddof=1) / (np.sqrt(m) * own.mean()) / (2.0 * np.sqrt(ratio))
+        worst = max(worst, (float(abs(np.sqrt(ratio) - 1.0)), float(error)), key=sum)
+    return worst
 
 
 def less(one: Cases, full: Cases) -> Cases:

@@ -40,9 +40,10 @@ ROUNDS = 30
 class Choice:
     """Effects ``left_out`` of all ``candidates``, and steps so many ``times`` as long; relative changes (quantities,).
 
-    predicted : by the screen; remainder : what that leaves out, estimated; confirmed :
-    over the whole run; kept : every confirmed change within the tolerance. calls and seconds (CPU) of the scene, of the
-    scene with longer steps alone, and of what is left. rounds : runs of the whole scene that confirmed or did not.
+    predicted : by the screen; remainder : what that leaves out, estimated; confirmed : over the whole run; chance : may
+    add so much to that, where quantities are means of samples; kept : every sum of both is within the tolerance. calls
+    and seconds (CPU) of the scene, of the scene with longer steps alone, and of what is left. rounds : runs of the whole
+    scene that confirmed or did not; spent : calls of all runs.
     """
 
     candidates: tuple[str, ...]
@@ -51,6 +52,7 @@ class Choice:
     predicted: np.ndarray
     remainder: np.ndarray
     confirmed: np.ndarray
+    chance: np.ndarray
     kept: bool
     calls: tuple[int, ...]
     seconds: tuple[float, ...]
@@ -71,7 +73,7 @@ class Chooser:
         self.lengths = [self.own * k for k in self.screen.variants.lengths()]
         self.effects = self.whole.variants.effects
         self._reach: dict[Set, int] = {}
-        self._confirmed: dict[Set, tuple[int, np.ndarray]] = {}
+        self._confirmed: dict[Set, tuple[int, np.ndarray, np.ndarray]] = {}
         self._pairs: list[Set] | None = None
         self.rounds = 0
 
@@ -113,17 +115,21 @@ class Chooser:
         return self.screen.variants.work(chosen, self.reach(chosen) // self.own)
 
     def confirm(self, chosen: Set) -> np.ndarray:
-        """Relative changes (quantities,) over the whole run, at the longest step that holds or nearly so."""
+        """Relative changes (quantities,) over the whole run, at the longest step that holds or nearly so; what chance
+        may add is added."""
         if chosen not in self._confirmed:
             longest = self.reach(chosen)
             for times in [k for k in reversed(self.whole.variants.lengths()) if k <= longest][: 1 + SHORTER]:
                 self.rounds += 1
-                found = self.whole.shares(self.whole.between(self.whole.variants.of(chosen, times),
-                                                             self.whole.variants.of()))  # fmt: skip
-                self._confirmed[chosen] = times, found
-                if self.holds(found):
+                change = self.whole.between(self.whole.variants.of(chosen, times), self.whole.variants.of())
+                self._confirmed[chosen] = times, self.whole.shares(change), self.whole.chance(change)
+                if self.holds(self._sum(chosen)):
                     break
-        return self._confirmed[chosen][1]
+        return self._sum(chosen)
+
+    def _sum(self, chosen: Set) -> np.ndarray:
+        _, found, chance = self._confirmed[chosen]
+        return found + chance
 
     def holds(self, changes: np.ndarray) -> bool:
         """Whether all changes are within the tolerance."""
@@ -133,7 +139,7 @@ class Chooser:
         """The greedy choice, confirmed."""
         none: Set = frozenset()
         if not self.holds(self.confirm(none)):
-            self._confirmed[none] = 1, np.zeros(len(self.whole.quantities))
+            self._confirmed[none] = 1, *np.zeros((2, len(self.whole.quantities)))
         kept, banned = [none], set[Set]()
         while self.rounds < ROUNDS:
             path = self.path(kept, banned)
@@ -151,7 +157,7 @@ class Chooser:
         return self._choice(kept[-1])
 
     def _choice(self, chosen: Set) -> Choice:
-        times, found = self._confirmed[chosen]
+        times, found, chance = self._confirmed[chosen]
         whole = self.whole.variants
         shown = [(frozenset[str](), 1), (frozenset[str](), self._confirmed[frozenset()][0]), (chosen, times)]
         runs = [run for key in shown if (run := whole.of(*key)) is not None]
@@ -160,8 +166,8 @@ class Chooser:
         calls = [run.counts["calls"] for run in runs]
         spent = whole.calls + (0 if self.screen is self.whole else self.screen.variants.calls)
         return Choice(self.effects, tuple(sorted(chosen)), times, self.told(chosen, times),
-                      self.screen.remainder(chosen), found, self.holds(found), tuple(calls), tuple(seconds),
-                      self.rounds, spent)  # fmt: skip
+                      self.screen.remainder(chosen), found, chance, self.holds(found + chance), tuple(calls),
+                      tuple(seconds), self.rounds, spent)  # fmt: skip
 
     def told(self, chosen: Set, times: int) -> np.ndarray:
         """Predicted changes (quantities,) of a set and a step together: that of the step by a shorter one."""

@@ -12,9 +12,12 @@ from itertools import combinations
 
 import numpy as np
 
-from models.choice.answer import Answer, Cases, added, less, relative, rounding, sizes
+from models.choice.answer import Answer, Cases, added, by_chance, less, relative, rounding
 from models.choice.variants import Set, Variants
 from models.errors import InputError
+
+FEW = 1 / 3
+"""Share of a sampled quantity's mean square that one sample may have."""
 
 
 class Screen:
@@ -27,11 +30,22 @@ class Screen:
             full = variants.system.answer(variants.scene, variants.engine)
         found = {name: full.of(name, variants.scene.file) for name in quantities}
         self.full = {name: one.cases for name, one in found.items()}
-        self.sizes = {name: sizes(cases) for name, cases in self.full.items()}
+        self.sizes = {name: one.sizes for name, one in found.items()}
+        self.sampled = {name for name, one in found.items() if one.sampled}
         for name, size in self.sizes.items():
             if not (np.isfinite(size).all() and (size > rounding(full, found[name].unit)).any()):
                 raise InputError(variants.scene.file, f"quantities.{name}", None, "does not move in this scene, so "
                                  "that there is nothing to hold it to")  # fmt: skip
+        for name in self.sampled:
+            self._check_samples(name)
+
+    def _check_samples(self, name: str) -> None:
+        """Refuse a quantity that few of its samples make up: no error could be told of it."""
+        share = max(float(case.max() / case.sum()) for case in self.full[name])
+        if share > FEW:
+            m = len(self.full[name][0])
+            raise InputError(self.variants.scene.file, f"quantities.{name}", None, f"is made up to {100 * share:.0f} % "
+                             f"by one sample of {m}, so that chance decides: ask for more or longer ones")  # fmt: skip
 
     def between(self, one: Answer | None, other: Answer | None) -> dict[str, Cases] | None:
         """Differences of two runs, quantity by quantity; None where one of them is missing."""
@@ -48,7 +62,15 @@ class Screen:
         """Relative changes (quantities,); infinite where there is none."""
         if change is None:
             return np.full(len(self.quantities), np.inf)
-        return np.array([relative(change[name], self.sizes[name]) for name in self.quantities])
+        return np.array([by_chance(change[name], self.full[name])[0] if name in self.sampled
+                         else relative(change[name], self.sizes[name]) for name in self.quantities])  # fmt: skip
+
+    def chance(self, change: dict[str, Cases] | None) -> np.ndarray:
+        """What chance may add to these (quantities,): nothing where a quantity is no mean of samples."""
+        if change is None:
+            return np.zeros(len(self.quantities))
+        return np.array([by_chance(change[name], self.full[name])[1] if name in self.sampled else 0.0
+                         for name in self.quantities])  # fmt: skip
 
     def alone(self, effect: str) -> dict[str, Cases] | None:
         """d of an effect."""

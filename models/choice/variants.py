@@ -50,11 +50,17 @@ class Variants:
 
     def __post_init__(self) -> None:
         self.system = system_of(self.scene)
+        self.scene = self.system.opened(self.scene) if self._opened else self.scene
+
+    @property
+    def _opened(self) -> bool:
+        """Whether scenes are run as something else, which has ``named``, ``without``, ``longer`` and ``fewer``."""
+        return hasattr(self.system, "opened")
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Effects that the scene names."""
-        return named(self.scene)
+        return tuple(self.scene.named) if self._opened else named(self.scene)
 
     def of(self, left_out: Iterable[str] = (), times: int = 1) -> Answer | None:
         """The run without these effects, with steps so many times as long."""
@@ -73,6 +79,8 @@ class Variants:
 
     def changed(self, left_out: Set, times: int = 1) -> Any:
         """The scene of a variant; InputError where it cannot be."""
+        if self._opened:
+            return self.scene.without(left_out).longer(times)
         scene = without(self.scene, *sorted(left_out)) if left_out else self.scene
         if times == 1:
             return scene
@@ -109,6 +117,8 @@ class Variants:
         """The first part of the run, of at least so many steps, or all of it if it has not many more.
 
         Of a length that the scene may have: whole samples of what it measures, for one."""
+        if self._opened:
+            return Variants(self.scene.fewer(steps), self.engine)
         count = self.system.steps(self.scene)
         for few in (n for n in range(steps, count) if n % FINE == 0 or count % n == 0):
             table = own_table(self.scene)

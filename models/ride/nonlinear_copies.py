@@ -93,24 +93,47 @@ def copies_in_time(vehicle: SpatialVehicle, excitation: Excitation, speed: float
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
     check_rates(vehicle, excitation)
-    springs = bent(vehicle)
-    plain = linearise(vehicle, speed, {s.name: (s.stiffness, s.damping) for s in springs})
-    own = _rates(statistically_linear(vehicle, excitation, speed).vehicle)
-    decay = abs(own.real)
-    slowest = decay[decay > HELD * decay.max()].min()
-    road = road_path(excitation, speed, longest or min(REACH / abs(own).max(), followed(vehicle, speed)))
-    settling, counted = int(np.ceil(SETTLE / slowest / road.step)), int(np.ceil(duration / road.step))
-    laws = laws_of(vehicle, plain, springs, speed)
-    x, sums = np.zeros((2 * len(plain.mass), copies)), np.zeros((POWERS, len(plain.outputs), copies))
+    replaced = statistically_linear(vehicle, excitation, speed).vehicle
+    road = road_path(excitation, speed, longest or usual_step(vehicle, speed, replaced))
+    settling, counted = int(np.ceil(forgotten(replaced) / road.step)), int(np.ceil(duration / road.step))
+    march = March(vehicle, speed, road.step, copies)
     for number, portion in enumerate(road.blocks(BLOCK, copies, seed)):
-        if number == 0:
-            x[: len(plain.mass)] = _standing(plain, portion[0])
         left = settling + counted - number * BLOCK
-        march(x, portion[: 2 * left + 1], road.step, _first(settling, number * BLOCK), EVERY, laws, sums)
+        march.over(portion[: 2 * left + 1], _first(settling, number * BLOCK))
         if left <= BLOCK:
             break
-    return Copies(tuple(o.name for o in plain.outputs), sums.swapaxes(1, 2) / len(range(0, counted, EVERY)), road.step,
+    return Copies(march.names, march.sums.swapaxes(1, 2) / len(range(0, counted, EVERY)), road.step,
                   counted * road.step)  # fmt: skip
+
+
+class March:
+    """Copies of a vehicle at rest, stepped over roads; ``sums`` (4, p, copies): of powers of its outputs so far."""
+
+    def __init__(self, vehicle: SpatialVehicle, speed: float, step: float, copies: int) -> None:
+        springs = bent(vehicle)
+        self.plain = linearise(vehicle, speed, {s.name: (s.stiffness, s.damping) for s in springs})
+        self.laws, self.step = laws_of(vehicle, self.plain, springs, speed), step
+        self.names = tuple(output.name for output in self.plain.outputs)
+        self.sums = np.zeros((POWERS, len(self.names), copies))
+        self.states: np.ndarray | None = None
+
+    def over(self, roads: np.ndarray, first: int, every: int = EVERY) -> None:
+        """Go on over roads (2 steps + 1, 2 w, copies), read every half step; outputs count from step ``first``."""
+        if self.states is None:
+            self.states = np.vstack([_standing(self.plain, roads[0])] * 2)
+            self.states[len(self.plain.mass) :] = 0.0
+        march(self.states, roads, self.step, first, every, self.laws, self.sums)
+
+
+def usual_step(vehicle: SpatialVehicle, speed: float, replaced: LinearVehicle) -> float:
+    """Step (s) for a vehicle that ``replaced`` stands for, by statistical linearisation."""
+    return min(REACH / float(abs(_rates(replaced)).max()), followed(vehicle, speed))
+
+
+def forgotten(replaced: LinearVehicle) -> float:
+    """Time (s) after which copies have forgotten their beginning."""
+    decay = abs(_rates(replaced).real)
+    return SETTLE / float(decay[decay > HELD * decay.max()].min())
 
 
 def followed(vehicle: SpatialVehicle, speed: float) -> float:

@@ -5,4 +5,8 @@ the scene and raises RunFailed or InputError where that cannot be; ``steps(scene
 ``parts(scene)``, of how many a whole number makes up a run, 1 where steps are not to be changed; ``WINDOWED``, whether
 a part of the run tells of all of it; and two edits of a scene's table: ``shorten(table, scene, steps)``, to so many
 steps, and ``coarsen(table, scene, times)``, to steps so many times as long.
+
+Where effects lie in files that scenes name, as in a vehicle's, a file has ``opened(scene)`` in place of both edits: it
+gives what ``answer``, ``steps`` and ``parts`` take. That has ``file``, ``title``, ``system`` and ``named``, names of
+effects, and gives others of its kind: ``without(names)``, ``longer(times)``, ``fewer(steps)``, of about so many steps.
 """

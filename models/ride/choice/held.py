@@ -19,8 +19,8 @@ from models.vehicles.spatial_linear import wheels
 @dataclass(frozen=True)
 class Held:
     """Scene and vehicle, less what is left out: ``massless`` bodies, ``rigid`` springs, ``locked`` freedoms, the
-    vehicle's motions faster than ``fastest`` (1/s), which follow at once, and laws of bent springs, of which ``straight``
-    ones go by the gains that stand for them."""
+    vehicle's motions faster than ``fastest`` (1/s), which follow at once, and the
+    laws of bent springs that are ``straight``: gains stand for them."""
 
     scene: RideScene
     vehicle: SpatialVehicle

@@ -1,0 +1,48 @@
+"""Ride with bent springs: quantities are the deviations of outputs, a case per speed, told by copies in time."""
+
+import time
+from math import gcd
+
+import numpy as np
+
+from models.choice.answer import Answer, Quantity
+from models.engines.spatial_protocol import curves
+from models.ride.choice.in_time import UNIT, InTime, in_time
+from models.ride.of_scene import told_by
+from models.ride.scene import RideScene
+
+ENGINE, WINDOWED = "reference", True
+
+
+def opened(scene: RideScene | InTime) -> InTime:
+    """The scene as it is run in time, which knows its effects and how it is shortened and taken in longer steps."""
+    if isinstance(scene, InTime):
+        return scene
+    with told_by(scene):
+        return in_time(scene)
+
+
+def answer(scene: InTime, engine: str) -> Answer:
+    """March the copies at every speed."""
+    found, seconds = dict[str, list[np.ndarray]](), 0.0
+    for pace in scene.paces:
+        begun = time.process_time()
+        outputs, squares = scene.squares(pace)
+        seconds += time.process_time() - begun
+        for output, own in zip(outputs, squares.T, strict=True):
+            found.setdefault(output.name, []).append(own)
+    units = {output.name: output.unit for output in outputs}
+    vehicle = scene.vehicle(scene.paces[0])
+    counts = {"steps": scene.steps, "calls": 4 * scene.steps, "states": 2 * len(vehicle.coordinates()),
+              "terms": curves(vehicle)}  # fmt: skip
+    return Answer({name: Quantity(units[name], tuple(cases), True) for name, cases in found.items()}, counts, seconds)
+
+
+def steps(scene: InTime) -> int:
+    """Of all copies at all speeds."""
+    return scene.steps
+
+
+def parts(scene: InTime) -> int:
+    """Steps of which whole numbers make up what is run, before and while outputs count."""
+    return UNIT // gcd(UNIT, scene.times)
