@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from models.contact.accuracy import Error, rolled
-from models.contact.of_scene import contact, creepages, touches
+from models.contact.of_scene import built_of, contact, creepages, touches
 from models.contact.scene import ContactScene, Method
 from models.contact.theories import Contact, ExactOnEllipse, Fastsim, Linear, Motion, OnEllipse, Rolled
 from models.contact.work_precision import duration
@@ -151,7 +151,7 @@ def _places(scene: ContactScene) -> list[str]:
         return []
     return [f"  touches at {1e3 * touch.rail_y:.2f} mm from the rail's top and {1e3 * touch.wheel_y:.2f} mm from the "
             f"taping line, {touch.angle:.4f} rad steep, gap {round(1e6 * touch.gap, 1) + 0.0:.1f} um"
-            for touch in touches(scene)]  # fmt: skip
+            for touch in touches(scene, built_of(scene))]  # fmt: skip
 
 
 def _figures(scene: ContactScene, body: Contact, motions: list[Motion], found: list[tuple[Rolled, Error]],
@@ -200,7 +200,7 @@ def _checks(scene: ContactScene, body: Contact) -> list[tuple[float, Rolled]]:
     points = read(Options, scene.options, scene.file, "options").exact
     if scene.sweep is None or not isinstance(body, OnEllipse) or isinstance(body, ExactOnEllipse) or not points:
         return []
-    if scene.falling_friction is not None:  # the exact theory here has constant friction
+    if built_of(scene).falling is not None:  # the exact theory here has constant friction
         return []
     exact = ExactOnEllipse(body.hertz, body.friction, body.pair)
     values, motions = scene.sweep.values(), creepages(scene)

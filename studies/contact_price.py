@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field
 
-from models.contact.of_scene import hertz_of
+from models.contact.of_scene import built_of, hertz_of
 from models.contact.scene import ContactScene
 from models.contact.work_precision import WAYS, cheapest_lines, duration, ellipse_cases, exact, measure
 from models.errors import InputError
@@ -32,7 +32,7 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
     for name in ("creepage", "sweep", "method"):
         if name in scene.model_fields_set:
             raise InputError(scene.file, name, None, "this study goes through all of them itself: drop this table")
-    if scene.falling_friction is not None:
+    if built_of(scene).falling is not None:
         raise InputError(scene.file, "falling_friction", None, "the exact theory here has constant friction: drop this")
     if not all(0 < level <= 100 for level in options.levels):
         raise InputError(scene.file, "options.levels", options.levels, "must be above 0 and at most 100")
@@ -42,8 +42,8 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     """Exact forces, then every theory on every number of cells; saves ``price.png`` and ``table.txt``."""
     check(scene, engines)
     options, hertz = read(Options, scene.options, scene.file, "options"), hertz_of(scene)
-    assert scene.contact is not None
-    cases = ellipse_cases(float(hertz.a), float(hertz.b), float(hertz.load), scene.contact.friction, scene.pair,
+    built = built_of(scene)
+    cases = ellipse_cases(float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair,
                           tuple(options.levels))  # fmt: skip
     known = []
     for i, case in enumerate(cases):

@@ -3,6 +3,7 @@
 import csv
 import time
 from collections.abc import Callable
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from models.contact.cases_table import answer, compile_first
 from models.contact.scene import ContactScene
 from models.contact.work_precision import duration
 from models.errors import InputError
+from models.scene_effects import extended
 
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]
@@ -33,9 +35,10 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     """Answer every row; saves ``forces.csv``."""
     check(scene, engines)
     path = scene.cases_file()
-    compile_first(scene.pair, scene.method)  # no part of the time below
+    extend = partial(extended, scene=scene)
+    compile_first(scene.pair, scene.method, extend)  # no part of the time below
     start = time.perf_counter()
-    rows = answer(path, folder / ANSWER, scene.pair, scene.method, lambda done: progress(f"{done:,} rows", 0.0))
+    rows = answer(path, folder / ANSWER, scene.pair, scene.method, lambda done: progress(f"{done:,} rows", 0.0), extend)
     seconds = time.perf_counter() - start
     table = told(rows["rows"], rows["wrong"], path.name, seconds)
     return {"scene": scene.title, "folder": str(folder), "failed": {}, "rows": rows, "answer": sizes(folder / ANSWER),

@@ -12,6 +12,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from models.contact.accuracy import band, moment_band, slenderness, spin_share, used_with_moment
+from models.contact.built import Built
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_load
 from models.contact.material import Pair
@@ -28,9 +29,12 @@ HEADER = ("line [-]", "fx [N]", "fy [N]", "mz [N m]", "stick [-]", "dissipation 
 ANSWERS = 9
 """Columns of numbers behind the line."""
 Progress = Callable[[int], None]
+Extend = Callable[[Built], Built]
+"""What the effects of a scene make of the rows of a block."""
 
 
-def answer(path: Path, out: Path, pair: Pair, method: Method, progress: Progress = lambda rows: None) -> dict[str, int]:
+def answer(path: Path, out: Path, pair: Pair, method: Method, progress: Progress = lambda rows: None,
+           extend: Extend = lambda built: built) -> dict[str, int]:  # fmt: skip
     """Answer the table at ``path`` into ``out``; returns how many rows there are and how many were wrong.
 
     Raises InputError for a file or a header that cannot be used; a wrong row gets a status and stops nothing.
@@ -42,7 +46,7 @@ def answer(path: Path, out: Path, pair: Pair, method: Method, progress: Progress
     with out.open("w") as file:
         file.write(",".join(HEADER) + "\n")
         for block in _with(first, reading):
-            found, wrong = _answered(block, pair, method)
+            found, wrong = _answered(block, pair, method, extend)
             _write(file, block, found, wrong)
             counts["rows"] += len(block.lines)
             counts["wrong"] += len(wrong)
@@ -50,10 +54,10 @@ def answer(path: Path, out: Path, pair: Pair, method: Method, progress: Progress
     return counts
 
 
-def compile_first(pair: Pair, method: Method) -> None:
+def compile_first(pair: Pair, method: Method, extend: Extend = lambda built: built) -> None:
     """Have the kernels behind ``answer`` compiled or loaded, for times that are those of the rows."""
     one = np.ones(1)
-    _forces({"A": one, "B": one, **dict.fromkeys(MOTION, one)}, pair, method)
+    _forces({"A": one, "B": one, **dict.fromkeys(MOTION, one)}, pair, method, extend)
 
 
 def _with(first: Block | None, others: Iterator[Block]) -> Iterator[Block]:
@@ -63,12 +67,12 @@ def _with(first: Block | None, others: Iterator[Block]) -> Iterator[Block]:
     yield from others
 
 
-def _answered(block: Block, pair: Pair, method: Method) -> tuple[np.ndarray, dict[int, str]]:
+def _answered(block: Block, pair: Pair, method: Method, extend: Extend) -> tuple[np.ndarray, dict[int, str]]:
     """Answers (rows, ANSWERS), NaN where a row is wrong, and what is wrong there."""
     found, wrong = np.full((len(block.lines), ANSWERS), np.nan), dict(block.wrong)
     good = np.array([i for i in range(len(block.lines)) if i not in wrong], dtype=int)
     values = {name: column[good] for name, column in block.values.items()}
-    found[good], refused = _sound(values, lambda some: _forces(some, pair, method))
+    found[good], refused = _sound(values, lambda some: _forces(some, pair, method, extend))
     wrong |= {int(good[i]): text for i, text in refused.items()}
     return found, wrong
 
@@ -90,9 +94,13 @@ def _sound(values: dict[str, np.ndarray], solve: Callable[[dict[str, Any]], np.n
     return np.concatenate([low, high]), wrong | {half + i: text for i, text in others.items()}
 
 
-def _forces(values: dict[str, Any], pair: Pair, method: Method) -> np.ndarray:
+def _forces(values: dict[str, Any], pair: Pair, method: Method, extend: Extend) -> np.ndarray:
     """Answers (rows, ANSWERS); raises InputError if a row is out of what the theory takes."""
     load, friction, xi_x, xi_y, spin = (values[name] for name in MOTION)
+    built = extend(Built(pair, friction, load))
+    load, friction, pair = built.load, built.friction, built.pair
+    if built.falling is not None:
+        raise InputError("", "effects", None, "make friction fall, and a table of cases has constant friction")
     if "A" in values:
         touching = by_load(values["A"], values["B"], load, pair)
         a, b = touching.a, touching.b

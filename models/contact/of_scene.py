@@ -4,6 +4,7 @@ from typing import Literal
 
 import numpy as np
 
+from models.contact.built import Built
 from models.contact.hertz import Hertz, by_approach, by_axes, by_load
 from models.contact.material import Pair
 from models.contact.profile_files import read_profile
@@ -15,26 +16,38 @@ from models.contact.theories import Contact, Exact, ExactOnEllipse, Fastsim, Lin
 from models.contact.undeformed_distance import quadratic
 from models.contact.wheel_on_rail import Touch, Track, Wheelset, wheel_on_rail
 from models.errors import InputError
+from models.scene_effects import extended
 
 BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
 
 
+def built_of(scene: ContactScene) -> Built:
+    """What touches and how, with the scene's effects."""
+    own = scene.contact
+    assert own is not None
+    kinds: tuple[Literal["wheel", "rail"], ...] = ("wheel", "rail") if scene.profiles is not None else ()
+    profiles: dict[str, Profile] = {kind: _profile(scene, kind) for kind in kinds}
+    return extended(Built(scene.pair, own.friction, own.load, own.approach, scene.falling_friction, profiles), scene)
+
+
 def contact(scene: ContactScene) -> Contact:
     """The contact of a scene, pressed, by the theory that the scene names."""
-    method = scene.method
-    assert scene.contact is not None
-    friction = scene.contact.friction
+    method, built = scene.method, built_of(scene)
+    friction, pair = built.friction, built.pair
+    if built.falling is not None and method.name != "fastsim":
+        raise InputError(scene.file, "method.name", method.name, "has constant friction, and an effect of this scene "
+                         "makes it fall: use fastsim")  # fmt: skip
     if scene.profiles is not None:
-        load, approach = _pressed(scene)
-        pressed = press([touch.patch for touch in touches(scene)], scene.pair, load=load, approach=approach)
+        places = touches(scene, built)
+        pressed = press([touch.patch for touch in places], pair, load=built.load, approach=built.approach)
         return Simplified(pressed, friction) if method.name == "simplified" else Exact(pressed, friction, method.cells)
     hertz = hertz_of(scene)
     if method.name == "simplified":
-        return Simplified(interpenetrating(hertz, scene.pair), friction)
+        return Simplified(interpenetrating(hertz, pair), friction)
     if method.name == "fastsim":
         choices = method.model_dump(include={"march", "bound", "flexibilities"})
-        return Fastsim(hertz, friction, scene.pair, **choices, falling=scene.falling_friction)
-    return (Linear if method.name == "linear" else ExactOnEllipse)(hertz, friction, scene.pair)
+        return Fastsim(hertz, friction, pair, **choices, falling=built.falling)
+    return (Linear if method.name == "linear" else ExactOnEllipse)(hertz, friction, pair)
 
 
 def creepages(scene: ContactScene) -> list[Motion]:
@@ -44,12 +57,6 @@ def creepages(scene: ContactScene) -> list[Motion]:
     return [tuple({**fixed, **value}.values()) for value in values]  # type: ignore[misc]
 
 
-def _pressed(scene: ContactScene) -> tuple[float | None, float | None]:
-    """What presses the bodies together: load (N) or approach (m)."""
-    assert scene.contact is not None
-    return scene.contact.load, scene.contact.approach
-
-
 def interpenetrating(hertz: Hertz, pair: Pair) -> NormalContact:
     """An ellipse as the theory of 1983 finds it, with room for more than its area."""
     A, B = float(hertz.A), float(hertz.B)
@@ -57,13 +64,13 @@ def interpenetrating(hertz: Hertz, pair: Pair) -> NormalContact:
     return press(quadratic(A, B, x, y), pair, load=float(hertz.load))
 
 
-def touches(scene: ContactScene) -> list[Touch]:
+def touches(scene: ContactScene, built: Built) -> list[Touch]:
     """Where the profiles of a scene touch."""
     p = scene.profiles
     assert p is not None
     track = Track(gauge=p.gauge, gauge_depth=p.gauge_depth, inclination=p.inclination)
     wheelset = Wheelset(radius=p.radius, back_to_back=p.back_to_back)
-    return wheel_on_rail(_profile(scene, "wheel"), _profile(scene, "rail"), lateral_shift=p.lateral_shift, yaw=p.yaw,
+    return wheel_on_rail(built.profiles["wheel"], built.profiles["rail"], lateral_shift=p.lateral_shift, yaw=p.yaw,
                          track=track, wheelset=wheelset)  # fmt: skip
 
 
@@ -80,11 +87,12 @@ def _profile(scene: ContactScene, kind: Literal["wheel", "rail"]) -> Profile:
 
 def hertz_of(scene: ContactScene) -> Hertz:
     """Hertz' contact from semi-axes, curvatures or radii, by load or approach."""
-    load, approach = _pressed(scene)
+    built = built_of(scene)
+    load, approach, pair = built.load, built.approach, built.pair
     if scene.ellipse is not None:
-        return by_axes(scene.ellipse.a, scene.ellipse.b, scene.pair, load=load, approach=approach)
+        return by_axes(scene.ellipse.a, scene.ellipse.b, pair, load=load, approach=approach)
     A, B = scene.radii.curvatures(scene.file) if scene.radii is not None else _given(scene)
-    return by_load(A, B, load, scene.pair) if load is not None else by_approach(A, B, approach, scene.pair)
+    return by_load(A, B, load, pair) if load is not None else by_approach(A, B, approach, pair)
 
 
 def _given(scene: ContactScene) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from models.contact.falling_friction import Falling
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN
 from models.contact.material import STEEL, Material, Pair
 from models.errors import InputError
-from models.scene_effects import check
+from models.scene_effects import check, with_own
 from models.scene_file import SceneFile, checked
 from models.strict import Strict, quantity
 
@@ -156,6 +156,7 @@ class ContactScene(SceneFile):
     creepage: Creepage = Creepage()
     sweep: Sweep | None = Field(default=None, description="one creepage through a range")
     method: Method = Method()
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     @property
     def geometry(self) -> str:
@@ -180,9 +181,9 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Co
     _check_size(scene)
     _check_sweep(scene)
     _check_method(scene)
-    check(scene)
+    check(found := with_own(scene))
     _check_friction(scene)
-    return scene
+    return found
 
 
 def _check_geometry(scene: ContactScene) -> None:
