@@ -7,9 +7,6 @@ that moment is on the chassis: brakes hold on to it, and locked wheels do.
 
 import math
 
-import numpy as np
-from numba import carray
-
 from models.braking.plane_step import (
     ALONG,
     ANGLE,
@@ -25,75 +22,78 @@ from models.braking.plane_step import (
     tyre,
 )
 from models.braking.tyre_table import place
-from models.compiled import njit
-from models.contact.stack import at, beyond
+from models.compiled import lean
+from models.contact.stack import array, at, beyond, doubles, row, start
 from models.handling.forces import (
+    AXLE,
     CHASSIS,
     COUNT,
     HEADER,
     JOINTS,
     LEDGER,
     OF_TYRES,
+    OF_WAVES,
+    PASSING,
     PER_TYRE,
     PRESS,
     REPORTED,
+    ROLLING,
     SLIP_Y,
     TYRES,
-    _creep,
-    _touch,
-    enter,
-    leave,
-    sum_of,
+    WAVES,
+    WAY,
+    creep,
+    touch,
 )
+from models.handling.kernel import enter, leave, room
+from models.handling.tree import PER_LINK, dot, three, times, twist
 
 STEER, HELD_X, HELD_Y, SPUN, ROW = range(5)
 """Columns of a wheel's row."""
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def held_forces(numbers, q, v, f, motion):
     """Add all forces to ``f`` (n,), and fill ``motion`` (W, 3): speeds of the wheels' centres along them (m/s), of
     their contacts across (m/s), loads (N)."""
-    w, chassis, rows = int(numbers[TYRES]), int(numbers[CHASSIS]), numbers[int(numbers[COUNT]) :]
-    contact, slide, way, found = np.empty(10), np.empty(4), np.empty((10, 3)), np.zeros(3)
-    report, ledger = np.empty(REPORTED), np.empty(LEDGER)
-    frame, tree, pushed, twisted = enter(numbers, q, v, f, ledger)
-    for i in range(w):
-        own, row = numbers[int(numbers[OF_TYRES]) + PER_TYRE * i :], rows[ROW * i :]
-        _touch(numbers, own, row[STEER], 0.0, v, chassis, frame, tree, contact, slide, way, ledger, report)
-        motion[i, 0], motion[i, 1], motion[i, 2] = sum_of(way[7], way[2]), report[SLIP_Y], report[PRESS]
-        found[0], found[1] = row[HELD_X], row[HELD_Y]
-        _creep(own, found, way, chassis, f, tree, pushed, twisted, report)
-        for k in range(3):
-            twisted[chassis, k] -= row[SPUN] * way[5, k]
-    leave(numbers, frame, tree, pushed, twisted, f, ledger)
+    chassis, table = int(numbers[CHASSIS]), start(numbers)
+    contact, slide, way, found = array(doubles(10), (10,)), array(doubles(4), (4,)), array(doubles(WAY), (WAY,)), array(
+        doubles(3), (3,))  # fmt: skip
+    report, ledger = array(doubles(REPORTED), (REPORTED,)), array(doubles(LEDGER), (LEDGER,))
+    frame, tree = enter(numbers, q, v, f, doubles(room(numbers)), ledger)
+    waves, rows = numbers[int(numbers[OF_WAVES]) :], numbers[int(numbers[COUNT]) :]
+    found[2], tyres, carrying = 0.0, beyond(table, int(numbers[OF_TYRES])), row(tree[0], PER_LINK, chassis)
+    for i in range(int(numbers[TYRES])):
+        own, held = row(tyres, PER_TYRE, i), rows[ROW * i :]
+        touch(own, waves, int(numbers[WAVES]), held[STEER], 0.0, v, chassis, frame, tree, contact, slide, way, ledger,
+              report)  # fmt: skip
+        motion[i, 0] = dot(three(way, PASSING), three(way, ROLLING))
+        motion[i, 1], motion[i, 2] = report[SLIP_Y], report[PRESS]
+        found[0], found[1] = held[HELD_X], held[HELD_Y]
+        creep(own, found, way, chassis, f, tree, report)
+        twist(carrying, tree[2], times(three(way, AXLE), -held[SPUN]))
+    leave(numbers, frame, tree, f, ledger)
 
 
-@njit(cache=True, error_model="numpy")
-def whole(numbers):
-    """The table at a pointer to doubles."""
-    head = carray(numbers, (HEADER,))
-    return carray(numbers, (int(head[COUNT]) + ROW * int(head[TYRES]),))
-
-
-@njit(cache=True, error_model="numpy")
+@lean
 def held(numbers, time, q, v, f):
     """Add the forces to ``f``, for callbacks: pointers to doubles; nothing depends on the time."""
-    table = whole(numbers)
-    n = int(table[JOINTS])
-    motion = np.empty((int(table[TYRES]), 3))
-    held_forces(table, carray(q, (n,)), carray(v, (n,)), carray(f, (n,)), motion)
+    head = array(numbers, (HEADER,))
+    n, w = int(head[JOINTS]), int(head[TYRES])
+    motion, table = array(doubles(3 * w), (w, 3)), array(numbers, (int(head[COUNT]) + ROW * w,))
+    held_forces(table, array(q, (n,)), array(v, (n,)), array(f, (n,)), motion)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def fill(block, n, numbers):
     """``held`` in a block of doubles at an address: f, q and v (n,), of which f is cleared before."""
-    f, motion = at(block), np.empty((int(numbers[TYRES]), 3))
-    carray(f, (n,))[:] = 0.0
-    held_forces(numbers, carray(beyond(f, n), (n,)), carray(beyond(f, 2 * n), (n,)), carray(f, (n,)), motion)
+    f, w = at(block), int(numbers[TYRES])
+    array(f, (n,))[:] = 0.0
+    motion = array(doubles(3 * w), (w, 3))
+    held_forces(numbers, array(beyond(f, n), (n,)), array(beyond(f, 2 * n), (n,)), array(f, (n,)), motion)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def hold(numbers, q, v, torque0, torque1, step, rates, regular, first, tables, known, report):
     """Put the tyres' mean forces over a step (s) into the table, by motion and loads at the state q, v (n,).
 
@@ -101,9 +101,11 @@ def hold(numbers, q, v, torque0, torque1, step, rates, regular, first, tables, k
     that in its middle; rates (W,) : changes of the wheels' speeds along them (m/s^2), taken at its start and found in
     its middle; known : see ``plane_step``, begun there; report (W, 7) is filled.
     """
-    w, angles = torque0.size, tables[0]
-    motion, rows = np.empty((w, 3)), numbers[int(numbers[COUNT]) :].reshape(w, ROW)
-    held_forces(numbers, q, v, np.zeros(q.size), motion)
+    w, n, angles = torque0.size, q.size, tables[0]
+    motion, f = array(doubles(3 * w), (w, 3)), array(doubles(n), (n,))
+    rows = array(beyond(start(numbers), int(numbers[COUNT])), (w, ROW))
+    f[:] = 0.0
+    held_forces(numbers, q, v, f, motion)
     for i in range(w):
         own, u, across = known[i], motion[i, 0], motion[i, 1]
         if first:

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from models.compiled import njit
+from models.compiled import lean, njit
 from models.contact.fastsim_kernels import (
     LANES,
     ROWS,
@@ -28,6 +28,8 @@ A, B, LOAD, MU, XI_X, XI_Y, SPIN, L1, L2, L3 = range(10)
 """Columns of contacts; L1 to L3 are the flexibilities (m^3/N) along x, along y and in spin."""
 Y, HALF, SPREAD, PART = range(4)
 """Rows of the strips: y/b, half length by a, that by the bound in the strip's middle, share of the load per bound."""
+PER_SLIP, ROOM = 5, ROWS * LANES
+"""Numbers of a rigid slip; of all lanes."""
 ONE, THREE, BLENDED = 0, 1, 2
 OF_X, OF_SPIN, AGAINST, REACH, GROWTH = 0.5, 0.52, 0.86, 1.9, 1.3
 SPIN_BY_RATIO, REACH_BY_RATIO, RATIOS = 0.6, 0.45, (0.1, 10.0)
@@ -46,11 +48,16 @@ def forces(contacts, strips, cells, middle, kind, march, found):
     contacts : (n, 10), columns as above; strips, cells, middle : a net from ``fastsim_grid``; kind : of flexibility;
     march : PLAIN or SECOND_ORDER. A contact without load or friction has zeros all over.
     """
-    slips = np.empty((len(contacts), 5))
+    slips, lanes = np.empty((len(contacts), PER_SLIP)), np.empty(ROOM)
+    forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, found)
+
+
+@lean
+def forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, found):
+    """``forces`` that makes no array: slips (n, PER_SLIP) and lanes (ROOM,) are room to work in."""
     for c in range(len(contacts)):
         rigid_slip(contacts[c], cells.shape[1], middle, kind, slips[c])
-        found[c] = 0.0
-    lanes = np.zeros(ROWS * LANES)
+        found[c, 0] = found[c, 1] = found[c, 2] = found[c, 3] = 0.0
     m = strips.shape[1]
     for first in range(0, len(contacts) * m, LANES):
         count = min(LANES, len(contacts) * m - first)
@@ -68,13 +75,13 @@ def forces(contacts, strips, cells, middle, kind, march, found):
             found[c, 3] = 1.0 - found[c, 3] / area
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def touches(contact):
     """Whether there is anything that friction could hold."""
     return contact[MU] * contact[LOAD] > NOTHING
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def rigid_slip(contact, cells, middle, kind, slip):
     """Fill ``slip`` (5,) with what the march and the moment need.
 
@@ -94,7 +101,7 @@ def rigid_slip(contact, cells, middle, kind, slip):
     slip[3], slip[4] = k3 / k1, k3 / k2
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def stiffness(contact, bound, kind):
     """Inverses of the flexibilities along x, along y and in spin (N/m^3)."""
     k1, k2, k3 = 1.0 / contact[L1], 1.0 / contact[L2], 1.0 / contact[L3]
@@ -105,7 +112,7 @@ def stiffness(contact, bound, kind):
     return k1 + part * (one - k1), k2 + part * (one - k2), k3 + part * (one - k3)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def blend(contact, bound, kind):
     """Part of the one flexibility, 0 to 1, and its derivatives to xi_x, xi_y and spin sqrt(a b).
 
@@ -133,7 +140,7 @@ def blend(contact, bound, kind):
             of_z * (steep * turns * (turns * z + AGAINST * y) - more * slides * z))  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def mean_flexibility(contact, turn, kind):
     """One flexibility for all creepages, ``turn`` = spin sqrt(a b) the third.
 
@@ -151,7 +158,7 @@ def mean_flexibility(contact, turn, kind):
     return (x * x * contact[L1] + y * y * contact[L2] + z * z * contact[L3]) / square
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _fill(lanes, first, count, contacts, strips, slips):
     """The strips from number ``first`` on into the lanes; those beyond ``count`` stay at rest."""
     c, s = first // strips.shape[1], first % strips.shape[1]
@@ -168,7 +175,7 @@ def _fill(lanes, first, count, contacts, strips, slips):
             c, s = c + 1, 0
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _collect(lanes, first, count, contacts, strips, slips, found):
     """Sums of the lanes into the forces of their ellipses, and slipping cells weighted by their length."""
     c, s = first // strips.shape[1], first % strips.shape[1]

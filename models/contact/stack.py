@@ -6,22 +6,31 @@ import llvmlite.ir as ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+from numba.np.arrayobj import get_cfarray_intrinsic, make_array, populate_array
 
 DOUBLES = types.CPointer(types.float64)
+REGISTER = 64
+"""Bytes of the longest vector register."""
 _intrinsic: Any = intrinsic
+array = get_cfarray_intrinsic("C", None)
+"""numba's ``carray``, for functions that are ``lean``, too: the array of a shape that lies at a pointer."""
 
 
 @_intrinsic(prefer_literal=True)
 def doubles(typing_context, count):
-    """Pointer to ``count`` doubles; they last until the function returns, and hold anything at first.
+    """Pointer to ``count`` doubles; they last until the function returns, and hold anything at first. A vector register
+    may begin there.
 
     A number written out takes its room once. Ask for any other outside of loops: every asking takes more of the stack.
     """
 
     def generate(context, builder, signature, arguments):
         if isinstance(count, types.IntegerLiteral):
-            return cgutils.alloca_once(builder, ir.DoubleType(), size=count.literal_value)
-        return builder.alloca(ir.DoubleType(), size=arguments[0])
+            room = cgutils.alloca_once(builder, ir.DoubleType(), size=count.literal_value)
+        else:
+            room = builder.alloca(ir.DoubleType(), size=arguments[0])
+        room.align = REGISTER
+        return room
 
     return DOUBLES(count), generate
 
@@ -34,6 +43,21 @@ def beyond(typing_context, pointer, count):
         return builder.gep(arguments[0], [arguments[1]])
 
     return DOUBLES(DOUBLES, types.intp), generate
+
+
+@_intrinsic
+def row(typing_context, pointer, size, i):
+    """The i-th of rows of ``size`` doubles that begin at a pointer, as an array (size,)."""
+    kind = types.Array(types.float64, 1, "C")
+
+    def generate(context, builder, signature, arguments):
+        first, size, i = arguments
+        own = make_array(kind)(context, builder)
+        populate_array(own, builder.gep(first, [builder.mul(size, i)]), [size], [ir.Constant(size.type, 8)],
+                       ir.Constant(size.type, 8), None, None)  # fmt: skip
+        return own._getvalue()
+
+    return kind(DOUBLES, types.intp, types.intp), generate
 
 
 @_intrinsic

@@ -8,6 +8,7 @@ from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.spatial_protocol import SpatialRun
 from models.errors import RunFailed
 from models.handling import forces as at
+from models.handling import kernel
 from models.handling.numbers import GRAVITY, Handling
 from models.handling.tyre import SLOW
 from models.resolved import check_resolved
@@ -57,7 +58,7 @@ def build(engine: str, handling: Handling) -> FreeModel:
 
 def driven_by(handling: Handling) -> Driven:
     """What an engine builds: the bodies, and the compiled forces with their table."""
-    return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces)
+    return Driven(handling.vehicle, handling.gravity, handling.numbers, kernel.forces, kernel.set_forces)
 
 
 def driven(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
@@ -75,7 +76,7 @@ def read(handling: Handling, run: SpatialRun, engine: str = "") -> Drive:
     """Reports of a run; RunFailed where a tyre's force is not finite, or the step cannot follow."""
     count, tyres = len(run.times), len(handling.vehicle.tyres)
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
-    at.reports(handling.numbers, run.times, np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates),
+    kernel.reports(handling.numbers, run.times, np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates),
                report, ledger)  # fmt: skip
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")

@@ -2,10 +2,10 @@
 
 import math
 
-from models.compiled import njit
+from models.compiled import lean
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def control(numbers, first, which, count, t):
     """Value and rate of a control at a time (s): at rest at every knot, by the smoothest step of degree 5 between."""
     knots = numbers[first + 2 * which * count :]
@@ -20,7 +20,7 @@ def control(numbers, first, which, count, t):
     return knots[2 * count - 1], 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def height(waves, count, x, y):
     """Height (m) of the road at a place (m) and its slopes along x and y: a sum of plane waves."""
     z = along = across = 0.0

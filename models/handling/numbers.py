@@ -1,11 +1,14 @@
-"""A free vehicle, its tyres, its controls and the road as the one table of doubles that ``forces`` reads."""
+"""A free vehicle, its tyres, its controls and the road as the one table of doubles that ``kernel`` reads."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from models.errors import InputError
 from models.handling import forces as at
+from models.handling import tree
+from models.handling.parts import ON_RATE, ON_TRAVEL, PER_PART
 from models.handling.tyre import net, shape_factor
 from models.vehicles.curve import Curve
 from models.vehicles.free_vehicle import anchor, chassis_of, free_vehicle, joints, rotor
@@ -99,18 +102,43 @@ class Handling:
 
 def _table(own: Handling) -> np.ndarray:
     """All numbers, in the order that ``forces`` names."""
-    free, chassis = own.vehicle, chassis_of(own.given)
-    parts, of = _parts(own), net(own.tyres.cells)
-    knots = _knots(own.controls)
-    tyres = [_tyre(own, i) for i in range(len(free.tyres))]
-    sections = [joints(free).ravel(), np.concatenate(parts or [np.empty(0)]), np.ravel(tyres), knots.ravel(),
-                own.waves.ravel(), of.cells.ravel(), of.strips.ravel()]  # fmt: skip
+    free, chassis, of, points = own.vehicle, chassis_of(own.given), net(own.tyres.cells), _Points(own.vehicle)
+    parts = [*_springs(own, points), *_bars(own, points)]
+    tyres, knots = [_tyre(own, i, points) for i in range(len(free.tyres))], _knots(own.controls)
+    sections = [_joints(free, points), np.ravel(points.rows), np.ravel([row for row, _ in parts]), np.ravel(tyres),
+                knots.ravel(), own.waves.ravel(), of.cells.ravel(), of.strips.ravel()]  # fmt: skip
     begins = at.HEADER + np.cumsum([0, *(section.size for section in sections)])
+    curves = _put_curves(parts, sections[2], int(begins[-1]))
     joint, place = _place(free, chassis.name, chassis.position)
     drag = own.given.drags[0].coefficient / 2.0 if own.given.drags else 0.0
-    counts = [begins[-1], len(free.coordinates()), len(parts), len(free.tyres), knots.shape[2], len(own.waves)]
+    counts = [begins[-1] + curves.size, len(free.coordinates()), len(points.rows), len(parts), len(free.tyres),
+              knots.shape[2], len(own.waves)]  # fmt: skip
     head = [*counts, joint, drag, *place, of.cells.shape[1], of.strips.shape[1], of.middle, *begins[1:-1]]
-    return np.concatenate([np.array(head, float), *sections])
+    return np.concatenate([np.array(head, float), *sections, curves])
+
+
+class _Points:
+    """Points where something acts, each once: rows of ``tree``."""
+
+    def __init__(self, vehicle: SpatialVehicle) -> None:
+        self.vehicle, self.rows = vehicle, list[tuple[float, ...]]()
+
+    def number(self, body: str, point: Vector) -> int:
+        """Of a point on a body, in the design position."""
+        joint, place = _place(self.vehicle, body, point)
+        row = (float(joint), *place.tolist())
+        if row not in self.rows:
+            self.rows.append(row)
+        return self.rows.index(row)
+
+
+def _joints(vehicle: SpatialVehicle, points: _Points) -> np.ndarray:
+    """Rows of all coordinates; those that turn what nothing else is on are loose."""
+    rows = joints(vehicle)
+    bears = {*rows[:, tree.BELOW], *(row[tree.JOINT] for row in points.rows)}
+    loose = [j >= 3 and row[tree.KIND] >= 3.0 and j not in bears for j, row in enumerate(rows)]
+    rows[loose, tree.KIND] = tree.LOOSE
+    return rows.ravel()
 
 
 def _place(vehicle: SpatialVehicle, body: str, point: Vector) -> tuple[int, np.ndarray]:
@@ -119,47 +147,52 @@ def _place(vehicle: SpatialVehicle, body: str, point: Vector) -> tuple[int, np.n
     return joint, np.subtract(point, origin)
 
 
-def _parts(own: Handling) -> list[np.ndarray]:
-    """Spring-dampers and bars."""
-    free, found = own.vehicle, []
-    for s in free.springs:
-        ends = [(s.two, s.point_two, np.array(s.axis)), (s.one, s.point_one, -np.array(s.axis))]
+_Part = tuple[list[float], tuple[Curve | None, ...]]
+"""A row of ``parts`` and its curves."""
+
+
+def _springs(own: Handling, points: _Points) -> Iterator[_Part]:
+    for s in own.vehicle.springs:
         if s.two is None:
-            raise InputError(free.name, f"springs[{s.name}].bodies", s.name, "a free vehicle is not tied to the ground")
-        law = [s.stiffness, s.damping, own.held.parts[s.name], s.friction, s.friction_rate]
-        found.append(_packed(free, law, ends, -1, (s.travel_force, s.rate_force)))
-    places = free.coordinates()
-    for bar in free.bars:
-        up = np.array([0.0, 0.0, 1.0 / bar.track])
-        ends = [(bar.left, bar.point_left, -up), (bar.right, bar.point_right, up)]
-        law = [bar.stiffness, bar.damping, own.held.parts[bar.name], 0.0, 1.0]
-        found.append(_packed(free, law, ends, places.index((bar.body, "rx")), (None, None)))
+            raise InputError(own.vehicle.name, f"springs[{s.name}].bodies", s.name,
+                             "a free vehicle is not tied to the ground")  # fmt: skip
+        ends = points.number(s.one, s.point_one), points.number(s.two, s.point_two)
+        rest = float(np.dot(np.subtract(s.point_two, s.point_one), s.axis))
+        law = [s.stiffness, s.damping, own.held.parts[s.name], s.friction, s.friction_rate, rest]
+        yield [*law, -1.0, 0.0, *ends, *s.axis, 0.0, 0.0], (s.travel_force, s.rate_force)
+
+
+def _bars(own: Handling, points: _Points) -> Iterator[_Part]:
+    for bar in own.vehicle.bars:
+        ends = points.number(bar.left, bar.point_left), points.number(bar.right, bar.point_right)
+        rest, rolls = (bar.point_right[2] - bar.point_left[2]) / bar.track, (bar.body, "rx")
+        law = [bar.stiffness, bar.damping, own.held.parts[bar.name], 0.0, 1.0, rest]
+        turns = [float(own.vehicle.coordinates().index(rolls)), 1.0]
+        yield [*law, *turns, *ends, 0.0, 0.0, 1.0 / bar.track, 0.0, 0.0], (None, None)
+
+
+def _put_curves(parts: list[_Part], rows: np.ndarray, first: int) -> np.ndarray:
+    """Numbers of all curves, and into the rows of their parts where they are, of which the first is at ``first``."""
+    found = np.empty(0)
+    for row, (_, curves) in zip(rows.reshape(-1, PER_PART), parts, strict=True):
+        for column, curve in zip((ON_TRAVEL, ON_RATE), curves, strict=True):
+            if curve is not None:
+                row[column] = first + found.size
+                found = np.concatenate((found, _hinges(curve)))
     return found
 
 
-def _packed(free: SpatialVehicle, law: list[float], ends: list[tuple], own: int,
-            curves: tuple[Curve | None, ...]) -> np.ndarray:  # fmt: skip
-    rest = sum(float(np.dot(point, axis)) for _, point, axis in ends)
-    points = np.concatenate([[joint, *place, *axis] for body, point, axis in ends
-                             for joint, place in [_place(free, body, point)]])  # fmt: skip
-    hinges = [_hinges(curve) for curve in curves]
-    count = at.FIRST_POINT + len(points) + sum(map(len, hinges))
-    head = [*law, rest, own, 1.0 if own >= 0 else 0.0, len(ends), count, *map(len, hinges)]
-    return np.concatenate([head, points, *hinges])
-
-
-def _hinges(curve: Curve | None) -> np.ndarray:
-    if curve is None:
-        return np.empty(0)
+def _hinges(curve: Curve) -> np.ndarray:
     offset, slope, corners, bends = curve.hinges()
-    return np.array([offset, slope, *(value for pair in zip(corners, bends, strict=True) for value in pair)])
+    pairs = [value for pair in zip(corners, bends, strict=True) for value in pair]
+    return np.array([3 + len(pairs), offset, slope, *pairs])
 
 
-def _tyre(own: Handling, i: int) -> list[float]:
+def _tyre(own: Handling, i: int, points: _Points) -> list[float]:
     """One tyre; its bristles are those with which it has the ride vehicle's cornering stiffness at its static load."""
     free, of = own.vehicle, own.tyres
     tyre, places = free.tyres[i], free.coordinates()
-    joint, place = _place(free, tyre.body, tyre.point)
+    joint, _ = _place(free, tyre.body, tyre.point)
     load = own.held.tyres[tyre.name]
     if not load > 0.0:
         raise InputError(free.name, f"tyres[{tyre.name}]", load, "carries no weight: it must press on the road at rest")
@@ -174,9 +207,9 @@ def _tyre(own: Handling, i: int) -> list[float]:
     brake = share * (c.front_brake if front else (1.0 - c.front_brake) / rear)
     drive = share * (c.front_drive if front else (1.0 - c.front_drive) / rear)
     side = np.sign(tyre.point[1])
-    return [joint, places.index(spins) if spins in places else -1, *place, tyre.point[2], load, tyre.stiffness,
-            tyre.damping, radius, of.half_width, bristles, of.friction, float(front), brake, drive,
-            side * of.inclination, of.brake_rate]  # fmt: skip
+    return [joint, places.index(spins) if spins in places else -1, points.number(tyre.body, tyre.point),
+            tyre.point[2], load, tyre.stiffness, tyre.damping, radius, of.half_width, bristles, of.friction,
+            float(front), brake, drive, side * of.inclination, of.brake_rate]  # fmt: skip
 
 
 def _knots(controls: Controls) -> np.ndarray:

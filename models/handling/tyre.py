@@ -16,10 +16,11 @@ from functools import cache
 
 import numpy as np
 
-from models.compiled import njit
+from models.compiled import lean
 from models.contact.fastsim import KINDS, MARCHES
 from models.contact.fastsim_grid import Grid, grid, strips_of
-from models.contact.fastsim_many import LOAD, MU, SPIN, XI_X, XI_Y, A, B, forces
+from models.contact.fastsim_many import LOAD, MU, PER_SLIP, ROOM, SPIN, XI_X, XI_Y, A, B, forces, forces_within
+from models.contact.stack import array, doubles
 from models.errors import InputError
 
 SLOW = 0.1
@@ -45,31 +46,39 @@ def shape_factor(cells: int) -> float:
     return -float(found[0, 1])
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def tyre_forces(contacts, slides, strips, cells, middle, found):
-    """Fill ``found`` (w, 4) with fx, fy (N) and mz (N m) on tyres; the last column is of no meaning.
+    """Fill ``found`` (w, 4) with fx, fy (N) and mz (N m) on tyres; the last column is of no meaning. No array is made.
 
     contacts (w, 10) : a, b, load, mu, three numbers that are filled in here, and three times 1/k (m^3/N); slides
     (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the tread (m/s).
     """
-    some = np.empty((len(contacts), 4))
-    found[:] = 0.0
-    for sign in (1.0, -1.0):
-        needed = False
-        for i in range(len(contacts)):
-            speed = max(abs(slides[i, 3]), SLOW)
-            needed = needed or sign * slides[i, 3] > -SLOW
-            contacts[i, XI_X], contacts[i, XI_Y] = sign * slides[i, 0] / speed, slides[i, 1] / speed
-            contacts[i, SPIN] = sign * slides[i, 2] / speed
-        if not needed:
-            continue
-        forces(contacts, strips, cells, middle, THREE, ORDER, some)
-        for i in range(len(contacts)):
-            share = min(1.0, max(0.0, 0.5 + 0.5 * sign * slides[i, 3] / SLOW))
-            if share > 0.0:
-                found[i, 0] += share * sign * some[i, 0]
-                found[i, 1] += share * some[i, 1]
-                found[i, 2] += share * sign * some[i, 2]
+    w = len(contacts)
+    some, slips, lanes = doubles(4 * w), doubles(PER_SLIP * w), array(doubles(ROOM), (ROOM,))
+    first, second = False, False
+    for i in range(w):
+        found[i, 0] = found[i, 1] = found[i, 2] = found[i, 3] = 0.0
+        first, second = first or slides[i, 3] > -SLOW, second or slides[i, 3] < SLOW
+    for sign, needed in ((1.0, first), (-1.0, second)):
+        if needed:
+            _roll(sign, contacts, slides, strips, cells, middle, array(some, (w, 4)), array(slips, (w, PER_SLIP)),
+                  lanes, found)  # fmt: skip
+
+
+@lean
+def _roll(sign, contacts, slides, strips, cells, middle, some, slips, lanes, found):
+    """Add the share of the forces that tyres have rolling forwards (sign 1) or backwards (-1)."""
+    for i in range(len(contacts)):
+        slide, contact = slides[i], contacts[i]
+        by = 1.0 / max(abs(slide[3]), SLOW)
+        contact[XI_X], contact[XI_Y], contact[SPIN] = sign * slide[0] * by, slide[1] * by, sign * slide[2] * by
+    forces_within(contacts, strips, cells, middle, THREE, ORDER, slips, lanes, some)
+    for i in range(len(contacts)):
+        share = min(1.0, max(0.0, 0.5 + 0.5 * sign * slides[i, 3] / SLOW))
+        if share > 0.0:
+            found[i, 0] += share * sign * some[i, 0]
+            found[i, 1] += share * some[i, 1]
+            found[i, 2] += share * sign * some[i, 2]
 
 
 def brush(load: float, mu: float, half_length: float, half_width: float, stiffness: float, slides: np.ndarray,

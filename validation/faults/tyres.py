@@ -8,6 +8,7 @@ import numpy as np
 
 from models.handling import forces as at
 from models.handling.in_engines import _bodies, build
+from models.handling.kernel import reports
 from models.handling.numbers import Controls, Handling, Tyres
 from models.vehicles.vehicle_file import load_vehicle
 from validation.faults.campaign import Campaign, Check, Fault, off
@@ -52,7 +53,7 @@ def _mirror() -> float:
 
 def _read(own: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     report, ledger = np.empty((1, len(own.vehicle.tyres), at.REPORTED)), np.empty((1, at.LEDGER))
-    at.reports(own.numbers, np.zeros(1), q[None].copy(), v[None].copy(), report, ledger)
+    reports(own.numbers, np.zeros(1), q[None].copy(), v[None].copy(), report, ledger)
     return report[0], ledger[0]
 
 
