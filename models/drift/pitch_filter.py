@@ -88,7 +88,8 @@ class PitchFilter(ExtendedKalmanFilter):
         self.step, self.intensity, self.measured = step, intensity, measured
         self.x, self.P = start.copy(), covariance.copy()
         self.late = np.zeros((STATES, 2))
-        self._seen: dict[tuple[int, ...], tuple[list[int], np.ndarray, np.ndarray]] = {}
+        self._there = np.isfinite(measured.values) @ (1 << np.arange(len(measured.columns)))
+        self._seen = [self._of(there) for there in range(1 << len(measured.columns))]
 
     def predict_x(self, u: Any = 0) -> None:
         """State and Jacobians over step number ``u``.
@@ -98,26 +99,25 @@ class PitchFilter(ExtendedKalmanFilter):
         covariance of the error is P with the part that is late.
         """
         self.x, self.F, early, late = self.step.advance(self.x, u)
-        push = early + self.F @ self.late
-        self.Q, self.late = self.intensity * (push @ push.T), late
+        push = early + self.F.dot(self.late)
+        self.Q, self.late = self.intensity * push.dot(push.T), late
 
     def measure(self, number: int) -> tuple[int, float]:
         """Take in what is a number in a row of the measurement: how many, and the normalised innovation squared."""
-        values = self.measured.values[number]
-        there = tuple(i for i, value in enumerate(values.tolist()) if math.isfinite(value))
+        there = self._there[number]
         if not there:
             return 0, math.nan
-        chosen, rows, own = self._of(there)
-        late = rows @ self.late
-        self.update(values[chosen], lambda x: rows, rows.dot, R=own + self.intensity * (late @ late.T))
-        return len(there), float(self.y @ self.SI @ self.y)
+        chosen, rows, own = self._seen[there]
+        late = rows.dot(self.late)
+        values = self.measured.values[number, chosen]
+        self.update(values, lambda x: rows, rows.dot, R=own + self.intensity * late.dot(late.T))
+        return len(values), float(self.y.dot(self.SI).dot(self.y))
 
-    def _of(self, there: tuple[int, ...]) -> tuple[list[int], np.ndarray, np.ndarray]:
-        """Measured columns, what each sees of the state (m, 7) and its noise (m, m); few patterns, so they are kept."""
-        if there not in self._seen:
-            rows = self._I[[self.measured.columns[i] for i in there]]
-            self._seen[there] = list(there), rows, np.diag([self.measured.deviations[i] ** 2 for i in there])
-        return self._seen[there]
+    def _of(self, there: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Columns that the bits of a number name, what each sees of the state (m, 7), and its noise (m, m)."""
+        chosen = np.array([i for i in range(len(self.measured.columns)) if there >> i & 1], dtype=int)
+        return (chosen, self._I[[self.measured.columns[i] for i in chosen]],
+                np.diag([self.measured.deviations[i] ** 2 for i in chosen]))  # fmt: skip
 
 
 def estimate(assembly: Assembly, measured: Measurement, deviation: float, *, start_deviation: float = 0.0,
@@ -151,7 +151,7 @@ def _march(own: PitchFilter) -> tuple[Estimate, _Steps]:
     for i in range(n):
         if i:
             own.predict(i - 1)
-        if not math.isfinite(own.x @ own.P @ own.x):
+        if not math.isfinite(own.x.dot(own.P).dot(own.x)):
             raise RunFailed("kalman filter", "the estimate became infinite or not a number", i * period)
         predictions[i], transitions[i], noises[i] = own.x, own.F, own.Q
         if i % every == 0 and i // every < len(measured.values):

@@ -72,7 +72,7 @@ class Parameters(Strict):
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The force-excited vehicle, drawn towards the estimate of its pitch."""
-    guide = _guide(assembly, p)
+    guide = guide_of(assembly, p)
     _check_surprise(assembly, p, guide)
     _check_bandwidth(assembly, p, guide)
     stiffness, damping = pull(assembly, p)
@@ -93,6 +93,7 @@ def pull(assembly: Assembly, p: Parameters) -> tuple[float, float]:
 class Guide:
     """What the run follows, at times i ``period`` (s).
 
+    states : (n, 7), the filter's (``models/drift/pitch_filter.py``)
     values, deviations : (n, 2), estimated pitch and rate (rad, rad/s) and their standard deviations
     inertia : (n,), share by which 1/I is estimated above the model's; lacking : (n,), the moment (N m) to it
     used, missed : (n,), measured values so far
@@ -100,6 +101,7 @@ class Guide:
     """
 
     period: float
+    states: np.ndarray
     values: np.ndarray
     deviations: np.ndarray
     inertia: np.ndarray
@@ -113,7 +115,8 @@ _LATEST: dict[str, Guide] = {}
 """The last guide, by a digest of all that it depends on: a check and a run per engine need it once."""
 
 
-def _guide(assembly: Assembly, p: Parameters) -> Guide:
+def guide_of(assembly: Assembly, p: Parameters) -> Guide:
+    """What a force-excited assembly would follow; raises InputError for a file that is none, RunFailed."""
     from models.drift.pitch_filter import estimate
 
     measured = _measurement(assembly, p)
@@ -122,16 +125,16 @@ def _guide(assembly: Assembly, p: Parameters) -> Guide:
         found = estimate(assembly, measured, p.force_deviation, start_deviation=p.start_deviation,
                          inertia_deviation=p.inertia_deviation, smoother=p.smoother)  # fmt: skip
         _LATEST.clear()
-        _LATEST[key] = _guide_of(assembly, found)
+        _LATEST[key] = _read(assembly, found)
     return _LATEST[key]
 
 
-def _guide_of(assembly: Assembly, found: "Estimate") -> Guide:
+def _read(assembly: Assembly, found: "Estimate") -> Guide:
     from models.drift.pitch_filter import INERTIA, PITCH, RATE, suspension_moment
 
     deviations = np.sqrt(found.errors()[:, [PITCH, RATE], [PITCH, RATE]])
     share = found.states[:, INERTIA]
-    return Guide(found.period, found.states[:, [PITCH, RATE]], deviations, share,
+    return Guide(found.period, found.states, found.states[:, [PITCH, RATE]], deviations, share,
                  share * suspension_moment(assembly, found.states), np.cumsum(found.used), np.cumsum(found.missed),
                  np.nancumsum(found.surprises))
 

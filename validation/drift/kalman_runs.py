@@ -13,7 +13,7 @@ from models.assembly import Assembly, assemble
 from models.damage import damage_ratio
 from models.drift.pitch_filter import PITCH, RATE, Estimate, Measurement, estimate
 from models.drift.pitch_step import KEPT, RELATIVE
-from models.effects.kalman_filter import pull
+from models.effects.kalman_filter import guide_of, pull
 from models.engines.protocol import Settings, build
 from models.engines.stability import first_order, linearised
 from models.noise import PITCH_SENSOR, normal
@@ -190,8 +190,7 @@ def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> n
     noise = noise_of(deviation, seed)
     drawn = driven(folder, duration, noise | {"kalman_filter": own}, geometry="linear")
     run = free_run(assemble(drawn), duration, COARSE)
-    found = estimate(assemble(driven(folder, duration, noise, geometry="linear")),
-                     Measurement(seen[:, None], COARSE, (PITCH,), (angle,)), deviation)  # fmt: skip
+    found = guide_of(assemble(driven(folder, duration, noise, geometry="linear")), drawn.effects["kalman_filter"])
     errors = np.hstack([found.states[:, :6] - RELATIVE @ start, (run - start) @ RELATIVE.T])
     return errors[round(2 / COARSE) :]
 
