@@ -24,6 +24,7 @@ from models.measured.resampling import SAME, onto
 from models.measured.scene import MeasuredScene
 from models.measured.signal import Signal
 from models.measured.timing import EVEN, Timing, timing
+from models.scene_effects import extended
 
 Progress = Callable[[str, float], None]
 COLUMNS, RAW, SOURCES = "recording.columns", "raw.columns", "sources.json"
@@ -78,7 +79,7 @@ class Grid:
 
 def record(scene: MeasuredScene, sources: Sequence[Source], signals: Sequence[Signal], hubs: Sequence[str],
            folder: Path, progress: Progress = lambda text, part: None) -> Recording:  # fmt: skip
-    """Bring mapped signals of opened files onto one clock, into columns in ``folder``.
+    """Bring mapped signals of opened files onto one clock, into columns in ``folder``, and extend them by the effects.
 
     hubs : where forces are put in; these set the clock. What is in the folder from the same files is taken as it is.
     Raises InputError for files that do not overlap, or none of whose channels is a wheel force.
@@ -103,7 +104,7 @@ def record(scene: MeasuredScene, sources: Sequence[Source], signals: Sequence[Si
     comment = "\n".join(source.comment for source in sources if source.comment)
     said = [finding for source in sources for finding in source.noticed]
     said += [*noticed, _rule(scene, groups, grid)]
-    return Recording(tuple(signals), columns, grid.period, began, comment, tuple(said))
+    return extended(Recording(tuple(signals), columns, grid.period, began, comment, tuple(said)), scene)
 
 
 def _rule(scene: MeasuredScene, groups: list[Group], grid: Grid) -> Finding:

@@ -37,9 +37,10 @@ def _text(scene: MeasuredScene, found: VirtualMeasurement, file: str) -> str:
     """The scene without its table ``virtual``, with the file's map."""
     assert scene.virtual is not None
     own = scene.model_dump(exclude_unset=True, exclude={"virtual", "files", "sensors", "file", "folder", "options"})
+    effects = own.pop("effects", {})
     plain = {key: value for key, value in own.items() if not isinstance(value, dict)}
     lines = [f"{key} = {_value(value)}" for key, value in plain.items()]
-    for name, table in own.items():
+    for name, table in (own | {f"effects.{name}": table for name, table in effects.items()}).items():
         if isinstance(table, dict):
             lines += ["", f"[{name}]", *(f"{key} = {_value(value)}" for key, value in table.items())]
     for name, place in scene.virtual.accelerometers.items():

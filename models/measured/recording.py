@@ -1,7 +1,7 @@
 """Signals in SI on one clock: what every check, run and page reads."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 import numpy as np
@@ -52,3 +52,14 @@ class Recording:
         names = tuple(s.name for s in signals)
         for first in range(0, self.count, length):
             yield first, self.columns.block(names, first, length)
+
+    def changed(self, change: Callable[[Signal, np.ndarray], np.ndarray]) -> "Recording":
+        """The same with other samples: ``change`` gives those (count,) of a signal by its own, SI, NaN where nothing
+        was measured. They lie in a new file beside the old one, so that nothing is changed twice."""
+        path = self.columns.path.with_stem(f"{self.columns.path.stem}_changed")
+        path.with_suffix(".json").unlink(missing_ok=True)
+        columns = Columns(path, self.columns.names, self.count)
+        for signal in self.signals:
+            columns.put((signal.name,), 0, change(signal, self.samples(signal))[:, None])
+        columns.close(self.count)
+        return replace(self, columns=columns)

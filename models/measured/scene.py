@@ -13,6 +13,7 @@ from models.measured.rig import Rig, in_plane, in_space
 from models.measured.signal import Frame, Quantity
 from models.measured.verdict import LIMITS
 from models.measured.virtual import VirtualTable
+from models.scene_effects import with_own
 from models.scene_file import SceneFile, checked
 from models.strict import Strict, quantity
 from models.vehicles.vehicle_file import load_vehicle
@@ -115,6 +116,7 @@ class MeasuredScene(SceneFile):
     run: Run = Run()
     limits: Limits = Field(default=LIMITS, description="of the verdict")
     hand_on: HandOn = HandOn()
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     def rig(self) -> Rig:
         """The vehicle that is driven; raises InputError."""
@@ -136,7 +138,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Me
     for i, name in enumerate(names):
         if name in names[:i]:
             raise InputError(file, f"files.{i}.file", name, "is named twice: put all its channels into one [[files]]")
-    return scene
+    return with_own(scene)
 
 
 def _check_vehicle(scene: MeasuredScene) -> None:
