@@ -3,27 +3,30 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from models.damage import damage_ratio
 from models.engines.hub_forces import HubRun, build
 from models.errors import RunFailed
-from models.hub_forces.cut_vehicle import ANGLES, PITCH, ROLL, CutVehicle, X, Y, Z
+from models.hub_forces.cut_vehicle import ANGLES, CutVehicle, X, Y, Z
 from models.hub_forces.halved import check_halved
 from models.hub_forces.measurement import Angles, HubForces
 from models.hub_forces.of_scene import measured
-from models.hub_forces.scene import COMPONENTS, HubScene
-from models.hub_forces.table import Drive
-from models.hub_forces.tilt_filter import Tilt, estimate, held, pulled
-from models.prescribed import smoothed
+from models.hub_forces.scene import COMPONENTS, HubScene, Method
+from models.hub_forces.stabilised import Stabilised
 from models.strict import Strict, read
 from models.time_series import write_time_series
+
+if TYPE_CHECKING:
+    from models.hub_forces.tilt_filter import Tilt
 
 SYSTEM = "hub-forces"
 Progress = Callable[[str, float], None]
 FREE, FILTER, PRESCRIBED = "free", "filter", "prescribed"
+METHODS: dict[str, Method] = {FREE: "none", FILTER: "kalman", PRESCRIBED: "prescribed"}
+"""Runs that are compared, whatever the scene's own method, and how roll and pitch are held in them."""
 DRIFTED = 0.05
 """rad: a roll or pitch that is off by more is drift-off, as in the study of the pitch plane."""
 
@@ -39,7 +42,7 @@ class Found:
     vehicle: CutVehicle
     forces: HubForces
     angles: Angles
-    tilt: Tilt
+    tilt: "Tilt"
     truth: HubRun | None
     runs: dict[str, HubRun]
     failed: dict[str, str]
@@ -63,45 +66,35 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
 
 
 def compute(scene: HubScene, engines: tuple[str, ...], progress: Progress = lambda text, part: None) -> Found:
-    """All runs: free in every engine, with stabilisers in the last one, which is the fastest. Raises RunFailed where
-    even the filter cannot hold the vehicle, or where the step is too long for its springs."""
+    """All runs: by the scene's own method in every engine, by the others in the last one, which is the fastest. Raises
+    RunFailed where even the filter cannot hold the vehicle, or where the step is too long for its springs."""
     vehicle, own, last = scene.cut_vehicle(), scene.run, engines[-1]
     progress("virtual measurement", 0.05)
     true, forces, angles = measured(scene, vehicle, last)
-    deviations = (scene.angles.angle_deviation, scene.angles.rate_deviation)
+    stabilised = Stabilised(scene, vehicle, forces, angles)
     progress("Kalman filter", 0.2)
-    tilt = estimate(vehicle, forces, angles, scene.deviations(vehicle), deviations, scene.stabilise.model, scene.file)
-
-    def filtered(step: float, steps: int) -> Drive:
-        held_on = forces.drive(step, steps, scene.forces.interpolation)
-        return pulled(held_on, vehicle, tilt, step, scene.stabilise.bandwidth)
-
-    steps = round(own.duration / own.step)
-    drive = forces.drive(own.step, steps, scene.forces.interpolation)
-    quiet = smoothed(angles.samples[:, :2], angles.period, scene.stabilise.smoothing, scene.file, "stabilise.smoothing")
-    drives = {f"{FREE}, {engine}": (engine, drive) for engine in engines}
-    drives[FILTER] = last, filtered(own.step, steps)
-    drives[PRESCRIBED] = last, held(drive, quiet, angles.period, own.step)
-    runs, failed = dict[str, HubRun](), dict[str, str]()
-    for i, (name, (engine, driven)) in enumerate(drives.items()):
-        progress(name, 0.3 + 0.6 * i / len(drives))
+    tilt = stabilised.tilt
+    runs, failed, planned = dict[str, HubRun](), dict[str, str](), _planned(scene, engines)
+    for i, (name, (method, engine)) in enumerate(planned.items()):
+        progress(name, 0.3 + 0.6 * i / len(planned))
+        drive = stabilised.drive(method, own.step, round(own.duration / own.step))
         try:
-            runs[name] = build(engine, vehicle, driven, own.step, own.duration).run(_start(vehicle, driven, angles))
+            runs[name] = build(engine, vehicle, drive, own.step, own.duration).run(stabilised.start(drive))
         except RunFailed as error:
             if name == FILTER:  # what the others are compared with
                 raise
             failed[name] = str(error)
     check_halved(last, runs[FILTER], [element.name for element in vehicle.elements], lambda step, steps: build(
-        last, vehicle, filtered(step, steps), step, step * steps).run())  # fmt: skip
+        last, vehicle, stabilised.drive("kalman", step, steps), step, step * steps).run())  # fmt: skip
     return Found(vehicle, forces, angles, tilt, true, runs, failed)
 
 
-def _start(vehicle: CutVehicle, drive: Drive, angles: Angles) -> np.ndarray:
-    """At rest in the design position; an enforced tilt begins where its file does."""
-    start = np.zeros(2 * vehicle.size)
-    if drive.guide is not None and drive.pull is None:
-        start[[ROLL, PITCH, vehicle.size + ROLL, vehicle.size + PITCH]] = drive.guide[0, :4]
-    return start
+def _planned(scene: HubScene, engines: tuple[str, ...]) -> dict[str, tuple[Method, str]]:
+    """Method and engine of every run by its name; those of a stabiliser in the last engine need none beside theirs."""
+    pairs = [(name, method, engine) for name, method in METHODS.items() for engine in engines
+             if method == scene.stabilise.method or engine == engines[-1]]  # fmt: skip
+    return {name if name != FREE and engine == engines[-1] else f"{name}, {engine}": (method, engine)
+            for name, method, engine in pairs}  # fmt: skip
 
 
 def errors(found: Found, run: HubRun) -> np.ndarray:
@@ -142,10 +135,11 @@ def answer(found: Found) -> dict[str, Any]:
 
 
 def engines_apart(found: Found) -> float:
-    """Largest difference of any coordinate or rate between the free runs of the engines before drift-off."""
-    free = [run for name, run in found.runs.items() if name.startswith(FREE)]
-    before = int(min(min(drift_off(found, run) for run in free), free[0].times[-1]) / free[0].times[1]) + 1
-    return max(float(np.abs(run.states[:before] - free[0].states[:before]).max()) for run in free)
+    """Largest difference of any coordinate or rate between the engines, before drift-off, of what several ran."""
+    kinds = [[run for name, run in found.runs.items() if name.startswith(kind)] for kind in METHODS]
+    own = max(kinds, key=len)
+    before = int(min(min(drift_off(found, run) for run in own), own[0].times[-1]) / own[0].times[1]) + 1
+    return max(float(np.abs(run.states[:before] - own[0].states[:before]).max()) for run in own)
 
 
 def _table(scene: HubScene, found: Found) -> list[str]:
@@ -162,7 +156,7 @@ def _table(scene: HubScene, found: Found) -> list[str]:
                      + f"{_told(drift_off(found, run)):>11}{roll:>8.3g}{pitch:>8.3g}   "
                      + f"{min(ratios):.3g}, {max(ratios):.3g}")  # fmt: skip
     lines += [f"  {name}: {text}" for name, text in found.failed.items()]
-    if sum(name.startswith(FREE) for name in found.runs) > 1:
+    if len(found.runs) > len(METHODS):
         lines.append(f"  engines before drift-off: {engines_apart(found):.1e}")
     return lines
 

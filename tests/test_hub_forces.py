@@ -9,11 +9,12 @@ import pytest
 from models.engines.hub_forces import HubRun, build
 from models.errors import InputError, Refused, RunFailed
 from models.hub_forces.cut_vehicle import PITCH, ROLL, cut
+from models.hub_forces.enforced import held
 from models.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
 from models.hub_forces.rigid import rigid
 from models.hub_forces.scene import build as scene_of
 from models.hub_forces.table import Drive
-from models.hub_forces.tilt_filter import estimate, held, pulled
+from models.hub_forces.tilt_filter import estimate, pulled
 from models.road.iso8608 import iso8608_road
 from models.vehicles.spatial_linear import linearise
 from validation.cases import hub_forces as case

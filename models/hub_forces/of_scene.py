@@ -9,7 +9,7 @@ from models.road.iso8608 import iso8608_road
 
 
 def measured(scene: HubScene, vehicle: CutVehicle, engine: str) -> tuple[HubRun | None, HubForces, Angles]:
-    """What transducers say: of the files, or of a run on the road with noise; RunFailed for too long a step."""
+    """What transducers say: of the files, or of a run on the road, with its noise; RunFailed for too long a step."""
     if scene.road is None:
         return None, *scene.measured(vehicle)
     own, road, steps = scene.run, scene.road, round(scene.run.duration / scene.run.step)
@@ -22,5 +22,8 @@ def measured(scene: HubScene, vehicle: CutVehicle, engine: str) -> tuple[HubRun 
     true = on_road(own.step, steps)
     check_halved(engine, true, [element.name for element in vehicle.elements], on_road)
     forces, angles = recorded(true, scene.forces.frame, round(1.0 / (scene.forces.sampling_rate * own.step)))
-    deviations = (scene.angles.angle_deviation, scene.angles.rate_deviation)
-    return true, forces.noisy(scene.deviations(vehicle), scene.seed), angles.noisy(deviations, scene.seed)
+    if scene.forces.noise == "white":
+        forces = forces.noisy(scene.deviations(vehicle), scene.seed)
+    if scene.angles.noise == "white":
+        angles = angles.noisy(scene.angles.deviations, scene.seed)
+    return true, forces, angles

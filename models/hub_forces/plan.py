@@ -8,6 +8,9 @@ from models.hub_forces.rigid import rigid
 from models.hub_forces.scene import HubScene
 from models.scene_effects import lines as effect_lines
 
+COMPARING = "hub_forces"
+"""The study that runs a scene with every stabiliser and without, whichever it names."""
+
 
 def check(scene: HubScene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
@@ -33,13 +36,24 @@ def describe(scene: HubScene) -> str:
                               f"{', '.join(vehicle.hubs)}"),
              _line("inside", f"{len(vehicle.elements)} springs, mounts and bars, in the chassis' axes"),
              _line("forces", f"{source}, six per hub in the frame {forces.frame!r}, {forces.interpolation}"),
-             _line("noise", f"{forces.force_deviation:g} N and {forces.moment_deviation:g} N m on every sample")]
+             _line("noise", _noise(scene))]
     if scene.road is not None:
         lines.append(_line("road", f"ISO 8608 class {scene.road.iso8608}, two independent tracks, seeds "
                                    f"{scene.road.seed} and {scene.road.seed + 1}, {scene.road.speed:g} m/s"))
     lines.append(_line("run", f"{scene.run.duration:g} s, Runge-Kutta 4, {scene.run.step:g} s"))
+    if scene.study == COMPARING:
+        lines.append(_line("compared", "free, with kalman_filter, with prescribed_angles: a scene each"))
     never = "drag, tyres that roll, curves and friction of springs"
     return "\n".join([*lines, *effect_lines(scene), _line("never", never)])
+
+
+def _noise(scene: HubScene) -> str:
+    """What every sample has, as is stated of files, or was added to a virtual measurement."""
+    forces, angles = scene.forces, scene.angles
+    of_forces = f"{forces.force_deviation:g} N and {forces.moment_deviation:g} N m on every sample of forces"
+    of_angles = f"{angles.angle_deviation:g} rad and {angles.rate_deviation:g} rad/s on every one of angles"
+    said = [text for own, text in ((forces, of_forces), (angles, of_angles)) if own.noise == "white"]
+    return ", ".join(said) or "none"
 
 
 def _line(head: str, text: str) -> str:

@@ -19,6 +19,8 @@ from models.time_series import read_time_series
 from models.vehicles.vehicle_file import load_vehicle
 
 Frame = Literal["hub", "body", "inertial"]
+Noise = Literal["white", "none"]
+Method = Literal["none", "kalman", "prescribed"]
 MOMENTS = {"N m": 1.0, "kN m": 1e3}
 COMPONENTS = {"fx": NEWTONS, "fy": NEWTONS, "fz": NEWTONS, "mx": MOMENTS, "my": MOMENTS, "mz": MOMENTS}
 """Columns of a hub, each after the hub's name and an underscore, with the factors of their units."""
@@ -55,6 +57,7 @@ class Forces(Strict):
     frame: Frame = Field(default="hub", description="axes of what carries the wheel, of the chassis, or of the space")
     interpolation: Literal["linear", "smooth"] = Field(default="linear", description="between samples")
     sampling_rate: float = quantity("Hz", "of the virtual measurement", default=500.0)
+    noise: Noise = Field(default="white", description="of the virtual measurement; what is stated stays")
     force_deviation: float = quantity("N", "white noise of every force sample", default=8.0)
     moment_deviation: float = quantity("N m", "white noise of every moment sample", default=1.0)
 
@@ -63,13 +66,20 @@ class Measured(Strict):
     """[angles]: roll and pitch with their rates."""
 
     file: str | None = Field(default=None, description="CSV: time [s], roll, pitch [rad]; roll_rate, pitch_rate")
+    noise: Noise = Field(default="white", description="of the virtual measurement; what the filter is told stays")
     angle_deviation: float = quantity("rad", "white noise of every angle", default=1.75e-3)
     rate_deviation: float = quantity("rad/s", "white noise of every rate", default=5e-3)
+
+    @property
+    def deviations(self) -> tuple[float, float]:
+        """Standard deviations of every angle (rad) and of every rate (rad/s)."""
+        return self.angle_deviation, self.rate_deviation
 
 
 class Stabilise(Strict):
     """[stabilise]: how roll and pitch are held."""
 
+    method: Method = Field(default="none", description="what holds roll and pitch")
     bandwidth: float = quantity("Hz", "of the moment towards the filter's estimate", default=0.7)
     model: float = quantity("rad/s^2", "deviation of what springs add to a rigid vehicle, to the filter", default=10.0)
     smoothing: float = quantity("Hz", "low-pass of angles before they are enforced", default=5.0)
@@ -123,10 +133,18 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Hu
     if (scene.forces.file is None) != (scene.angles.file is None):
         missing = "angles.file" if scene.angles.file is None else "forces.file"
         raise InputError(file, missing, None, "is missing: forces and angles are measured together")
-    if scene.forces.file is not None and "sampling_rate" in scene.forces.model_fields_set:
-        raise InputError(file, "forces.sampling_rate", scene.forces.sampling_rate, "is that of forces.file: drop it")
+    if scene.forces.file is not None:
+        _check_file_only(file, scene)
     _check_steps(file, scene)
     return with_own(scene)
+
+
+def _check_file_only(file: str, scene: HubScene) -> None:
+    """What a virtual measurement can choose, and files have as they are."""
+    for table, name, own in (("forces", "sampling_rate", scene.forces), ("forces", "noise", scene.forces),
+                             ("angles", "noise", scene.angles)):  # fmt: skip
+        if name in own.model_fields_set:
+            raise InputError(file, f"{table}.{name}", getattr(own, name), f"is that of {table}.file: drop it")
 
 
 def _check_steps(file: str, scene: HubScene) -> None:

@@ -18,7 +18,7 @@ from models.hub_forces.rigid import rigid
 from models.hub_forces.scene import Frame
 from models.hub_forces.table import Drive
 from models.hub_forces.tilt_march import march
-from models.signals import Sampled, Smooth
+from models.signals import Sampled
 
 SURPRISE = 4.0
 """Largest mean of the normalised innovation squared, per measured value: errors twice as large as stated."""
@@ -175,9 +175,3 @@ def pulled(drive: Drive, vehicle: CutVehicle, tilt: Tilt, step: float, bandwidth
     roll, pitch, _ = np.diag(rigid(vehicle).inertia)
     pull = (roll * corner**2, 2 * ratio * roll * corner, pitch * corner**2, 2 * ratio * pitch * corner)
     return replace(drive, guide=np.hstack([wanted, np.zeros((rows, 2))]), pull=pull)
-
-
-def held(drive: Drive, angles: np.ndarray, period: float, step: float) -> Drive:
-    """The drive with roll and pitch (m, 2), rad, enforced: a quintic spline through the samples."""
-    motion = Smooth(angles, period, derivatives=2, degree=5)
-    return replace(drive, guide=motion.sample(0.0, step / 2, len(drive.hubs)))

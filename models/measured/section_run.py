@@ -6,10 +6,10 @@ read alike whatever the block: a run in blocks, or resumed after any interruptio
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -20,13 +20,15 @@ from models.errors import InputError, RunFailed
 from models.hub_forces.cut_vehicle import PITCH, ROLL, CutVehicle
 from models.hub_forces.rigid import rigid
 from models.hub_forces.table import Drive, table
-from models.hub_forces.tilt_filter import FilterState, TiltFilter
 from models.measured.checkpoint import Checkpoint, digest, digest_of
 from models.measured.columns import Columns
 from models.measured.finding import Finding
 from models.measured.inputs import Grid, Inputs, Prescribed
 from models.measured.recording import Recording
 from models.measured.sections import Answer, Sections
+
+if TYPE_CHECKING:
+    from models.hub_forces.tilt_filter import TiltFilter
 
 BLOCK = 60.0
 """s of recording between two checkpoints."""
@@ -130,25 +132,27 @@ class _March:
     def __init__(self, own: SectionRun, folder: Path, length: int) -> None:
         self.own, self.length, hold = own, length, own.hold
         self.inputs = Inputs(own.recording, own.vehicle, hold.method == "prescribed")
-        self.filter, self.prescribed = self._filter(), None
+        self.filter = self._filter() if hold.method == "kalman" else None
+        self.prescribed = None
         if hold.method == "prescribed":
             self.prescribed = Prescribed(self.inputs, own.grid, hold.smoothing, own.file)
         folder.mkdir(parents=True, exist_ok=True)
         self._checkpoint = Checkpoint(folder / "run.npz", _inputs_of(own, self.inputs))
         found = self._checkpoint.load()
         self.done, self.state = (0, self._start()) if found is None else (int(found["done"]), found["state"])
-        if found is not None:
-            self.filter.state = FilterState(found["x"], found["p"], found["surprise"], found["rates"])
-        else:
+        if found is None:
             self._save()
+        elif self.filter is not None:
+            known = self.filter.state
+            self.filter.state = replace(known, **{name: found[name] for name in vars(known)})
         names = tuple(answer.name for answer in own.sections.answers)
         self.columns = Columns(folder / "run.f64", names, own.count)
 
     def outcome(self) -> Outcome:
         """What there is until now."""
-        grid, held = self.own.grid, self.own.hold.method == "kalman"
+        grid = self.own.grid
         return Outcome(self.columns, self.own.sections.answers, grid.period * grid.skip, self.done,
-                       self.filter.surprise if held else math.nan, tuple(self.inputs.findings))  # fmt: skip
+                       self.filter.surprise if self.filter else math.nan, tuple(self.inputs.findings))  # fmt: skip
 
     def advance(self) -> None:
         """March a block and save it; RunFailed with the outcome until then."""
@@ -206,7 +210,7 @@ class _March:
         drive = Drive(grid.cubic(wrenches, rows), self.inputs.frame)
         if self.prescribed is not None:
             return Drive(drive.hubs, drive.frame, guide=self.prescribed.rows(first, rows))
-        if own.hold.method == "none":
+        if self.filter is None:
             return drive
         used = math.floor((rows - 1) * grid.part) + 1
         tilt, _ = self.filter.advance(wrenches[1 : used + 1], self.inputs.tilt(first, used))
@@ -220,20 +224,21 @@ class _March:
         state, n = np.zeros(2 * self.own.vehicle.size), self.own.vehicle.size
         if self.prescribed is not None:
             state[[ROLL, PITCH, n + ROLL, n + PITCH]] = self.prescribed.rows(0, 1)[0, :4]
-        elif self.own.hold.method == "kalman":
+        elif self.filter is not None:
             state[[ROLL, PITCH, n + ROLL, n + PITCH]] = np.nan_to_num(self.inputs.tilt(0, 1)[0])
         return state
 
-    def _filter(self) -> TiltFilter:
+    def _filter(self) -> "TiltFilter":
+        from models.hub_forces.tilt_filter import TiltFilter
+
         own, hold = self.own, self.own.hold
         deviations = np.tile(np.repeat([hold.force, hold.moment], 3), len(own.vehicle.hubs))
         return TiltFilter(own.vehicle, self.inputs.frame, own.recording.period, deviations, (hold.angle, hold.rate),
                           hold.model, own.file)  # fmt: skip
 
     def _save(self) -> None:
-        known = self.filter.state
-        self._checkpoint.save(done=np.array(self.done), state=self.state, x=known.x, p=known.p,
-                              surprise=known.surprise, rates=known.rates)  # fmt: skip
+        known = vars(self.filter.state) if self.filter else {}
+        self._checkpoint.save(done=np.array(self.done), state=self.state, **known)
 
 
 def _inputs_of(own: SectionRun, inputs: Inputs) -> dict[str, str]:

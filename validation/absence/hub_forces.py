@@ -12,10 +12,15 @@ ENGINES = ("reference", "exudyn", "mujoco")
 HUBS = ("fl", "fr", "rl", "rr")
 STEPS, STEP, PERIOD = 20, 1e-3, 2e-3
 BARE: dict[str, Any] = {"title": "bare", "system": "hub-forces", "vehicle": {"file": "r19_free"},
-                        "run": {"duration": STEPS * STEP, "step": STEP}, "angles": {"file": "angles.csv"},
-                        "forces": {"file": "forces.csv", "frame": "inertial"}}  # fmt: skip
-ON_ROAD: dict[str, Any] = {"road": {}, "angles": {}, "forces": {"frame": "inertial"}}
-BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {"virtual_measurement": ({}, ON_ROAD)}
+                        "run": {"duration": STEPS * STEP, "step": STEP}, "stabilise": {"smoothing": 60.0},
+                        "angles": {"file": "angles.csv"}, "forces": {"file": "forces.csv", "frame": "inertial"}}
+QUIET: dict[str, Any] = {"noise": "none"}
+ON_ROAD: dict[str, Any] = {"road": {}, "angles": QUIET, "forces": QUIET | {"frame": "inertial"}}
+BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "virtual_measurement": ({}, ON_ROAD),
+    "force_noise": (ON_ROAD, ON_ROAD | {"forces": {"frame": "inertial"}}),
+    "angle_noise": (ON_ROAD, ON_ROAD | {"angles": {}}),
+}
 
 
 def write(folder: Path) -> None:
@@ -30,19 +35,35 @@ def write(folder: Path) -> None:
 
 
 def seen(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Counts of the run that is free, as an engine is handed it, and its path."""
+    """Counts of the scene's run, as an engine is handed it, and its path."""
     from models.engines.hub_forces import build
     from models.hub_forces import kernel
     from models.hub_forces.of_scene import measured
+    from models.hub_forces.stabilised import Stabilised
 
     vehicle, own = scene.cut_vehicle(), scene.run
-    truth, forces, _ = measured(scene, vehicle, engine)
-    drive = forces.drive(own.step, round(own.duration / own.step), scene.forces.interpolation)
+    truth, forces, angles = measured(scene, vehicle, engine)
+    stabilised = Stabilised(scene, vehicle, forces, angles)
+    drive = stabilised.drive(scene.stabilise.method, own.step, STEPS)
     model = build(engine, vehicle, drive, own.step, own.duration)
     table = model.numbers
     within = drive.hubs[: round(2 * forces.period / own.step) + 1]  # a period of them, at half steps
     curved = np.abs(np.diff(within, n=2, axis=0)).max() > 1e-9 * np.abs(within).max()
-    counts = {"runs on tyres": int(truth is not None), "guides": int(table[kernel.GUIDE]),
+    noisy = _noisy(scene, truth, forces, angles)
+    counts = {"runs on tyres": int(truth is not None), "noisy forces": noisy[0], "noisy angles": noisy[1],
+              "pulled angles": 2 * int(table[kernel.GUIDE] == kernel.PULLED),
+              "enforced angles": 2 * int(table[kernel.GUIDE] == kernel.HELD),
               "turning hubs": int(table[kernel.HUBS] * (table[kernel.FRAME] != kernel.FRAMES.index("inertial"))),
               "curves between samples": int(curved)}  # fmt: skip
-    return counts, model.run().states.tobytes()
+    return counts, model.run(stabilised.start(drive)).states.tobytes()
+
+
+def _noisy(scene: HubScene, truth: Any, forces: Any, angles: Any) -> tuple[int, int]:
+    """Columns of forces and of angles that are not those of the true run; none of files, which have no true one."""
+    from models.hub_forces.measurement import recorded
+
+    if truth is None:
+        return 0, 0
+    of_forces, of_angles = recorded(truth, scene.forces.frame, round(forces.period / scene.run.step))
+    noisy = (forces.samples != of_forces.samples).any(axis=0), (angles.samples != of_angles.samples).any(axis=0)
+    return int(noisy[0].sum()), int(noisy[1].sum())

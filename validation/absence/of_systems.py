@@ -123,19 +123,19 @@ def probed(systems: tuple[str, ...] = tuple(FILES)) -> dict[str, Any]:
         if file_of(system).ENGINES[0] == "reference":
             with _removed(system, own[system]):
                 seen(system, bare(system), quick=True)
-    engines = _loaded(["exudyn", "mujoco"])
-    return {"engines": engines, "systems": {system: _probed(system, own[system]) for system in systems}}
+    engines, bares = _loaded(["exudyn", "mujoco"]), dict[str, Any]()
+    for system in systems:  # all of them before any effect, as two systems may have a module in common
+        with _removed(system, own[system]):
+            bares[system] = seen(system, bare(system)), _loaded(own[system])
+    return {"engines": engines, "systems": {system: _probed(system, *bares[system]) for system in systems}}
 
 
 def _modules(system: str) -> dict[str, tuple[str, ...]]:
     return {name: module_of(system, name).MODULES for name in names_of(system)}
 
 
-def _probed(system: str, own: list[str]) -> dict[str, Any]:
+def _probed(system: str, first: dict[str, tuple[dict[str, int], bytes]], imported: list[str]) -> dict[str, Any]:
     modules = _modules(system)
-    with _removed(system, own):
-        first = seen(system, bare(system))
-    imported = _loaded(own)
     adds, missing = dict[str, Counts](), []
     for name in controlled(system):
         adds[name] = added(system, name)

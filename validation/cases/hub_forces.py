@@ -14,13 +14,14 @@ from models.engines.hub_forces import ENGINES, EngineHubs, HubModel, HubRun, bui
 from models.engines.spatial_reference import SpatialReference
 from models.errors import InputError
 from models.hub_forces.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut
+from models.hub_forces.enforced import held
 from models.hub_forces.kernel import WRENCH, forces
 from models.hub_forces.measurement import HubForces, model, recorded, truth, two_tracks
 from models.hub_forces.rigid import rigid
 from models.hub_forces.scene import HubScene
 from models.hub_forces.scene import build as scene_of
 from models.hub_forces.table import Drive
-from models.hub_forces.tilt_filter import estimate, held
+from models.hub_forces.tilt_filter import estimate
 from models.road.iso8608 import iso8608_road
 from models.signals import Interpolation
 from models.vehicles.spatial import SpatialVehicle, SpringDamper

@@ -3,25 +3,25 @@
 import time
 from typing import Any
 
-import numpy as np
-
 from models.choice.answer import Answer, Quantity
 from models.engines.hub_forces import build
 from models.hub_forces.cut_vehicle import ANGLES, X, Y, Z
 from models.hub_forces.of_scene import measured
 from models.hub_forces.scene import HubScene
+from models.hub_forces.stabilised import Stabilised
 
 ENGINE, WINDOWED = "mujoco", True
 
 
 def answer(scene: HubScene, engine: str) -> Answer:
-    """Measure, and run free, without a stabiliser."""
+    """Measure, and run as the scene holds roll and pitch."""
     vehicle, own = scene.cut_vehicle(), scene.run
-    _, forces, _ = measured(scene, vehicle, engine)
-    drive = forces.drive(own.step, steps(scene), scene.forces.interpolation)
+    _, forces, angles = measured(scene, vehicle, engine)
+    stabilised = Stabilised(scene, vehicle, forces, angles)
+    drive = stabilised.drive(scene.stabilise.method, own.step, steps(scene))
     model = build(engine, vehicle, drive, own.step, own.duration)
     begun = time.process_time()
-    run = model.run(np.zeros(2 * vehicle.size))
+    run = model.run(stabilised.start(drive))
     seconds = time.process_time() - begun
     places = {name: (i, "rad") for name, i in ANGLES.items()} | {"x": (X, "m"), "y": (Y, "m"), "z": (Z, "m")}
     found = {name: Quantity(unit, (run.states[:, i],)) for name, (i, unit) in places.items()}

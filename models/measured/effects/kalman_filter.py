@@ -5,6 +5,7 @@ from typing import Any
 PLACE = "stabilise.method"
 COST = "a filter over all samples before the run, and a moment over time"
 COUNTS = {"all": {"pulled angles": 2}}
+MODULES = ("models.hub_forces.tilt_filter", "models.hub_forces.tilt_march")
 
 
 def named(scene: Any) -> bool:

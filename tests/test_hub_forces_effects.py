@@ -1,0 +1,102 @@
+"""Noise and stabilisers of hub forces as effects: left out one by one, put in, legal; how they are run."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.choice.systems.hub_forces import answer
+from models.errors import InputError
+from models.hub_forces.measurement import recorded
+from models.hub_forces.of_scene import measured
+from models.hub_forces.scene import build
+from models.hub_forces.stabilised import Stabilised
+from models.scene_effects import beside, legal, named, without
+from studies.asked import plan_of
+from studies.hub_forces import _planned
+
+NOISES = ("angle_noise", "force_noise")
+ON_ROAD = {"title": "t", "system": "hub-forces", "study": "hub_forces", "vehicle": {"file": "r19_free"}, "road": {},
+           "run": {"duration": 0.2}}  # fmt: skip
+
+
+def scene(**more):
+    return build({**ON_ROAD, **more}, "s.toml")
+
+
+def test_each_noise_leaves_alone_and_without_both_transducers_tell_the_truth():
+    own = scene()
+    car = own.cut_vehicle()
+    truth, *both = measured(own, car, "mujoco")
+    true = recorded(truth, own.forces.frame, 2)
+    told = [measured(without(own, *out), car, "mujoco")[1:] for out in (*((name,) for name in NOISES), NOISES)]
+    same = [[np.array_equal(a.samples, b.samples) for a, b in zip(one, true, strict=True)] for one in (both, *told)]
+    assert same == [[False, False], [False, True], [True, False], [True, True]]
+    assert np.array_equal(told[0][0].samples, both[0].samples)  # its own noise is what it was
+
+
+def test_what_is_stated_stays_without_noise():
+    quiet = without(scene(angles={"angle_deviation": 0.01}), *NOISES)
+    assert quiet.angles.deviations == (0.01, 5e-3)  # the filter weighs by it, and needs some
+    told = plan_of(quiet).describe(quiet)
+    assert "  noise      none\n" in told and "absent     angle_noise, force_noise, kalman_filter" in told
+
+
+def test_a_stabiliser_leaves_for_none_and_gives_way_to_the_other():
+    held = scene(stabilise={"method": "kalman"})
+    assert without(held, "kalman_filter").stabilise.method == "none"
+    assert beside(held, "prescribed_angles").stabilise.method == "prescribed"
+    assert without(beside(held, "prescribed_angles"), "prescribed_angles").stabilise.method == "none"
+
+
+@pytest.mark.parametrize(("there", "told"), [
+    (("force_noise",), "forces.noise: needs the effect 'virtual_measurement', for files have the noise that they have"),
+    (("angle_noise",), "angles.noise: needs the effect 'virtual_measurement'"),
+    (("kalman_filter", "prescribed_angles"), "stabilise.method: cannot stand beside 'prescribed_angles', as one moment "
+                                             "holds roll and pitch: drop one of them")])  # fmt: skip
+def test_what_cannot_be_together_is_told_with_the_remedy(there, told):
+    with pytest.raises(InputError, match=told):
+        legal(there, scene())
+
+
+@pytest.mark.parametrize("table", ["forces", "angles"])
+def test_files_have_the_noise_that_they_have(table):
+    own = {"forces": {"file": "f.csv"}, "angles": {"file": "a.csv"}, "road": None}
+    own[table] = {**own[table], "noise": "none"}
+    with pytest.raises(InputError, match=rf"{table}.noise = 'none': is that of {table}.file: drop it"):
+        build({key: value for key, value in {**ON_ROAD, **own}.items() if value is not None}, "s.toml", Path())
+
+
+def test_quantities_are_those_of_the_run_that_the_scene_holds():
+    """A price and a choice see a stabiliser by what it changes; angles that nothing reads change nothing."""
+    free, held = scene(), scene(stabilise={"method": "kalman"})
+    paths = [answer(own, "mujoco").quantities["roll"].cases[0]
+             for own in (free, without(free, "angle_noise"), held, without(held, "angle_noise"))]  # fmt: skip
+    assert np.array_equal(paths[0], paths[1])
+    assert not np.array_equal(paths[0], paths[2]) and not np.array_equal(paths[2], paths[3])
+
+
+def test_a_scene_that_names_no_stabiliser_makes_no_estimate(monkeypatch):
+    """Positive control beside it: a filter that cannot be made is missed where it is named, and there only."""
+    def missing(*given):
+        raise AssertionError("was made")
+
+    monkeypatch.setattr("models.hub_forces.tilt_filter.estimate", missing)
+    monkeypatch.setattr("models.hub_forces.enforced.enforced", missing)
+    own = scene()
+    car = own.cut_vehicle()
+    stabilised = Stabilised(own, car, *measured(own, car, "mujoco")[1:])
+    assert stabilised.drive("none", 1e-3, 200).guide is None
+    for method in ("kalman", "prescribed"):
+        with pytest.raises(AssertionError, match="was made"):
+            replace(stabilised).drive(method, 1e-3, 200)
+
+
+def test_a_study_runs_the_scene_as_it_is_in_every_engine_and_the_others_in_one():
+    engines = ("exudyn", "mujoco")
+    names = {method: list(_planned(scene(stabilise={"method": method}), engines)) for method in ("none", "kalman")}
+    assert names["none"] == ["free, exudyn", "free, mujoco", "filter", "prescribed"]
+    assert names["kalman"] == ["free, mujoco", "filter, exudyn", "filter", "prescribed"]
+    assert named(scene(stabilise={"method": "kalman"})) == (
+        "angle_noise", "force_noise", "kalman_filter", "turning_forces", "virtual_measurement")  # fmt: skip
