@@ -59,14 +59,19 @@ def check(scene: Any, engines: tuple[str, ...]) -> None:
 
 def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Choose; saves ``SYSTEM.csv`` of every scene and a figure."""
+    check(scene, engines)
+    beside = [load_scene(name, None) for name in scene.options.get("beside", [])]
+    return told([scene, *beside], engines, folder, progress)
+
+
+def told(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Choices of scenes, the first by one of these engines, saved and drawn."""
     from studies.choice_figure import choice_figure
 
-    check(scene, engines)
-    scenes = [scene, *(load_scene(name, None) for name in scene.options.get("beside", []))]
-    found = list[Found]()
+    scene, found = scenes[0], list[Found]()
     for i, own in enumerate(scenes):
         progress(own.title, i / len(scenes))
-        linear, asked = own.study == "ride_choice", engines if own is scene else ()
+        linear, asked = has_closed_form(own), engines if own is scene else ()
         plan_of(own).check(own, () if linear else (engine_of(own, asked),))
         found.append(_linear(own) if linear else chosen(own, asked))
         _save(found[-1], folder / f"{i + 1}_{own.system.replace('-', '_')}.csv")
@@ -74,6 +79,15 @@ def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) 
     choice_figure(found, folder / "choice.png")
     return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": [_answer(one) for one in found],
             "table": [line for one in found for line in lines(one, len(found) > 1)]}  # fmt: skip
+
+
+def has_closed_form(scene: Any) -> bool:
+    """Whether a scene's choice needs no runs."""
+    if scene.system != "ride":
+        return False
+    from models.ride.choice.in_time import goes_in_time
+
+    return not goes_in_time(scene)
 
 
 def engine_of(scene: Any, engines: tuple[str, ...]) -> str:
@@ -112,18 +126,20 @@ def _linear(scene: Any) -> Found:
     work = tuple(cost.work for cost in (found.before, found.before, found.after))
     choice = Choice(tuple(one.name for one in found.candidates), tuple(one.name for one in found.left_out),
                     1, abs(found.predicted), 0.0 * found.predicted, abs(found.confirmed), 0.0 * found.predicted,
-                    found.kept, (before, before, after), work, found.rounds, 0)  # fmt: skip
+                    found.kept, (before, before, after), work, found.rounds, 0, 0.0)  # fmt: skip
     return Found(scene, "closed form", choice, alone, further, watts)
 
 
 def _answer(one: Found) -> dict[str, Any]:
     """What was chosen, and how right and how cheap that is."""
     choice = one.choice
-    errors = zip(one.scene.quantities, choice.predicted.tolist(), choice.confirmed.tolist(), strict=True)
+    errors = zip(one.scene.quantities, *(part.tolist() for part in (choice.predicted, choice.confirmed, choice.chance)),
+                 strict=True)  # fmt: skip
     return {
         "system": one.scene.system, "implementation": one.engine, "left out": list(choice.left_out),
         "stay": [name for name in choice.candidates if name not in choice.left_out], "step times": choice.times,
-        "errors": {name: {"predicted": predicted, "confirmed": found} for name, predicted, found in errors},
+        "errors": {name: {"predicted": predicted, "confirmed": found, "chance": chance}
+                   for name, predicted, found, chance in errors},
         "kept": choice.kept, "calls": list(choice.calls), "confirmations": choice.rounds,
         "would matter no more above": one.further,
     }  # fmt: skip
@@ -145,6 +161,10 @@ def percent(value: float) -> str:
     return f"{100 * value:.2g} %" if np.isfinite(value) else "without end"
 
 
+def _between(change: float, beside: float) -> str:
+    return percent(change) + (f" +- {percent(beside)}" if beside else "")
+
+
 def lines(one: Found, named: bool) -> list[str]:
     """The choice in words."""
     choice, scene = one.choice, one.scene
@@ -153,10 +173,10 @@ def lines(one: Found, named: bool) -> list[str]:
     stay = [name for name in choice.candidates if name not in choice.left_out]
     rows.append(f"    stay: {', '.join(stay) or 'nothing'}")
     for i, name in enumerate(scene.quantities):
-        rows.append(f"    {name}: {percent(choice.predicted[i])} predicted"
-                    + (f" +- {percent(choice.remainder[i])}" if choice.remainder[i] else "")
-                    + f", {percent(choice.confirmed[i])} confirmed, tolerance {100 * scene.tolerance:g} %: "
-                    + ("kept" if choice.confirmed[i] <= scene.tolerance else "NOT KEPT"))  # fmt: skip
+        kept = "kept" if choice.confirmed[i] + choice.chance[i] <= scene.tolerance else "NOT KEPT"
+        rows.append(f"    {name}: {_between(choice.predicted[i], choice.remainder[i])} predicted, "
+                    f"{_between(choice.confirmed[i], choice.chance[i])} confirmed, tolerance "
+                    f"{100 * scene.tolerance:g} %: {kept}")  # fmt: skip
     before, step, after = choice.calls
     saved = f"{before:,} -> {after:,}, {before / after:.3g} times fewer"
     if one.watts:
@@ -167,8 +187,10 @@ def lines(one: Found, named: bool) -> list[str]:
                     f"steps with all effects; CPU seconds {faster:.3g} times fewer")  # fmt: skip
     rows += [f"    {name} would matter no more at a tolerance above {percent(change)}"
              for name, change in sorted(one.further.items(), key=lambda item: item[1])]  # fmt: skip
+    if choice.more:
+        rows.append(f"    chance alone stands in the way of more: {choice.more:.2g} times as many samples would tell")
     rows += misled(one)
-    worst = float(choice.confirmed.max())
+    worst = float((choice.confirmed + choice.chance).max())
     return [*rows, f"    the choice holds for tolerances down to {percent(worst)}"] if choice.left_out else rows
 
 

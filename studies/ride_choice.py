@@ -9,13 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from models.choice.systems.ride import opened
+from models.errors import InputError
 from models.ride.choice.activity import activity
 from models.ride.choice.choose import Choice, Chooser
 from models.ride.choice.held import Effect, Held, illegal, without
+from models.ride.choice.in_time import Samples, goes_in_time
 from models.ride.choice.reduced import Reduced, Whole
-from models.ride.of_scene import LINEAR_ALONE, check_linear, told_by, vehicle_of
+from models.ride.of_scene import told_by, vehicle_of
 from models.ride.scene import RideScene
-from models.strict import Strict, read
+from models.strict import read
+from studies.choice import told
 
 SYSTEM = "ride"
 Progress = Callable[[str, float], None]
@@ -23,8 +27,8 @@ SECONDS = 2.0
 """Motion (s) of the time runs that are timed, each at its own largest stable step."""
 
 
-class Options(Strict):
-    """[options] of this study: none."""
+class Options(Samples):
+    """[options] of this study: the copies of a vehicle whose springs are bent; none for a linear one."""
 
 
 @dataclass(frozen=True)
@@ -38,16 +42,23 @@ class Alone:
 
 
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:
-    """Refuse scenes that ask no question, and vehicles that are not linear."""
+    """Refuse scenes that ask no question, and options of copies where there are none."""
     read(Options, scene.options, scene.file, "options")
-    check_linear(scene, vehicle_of(scene), LINEAR_ALONE)
+    if goes_in_time(scene):
+        opened(scene)
+    elif scene.options:
+        place, value = next(iter(scene.options.items()))
+        raise InputError(scene.file, f"options.{place}", value, "is read where springs are bent, and effects chosen "
+                         "by runs; for this vehicle there is a closed form")  # fmt: skip
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Choose; saves ``effects.csv``, ``activity.csv`` and a figure."""
+    """Choose; saves ``effects.csv``, ``activity.csv`` and a figure; by runs where springs are bent."""
     from studies.ride_choice_figure import choice_figure
 
     check(scene, engines)
+    if goes_in_time(scene):
+        return told([scene], engines, folder, progress)
     assert scene.speeds is not None and scene.tolerance is not None
     progress("screening", 0.1)
     with told_by(scene):

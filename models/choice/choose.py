@@ -19,6 +19,7 @@ import numpy as np
 from models.choice.answer import added
 from models.choice.screen import Screen
 from models.choice.variants import Set, Variants
+from models.errors import InputError
 
 BUDGET = 0.8
 """Share of the tolerance that predictions may use."""
@@ -41,9 +42,10 @@ class Choice:
     """Effects ``left_out`` of all ``candidates``, and steps so many ``times`` as long; relative changes (quantities,).
 
     predicted : by the screen; remainder : what that leaves out, estimated; confirmed : over the whole run; chance : may
-    add so much to that, where quantities are means of samples; kept : every sum of both is within the tolerance. calls
-    and seconds (CPU) of the scene, of the scene with longer steps alone, and of what is left. rounds : runs of the whole
-    scene that confirmed or did not; spent : calls of all runs.
+    add so much to that, where quantities are means of samples; kept : each sum of both is within the tolerance. calls
+    and seconds (CPU) of the scene, of that with longer steps alone, and of what is left. rounds : runs of the whole
+    scene that confirmed or did not; spent : calls of all runs. more : times as many samples would let more go, about, 0
+    where chance alone stands in nothing's way.
     """
 
     candidates: tuple[str, ...]
@@ -58,6 +60,7 @@ class Choice:
     seconds: tuple[float, ...]
     rounds: int
     spent: int
+    more: float
 
 
 class Chooser:
@@ -75,7 +78,7 @@ class Chooser:
         self._reach: dict[Set, int] = {}
         self._confirmed: dict[Set, tuple[int, np.ndarray, np.ndarray]] = {}
         self._pairs: list[Set] | None = None
-        self.rounds = 0
+        self.rounds, self._doubtful = 0, list[float]()
 
     def _steps(self, window: float) -> tuple[int, np.ndarray]:
         """Longest steps for the screen, by the scene's own, and the relative changes (quantities,) by them."""
@@ -122,9 +125,12 @@ class Chooser:
             for times in [k for k in reversed(self.whole.variants.lengths()) if k <= longest][: 1 + SHORTER]:
                 self.rounds += 1
                 change = self.whole.between(self.whole.variants.of(chosen, times), self.whole.variants.of())
-                self._confirmed[chosen] = times, self.whole.shares(change), self.whole.chance(change)
-                if self.holds(self._sum(chosen)):
+                found, chance = self.whole.shares(change), self.whole.chance(change)
+                self._confirmed[chosen] = times, found, chance
+                if self.holds(found + chance):
                     break
+                if (found < self.tolerance).all():
+                    self._doubtful.append(float(np.max(chance / (self.tolerance - found)) ** 2))
         return self._sum(chosen)
 
     def _sum(self, chosen: Set) -> np.ndarray:
@@ -154,7 +160,15 @@ class Chooser:
                 low, high = (middle, high) if self.holds(self.confirm(path[middle])) else (low, middle)
             banned.add(path[high] - path[low])
             kept = path[: low + 1]
-        return self._choice(kept[-1])
+        return self._sure(self._choice(kept[-1]))
+
+    def _sure(self, choice: Choice) -> Choice:
+        """The choice; InputError where nothing was found by which it could be better, for chance alone."""
+        if not choice.more or choice.left_out or choice.times > 1:
+            return choice
+        raise InputError(self.whole.variants.scene.file, "tolerance", self.tolerance, "is too fine for so few samples: "
+                         "what could go changes the quantities by less, but by chance it may be more; about "
+                         f"{choice.more:.2g} times as many samples would tell")  # fmt: skip
 
     def _choice(self, chosen: Set) -> Choice:
         times, found, chance = self._confirmed[chosen]
@@ -167,7 +181,7 @@ class Chooser:
         spent = whole.calls + (0 if self.screen is self.whole else self.screen.variants.calls)
         return Choice(self.effects, tuple(sorted(chosen)), times, self.told(chosen, times),
                       self.screen.remainder(chosen), found, chance, self.holds(found + chance), tuple(calls),
-                      tuple(seconds), self.rounds, spent)  # fmt: skip
+                      tuple(seconds), self.rounds, spent, min(self._doubtful, default=0.0))  # fmt: skip
 
     def told(self, chosen: Set, times: int) -> np.ndarray:
         """Predicted changes (quantities,) of a set and a step together: that of the step by a shorter one."""
@@ -184,11 +198,12 @@ class Chooser:
     def further(self, chosen: Set) -> dict[str, float]:
         """Largest predicted change if an effect that stayed went, too: above, as a tolerance, it would matter no more.
 
-        Only those that may go, and whose going would save anything."""
-        found = {}
+        Only those that may go, and whose going would save anything at the same step."""
+        found, times = {}, self.reach(chosen) // self.own
         for effect in self.effects:
-            if effect not in chosen and self.work(chosen | {effect}) < self.work(chosen):
-                found[effect] = self.share(chosen | {effect}) * self.tolerance
+            further = chosen | {effect}
+            if effect not in chosen and self.screen.variants.work(further, times) < self.work(chosen):
+                found[effect] = self.share(further) * self.tolerance
         return {effect: change for effect, change in found.items() if math.isfinite(change)}
 
     def path(self, kept: list[Set], banned: set[Set]) -> list[Set]:

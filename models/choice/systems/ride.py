@@ -7,6 +7,7 @@ import numpy as np
 
 from models.choice.answer import Answer, Quantity
 from models.engines.spatial_protocol import curves
+from models.errors import InputError
 from models.ride.choice.in_time import UNIT, InTime, in_time
 from models.ride.of_scene import told_by
 from models.ride.scene import RideScene
@@ -23,7 +24,9 @@ def opened(scene: RideScene | InTime) -> InTime:
 
 
 def answer(scene: InTime, engine: str) -> Answer:
-    """March the copies at every speed."""
+    """March the copies at every speed, by their own equations; InputError for another engine."""
+    if engine != ENGINE:
+        raise InputError("--engine", "", engine, "marches no copies of a vehicle with bent springs: leave it out")
     found, seconds = dict[str, list[np.ndarray]](), 0.0
     for pace in scene.paces:
         begun = time.process_time()
