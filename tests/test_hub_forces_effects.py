@@ -18,7 +18,7 @@ from studies.hub_forces import _planned
 
 NOISES = ("angle_noise", "force_noise")
 ON_ROAD = {"title": "t", "system": "hub-forces", "study": "hub_forces", "vehicle": {"file": "r19_free"}, "road": {},
-           "run": {"duration": 0.2}}  # fmt: skip
+           "run": {"duration": 0.1}}  # fmt: skip
 
 
 def scene(**more):
@@ -87,10 +87,10 @@ def test_a_scene_that_names_no_stabiliser_makes_no_estimate(monkeypatch):
     own = scene()
     car = own.cut_vehicle()
     stabilised = Stabilised(own, car, *measured(own, car, "mujoco")[1:])
-    assert stabilised.drive("none", 1e-3, 200).guide is None
+    assert stabilised.drive("none", 1e-3, 100).guide is None
     for method in ("kalman", "prescribed"):
         with pytest.raises(AssertionError, match="was made"):
-            replace(stabilised).drive(method, 1e-3, 200)
+            replace(stabilised).drive(method, 1e-3, 100)
 
 
 def test_a_study_runs_the_scene_as_it_is_in_every_engine_and_the_others_in_one():

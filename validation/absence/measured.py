@@ -24,11 +24,17 @@ BARE: dict[str, Any] = {"title": "bare", "system": "measured", "vehicle": {"file
                         "stabilise": {"method": "none", "smoothing": 20.0}}  # fmt: skip
 VIRTUAL = {"duration": PERIOD * (SAMPLES - 1), "format": "csv"}
 ON_ROAD: dict[str, Any] = {"files": [], "virtual": VIRTUAL}
-NOISY = {"noise": {"force": 8.0, "moment": 1.0}}
+FAULTS: dict[str, Any] = {
+    "sensor_noise": {"noise": {"force": 8.0, "moment": 1.0, "angle": 1.75e-3, "angular rate": 5e-3}},
+    "quantisation": {"quantisation": {"bits": 12}},
+    "late_channels": {"delay": {"force": 2e-3}}, "wrong_gains": {"gain": {"force": 0.01}},
+    "offsets": {"bias": {"force": 20.0}}, "dropouts": {"dropouts": {"rate": 20.0, "length": 5e-3}},
+}  # fmt: skip
+"""What the effects of transducers put in; of dropouts more than usual, so that a short recording has some."""
 BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "own_clocks": ({}, {"files": [FILE | {"drift": 1e-4}]}),
     "virtual_measurement": ({}, ON_ROAD),
-    "transducer_faults": (ON_ROAD, {**ON_ROAD, "virtual": VIRTUAL | {"faults": NOISY}}),
+    **{name: (ON_ROAD, {**ON_ROAD, "virtual": VIRTUAL | {"faults": fault}}) for name, fault in FAULTS.items()},
 }
 
 
@@ -53,34 +59,35 @@ def seen(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:
         return model
 
     with tempfile.TemporaryDirectory() as name, mock.patch.object(section_run, "build", watched):
-        vehicle, (own, faulty) = scene.rig().vehicle, _recorded(scene, engine, Path(name))
+        vehicle, (own, faults) = scene.rig().vehicle, _recorded(scene, engine, Path(name))
         assert vehicle is not None
         hold = section_run.Hold(said.method, smoothing=said.smoothing)
         job = section_run.SectionRun(vehicle, own, Sections(vehicle), engine, hold)
         found = section_run.run(job, Path(name) / "run")
         path = b"".join(found.samples(answer).tobytes() for answer in found.answers)
     guides = {int(table[kernel.GUIDE]) for table in tables}
-    counts = {"runs on tyres": int(scene.virtual is not None), "faulty channels": faulty,
+    counts = {"runs on tyres": int(scene.virtual is not None), **faults,
               "pulled angles": 2 * (guides == {kernel.PULLED}),
               "enforced angles": 2 * (guides == {kernel.HELD}),
               "moved clocks": sum(bool(file.offset or file.drift) for file in scene.files)}  # fmt: skip
     return counts, path
 
 
-def _recorded(scene: MeasuredScene, engine: str, folder: Path) -> tuple[Recording, int]:
-    """The scene's files, or those of its virtual measurement, on one clock; channels that do not tell the truth."""
+def _recorded(scene: MeasuredScene, engine: str, folder: Path) -> tuple[Recording, dict[str, int]]:
+    """The scene's files, or those of its virtual measurement, on one clock; how many channels do not tell the truth."""
     from models.measured import plan
     from models.measured.clock import record
     from models.measured.faults_of_measurement import Faults
     from models.measured.pattern import write_pattern
     from models.measured.virtual import virtual_measurement
 
-    rig, own, faulty = scene.rig(), scene.virtual, 0
+    rig, own, faulty = scene.rig(), scene.virtual, np.zeros((2, 1), bool)
     if own is not None and rig.vehicle is not None:
         true = virtual_measurement(rig.vehicle, own, engine)
         samples = true.samples(own.faults, own.seed)
-        faulty = int((samples != true.samples(Faults(), own.seed)).any(axis=0).sum())
+        faulty = np.array([(samples != true.samples(Faults(), own.seed)).any(axis=0), np.isnan(samples).any(axis=0)])
         write_pattern(scene, true, samples, folder)
         scene = load(folder / "scene.toml")
-    sources = plan.opened(scene)
-    return record(scene, sources, plan.mapped(scene, sources, rig), rig.hubs, folder), faulty
+    sources, counts = plan.opened(scene), dict(zip(("faulty channels", "silent channels"),
+                                                   map(int, faulty.sum(axis=1)), strict=True))  # fmt: skip
+    return record(scene, sources, plan.mapped(scene, sources, rig), rig.hubs, folder), counts

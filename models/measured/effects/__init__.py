@@ -1,4 +1,1 @@
-"""Effects of scenes of a recording, one file each: see ``models.scene_effects``.
-
-No counts are kept of such scenes, so that no effect declares any.
-"""
+"""Effects of scenes of a recording, one file each: see ``models.scene_effects``."""
