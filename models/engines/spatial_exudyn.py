@@ -31,7 +31,7 @@ class SpatialExudyn:
         self.size = len(vehicle.coordinates())
         per_time = 2.0 / settings.step if settings is not None and road is not None else 0.0
         self._flat = np.zeros((1, 2 * len(vehicle.tyres)))
-        self.road = RoadTable((self._flat if road is None else road).T.tolist(), per_time)
+        self.road = RoadTable(self._flat if road is None else road, per_time)
         self.built = assemble(vehicle, speed, self.road)
         mbs = self.mbs = self.built.mbs
         places = [self.built.places[place] for place in vehicle.coordinates()]
@@ -59,19 +59,17 @@ class SpatialExudyn:
         return np.linalg.solve(mass, force)
 
     def _mass_and_force(self, q: np.ndarray, v: np.ndarray, road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        table = self.road.columns, self.road.per_time
-        self.road.columns, self.road.per_time = [[float(value)] for value in road], 0.0
         self._start(q, v)
         solver: Any = exu.MainSolverImplicitSecondOrder()
         options = exu.SimulationSettings()
         options.solution.file.write = options.solution.sensors.active = False
-        solver.InitializeSolver(self.mbs, options)
-        solver.ComputeMassMatrix(self.mbs)
-        solver.ComputeODE2RHS(self.mbs)
+        with self.road.still(road):
+            solver.InitializeSolver(self.mbs, options)
+            solver.ComputeMassMatrix(self.mbs)
+            solver.ComputeODE2RHS(self.mbs)
         mass = np.asarray(solver.GetSystemMassMatrix(), dtype=float)[np.ix_(self._columns, self._columns)]
         force = np.asarray(solver.GetSystemResidual(), dtype=float)[self._columns]
         solver.FinalizeSolver(self.mbs, options)
-        self.road.columns, self.road.per_time = table
         return mass, force
 
     def linearise(self) -> LinearVehicle:
@@ -81,11 +79,9 @@ class SpatialExudyn:
         steps to both sides, its answers combine to central differences of order six.
         """
         zero, h = np.zeros(self.size), difference_step(self.vehicle)
-        table = self.road.columns, self.road.per_time
-        self.road.columns, self.road.per_time = self._flat.T.tolist(), 0.0
         self._start(zero, zero)
-        found = {i: self._linearised(i * h) for weight in DIFFERENCES for i in (weight, -weight)}
-        self.road.columns, self.road.per_time = table
+        with self.road.still(self._flat[0]):
+            found = {i: self._linearised(i * h) for weight in DIFFERENCES for i in (weight, -weight)}
         stiffness, damping = (sum(w * i * (found[i][part] + found[-i][part]) for i, w in DIFFERENCES.items())
                               for part in (1, 2))  # fmt: skip
         motion = EngineKinematics(self.vehicle, self._shift, self._turn)

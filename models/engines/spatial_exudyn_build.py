@@ -7,7 +7,8 @@ curves and friction, inclined axes between two bodies that turn, anti-roll bars,
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,32 +40,60 @@ JOINTS = dict(zip(FREEDOMS, (
     exu.JointType.RevoluteX, exu.JointType.RevoluteY, exu.JointType.RevoluteZ), strict=True))  # fmt: skip
 
 
+SLIDES = dict(zip(FREEDOMS, (
+    [[1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
+    ), strict=False))  # fmt: skip
+"""Where a body of one slide has its own axes: its first one lies along the slide."""
+
+
+@dataclass
+class RoadForces:
+    """What callbacks hand over: lists of forces at every half step, ``by_road`` (2 w, k) of heights and rates."""
+
+    by_road: np.ndarray
+    rows: list[list[float]]
+
+
 @dataclass
 class RoadTable:
-    """Heights and rates under the tyres as the loads read them: columns of values per half step."""
+    """Heights (m) under the tyres, then their rates (m/s), ``per_time`` rows in a second, and all forces of them."""
 
-    columns: list[list[float]]
+    rows: np.ndarray
     per_time: float
+    read: list[RoadForces] = field(default_factory=list)
 
-    def force(self, wheel: int, stiffness: float, damping: float, t: float) -> float:
-        """Force (N) of the road through one tyre at a time."""
-        row, count = round(t * self.per_time), len(self.columns) // 2
-        return stiffness * self.columns[wheel][row] + damping * self.columns[count + wheel][row]
+    def forces(self, by_road: np.ndarray) -> RoadForces:
+        """Forces by the road, for one callback."""
+        self.read.append(RoadForces(by_road, (self.rows @ by_road).tolist()))
+        return self.read[-1]
+
+    @contextmanager
+    def still(self, row: np.ndarray) -> Iterator[None]:
+        """One row of the road at every time."""
+        kept, per_time, self.per_time = [one.rows for one in self.read], self.per_time, 0.0
+        for one in self.read:
+            one.rows = [(row @ one.by_road).tolist()]
+        try:
+            yield
+        finally:
+            self.per_time = per_time
+            for one, rows in zip(self.read, kept, strict=True):
+                one.rows = rows
 
 
 @dataclass
 class Build:
     """Exudyn's system while it is put together.
 
-    links: (tree, last link, where its joint is) of every body; places: (node, index within it) of every coordinate;
-    markers by body and point.
+    links: (object, last link or None, where its joint is) of every body; places: (node, index within it) of every
+    coordinate; markers by body and point.
     """
 
     vehicle: SpatialVehicle
     mbs: Any
     held: Preloads
     ground: Any
-    links: dict[str, tuple[Any, int, Vector]] = field(default_factory=dict)
+    links: dict[str, tuple[Any, int | None, Vector]] = field(default_factory=dict)
     places: dict[tuple[str, str], tuple[Any, int]] = field(default_factory=dict)
     markers: dict[tuple[str | None, Vector], Any] = field(default_factory=dict)
     callbacks: int = 0
@@ -80,7 +109,9 @@ class Build:
         if body is None:
             return items.MarkerBodyRigid(bodyNumber=self.ground, localPosition=list(point))
         tree, link, origin = self.links[body]
-        local = np.subtract(point, origin)
+        local = self.own(body, np.subtract(point, origin))
+        if link is None:
+            return items.MarkerBodyRigid(bodyNumber=tree, localPosition=local)
         return items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localPosition=local)
 
     def reader(self, body: str, freedom: str, kind: Any = KINDS.Coordinates) -> Callable[[], float]:
@@ -90,12 +121,15 @@ class Build:
         read, (node, index) = self.mbs.GetNodeOutput, self.places[body, freedom]
         return lambda: read(node, kind)[index]
 
-    def steady(self, body: str | None) -> bool:
-        """Whether a body never turns."""
-        if body is None:
-            return True
-        own = self.vehicle.body(body)
-        return not any(freedom.startswith("r") for freedom in own.freedoms) and self.steady(own.parent)
+    def own(self, body: str | None, vector: np.ndarray) -> np.ndarray:
+        """A vector (3,) of the design position in the axes that Exudyn gives a body."""
+        if body is None or self.links[body][1] is not None:
+            return vector
+        return np.array(SLIDES[self.vehicle.body(body).freedoms[0]]).T @ vector
+
+    def coordinate(self, node: Any, index: int) -> Any:
+        """Marker of one coordinate of a node."""
+        return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=index))
 
     def connect(self, first: Any, second: Any, law: Callable[[Any, Any], list[float]]) -> None:
         """Two points and the force (N, space's axes) on the first by the second's position and rate beside it."""
@@ -160,6 +194,19 @@ def _tree(built: Build, bodies: list[Body]) -> None:
     built.places |= {place: (node, i) for i, place in enumerate(places)}
 
 
+def _slider(built: Build, body: Body) -> None:
+    """A body of one slide on the ground that carries nothing: with trees of one link a car takes 1.6 times as long."""
+    still = [0.0]
+    node = built.mbs.AddNode(items.Node1D(
+        referenceCoordinates=still, initialCoordinates=still, initialVelocities=still))
+    mass = built.mbs.AddObject(items.Mass1D(nodeNumber=node, mass=body.mass, referencePosition=list(body.position),
+                                            referenceRotation=SLIDES[body.freedoms[0]]))  # fmt: skip
+    built.links[body.name], built.places[body.name, body.freedoms[0]] = (mass, None, body.position), (node, 0)
+    if body.freedoms == ("z",) and built.vehicle.gravity:
+        built.mbs.AddLoad(items.LoadCoordinate(markerNumber=built.coordinate(node, 0),
+                                               load=-body.mass * built.vehicle.gravity))  # fmt: skip
+
+
 def _trees(vehicle: SpatialVehicle) -> list[list[Body]]:
     """Bodies without parent, each with all that ride on it, parents first."""
     roots: dict[str, str] = {}
@@ -174,7 +221,7 @@ def _spring(built: Build, spring: SpringDamper) -> None:
     one, two = built.marker(spring.one, spring.point_one), built.marker(spring.two, spring.point_two)
     rest = np.subtract(spring.point_two, spring.point_one)
     curved = spring.travel_force or spring.rate_force or spring.friction
-    if curved or not (np.count_nonzero(axis) == 1 or any(built.steady(end) for end in ends)):
+    if curved or not (np.count_nonzero(axis) == 1 or any(not built.vehicle.turns(end) for end in ends)):
         built.connect(one, two, _law(spring, axis, rest, built.held.parts[spring.name]))
         return
     sunk = built.held.parts[spring.name] / spring.stiffness if spring.stiffness else 0.0
@@ -183,9 +230,10 @@ def _spring(built: Build, spring: SpringDamper) -> None:
             markerNumbers=[one, two], stiffness=spring.stiffness * axis**2, damping=spring.damping * axis**2,
             offset=rest - sunk * axis))  # fmt: skip
         return
-    sign = 1 if built.steady(spring.one) else -1  # the axis is one of the first marker's body
+    sign = -1 if built.vehicle.turns(spring.one) else 1  # the axis is one of the first marker's body
     built.mbs.AddObject(items.LinearSpringDamper(
-        markerNumbers=[one, two][::sign], axisMarker0=sign * axis, stiffness=spring.stiffness, damping=spring.damping,
+        markerNumbers=[one, two][::sign], axisMarker0=sign * built.own(ends[::sign][0], axis),
+        stiffness=spring.stiffness, damping=spring.damping,
         offset=float(axis @ rest) - sunk))  # fmt: skip
 
 
@@ -230,28 +278,61 @@ def _bar(built: Build, bar: AntiRollBar) -> None:
     built.connect(left, right, lambda apart, rate: [0.0, 0.0, moment(apart[2], rate[2]) / track])
     if (bar.body, "rx") in built.places:
         node, index = built.places[bar.body, "rx"]
-        still = built.mbs.AddMarker(items.MarkerNodeCoordinate(
-            nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
-        rolling = built.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=index))
+        still = built.coordinate(built.mbs.AddNode(items.NodePointGround()), 0)
+        rolling = built.coordinate(node, index)
         built.mbs.AddObject(items.CoordinateSpringDamper(
             markerNumbers=[still, rolling], springForceUserFunction=on_body))  # fmt: skip
         built.callbacks += 1
 
 
-def _tyre(built: Build, tyre: Tyre, wheel: int, road: RoadTable) -> None:
-    """A spring-damper to the flat ground, and what the road adds as a load."""
+def _turning_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadTable) -> None:
+    """A spring-damper to the flat ground, and what the road adds as a load; ``by_road`` (2 w,): what it adds (N)."""
     marker, held = built.marker(tyre.body, tyre.point), built.held.tyres[tyre.name]
     sunk = held / tyre.stiffness if tyre.stiffness else 0.0
     built.mbs.AddObject(items.CartesianSpringDamper(
         markerNumbers=[built.marker(None, tyre.point), marker], stiffness=[0, 0, tyre.stiffness],
         damping=[0, 0, tyre.damping], offset=[0, 0, sunk]))  # fmt: skip
-    k, c = tyre.stiffness, tyre.damping
-
-    def lift(mbs: Any, t: float, load: Any) -> Any:
-        return [0.0, 0.0, road.force(wheel, k, c, t)]
-
-    built.mbs.AddLoad(items.LoadForceVector(markerNumber=marker, loadVectorUserFunction=lift))
+    force = road.forces(np.outer(by_road, (0.0, 0.0, 1.0)))
+    built.mbs.AddLoad(items.LoadForceVector(
+        markerNumber=marker, loadVectorUserFunction=lambda mbs, t, load: force.rows[round(t * road.per_time)]))
     built.callbacks += 1
+
+
+def _steady_tyres(built: Build, tyres: list[Tyre], by_road: np.ndarray, road: RoadTable) -> None:
+    """All tyres of bodies that never turn: matrices over the coordinates that lift them, and one callback.
+
+    by_road : (2 w, tyres), what the road adds to each (N).
+    """
+    lifts = [[built.places[name, "z"] for name in built.vehicle.chain(tyre.body) if (name, "z") in built.places]
+             for tyre in tyres]  # fmt: skip
+    nodes = list(dict.fromkeys(node for places in lifts for node, _ in places))
+    if not nodes:
+        return
+    sizes = [sum(node == own for own, _ in built.places.values()) for node in nodes]
+    first = dict(zip(nodes, np.cumsum([0, *sizes]), strict=False))
+    rows = np.zeros((len(tyres), sum(sizes)))
+    for row, places in zip(rows, lifts, strict=True):
+        for node, index in places:
+            row[first[node] + index] = 1.0
+    stiffness, damping = (np.array(values) for values in zip(*((t.stiffness, t.damping) for t in tyres), strict=True))
+    force = road.forces(by_road @ rows)
+    built.mbs.AddObject(items.ObjectGenericODE2(
+        nodeNumbers=nodes, massMatrix=np.zeros((rows.shape[1],) * 2), stiffnessMatrix=rows.T * stiffness @ rows,
+        dampingMatrix=rows.T * damping @ rows, forceVector=rows.T @ [built.held.tyres[t.name] for t in tyres],
+        forceUserFunction=lambda mbs, t, item, q, v: force.rows[round(t * road.per_time)]))  # fmt: skip
+    built.callbacks += 1
+
+
+def _tyres(built: Build, road: RoadTable) -> None:
+    """All tyres."""
+    tyres, turns = built.vehicle.tyres, built.vehicle.turns
+    by_road = np.vstack([np.diag([tyre.stiffness for tyre in tyres]), np.diag([tyre.damping for tyre in tyres])])
+    steady = [i for i, tyre in enumerate(tyres) if not turns(tyre.body)]
+    if steady:
+        _steady_tyres(built, [tyres[i] for i in steady], by_road[:, steady], road)
+    for i, tyre in enumerate(tyres):
+        if i not in steady:
+            _turning_tyre(built, tyre, by_road[:, i], road)
 
 
 def _side_force(built: Build, force: SideForce, speed: float) -> None:
@@ -268,13 +349,15 @@ def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadTable) -> B
     mbs = exu.SystemContainer().AddSystem()
     built = Build(vehicle, mbs, preloads(vehicle), mbs.AddObject(items.ObjectGround()))
     for bodies in _trees(vehicle):
-        _tree(built, bodies)
+        if len(bodies) == 1 and bodies[0].freedoms in (("x",), ("y",), ("z",)):
+            _slider(built, bodies[0])
+        else:
+            _tree(built, bodies)
     for spring in vehicle.springs:
         _spring(built, spring)
     for bar in vehicle.bars:
         _bar(built, bar)
-    for wheel, tyre in enumerate(vehicle.tyres):
-        _tyre(built, tyre, wheel, road)
+    _tyres(built, road)
     for force in vehicle.side_forces:
         _side_force(built, force, float(speed or 0.0))
     for drag in vehicle.drags:

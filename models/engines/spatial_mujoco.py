@@ -8,7 +8,6 @@ no distribution of mass has, which published vehicles contain.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -21,7 +20,8 @@ from models.engines.mujoco_callback import installed
 from models.engines.mujoco_layout import check
 from models.engines.mujoco_quiet import quiet
 from models.engines.protocol import Settings, guard
-from models.engines.spatial_mujoco_callback import spatial_law
+from models.engines.spatial_mujoco_callback import HEADER, PER_TIME, ROAD, spatial_law
+from models.engines.spatial_mujoco_numbers import AXES, Numbers, elements, packed
 from models.engines.spatial_protocol import (
     EngineKinematics,
     SpatialRun,
@@ -34,14 +34,7 @@ from models.engines.spatial_protocol import (
 )
 from models.errors import RunFailed
 from models.ride.linear_vehicle import LinearVehicle
-from models.vehicles.curve import Curve
 from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle, Vector
-from models.vehicles.spatial_linear import preloads
-
-UP: Vector = (0.0, 0.0, 1.0)
-AXES = {freedom: np.eye(3)[i % 3].tolist() for i, freedom in enumerate(FREEDOMS)}
-Place = tuple[str | None, Vector, Vector]
-"""Body, point and axis."""
 
 
 def _spec(vehicle: SpatialVehicle, step: float) -> mujoco.MjSpec:
@@ -79,17 +72,6 @@ def _principal(body: Body) -> tuple[np.ndarray, np.ndarray]:
     return principal, quaternion
 
 
-class Numbers:
-    """Where MuJoCo keeps a vehicle's bodies and coordinates: ids by name, columns (n,) by the vehicle's order."""
-
-    def __init__(self, vehicle: SpatialVehicle, model: mujoco.MjModel) -> None:
-        order = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
-        self.bodies = {name: int(model.body(number).id) for name, number in order.items()}
-        self.joints: dict[tuple[str, str], int] = {
-            (name, freedom): int(model.joint(f"{order[name]} {freedom}").id) for name, freedom in vehicle.coordinates()}
-        self.columns = np.array(list(self.joints.values()))
-
-
 def _weigh(model: mujoco.MjModel, numbers: Numbers, bodies: tuple[Body, ...]) -> None:
     """Give the bodies their masses and principal inertias."""
     for body in bodies:
@@ -98,97 +80,19 @@ def _weigh(model: mujoco.MjModel, numbers: Numbers, bodies: tuple[Body, ...]) ->
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
-@dataclass(frozen=True)
-class Element:
-    """A force F against the travel s = own coordinate + sum of axis . point - value at rest, less the tyre's road.
-
-    F = held + stiffness s + damping s' + curves + friction + sum of gain * coordinate (``steered``): what acts on
-    every coordinate q is -F ds/dq.
-    """
-
-    points: tuple[Place, ...]
-    stiffness: float = 0.0
-    damping: float = 0.0
-    held: float = 0.0
-    friction: tuple[float, float] = (0.0, 1.0)
-    tyre: int = -1
-    own: tuple[tuple[str, str], float] | None = None
-    steered: tuple[tuple[tuple[str, str], float], ...] = ()
-    on_travel: Curve | None = None
-    on_rate: Curve | None = None
-
-
-def elements(vehicle: SpatialVehicle, speed: float | None) -> list[Element]:
-    """Everything that acts in a vehicle besides weights and inertia."""
-    held, v, found = preloads(vehicle), float(speed or 0.0), []
-    for s in vehicle.springs:
-        points = ((s.two, s.point_two, s.axis), (s.one, s.point_one, _scaled(s.axis, -1.0)))
-        found.append(Element(points, s.stiffness, s.damping, held.parts[s.name], (s.friction, s.friction_rate),
-                             on_travel=s.travel_force, on_rate=s.rate_force))  # fmt: skip
-    for bar in vehicle.bars:
-        down, up = _scaled(UP, -1.0 / bar.track), _scaled(UP, 1.0 / bar.track)
-        found.append(Element(((bar.left, bar.point_left, down), (bar.right, bar.point_right, up)), bar.stiffness,
-                             bar.damping, held.parts[bar.name], own=((bar.body, "rx"), 1.0)))  # fmt: skip
-    for i, tyre in enumerate(vehicle.tyres):
-        found.append(Element(((tyre.body, tyre.point, UP),), tyre.stiffness, tyre.damping,
-                             -held.tyres[tyre.name], tyre=i))  # fmt: skip
-    for f in vehicle.side_forces:
-        steered = (((f.chassis, "rx"), -f.stiffness * f.roll_steer), ((f.chassis, "rz"), -f.stiffness))
-        found.append(Element(((f.body, f.point, (0.0, 1.0, 0.0)),), damping=f.stiffness / v, steered=steered))
-    for drag in vehicle.drags:
-        centre = vehicle.body(drag.body).position
-        found.append(Element(((drag.body, centre, (1.0, 0.0, 0.0)),), damping=drag.coefficient * v))
-    return found
-
-
-def _scaled(axis: Vector, factor: float) -> Vector:
-    return (factor * axis[0], factor * axis[1], factor * axis[2])
-
-
-def _packed(element: Element, vehicle: SpatialVehicle, model: mujoco.MjModel, numbers: Numbers) -> list[float]:
-    """An element as the callback reads it."""
-    places = numbers.joints
-    points = [(body, point, axis) for body, point, axis in element.points if body is not None]
-    rest = sum(float(np.dot(point, axis)) for _, point, axis in points)
-    own = places.get(element.own[0], -1) if element.own else -1
-    steered = [value for place, gain in element.steered for value in (places.get(place, -1), gain)]
-    of_points = [value for body, point, axis in points for value in (
-        numbers.bodies[body], _last(model, numbers.bodies[body]),
-        *np.subtract(point, vehicle.body(body).position), *axis)]  # fmt: skip
-    curves = [element.on_travel, element.on_rate]
-    counts = [len(curve.arguments) if curve else 0 for curve in curves]
-    pairs = [value for curve in curves if curve for pair in zip(curve.arguments, curve.forces, strict=True)
-             for value in pair]  # fmt: skip
-    gain = element.own[1] if element.own else 0.0
-    law = [element.stiffness, element.damping, element.held, *element.friction, element.tyre, own, gain, rest,
-           *(steered or [-1, 0.0, -1, 0.0]), len(points), *counts]  # fmt: skip
-    return [1.0 + len(law) + len(of_points) + len(pairs), *law, *of_points, *pairs]
-
-
-def _last(model: mujoco.MjModel, body: int) -> int:
-    """The last joint that moves a body, -1 if none does."""
-    while body and not model.body_jntnum[body]:
-        body = model.body_parentid[body]
-    return int(model.body_jntadr[body] + model.body_jntnum[body] - 1) if body else -1
-
-
 def _compiled(vehicle: SpatialVehicle, step: float, integrator: str, speed: float | None, road: np.ndarray,
               per_time: float) -> mujoco.MjModel:  # fmt: skip
     """The model with all numbers of the callback in its numeric data."""
     spec = _spec(vehicle, step)
     spec.option.integrator = OWN_NAMES[integrator]
     plain = spec.compile()
-    tree = [value for i in range(plain.njnt) for value in (
-        float(plain.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE), float(plain.dof_parentid[i]))]  # fmt: skip
-    numbers = Numbers(vehicle, plain)
-    packed = [_packed(element, vehicle, plain, numbers) for element in elements(vehicle, speed)]
-    content = np.concatenate([tree, *packed])
-    begins = 8 + len(content)
-    header = [per_time, len(road), len(vehicle.tyres), plain.njnt, plain.nbody, len(packed), begins, begins + road.size]
+    content = packed(vehicle, elements(vehicle, speed), plain, Numbers(vehicle, plain))
+    begins = HEADER + len(content.numbers)
+    header = [per_time, len(road), len(vehicle.tyres), *content.counts, begins]
     spec.add_numeric(name="vehicle", size=begins + road.size, data=[0.0])
     model = spec.compile()
-    model.numeric_data[:] = np.concatenate([header, content, road.ravel()])
-    _weigh(model, numbers, vehicle.bodies)
+    model.numeric_data[:] = np.concatenate([header, content.numbers, road.ravel()])
+    _weigh(model, Numbers(vehicle, model), vehicle.bodies)
     return model
 
 
@@ -219,15 +123,15 @@ class SpatialMujoco:
     def _still(self) -> Iterator[np.ndarray]:
         """The callback reads the row (2 w,) of the road that is given here, at every time."""
         numbers = self.model.numeric_data
-        first = int(numbers[6])
+        first = int(numbers[ROAD])
         row = numbers[first : first + len(self._flat)]
-        before = numbers[0], row.copy()
-        numbers[0] = 0.0
+        before = numbers[PER_TIME], row.copy()
+        numbers[PER_TIME] = 0.0
         try:
             with self._forces():
                 yield row
         finally:
-            numbers[0], row[:] = before
+            numbers[PER_TIME], row[:] = before
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
         """Accelerations (n,) at positions and rates (n,); ``road`` (2 w,) as in the protocol."""
@@ -280,31 +184,30 @@ class SpatialMujoco:
 
     def run(self, q: np.ndarray, v: np.ndarray) -> SpatialRun:
         """March from positions and rates (n,) over the duration; RunFailed unless all of it is finite and sane."""
-        own = timed("mujoco", self.settings)
-        states = np.empty((own.steps + 1, 2 * self.model.nv))
-        both = np.concatenate((self.numbers.columns, self.model.nv + self.numbers.columns))
-        states[0, both] = np.concatenate((q, v))
+        own, size = timed("mujoco", self.settings), self.model.nv
+        both = 1 + np.concatenate((self.numbers.columns, size + self.numbers.columns))
+        path = np.empty((own.steps + 1, 1 + 2 * size))
+        path[0, 0], path[0, both] = 0.0, np.concatenate((q, v))
         for warning in self.data.warning:
             warning.number = 0
-        with self._forces(), quiet():
-            self._advance(states, own)
         times = own.step * np.arange(own.steps + 1)
+        with self._forces(), quiet():
+            self._advance(path, times, own)
         counts = {"steps": own.steps, "force calls": (4 if own.integrator == "RK4" else 1) * own.steps}
-        return sound("mujoco", own, times, states[:, both], self._warned(), counts)
+        states = path[:, 1:] if (np.diff(both) == 1).all() else path[:, both]
+        return sound("mujoco", own, times, states, self._warned(), counts)
 
-    def _advance(self, states: np.ndarray, own: Settings) -> None:
-        """March in chunks, so that a run that has failed is not carried to its end."""
-        state = np.concatenate(([0.0], states[0]))
+    def _advance(self, path: np.ndarray, times: np.ndarray, own: Settings) -> None:
+        """March in chunks, so that a run that has failed is not carried to its end; ``path``: time and state."""
         for first in range(0, own.steps, CHUNK):
-            count = min(CHUNK, own.steps - first)
-            path = rollout.rollout(self.model, self.data, state[None, :], nstep=count)[0][0, :, : len(state)]
-            states[first + 1 : first + 1 + count] = path[:, 1:]
-            late = np.abs(path[:, 0] - own.step * (first + 1 + np.arange(count))) > 1e-6 * own.duration
+            after = slice(first + 1, min(first + CHUNK, own.steps) + 1)
+            found = path[after]
+            rollout.rollout(self.model, self.data, path[None, first], nstep=len(found), state=found[None])
+            late = np.abs(found[:, 0] - times[after]) > 1e-6 * own.duration
             if late.any() or self._warned():
-                last = first + (int(np.argmax(late)) if late.any() else count)
-                guard("mujoco", own.step * np.arange(last + 1), states[: last + 1], last * own.step)
-                raise RunFailed("mujoco", f"the engine gave up{self._warned()}", last * own.step, states[last])
-            state = path[-1]
+                last = first + (int(np.argmax(late)) if late.any() else len(found))
+                guard("mujoco", times[: last + 1], path[: last + 1, 1:], times[last])
+                raise RunFailed("mujoco", f"the engine gave up{self._warned()}", times[last], path[last, 1:])
 
     def _warned(self) -> str:
         """What MuJoCo itself noticed, as a phrase; empty if nothing."""

@@ -212,3 +212,11 @@ class SpatialVehicle:
     def body(self, name: str) -> Body:
         """The body of that name; KeyError if there is none."""
         return {body.name: body for body in self.bodies}[name]
+
+    def chain(self, name: str | None) -> tuple[str, ...]:
+        """A body and all that it rides on, down to the one without parent; nothing for None, the ground."""
+        return () if name is None else (name, *self.chain(self.body(name).parent))
+
+    def turns(self, name: str | None) -> bool:
+        """Whether a body may turn, by a freedom of its own or of what it rides on."""
+        return any(freedom.startswith("r") for one in self.chain(name) for freedom in self.body(one).freedoms)
