@@ -196,12 +196,9 @@ def test_rounding_is_not_taken_for_white_noise():
     assert choice.predicted == pytest.approx(choice.confirmed, rel=0.2) and choice.kept
 
 
-def test_effects_of_vehicles_with_curves_are_neither_priced_nor_chosen(twinrig, capsys):
-    nonlinear = ("--set", "vehicle.file=quarter_car_nonlinear", "--set", "quantities=['body front']")
-    assert twinrig("run", "ride_choice", *nonlinear, "--out", "out") == 2
-    assert "for linear vehicles alone" in capsys.readouterr().err
-    assert twinrig("show", "ride_nonlinear", "--price") == 2
-    assert "for linear vehicles alone" in capsys.readouterr().err
+def test_options_of_copies_are_refused_where_a_vehicle_is_linear(twinrig, capsys):
+    assert twinrig("run", "ride_choice", "--set", "options.copies=20", "--out", "out") == 2
+    assert "there is a closed form" in capsys.readouterr().err
 
 
 def test_a_tolerance_that_nothing_keeps_leaves_everything_and_says_what_would_change_that(twinrig, capsys):

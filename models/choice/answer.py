@@ -85,8 +85,8 @@ def by_chance(change: Cases, full: Cases) -> tuple[float, float]:
     worst = 0.0, 0.0
     for moved, own in zip(change, full, strict=True):
         ratio = 1.0 + moved.mean() / own.mean()
-        if not ratio > 0.0:
-            return np.inf, np.inf
+        if not ratio > 0.0:  # nothing is left, or no mean square at all
+            return (1.0, 0.0) if not (moved + own).any() else (np.inf, np.inf)
         rest, m = moved - (ratio - 1.0) * own, len(own)
         error = float(stdtrit(m - 1, SURE)) * rest.std(ddof=1) / (np.sqrt(m) * own.mean()) / (2.0 * np.sqrt(ratio))
         worst = max(worst, (float(abs(np.sqrt(ratio) - 1.0)), float(error)), key=sum)

@@ -11,7 +11,7 @@ from typing import Any
 
 from models.choice.answer import Answer
 from models.errors import InputError, RunFailed
-from models.scene_effects import named, own_table, rebuilt, without
+from models.scene_effects import absent, beside, module_of, named, own_table, rebuilt, without
 
 Set = frozenset[str]
 LONGEST = 128
@@ -54,13 +54,27 @@ class Variants:
 
     @property
     def _opened(self) -> bool:
-        """Whether scenes are run as something else, which has ``named``, ``without``, ``longer`` and ``fewer``."""
+        """Whether scenes are run as something else, which knows its effects and makes its own variants."""
         return hasattr(self.system, "opened")
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Effects that the scene names."""
         return tuple(self.scene.named) if self._opened else named(self.scene)
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Effects that it does not name."""
+        return tuple(self.scene.absent) if self._opened else absent(self.scene)
+
+    def beside(self, name: str) -> Any:
+        """The scene with one of these at its usual values; InputError where it cannot be."""
+        return self.scene.beside(name) if self._opened else beside(self.scene, name)
+
+    def says(self, name: str) -> str:
+        """What an effect is, or what leaving it out means."""
+        told = self.scene.said if self._opened else {}
+        return str(told.get(name) or module_of(self.scene.system, name).__doc__ or "").partition("\n")[0]
 
     def of(self, left_out: Iterable[str] = (), times: int = 1) -> Answer | None:
         """The run without these effects, with steps so many times as long."""

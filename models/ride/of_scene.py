@@ -57,19 +57,13 @@ def _built(scene: RideScene) -> Built:
     return extended(Built(load_vehicle(scene.vehicle.file, scene.folder, scene.file, "vehicle.file")), scene)
 
 
-LINEAR_ALONE = "effects are priced and chosen in closed form, for linear vehicles alone: name one"
-"""What ``check_linear`` says where effects are asked about."""
-
-
-def check_linear(scene: RideScene, vehicle: SpatialVehicle, instead: str = "use the study ride_nonlinear") -> None:
-    """Refuse curves and friction where nobody has said that their slopes at rest shall stand for them.
-
-    instead : what else there is, for the message."""
+def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:
+    """Refuse curves and friction where nobody has said that their slopes at rest shall stand for them."""
     bent = [s.name for s in vehicle.springs if s.travel_force or s.rate_force or s.friction]
     if bent and not scene.vehicle.small_motion:
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file,
                          f"has curves or friction ({', '.join(bent)}), whose slopes at rest can be 60 % wrong: "
-                         f"{instead}, or say vehicle.small_motion = true")  # fmt: skip
+                         "use the study ride_nonlinear, or say vehicle.small_motion = true")  # fmt: skip
 
 
 def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear:

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from models.choice.answer import Answer, less, relative, sizes
+from models.choice.answer import Answer, by_chance, less, relative
 from models.choice.variants import Variants, system_of
 from models.errors import InputError, RunFailed
-from models.scene_effects import absent, beside, module_of, named, without
+from models.ride.choice.in_time import goes_in_time
 from validation.timing import describe, paired_ratio
 
 STEPS = 960
@@ -27,12 +27,14 @@ SEED = 11
 
 @dataclass(frozen=True)
 class Changed:
-    """A quantity's largest change of all cases: rms of a path's difference, or a number's, and by its own size."""
+    """A quantity's largest change of all cases: rms of a path's difference, or a number's, and by its own size; what
+    chance may add to the latter."""
 
     name: str
     unit: str
     absolute: float
     relative: float
+    chance: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -74,26 +76,29 @@ class PriceList:
 def price_list(scene: Any, engine: str | None = None) -> PriceList:
     """Run the scene, and every scene that has one effect more or less. Raises InputError or RunFailed where the scene
     itself cannot be run."""
-    if scene.system == "ride":
+    if scene.system == "ride" and not goes_in_time(scene):
         from validation.price.effects_of_ride import price_list_of_ride
 
         return price_list_of_ride(scene)
     system = system_of(scene)
-    engine, whole = engine or system.ENGINE, system.steps(scene)
-    short = Variants(scene, engine).window(STEPS).scene
+    engine = engine or system.ENGINE
+    all_of_it = Variants(scene, engine)
+    variants = all_of_it.window(STEPS)
+    short, names = variants.scene, (*variants.effects, *variants.absent)
     base: Answer = system.answer(short, engine)
     runs: dict[str, Callable[[], Answer]] = {"": partial(system.answer, short, engine)}
     first, whys = {"": base}, dict[str, str]()
-    for name in (*named(short), *absent(short)):
+    for name in names:
         try:
-            other = (without if name in named(short) else beside)(short, name)
+            other = variants.changed(frozenset([name])) if name in variants.effects else variants.beside(name)
             first[name], runs[name] = system.answer(other, engine), partial(system.answer, other, engine)
         except (InputError, RunFailed) as error:
             whys[name] = getattr(error, "why", "") or getattr(error, "allowed", "") or str(error)
     micros = _turns(runs)
-    prices = [_price(short, name, base, first.get(name), micros.get(name), micros[""], whys.get(name, ""))
-              for name in (*named(short), *absent(short))]  # fmt: skip
-    return PriceList(scene.title, engine, system.steps(short), whole, base.counts, spread(micros[""]), tuple(prices))
+    prices = [_price(variants, name, base, first.get(name), micros.get(name), micros[""], whys.get(name, ""))
+              for name in names]  # fmt: skip
+    return PriceList(scene.title, engine, system.steps(short), system.steps(all_of_it.scene), base.counts,
+                     spread(micros[""]), tuple(prices))  # fmt: skip
 
 
 def _turns(runs: dict[str, Callable[[], Answer]]) -> dict[str, np.ndarray]:
@@ -115,9 +120,9 @@ def spread(values: np.ndarray) -> tuple[float, float]:
     return told["median"], told["mad"]
 
 
-def _price(scene: Any, name: str, base: Answer, other: Answer | None, took: np.ndarray | None, own: np.ndarray,
+def _price(variants: Variants, name: str, base: Answer, other: Answer | None, took: np.ndarray | None, own: np.ndarray,
            why: str) -> Price:  # fmt: skip
-    there, says = name in named(scene), (module_of(scene.system, name).__doc__ or "").partition("\n")[0]
+    there, says = name in variants.effects, variants.says(name)
     if other is None or took is None:
         return Price(name, there, says, why)
     before, after = (other, base) if there else (base, other)
@@ -137,7 +142,11 @@ def _changes(base: Answer, other: Answer) -> tuple[Changed, ...]:
                 change = less(other.quantities[name].cases, quantity.cases)
             except (InputError, ValueError):  # of other lengths, or of another number of cases
                 continue
-            size = sizes(quantity.cases)
+            size = quantity.sizes
+            if quantity.sampled:
+                share, chance = by_chance(change, quantity.cases)
+                found.append(Changed(name, quantity.unit, share * float(size.max()), share, chance))
+                continue
             most = max(float(np.sqrt(np.mean(one**2))) for one in change)
             found.append(Changed(name, quantity.unit, most, relative(change, size)))
     return tuple(sorted(found, key=lambda one: -one.relative))

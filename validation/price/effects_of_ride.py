@@ -13,7 +13,7 @@ from models.ride.choice.cost import cost
 from models.ride.choice.held import Effect, Held, effects_of, illegal, without
 from models.ride.choice.reduced import Reduced, Whole
 from models.ride.choice.screen import confirmed
-from models.ride.of_scene import LINEAR_ALONE, check_linear, told_by, vehicle_of
+from models.ride.of_scene import told_by, vehicle_of
 from validation.price.effects import ROUNDS, SEED, Changed, Price, PriceList, spread
 from validation.timing import paired_ratio
 
@@ -22,11 +22,10 @@ STEPS = 500
 
 
 def price_list_of_ride(scene: Any) -> PriceList:
-    """Prices at the scene's middle speed; InputError for what is neither linear nor at constant speed."""
+    """Prices at the scene's middle speed; InputError for one that varies."""
     if scene.speeds is None:
         raise InputError(scene.file, "drive", None, "has no effects priced in closed form: give [speeds]")
     held = Held(scene, vehicle_of(scene))
-    check_linear(scene, held.vehicle, LINEAR_ALONE)
     speeds = scene.speeds.all()
     with told_by(scene):
         whole = Whole(held, float(speeds[len(speeds) // 2]))

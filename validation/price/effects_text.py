@@ -18,13 +18,18 @@ NOTHING = 1e-12
 def lines(found: PriceList, quantities: list[str]) -> list[str]:
     """What the scene costs, then every effect with what it costs and changes."""
     counts = ", ".join(f"{value:,} {name}" for name, value in found.counts.items())
-    part = "" if found.each >= found.whole else f", the first {found.each:,} steps of every run"
+    part = "" if found.each >= found.whole else f", {found.each:,} of {found.whole:,} steps priced"
     return [found.title,
             f"  {found.engine}, {counts}{part}; {_micros(found.micros)} a step, CPU, median and its deviation",
             "", "  effects of the scene: what each adds to it, and what leaving it out changes",
             *(line for one in found.prices if one.there for line in _price(one, quantities)),
             *_absent(found, quantities),
-            "", "  changes: rms of the difference, largest of all cases; in ( ) by the quantity's own deviation"]
+            "", "  changes: rms of the difference, largest of all cases; in ( ) by the quantity's own deviation"
+            + ("; +- what chance may add, of so few samples" if _by_chance(found) else "")]  # fmt: skip
+
+
+def _by_chance(found: PriceList) -> bool:
+    return any(change.chance for one in found.prices for change in one.changes)
 
 
 def _absent(found: PriceList, quantities: list[str]) -> list[str]:
@@ -64,7 +69,8 @@ def _changes(one: Price, quantities: list[str]) -> str:
 def _changed(change: Changed) -> str:
     unit = f" {change.unit}" if change.unit and change.unit != "1" else ""
     name = change.name.partition(" [")[0]
-    share = f"{100 * change.relative:.2g} %" if np.isfinite(change.relative) else "from nothing"
+    beside = f" +- {100 * change.chance:.2g} %" if change.chance else ""
+    share = f"{100 * change.relative:.2g} %{beside}" if np.isfinite(change.relative) else "from nothing"
     return f"{name} by {change.absolute:.3g}{unit} ({share})"
 
 

@@ -7,6 +7,7 @@ a part of the run tells of all of it; and two edits of a scene's table: ``shorte
 steps, and ``coarsen(table, scene, times)``, to steps so many times as long.
 
 Where effects lie in files that scenes name, as in a vehicle's, a file has ``opened(scene)`` in place of both edits: it
-gives what ``answer``, ``steps`` and ``parts`` take. That has ``file``, ``title``, ``system`` and ``named``, names of
-effects, and gives others of its kind: ``without(names)``, ``longer(times)``, ``fewer(steps)``, of about so many steps.
+gives what ``answer``, ``steps`` and ``parts`` take. That has ``file``, ``system``, names of effects, ``named`` and
+``absent``, and what each is, ``said``; and it gives others of its kind: ``without(names)``, ``beside(name)``,
+``longer(times)`` and ``fewer(steps)``, of about so many steps.
 """

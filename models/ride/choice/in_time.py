@@ -18,19 +18,21 @@ from models.ride.excitation import Excitation
 from models.ride.gaussian_laws import of_curve, of_friction
 from models.ride.linear_vehicle import Output
 from models.ride.nonlinear_copies import EVERY, March, forgotten, usual_step
-from models.ride.of_scene import vehicle_of
+from models.ride.of_scene import excitation_of, vehicle_of
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.scene import RideScene
 from models.ride.statistical_linearisation import BentSpring, bent, statistically_linear
+from models.scene_effects import absent, beside
 from models.strict import Strict, quantity
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper
+from models.vehicles.spatial_linear import wheels
 
 FEWEST = 12
 """Copies of which a standard error can be told, its own error about a fifth."""
 UNIT = 48
 """Steps are whole numbers of so many, before and while outputs count: a step may be any divisor of it times as long."""
-BESIDE = 4
-"""Roads that are kept, which many variants share."""
+ROOM = 3e8
+"""Bytes of roads that are kept, which many variants share, before one more."""
 
 
 class Samples(Strict):
@@ -76,14 +78,25 @@ class InTime:
         return self.held.scene.file
 
     @property
-    def title(self) -> str:
-        """The scene's."""
-        return self.held.scene.title
-
-    @property
     def named(self) -> tuple[str, ...]:
         """Effects that are there."""
         return tuple(effect.name for effect in self.effects if effect.name not in self.left_out)
+
+    @property
+    def said(self) -> dict[str, str]:
+        """What leaving each of all effects out means."""
+        return {effect.name: effect.says for effect in self.effects}
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Effects that the scene does not name."""
+        return absent(self.held.scene)
+
+    def beside(self, name: str) -> "InTime":
+        """With one of these at its usual values; InputError where it cannot be."""
+        scene = beside(self.held.scene, name)
+        _check(scene)
+        return replace(self, held=Held(scene, vehicle_of(scene)))
 
     @property
     def steps(self) -> int:
@@ -117,13 +130,17 @@ class InTime:
         """What is left of the vehicle at a speed; InputError where a run in time cannot do without it."""
         return left(self.held, pace.springs)
 
-    def squares(self, pace: Pace) -> tuple[tuple[Output, ...], np.ndarray]:
-        """Outputs, and each copy's mean square (copies, p) about the mean of all."""
-        vehicle, step = self.vehicle(pace), 2.0 * pace.half * self.times
+    def roads(self, pace: Pace) -> np.ndarray:
+        """Heights and rates (2 steps + 1, 2 w, copies) at half steps."""
         roads = _roads(RoadPath(self._excitation, pace.speed, pace.half), pace.steps, self.samples)
-        march = March(vehicle, pace.speed, step, self.samples.copies)
+        return np.ascontiguousarray(roads[:: self.times])
+
+    def squares(self, pace: Pace, roads: np.ndarray) -> tuple[tuple[Output, ...], np.ndarray]:
+        """Outputs, and each copy's mean square (copies, p) about the mean of all."""
+        step = 2.0 * pace.half * self.times
+        march = March(self.vehicle(pace), pace.speed, step, self.samples.copies)
         every = max(1, EVERY // self.times)
-        march.over(np.ascontiguousarray(roads[:: self.times]), pace.settling // self.times, every)
+        march.over(roads, pace.settling // self.times, every)
         count = len(range(0, pace.counted // self.times, every))
         first, second = march.sums[0].T / count, march.sums[1].T / count
         if not np.isfinite(second).all():
@@ -134,14 +151,9 @@ class InTime:
 
 def in_time(scene: RideScene) -> InTime:
     """The whole of a scene; InputError for one that has a closed form, or that no copies answer."""
-    vehicle, held = vehicle_of(scene), Held(scene, vehicle_of(scene))
-    if not goes_in_time(scene):
-        raise InputError(scene.file, "vehicle.file", scene.vehicle.file, "is linear, and has a closed form")
-    if scene.speeds is None:
-        raise InputError(scene.file, "drive", None, "has no effects priced or chosen by runs: give [speeds]")
-    for name, by in scene.weighting.items():
-        raise InputError(scene.file, f"weighting.{name}", by, "is not read by runs in time: leave it out")
-    check_rates(vehicle, held.excitation(), scene.file)
+    _check(scene)
+    assert scene.speeds is not None
+    held = Held(scene, vehicle_of(scene))
     own = {key: value for key, value in scene.options.items() if key in Samples.model_fields}
     samples = Samples.model_validate(own)
     paces = tuple(_pace(held, float(speed), samples.lasting) for speed in scene.speeds.all())
@@ -151,6 +163,17 @@ def in_time(scene: RideScene) -> InTime:
 def goes_in_time(scene: RideScene) -> bool:
     """Whether springs of the scene's vehicle are bent and nobody said that their slopes shall stand for them."""
     return bool(bent(vehicle_of(scene))) and not scene.vehicle.small_motion
+
+
+def _check(scene: RideScene) -> None:
+    if not goes_in_time(scene):
+        raise InputError(scene.file, "vehicle.file", scene.vehicle.file, "is linear, and has a closed form")
+    if scene.speeds is None:
+        raise InputError(scene.file, "drive", None, "has no effects priced or chosen by runs: give [speeds]")
+    for name, by in scene.weighting.items():
+        raise InputError(scene.file, f"weighting.{name}", by, "is not read by runs in time: leave it out")
+    vehicle = vehicle_of(scene)
+    check_rates(vehicle, excitation_of(scene, wheels(vehicle)), scene.file)
 
 
 def _pace(held: Held, speed: float, lasting: float) -> Pace:
@@ -219,7 +242,7 @@ def _roads(path: RoadPath, steps: int, samples: Samples) -> np.ndarray:
     key = (own.F.tobytes(), own.G.tobytes(), *(H.tobytes() for H in own.heights), own.lengths, own.independent,
            path.speed, path.half, steps, samples.copies, samples.seed)  # fmt: skip
     if key not in _kept:
-        while len(_kept) >= BESIDE:
+        while sum(roads.nbytes for roads in _kept.values()) > ROOM:
             del _kept[next(iter(_kept))]
         _kept[key] = next(path.blocks(steps, samples.copies, samples.seed))
     return _kept[key]
