@@ -1,6 +1,7 @@
-"""What several test files share: an empty folder to work in, and the command."""
+"""What several test files share: an empty folder to work in, the command, and a new file among a system's effects."""
 
 import sys
+from importlib import import_module
 
 import pytest
 
@@ -24,3 +25,18 @@ def twinrig(empty_folder):
         return ended.value.code
 
     return run
+
+
+@pytest.fixture
+def new_file(tmp_path, monkeypatch):
+    """Put a file among the effects of a system, in a folder of its own."""
+    from models.systems import SYSTEMS
+
+    def put(system, name, text):
+        package = SYSTEMS[system].effects
+        (tmp_path / f"{name}.py").write_text(text)
+        monkeypatch.setattr(import_module(package), "__path__", [*import_module(package).__path__, str(tmp_path)])
+        monkeypatch.setitem(sys.modules, f"{package}.{name}", None)  # to be taken away again
+        del sys.modules[f"{package}.{name}"]
+
+    return put
