@@ -3,7 +3,7 @@
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from models.measured.comparison import Compared, checks, compare
 from models.measured.counting import Counted, count
 from models.measured.finding import Finding
 from models.measured.hand_on import NAME, forces, hand_on
+from models.measured.hold_of import NOISE, hold_of, noise_of
 from models.measured.pattern import write_pattern
 from models.measured.recording import Recording
 from models.measured.rig import Rig
@@ -33,7 +34,7 @@ from models.measured.section_run import Hold, Outcome, SectionRun
 from models.measured.section_run import check as check_run
 from models.measured.section_run import run as march
 from models.measured.sections import Answer, Sections, points
-from models.measured.signal import Quantity, Signal
+from models.measured.signal import Signal
 from models.measured.trust import Drift, Level, drift
 from models.measured.verdict import judge, surprised
 from models.measured.virtual import VirtualMeasurement, virtual_measurement
@@ -44,8 +45,6 @@ SYSTEM = "measured"
 BLOCKS = "work"
 """Folder of what a killed run goes on with: samples on one clock, and runs with their checkpoints."""
 FREE = "free"
-NOISE: dict[str, Quantity] = {"force": "force", "moment": "moment", "angle": "angle", "rate": "angular rate"}
-"""Keys of the scene's table ``noise``, and the quantities that they are of."""
 Progress = Callable[[str, float], None]
 
 
@@ -203,20 +202,10 @@ def _claimed(scene: MeasuredScene, recording: Recording) -> dict[str, float]:
     return {s.name: stated[s.quantity] for s in recording.signals if stated.get(s.quantity) is not None}
 
 
-def _noise(found: Found) -> dict[str, float]:
-    """Noise as the scene states it; or else estimated, and not below what transducers have: filters hide noise."""
-    stated, usual = found.scene.noise, Hold()
-    out = dict[str, float]()
-    for key, quantity in NOISE.items():
-        sizes = [noise(found.recording, s) for s in found.recording.find(quantity) if not s.check]
-        least = float(getattr(usual, key))
-        out[key] = getattr(stated, key) or float(np.nanmax([least, np.nanmedian(sizes)] if sizes else [least]))
-    return out
-
-
 def _predicted(found: Found) -> Drift:
     """Drift of the free run, which begins level and at rest, from the noise and from how the vehicle really began."""
-    own, noise, chassis, vehicle = found.recording, _noise(found), found.rig.chassis, _vehicle(found)
+    own, chassis, vehicle = found.recording, found.rig.chassis, _vehicle(found)
+    noise = noise_of(found.scene.noise, own)
     tilt, rate = ((_began(own, what, "roll", chassis), _began(own, what, "pitch", chassis))
                   for what in ("angle", "angular rate"))  # fmt: skip
     frame = next(s.frame for s in own.signals if s.at in vehicle.hubs)
@@ -255,11 +244,9 @@ def _run(found: Found, work: Path, progress: Progress) -> None:
 
 def _holds(found: Found) -> dict[str, Hold]:
     """How each run is held."""
-    own, noise = found.scene.stabilise, _noise(found)
-    holds = {FREE: Hold("none", **noise)}
-    if own.method != "none":
-        holds[own.method] = Hold(own.method, own.bandwidth, own.model, own.smoothing, **noise)
-    return holds
+    held = hold_of(found.scene, found.recording)
+    free = replace(Hold("none"), force=held.force, moment=held.moment, angle=held.angle, rate=held.rate)
+    return {FREE: free} if held.method == "none" else {FREE: free, held.method: held}
 
 
 def _vehicle(found: Found) -> CutVehicle:

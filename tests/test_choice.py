@@ -199,9 +199,9 @@ def test_unknown_quantities_and_systems_without_runs_are_refused():
     scene = half_car(quantities=["yaw"])
     with pytest.raises(InputError, match="yaw"):
         Chooser(scene, "reference", scene.quantities, scene.tolerance)
-    with pytest.raises(InputError, match="measured"):
-        Variants(type("Other", (), {"system": "measured", "file": "t"}), "reference")
-    assert "measured" in SYSTEMS
+    with pytest.raises(InputError, match="pictures"):
+        Variants(type("Other", (), {"system": "pictures", "file": "t"}), "reference")
+    assert "pictures" in SYSTEMS
 
 
 def test_prices_name_costs_and_changes_and_why_there_is_none():

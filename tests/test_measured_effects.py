@@ -1,12 +1,16 @@
-"""Effects of virtual transducers, each left out and put in by itself."""
+"""Effects of virtual transducers, each left out and put in by itself; what a price and a choice see of a recording."""
 
 import pytest
 
+from models.choice.choose import Chooser
+from models.choice.systems import measured
+from models.choice.variants import Variants
 from models.errors import InputError
+from models.measured.scene import build
 from models.scene_effects import absent, beside, named, without
 from models.systems import load
 from studies.asked import SCENES
-from validation.absence.measured import FAULTS
+from validation.absence.measured import FAULTS, write
 from validation.absence.of_systems import bare
 
 
@@ -23,3 +27,46 @@ def test_each_fault_of_transducers_comes_and_goes_alone():
 def test_files_have_the_faults_that_they_have(name):
     with pytest.raises(InputError, match=r"virtual.faults.* needs a table \[virtual\], for files have the faults"):
         beside(bare("measured"), name)
+
+
+def short(**more):
+    table = {"title": "t", "system": "measured", "vehicle": {"file": "r19_free"}, "stabilise": {"method": "none"},
+             "virtual": {"duration": 0.18, "format": "csv", "faults": FAULTS["sensor_noise"]}}  # fmt: skip
+    return build(table | more, "s.toml")
+
+
+def test_a_price_and_a_choice_see_what_a_fault_changes_in_the_answers():
+    noisy = short()
+    told = [measured.answer(own, "mujoco") for own in (noisy, without(noisy, "sensor_noise"), beside(noisy, "offsets"))]
+    seats = [one.quantities["left seat F"].cases[0] for one in told]
+    assert len(seats[0]) == 181 and told[0].counts["steps"] == measured.steps(noisy) == 180
+    assert len({seat.tobytes() for seat in seats}) == 3
+
+
+def test_a_recording_is_run_for_a_part_and_in_longer_steps(tmp_path, monkeypatch):
+    monkeypatch.setattr("validation.absence.measured.SAMPLES", 201)
+    write(tmp_path)
+    of_files = build(bare("measured").table() | {"stabilise": {"method": "none"}}, "s.toml", tmp_path)
+    for own, steps in ((short(), 180), (of_files, 200)):
+        whole = Variants(own, "mujoco")
+        part = whole.window(20)
+        assert measured.steps(own) == steps and measured.steps(part.scene) == 120  # at least 100 samples
+        assert whole.of(times=2).counts["steps"] == steps // 2
+        paths = [one.of().quantities["body z"].cases[0] for one in (whole, part)]
+        assert len(paths[1]) == 121 and abs(paths[0][:115] - paths[1][:115]).max() < 1e-12 * abs(paths[0]).max()
+
+
+def test_the_pitch_plane_is_told_what_has_a_price():
+    scene = build({"title": "t", "system": "measured", "vehicle": {"parameters": "itwm_drift"},
+                   "files": bare("measured").table()["files"]}, "s.toml")  # fmt: skip
+    with pytest.raises(InputError, match=r"vehicle.parameters.* for a vehicle in space: name vehicle.file"):
+        measured.answer(scene, "mujoco")
+
+
+def test_auto_leaves_out_what_the_question_does_not_see():
+    """The noise of angles is read by nothing in a free run; steps stay whole samples of the recording."""
+    faults = {"noise": {"angle": 1e-3}}
+    scene = short(stabilise={"method": "none"}, effects="auto", quantities=["rms front left F"], tolerance=0.02,
+                  virtual={"duration": 0.18, "format": "csv", "faults": faults})  # fmt: skip
+    choice = Chooser(scene, "mujoco", scene.quantities, scene.tolerance).choose()
+    assert choice.left_out == ("sensor_noise",) and choice.kept

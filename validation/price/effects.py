@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from models.choice.answer import Answer, by_chance, less, relative
+from models.choice.answer import Answer, by_chance, less, relative, rounding
 from models.choice.variants import Variants, system_of
 from models.errors import InputError, RunFailed
 from models.ride.choice.in_time import goes_in_time
@@ -148,5 +148,6 @@ def _changes(base: Answer, other: Answer) -> tuple[Changed, ...]:
                 found.append(Changed(name, quantity.unit, share * float(size.max()), share, chance))
                 continue
             most = max(float(np.sqrt(np.mean(one**2))) for one in change)
-            found.append(Changed(name, quantity.unit, most, relative(change, size)))
+            moved = most > rounding(base, quantity.unit)
+            found.append(Changed(name, quantity.unit, most, relative(change, size) if moved else 0.0))
     return tuple(sorted(found, key=lambda one: -one.relative))
