@@ -12,6 +12,7 @@ from models.rail.equations import Path
 from models.rail.of_scene import equations_of
 from models.rail.wheel_forces import LOAD, MZ
 from validation.absence import braking, hand_built_wheelset, wheelset
+from validation.absence.bare_rides import rides
 from validation.absence.of_systems import bare
 from validation.rows import Row, System, at_most
 from validation.timing import interleave, paired_ratio
@@ -64,6 +65,13 @@ def made_by_wheelset(which: int) -> int:
     return arrays(long) - arrays(short)
 
 
+def made_by_ride() -> int:
+    """Arrays that more steps of a bare ride make in MuJoCo, where all its forces are compiled."""
+    short, long = (rides("mujoco", steps)[0] for steps in (SHORT, 10 * SHORT))
+    short(), long()
+    return arrays(long) - arrays(short)
+
+
 def made_by_braking() -> tuple[int, int]:
     """Arrays that more samples of a bare manoeuvre of a braked vehicle make, and how many more samples these are."""
     from models.braking.procedures import drive
@@ -84,6 +92,8 @@ def rows() -> list[Row]:
     return [
         at_most("absent.wheelset.arrays", SYSTEM, "arrays that 360 more steps of a bare wheelset make",
                 made_by_wheelset(0), "", 0, why, "none"),
+        at_most("absent.ride.arrays", SYSTEM, "arrays that 360 more steps of a bare ride make in MuJoCo",
+                made_by_ride(), "", 0, why, "none"),
         at_most("absent.braking.arrays", SYSTEM, f"arrays that {samples} more samples of a bare braked vehicle make, "
                 "in four steps each", made, "", 0, why, "none"),
     ]  # fmt: skip

@@ -11,6 +11,7 @@ from models.assembly import assemble
 from models.engines.protocol import build, guard, settings_of
 from models.scene import Scene
 from models.simulate import outputs
+from validation.absence.bare_rides import ratio_of_rides
 from validation.absence.hand_built import exudyn_run, mujoco_run
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import EFFECTS, ENGINES, STEP, change, changes, model, pair, scene, write_files
@@ -26,6 +27,8 @@ ROUNDS, PRICED = {True: 7, False: 80}, {True: 5, False: 15}
 """Rounds of these runs, and of those that tell what an effect adds, by ``quick``."""
 UNJUDGED = 4
 """Of how many rounds what no row judges is in the first."""
+RIDES = {"exudyn": {True: 50, False: 400}, "mujoco": {True: 500, False: 1000}}
+"""Steps of rides, engine by engine: one of Exudyn takes as long as eight of MuJoCo."""
 DEAREST = 1.03
 """Ratio of the time of a bare scene to that of a hand-built model."""
 SHORT = 500
@@ -44,7 +47,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
                  for i, effect in enumerate(EFFECTS) for j, engine in enumerate(ENGINES)
                  if not quick or i % len(ENGINES) == j]  # fmt: skip
     rows = [row for engine, ratio in ratios.items() for row in _machinery(engine, ratio, STEPS[quick], quick)]
-    return rows + _wheelset(STEPS[quick] // 4, quick), {"price": price, "ratios": ratios}
+    rows += _wheelset(STEPS[quick] // 4, quick) + _rides(quick)
+    return rows, {"price": price, "ratios": ratios}
 
 
 def hand_built(engine: str, own: Scene) -> Any:
@@ -102,6 +106,22 @@ def _wheelset(steps: int, quick: bool) -> list[Row]:
                "the same checks", ratio, "what the kernel of all wheelsets costs where no effect is named",
                judged=not quick),
     ]  # fmt: skip
+
+
+def _rides(quick: bool) -> list[Row]:
+    """A car with seven freedoms on a rough road in both engines, against one written for each."""
+    rows = []
+    for engine, steps in RIDES.items():
+        gap, ratio = ratio_of_rides(engine, steps[quick], ROUNDS[quick])
+        rows += [
+            at_most(f"effect_prices.same.ride.{engine}", SYSTEM, f"{engine}: states of a bare ride against those of a "
+                    "car with seven freedoms written directly for the engine", gap, "m, rad, m/s, rad/s", 1e-11,
+                    "the same vehicle on the same road; in MuJoCo the forces are summed in another order", "native"),
+            slower(f"effect_prices.ratio.ride.{engine}", f"{engine}: time of a bare ride by that of the written one, "
+                   "whose path passes the same guard", ratio, "what the machinery of all vehicles in space costs where "
+                   "no effect is named", judged=not quick),
+        ]  # fmt: skip
+    return rows
 
 
 def _price(effect: str, engine: str, folder: Path, rounds: int) -> dict[str, Any]:

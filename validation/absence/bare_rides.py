@@ -1,0 +1,56 @@
+"""Bare rides in time beside cars that were written for that alone: a car with seven freedoms on one track of a road."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from models.engines.protocol import Settings, guard
+from models.engines.spatial_protocol import INTEGRATORS, build
+from models.ride.of_scene import excitation_of, vehicle_of
+from models.ride.road_path import RoadPath, road_path
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import wheels
+from validation.absence import ride
+from validation.absence.hand_built_ride import Car, exudyn_run, mujoco_run
+from validation.absence.of_systems import bare
+from validation.timing import interleave, paired_ratio
+
+STEP = 1e-3
+"""Step of the runs (s)."""
+Job = Callable[[], np.ndarray]
+BY_HAND = {"exudyn": exudyn_run, "mujoco": mujoco_run}
+
+
+def scene() -> tuple[SpatialVehicle, RoadPath]:
+    """The vehicle of the bare scene without its anti-roll bars, an effect of a vehicle's file, and its road."""
+    own = bare("ride")
+    vehicle = replace(vehicle_of(own), bars=())
+    return vehicle, road_path(excitation_of(own, wheels(vehicle)), ride.SPEED, STEP)
+
+
+def rides(engine: str, steps: int) -> tuple[Job, Job]:
+    """Runs of a bare ride and of the car written for an engine, whose states (steps + 1, 14) pass the same guard."""
+    vehicle, road = scene()
+    table, rest, duration = road.table(steps, 0), np.zeros(len(vehicle.coordinates())), steps * road.step
+    own = build(engine, vehicle, Settings(INTEGRATORS[engine], road.step, duration), road.speed, table)
+    by_hand = BY_HAND[engine](Car.of(vehicle), table[:, : len(vehicle.tyres)], road.step, steps)
+
+    def ours() -> np.ndarray:
+        found = own.run(rest, rest)
+        return np.hstack([found.positions, found.rates])
+
+    def theirs() -> np.ndarray:
+        states = by_hand()
+        guard(engine, road.step * np.arange(steps + 1), states, duration)
+        return states
+
+    return ours, theirs
+
+
+def ratio_of_rides(engine: str, steps: int, rounds: int) -> tuple[float, tuple[float, float, float]]:
+    """Largest difference of states (m, rad, m/s, rad/s), and the ratio of seconds with its interval."""
+    jobs = rides(engine, steps)
+    ours, theirs = (job() for job in jobs)
+    return float(np.abs(ours - theirs).max()), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))

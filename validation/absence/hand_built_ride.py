@@ -1,0 +1,179 @@
+"""A car with seven freedoms on a rough road written directly for each engine, as someone would who needs that alone.
+
+Body (z, roll, pitch) on four upright spring-dampers, wheels (z) on tyre springs, neither gravity nor anything else:
+its numbers straight into Exudyn's items, and into MuJoCo's XML with site actuators for the suspension. No engine reads
+a table at the stages of a step, so the road's forces come by one callback in each, compiled in MuJoCo.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from models.vehicles.spatial import SpatialVehicle
+
+Run = Callable[[], np.ndarray]
+"""One run from rest; returns the states (steps + 1, 14): z, roll and pitch of the body, the wheels, then all rates."""
+
+
+@dataclass(frozen=True)
+class Car:
+    """Places (m) count from the body's centre; corners (4, 5): x, y, z of a strut, its stiffness and damping."""
+
+    mass: float
+    inertia: tuple[float, float, float]
+    wheel: float
+    tyre: float
+    centre: tuple[float, float, float]
+    corners: np.ndarray
+
+    @classmethod
+    def of(cls, vehicle: SpatialVehicle) -> "Car":
+        """The numbers of a vehicle of this kind."""
+        body, wheel = vehicle.bodies[:2]
+        corners = [[*np.subtract(s.point_one, body.position), s.stiffness, s.damping] for s in vehicle.springs]
+        return cls(body.mass, tuple(np.diag(body.inertia).tolist()), wheel.mass, vehicle.tyres[0].stiffness,
+                   body.position, np.array(corners))  # fmt: skip
+
+
+def exudyn_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
+    """Runge-Kutta 4 in Exudyn; ``road`` (2 steps + 1, 4): heights (m) at half steps."""
+    import exudyn as exu
+    import exudyn.itemInterface as typed_items
+
+    items: Any = typed_items
+    lists: Any = exu
+    container = exu.SystemContainer()
+    mbs: Any = container.AddSystem()
+    mbs.AddObject(items.ObjectGround())
+    kinds, zero, still = exu.JointType, np.zeros((3, 3)), [0.0, 0.0, 0.0]
+    nodes = [mbs.AddNode(items.NodeGenericODE2(referenceCoordinates=still, initialCoordinates=still,
+                                               initialCoordinates_t=still, numberOfODE2Coordinates=3))]  # fmt: skip
+    body = mbs.AddObject(items.ObjectKinematicTree(
+        nodeNumber=nodes[0], gravity=still, jointTypes=[kinds.PrismaticZ, kinds.RevoluteX, kinds.RevoluteY],
+        linkParents=[-1, 0, 1], jointTransformations=lists.Matrix3DList([np.eye(3)] * 3),
+        jointOffsets=lists.Vector3DList([np.array(car.centre), np.zeros(3), np.zeros(3)]),
+        linkInertiasCOM=lists.Matrix3DList([zero, zero, np.diag(car.inertia)]),
+        linkCOMs=lists.Vector3DList([np.zeros(3)] * 3), linkMasses=[0.0, 0.0, car.mass]))  # fmt: skip
+    upright = [[0, 0, -1], [0, 1, 0], [1, 0, 0]]
+    for x, y, z, stiffness, damping in car.corners.tolist():
+        node = mbs.AddNode(items.Node1D(referenceCoordinates=[0.0], initialCoordinates=[0.0], initialVelocities=[0.0]))
+        wheel = mbs.AddObject(items.Mass1D(nodeNumber=node, mass=car.wheel, referenceRotation=upright,
+                                           referencePosition=np.add(car.centre, (x, y, z)).tolist()))  # fmt: skip
+        ends = [mbs.AddMarker(items.MarkerKinematicTreeRigid(objectNumber=body, linkNumber=2, localPosition=[x, y, z])),
+                mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=wheel))]  # fmt: skip
+        mbs.AddObject(items.CartesianSpringDamper(
+            markerNumbers=ends, stiffness=[0, 0, stiffness], damping=[0, 0, damping]))  # fmt: skip
+        nodes.append(node)
+    forces, per_time = (car.tyre * road).tolist(), 2.0 / step
+    mbs.AddObject(items.ObjectGenericODE2(
+        nodeNumbers=nodes[1:], massMatrix=np.zeros((4, 4)), stiffnessMatrix=car.tyre * np.eye(4),
+        forceUserFunction=lambda mbs, t, item, q, v: forces[round(t * per_time)]))  # fmt: skip
+    sensors = [mbs.AddSensor(items.SensorNode(
+        nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind))
+        for kind in (exu.OutputVariableType.Coordinates, exu.OutputVariableType.Coordinates_t) for node in nodes]
+    mbs.Assemble()
+    options = exu.SimulationSettings()
+    options.solution.file.write = False
+    options.solution.sensors.writePeriod = step
+    ti = options.timeIntegration
+    ti.numberOfSteps, ti.endTime, ti.verboseMode = steps, step * steps, 0
+    ti.adaptiveStep = False
+    ti.explicit.computeEndOfStepAccelerations = False
+
+    def run(owner=container) -> np.ndarray:  # the system lives as long as its container
+        mbs.SolveDynamic(options, solverType=exu.DynamicSolverType.RK44)
+        return np.hstack([mbs.GetSensorStoredData(sensor)[:, 1:] for sensor in sensors])
+
+    return run
+
+
+def mujoco_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
+    """Runge-Kutta 4 in MuJoCo; ``road`` as for Exudyn."""
+    import mujoco
+    from mujoco import rollout
+
+    wheels = np.add(car.centre, car.corners[:, :3])
+    parts = [MJCF.format(i=i, strut=_text(corner[:3]), wheel=_text(place), mass=car.wheel, tyre=car.tyre)
+             for i, (corner, place) in enumerate(zip(car.corners, wheels, strict=True))]  # fmt: skip
+    site, wheel, actuator = (
+        "".join(part.split("----\n")[k].format(k=corner[3], d=corner[4]) for part, corner in zip(
+            parts, car.corners.tolist(), strict=True)) for k in range(3))  # fmt: skip
+    model = mujoco.MjModel.from_xml_string(WHOLE.format(
+        step=step, centre=_text(np.array(car.centre)), mass=car.mass, site=site, wheel=wheel, actuator=actuator,
+        size=2 + road.size))  # fmt: skip
+    model.body_inertia[1] = car.inertia  # no distribution of mass has these, and the compiler says so
+    model.numeric_data[:] = [2.0 / step, car.tyre, *road.ravel()]
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    data, start, law = mujoco.MjData(model), np.zeros((1, 15)), _road_law()
+
+    def run() -> np.ndarray:
+        mujoco.set_mjcb_passive(law.ctypes)
+        try:
+            path, _ = rollout.rollout(model, data, start, nstep=steps)
+        finally:
+            mujoco.set_mjcb_passive(None)
+        return np.vstack([start[:, 1:], path[0, :, 1:15]])
+
+    return run
+
+
+@cache
+def _road_law() -> Any:
+    """The compiled callback: forces of the road on the wheels, from the model's numeric data."""
+    from numba import cfunc, types
+
+    from models.engines.mujoco_callback import _array_at, _double_at
+    from models.engines.mujoco_layout import offset
+
+    numeric, passive = offset("mjModel", "numeric_data"), offset("mjData", "qfrc_passive")
+    time = offset("mjData", "time")
+
+    @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
+    def law(model, data):
+        numbers, forces = _array_at(model, numeric), _array_at(data, passive)
+        row = 2 + 4 * int(np.rint(_double_at(data, time)[0] * numbers[0]))
+        for i in range(4):
+            forces[3 + i] += numbers[1] * numbers[row + i]
+
+    return law
+
+
+def _text(values: np.ndarray) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+MJCF = """<site name="top {i}" pos="{strut}"/>
+----
+<body pos="{wheel}">
+  <inertial pos="0 0 0" mass="{mass!r}" diaginertia="1 1 1"/>
+  <joint type="slide" axis="0 0 1" stiffness="{tyre!r}"/>
+  <site name="wheel {i}"/>
+</body>
+----
+<general site="top {i}" refsite="wheel {i}" gear="0 0 1 0 0 0"
+         gainprm="0" biastype="affine" biasprm="0 -{{k!r}} -{{d!r}}"/>
+"""
+"""What each corner adds to the body's sites, to the world and to the actuators."""
+WHOLE = """
+<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="{step!r}" gravity="0 0 0" integrator="RK4">
+    <flag autoreset="disable" contact="disable" constraint="disable"/>
+  </option>
+  <worldbody>
+    <body pos="{centre}">
+      <inertial pos="0 0 0" mass="{mass!r}" diaginertia="1 1 1"/>
+      <joint type="slide" axis="0 0 1"/>
+      <joint type="hinge" axis="1 0 0"/>
+      <joint type="hinge" axis="0 1 0"/>
+      {site}
+    </body>
+    {wheel}
+  </worldbody>
+  <actuator>{actuator}</actuator>
+  <custom><numeric name="road" size="{size}" data="0"/></custom>
+</mujoco>
+"""
