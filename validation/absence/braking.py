@@ -63,5 +63,13 @@ def _counts(vehicle: Any, controller: Any) -> dict[str, int]:
         "asked": len(chain) - 1, "files": int(isinstance(last, MeasuredPressures)),
         "controllers": int(not isinstance(last, (CONTROLLERS["none"], MeasuredPressures))),
         "surfaces": int(max(vehicle.road.left.max(), vehicle.road.right.max())) + 1,
-        "tables": len(vehicle.tables.mu_x),
+        "tables": len(vehicle.tables.mu_x), **_sensed(chain, plane.wheels),
     }  # fmt: skip
+
+
+def _sensed(chain: list[Any], wheels: int) -> dict[str, int]:
+    """Signals and pressures that do not arrive as they are."""
+    read = [channels.conversion for one in chain if hasattr(one, "teeth") for channels in (one.wheels, one.pressures)]
+    return {"noisy signals": wheels * sum(own.noise > 0.0 for own in read),
+            "converted signals": wheels * sum(own.bits is not None for own in read),
+            "wrong signals": wheels * sum((own.gain, own.offset) != (1.0, 0.0) for own in read)}  # fmt: skip

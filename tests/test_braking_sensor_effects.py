@@ -1,0 +1,33 @@
+"""Noise, quantisation and calibration of what passes a brake controller's port: each comes and goes alone."""
+
+import pytest
+
+from models.braking.port.sensors import Conversion
+from models.errors import InputError
+from models.scene_effects import beside, legal, named, without
+from validation.absence.of_systems import bare
+
+SENSORS = tuple(f"{what}_{how}" for what in ("signal", "pressure") for how in ("noise", "quantisation", "calibration"))
+
+
+@pytest.fixture(scope="module")
+def full():
+    return beside(bare("braking"), "port", *SENSORS)
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_each_leaves_alone_and_takes_all_of_its_own_with_it(full, name):
+    less = without(full, name)
+    assert {*named(full)} - {*named(less)} == {name}
+    assert named(without(less, *(other for other in SENSORS if other != name))) == ("port",)
+
+
+def test_what_is_left_is_a_perfect_sensor(full):
+    bare_port = without(full, *SENSORS).port
+    assert bare_port.signals == bare_port.pressures == Conversion()
+
+
+def test_a_sensor_needs_a_port(full):
+    with pytest.raises(InputError, match="needs the effect 'port'"):
+        legal(SENSORS[:1], full)
+    assert "signal_noise" not in named(bare("braking", port={"signals": {"seed": 3}}))  # a seed is no noise
