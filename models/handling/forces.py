@@ -39,7 +39,10 @@ from models.handling.tyre import FIRST
 """Head: count of all numbers; how many coordinates, points, parts, tyres, knots of a control (three), waves; the
 chassis' last coordinate; drag (N s^2/m^2) and its place from there; cells, strips and middle of the net; where each
 begins."""
-STEER, BRAKE, DRIVE = range(3)
+STEER, BRAKE, DRIVE, FIRST_PUSH = range(4)
+PUSHED_BY, PUSHED_AT, PUSH_AXIS, PER_PUSH = 0, 1, 4, 7
+"""Of a push from outside: the coordinate that moves its body last, its place from there (m), its axis in the frame of
+the carrier. These rows, and then their count, stand before the controls, the last of which are their forces (N)."""
 (KNUCKLE, ROTOR, POINT, HEIGHT, STATIC, VERTICAL, VISCOUS, RADIUS, HALF_WIDTH, BRISTLES, GRIP, STEERED, BRAKED, DRIVEN,
  INCLINED, BRAKE_RATE, PER_TYRE) = range(17)  # fmt: skip
 """Numbers of a tyre: coordinates of its wheel and of its spin (-1: fixed); its point; height of that at rest (m); F0
@@ -50,8 +53,8 @@ the brake's torque is whole."""
 across (m/s), speed of the tread (m/s), turning (1/s), their power (W), moment about the steering axis (N m), steer
 angle (rad), torque on the wheel by brake and drive (N m)."""
 POTENTIAL, DISSIPATED, TORQUE_POWER, STEER_POWER, LEDGER = range(5)
-"""Columns of the ledger: energy of springs and tyres (J); power (W) of dampers, friction, tyres' dampers and drag; of
-brakes and drive on wheels; of the steering on the wheels."""
+"""Columns of the ledger: energy of springs and tyres (J); power (W) of dampers, friction, tyres' dampers, drag and
+pushes; of brakes and drive on wheels; of the steering on the wheels."""
 CENTRE, DOWN, ROLLING, ACROSS, NORMAL, AXLE, LOADING, PASSING, WAY = *range(0, 24, 3), 24
 """Of a wheel's way: its centre, the arm from there to the contact, axes along, across and normal to the road, axle,
 force of its load, velocity of its centre (3 each)."""

@@ -19,6 +19,7 @@ from models.handling.forces import (
     DRAG,
     DRAG_X,
     DRIVE,
+    FIRST_PUSH,
     HEADER,
     JOINTS,
     KNOTS,
@@ -32,18 +33,25 @@ from models.handling.forces import (
     OF_TYRES,
     OF_WAVES,
     PARTS,
+    PER_PUSH,
     PER_TYRE,
     POINTS,
     POTENTIAL,
+    PUSH_AXIS,
+    PUSHED_AT,
+    PUSHED_BY,
     REPORTED,
     STEER,
     STEER_MOMENT,
     STEER_POWER,
     STEERED,
     STRIPS,
+    TO_FRONT,
+    TO_LEFT,
     TYRES,
     WAVES,
     WAY,
+    YAWING,
     creep,
     touch,
     turn_wheel,
@@ -58,6 +66,7 @@ from models.handling.tree import (
     SPEED,
     TURNING,
     cross,
+    dot,
     inwards,
     locate,
     out,
@@ -65,6 +74,7 @@ from models.handling.tree import (
     plus,
     push,
     three,
+    times,
 )
 from models.handling.tyre import tyre_forces
 
@@ -121,6 +131,22 @@ def _drag(numbers, frame, tree, ledger):
 
 
 @lean
+def _push_from_outside(numbers, t, frame, tree, ledger):
+    """Pushes, which keep to where the vehicle heads."""
+    controls, knots, table = int(numbers[OF_KNOTS]), int(numbers[KNOTS]), start(numbers)
+    count = int(numbers[controls - 1])
+    for i in range(count):
+        of = row(beyond(table, controls - 1 - PER_PUSH * count), PER_PUSH, i)
+        own = row(tree[0], PER_LINK, int(of[PUSHED_BY]))
+        force = times(three(of, PUSH_AXIS), control(numbers, controls, FIRST_PUSH + i, knots, t)[0])
+        place = plus(three(own, PLACE), out(own, of, PUSHED_AT))
+        passing = (frame[TO_FRONT] - frame[YAWING] * place[1], frame[TO_LEFT] + frame[YAWING] * place[0], 0.0)
+        speed = plus(plus(three(own, SPEED), cross(three(own, TURNING), place)), passing)
+        ledger[DISSIPATED] += dot(force, speed)
+        push(own, tree[2], force, place)
+
+
+@lean
 def all_forces(numbers, t, q, v, f, report, ledger):
     """Add the forces (N, N m) on all coordinates to ``f``; all are arrays, report (tyres, REPORTED), ledger (LEDGER,).
 
@@ -146,6 +172,7 @@ def all_forces(numbers, t, q, v, f, report, ledger):
         creep(tyre, found[i], way, chassis, f, tree, report[i])
         turn_wheel(tyre, braking, driving, v, three(way, AXLE), chassis, f, tree, ledger, report[i])
         ledger[STEER_POWER] -= tyre[STEERED] * steering * report[i, STEER_MOMENT]
+    _push_from_outside(numbers, t, frame, tree, ledger)
     leave(numbers, frame, tree, f, ledger)
 
 

@@ -53,12 +53,24 @@ class Controls:
     front_drive: float = 0.0
 
 
+@dataclass(frozen=True)
+class Push:
+    """A force from outside, as of wind: ``size`` (N, over time) along ``axis``, x ahead, y to the left and z up as the
+    vehicle heads, however it leans; at ``point`` (m) of a body, in the design position."""
+
+    body: str
+    point: Vector
+    axis: Vector
+    size: Control
+
+
 @dataclass(frozen=True, eq=False)
 class Handling:
     """A vehicle on the road: what every implementation marches.
 
     given : the vehicle of the ride; waves (m, 4) : the road as ``road`` makes it; slope : of the whole road, uphill
-    along x (rad). ``vehicle`` is the free one, ``numbers`` its table, ``gravity`` (3,) in m/s^2.
+    along x (rad); pushes : forces from outside. ``vehicle`` is the free one, ``numbers`` its table, ``gravity`` (3,) in
+    m/s^2.
     """
 
     given: SpatialVehicle
@@ -66,6 +78,7 @@ class Handling:
     controls: Controls = Controls()
     waves: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
     slope: float = 0.0
+    pushes: tuple[Push, ...] = ()
     vehicle: SpatialVehicle = field(init=False)
     held: Preloads = field(init=False)
     numbers: np.ndarray = field(init=False)
@@ -104,16 +117,17 @@ def _table(own: Handling) -> np.ndarray:
     """All numbers, in the order that ``forces`` names."""
     free, chassis, of, points = own.vehicle, chassis_of(own.given), net(own.tyres.cells), _Points(own.vehicle)
     parts = [*_springs(own, points), *_bars(own, points)]
-    tyres, knots = [_tyre(own, i, points) for i in range(len(free.tyres))], _knots(own.controls)
+    tyres, knots = [_tyre(own, i, points) for i in range(len(free.tyres))], _knots(own.controls, own.pushes)
     sections = [_joints(free, points), np.ravel(points.rows), np.ravel([row for row, _ in parts]), np.ravel(tyres),
-                knots.ravel(), own.waves.ravel(), of.cells.ravel(), of.strips.ravel()]  # fmt: skip
+                _pushes(own), knots.ravel(), own.waves.ravel(), of.cells.ravel(), of.strips.ravel()]  # fmt: skip
     begins = at.HEADER + np.cumsum([0, *(section.size for section in sections)])
     curves = _put_curves(parts, sections[2], int(begins[-1]))
     joint, place = _place(free, chassis.name, chassis.position)
     drag = own.given.drags[0].coefficient / 2.0 if own.given.drags else 0.0
     counts = [begins[-1] + curves.size, len(free.coordinates()), len(points.rows), len(parts), len(free.tyres),
               knots.shape[2], len(own.waves)]  # fmt: skip
-    head = [*counts, joint, drag, *place, of.cells.shape[1], of.strips.shape[1], of.middle, *begins[1:-1]]
+    places = [*begins[1:4], *begins[5:-1]]  # pushes are found from the controls
+    head = [*counts, joint, drag, *place, of.cells.shape[1], of.strips.shape[1], of.middle, *places]
     return np.concatenate([np.array(head, float), *sections, curves])
 
 
@@ -212,9 +226,20 @@ def _tyre(own: Handling, i: int, points: _Points) -> list[float]:
             float(front), brake, drive, side * of.inclination, of.brake_rate]  # fmt: skip
 
 
-def _knots(controls: Controls) -> np.ndarray:
-    """(3, 2, k): times and values of steer, brake and drive, filled up with the last knot."""
-    all_knots = (controls.steer, controls.brake, controls.drive)
+def _pushes(own: Handling) -> np.ndarray:
+    """A row of each push, and how many there are."""
+    names = tuple(body.name for body in own.vehicle.bodies)
+    for push in own.pushes:
+        if push.body not in names:
+            raise InputError(own.given.name, "pushes", push.body, "no such body", names)
+    rows = [[joint, *place, *push.axis] for push in own.pushes
+            for joint, place in [_place(own.vehicle, push.body, push.point)]]  # fmt: skip
+    return np.array([*np.ravel(rows), len(rows)])
+
+
+def _knots(controls: Controls, pushes: tuple[Push, ...]) -> np.ndarray:
+    """(3 + pushes, 2, k): times and values of steer, brake, drive and pushes, filled up with the last knot."""
+    all_knots = (controls.steer, controls.brake, controls.drive, *(push.size for push in pushes))
     most = max(map(len, all_knots))
     filled = [(*knots, *[(knots[-1][0] + 1.0 + i, knots[-1][1]) for i in range(most - len(knots))])
               for knots in all_knots]  # fmt: skip
