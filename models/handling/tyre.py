@@ -54,31 +54,35 @@ def tyre_forces(contacts, slides, strips, cells, middle, found):
     (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the tread (m/s).
     """
     w = len(contacts)
-    some, slips, lanes = doubles(4 * w), doubles(PER_SLIP * w), array(doubles(ROOM), (ROOM,))
-    first, second = False, False
+    slips, lanes, slowest = array(doubles(PER_SLIP * w), (w, PER_SLIP)), array(doubles(ROOM), (ROOM,)), SLOW
     for i in range(w):
-        found[i, 0] = found[i, 1] = found[i, 2] = found[i, 3] = 0.0
-        first, second = first or slides[i, 3] > -SLOW, second or slides[i, 3] < SLOW
-    for sign, needed in ((1.0, first), (-1.0, second)):
-        if needed:
-            _roll(sign, contacts, slides, strips, cells, middle, array(some, (w, 4)), array(slips, (w, PER_SLIP)),
-                  lanes, found)  # fmt: skip
+        slowest = min(slowest, slides[i, 3])
+    _creepages(1.0, contacts, slides)
+    forces_within(contacts, strips, cells, middle, THREE, ORDER, slips, lanes, found)
+    if slowest < SLOW:
+        some = array(doubles(4 * w), (w, 4))
+        _creepages(-1.0, contacts, slides)
+        forces_within(contacts, strips, cells, middle, THREE, ORDER, slips, lanes, some)
+        _mix(slides, some, found)
 
 
 @lean
-def _roll(sign, contacts, slides, strips, cells, middle, some, slips, lanes, found):
-    """Add the share of the forces that tyres have rolling forwards (sign 1) or backwards (-1)."""
+def _creepages(sign, contacts, slides):
+    """Of tyres that roll forwards (sign 1) or backwards (-1)."""
     for i in range(len(contacts)):
-        slide, contact = slides[i], contacts[i]
-        by = 1.0 / max(abs(slide[3]), SLOW)
-        contact[XI_X], contact[XI_Y], contact[SPIN] = sign * slide[0] * by, slide[1] * by, sign * slide[2] * by
-    forces_within(contacts, strips, cells, middle, THREE, ORDER, slips, lanes, some)
-    for i in range(len(contacts)):
-        share = min(1.0, max(0.0, 0.5 + 0.5 * sign * slides[i, 3] / SLOW))
-        if share > 0.0:
-            found[i, 0] += share * sign * some[i, 0]
-            found[i, 1] += share * some[i, 1]
-            found[i, 2] += share * sign * some[i, 2]
+        speed = max(abs(slides[i, 3]), SLOW)
+        contacts[i, XI_X], contacts[i, XI_Y] = sign * slides[i, 0] / speed, slides[i, 1] / speed
+        contacts[i, SPIN] = sign * slides[i, 2] / speed
+
+
+@lean
+def _mix(slides, backwards, found):
+    """Forces of rolling forwards with their share, and those of rolling backwards, seen from ahead, with theirs."""
+    for i in range(len(found)):
+        share = min(1.0, max(0.0, 0.5 + 0.5 * slides[i, 3] / SLOW))
+        found[i, 0] = share * found[i, 0] - (1.0 - share) * backwards[i, 0]
+        found[i, 1] = share * found[i, 1] + (1.0 - share) * backwards[i, 1]
+        found[i, 2] = share * found[i, 2] - (1.0 - share) * backwards[i, 2]
 
 
 def brush(load: float, mu: float, half_length: float, half_width: float, stiffness: float, slides: np.ndarray,

@@ -12,6 +12,7 @@ from models.rail.equations import Path
 from models.rail.of_scene import equations_of
 from models.rail.wheel_forces import LOAD, MZ
 from validation.absence import braking, hand_built_wheelset, wheelset
+from validation.absence.bare_cars import cars
 from validation.absence.bare_rides import rides
 from validation.absence.of_systems import bare
 from validation.rows import Row, System, at_most
@@ -72,6 +73,13 @@ def made_by_ride() -> int:
     return arrays(long) - arrays(short)
 
 
+def made_by_car() -> int:
+    """Arrays that more steps of a bare car of a scene of handling make in MuJoCo."""
+    short, long = (cars(steps)[0] for steps in (SHORT, 10 * SHORT))
+    short(), long()
+    return arrays(long) - arrays(short)
+
+
 def made_by_braking() -> tuple[int, int]:
     """Arrays that more samples of a bare manoeuvre of a braked vehicle make, and how many more samples these are."""
     from models.braking.procedures import drive
@@ -94,6 +102,8 @@ def rows() -> list[Row]:
                 made_by_wheelset(0), "", 0, why, "none"),
         at_most("absent.ride.arrays", SYSTEM, "arrays that 360 more steps of a bare ride make in MuJoCo",
                 made_by_ride(), "", 0, why, "none"),
+        at_most("absent.handling.arrays", SYSTEM, "arrays that 360 more steps of a bare car make in MuJoCo",
+                made_by_car(), "", 0, why, "none"),
         at_most("absent.braking.arrays", SYSTEM, f"arrays that {samples} more samples of a bare braked vehicle make, "
                 "in four steps each", made, "", 0, why, "none"),
     ]  # fmt: skip

@@ -11,6 +11,7 @@ from models.assembly import assemble
 from models.engines.protocol import build, guard, settings_of
 from models.scene import Scene
 from models.simulate import outputs
+from validation.absence.bare_cars import ratio_of_cars
 from validation.absence.bare_rides import ratio_of_rides
 from validation.absence.hand_built import exudyn_run, mujoco_run
 from validation.absence.machinery import ratio_of_wheelsets
@@ -47,7 +48,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
                  for i, effect in enumerate(EFFECTS) for j, engine in enumerate(ENGINES)
                  if not quick or i % len(ENGINES) == j]  # fmt: skip
     rows = [row for engine, ratio in ratios.items() for row in _machinery(engine, ratio, STEPS[quick], quick)]
-    rows += _wheelset(STEPS[quick] // 4, quick) + _rides(quick)
+    rows += _wheelset(STEPS[quick] // 4, quick) + _rides(quick) + _cars(STEPS[quick] // 20, quick)
     return rows, {"price": price, "ratios": ratios}
 
 
@@ -122,6 +123,19 @@ def _rides(quick: bool) -> list[Row]:
                    "no effect is named", judged=not quick),
         ]  # fmt: skip
     return rows
+
+
+def _cars(steps: int, quick: bool) -> list[Row]:
+    """A car of the handling scenes that rolls freely on a flat road in MuJoCo, against one written for that alone."""
+    gap, ratio = ratio_of_cars(steps, ROUNDS[quick])
+    return [
+        at_most("effect_prices.same.handling", SYSTEM, "MuJoCo: states of a bare car of a scene of handling against "
+                "those of one written for its springs, bars, mounts and brush tyres alone", gap, "m, rad, m/s, rad/s",
+                1e-11, "the same equations, sums in another order", "native"),
+        slower("effect_prices.ratio.handling", "MuJoCo: time of a bare car of a scene of handling by that of the "
+               "written one, whose path passes the same guard", ratio, "what walking through any vehicle's tree costs "
+               "where no effect is named", judged=False),
+    ]  # fmt: skip
 
 
 def _price(effect: str, engine: str, folder: Path, rounds: int) -> dict[str, Any]:

@@ -1,0 +1,50 @@
+"""A bare car in time beside one that was written for that alone, in MuJoCo: it rolls freely on a flat road."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from models.engines.protocol import guard
+from models.handling.in_engines import build
+from models.handling.numbers import Handling
+from validation.absence import hand_built_handling, handling
+from validation.absence.of_systems import bare
+from validation.timing import interleave, paired_ratio
+
+STEP, SPEED = 1e-3, 15.0
+"""Step of the runs (s); speed (m/s)."""
+Job = Callable[[], np.ndarray]
+
+
+def start() -> tuple[Handling, np.ndarray, np.ndarray]:
+    """The car of the bare scene, and a start of which nothing is left at rest: it drifts, turns, bounces and rolls."""
+    own = bare("handling").handling(handling.ROLLING)
+    q, v = own.straight(SPEED)
+    q[3:6], v[1], v[2] = (0.01, 0.01, 0.002), 0.1, 0.02
+    return own, q, v
+
+
+def cars(steps: int) -> tuple[Job, Job]:
+    """Runs of a bare car and of the written one, whose states (steps + 1, 46) pass the same guard."""
+    own, q, v = start()
+    model, by_hand, times = build("mujoco", own), hand_built_handling.run(own, q, v, STEP, steps), STEP * np.arange(
+        steps + 1)  # fmt: skip
+
+    def ours() -> np.ndarray:
+        found = model.run(q, v, steps * STEP, STEP)
+        return np.hstack([found.positions, found.rates])
+
+    def theirs() -> np.ndarray:
+        states = by_hand()
+        guard("mujoco", times, states, steps * STEP)
+        return states
+
+    return ours, theirs
+
+
+def ratio_of_cars(steps: int, rounds: int) -> tuple[float, tuple[float, float, float]]:
+    """Largest difference of states (m, rad, m/s, rad/s), and the ratio of seconds with its interval."""
+    jobs = cars(steps)
+    ours, theirs = (job() for job in jobs)
+    return float(np.abs(ours - theirs).max()), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))

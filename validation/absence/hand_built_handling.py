@@ -1,0 +1,252 @@
+"""The car of the handling scenes rolling freely on a flat road, written for MuJoCo and for that alone: struts and
+bushes, bars, an engine on three mounts, two seats, drag, brush tyres.
+
+No steering, brakes, drive, rough road, leaning wheels, curves or friction in its suspension, and no way to have them;
+no tree is walked. Forces act along axes that only yaw with the car, as in ``models.vehicles.free_vehicle``. Places are
+relative to S, which the car has on the road where its chassis rolls and pitches. The tyres' march is the contact's.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+
+from models.compiled import lean
+from models.contact.fastsim_many import PER_SLIP, ROOM, forces_within
+from models.contact.stack import array, beyond, doubles, row
+from models.engines.contact_bridge_mujoco import native_law
+from models.engines.mujoco_callback import installed
+from models.engines.spatial_mujoco import _principal
+from models.handling.numbers import Handling
+from models.handling.tree import cross, dot, plus, three, times
+from models.handling.tyre import ORDER, THREE, net, shape_factor
+from models.vehicles.free_vehicle import SPECK
+
+SIZE, CELLS = 23, 21
+HEAD, WHEEL, MOUNT, SEAT, CONTACT = 14, 18, 15, 6, 10
+"""Numbers in the table that ``numbers_of`` writes."""
+
+
+@lean
+def law(numbers, q, v, f):
+    """Add the forces to ``f`` (23,); all are pointers to doubles: the table, positions, rates."""
+    head, q, v, f = array(numbers, (HEAD,)), array(q, (SIZE,)), array(v, (SIZE,)), array(f, (SIZE,))
+    wheels, mounts = beyond(numbers, HEAD), beyond(numbers, HEAD + 4 * WHEEL)
+    cells = beyond(mounts, 3 * MOUNT + 2 * SEAT)
+    c_yaw, s_yaw, c_roll, s_roll = math.cos(q[2]), math.sin(q[2]), math.cos(q[4]), math.sin(q[4])
+    c_pitch, s_pitch = math.cos(q[5]), math.sin(q[5])
+    x, y = (c_pitch, s_roll * s_pitch, -c_roll * s_pitch), (0.0, c_roll, s_roll)
+    z = s_pitch, -s_roll * c_pitch, c_roll * c_pitch
+    turning = v[4], c_roll * v[5], s_roll * v[5]
+    frame, ahead, aside = (x, y, z, turning), c_yaw * v[0] + s_yaw * v[1], c_yaw * v[1] - s_yaw * v[0]
+    contacts, slips, found = doubles(4 * CONTACT), doubles(4 * PER_SLIP), doubles(16)
+    places, pushes = doubles(12), doubles(12)
+    moment = plus(_engine(mounts, head, frame, q, v, f), _seats(beyond(mounts, 3 * MOUNT), frame, q, v, f))
+    for i in range(4):
+        moment = plus(moment, _wheel(row(wheels, WHEEL, i), frame, ahead, aside, head[0], q, v, 9 + 3 * i,
+                                     row(places, 3, i), row(pushes, 3, i), row(contacts, CONTACT, i)))  # fmt: skip
+    _bar(head[6], head[7], head[8], 0, places, pushes, q, f)
+    _bar(head[9], head[10], head[11], 2, places, pushes, q, f)
+    forces_within(array(contacts, (4, CONTACT)), array(beyond(cells, 5 * CELLS), (4, int(head[12]))),
+                  array(cells, (5, CELLS)), head[13], THREE, ORDER, array(slips, (4, PER_SLIP)),
+                  array(doubles(ROOM), (ROOM,)), array(found, (4, 4)))  # fmt: skip
+    along, across, turn, lift = 0.0, 0.0, 0.0, 0.0
+    for i in range(4):
+        place, push, creep, k = row(places, 3, i), row(pushes, 3, i), row(found, 4, i), 9 + 3 * i
+        force, radius = (push[0] + creep[0], push[1] + creep[1], push[2]), q[3] + place[2]
+        f[k] += dot(x, force)
+        f[k + 1] += dot(z, force)
+        f[k + 2] -= radius * creep[0]
+        moment = plus(moment, plus(cross(three(place, 0), force), (radius * creep[1], -radius * creep[0], creep[2])))
+        along, across, lift = along + creep[0], across + creep[1], lift + row(contacts, CONTACT, i)[2]
+        turn += (head[0] + place[0]) * creep[1] - place[1] * creep[0] + creep[2]
+    middle = times(z, head[2])
+    speed = ahead + turning[1] * middle[2] - turning[2] * middle[1] - v[2] * middle[1]
+    drag = -head[1] * abs(speed) * speed
+    moment = plus(moment, cross(middle, (drag, 0.0, 0.0)))
+    along, turn = along + drag, turn - middle[1] * drag
+    f[0] += c_yaw * along - s_yaw * across
+    f[1] += s_yaw * along + c_yaw * across
+    f[2] += turn
+    f[3] += lift
+    f[4] += moment[0]
+    f[5] += dot(y, moment)
+
+
+@lean
+def _wheel(w, frame, ahead, aside, s_x, q, v, k, place, push, contact):
+    """Springs and load of a wheel of coordinates from ``k`` on, and its creepages; moment on the chassis about S."""
+    x, y, z, turning = frame
+    arm = plus(plus(times(x, w[0]), times(y, w[1])), times(z, w[2]))
+    moved, passing = plus(times(x, q[k]), times(z, q[k + 1])), plus(times(x, v[k]), times(z, v[k + 1]))
+    rate = plus(passing, cross(turning, moved))
+    strut = w[7] + w[5] * (w[3] * moved[0] + w[4] * moved[2]) + w[6] * (w[3] * rate[0] + w[4] * rate[2])
+    bush = w[10] + w[8] * (w[4] * moved[0] - w[3] * moved[2]) + w[9] * (w[4] * rate[0] - w[3] * rate[2])
+    along, up = -strut * w[3] - bush * w[4], bush * w[3] - strut * w[4]
+    place[0], place[1], place[2] = plus(arm, moved)
+    u, radius = plus(passing, cross(turning, three(place, 0))), q[3] + place[2]
+    load, tread = max(w[11] - w[12] * (radius - w[13]), 0.0), radius * v[k + 2]
+    push[0], push[1], push[2] = along, 0.0, up + load
+    contact[0], contact[1], contact[2], contact[3] = math.sqrt(w[14] * load / w[12]), w[15], load, w[17]
+    contact[4] = (u[0] + ahead - v[2] * place[1] - radius * (turning[1] + v[k + 2])) / tread
+    contact[5] = (u[1] + aside + v[2] * (s_x + place[0]) + radius * turning[0]) / tread
+    contact[6] = (turning[2] + v[2]) / tread
+    contact[7] = contact[8] = contact[9] = w[16]
+    return cross((along, 0.0, up), arm)
+
+
+@lean
+def _bar(stiffness, held, by, i, places, pushes, q, f):
+    """A bar between the wheels i and i + 1 and the chassis' roll."""
+    left, right = row(places, 3, i), row(places, 3, i + 1)
+    twist = held + stiffness * (q[4] - (left[2] - right[2]) * by)
+    f[4] -= twist
+    row(pushes, 3, i)[2] += twist * by
+    row(pushes, 3, i + 1)[2] -= twist * by
+
+
+@lean
+def _engine(mounts, head, frame, q, v, f):
+    """The engine on its mounts; moment on the chassis about S."""
+    x, y, z, turning = frame
+    c_roll, s_roll, c_pitch, s_pitch = math.cos(q[7]), math.sin(q[7]), math.cos(q[8]), math.sin(q[8])
+    over = plus(times(y, c_roll), times(z, s_roll))
+    up = plus(times(z, c_roll), times(y, -s_roll))
+    ahead, high = plus(times(x, c_pitch), times(up, -s_pitch)), plus(times(x, s_pitch), times(up, c_pitch))
+    joint = plus(times(x, head[4]), times(z, head[5] + q[6]))
+    own = plus(plus(turning, times(x, v[7])), times(over, v[8]))
+    passing, total, twist = plus(cross(turning, joint), times(z, v[6])), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    moment = 0.0, 0.0, 0.0
+    for i in range(3):
+        m = row(mounts, MOUNT, i)
+        here = plus(plus(times(x, m[0]), times(y, m[1])), times(z, m[2]))
+        arm = plus(plus(times(ahead, m[3]), times(over, m[4])), times(high, m[5]))
+        gap = plus(here, times(plus(joint, arm), -1.0))
+        rate = plus(cross(turning, here), times(plus(passing, cross(own, arm)), -1.0))
+        force = (m[12] + m[6] * gap[0] + m[9] * rate[0], m[13] + m[7] * gap[1] + m[10] * rate[1],
+                 m[14] + m[8] * gap[2] + m[11] * rate[2])  # fmt: skip
+        total, twist = plus(total, force), plus(twist, cross(arm, force))
+        moment = plus(moment, cross(force, gap))
+    f[6] += dot(z, total)
+    f[7] += dot(x, twist)
+    f[8] += dot(over, twist)
+    return moment
+
+
+@lean
+def _seats(seats, frame, q, v, f):
+    """Both seats; moment on the chassis about S."""
+    _, _, z, turning = frame
+    moment = 0.0, 0.0, 0.0
+    for i in range(2):
+        s, k = row(seats, SEAT, i), 21 + i
+        moved = times(z, q[k])
+        force = s[5] - s[3] * moved[2] - s[4] * (v[k] * z[2] + cross(turning, moved)[2])
+        f[k] += force * z[2]
+        moment = plus(moment, cross(moved, (0.0, 0.0, force)))
+    return moment
+
+
+def numbers_of(own: Handling) -> np.ndarray:
+    """The car's table: head, wheels, mounts, seats, net."""
+    car, of, held = own.vehicle, net(CELLS), own.held.parts
+    springs, s, joint = {p.name: p for p in car.springs}, car.body("sway").position, car.body("engine").position
+    bars = [number for bar in car.bars for number in (bar.stiffness, held[bar.name], 1.0 / bar.track)]
+    head = [s[0], own.given.drags[0].coefficient / 2.0, car.body("body").position[2], 0.0, joint[0] - s[0], joint[2],
+            *bars, len(of.strips[0]), of.middle]  # fmt: skip
+
+    def law(name: str) -> list[float]:
+        return [springs[name].stiffness, springs[name].damping, held[name]]
+
+    wheels = []
+    for tyre, corner in zip(car.tyres, CORNERS, strict=True):
+        strut, load, width = springs[corner].axis, own.held.tyres[tyre.name], own.tyres.half_width
+        sunk = load / tyre.stiffness
+        radius = tyre.point[2] + sunk
+        side = next(force.stiffness for force in own.given.side_forces if force.name == tyre.name)
+        wheels += [*np.subtract(tyre.point, s), strut[0], strut[2], *law(corner), *law(f"{corner} bush"), load,
+                   tyre.stiffness, tyre.point[2], radius, width, shape_factor(CELLS) * radius * sunk * width / side,
+                   own.tyres.friction]  # fmt: skip
+    mounts = [np.r_[np.subtract(springs[f"{name} mount.x"].point_one, s),
+                    np.subtract(springs[f"{name} mount.x"].point_one, joint),
+                    np.array([law(f"{name} mount.{axis}") for axis in "xyz"]).T.ravel()]
+              for name in ("left", "right", "rear")]  # fmt: skip
+    seats = [[*np.subtract(springs[name].point_one, s), *law(name)] for name in ("left seat", "right seat")]
+    return np.concatenate([head, wheels, np.ravel(mounts), np.ravel(seats), of.cells.ravel(), of.strips.ravel()])
+
+
+def model_of(own: Handling, step: float) -> mujoco.MjModel:
+    """The car in MuJoCo, the table among its numbers; bodies without inertia get it as the model is there."""
+    car, table = own.vehicle, numbers_of(own)
+    chassis = car.body("body")
+    bodies = "".join(
+        BODY.format(name=name, joints="".join(JOINTS[kind] for kind in kinds),
+                    mass=car.body(name).mass + SPECK * (kinds == WHEELED),
+                    pos=_text(np.subtract(car.body(name).position, chassis.position)))
+        for name, kinds in RIDERS.items())  # fmt: skip
+    principal, axes = _principal(chassis)
+    built = mujoco.MjModel.from_xml_string(MJCF.format(
+        step=repr(step), gravity=_text(own.gravity), size=table.size, bodies=bodies, pos=_text(chassis.position),
+        mass=chassis.mass, axes=_text(axes), height=-chassis.position[2], x=-chassis.position[0]))  # fmt: skip
+    built.body_inertia[1] = principal
+    for name, kinds in RIDERS.items():
+        spin = [0.0, own.tyres.spin_inertia, 0.0] if kinds == WHEELED else np.diagonal(car.body(name).inertia)
+        built.body_inertia[built.body(name).id] = spin
+    mujoco.mj_setConst(built, mujoco.MjData(built))
+    built.numeric_data[:] = table
+    return built
+
+
+def run(own: Handling, q: np.ndarray, v: np.ndarray, step: float, steps: int) -> Callable[[], np.ndarray]:
+    """One run from positions and rates (23,) that gives states (steps + 1, 46)."""
+    built = model_of(own, step)
+    data, state, callback = mujoco.MjData(built), np.concatenate(([0.0], q, v)), native_law(law)
+
+    def marched() -> np.ndarray:
+        with installed(callback):
+            path, _ = rollout.rollout(built, data, state[None, :], nstep=steps)
+        return np.vstack([state[1:], path[0, :, 1 : 1 + 2 * SIZE]])
+
+    return marched
+
+
+def _text(numbers: Any) -> str:
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+CORNERS = ("front left", "front right", "rear left", "rear right")
+WHEELED = "xzP"
+RIDERS = {"engine": "zRP", **dict.fromkeys(("fl", "fr", "rl", "rr"), WHEELED), "left seat": "z", "right seat": "z"}
+"""Bodies on the chassis and their joints."""
+JOINTS = {"x": '<joint type="slide" axis="1 0 0"/>', "z": '<joint type="slide" axis="0 0 1"/>',
+          "R": '<joint type="hinge" axis="1 0 0"/>', "P": '<joint type="hinge" axis="0 1 0"/>'}  # fmt: skip
+BODY = """
+      <body name="{name}" pos="{pos}">
+        {joints}
+        <inertial pos="0 0 0" mass="{mass!r}" diaginertia="1 1 1"/>
+      </body>"""
+MJCF = """
+<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="{step}" gravity="{gravity}" integrator="RK4">
+    <flag autoreset="disable" contact="disable" constraint="disable"/>
+  </option>
+  <custom>
+    <numeric name="car" size="{size}" data="0"/>
+  </custom>
+  <worldbody>
+    <body pos="{pos}">
+      <inertial pos="0 0 0" mass="{mass!r}" quat="{axes}" diaginertia="1 1 1"/>
+      <joint type="slide" axis="1 0 0"/>
+      <joint type="slide" axis="0 1 0"/>
+      <joint type="hinge" axis="0 0 1" pos="{x!r} 0 0"/>
+      <joint type="slide" axis="0 0 1"/>
+      <joint type="hinge" axis="1 0 0" pos="0 0 {height!r}"/>
+      <joint type="hinge" axis="0 1 0" pos="0 0 {height!r}"/>{bodies}
+    </body>
+  </worldbody>
+</mujoco>
+"""
