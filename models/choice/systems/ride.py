@@ -8,8 +8,9 @@ import numpy as np
 from models.choice.answer import Answer, Quantity
 from models.engines.spatial_protocol import curves
 from models.errors import InputError
+from models.ride.choice.held import Held
 from models.ride.choice.in_time import UNIT, InTime, in_time
-from models.ride.of_scene import told_by
+from models.ride.of_scene import told_by, vehicle_of
 from models.ride.scene import RideScene
 
 ENGINE, WINDOWED = "reference", True
@@ -20,7 +21,7 @@ def opened(scene: RideScene | InTime) -> InTime:
     if isinstance(scene, InTime):
         return scene
     with told_by(scene):
-        return in_time(scene)
+        return in_time(Held(scene, vehicle_of(scene)))
 
 
 def answer(scene: InTime, engine: str) -> Answer:

@@ -18,14 +18,13 @@ from models.ride.excitation import Excitation
 from models.ride.gaussian_laws import of_curve, of_friction
 from models.ride.linear_vehicle import Output
 from models.ride.nonlinear_copies import EVERY, March, forgotten, usual_step
-from models.ride.of_scene import excitation_of, vehicle_of
+from models.ride.of_scene import vehicle_of
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.scene import RideScene
 from models.ride.statistical_linearisation import BentSpring, bent, statistically_linear
 from models.scene_effects import absent, beside
 from models.strict import Strict, quantity
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper
-from models.vehicles.spatial_linear import wheels
 
 FEWEST = 12
 """Copies of which a standard error can be told, its own error about a fifth."""
@@ -95,8 +94,9 @@ class InTime:
     def beside(self, name: str) -> "InTime":
         """With one of these at its usual values; InputError where it cannot be."""
         scene = beside(self.held.scene, name)
-        _check(scene)
-        return replace(self, held=Held(scene, vehicle_of(scene)))
+        held = Held(scene, vehicle_of(scene))
+        _check(held)
+        return replace(self, held=held)
 
     @property
     def steps(self) -> int:
@@ -149,11 +149,11 @@ class InTime:
         return march.plain.outputs, second - 2 * mean * first + mean**2
 
 
-def in_time(scene: RideScene) -> InTime:
+def in_time(held: Held) -> InTime:
     """The whole of a scene; InputError for one that has a closed form, or that no copies answer."""
-    _check(scene)
+    _check(held)
+    scene = held.scene
     assert scene.speeds is not None
-    held = Held(scene, vehicle_of(scene))
     own = {key: value for key, value in scene.options.items() if key in Samples.model_fields}
     samples = Samples.model_validate(own)
     paces = tuple(_pace(held, float(speed), samples.lasting) for speed in scene.speeds.all())
@@ -162,18 +162,18 @@ def in_time(scene: RideScene) -> InTime:
 
 def goes_in_time(scene: RideScene) -> bool:
     """Whether springs of the scene's vehicle are bent and nobody said that their slopes shall stand for them."""
-    return bool(bent(vehicle_of(scene))) and not scene.vehicle.small_motion
+    return not scene.vehicle.small_motion and bool(bent(vehicle_of(scene)))
 
 
-def _check(scene: RideScene) -> None:
-    if not goes_in_time(scene):
+def _check(held: Held) -> None:
+    scene = held.scene
+    if scene.vehicle.small_motion or not bent(held.vehicle):
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, "is linear, and has a closed form")
     if scene.speeds is None:
         raise InputError(scene.file, "drive", None, "has no effects priced or chosen by runs: give [speeds]")
     for name, by in scene.weighting.items():
         raise InputError(scene.file, f"weighting.{name}", by, "is not read by runs in time: leave it out")
-    vehicle = vehicle_of(scene)
-    check_rates(vehicle, excitation_of(scene, wheels(vehicle)), scene.file)
+    check_rates(held.vehicle, held.excitation(), scene.file)
 
 
 def _pace(held: Held, speed: float, lasting: float) -> Pace:
