@@ -7,6 +7,7 @@ is not smooth, where an accurate solver must restart.
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal, Protocol, get_args
 
 import numpy as np
@@ -90,7 +91,7 @@ class Sampled:
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values at start + i step, shape (count, channels)."""
-        index, part = self._place((start + step * np.arange(count)) / self.period)
+        index, part = _placed(start, step, count, self.period, len(self.values))
         if self.held:
             return self.values[index]
         from models.piecewise import interpolate
@@ -110,12 +111,19 @@ class Sampled:
         """All sample times inside (0, duration)."""
         return self.period * np.arange(1, math.ceil(duration / self.period - 1e-9))
 
-    def _place(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Index of the sample at or before each position, and the part of the period after it."""
-        nearest = np.rint(position)
-        snapped = np.where(np.abs(position - nearest) < SNAP, nearest, position)
-        index = np.clip(np.floor(snapped), 0, len(self.values) - 1).astype(np.int64)
-        return index, snapped - index
+
+@lru_cache(maxsize=2)
+def _placed(start: float, step: float, count: int, period: float, samples: int) -> tuple[np.ndarray, np.ndarray]:
+    """Index of the sample at or before each time start + i step, and the part of the period after it; the same for
+    every path of an ensemble.
+    """
+    position = (start + step * np.arange(count)) / period
+    nearest = np.rint(position)
+    snapped = np.where(np.abs(position - nearest) < SNAP, nearest, position)
+    index = np.clip(np.floor(snapped), 0, samples - 1).astype(np.int64)
+    part = snapped - index
+    index.flags.writeable = part.flags.writeable = False
+    return index, part
 
 
 @dataclass(frozen=True)
