@@ -1,18 +1,33 @@
 """A new effect of every system is one new file: listed, named, computed in every engine, counted, refused, left out."""
 
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 
 import numpy as np
 import pytest
 
+from models.contact.cases_table import answer
+from models.contact.of_scene import contact
+from models.contact.scene import build as build_contact
 from models.errors import InputError
 from models.handling.in_engines import driven, unaccounted
 from models.handling.numbers import Handling, Push
-from models.scene_effects import beside, listing, own_table, rebuilt, without
-from models.systems import SYSTEMS
+from models.ride.choice.held import Held, effects_of, illegal
+from models.ride.choice.held import without as without_effects
+from models.ride.choice.reduced import Whole
+from models.ride.in_engines import ridden
+from models.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
+from models.ride.road_path import road_path
+from models.ride.scene import build as build_ride
+from models.scene_effects import beside, extended, listing, own_table, rebuilt, without
+from models.systems import SYSTEMS, load
+from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
+from studies.asked import SCENES
+from validation.absence.contact import BARE as CONTACT
 from validation.absence.of_systems import added, bare, declared, seen
+from validation.price.effects import price_list
 
 
 @dataclass(frozen=True)
@@ -137,6 +152,101 @@ def test_a_push_from_outside_does_the_work_that_the_vehicle_gains():
     assert drive.path[-1, 1] > 0.04  # m, to the left
     with pytest.raises(InputError, match="no such body"):
         handling.changed(pushes=(Push("sail", (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), ((0.0, 1.0),)),))
+
+
+DAMPERS = New("dampers", "curves", "damping", 800.0, "{}", """
+    from models.vehicles.spatial import SpringDamper
+
+    more = (SpringDamper(f"{t.name} damper", "body", t.body, t.point, t.point, (0.0, 0.0, 1.0), 0.0, p.damping)
+            for t in built.vehicle.tyres)
+    return replace(built, vehicle=replace(built.vehicle, springs=(*built.vehicle.springs, *more)))
+""")
+HALF_CAR = {"title": "t", "system": "ride", "vehicle": {"file": "half_car"}, "speeds": {"values": [20.0]},
+            "road": {"cutoff": 20.0}}  # fmt: skip
+"""Its road has rates, as runs in time need where tyres are damped."""
+
+
+def test_a_new_effect_of_ride_is_in_every_linear_vehicle_and_in_both_engines(new_file):
+    """Engines are linearised by differences, good to 1e-9; in time both march by one tableau."""
+    new_file("ride", DAMPERS.name, DAMPERS.text)
+    new_file("ride", "tread", NEW["ride"].text.replace("second_corner", "measured_road"))
+    scene = build_ride(HALF_CAR)
+    own = beside(scene, "dampers", "tread")
+    vehicle, road = vehicle_of(own), excitation_of(own, wheels(vehicle_of(own)))
+    by = {engine: linear_vehicle(vehicle, engine)(20.0).damping for engine in SYSTEMS["ride"].engines}
+    bare_one = linear_vehicle(vehicle_of(scene))(20.0).damping
+    for damping in by.values():
+        assert damping - bare_one == pytest.approx(by["reference"] - bare_one, rel=1e-6, abs=1e-6)
+    assert np.trace(by["reference"] - bare_one) > 4 * 800.0  # two dampers of two ends, and pitch
+    runs = {engine: ridden(engine, vehicle, road_path(road, 20.0, 2e-3), 0.1) for engine in ("exudyn", "mujoco")}
+    rough = ridden("mujoco", vehicle_of(scene), road_path(excitation_of(scene, wheels(vehicle)), 20.0, 2e-3), 0.1)
+    one, two = (run.run.positions for run in runs.values())
+    assert np.abs(one - two).max() < 1e-12 * np.abs(one).max() < np.abs(two - rough.run.positions).max()
+
+
+def test_new_effects_of_ride_are_priced_and_chosen_among(new_file):
+    """Exactly: each is left out of the equations themselves. What needs another one goes with it."""
+    new_file("ride", DAMPERS.name, DAMPERS.text)
+    new_file("ride", "tread", NEW["ride"].text.replace('COST', 'NEEDS = ("delay", "dampers")\nCOST', 1))
+    scene = load(SCENES / "ride_choice.toml")
+    held = Held(own := beside(scene, "dampers", "tread"), vehicle_of(own))
+    effects = {effect.name: effect for effect in effects_of(held)}
+    assert {"dampers", "tread"} <= effects.keys() and effects["delay front to rear"].needs == ("tread",)
+    assert "cannot be left out alone: leave out tread, too, for it needs it" in illegal([effects["dampers"]])
+    whole = Whole(held, 20.0)
+    rest = whole.reduced(without_effects(held, [effects["dampers"], effects["tyre damping"], effects["tread"]]))
+    other = Held(scene, vehicle_of(scene))
+    known = Whole(other, 20.0).reduced(without_effects(other, [effects["tyre damping"]]))
+    assert np.abs(rest.system.A - known.system.A).max() < 1e-12 * np.abs(known.system.A).max()
+    prices = {price.name: price for price in price_list(own).prices}
+    assert prices["tread"].counts[1]["states"] - prices["tread"].counts[0]["states"] == 4 and prices["dampers"].why
+    assert prices["tread"].changes[0].relative > 0.01
+
+
+RAIN = New("rain", "spin", "share", 0.5, "{}", """
+    return replace(built, friction=p.share * built.friction)
+""")
+
+
+@pytest.mark.parametrize("theory", ["fastsim", "simplified", "exact"])
+def test_a_new_law_of_friction_is_in_every_theory(theory, new_file):
+    new_file("contact", RAIN.name, RAIN.text)
+    table = CONTACT | {"contact": {"load": 8e4, "friction": 0.2}, "method": {"name": theory}}
+    own, known = build_contact(table | {"effects": {"rain": {"share": 0.5}}}), build_contact(
+        table | {"contact": {"load": 8e4, "friction": 0.1}})  # fmt: skip
+    one, other = (contact(scene).roll((5e-3, 1e-3, 0.0), 9) for scene in (own, known))
+    assert (one.fx, one.fy) == (other.fx, other.fy) != (0.0, 0.0)
+
+
+def test_a_new_law_of_friction_holds_for_every_row_of_a_table(new_file, tmp_path):
+    new_file("contact", RAIN.name, RAIN.text)
+    head = "a [m],b [m],load [N],friction [-],xi_x [-],xi_y [-],spin [1/m]\n"
+    for name, friction in (("wet", (0.2, 0.6)), ("dry", (0.1, 0.3))):
+        rows = (f"5e-3,4e-3,8e4,{mu},5e-3,1e-3,0.1\n" for mu in friction)
+        (tmp_path / f"{name}.csv").write_text(head + "".join(rows))
+    scene = build_contact({"title": "t", "system": "contact", "cases": {"file": "wet.csv"},
+                           "effects": {"rain": {"share": 0.5}}})  # fmt: skip
+    answer(tmp_path / "wet.csv", tmp_path / "a.csv", scene.pair, scene.method, extend=partial(extended, scene=scene))
+    answer(tmp_path / "dry.csv", tmp_path / "b.csv", scene.pair, scene.method)
+    assert (tmp_path / "a.csv").read_text() == (tmp_path / "b.csv").read_text()
+
+
+def test_a_new_profile_and_a_law_that_no_theory_of_the_scene_knows(new_file):
+    """A rail that is rounder by a parabola carries on a smaller area."""
+    new_file("contact", "ground", New("ground", "falling_friction", "depth", 1e-4, "{}", """
+    rail = built.profiles["rail"]
+    own = replace(rail, z=rail.z + p.depth * (rail.y / 0.02) ** 2)
+    return replace(built, profiles={**built.profiles, "rail": own})
+""").text)
+    scene = build_contact(CONTACT | {"ellipse": None, "profiles": {}, "method": {"name": "simplified"}})
+    assert contact(beside(scene, "ground")).pressing.area < contact(scene).pressing.area
+    new_file("contact", "worn_in", New("worn_in", "falling_friction", "floor", 0.4, "{}", """
+    from models.contact.falling_friction import Falling
+
+    return replace(built, falling=Falling(floor=p.floor, decay=0.6, speed=20.0))
+""").text)
+    with pytest.raises(InputError, match=r"'simplified': has constant friction, .*: use fastsim"):
+        contact(beside(scene, "worn_in"))
 
 
 @pytest.mark.parametrize("system", [name for name in NEW if name != "measured"])

@@ -19,7 +19,7 @@ from models.vehicles.spatial_linear import wheels
 @dataclass(frozen=True)
 class Held:
     """Scene and vehicle, less what is left out: ``massless`` bodies, ``rigid`` springs, ``locked`` freedoms, the
-    vehicle's motions faster than ``fastest`` (1/s), which follow at once, and the
+    vehicle's motions faster than ``fastest`` (1/s), which follow the rest and the road, and the
     laws of bent springs that are ``straight``: gains stand for them."""
 
     scene: RideScene
@@ -69,15 +69,15 @@ def effects_of(held: Held) -> tuple[Effect, ...]:
     modules = {name: module_of(held.scene.system, name) for name in names_of(held.scene.system)}
     own = tuple(tables_of(held.scene))
     found = {name: module.found(held) for name, module in modules.items() if hasattr(module, "found")}
-    found |= {name: [Effect(name, partial(_without, name=name), modules[name].COST, singular=True, own=True)]
+    found |= {name: [Effect(name, partial(_without, names=(name,)), modules[name].COST, singular=True, own=True)]
               for name in own}  # fmt: skip
     return tuple(_with_needy(effect, tuple(other for other in own if name in modules[other].NEEDS))
                  for name in sorted(found) for effect in found[name])  # fmt: skip
 
 
-def _without(held: Held, name: str) -> Held:
-    """Less one of the scene's own tables."""
-    scene = without_own(held.scene, name)
+def _without(held: Held, names: tuple[str, ...]) -> Held:
+    """Less some of the scene's own tables."""
+    scene = without_own(held.scene, *names)
     return replace(held, scene=scene, vehicle=vehicle_of(scene))
 
 
@@ -112,7 +112,10 @@ def illegal(chosen: Iterable[Effect]) -> str:
 
 
 def without(held: Held, chosen: Iterable[Effect]) -> Held:
-    """The scene less these effects."""
-    for effect in sorted(chosen, key=lambda effect: not effect.own):
-        held = effect.without(held)
+    """The scene less these effects; its own tables go first and together."""
+    chosen = tuple(chosen)
+    own = tuple(effect.name for effect in chosen if effect.own)
+    held = _without(held, own) if own else held
+    for effect in chosen:
+        held = held if effect.own else effect.without(held)
     return held
