@@ -89,21 +89,26 @@ def test_roads_without_delay_and_second_corner():
     assert deviations(held(cutoff=50.0), "second corner of the road") == pytest.approx(deviations(held()), rel=1e-9)
 
 
-def test_fast_motions_follow_at_once_and_slow_ones_keep_their_rates():
-    scene = held("seven_freedoms")
+def test_fast_motions_follow_in_the_mean_and_slow_ones_keep_their_rates_and_covariance():
+    scene = held("seven_freedoms", 100.0, cutoff=50.0)
     whole = Whole(scene, SPEED)
     own = [effect for effect in effects_of(scene) if effect.name.startswith("motions")]
     assert "cannot be left out alone" in illegal(own[1:2]) and not illegal(own[:2])
     rest = whole.reduced(without(scene, own[:1]))
     roads = len(whole.excitation.heights) * len(whole.excitation.F)
-    full, left = whole.full.system, rest.system
+    full, left, back = whole.full.system, rest.system, rest.left
     rates, slow = (np.linalg.eigvals(s.A[: len(s.A) - roads, : len(s.A) - roads]) for s in (full, left))
     assert len(slow) < len(rates)
     assert np.sort(abs(slow)) == pytest.approx(np.sort(abs(rates))[: len(slow)], rel=1e-9)
-    still, also = (s.C[:, -roads:] - s.C[:, :-roads] @ np.linalg.solve(s.A[:-roads, :-roads], s.A[:-roads, -roads:])
-                   for s in (full, left))  # fmt: skip
-    assert also == pytest.approx(still, rel=1e-9, abs=1e-9 * abs(still).max())  # at rest nothing is missing
-    assert rest.left @ rest.T == pytest.approx(np.eye(len(left.A)), abs=1e-9)
+    assert back @ rest.T == pytest.approx(np.eye(len(left.A)), abs=1e-9)
+    P, known = stationary(full).P, stationary(left).P
+    assert known == pytest.approx(back @ P @ back.T, rel=1e-9, abs=1e-9 * abs(known).max())
+    untold = np.eye(len(P)) - rest.T @ back  # what is not told of the motions, by the whole state
+    size = np.sqrt(np.outer(P.diagonal(), known.diagonal()))
+    assert np.abs(untold @ P @ back.T).max() < 1e-9 * size.max() and np.abs((untold @ P @ back.T) / size).max() < 1e-6
+    lost = stationary(full).variance - stationary(left).variance
+    said = np.einsum("ij,jk,ik->i", full.C @ untold, P, full.C @ untold)
+    assert lost == pytest.approx(said, rel=1e-6, abs=1e-9 * stationary(full).variance.max()) and said.max() > 0
     two, one = Screen(whole.full, [0, 4]).identity(rest)
     assert np.abs(two / one - 1).max() < 1e-12
 
@@ -149,7 +154,7 @@ def test_the_published_pair_is_found_and_reported(twinrig, capsys):
     found = json.loads(capsys.readouterr().out)["answer"]
     assert {"mass of all wheels", "tyre damping"} <= set(found["left out"]) and found["kept"]
     assert all(abs(error["confirmed"]) <= 0.02 for error in found["errors"].values())
-    assert found["calls"][0] / found["calls"][1] == pytest.approx(28.8, abs=0.5)  # the published 691 and 24 1/s
+    assert found["calls"][0] / found["calls"][1] > 28.3  # the published 691 and 24 1/s; fast motions may follow besides
 
 
 def test_a_quantity_that_symmetry_silences_is_refused_not_held_to_its_rounding():

@@ -110,6 +110,12 @@ def _stable(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float],
     return lyapunov(split.S, intensity(split.S, [(split.W @ b).astype(float) for b in B], delays, independent))
 
 
+def noise_of(system: DelayedSystem) -> np.ndarray:
+    """``intensity`` of a system's own noise."""
+    B, _, delays = hits(system)
+    return intensity(system.A, B, delays, system.independent)
+
+
 def intensity(A: np.ndarray, B: Sequence[np.ndarray], delays: Sequence[float], independent: bool) -> np.ndarray:
     """Q (n, n) of A P + P A' + Q = 0: what the noise of all hits adds to the covariance per second, delays exact."""
     before = _responses(A, B, delays, independent)

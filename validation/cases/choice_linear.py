@@ -65,30 +65,40 @@ def judged(scene: Drawn, second: bool) -> Judged:
 
 
 def _by_frequency(whole: Whole, held: Held, rows: list[int]) -> np.ndarray:
-    """Variances (quantities,) as sums over frequencies, from M, D, K as they are: singular ones need no state.
-
-    Of motions that follow at once, what sets each apart from following at once is taken away, mode by mode.
-    """
+    """Variances (quantities,) as sums over frequencies, from M, D, K as they are: singular ones need no state."""
     rest = whole.reduced(replace(held, fastest=np.inf))
     parts = transfer(rest.vehicle, OMEGA) @ road(rest.excitation, whole.speed, OMEGA)
-    if held.fastest < np.inf:
-        parts = parts - _lagging(rest, whole.speed, held.fastest)
     delays = np.array(rest.excitation.lengths) / whole.speed
-    turned = (parts * np.exp(-1j * delays[:, None] * OMEGA)[:, :, None, None]).sum(axis=0)[:, rows]
-    return np.asarray(2 * np.trapezoid((abs(turned) ** 2).sum(axis=2) / (2 * np.pi), OMEGA, axis=0))
+    turn = np.exp(-1j * delays[:, None] * OMEGA)[:, :, None, None]
+    seen = (parts * turn).sum(axis=0)
+    if held.fastest < np.inf:
+        seen = seen - _untold(rest, whole.speed, held.fastest, turn)
+    return np.asarray(2 * np.trapezoid((abs(seen[:, rows]) ** 2).sum(axis=2) / (2 * np.pi), OMEGA, axis=0))
 
 
-def _lagging(rest: Reduced, speed: float, fastest: float) -> np.ndarray:
-    """Outputs by the noise of each axle (a, w, p, k) of the modes faster than ``fastest`` (1/s), less what they would
-    be if they followed at once."""
+def _untold(rest: Reduced, speed: float, fastest: float, turn: np.ndarray) -> np.ndarray:
+    """Outputs by noise (w, p, k) of the modes faster than ``fastest`` (1/s), less what slower ones and the road tell of
+    them by least squares over all frequencies."""
     A, F, axles = rest.system.A, rest.excitation.F, len(rest.excitation.heights)
     n = rest.states - axles * len(F)
     rates, V = np.linalg.eig(A[:n, :n])
-    fast, s = abs(rates) > fastest, 1j * OMEGA[:, None]
-    seen = (rest.system.C[:, :n] @ V[:, fast]) * (1 / (s - rates[fast]) + 1 / rates[fast])[:, None]
-    filtered = np.linalg.solve(s[:, :, None] * np.eye(len(F)) - speed * F, speed**0.5 * rest.excitation.G[None] + 0j)
-    driven = np.split(np.linalg.inv(V)[fast] @ A[:n, n:], axles, axis=1)
-    return np.array([seen @ (own @ filtered) for own in driven])
+    fast, s, back = abs(rates) > fastest, 1j * OMEGA[:, None, None], np.linalg.inv(V)
+    filtered = np.linalg.solve(s * np.eye(len(F)) - speed * F, speed**0.5 * rest.excitation.G[None] + 0j)
+    heights = np.concatenate(turn * filtered, axis=1)
+    direct = sum(own * (back @ b[:n]) for own, b in zip(turn, rest.system.B, strict=True))
+    modes = (back @ A[:n, n : rest.states] @ heights + direct) / (s - rates[:, None])
+    basis = np.vstack([back[~fast].real, back[~fast].imag]) @ V[:, ~fast]
+    known, sought = np.concatenate([basis @ modes[:, ~fast], heights], axis=1), modes[:, fast]
+    seen = (rest.system.C[:, :n] @ V[:, fast]) @ sought
+    size = np.sqrt(_common(known, known).diagonal())
+    size = np.where(size > 0, size, 1.0)
+    told = np.linalg.pinv(_common(known, known) / np.outer(size, size), rcond=1e-9, hermitian=True)
+    return np.asarray(seen - (_common(seen, known) / size @ told / size) @ known)
+
+
+def _common(one: np.ndarray, two: np.ndarray) -> np.ndarray:
+    """Covariance (a, b) of two real signals by their responses (w, a, k) and (w, b, k) to white noise."""
+    return np.asarray(np.trapezoid((one @ two.conj().swapaxes(1, 2)).real / np.pi, OMEGA, axis=0))
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:

@@ -2,7 +2,8 @@
 
 A greedy choice: of all single effects, and of all pairs where no single one will do, the next to be left out is the
 one that saves most for the error that the screen predicts for the whole set: calls (their logarithm) and, where no step
-saves any, calls times states, if calls do not rise; or the latter throughout, if that ends with fewer calls. The set is
+saves any, calls times states, if calls do not rise. A second choice saves calls times states throughout, and lets fast
+motions follow last of all; it is taken where it ends with fewer calls, or with fewer states for hardly more. The set is
 confirmed by the exact solve at every speed. Where it is not kept, the step of the path that breaks it is found by
 halving, taken back for good, and the choice goes on without it. What is reported was confirmed and certified, always.
 """
@@ -10,7 +11,7 @@ halving, taken back for good, and the choice goes on without it. What is reporte
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from math import inf, log
+from math import exp, inf, log
 
 import numpy as np
 
@@ -31,11 +32,14 @@ ROUNDS = 30
 CERTAIN = 1e-12
 """Relative error of the identity that certifies a choice; beyond it, rounding has eaten the certificate."""
 WORTH, EVEN = 0.05, 1e-3
-"""Logarithm of calls below which none are saved; by how much, relative, they may rise where states are saved."""
+"""Logarithm of calls up to which two sets cost the same; by how much, relative, a step that saves states may raise
+them."""
 
 Set = frozenset[Effect]
-Order = tuple[Callable[[Set, Set], float], ...]
-"""Measures of what a step saves, from a set to a larger one; a later one counts where no step saves by those before."""
+Steps = Callable[[], list[Set]]
+Order = tuple[tuple[Callable[[Set, Set], float], Steps], ...]
+"""Measures of what a step saves, from a set to a larger one, each with the steps that it judges; a later one counts
+where no step saves by those before."""
 
 
 @dataclass(frozen=True)
@@ -159,10 +163,13 @@ class Chooser:
         return self._costs[chosen]
 
     def choose(self) -> Choice:
-        """Of two greedy choices, each confirmed, the one of fewer calls, else of fewer states: the first saves calls
-        wherever a step can, the second calls times states throughout."""
-        both = [self._greedy(order) for order in ((self._calls_saved, self._work_saved), (self._work_saved,))]
-        return min(both, key=lambda one: (round(log(one.after.calls) / EVEN), one.after.states))
+        """Of two greedy choices, each confirmed, the one of fewer calls, or of fewer states for as good as no more: the
+        first saves calls wherever a step can, the second calls times states throughout, and leaves motions last."""
+        calls, work, one, two = self._calls_saved, self._work_saved, self._singles, self._pairs
+        both = [self._greedy(((calls, one), (calls, two), (work, one), (work, two))),
+                self._greedy(((work, self._firsts), (work, two), (work, one)))]  # fmt: skip
+        least = min(choice.after.calls for choice in both) * exp(WORTH)
+        return min((choice for choice in both if choice.after.calls <= least), key=lambda choice: choice.after.states)
 
     def _greedy(self, order: Order) -> Choice:
         kept: list[Set] = [frozenset()]
@@ -210,13 +217,10 @@ class Chooser:
         return path
 
     def _next(self, chosen: Set, banned: set[Set], order: Order) -> Set:
-        """The next step: one that saves by the first of the measures by which one does; a pair only if no single one
-        does. Empty where none is within the budget."""
-        for saved in order:
-            for steps in (self._singles, self._pairs):
-                if step := self._best(chosen, banned, steps(), saved):
-                    return step
-        return frozenset()
+        """The next step: one that saves by the first of the measures by which one does; empty where none is within the
+        budget."""
+        found = (self._best(chosen, banned, steps(), saved) for saved, steps in order)
+        return next((step for step in found if step), frozenset())
 
     def _calls_saved(self, chosen: Set, further: Set) -> float:
         """Logarithm, of savings worth the tolerance they take."""
@@ -232,6 +236,10 @@ class Chooser:
         named = {effect.name: effect for effect in self.effects}
         return [frozenset([effect, *(named[name] for name in (*effect.needs, *effect.after))])
                 for effect in self.effects]  # fmt: skip
+
+    def _firsts(self) -> list[Set]:
+        """The same of effects that none need go after."""
+        return [own for own in self._singles() if not any(effect.last for effect in own)]
 
     def _pairs(self) -> list[Set]:
         """Pairs of which at least one breaks the tolerance alone, while both together hold it; of effects that others

@@ -49,7 +49,8 @@ class Effect:
 
     needs : effects that must be left out, too, and go with it; after : ones that must be left out, too, and go before;
     excludes : effects that may not be left out beside it; ``why``, a phrase for all three. singular : no small change
-    in any respect, so that it is solved and not screened. own : a table [effects.NAME], which goes before all others,
+    in any respect, so that it is solved and not screened. last : left out of any set in one and the same way, and so
+    at times after all others. own : a table [effects.NAME], which goes before all others,
     for without it the vehicle is another one.
     """
 
@@ -61,6 +62,7 @@ class Effect:
     why: str = ""
     singular: bool = False
     after: tuple[str, ...] = ()
+    last: bool = False
     own: bool = False
 
 

@@ -8,6 +8,7 @@ that is inert, b that only dampers hold back (a state each) and e that only spri
 Nothing is taken to a limit with large numbers, so that singular changes are as exact as any other.
 """
 
+from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -16,11 +17,12 @@ from scipy.linalg import block_diag, null_space
 
 from models.errors import InputError
 from models.ride.choice.held import Held
-from models.ride.choice.slow import slow
+from models.ride.choice.slow import Motions
 from models.ride.delayed_system import DelayedSystem
 from models.ride.excitation import Excitation
 from models.ride.linear_vehicle import LinearVehicle
 from models.ride.weighting import weighted
+from models.scene_effects import tables_of
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, mass
@@ -44,6 +46,18 @@ class Reduced:
     states: int
 
 
+@dataclass(frozen=True)
+class Unweighted:
+    """``Reduced`` before weightings, with all its motions."""
+
+    vehicle: LinearVehicle
+    N: np.ndarray
+    excitation: Excitation
+    motions: Motions
+    T: np.ndarray
+    left: np.ndarray
+
+
 class Whole:
     """A scene with all its effects at a speed (m/s), from which systems without some of them are made."""
 
@@ -51,15 +65,36 @@ class Whole:
         self.held, self.speed = held, speed
         self.linear = linearise(held.vehicle, speed)
         self.excitation = held.excitation()
+        self._made: dict[Hashable, Unweighted] = {}
+        self._roads: dict[Hashable, tuple[Excitation, np.ndarray, np.ndarray]] = {}
         self.full = self.reduced(held)
 
     def reduced(self, held: Held) -> Reduced:
         """What is left of the scene; raises InputError where it is no system."""
+        rest = self._unweighted(held)
+        system, T, left = rest.motions.system, rest.T, rest.left
+        if held.fastest < np.inf:
+            system, G, back = rest.motions.slow(held.fastest)
+            T, left = T @ G, back @ left
+        states, weightings = len(system.A), self.held.scene.weighting
+        if weightings:
+            system = weighted(system, weightings)
+            more = np.eye(len(system.A) - states)
+            T, left = block_diag(T, more), block_diag(left, more)
+        return Reduced(rest.vehicle, rest.N, rest.excitation, system, T, left, states)
+
+    def _unweighted(self, held: Held) -> "Unweighted":
+        """Made once, however many of its fast motions are left out."""
+        key = (held.vehicle, *_road(held), held.massless, held.rigid, held.locked)
+        if key not in self._made:
+            self._made[key] = self._make(held)
+        return self._made[key]
+
+    def _make(self, held: Held) -> "Unweighted":
         constrained, N = constrain(held, self.speed)
-        excitation = held.excitation()
+        excitation, Tf, left_f = self._heights(held)
         system, Tq, back = first_order(constrained, excitation, self.speed)
         behind = np.linalg.solve(N.T @ self.linear.mass @ N, N.T @ self.linear.mass)
-        Tf, left_f = _of_road(self.held, self.excitation, held, excitation)
         n, m, x = len(self.linear.mass), len(Tf), len(system.A)
         if x == Tf.shape[1]:
             raise InputError("", "effects", None, "nothing is left that could move")
@@ -70,13 +105,21 @@ class Whole:
         left[:inert, :n], left[inert : 2 * inert, n : 2 * n] = back[0] @ behind, back[0] @ behind
         left[2 * inert : x - Tf.shape[1], :n] = back[1] @ behind
         left[x - Tf.shape[1] :, 2 * n :] = left_f
-        T = np.vstack([q, q @ system.A, f])
-        if held.fastest < np.inf:
-            system, G, rest = slow(system, x - Tf.shape[1], held.fastest)
-            T, left = T @ G, rest @ left
-        out = weighted(system, self.held.scene.weighting)
-        more = np.eye(len(out.A) - len(system.A))
-        return Reduced(constrained, N, excitation, out, block_diag(T, more), block_diag(left, more), len(system.A))
+        motions = Motions(system, x - Tf.shape[1])
+        return Unweighted(constrained, N, excitation, motions, np.vstack([q, q @ system.A, f]), left)
+
+    def _heights(self, held: Held) -> tuple[Excitation, np.ndarray, np.ndarray]:
+        """The road that is left, and ``_of_road`` of it."""
+        key = _road(held)
+        if key not in self._roads:
+            excitation = held.excitation()
+            self._roads[key] = (excitation, *_of_road(self.held, self.excitation, held, excitation))
+        return self._roads[key]
+
+
+def _road(held: Held) -> tuple[Hashable, ...]:
+    """What tells one road of a scene less some effects from another."""
+    return held.scene.road, tuple(tables_of(held.scene))
 
 
 def constrain(held: Held, speed: float) -> tuple[LinearVehicle, np.ndarray]:

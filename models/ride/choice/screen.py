@@ -18,7 +18,8 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from models.errors import InputError
 from models.ride.choice.reduced import Reduced
-from models.ride.covariance import FINITE, Covariance, hits, intensity, lyapunov, silence, stationary
+from models.ride.choice.slow import still
+from models.ride.covariance import FINITE, Covariance, lyapunov, noise_of, silence, stationary
 from models.ride.delayed_system import DelayedSystem
 from models.ride.marginal import parts
 
@@ -47,24 +48,13 @@ def solve(system: DelayedSystem, rows: list[int]) -> Solved:
     return Solved(P, L, np.array([c @ P @ c for c in C.astype(np.longdouble)]))
 
 
-def noise_of(system: DelayedSystem) -> np.ndarray:
-    """Q of the system's Lyapunov equation."""
-    B, _, delays = hits(system)
-    return intensity(system.A, B, delays, system.independent)
-
-
-SLOWEST = 1e-9
-"""Decay, by the fastest rate, below which a motion counts as one that does not die out."""
-
-
 class Screen:
     """Predictions for systems reduced further than ``base``, from its solution; quantities by their rows of C."""
 
     def __init__(self, base: Reduced, rows: list[int]) -> None:
         self.base, self.rows = base, rows
         A, C = base.system.A, base.system.C[rows]
-        values = np.linalg.eigvals(A)
-        if values.real.max(initial=-np.inf) > -SLOWEST * abs(values).max(initial=0.0):
+        if still(A):
             raise InputError("", "vehicle", None, "has a motion that nothing pulls back, as one that is free to drive "
                              "away: effects are chosen for vehicles of which every motion dies out")
         self.P = solve_continuous_lyapunov(A, -noise_of(base.system))

@@ -1,4 +1,4 @@
-"""Fast motions of the vehicle, such as wheel hop or an engine on its mounts: they follow the road at once."""
+"""Fast motions of the vehicle, such as wheel hop or an engine on its mounts: they follow the rest and the road."""
 
 from dataclasses import replace
 from functools import partial
@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from models.ride.choice.held import Effect, Held, holds, of_vehicle
-from models.ride.effects import tyre_damping
 from models.ride.operating_point import poles
 from models.vehicles.spatial_linear import linearise
 
@@ -21,23 +20,19 @@ leave_out = of_vehicle
 
 
 def found(held: Held) -> list[Effect]:
-    """One effect per group of motions of like rate but the slowest; each goes after all that are faster, so that large
-    errors of several never pass for small ones where they cancel."""
+    """One effect per group of motions of like rate but the slowest; each goes after all that are faster."""
     if held.scene.speeds is None:
         return []
     speeds = held.scene.speeds.all()
     rates = np.sort(abs(poles(linearise(held.vehicle, float(speeds[len(speeds) // 2])))))
     groups = [group for group in np.split(rates, 1 + np.flatnonzero(rates[1:] > APART * rates[:-1])) if group[-1] > 0]
-    white = held.scene.road.cutoff is None and any(tyre.damping for tyre in held.vehicle.tyres)
-    needs = (tyre_damping.NAME,) if white else ()
-    why = "for the fastest go first" + (", and the road's white noise would pass" if white else "")
     out: list[Effect] = []
     for slower, group in zip(groups[-2::-1], groups[:0:-1], strict=True):
         fastest = float(np.sqrt(slower[-1] * group[0]))
         name = f"motions at {_hertz(group)}"
-        said = f"what is faster than {fastest / (2 * pi):.4g} Hz follows the road at once"
-        out.append(Effect(name, partial(_without, fastest=fastest), said, needs, (), why, True,
-                          tuple(effect.name for effect in out)))  # fmt: skip
+        said = f"what is faster than {fastest / (2 * pi):.4g} Hz is where the rest and the road have it in the mean"
+        out.append(Effect(name, partial(_without, fastest=fastest), said, why="for the fastest go first", singular=True,
+                          after=tuple(effect.name for effect in out), last=True))  # fmt: skip
     return out
 
 
