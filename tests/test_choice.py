@@ -99,6 +99,7 @@ def test_what_the_confirmation_breaks_is_taken_back(monkeypatch):
     own = chooser(monkeypatch, quantity, ("a", "b"))
     own.screen.variants._run = lambda left_out, times: Made._run(own.screen.variants, left_out, max(2, times))
     own.screen.variants._kept.clear()
+    own.whole.variants._kept.clear()
     monkeypatch.setattr(own.whole.variants, "_run", lambda left_out, times: Made._run(own.whole.variants, left_out, 1))
     choice = own.choose()
     assert choice.left_out == ("a",) and choice.kept and choice.confirmed[0] == pytest.approx(0.005)

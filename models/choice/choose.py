@@ -141,6 +141,13 @@ class Chooser:
         """Whether all changes are within the tolerance."""
         return bool((changes <= self.tolerance).all())
 
+    def better(self, further: Set, kept: Set) -> bool:
+        """Whether it holds to leave these out, and takes less work than what is kept does at the steps that hold."""
+        if not self.holds(self.confirm(further)):
+            return False
+        work = [self.whole.variants.work(one, self._confirmed[one][0]) for one in (further, kept)]
+        return work[0] < work[1]
+
     def choose(self) -> Choice:
         """The greedy choice, confirmed."""
         none: Set = frozenset()
@@ -151,13 +158,13 @@ class Chooser:
             path = self.path(kept, banned)
             if path == kept:
                 break
-            if self.holds(self.confirm(path[-1])):
+            if self.better(path[-1], kept[-1]):
                 kept = path
                 continue
             low, high = len(kept) - 1, len(path) - 1  # path[low] is kept, path[high] is not
             while high - low > 1:
                 middle = (low + high) // 2
-                low, high = (middle, high) if self.holds(self.confirm(path[middle])) else (low, middle)
+                low, high = (middle, high) if self.better(path[middle], kept[-1]) else (low, middle)
             banned.add(path[high] - path[low])
             kept = path[: low + 1]
         return self._sure(self._choice(kept[-1]))

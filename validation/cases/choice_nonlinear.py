@@ -7,16 +7,22 @@ from typing import Any
 import numpy as np
 
 from models.choice.choose import Choice, Chooser
+from models.choice.variants import Variants
 from validation.choice.drawn_scenes import Asked, drawn
+from validation.ride.drawn_bent_rides import COPIES, Bent, drawn_bent
 from validation.rows import Row, System, Table, at_most, finding, within
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
 SYSTEM: System = "effects"
-COUNTS = {"pitch-plane": 22, "wheelset": 3, "braking": 3}
+COUNTS = {"pitch-plane": 22, "wheelset": 3, "braking": 3, "ride": 7}
 """Scenes drawn of each system."""
 ENGINES = {"pitch-plane": ("reference", "mujoco"), "wheelset": ("reference", "mujoco", "exudyn"),
-           "braking": ("mujoco", "reference", "reference")}  # fmt: skip
+           "braking": ("mujoco", "reference", "reference"), "ride": ("reference",)}  # fmt: skip
 """Implementations that take turns."""
+FRESH, AGAIN = 4, 77
+"""Rides are judged by so many times as many copies as they were chosen with, on roads of this seed."""
+RESAMPLED, UNSURE = 4000, 0.0015
+"""Of copies, to tell what they are sure of: this quantile is left below."""
 QUICK = 3
 """Scenes of the pitch plane alone in the quick share."""
 TOLD = (1e-4, 0.05)
@@ -25,11 +31,12 @@ TOLD = (1e-4, 0.05)
 
 @dataclass(frozen=True)
 class Judged:
-    """A scene with its choice, and changes (quantities,) by two runs of its own, made after the choice."""
+    """A scene with its choice, and changes (quantities,) by two runs of its own, made after the choice; of rides, on
+    fresh roads and less what chance may add there."""
 
     system: str
     engine: str
-    asked: Asked
+    asked: Asked | Bent
     choice: Choice
     again: np.ndarray
 
@@ -41,6 +48,8 @@ class Judged:
 
 def judged(system: str, seed: int) -> Judged:
     """The scene of a seed."""
+    if system == "ride":
+        return judged_ride(drawn_bent(seed))
     return judged_of(drawn(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
 
 
@@ -52,6 +61,25 @@ def judged_of(asked: Asked, system: str, engine: str) -> Judged:
     rest = runs.system.answer(runs.changed(frozenset(choice.left_out), choice.times), engine)
     again = [_change(whole.of(name).cases, rest.of(name).cases) for name in asked.quantities]
     return Judged(system, engine, asked, choice, np.array(again))
+
+
+def judged_ride(asked: Bent) -> Judged:
+    """Choose, and run the vehicle and what is left on roads that the choice has not seen."""
+    engine = ENGINES["ride"][0]
+    choice = Chooser(asked.opened(), engine, list(asked.quantities), asked.tolerance).choose()
+    fresh = Variants(asked.opened(FRESH * COPIES, AGAIN), engine)
+    whole, rest = fresh.of(), fresh.of(choice.left_out, choice.times)
+    if whole is None or rest is None:
+        return Judged("ride", engine, asked, choice, np.full(len(asked.quantities), np.inf))
+    again = [_sure(whole.of(name).cases[0], rest.of(name).cases[0]) for name in asked.quantities]
+    return Judged("ride", engine, asked, choice, np.array(again))
+
+
+def _sure(whole: np.ndarray, rest: np.ndarray) -> float:
+    """Least relative change of a deviation that mean squares (m,) are sure of, by resampling the copies."""
+    picked = np.random.default_rng(AGAIN).integers(len(whole), size=(RESAMPLED, len(whole)))
+    changes = np.abs(np.sqrt(rest[picked].mean(axis=1) / whole[picked].mean(axis=1)) - 1.0)
+    return float(np.quantile(changes, UNSURE))
 
 
 def _change(whole: tuple[np.ndarray, ...], rest: tuple[np.ndarray, ...]) -> float:
@@ -66,7 +94,7 @@ def _change(whole: tuple[np.ndarray, ...], rest: tuple[np.ndarray, ...]) -> floa
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Random scenes of three systems; the quick share has three of the pitch plane."""
+    """Random scenes of four systems; the quick share has three of the pitch plane."""
     counts = {"pitch-plane": QUICK} if quick else COUNTS
     found = [judged(system, seed) for system, count in counts.items() for seed in range(count)]
     rows = [*_kept(found), _predictions(found, quick), *(row for system in counts for row in _saving(found, system))]
@@ -134,7 +162,8 @@ def tables(data: dict[str, Any]) -> list[Table]:
         rows.append((system, str(len(own)), *(f"{np.median(values):.3g}" for values in (saved, alone, faster)),
                      ", ".join(f"{name} {sum(name in one['left out'] for one in own)}" for name in went) or "none"))
     heads = ("system", "scenes", "fewer calls", "by steps alone", "fewer CPU seconds", "effects left out, how often")
-    note = "Medians, times; tolerances are 0.5, 2 and 5 % in turn. Each choice is confirmed over the whole run."
+    note = ("Medians, times; tolerances are 0.5, 2 and 5 % in turn, of rides 1, 2 and 5 %. Each choice is confirmed "
+            "over the whole run.")  # fmt: skip
     return [Table("What choosing effects and steps saves", note, heads, tuple(rows))]
 
 
@@ -149,10 +178,10 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         own = [one for one in data["scenes"] if one["system"] == system]
         predicted, confirmed = (100 * np.array([value for one in own for value in one[key]])
                                 for key in ("predicted", "confirmed"))  # fmt: skip
-        left.plot(confirmed.clip(ends[0]), predicted.clip(ends[0]), "os^"[i], ms=4, color=f"C{i}", label=system)
+        left.plot(confirmed.clip(ends[0]), predicted.clip(ends[0]), "os^D"[i], ms=4, color=f"C{i}", label=system)
         shift = 1.06 ** (i - 1)
         right.plot([100 * one["tolerance"] * shift for one in own], [one["calls"][0] / one["calls"][2] for one in own],
-                   "os^"[i], ms=4, color=f"C{i}", label=system)  # fmt: skip
+                   "os^D"[i], ms=4, color=f"C{i}", label=system)  # fmt: skip
     left.set(xscale="log", yscale="log", xlabel="confirmed change [%] (at the end: smaller)",
              ylabel="predicted change [%]", title="All that was left out, and longer steps")  # fmt: skip
     right.axhline(5.0, color="#222222", ls="--", lw=0.8, label="5 times")
@@ -163,8 +192,8 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
 
 
 SAID = (
-    "Random scenes of half cars on roads, wheelsets and braked trucks: effects that the quantities can do without are "
-    "left out and steps lengthened as far as the tolerance allows, predicted from runs without one and two effects in "
-    "steps as long as hardly matters, and confirmed by the whole run."
+    "Random scenes of half cars on roads, wheelsets, braked trucks and rides on bent springs: effects that the "
+    "quantities can do without are left out and steps lengthened as far as the tolerance allows, predicted from runs "
+    "without one and two effects in steps as long as hardly matters, and confirmed by the whole run."
 )
 """Text of the figure."""

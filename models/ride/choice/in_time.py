@@ -23,7 +23,7 @@ from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.scene import RideScene
 from models.ride.statistical_linearisation import BentSpring, bent, statistically_linear
 from models.scene_effects import absent, beside
-from models.strict import Strict, quantity
+from models.strict import LARGEST, Strict, quantity
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper
 
 FEWEST = 12
@@ -143,7 +143,7 @@ class InTime:
         march.over(roads, pace.settling // self.times, every)
         count = len(range(0, pace.counted // self.times, every))
         first, second = march.sums[0].T / count, march.sums[1].T / count
-        if not np.isfinite(second).all():
+        if not (second < LARGEST).all():
             raise RunFailed("reference", f"grows without end in steps of {step:.3g} s", step)
         mean = first.mean(axis=0)
         return march.plain.outputs, second - 2 * mean * first + mean**2
