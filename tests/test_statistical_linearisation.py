@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.errors import InputError, RunFailed
-from models.ride.copies_kernel import march, rates
+from models.ride.copies_kernel import TOGETHER, march, rates
 from models.ride.covariance import stationary
 from models.ride.excitation import excited
 from models.ride.gaussian_laws import of_curve, of_friction
@@ -174,15 +174,30 @@ def test_a_copy_goes_where_an_engine_goes():
     springs = bent(vehicle)
     plain = linearise(vehicle, SPEED, {s.name: (s.stiffness, s.damping) for s in springs})
     laws, x = laws_of(vehicle, plain, springs, SPEED), np.zeros((4, 1))
-    sums, force, rate = np.zeros((4, 3, 1)), np.empty(1), np.empty(4)
+    sums, force, rate = np.zeros((4, len(plain.outputs), 1)), np.empty((1, 1)), np.empty((4, 1))
     march(x, table[:, :, None], road.step, 300, 1, laws, sums)
     assert not sums.any(), "nothing is read before its time"
     assert np.abs(x[:, 0] - [*run.positions[-1], *run.rates[-1]]).max() < 1e-12
-    rates(x[:, 0].copy(), table[-1], laws, force, rate)
-    assert abs(force[0]) > 100.0, "N: the bent laws are at work"
+    rates(x.copy(), table[-1:].T.copy(), laws, force, rate, np.empty((2, 1)))
+    assert abs(force[0, 0]) > 100.0, "N: the bent laws are at work"
     march(x, np.repeat(table[-1:, :, None], 3, axis=0), 0.0, 0, 1, laws, sums)
-    strut = vehicle.bodies[0].mass * rate[2]  # all that pulls at the body
+    strut = vehicle.bodies[0].mass * rate[2, 0]  # all that pulls at the body
     assert sums[:, 2, 0] == pytest.approx(strut ** np.arange(1, 5), rel=1e-12)
+
+
+def test_copies_side_by_side_go_where_each_goes_alone():
+    """As many as two and a bit of the blocks that are stepped together, by bits: all do the same sums."""
+    vehicle, excitation_ = ride(NONLINEAR, 16.0)
+    road, copies = road_path(excitation_, SPEED, 1e-3), 2 * TOGETHER + 3
+    springs = bent(vehicle)
+    plain = linearise(vehicle, SPEED, {s.name: (s.stiffness, s.damping) for s in springs})
+    laws, roads = laws_of(vehicle, plain, springs, SPEED), next(road.blocks(30, copies, 5))
+    x, sums = np.zeros((4, copies)), np.zeros((4, len(plain.outputs), copies))
+    march(x, roads, road.step, 0, 4, laws, sums)
+    for copy in (0, TOGETHER - 1, TOGETHER, copies - 1):
+        one, of_one = np.zeros((4, 1)), np.zeros((4, len(plain.outputs), 1))
+        march(one, roads[:, :, copy : copy + 1].copy(), road.step, 0, 4, laws, of_one)
+        assert (one[:, 0] == x[:, copy]).all() and (of_one[:, :, 0] == sums[:, :, copy]).all()
 
 
 def test_standard_errors_of_a_run():

@@ -111,7 +111,7 @@ class SpatialExudyn:
         return self._jacobian(self.built.marker(body, point), KINDS.Velocity)
 
     def _turn(self, body: str) -> np.ndarray:
-        return self._jacobian(self.built.marker(body, self.vehicle.body(body).position), KINDS.AngularVelocity)
+        return self._jacobian(self.built.marker(body, self.vehicle.body(body).position, True), KINDS.AngularVelocity)
 
     def _jacobian(self, marker: Any, kind: Any) -> np.ndarray:
         """(3, n) of a marker in the design position: its velocity by each rate of 1."""

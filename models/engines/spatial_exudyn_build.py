@@ -95,23 +95,24 @@ class Build:
     ground: Any
     links: dict[str, tuple[Any, int | None, Vector]] = field(default_factory=dict)
     places: dict[tuple[str, str], tuple[Any, int]] = field(default_factory=dict)
-    markers: dict[tuple[str | None, Vector], Any] = field(default_factory=dict)
+    markers: dict[tuple[str | None, Vector, bool], Any] = field(default_factory=dict)
     callbacks: int = 0
 
-    def marker(self, body: str | None, point: Vector) -> Any:
-        """Marker of a point, made once."""
-        key = (body, point)
+    def marker(self, body: str | None, point: Vector, turning: bool = False) -> Any:
+        """Marker of a point, made once; ``turning``: it is asked for its axes or its turning, too."""
+        key = (body, point, turning and body is not None and self.links[body][1] is None)
         if key not in self.markers:
-            self.markers[key] = self.mbs.AddMarker(self._new_marker(body, point))
+            self.markers[key] = self.mbs.AddMarker(self._new_marker(*key))
         return self.markers[key]
 
-    def _new_marker(self, body: str | None, point: Vector) -> Any:
+    def _new_marker(self, body: str | None, point: Vector, turning: bool) -> Any:
         if body is None:
             return items.MarkerBodyRigid(bodyNumber=self.ground, localPosition=list(point))
         tree, link, origin = self.links[body]
         local = self.own(body, np.subtract(point, origin))
         if link is None:
-            return items.MarkerBodyRigid(bodyNumber=tree, localPosition=local)
+            kind = items.MarkerBodyRigid if turning else items.MarkerBodyPosition
+            return kind(bodyNumber=tree, localPosition=local)
         return items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localPosition=local)
 
     def reader(self, body: str, freedom: str, kind: Any = KINDS.Coordinates) -> Callable[[], float]:
@@ -218,14 +219,16 @@ def _trees(vehicle: SpatialVehicle) -> list[list[Body]]:
 def _spring(built: Build, spring: SpringDamper) -> None:
     """Native where Exudyn has an item for it: along a global axis, or along any axis of a body that never turns."""
     axis, ends = np.array(spring.axis), [spring.one, spring.two]
-    one, two = built.marker(spring.one, spring.point_one), built.marker(spring.two, spring.point_two)
+    upright = np.count_nonzero(axis) == 1
+    one, two = (built.marker(end, point, not upright) for end, point in zip(
+        ends, (spring.point_one, spring.point_two), strict=True))  # fmt: skip
     rest = np.subtract(spring.point_two, spring.point_one)
     curved = spring.travel_force or spring.rate_force or spring.friction
-    if curved or not (np.count_nonzero(axis) == 1 or any(not built.vehicle.turns(end) for end in ends)):
+    if curved or not (upright or any(not built.vehicle.turns(end) for end in ends)):
         built.connect(one, two, _law(spring, axis, rest, built.held.parts[spring.name]))
         return
     sunk = built.held.parts[spring.name] / spring.stiffness if spring.stiffness else 0.0
-    if np.count_nonzero(axis) == 1:
+    if upright:
         built.mbs.AddObject(items.CartesianSpringDamper(
             markerNumbers=[one, two], stiffness=spring.stiffness * axis**2, damping=spring.damping * axis**2,
             offset=rest - sunk * axis))  # fmt: skip
@@ -314,11 +317,12 @@ def _steady_tyres(built: Build, tyres: list[Tyre], by_road: np.ndarray, road: Ro
     for row, places in zip(rows, lifts, strict=True):
         for node, index in places:
             row[first[node] + index] = 1.0
-    stiffness, damping = (np.array(values) for values in zip(*((t.stiffness, t.damping) for t in tyres), strict=True))
+    stiffness, damping, held = np.array([(t.stiffness, t.damping, built.held.tyres[t.name]) for t in tyres]).T
     force = road.forces(by_road @ rows)
     built.mbs.AddObject(items.ObjectGenericODE2(
         nodeNumbers=nodes, massMatrix=np.zeros((rows.shape[1],) * 2), stiffnessMatrix=rows.T * stiffness @ rows,
-        dampingMatrix=rows.T * damping @ rows, forceVector=rows.T @ [built.held.tyres[t.name] for t in tyres],
+        **({"dampingMatrix": rows.T * damping @ rows} if damping.any() else {}),
+        **({"forceVector": rows.T @ held} if held.any() else {}),
         forceUserFunction=lambda mbs, t, item, q, v: force.rows[round(t * road.per_time)]))  # fmt: skip
     built.callbacks += 1
 
@@ -366,6 +370,8 @@ def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadTable) -> B
             markerNumbers=[built.marker(None, centre), built.marker(drag.body, centre)],
             damping=[drag.coefficient * float(speed or 0.0), 0, 0]))  # fmt: skip
     for output in vehicle.outputs:
-        if isinstance(output, PointOutput | TurnOutput):
-            built.marker(output.body, getattr(output, "point", vehicle.body(output.body).position))
+        if isinstance(output, PointOutput):
+            built.marker(output.body, output.point)
+        if isinstance(output, TurnOutput):
+            built.marker(output.body, vehicle.body(output.body).position, True)
     return built
