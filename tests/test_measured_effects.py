@@ -70,3 +70,8 @@ def test_auto_leaves_out_what_the_question_does_not_see():
                   virtual={"duration": 0.18, "format": "csv", "faults": faults})  # fmt: skip
     choice = Chooser(scene, "mujoco", scene.quantities, scene.tolerance).choose()
     assert choice.left_out == ("sensor_noise",) and choice.kept
+
+
+def test_a_stabiliser_leaves_for_none_as_the_other_one_costs_more():
+    for name in ("kalman_filter", "prescribed_angles"):
+        assert without(beside(short(), name), name).stabilise.method == "none"

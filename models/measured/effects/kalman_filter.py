@@ -14,9 +14,8 @@ def named(scene: Any) -> bool:
 
 
 def leave_out(table: dict[str, Any], scene: Any) -> None:
-    """Measured angles are enforced as they are."""
-    table["stabilise"] = {key: value for key, value in table.get("stabilise", {}).items() if key == "smoothing"} | {
-        "method": "prescribed"}
+    """Nothing holds roll and pitch: to enforce them would cost more."""
+    table.setdefault("stabilise", {})["method"] = "none"
 
 
 def put_in(table: dict[str, Any], scene: Any) -> None:

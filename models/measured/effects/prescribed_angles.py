@@ -3,7 +3,7 @@
 from typing import Any
 
 PLACE = "stabilise.method"
-COST = "two coordinates less, and derivatives of the smoothed angles"
+COST = "derivatives of the smoothed angles before the run, and in every call a mass matrix solved for two moments"
 COUNTS = {"all": {"enforced angles": 2}}
 
 
