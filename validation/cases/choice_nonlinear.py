@@ -8,9 +8,11 @@ import numpy as np
 
 from models.choice.choose import Choice, Chooser
 from models.choice.variants import Variants
+from models.errors import InputError
+from models.ride.choice.in_time import FEWEST
 from validation.choice.drawn_scenes import Asked, drawn
 from validation.ride.drawn_bent_rides import COPIES, Bent, drawn_bent
-from validation.rows import Row, System, Table, at_most, finding, within
+from validation.rows import Row, System, Table, at_most, behaves, finding, within
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
 SYSTEM: System = "effects"
@@ -21,6 +23,8 @@ ENGINES = {"pitch-plane": ("reference", "mujoco"), "wheelset": ("reference", "mu
 """Implementations that take turns."""
 FRESH, AGAIN = 4, 77
 """Rides are judged by so many times as many copies as they were chosen with, on roads of this seed."""
+NOISY, FINE = 4, 0.005
+"""A ride, and a tolerance for which its copies are too few if they are the fewest."""
 RESAMPLED, UNSURE = 4000, 0.0015
 """Of copies, to tell what they are sure of: this quantile is left below."""
 QUICK = 3
@@ -98,6 +102,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     counts = {"pitch-plane": QUICK} if quick else COUNTS
     found = [judged(system, seed) for system, count in counts.items() for seed in range(count)]
     rows = [*_kept(found), _predictions(found, quick), *(row for system in counts for row in _saving(found, system))]
+    rows += [] if quick else [_refused()]
     return rows, {"scenes": [_shown(one) for one in found], "systems": list(counts)}
 
 
@@ -107,6 +112,17 @@ def _kept(found: list[Judged]) -> list[Row]:
                    kept, "", 1.0, 0.05, "asked: at least 95 of 100", "none"),
             at_most("choice_nonlinear.honest", SYSTEM, "choices reported as kept that two more runs find broken",
                     float(sum(not one.honest for one in found)), "", 0.0, "asked: never", "none")]  # fmt: skip
+
+
+def _refused() -> Row:
+    """A ride with few copies and a fine tolerance, which chance alone could break."""
+    asked, said = drawn_bent(NOISY), "a choice"
+    try:
+        Chooser(asked.opened(FEWEST), ENGINES["ride"][0], list(asked.quantities), FINE).choose()
+    except InputError as error:
+        said = "refused" if "samples would tell" in error.allowed else error.allowed
+    return behaves("choice_nonlinear.refused", SYSTEM, f"a ride of {FEWEST} copies, tolerance {100 * FINE:g} %, where "
+                   "chance may add more than that", said, "refused", "and how many samples would tell")  # fmt: skip
 
 
 def _pairs(found: list[Judged]) -> np.ndarray:

@@ -1,0 +1,129 @@
+"""Effects of rides on bent springs: copies that meet the same roads, what chance may add, choice, price, refusals."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.choice.answer import by_chance
+from models.choice.choose import Chooser
+from models.choice.screen import Screen
+from models.choice.systems.ride import opened
+from models.choice.variants import Variants
+from models.errors import InputError
+from models.ride.choice.held import Held
+from models.ride.choice.in_time import FEWEST, left
+from models.ride.scene import build
+from models.ride.statistical_linearisation import bent
+from models.vehicles.spatial_linear import linearise
+from models.vehicles.vehicle_file import load_vehicle
+from validation.price import effects
+from validation.price.effects import price_list
+from validation.price.effects_text import lines
+from validation.ride.drawn_bent_rides import drawn_bent
+
+LAWS = ("curves over rate", "curves over travel", "friction")
+
+
+def quarter_car(**more):
+    table = {"title": "t", "system": "ride", "effects": "auto", "quantities": ["body front"], "tolerance": 0.05,
+             "vehicle": {"file": "quarter_car_nonlinear"}, "road": {"level": 6.4e-5}, "speeds": {"values": [20.0]},
+             "options": {"copies": 16, "lasting": 2.0}}  # fmt: skip
+    return build(table | more, "t")
+
+
+def test_chance_is_the_error_of_a_ratio_of_means():
+    draw = np.random.default_rng(5)
+    full = draw.gamma(4.0, size=(2000, 40))  # 2000 experiments of 40 samples each
+    rest = full * draw.normal(1.02, 0.05, full.shape)
+    found = [by_chance((b - a,), (a,)) for a, b in zip(full, rest, strict=True)]
+    roots = np.sqrt(rest.mean(axis=1) / full.mean(axis=1)) - 1.0
+    assert [one for one, _ in found] == pytest.approx(abs(roots))
+    off, beside = abs(roots - (np.sqrt(1.02) - 1.0)), np.array(found)[:, 1]
+    assert 0.99 < np.mean(off <= beside) < 1.0  # 0.997 of them for normal samples; these are skewed
+
+
+def test_a_change_that_is_the_same_in_all_samples_is_sure_and_nothing_left_is_all():
+    own = np.array([1.0, 2.0, 5.0])
+    assert by_chance((0.21 * own,), (own,)) == pytest.approx((0.1, 0.0))
+    assert by_chance((-own,), (own,)) == (1.0, 0.0)
+    assert by_chance((-2.0 * own,), (own,)) == (np.inf, np.inf)
+
+
+def test_longer_steps_meet_the_same_roads():
+    whole = opened(quarter_car())
+    pace = whole.paces[0]
+    one, two = (scene.squares(pace, scene.roads(pace))[1] for scene in (whole, whole.longer(2)))
+    other = whole.squares(pace, opened(quarter_car(options={"copies": 16, "lasting": 2.0, "seed": 2})).roads(pace))[1]
+    assert np.array_equal(whole.longer(2).roads(pace), whole.roads(pace)[::2])
+    same, apart = (by_chance((rest[:, 0] - one[:, 0],), (one[:, 0],)) for rest in (two, other))
+    assert 0.0 < same[0] < 0.02 and apart[1] > 10.0 * same[1]  # other roads tell next to nothing
+
+
+def test_what_is_left_out_is_gone_and_gains_stand_for_it():
+    whole = opened(quarter_car())
+    rest = whole.without(LAWS)
+    (spring,) = bent(whole.vehicle(whole.paces[0]))
+    (gains,) = rest.vehicle(rest.paces[0]).springs
+    assert not bent(rest.vehicle(rest.paces[0])) and rest.named == ("body z",)
+    k, c = whole.paces[0].springs[spring.name].gains
+    assert (gains.stiffness, gains.damping) == pytest.approx((k, c))  # those of statistical linearisation
+    with pytest.raises(InputError, match="closed form"):
+        opened(quarter_car(vehicle={"file": "quarter_car_nonlinear", "small_motion": True}))
+
+
+def test_a_mount_that_is_left_out_seats_its_body_on_the_other():
+    vehicle = load_vehicle("r19_ride")
+    names = frozenset(spring.name for spring in vehicle.springs if spring.one == "engine")
+    scene = quarter_car(vehicle={"file": "r19_ride"}, quantities=["body centre"])
+    found = left(Held(scene, vehicle, rigid=names), {})
+    assert len(found.coordinates()) == len(vehicle.coordinates()) - 6
+    before, after = (linearise(own) for own in (vehicle, found))
+    mass = sum(body.mass for body in vehicle.bodies if body.name in ("engine", "body"))
+    assert after.mass[0, 0] == pytest.approx(mass) and before.mass[0, 0] < 0.95 * mass
+
+
+def test_a_choice_is_kept_and_says_what_chance_may_add():
+    scene = quarter_car()
+    choice = Chooser(scene, "reference", scene.quantities, scene.tolerance).choose()
+    assert choice.kept and choice.left_out and choice.times > 1
+    assert scene.tolerance - choice.confirmed[0] >= choice.chance[0] > 0.0
+
+
+def test_a_choice_that_chance_alone_could_break_is_refused():
+    asked = drawn_bent(4)
+    with pytest.raises(InputError, match="times as many samples would tell"):
+        Chooser(asked.opened(FEWEST), "reference", list(asked.quantities), 0.005).choose()
+
+
+def test_a_quantity_that_one_sample_makes_up_is_refused():
+    variants = Variants(quarter_car(), "reference")
+    answer = variants.of()
+    name = "body front"
+    lone = replace(answer.quantities[name], cases=(np.array([1.0, *[0.01] * 15]),))
+    variants._kept[frozenset(), 1] = replace(answer, quantities={**answer.quantities, name: lone})
+    with pytest.raises(InputError, match="made up to 87 % by one sample of 16"):
+        Screen(variants, [name])
+
+
+def test_prices_of_a_ride_on_bent_springs_say_what_chance_may_add(monkeypatch):
+    monkeypatch.setattr(effects, "ROUNDS", 3)
+    found = price_list(quarter_car())
+    prices = {price.name: price for price in found.prices}
+    before, after = prices["friction"].counts
+    assert set(LAWS) < set(prices) and after["terms"] == before["terms"] + 1
+    rate = {change.name: change for change in prices["curves over rate"].changes}["body front"]
+    assert rate.chance > 0.0 and rate.relative > 0.01
+    assert " +- " in "\n".join(lines(found, ["body front"])).partition("body front by")[2]
+    assert "weighting" in prices and "not read by runs in time" in prices["weighting"].why
+
+
+def test_the_study_tells_the_choice(twinrig, capsys):
+    asked = ("--set", "vehicle.file=quarter_car_nonlinear", "--set", "quantities=['body front']", "--set",
+             "options.copies=16", "--set", "options.lasting=2.0", "--set", "tolerance=0.05")  # fmt: skip
+    assert twinrig("run", "ride_choice", *asked, "--out", "out", "--json") == 0
+    (found,) = json.loads(capsys.readouterr().out)["answer"]
+    assert found["kept"] and found["errors"]["body front"]["chance"] > 0.0
+    assert twinrig("run", "ride_choice", *asked, "--engine", "mujoco", "--out", "other") == 2
+    assert "leave it out" in capsys.readouterr().err
