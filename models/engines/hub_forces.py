@@ -14,8 +14,8 @@ from models.engines.protocol import Settings, guard
 from models.engines.spatial_protocol import _check_step
 from models.errors import Refused, RunFailed
 from models.hub_forces.cut_vehicle import PITCH, CutVehicle
-from models.hub_forces.kernel import GRAVITY, WRENCH, forces, joint_forces, parts, set_joint_forces
-from models.hub_forces.mechanics import PER_MOTION, inertia
+from models.hub_forces.kernel import WRENCH, accelerate, joint_forces, march, report, set_joint_forces
+from models.hub_forces.mechanics import PER_MOTION
 from models.hub_forces.table import Drive, table
 from models.steps import divides, fitting
 from models.vehicles.spatial_linear import linearise
@@ -76,11 +76,10 @@ class HubModel(ABC):
 
     def reported(self, times: np.ndarray, states: np.ndarray) -> HubRun:
         """A run with the forces of its states."""
-        work, vehicle, n = self.work(), self.vehicle, self.size
+        vehicle = self.vehicle
         inside, moments = np.empty((len(times), len(vehicle.elements))), np.empty((len(times), 2))
         wrenches = np.empty((len(times), len(vehicle.hubs), WRENCH))
-        for i, (time, state) in enumerate(zip(times, np.ascontiguousarray(states), strict=True)):
-            forces(self.numbers, time, state[:n], state[n:], *work[:2], inside[i], wrenches[i], moments[i])
+        report(self.numbers, times, np.ascontiguousarray(states), inside, wrenches, moments)
         return HubRun(times, states, inside, wrenches, moments)
 
     def work(self) -> tuple[np.ndarray, ...]:
@@ -109,25 +108,15 @@ class ReferenceHubs(HubModel):
 
     def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) from the mass matrix of ``mechanics``."""
-        head, joints, bodies, *_ = parts(self.numbers)
-        work, mass = self.work(), np.empty((self.size, self.size))
-        forces(self.numbers, time, q, v, *work)
-        inertia(joints, bodies, work[0], head[GRAVITY], mass, work[1])
-        return np.linalg.solve(mass, work[1])
+        found = np.empty(self.size)
+        accelerate(self.numbers, time, np.ascontiguousarray(q), np.ascontiguousarray(v), found)
+        return found
 
     def marched(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Coordinates and rates (steps + 1, 2 n) by the classical Runge-Kutta method."""
-        states, n, h = np.empty((self.steps + 1, 2 * self.size)), self.size, self.step
+        states = np.empty((self.steps + 1, 2 * self.size))
         states[0] = np.concatenate((q, v))
-
-        def rates(t: float, x: np.ndarray) -> np.ndarray:
-            return np.concatenate((x[n:], self.accelerations(t, x[:n], x[n:])))
-
-        for i, x in enumerate(states[:-1]):
-            a = rates(t := i * h, x)
-            b = rates(t + h / 2, x + h / 2 * a)
-            c = rates(t + h / 2, x + h / 2 * b)
-            states[i + 1] = x + h / 6 * (a + 2 * b + 2 * c + rates(t + h, x + h * c))
+        march(self.numbers, states, self.step)
         return states
 
 

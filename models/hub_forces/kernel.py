@@ -6,10 +6,9 @@ elements, hubs, then the inputs of every half step.
 """
 
 import numpy as np
-from numba import carray
 
-from models.compiled import njit
-from models.contact.stack import at, beyond
+from models.compiled import lean, njit
+from models.contact.stack import array, at, beyond, doubles, start
 from models.hub_forces.cut_vehicle import HEADING, PITCH, ROLL
 from models.hub_forces.mechanics import (
     PARENT,
@@ -40,7 +39,7 @@ WRENCH, GUIDING = 6, 6
 """Columns of inputs: force (N) and moment (N m) of each hub; roll, pitch, their rates and their accelerations."""
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _element(e, joints, m, chassis, v, row, axis, end, by):
     """Force of an element; ``row`` (n,) becomes its travel by the joints behind the chassis. Room: three vectors."""
     turned(m[chassis + 1], e, AXIS, axis, 0)
@@ -60,10 +59,11 @@ def _element(e, joints, m, chassis, v, row, axis, end, by):
     return e[FORCE] + e[STIFFNESS] * travel + e[DAMPING] * rate
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _tyre(hub, joints, m, q, v, height, rate, speed, place, wrench):
     """Write force and moment (space) at the hub by a tyre on a road of this height and rate under it."""
-    by, down, point = np.empty(3), np.array([0.0, 0.0, -hub[HEIGHT]]), np.empty(6)
+    by, down, point = array(doubles(3), (3,)), array(doubles(3), (3,)), array(doubles(6), (6,))
+    down[0], down[1], down[2] = 0.0, 0.0, -hub[HEIGHT]
     turned(m[ROLL + 1], down, 0, point, 0)
     for k in range(3):
         point[3 + k] = place[k] + point[k]
@@ -82,13 +82,13 @@ def _tyre(hub, joints, m, q, v, height, rate, speed, place, wrench):
     wrench[3], wrench[4], wrench[5] = -point[2] * wrench[1], 0.0, point[0] * wrench[1]
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def frame(head, hub):
     """Row of ``m`` in whose axes a hub's wrench is given."""
     return 0 if head[FRAME] == 2.0 else int(head[CHASSIS] if head[FRAME] == 1.0 else hub[LAST]) + 1
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def into(own, vector, i, out, o):
     """Write a vector of space in the axes of a row of ``m``."""
     for k in range(3):
@@ -96,11 +96,12 @@ def into(own, vector, i, out, o):
         out[o + k] = own[r] * vector[i] + own[r + 3] * vector[i + 1] + own[r + 6] * vector[i + 2]
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _enforce(head, wanted, joints, bodies, m, q, v, out, moments):
     """Write the moments (roll, pitch), N m, that give both the accelerations that are wanted."""
     n, w = len(joints), head[HOLDING]
-    mass, sides = np.empty((n, n)), np.zeros((3, n))
+    mass, sides = array(doubles(n * n), (n, n)), array(doubles(3 * n), (3, n))
+    sides[:] = 0.0
     for j in range(n):
         sides[0, j] = out[j]
     sides[1, ROLL] = sides[2, PITCH] = 1.0
@@ -137,7 +138,9 @@ def forces(numbers, t, q, v, m, out, inside, wrenches, moments):
     head, joints, bodies, elements, hubs, inputs = parts(numbers)
     row = inputs[min(max(int(np.rint(t * head[PER_TIME])), 0), len(inputs) - 1)]
     chassis, count = int(head[CHASSIS]), len(hubs)
-    place, wrench, travel, axis, by = np.empty(3), np.empty(6), np.empty(len(joints)), np.empty(3), np.empty(3)
+    place, wrench, axis, by = (array(doubles(3), (3,)), array(doubles(6), (6,)), array(doubles(3), (3,)),
+                               array(doubles(3), (3,)))  # fmt: skip
+    travel = array(doubles(len(joints)), (len(joints),))
     move(joints, q, v, m)
     for i in range(len(elements)):
         inside[i] = _element(elements[i], joints, m, chassis, v, travel, axis, place, by)
@@ -169,17 +172,61 @@ def forces(numbers, t, q, v, m, out, inside, wrenches, moments):
 
 
 @njit(cache=True, error_model="numpy")
+def report(numbers, times, states, inside, wrenches, moments):
+    """Fill what ``forces`` tells of states (m, 2 n) at times (m,): a row of each for every one."""
+    n = states.shape[1] // 2
+    m, out = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n), (n,))
+    out[:] = 0.0
+    for i in range(len(times)):
+        forces(numbers, times[i], states[i, :n], states[i, n:], m, out, inside[i], wrenches[i], moments[i])
+
+
+@njit(cache=True, error_model="numpy")
+def accelerate(numbers, t, q, v, out):
+    """Write the accelerations (n,) of the written-out equations at a time (s), coordinates and rates (n,)."""
+    head, joints, bodies, elements, hubs, _ = parts(numbers)
+    n, e, h = len(joints), len(elements), len(hubs)
+    m, mass = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n * n), (n, n))
+    out[:] = 0.0
+    forces(numbers, t, q, v, m, out, array(doubles(e), (e,)), array(doubles(WRENCH * h), (h, WRENCH)),
+           array(doubles(2), (2,)))  # fmt: skip
+    inertia(joints, bodies, m, head[GRAVITY], mass, out)
+    solve(mass, array(start(out), (1, n)))
+
+
+@njit(cache=True, error_model="numpy")
+def march(numbers, states, step):
+    """The classical Runge-Kutta method by steps (s) from the first of states (m, 2 n), which fills the others."""
+    size = states.shape[1]
+    n = size // 2
+    rate, total, here = array(doubles(size), (size,)), array(doubles(size), (size,)), array(doubles(size), (size,))
+    for i in range(len(states) - 1):
+        total[:] = 0.0
+        for stage in range(4):
+            ahead = 0.0 if stage == 0 else step if stage == 3 else 0.5 * step
+            for k in range(size):
+                here[k] = states[i, k] + (ahead * rate[k] if stage > 0 else 0.0)
+            rate[:n] = here[n:]
+            accelerate(numbers, i * step + ahead, here[:n], here[n:], rate[n:])
+            for k in range(size):
+                total[k] += rate[k] if stage in (0, 3) else 2.0 * rate[k]
+        for k in range(size):
+            states[i + 1, k] = states[i, k] + step / 6.0 * total[k]
+
+
+@njit(cache=True, error_model="numpy")
 def joint_forces(numbers, t, q, v, f):
     """Add the joints' forces to ``f``, for callbacks: all but the time (s) are pointers to doubles."""
-    head = carray(numbers, (HEADER,))
+    head = array(numbers, (HEADER,))
     n, e, h = int(head[JOINTS]), int(head[ELEMENTS]), int(head[HUBS])
-    forces(carray(numbers, (int(head[ALL]),)), t, carray(q, (n,)), carray(v, (n,)),
-           np.empty((n + 1, PER_MOTION)), carray(f, (n,)), np.empty(e), np.empty((h, WRENCH)), np.empty(2))
+    forces(array(numbers, (int(head[ALL]),)), t, array(q, (n,)), array(v, (n,)),
+           array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(f, (n,)), array(doubles(e), (e,)),
+           array(doubles(WRENCH * h), (h, WRENCH)), array(doubles(2), (2,)))  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")
 def set_joint_forces(block, t, n):
     """``joint_forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
     f = at(block)
-    carray(f, (n,))[:] = 0.0
+    array(f, (n,))[:] = 0.0
     joint_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

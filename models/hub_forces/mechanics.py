@@ -7,9 +7,8 @@ principle, with axes and anchors of joints as the columns of its rows.
 
 import math
 
-import numpy as np
-
-from models.compiled import njit
+from models.compiled import lean
+from models.contact.stack import array, doubles
 
 PARENT, TURNS, AXIS, OFFSET, PER_JOINT = 0, 1, 2, 3, 6
 """Numbers of a joint: the one below it (-1: the ground), whether it turns, its axis, where it is on what is below."""
@@ -18,7 +17,7 @@ LAST, MASS, ARM, INERTIA, PER_BODY = 0, 1, 2, 5, 14
 PLACE, TURNED, ALONG, OMEGA, REST, TURN_REST, PER_MOTION = 0, 3, 12, 15, 18, 21, 24
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def add_cross(out, o, a, i, b, j, factor):
     """Add factor a x b to ``out``; vectors begin at o, i and j within the rows that are given."""
     out[o] += factor * (a[i + 1] * b[j + 2] - a[i + 2] * b[j + 1])
@@ -26,7 +25,7 @@ def add_cross(out, o, a, i, b, j, factor):
     out[o + 2] += factor * (a[i] * b[j + 1] - a[i + 1] * b[j])
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def turned(own, vector, i, out, o):
     """Write a vector of the frame of a row of ``m`` in the axes of space."""
     for k in range(3):
@@ -34,10 +33,10 @@ def turned(own, vector, i, out, o):
         out[o + k] = own[r] * vector[i] + own[r + 1] * vector[i + 1] + own[r + 2] * vector[i + 2]
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def move(joints, q, v, m):
     """Fill ``m`` (n + 1, PER_MOTION) from coordinates and rates (n,)."""
-    r = np.zeros(6)
+    r = array(doubles(6), (6,))
     m[0, :] = 0.0
     m[0, TURNED] = m[0, TURNED + 4] = m[0, TURNED + 8] = 1.0
     for j in range(len(joints)):
@@ -63,7 +62,7 @@ def move(joints, q, v, m):
             _turn(own, below, k, q[j], v[j])
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _turn(own, below, k, angle, rate):
     """Turn a row of ``m`` about axis k of the row below by an angle (rad) and its rate (rad/s)."""
     c, s, a, b = math.cos(angle), math.sin(angle), TURNED + (k + 1) % 3, TURNED + (k + 2) % 3
@@ -74,7 +73,7 @@ def _turn(own, below, k, angle, rate):
         own[b + 3 * i] = c * two - s * one
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def locate(own, arms, i, place, o):
     """Write where a point is that lies at an arm from the origin of a row of ``m``, in its axes."""
     turned(own, arms, i, place, o)
@@ -82,7 +81,7 @@ def locate(own, arms, i, place, o):
         place[o + k] += own[PLACE + k]
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def column(turns, own, place, i, out, o):
     """Write how a point at ``place`` moves by the rate of the joint of a row of ``m``, which carries it."""
     for k in range(3):
@@ -92,10 +91,10 @@ def column(turns, own, place, i, out, o):
         add_cross(out, o, own, ALONG, own, PLACE, -1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def add_wrench(joints, m, last, place, wrench, out):
     """Add a force (N) at ``place`` and a moment (N m), ``wrench`` (6,) in space, on what a joint carries."""
-    j, by = last, np.empty(3)
+    j, by = last, array(doubles(3), (3,))
     while j >= 0:
         turns = joints[j, TURNS]
         column(turns != 0.0, m[j + 1], place, 0, by, 0)
@@ -104,13 +103,13 @@ def add_wrench(joints, m, last, place, wrench, out):
         j = int(joints[j, PARENT])
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _times(tensor, vector, i, out):
     for k in range(3):
         out[k] = tensor[3 * k] * vector[i] + tensor[3 * k + 1] * vector[i + 1] + tensor[3 * k + 2] * vector[i + 2]
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _turned_tensor(own, body, out):
     """Write R T R^T (9,) of the inertia of a body and the rotation of a row of ``m``."""
     for i in range(3):
@@ -120,10 +119,11 @@ def _turned_tensor(own, body, out):
                 out[3 * i + j] += own[TURNED + 3 * i + k // 3] * body[INERTIA + k] * own[TURNED + 3 * j + k % 3]
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def resting(own, body, gravity, tensor, arm, a, t):
     """Write a body's inertia and arm in space, and its acceleration and moment of momentum's rate without q''."""
-    h = np.zeros(3)
+    h = array(doubles(3), (3,))
+    h[0] = h[1] = h[2] = 0.0
     _turned_tensor(own, body, tensor)
     turned(own, body, ARM, arm, 0)
     add_cross(h, 0, own, OMEGA, arm, 0, 1.0)
@@ -137,13 +137,13 @@ def resting(own, body, gravity, tensor, arm, a, t):
     add_cross(t, 0, own, OMEGA, h, 0, 1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def inertia(joints, bodies, m, gravity, mass, force):
     """Write the mass matrix (n, n), and add weights and inertia forces without q'' to ``force`` (n,)."""
     n = len(joints)
     mass[:] = 0.0
-    chain, rows = np.empty(n, np.int64), np.empty((n, 9))
-    place, a, t, tensor = np.empty(3), np.empty(3), np.empty(3), np.empty(9)
+    chain, rows, tensor = array(doubles(n), (n,)), array(doubles(9 * n), (n, 9)), array(doubles(9), (9,))
+    place, a, t = array(doubles(3), (3,)), array(doubles(3), (3,)), array(doubles(3), (3,))
     for b in range(len(bodies)):
         body = bodies[b]
         last, kg, count = int(body[LAST]), body[MASS], 0
@@ -166,10 +166,10 @@ def inertia(joints, bodies, m, gravity, mass, force):
                 both = 0.0
                 for k in range(3):
                     both += kg * rows[one, k] * rows[two, k] + rows[one, 6 + k] * rows[two, 3 + k]
-                mass[chain[one], chain[two]] += both
+                mass[int(chain[one]), int(chain[two])] += both
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def solve(matrix, sides):
     """Solve for the rows of ``sides`` (k, n) in place; the matrix, positive, becomes its root (Cholesky)."""
     n = len(matrix)

@@ -1,5 +1,6 @@
 """Hub forces: a bare scene has files of forces and angles; what a run of the cut vehicle is made of, and its path."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,16 @@ def seen(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
               "turning hubs": int(table[kernel.HUBS] * (table[kernel.FRAME] != kernel.FRAMES.index("inertial"))),
               "curves between samples": int(curved)}  # fmt: skip
     return counts, model.run(stabilised.start(drive)).states.tobytes()
+
+
+def job(scene: HubScene, engine: str, steps: int) -> Callable[[], Any]:
+    """A run of the scene over so many of its steps, built beforehand."""
+    from models.engines.hub_forces import build
+    from models.hub_forces.of_scene import measured
+
+    vehicle, own = scene.cut_vehicle(), scene.run
+    drive = measured(scene, vehicle, engine)[1].drive(own.step, steps, scene.forces.interpolation)
+    return build(engine, vehicle, drive, own.step, steps * own.step).run
 
 
 def _noisy(scene: HubScene, truth: Any, forces: Any, angles: Any) -> tuple[int, int]:

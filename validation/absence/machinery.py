@@ -11,9 +11,9 @@ from numba.core.runtime import _nrt_python, rtsys  # type: ignore[attr-defined]
 from models.rail.equations import Path
 from models.rail.of_scene import equations_of
 from models.rail.wheel_forces import LOAD, MZ
-from validation.absence import braking, hand_built_wheelset, wheelset
+from validation.absence import braking, hand_built_wheelset, hub_forces, wheelset
 from validation.absence.bare_cars import cars
-from validation.absence.bare_rides import rides
+from validation.absence.bare_rides import copies, rides
 from validation.absence.of_systems import bare
 from validation.rows import Row, System, at_most
 from validation.timing import interleave, paired_ratio
@@ -67,15 +67,26 @@ def made_by_wheelset(which: int) -> int:
 
 
 def made_by_ride() -> int:
-    """Arrays that more steps of a bare ride make in MuJoCo, where all its forces are compiled."""
-    short, long = (rides("mujoco", steps)[0] for steps in (SHORT, 10 * SHORT))
-    short(), long()
-    return arrays(long) - arrays(short)
+    """Arrays that more steps of a bare ride make, in MuJoCo, where all its forces are compiled, and as copies."""
+    made = 0
+    for jobs in (partial(rides, "mujoco"), copies):
+        short, long = (jobs(steps)[0] for steps in (SHORT, 10 * SHORT))
+        short(), long()
+        made += arrays(long) - arrays(short)
+    return made
 
 
 def made_by_car() -> int:
     """Arrays that more steps of a bare car of a scene of handling make in MuJoCo."""
     short, long = (cars(steps)[0] for steps in (SHORT, 10 * SHORT))
+    short(), long()
+    return arrays(long) - arrays(short)
+
+
+def made_by_hubs(engine: str) -> int:
+    """Arrays that more steps of a bare vehicle driven by its hub forces make."""
+    scene = bare("hub-forces")
+    short, long = (hub_forces.job(scene, engine, steps) for steps in (hub_forces.STEPS // 4, hub_forces.STEPS))
     short(), long()
     return arrays(long) - arrays(short)
 
@@ -100,10 +111,13 @@ def rows() -> list[Row]:
     return [
         at_most("absent.wheelset.arrays", SYSTEM, "arrays that 360 more steps of a bare wheelset make",
                 made_by_wheelset(0), "", 0, why, "none"),
-        at_most("absent.ride.arrays", SYSTEM, "arrays that 360 more steps of a bare ride make in MuJoCo",
+        at_most("absent.ride.arrays", SYSTEM, "arrays that 360 more steps of a bare ride make in MuJoCo and as copies",
                 made_by_ride(), "", 0, why, "none"),
         at_most("absent.handling.arrays", SYSTEM, "arrays that 360 more steps of a bare car make in MuJoCo",
                 made_by_car(), "", 0, why, "none"),
+        at_most("absent.hub-forces.arrays", SYSTEM, "arrays that 15 more steps of a bare vehicle driven by its hub "
+                "forces make in the reference, Exudyn and MuJoCo together", sum(map(made_by_hubs, hub_forces.ENGINES)),
+                "", 0, why, "none"),
         at_most("absent.braking.arrays", SYSTEM, f"arrays that {samples} more samples of a bare braked vehicle make, "
                 "in four steps each", made, "", 0, why, "none"),
     ]  # fmt: skip
