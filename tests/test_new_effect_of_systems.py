@@ -7,6 +7,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+from models.choice.variants import system_of
 from models.contact.cases_table import answer
 from models.contact.of_scene import contact
 from models.contact.scene import build as build_contact
@@ -27,6 +28,7 @@ from models.vehicles.vehicle_file import load_vehicle
 from studies.asked import SCENES
 from validation.absence.contact import BARE as CONTACT
 from validation.absence.of_systems import added, bare, declared, seen
+from validation.price import effects
 from validation.price.effects import price_list
 
 
@@ -190,13 +192,13 @@ def test_new_effects_of_ride_are_priced_and_chosen_among(new_file):
     new_file("ride", "tread", NEW["ride"].text.replace('COST', 'NEEDS = ("delay", "dampers")\nCOST', 1))
     scene = load(SCENES / "ride_choice.toml")
     held = Held(own := beside(scene, "dampers", "tread"), vehicle_of(own))
-    effects = {effect.name: effect for effect in effects_of(held)}
-    assert {"dampers", "tread"} <= effects.keys() and effects["delay front to rear"].needs == ("tread",)
-    assert "cannot be left out alone: leave out tread, too, for it needs it" in illegal([effects["dampers"]])
+    there = {effect.name: effect for effect in effects_of(held)}
+    assert {"dampers", "tread"} <= there.keys() and there["delay front to rear"].needs == ("tread",)
+    assert "cannot be left out alone: leave out tread, too, for it needs it" in illegal([there["dampers"]])
     whole = Whole(held, 20.0)
-    rest = whole.reduced(without_effects(held, [effects["dampers"], effects["tyre damping"], effects["tread"]]))
+    rest = whole.reduced(without_effects(held, [there["dampers"], there["tyre damping"], there["tread"]]))
     other = Held(scene, vehicle_of(scene))
-    known = Whole(other, 20.0).reduced(without_effects(other, [effects["tyre damping"]]))
+    known = Whole(other, 20.0).reduced(without_effects(other, [there["tyre damping"]]))
     assert np.abs(rest.system.A - known.system.A).max() < 1e-12 * np.abs(known.system.A).max()
     prices = {price.name: price for price in price_list(own).prices}
     assert prices["tread"].counts[1]["states"] - prices["tread"].counts[0]["states"] == 4 and prices["dampers"].why
@@ -255,3 +257,28 @@ def test_a_new_effect_cannot_stand_beside_what_it_excludes(system, new_file):
     new_file(system, new.name, new.text)
     with pytest.raises(InputError, match=f"cannot stand beside '{new.excludes}', which it would be twice: drop one"):
         beside(bare(system), *new.beside, new.excludes, new.name)
+
+
+@pytest.mark.parametrize("system", [name for name, own in SYSTEMS.items() if not own.effects])
+def test_a_system_without_effects_says_where_there_are_some(system):
+    with pytest.raises(InputError, match=r"effects: has no place in a scene of this system, .* put it into a scene of"):
+        import_module(SYSTEMS[system].scene).build({"title": "t", "system": system, "effects": {"mine": {}}})
+
+
+@pytest.mark.parametrize("system", [name for name in NEW if name != "ride"])
+def test_a_new_effect_changes_what_a_price_list_compares(system, new_file):
+    """Of the runs that it times, at the usual values of both."""
+    new_file(system, NEW[system].name, NEW[system].text)
+    scene = bare(system)
+    runs = system_of(scene)
+    less, more = (runs.answer(one, runs.ENGINE) for one in (scene, beside(scene, NEW[system].name)))
+    assert any(np.any(more.quantities[name].cases[0] != own.cases[0]) for name, own in less.quantities.items())
+
+
+def test_a_new_effect_has_a_price_there_and_absent(new_file, monkeypatch):
+    monkeypatch.setattr(effects, "ROUNDS", 3)
+    new_file("contact", NEW["contact"].name, NEW["contact"].text)
+    for scene in (bare("contact"), beside(bare("contact"), "soft_bodies")):
+        price = next(price for price in price_list(scene).prices if price.name == "soft_bodies")
+        assert (price.why, price.there) == ("", bool(scene.effects)) and np.isfinite(price.micros[0])
+        assert 0.1 < price.changes[0].relative < 1.1  # half the modulus halves the forces on a given ellipse
