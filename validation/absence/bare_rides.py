@@ -8,17 +8,21 @@ import numpy as np
 
 from models.engines.protocol import Settings, guard
 from models.engines.spatial_protocol import INTEGRATORS, build
+from models.ride.copies_kernel import POWERS, march
+from models.ride.nonlinear_copies import laws_of
 from models.ride.of_scene import excitation_of, vehicle_of
 from models.ride.road_path import RoadPath, road_path
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import wheels
+from models.vehicles.spatial_linear import linearise, wheels
 from validation.absence import ride
-from validation.absence.hand_built_ride import Car, exudyn_run, mujoco_run
+from validation.absence.hand_built_ride import Car, exudyn_run, mujoco_run, numbers
+from validation.absence.hand_built_ride import march as march_written
 from validation.absence.of_systems import bare
 from validation.timing import interleave, paired_ratio
 
 STEP = 1e-3
 """Step of the runs (s)."""
+COPIES = 64
 Job = Callable[[], np.ndarray]
 BY_HAND = {"exudyn": exudyn_run, "mujoco": mujoco_run}
 
@@ -49,8 +53,29 @@ def rides(engine: str, steps: int) -> tuple[Job, Job]:
     return ours, theirs
 
 
+def copies(steps: int) -> tuple[Job, Job]:
+    """Copies of the bare car's small motion on roads of their own, and of the one whose equations are written out:
+    states (14, COPIES) at the end."""
+    vehicle, road = scene()
+    plain, roads = linearise(vehicle, road.speed), next(road.blocks(steps, COPIES, 0))
+    laws, car, heights = laws_of(vehicle, plain, (), road.speed), numbers(Car.of(vehicle)), roads[:, :4].copy()
+    sums = np.zeros((POWERS, len(plain.outputs), COPIES))
+
+    def ours() -> np.ndarray:
+        states = np.zeros((2 * len(plain.mass), COPIES))
+        march(states, roads, road.step, steps, 1, laws, sums)
+        return states
+
+    def theirs() -> np.ndarray:
+        states = np.zeros((2 * len(plain.mass), COPIES))
+        march_written(states, heights, road.step, car)
+        return states
+
+    return ours, theirs
+
+
 def ratio_of_rides(engine: str, steps: int, rounds: int) -> tuple[float, tuple[float, float, float]]:
-    """Largest difference of states (m, rad, m/s, rad/s), and the ratio of seconds with its interval."""
-    jobs = rides(engine, steps)
+    """Of an engine or the reference: largest difference of states (m, rad, m/s, rad/s), and the ratio of seconds with its interval."""
+    jobs = copies(steps) if engine == "reference" else rides(engine, steps)
     ours, theirs = (job() for job in jobs)
     return float(np.abs(ours - theirs).max()), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))

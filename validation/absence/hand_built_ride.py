@@ -1,4 +1,6 @@
-"""A car with seven freedoms on a rough road written directly for each engine, as someone would who needs that alone.
+"""A car with seven freedoms on a rough road written directly for each engine, and its equations written out.
+
+As someone would write it who needs that alone.
 
 Body (z, roll, pitch) on four upright spring-dampers, wheels (z) on tyre springs, neither gravity nor anything else:
 its numbers straight into Exudyn's items, and into MuJoCo's XML with site actuators for the suspension. No engine reads
@@ -12,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from models.compiled import lean, njit
 from models.vehicles.spatial import SpatialVehicle
 
 Run = Callable[[], np.ndarray]
@@ -139,6 +142,55 @@ def _road_law() -> Any:
             forces[3 + i] += numbers[1] * numbers[row + i]
 
     return law
+
+
+STATES, BODY, CORNER = 14, 4, 5
+"""States of the written car; where the numbers of its corners begin in ``numbers``, and how many each has."""
+
+
+@lean
+def rates(x, road, car, out):
+    """Rates (14,) of a state of small motion on heights (4,); ``car``: mass of body and wheel, roll and pitch inertia,
+    then x, y, stiffness, damping and tyre stiffness of every corner."""
+    lift = roll = pitch = 0.0
+    for i in range(4):
+        k = BODY + CORNER * i
+        ahead, aside, stiffness, damping, tyre = car[k], car[k + 1], car[k + 2], car[k + 3], car[k + 4]
+        up, fast = x[0] + aside * x[1] - ahead * x[2], x[7] + aside * x[8] - ahead * x[9]
+        force = stiffness * (x[3 + i] - up) + damping * (x[10 + i] - fast)
+        lift, roll, pitch = lift + force, roll + aside * force, pitch - ahead * force
+        out[3 + i], out[10 + i] = x[10 + i], (tyre * (road[i] - x[3 + i]) - force) / car[1]
+    for i in range(3):
+        out[i] = x[7 + i]
+    out[7], out[8], out[9] = lift / car[0], roll / car[2], pitch / car[3]
+
+
+@njit(cache=True, error_model="numpy")
+def march(states, roads, step, car):
+    """The classical Runge-Kutta method, one of the copies (14, copies) after the other, over roads (2 steps + 1, 4,
+    copies)."""
+    rate, total, here = np.empty(STATES), np.empty(STATES), np.empty(STATES)
+    for copy in range(states.shape[1]):
+        x, road = states[:, copy].copy(), roads[:, :, copy].copy()
+        for i in range(len(road) // 2):
+            rates(x, road[2 * i], car, rate)
+            for k in range(STATES):
+                total[k], here[k] = rate[k], x[k] + 0.5 * step * rate[k]
+            for stage in range(2):
+                rates(here, road[2 * i + 1], car, rate)
+                for k in range(STATES):
+                    total[k] += 2.0 * rate[k]
+                    here[k] = x[k] + (0.5 * step if stage == 0 else step) * rate[k]
+            rates(here, road[2 * i + 2], car, rate)
+            for k in range(STATES):
+                x[k] += step / 6.0 * (total[k] + rate[k])
+        states[:, copy] = x
+
+
+def numbers(car: Car) -> np.ndarray:
+    """A car's numbers for ``rates``."""
+    corners = np.column_stack([car.corners[:, [0, 1, 3, 4]], np.full(4, car.tyre)])
+    return np.concatenate([[car.mass, car.wheel, car.inertia[0], car.inertia[1]], corners.ravel()])
 
 
 def _text(values: np.ndarray) -> str:
