@@ -58,7 +58,7 @@ def test_the_contact_of_the_readme_is_a_valid_scene_and_its_python_runs(tmp_path
 
     table = tomllib.loads(re.findall(r"```toml\n(.*?)```", README, flags=re.DOTALL)[1])
     assert build(table, "README.md", tmp_path).geometry == "radii"
-    exec(re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)[1], {})
+    exec(python_of("models.contact"), {})
     assert float(capsys.readouterr().out.split()[0]) < 0
 
 
@@ -70,3 +70,16 @@ def test_the_figure_of_the_readme_is_there():
 def test_the_constraints_are_plain_pins():
     for line in (ROOT / ".ci" / "constraints.txt").read_text().splitlines():
         assert re.fullmatch(r"[A-Za-z0-9_.-]+==[A-Za-z0-9_.]+", line), line
+
+
+def python_of(word):
+    """The block of Python in which a word stands first."""
+    return next(block for block in re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL) if word in block)
+
+
+def test_the_effect_of_the_readme_is_one_file(new_file):
+    from validation.absence.of_systems import added, declared
+
+    new_file("handling", "side_wind", python_of("def extend"))
+    assert added("handling", "side_wind", quick=True) == declared("handling", "side_wind", ["mujoco"])
+    assert declared("handling", "side_wind", ["mujoco"]) == {"mujoco": {"pushes": 1}}
