@@ -63,6 +63,7 @@ def test_the_pitch_plane_is_told_what_has_a_price():
         measured.answer(scene, "mujoco")
 
 
+@pytest.mark.full
 def test_auto_leaves_out_what_the_question_does_not_see():
     """The noise of angles is read by nothing in a free run; steps stay whole samples of the recording."""
     faults = {"noise": {"angle": 1e-3}}
