@@ -1,7 +1,7 @@
 """What stands at the port: a controller is asked once per sample, and answers with what its valves do."""
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
@@ -35,7 +35,10 @@ class Command(NamedTuple):
 
 
 class Controller(Protocol):
-    """A controller, whatever it runs in."""
+    """A controller, whatever it runs in.
+
+    One that has ``steady = True`` answers alike to every sample in which the switch is closed, and is asked once.
+    """
 
     def sample(self, given: Sample) -> Command:
         """Answer to one sample."""
@@ -47,6 +50,7 @@ class AllApplied:
     """No anti-lock system: every valve stays open."""
 
     wheels: int
+    steady: ClassVar[bool] = True
 
     def sample(self, given: Sample) -> Command:
         """Apply."""

@@ -7,7 +7,10 @@ prescribed, only the headings are free.
 
 import math
 
-from models.compiled import lean
+from models.compiled import inlined, lean
+
+ALONE = 3
+"""Coordinates of one unit that has no other."""
 
 
 @lean
@@ -36,36 +39,43 @@ def place_of(k, x, y, positions, reach):
     return px, py
 
 
-@lean
-def rows(k, x, y, heading, positions, rates, reach, along, across):
-    """Fill the two rows (n,) that give the velocity of the point (x, y) of unit k in axes of a ``heading``.
+@inlined
+def headings(positions, units):
+    """Fill the cosine and the sine of the heading of every unit (U, 2)."""
+    for j in range(units.shape[0]):
+        units[j, 0], units[j, 1] = math.cos(positions[2 + j]), math.sin(positions[2 + j])
+
+
+@inlined
+def rows(k, x, y, c, s, units, rates, reach, along, across):
+    """Fill the two rows (n,) that give the velocity of the point (x, y) of unit k in axes whose heading has the cosine
+    c and the sine s; ``units`` : see ``headings``.
 
     Its acceleration is the rows times those of the coordinates, plus the two terms returned (m/s^2); a force in these
     axes acts on the coordinates by the rows' transposes.
     """
-    along[0], along[1] = math.cos(heading), math.sin(heading)
-    across[0], across[1] = -along[1], along[0]
+    along[0], along[1], across[0], across[1] = c, s, -s, c
     ahead, aside = 0.0, 0.0
-    for j in range(reach.shape[1]):
+    for j in range(units.shape[0]):
         way, side = reach[k, j], 0.0
         if j == k:
             way, side = way + x, y
-        c, s = math.cos(heading - positions[2 + j]), math.sin(heading - positions[2 + j])
-        along[2 + j], across[2 + j] = way * s - side * c, way * c + side * s
+        turned, aslant = c * units[j, 0] + s * units[j, 1], s * units[j, 0] - c * units[j, 1]
+        along[2 + j], across[2 + j] = way * aslant - side * turned, way * turned + side * aslant
         ahead -= across[2 + j] * rates[2 + j] ** 2
         aside += along[2 + j] * rates[2 + j] ** 2
     return ahead, aside
 
 
-@lean
-def inertia(positions, rates, masses, inertias, reach, mass, right, along, across):
+@inlined
+def inertia(units, rates, masses, inertias, reach, mass, right, along, across):
     """Fill the mass matrix (n, n) and what its product with the accelerations has besides the forces (n,).
 
-    along, across (n,) : room to work in.
+    units : see ``headings``; along, across (n,) : room to work in.
     """
     mass[:], right[:] = 0.0, 0.0
-    for k in range(masses.size):
-        ahead, aside = rows(k, 0.0, 0.0, 0.0, positions, rates, reach, along, across)
+    for k in range(units.shape[0]):
+        ahead, aside = rows(k, 0.0, 0.0, 1.0, 0.0, units, rates, reach, along, across)
         for a in range(right.size):
             right[a] -= masses[k] * (along[a] * ahead + across[a] * aside)
             for b in range(right.size):
@@ -73,9 +83,12 @@ def inertia(positions, rates, masses, inertias, reach, mass, right, along, acros
         mass[2 + k, 2 + k] += inertias[k]
 
 
-@lean
+@inlined
 def factor(mass, first):
-    """Cholesky's factor of the mass matrix from row ``first`` on, in place of its lower triangle."""
+    """Cholesky's factor of the mass matrix from row ``first`` on, in place of its lower triangle; of a unit alone the
+    matrix itself, which is diagonal."""
+    if mass.shape[0] == ALONE:
+        return
     for a in range(first, mass.shape[0]):
         for b in range(first, a + 1):
             rest = mass[a, b]
@@ -84,9 +97,13 @@ def factor(mass, first):
             mass[a, b] = math.sqrt(rest) if a == b else rest / mass[b, b]
 
 
-@lean
+@inlined
 def solve(mass, first, right):
     """Forces (n,) to accelerations from row ``first`` on, in place, by ``factor``'s."""
+    if right.size == ALONE:
+        for a in range(ALONE):
+            right[a] /= mass[a, a]
+        return
     for a in range(first, right.size):
         for b in range(first, a):
             right[a] -= mass[a, b] * right[b]

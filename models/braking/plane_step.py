@@ -10,13 +10,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import carray
 
-from models.braking.plane_chain import factor, inertia, rows, solve
+from models.braking.plane_chain import ALONE, factor, headings, inertia, rows, solve
 from models.braking.tyre_table import across, place
 from models.braking.wheel_step import wheel_step
-from models.compiled import lean, njit
-from models.contact.stack import doubles
+from models.compiled import inlined, lean
+from models.contact.stack import array, doubles
 
 CLOSE = 1e-7
 """What is left of the accelerations' error (m/s^2, and rad/s^2 times 1 m) when the loads are taken to be found."""
@@ -30,42 +29,44 @@ FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE, LOCKED, TURNING = range(7)
 """Columns of what each wheel reports: mean forces on it (N) in its own axes, load (N), mean slip, slip angle (rad),
 time locked (s), speed of turning at the end (rad/s)."""
 REPORTED = 7
-START, RATE, ALONG, ASIDE, ANGLE, CELL, PART, BASE, TURNED, RADIUS, SPIN, FIRST, SECOND, SHARE, LAGGED = range(15)
+KNOWN = 17
+(START, RATE, ALONG, ASIDE, ANGLE, CELL, PART, BASE, TURNED, RADIUS, SPIN, FIRST, SECOND, SHARE, LAGGED, COSINE,
+ SINE) = range(KNOWN)
 """Columns of what is known of each wheel: speed of its centre along it at the start, what its rate has besides the
 accelerations, speeds along and across it where slip angles are taken, slip angle with its cell and part in the tables,
 load besides the accelerations, speed of turning at the start, radius, inertia, tables and the share of the second, tan
-of a slip angle that lags (NaN if it does not)."""
-KNOWN = 15
+of a slip angle that lags (NaN if it does not), cosine and sine of the angle by which it is steered."""
 
 
 class Frame(NamedTuple):
     """What a step's rounds have in common, for W wheels and n coordinates, of which those from ``free`` on are free.
 
-    along, across (W, n): see ``rows``; press (W, n): load by accelerations; known (W, 15): see above; mass (n, n): the
-    factor of the mass matrix; right (n,): forces besides the tyres' ones; tried (3, n): what a round gave, what the one
-    before gave, and by how much that was off.
+    along, across (W, n): see ``rows``; press (W, n): load by accelerations; known (W, 17): see above; units (U, 2): see
+    ``headings``; mass (n, n): the factor of the mass matrix; right (n,): forces besides the tyres' ones; tried (3, n):
+    what a round gave, what the one before gave, and by how much that was off.
     """
 
     along: np.ndarray
     across: np.ndarray
     press: np.ndarray
     known: np.ndarray
+    units: np.ndarray
     mass: np.ndarray
     right: np.ndarray
     tried: np.ndarray
     free: int
 
 
-@lean
+@inlined
 def times(row, vector):
     """Scalar product."""
     total = 0.0
-    for a in range(vector.size):
+    for a in range(row.size):
         total += row[a] * vector[a]
     return total
 
 
-@lean
+@inlined
 def begin(turning, surface, plane, known):
     """Fill what is known of the wheels and stays so for a whole step."""
     for i in range(turning.size):
@@ -75,17 +76,26 @@ def begin(turning, surface, plane, known):
         known[i, LAGGED] = surface[i, 3] if surface.shape[1] > 3 else math.nan
 
 
-@lean
+@inlined
 def settle(positions, rates, steer, regular, starts, plane, angles, frame, found):
     """Fill the frame at a state; ``starts`` at the start of the step, whose speeds along the wheels it keeps."""
+    units = frame.units
+    headings(positions, units)
     for i in range(plane.unit.size):
         known, along, aside, g, k = frame.known[i], frame.along[i], frame.across[i], plane.group[i], plane.unit[i]
-        ahead, left = rows(g, 0.0, 0.0, positions[2 + g], positions, rates, plane.reach, along, aside)
-        for a in range(rates.size):
-            frame.press[i, a] = plane.by_x[i] * along[a] + plane.by_y[i] * aside[a]
-        known[BASE] = plane.static[i] + plane.by_x[i] * ahead + plane.by_y[i] * left
-        ahead, _ = rows(k, plane.place[i, 0], plane.place[i, 1], positions[2 + k] + steer[i], positions, rates,
-                        plane.reach, along, aside)  # fmt: skip
+        known[BASE] = plane.static[i]
+        if plane.by_x[i] != 0.0 or plane.by_y[i] != 0.0:
+            ahead, left = rows(g, 0.0, 0.0, units[g, 0], units[g, 1], units, rates, plane.reach, along, aside)
+            for a in range(frame.right.size):
+                frame.press[i, a] = plane.by_x[i] * along[a] + plane.by_y[i] * aside[a]
+            known[BASE] += plane.by_x[i] * ahead + plane.by_y[i] * left
+        if starts:
+            before, same = frame.known[i - 1], i > 0 and steer[i] == steer[i - 1]
+            known[COSINE] = before[COSINE] if same else math.cos(steer[i])
+            known[SINE] = before[SINE] if same else math.sin(steer[i])
+        c = units[k, 0] * known[COSINE] - units[k, 1] * known[SINE]
+        s = units[k, 1] * known[COSINE] + units[k, 0] * known[SINE]
+        ahead, _ = rows(k, plane.place[i, 0], plane.place[i, 1], c, s, units, rates, plane.reach, along, aside)
         u, v = times(along, rates), times(aside, rates)
         if starts:
             known[START] = u
@@ -95,15 +105,15 @@ def settle(positions, rates, steer, regular, starts, plane, angles, frame, found
             v = known[LAGGED] * max(forwards, regular)
         known[ASIDE], known[ANGLE] = v, math.atan2(abs(v), max(forwards, regular))
         known[CELL], known[PART] = place(angles, known[ANGLE])
-    inertia(positions, rates, plane.masses, plane.inertias, plane.reach, frame.mass, frame.right,
+    inertia(units, rates, plane.masses, plane.inertias, plane.reach, frame.mass, frame.right,
             frame.tried[0], frame.tried[1])  # fmt: skip
-    for a in range(frame.free, rates.size):
+    for a in range(frame.free, frame.right.size):
         for b in range(frame.free):
             frame.right[a] -= frame.mass[a, b] * found[b]
     factor(frame.mass, frame.free)
 
 
-@lean
+@inlined
 def tyre(known, rate, load, torque0, torque1, step, tables, report):
     """Fill the report (7,) of a wheel whose centre's speed along it changes at a ``rate`` (m/s^2)."""
     _, slips, loads, mu_x, g, h = tables
@@ -129,7 +139,7 @@ def tyre(known, rate, load, torque0, torque1, step, tables, report):
     report[LOCKED], report[TURNING] = locked, sign * w
 
 
-@lean
+@inlined
 def respond(found, torque0, torque1, step, tables, frame, out, report):
     """Fill ``out`` (n,) with the accelerations by the tyres' forces if they were ``found``: the map whose fixed point
     is wanted. A wheel that would lift bears none."""
@@ -144,7 +154,7 @@ def respond(found, torque0, torque1, step, tables, frame, out, report):
     solve(frame.mass, frame.free, out)
 
 
-@lean
+@inlined
 def stage(torque0, torque1, step, most, tables, frame, found, report):
     """Mean accelerations over a step, into ``found`` (n,): what stands there is where the search begins.
 
@@ -155,7 +165,7 @@ def stage(torque0, torque1, step, most, tables, frame, found, report):
     for rounds in range(most):
         respond(found, torque0, torque1, step, tables, frame, out, report)
         change, product, square = 0.0, 0.0, 0.0
-        for a in range(found.size):
+        for a in range(out.size):
             off = out[a] - found[a]
             change = max(change, abs(off))
             product += off * (off - off0[a])
@@ -163,7 +173,7 @@ def stage(torque0, torque1, step, most, tables, frame, found, report):
         left = change * min(change / before, 1.0) if before > 0.0 else change
         done, before = not left > CLOSE or rounds == most - 1, change
         mix = min(max(product / square, -2.0), 0.75) if rounds > 0 and square > 0.0 and not done else 0.0
-        for a in range(found.size):
+        for a in range(out.size):
             off0[a] = out[a] - found[a]
             found[a] = out[a] - mix * (out[a] - out0[a]) if done or rounds < PATIENCE else found[a] + 0.5 * off0[a]
             out0[a] = out[a]
@@ -172,16 +182,18 @@ def stage(torque0, torque1, step, most, tables, frame, found, report):
     return left
 
 
-@lean
+@inlined
 def comes_to_rest(rates, turning, found, step, plane):
     """Time (s) within the step at which the vehicle stands, or -1 if it does not.
 
     Friction takes speed away until there is none, and only the time grid would let it turn round: it stands where its
     kinetic energy along the step is least, if it was about to lose all of its speed in that step anyhow.
     """
-    speed, both, rate = 0.0, 0.0, 0.0
+    speed, both, rate, mass = 0.0, 0.0, 0.0, 0.0
+    for k in range(rates.size - 2):
+        mass += plane.masses[k]
     for a in range(rates.size):
-        weight = plane.masses.sum() if a < 2 else plane.inertias[a - 2]
+        weight = mass if a < 2 else plane.inertias[a - 2]
         speed += weight * rates[a] ** 2
         both += weight * rates[a] * found[a]
         rate += weight * found[a] ** 2
@@ -192,7 +204,7 @@ def comes_to_rest(rates, turning, found, step, plane):
     return -both / rate
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def step_on(state, turning, torque0, torque1, step, steer, surface, regular, plane, tables, found, report):
     """One step of ``state`` (2, n), positions and rates, and ``turning`` (W,): speeds of the wheels (rad/s).
 
@@ -201,14 +213,16 @@ def step_on(state, turning, torque0, torque1, step, steer, surface, regular, pla
     found (n,) : accelerations, those of the step before on entry. Returns the time (s) of the step at which the vehicle
     comes to rest, ``step`` if it does not, -1 if the loads were not found.
     """
-    wheels, size = turning.size, found.size
-    ways = carray(doubles(3 * wheels * size), (3, wheels, size))
-    known, mass = carray(doubles(wheels * KNOWN), (wheels, KNOWN)), carray(doubles(size * size), (size, size))
-    some, middle = carray(doubles(6 * size), (6, size)), carray(doubles(wheels), (wheels,))
-    frame = Frame(ways[0], ways[1], ways[2], known, mass, some[0], some[1:4], 2 if plane.hooked else 0)
-    frame.tried[:] = 0.0
+    wheels, size = turning.size, 2 + len(plane.units)
+    ways, known = array(doubles(3 * wheels * size), (3, wheels, size)), array(doubles(wheels * KNOWN), (wheels, KNOWN))
+    units, mass = array(doubles(2 * (size - 2)), (size - 2, 2)), array(doubles(size * size), (size, size))
+    some, middle = array(doubles(6 * size), (6, size)), array(doubles(wheels), (wheels,))
+    frame = Frame(ways[0], ways[1], ways[2], known, units, mass, some[0], some[1:4],
+                  0 if size == ALONE else 2 * plane.hooked)  # fmt: skip
+    frame.press[:], frame.tried[:] = 0.0, 0.0
     place0, rate0 = some[4], some[5]
-    place0[:], rate0[:] = state[0], state[1]
+    for a in range(size):
+        place0[a], rate0[a] = state[0, a], state[1, a]
     for i in range(wheels):
         middle[i] = 0.5 * (torque0[i] + torque1[i])
     begin(turning, surface, plane, frame.known)
@@ -227,5 +241,6 @@ def step_on(state, turning, torque0, torque1, step, steer, surface, regular, pla
         if rest >= 0.0:
             state[1], turning[:] = 0.0, 0.0
             return rest
-    turning[:] = report[:, TURNING]
+    for i in range(wheels):
+        turning[i] = report[i, TURNING]
     return step

@@ -45,7 +45,8 @@ class Plane(NamedTuple):
     masses, inertias (U,); reach (U, U): see ``plane_chain``; unit, group (W,): of each wheel, the group being the unit
     whose acceleration moves its load; place (W, 2): m, in its unit's axes; radius, spin (W,): m, kg m^2;
     static (W,): N; by_x, by_y (W,): change of load by the group's acceleration, N s^2/m; hooked: 1 if the first two
-    coordinates are prescribed.
+    coordinates are prescribed; units (U,): their numbers, of one alone as a tuple, whose size compiled functions know
+    beforehand, so that none of them counts units where there is no trailer.
     """
 
     masses: np.ndarray
@@ -60,6 +61,7 @@ class Plane(NamedTuple):
     by_x: np.ndarray
     by_y: np.ndarray
     hooked: int
+    units: np.ndarray | tuple[int] = (0,)
 
     @property
     def wheels(self) -> int:

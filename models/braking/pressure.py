@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.braking.brake import torque
-from models.compiled import lean, njit
+from models.compiled import lean
 from models.errors import InputError
 
 RELEASE, HOLD, APPLY = -1, 0, 1
@@ -62,8 +62,10 @@ def still(chambers: Chambers, sample: float) -> Air:
 def chamber(pressure, valve, time, fill, empty, supply):
     """Pressure (bar) of a chamber after a time (s) with its valve in a state."""
     if valve == APPLY:
-        return supply + (pressure - supply) * math.exp(-time / fill)
-    return pressure * math.exp(-time / empty) if valve == RELEASE else pressure
+        return supply + (pressure - supply) * math.exp(-time / fill) if fill > 0.0 else supply
+    if valve == RELEASE:
+        return pressure * math.exp(-time / empty) if empty > 0.0 else 0.0
+    return pressure
 
 
 @lean
@@ -80,27 +82,30 @@ def press(valves, time, air, chambers, brakes):
         air.supply[0] -= taken / chambers.reservoir
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def by_valves(valves, sample, air, chambers, brakes, torques):
     """Mode V: fill ``torques`` (n + 1, W), those at the ends of the n steps of a sample (s)."""
-    steps = torques.shape[0] - 1
-    air.commands[:-1] = air.commands[1:]
-    air.commands[-1] = valves
-    late = chambers.delay - (air.commands.shape[0] - 2) * sample
+    steps, last = torques.shape[0] - 1, air.commands.shape[0] - 1
+    for i in range(valves.size):
+        for k in range(last):
+            air.commands[k, i] = air.commands[k + 1, i]
+        air.commands[last, i], torques[0, i] = valves[i], air.torque[i]
+    late = chambers.delay - (last - 1) * sample
     step = sample / steps
-    torques[0] = air.torque
     for n in range(steps):
         wait = min(max(late - n * step, 0.0), step)
         if wait > 0.0:
             press(air.commands[0], wait, air, chambers, brakes)
         if wait < step:
             press(air.commands[1], step - wait, air, chambers, brakes)
-        torques[n + 1] = air.torque
+        for i in range(valves.size):
+            torques[n + 1, i] = air.torque[i]
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def by_pressures(pressures, air, brakes, torques):
     """Mode P: pressures (W,) in bar are there at once and stay for the sample; ``torques`` (n + 1, W) as above."""
     for i in range(pressures.size):
         air.pressure[i], air.torque[i] = pressures[i], torque(i, pressures[i], air.torque[i], brakes)
-    torques[:] = air.torque
+        for n in range(torques.shape[0]):
+            torques[n, i] = air.torque[i]

@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path as Folder
+from typing import ClassVar
 
 import numpy as np
 from scipy.optimize import root
@@ -65,6 +66,7 @@ class Released:
     """No pressure anywhere, for wheels (W,)."""
 
     wheels: int
+    steady: ClassVar[bool] = True
 
     def sample(self, given: Sample) -> Command:
         """None."""

@@ -34,8 +34,8 @@ def row(coordinates: int, wheels: int) -> Row:
 
 
 def parts(rows: list[np.ndarray], like: Row) -> list[np.ndarray]:
-    """Of rows that are like one, each part with an axis for the rows before its own."""
+    """Of blocks of rows that are like one, each part with an axis for the rows before its own."""
     ends = np.cumsum([part.size for part in like[1:]])
-    columns = np.split(np.array(rows), ends[:-1], axis=1)
+    columns = np.split(np.concatenate(rows), ends[:-1], axis=1)
     return [np.ascontiguousarray(column).reshape(-1, *part.shape)
             for column, part in zip(columns, like[1:], strict=True)]  # fmt: skip

@@ -15,10 +15,13 @@ from models.braking.plane_vehicle import Plane
 from models.braking.port.ask import ask
 from models.braking.pressure import RELEASE, Chambers, still
 from models.braking.row import Row, parts, row
-from models.braking.samples import Braking, Told, by_steps
+from models.braking.samples import Braking, Kept, Told, by_steps
 from models.braking.surfaces import Road, check_way
 from models.braking.tyre_table import Tables
 from models.errors import RunFailed
+
+MOST = 1024
+"""Samples of which a controller that is not asked knows nothing, at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,17 +102,20 @@ class Braked:
         check_way(self.road, self.sample / self.substeps * float(np.hypot(*given.state[1, :2])))
         now = row(given.state.shape[1], wheels)
         now.state[:], now.turning[:] = given.state, given.turning
-        told = Told(np.full(wheels, RELEASE), np.full(wheels, math.nan), self.steer.copy())
-        rows, status, number = list[np.ndarray](), FINE, 0
-        with _kept(rows, now, self.coordinates):
-            for status, time, speed, supply in self._moving(told, now):
+        told = Told(np.ones(1, dtype=np.int64), np.full(wheels, RELEASE), np.full(wheels, math.nan), self.steer.copy())
+        steady = self.steering is None and getattr(controller, "steady", False)
+        most = int(min(duration / self.sample + 2.0, MOST)) if steady else 1
+        kept = Kept(now.whole, np.empty((most, now.whole.size)), np.zeros(1, dtype=np.int64), duration - 1e-9)
+        rows, status, number = [now.whole[None].copy()], FINE, 0
+        with _taken(rows, kept, now, self.coordinates):
+            for status, time, speed, supply in self._moving(told, kept, now):
                 if status in (NOT_FOUND, LIFTED):
                     raise RunFailed("braking", "a wheel lifts off" if status == LIFTED else "no loads were found", time)
-                now.time[0] = time
-                rows.append(now.whole.copy())
-                if status == AT_REST or time >= duration - 1e-9:
+                _take(rows, kept)
+                if status == AT_REST or time >= kept.until:
                     break
                 braked = time >= self.switch - 1e-9
+                told.samples[0] = most if braked else 1
                 known = speed if self.speed_given else math.nan
                 asked = Sample(number, round(time * 1e9), now.turning * self.plane.radius, braked, supply, known)
                 number += 1
@@ -118,11 +124,11 @@ class Braked:
                     told.steer[:] = self.steering(time + 0.5 * self.sample)
         return _path(rows, now, status == AT_REST, self.coordinates)
 
-    def _moving(self, told: Told, now: Row) -> Iterator[tuple[int, float, float, float]]:
+    def _moving(self, told: Told, kept: Kept, now: Row) -> Iterator[tuple[int, float, float, float]]:
         """The vehicle as it is ``now``, moved on sample by sample; see ``samples``."""
         air = still(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
         torques, found = np.zeros((self.substeps + 1, self.plane.wheels)), np.zeros(2 + self.plane.masses.size)
-        given = (told, self.sample, Braking(air, self.chambers, self.brakes, torques), now.state, now.turning,
+        given = (told, kept, self.sample, Braking(air, self.chambers, self.brakes, torques), now.state, now.turning,
                  self.slope, self.plane, self.kind, self.road, self.tables.packed, found, now.report)  # fmt: skip
         if self.engine is not None:
             moving: Iterator[tuple[int, float, float, float]] = self.engine.moving(*given)
@@ -145,12 +151,19 @@ def _tell(told: Told, command: Command, braked: bool) -> None:
         told.pressures[0] = math.nan
 
 
+def _take(rows: list[np.ndarray], kept: Kept) -> None:
+    """Put what was recorded to the rows."""
+    rows.append(kept.rows[: kept.count[0]].copy())
+    kept.count[0] = 0
+
+
 @contextmanager
-def _kept(rows: list[np.ndarray], now: Row, names: tuple[str, ...]) -> Iterator[None]:
+def _taken(rows: list[np.ndarray], kept: Kept, now: Row, names: tuple[str, ...]) -> Iterator[None]:
     """Gives a failed run the path until then."""
     try:
         yield
     except RunFailed as error:
+        _take(rows, kept)
         error.partial = _path(rows, now, False, names)
         raise
 

@@ -11,19 +11,30 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from models.braking.advance import FINE, advance
+from models.braking.advance import AT_REST, FINE, advance
 from models.braking.brake import Brakes
 from models.braking.pressure import Air, Chambers, by_pressures, by_valves
 from models.compiled import named, njit
 
 
 class Told(NamedTuple):
-    """What holds for the next sample: states of the valves (W,), pressures (W,) in bar, of which the first is not a
-    number where valves hold, and steer angles (W,) in rad."""
+    """What holds for the next samples, whose number is samples (1,): states of the valves (W,), pressures (W,) in bar,
+    of which the first is not a number where valves hold, and steer angles (W,) in rad."""
 
+    samples: np.ndarray
     valves: np.ndarray
     pressures: np.ndarray
     steer: np.ndarray
+
+
+class Kept(NamedTuple):
+    """What is recorded: now (k,), the moment as numbers of which the first is the time (s); rows (m, k), such moments,
+    of which the first count (1,) have not been taken; until (s): the last sample ends then or after."""
+
+    now: np.ndarray
+    rows: np.ndarray
+    count: np.ndarray
+    until: float
 
 
 class Braking(NamedTuple):
@@ -39,22 +50,31 @@ go: Callable[..., Any] = advance
 """Stands here for what ``moved`` puts in its place."""
 
 
-def samples(told, sample, braking, state, turning, *others):
-    """Generator of a vehicle that ``go``, which is ``advance`` or stands in for it, moves on by one sample at a time.
+def samples(told, kept, sample, braking, state, turning, *others):
+    """Generator of a vehicle that ``go``, which is ``advance`` or stands in for it, moves on by as many samples at a
+    time as it is told for, less only where it does not move any further.
 
-    Each time, and first at the start, it gives how the sample ended, the time (s), the speed of the first unit (m/s)
-    and the supply (bar).
+    Each time, and first at the start, it gives how the last sample ended, the time (s), the speed of the first unit
+    (m/s) and the supply (bar).
     """
     air, chambers, brakes, torques = braking
     status, time, step = FINE, 0.0, sample / (torques.shape[0] - 1)
     while True:
         yield status, time, math.hypot(state[1, 0], state[1, 1]), air.supply[0]
-        if math.isnan(told.pressures[0]):
-            by_valves(told.valves, sample, air, chambers, brakes, torques)
-        else:
-            by_pressures(told.pressures, air, brakes, torques)
-        status, used = go(state, turning, torques, step, told.steer, *others)
-        time += used
+        for _ in range(told.samples[0]):
+            if math.isnan(told.pressures[0]):
+                by_valves(told.valves, sample, air, chambers, brakes, torques)
+            else:
+                by_pressures(told.pressures, air, brakes, torques)
+            status, used = go(state, turning, torques, step, told.steer, *others)
+            time += used
+            if status not in (FINE, AT_REST):
+                break
+            kept.now[0] = time
+            kept.rows[kept.count[0]] = kept.now
+            kept.count[0] += 1
+            if status == AT_REST or time >= kept.until:
+                break
 
 
 def moved(go: Callable[..., Any]) -> Callable[..., Iterator[tuple[int, float, float, float]]]:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.braking.plane_chain import place_of, point
-from models.compiled import lean
+from models.compiled import inlined, lean
 from models.errors import InputError
 
 
@@ -56,6 +56,12 @@ def check_way(own: Road, way: float) -> None:
                          "longer stretches or more substeps")  # fmt: skip
 
 
+@inlined
+def even(road):
+    """Whether one surface is everywhere."""
+    return road.starts.size == 1 and road.left[0] == road.right[0]
+
+
 @lean
 def under_wheels(state, step, plane, kind, road, surface):
     """Fill ``surface`` (W, 3): tables of each wheel and the share of the second.
@@ -65,6 +71,11 @@ def under_wheels(state, step, plane, kind, road, surface):
     way on it, forwards or backwards, so that no place of the road counts by how steps fall on it. A wheel that passes
     both in one step is on the side where it is in the middle of the step.
     """
+    if even(road):
+        for i in range(kind.size):
+            surface[i, 0] = surface[i, 1] = road.left[0] * road.kinds + kind[i]
+            surface[i, 2] = 0.0
+        return
     for i in range(plane.unit.size):
         k, x, y = plane.unit[i], plane.place[i, 0], plane.place[i, 1]
         px, py = place_of(k, x, y, state[0], plane.reach)

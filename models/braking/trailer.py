@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.braking.plane_chain import inertia
+from models.braking.plane_chain import headings, inertia
 from models.braking.plane_step import FORCE_X, FORCE_Y, step_on
 from models.braking.plane_vehicle import GRAVITY, Axle, Plane, Truck, truck, wheels
 from models.braking.tyre_table import Tables
@@ -32,7 +32,7 @@ class Trailer(Truck):
 def hooked(trailer: Trailer, transfer: bool = True) -> Plane:
     """Numbers of a trailer whose hook, the first two coordinates, follows a prescribed motion."""
     reach = np.array([[-trailer.drawbar, 0.0], [-trailer.drawbar, -trailer.front.x]])
-    parts: list[Any] = [*_units(trailer), reach, *_wheels(trailer, 0, transfer), 1]
+    parts: list[Any] = [*_units(trailer), reach, *_wheels(trailer, 0, transfer), 1, np.arange(2)]
     return Plane(*parts)
 
 
@@ -42,7 +42,7 @@ def train(vehicle: Truck, trailer: Trailer, transfer: bool = True) -> Plane:
     reach[1:, 0], reach[1:, 1], reach[2, 2] = trailer.hook, -trailer.drawbar, -trailer.front.x
     units = (np.concatenate((a, b)) for a, b in zip(own[:2], _units(trailer), strict=True))
     both = (np.concatenate((a, b)) for a, b in zip(own[3:11], _wheels(trailer, 1, transfer), strict=True))
-    parts: list[Any] = [*units, reach, *both, 0]
+    parts: list[Any] = [*units, reach, *both, 0, np.arange(3)]
     return Plane(*parts)
 
 
@@ -82,15 +82,16 @@ def follow(plane: Plane, tables: Tables, state: np.ndarray, hook: np.ndarray, st
 def _follow(states, forces, turning, hook, step, regular, plane, tables, torques):
     wheels, size = turning.size, states.shape[2]
     surface, steer, report, found = np.zeros((wheels, 3)), np.zeros(wheels), np.zeros((wheels, 7)), np.zeros(size)
-    mass, (right, along, across) = np.empty((size, size)), np.empty((3, size))
+    mass, (right, along, across), units = np.empty((size, size)), np.empty((3, size)), np.empty((size - 2, 2))
     for n in range(hook.shape[0] - 1):
         state = states[n].copy()
         found[:2] = (hook[n + 1] - hook[n]) / step
         if step_on(state, turning, torques, torques, step, steer, surface, regular, plane, tables, found, report) < 0.0:
             return False
         states[n + 1] = state
-        inertia(0.5 * (states[n, 0] + state[0]), 0.5 * (states[n, 1] + state[1]), plane.masses, plane.inertias,
-                plane.reach, mass, right, along, across)  # fmt: skip
+        headings(0.5 * (states[n, 0] + state[0]), units)
+        inertia(units, 0.5 * (states[n, 1] + state[1]), plane.masses, plane.inertias, plane.reach, mass, right, along,
+                across)  # fmt: skip
         forces[n] = (mass @ found - right)[:2]
         for i in range(wheels):
             psi = 0.5 * (states[n, 0, 2 + plane.unit[i]] + state[0, 2 + plane.unit[i]])

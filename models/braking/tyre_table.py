@@ -172,6 +172,8 @@ def across(table, i, p, j, q, k, w, g, h):
     i1, j1, k1 = min(i + 1, h.shape[1] - 1), min(j + 1, h.shape[2] - 1), min(k + 1, g.shape[2] - 1)
     by_slip = (1.0 - p) * ((1.0 - w) * g[table, i, k] + w * g[table, i, k1])
     by_slip += p * ((1.0 - w) * g[table, i1, k] + w * g[table, i1, k1])
+    if q == 0.0:  # at a node, as everywhere in a table of one load
+        return by_slip * ((1.0 - p) * h[table, i, j] + p * h[table, i1, j])
     by_load = (1.0 - p) * ((1.0 - q) * h[table, i, j] + q * h[table, i, j1])
     by_load += p * ((1.0 - q) * h[table, i1, j] + q * h[table, i1, j1])
     return by_slip * by_load
@@ -181,5 +183,7 @@ def across(table, i, p, j, q, k, w, g, h):
 def along(table, i, p, j, q, k, mu_x):
     """mu_x of one table at slip node k, in cells i and j of slip angle and load with shares p and q."""
     i1, j1 = min(i + 1, mu_x.shape[1] - 1), min(j + 1, mu_x.shape[2] - 1)
+    if q == 0.0:
+        return (1.0 - p) * mu_x[table, i, j, k] + p * mu_x[table, i1, j, k]
     low = (1.0 - q) * mu_x[table, i, j, k] + q * mu_x[table, i, j1, k]
     return (1.0 - p) * low + p * ((1.0 - q) * mu_x[table, i1, j, k] + q * mu_x[table, i1, j1, k])

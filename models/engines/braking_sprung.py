@@ -81,12 +81,13 @@ class OnSprings:
             status, time = go(state, turning, torques, step, *rest, own)
         return self._sound(status, time), time
 
-    def moving(self, told: Any, sample: float, braking: Any, *rest: Any) -> Iterator[tuple[int, float, float, float]]:
+    def moving(self, told: Any, kept: Any, sample: float, braking: Any,
+               *rest: Any) -> Iterator[tuple[int, float, float, float]]:  # fmt: skip
         """As ``models.braking.samples.samples``; Refused for a step that is too long, RunFailed as ``advance``."""
         own, _, by_steps = self._parts
         step = sample / (braking.torques.shape[0] - 1)
         self.check_step(step)
-        rows = by_steps(told, sample, braking, *rest, own)
+        rows = by_steps(told, kept, sample, braking, *rest, own)
         while True:
             with self._model.at_step(step):
                 status, time, speed, supply = next(rows)

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from models.braking.run import Path
 from models.braking.tyre_table import across, place
 from models.braking.wheel_step import wheel_step
-from models.compiled import lean, njit
+from models.compiled import inlined, lean, njit
 
 CLOSE, NEARLY, PATIENCE, MOST = 1e-7, 0.98, 12, 200
 START, RATE, ALONG, ASIDE, ANGLE, CELL, PART, EAST, NORTH, ARM, SIDE = range(11)
@@ -23,27 +24,29 @@ about the centre of mass."""
 COLUMNS = 7
 
 
-@lean
-def settle(now, steer, regular, starts, truck, angles, known):
+@inlined
+def settle(now, course, regular, starts, truck, angles, known):
     """Fill what is known (4, 11) of the wheels at a state ``now`` (6,): x, y, heading and their rates."""
     x, y = truck[:2]
     vx, vy, r = now[3], now[4], now[5]
-    c, s, e, f, rear = math.cos(steer), math.sin(steer), math.cos(now[2] + steer), math.sin(now[2] + steer), False
+    c, s, ahead, aslant = *course, math.cos(now[2]), math.sin(now[2])
+    e, f = ahead * c - aslant * s, aslant * c + ahead * s
     for i in range(4):
         if i == 2:
-            c, s, e, f = 1.0, 0.0, math.cos(now[2]), math.sin(now[2])
+            c, s, e, f = 1.0, 0.0, ahead, aslant
         arm, side = x[i] * s - y[i] * c, x[i] * c + y[i] * s
         u, v = e * vx + f * vy + arm * r, e * vy - f * vx + side * r
         if starts:
             known[i, START] = u
         forwards = u if known[i, START] >= 0.0 else -u
         angle = math.atan2(abs(v), max(forwards, regular))
-        known[i, RATE], known[i, ALONG], known[i, ASIDE], known[i, ANGLE] = -side * r * r, max(forwards, 0.0), v, angle
+        known[i, RATE], known[i, ALONG], known[i, ASIDE] = (v - side * r) * r, max(forwards, 0.0), v
+        known[i, ANGLE] = angle
         known[i, CELL], known[i, PART] = place(angles, angle)
         known[i, EAST], known[i, NORTH], known[i, ARM], known[i, SIDE] = e, f, arm, side
 
 
-@lean
+@inlined
 def tyre(know, rate, w0, torque0, torque1, step, load, radius, spin, tables, report):
     """Fill the report (7,) of a wheel whose centre's speed along it changes at a ``rate``."""
     _, slips, _, mu_x, g, h = tables
@@ -61,7 +64,7 @@ def tyre(know, rate, w0, torque0, torque1, step, load, radius, spin, tables, rep
     report[3], report[4], report[5], report[6] = slip, math.copysign(know[ANGLE], v), locked, sign * w
 
 
-@lean
+@inlined
 def rounds(turning, torque0, torque1, step, most, truck, tables, known, found, last, report):
     """Accelerations ``found`` (3,) that the tyres' forces give back; ``last`` (2, 3) is room. False if there are none.
     """
@@ -94,7 +97,7 @@ def rounds(turning, torque0, torque1, step, most, truck, tables, known, found, l
     return left <= CLOSE or most == 1
 
 
-@lean
+@inlined
 def rests(now, turning, found, step, mass, inertia):
     """Time within the step at which the truck stands, or -1 if it does not."""
     speed = mass * (now[3] * now[3] + now[4] * now[4]) + inertia * now[5] * now[5]
@@ -108,7 +111,7 @@ def rests(now, turning, found, step, mass, inertia):
 
 
 @lean
-def go(now, turning, torque0, torque1, step, steer, regular, truck, tables, room, report):
+def go(now, turning, torque0, torque1, step, course, regular, truck, tables, room, report):
     """One step; how long the truck still moves in it, -1 if no accelerations were found."""
     known, found, last, first, middle = room
     for a in range(6):
@@ -116,7 +119,7 @@ def go(now, turning, torque0, torque1, step, steer, regular, truck, tables, room
     for i in range(4):
         middle[i] = 0.5 * (torque0[i] + torque1[i])
     for half in (True, False):
-        settle(now, steer, regular, half, truck, tables[0], known)
+        settle(now, course, regular, half, truck, tables[0], known)
         time, end = (0.5 * step, middle) if half else (step, torque1)
         if not rounds(turning, torque0, end, time, 1 if half else MOST, truck, tables, known, found, last, report):
             return -1.0
@@ -135,39 +138,41 @@ def go(now, turning, torque0, torque1, step, steer, regular, truck, tables, room
 
 
 @njit(cache=True, error_model="numpy")
-def march(speed, steer, torque, sample, steps, slope, truck, tables, times, states, turned, reports):
+def march(speed, course, torque, sample, steps, slope, truck, tables, times, states, turned, reports):
     """The whole stop: fills times (n,), states (n, 6), turning (n, 4) and reports (n, 4, 7) of the steps' ends, sample
-    by sample, of which it returns the number; torque (4,) is there from the first step's end on."""
-    now, turning, none, step, n = np.zeros(6), speed / truck[3], np.zeros(4), sample / steps, 0
+    by sample, of which it returns the number, 0 if no accelerations were found; torque (4,) is there from the first
+    step's end on."""
+    now, turning, none, step = np.zeros(6), speed / truck[3], np.zeros(4), sample / steps
     room = np.empty((4, 11)), np.zeros(3), np.zeros((2, 3)), np.empty(6), np.empty(4)
     now[3], states[0], turned[0], times[0] = speed, 0.0, turning, 0.0
     states[0, 3] = speed
-    while True:
-        n += 1
-        times[n] = times[n - 1]
+    for n in range(1, times.size):
         used = 0.0
         for k in range(steps):
             first = none if n == 1 and k == 0 else torque
-            part = go(now, turning, first, torque, step, steer, slope * 9.81 * step, truck, tables, room, reports[n])
+            part = go(now, turning, first, torque, step, course, slope * 9.81 * step, truck, tables, room, reports[n])
             used += part
             if part < step:
                 break
-        times[n] += used
-        states[n], turned[n] = now, turning
+        times[n], states[n], turned[n] = times[n - 1] + used, now, turning
         if part < step:
-            return n + 1 if part >= 0.0 else -1
+            return n + 1 if part >= 0.0 else 0
+    return times.size
 
 
-def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], Any]:
+def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], Path]:
     """One stop from a speed (m/s) with the front wheels at an angle (rad) of the numbers of a bare vehicle
-    (``models.braking.run.Braked``), in at most so many samples: times, states, turning and reports."""
-    p, tyres = vehicle.plane, vehicle.tables
+    (``models.braking.run.Braked``), in at most so many samples, the start included."""
+    p, tyres, pressure = vehicle.plane, vehicle.tables.packed, vehicle.chambers.supply
     truck = (p.place[:, 0].copy(), p.place[:, 1].copy(), p.static, p.radius, p.spin, p.masses[0], p.inertias[0])
-    torque = vehicle.brakes.rising * vehicle.chambers.supply
+    course, torque = (math.cos(steer), math.sin(steer)), vehicle.brakes.rising * pressure
 
-    def marched() -> tuple[np.ndarray, ...]:
-        path = tuple(np.empty((samples, *shape)) for shape in ((), (6,), (4,), (4, COLUMNS)))
-        n = march(speed, steer, torque, vehicle.sample, vehicle.substeps, vehicle.slope, truck, tyres.packed, *path)
-        return tuple(part[:n] for part in path)
+    def marched() -> Path:
+        times, states, turned, reports = (np.empty((samples, *shape)) for shape in ((), (6,), (4,), (4, COLUMNS)))
+        n = march(speed, course, torque, vehicle.sample, vehicle.substeps, vehicle.slope, truck, tyres, times, states,
+                  turned, reports)  # fmt: skip
+        applied = (np.arange(n) > 0.0)[:, None]
+        return Path(times[:n], states[:n].reshape(n, 2, 3), turned[:n], pressure * applied * np.ones(4),
+                    torque * applied, reports[1:n], True, ("x", "y", "heading_0"))  # fmt: skip
 
     return marched

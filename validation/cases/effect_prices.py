@@ -13,6 +13,7 @@ from models.scene import Scene
 from models.simulate import outputs
 from validation.absence.bare_cars import ratio_of_cars
 from validation.absence.bare_rides import ratio_of_rides
+from validation.absence.bare_stops import ratio_of_stops
 from validation.absence.hand_built import exudyn_run, mujoco_run
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import EFFECTS, ENGINES, STEP, change, changes, model, pair, scene, write_files
@@ -51,7 +52,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
                  for i, effect in enumerate(EFFECTS) for j, engine in enumerate(ENGINES)
                  if not quick or i % len(ENGINES) == j]  # fmt: skip
     rows = [row for engine, ratio in ratios.items() for row in _machinery(engine, ratio, STEPS[quick], quick)]
-    rows += _wheelset(STEPS[quick] // 4, quick) + _rides(quick) + _cars(STEPS[quick] // 20, quick)
+    rows += _wheelset(STEPS[quick] // 4, quick) + _rides(quick) + _cars(STEPS[quick] // 20, quick) + _stops(quick)
     return rows, {"price": price, "ratios": ratios}
 
 
@@ -138,6 +139,18 @@ def _cars(steps: int, quick: bool) -> list[Row]:
         slower("effect_prices.ratio.handling", "MuJoCo: time of a bare car of a scene of handling by that of the "
                "written one, whose path passes the same guard", ratio, "what walking through any vehicle's tree costs "
                "where no effect is named", judged=False),
+    ]  # fmt: skip
+
+
+def _stops(quick: bool) -> list[Row]:
+    """A truck that brakes in a turn on snow by the reference, against one that was written for that alone."""
+    gap, ratio = ratio_of_stops(3.0 if quick else 10.0, ROUNDS[quick])
+    return [
+        at_most("effect_prices.same.braking", SYSTEM, "states, wheels, forces and brakes of a bare stop against those "
+                "of one written for a truck of fixed loads on one surface alone", gap, "m, rad, m/s, rad/s, shares",
+                1e-11, "the same equations, sums in another order", "none"),
+        slower("effect_prices.ratio.braking", "time of a bare stop by that of the written one", ratio, "what a step of "
+               "any braked vehicle in the plane costs where no effect is named", judged=False),
     ]  # fmt: skip
 
 

@@ -214,7 +214,8 @@ def jackknifed(implementation: str, folder: Path) -> float:
 
     def energy() -> float:
         mass, rest = np.zeros((5, 5)), np.zeros(5)
-        inertia(state[0], state[1], plane.masses, plane.inertias, plane.reach, mass, rest, rest.copy(), rest.copy())
+        units = np.column_stack((np.cos(state[0, 2:]), np.sin(state[0, 2:])))
+        inertia(units, state[1], plane.masses, plane.inertias, plane.reach, mass, rest, rest.copy(), rest.copy())
         return float(0.5 * state[1] @ mass @ state[1])
 
     levels = [energy()]

@@ -1,0 +1,26 @@
+"""A bare stop is that of a truck written for it alone, and asking a steady controller in every sample changes none."""
+
+import numpy as np
+import pytest
+
+from models.braking.controller import AllApplied
+from models.braking.port.ask import Asked
+from models.braking.procedures import ready
+from validation.absence.bare_stops import ratio_of_stops
+from validation.absence.braking import STOP
+from validation.absence.of_systems import bare
+
+
+def test_a_steady_controller_is_asked_once_and_drives_as_one_that_is_asked_in_every_sample():
+    scene = bare("braking")
+    vehicle, start = ready(scene, STOP)
+    once, always = (vehicle.run(own, start) for own in (AllApplied(4), Asked(AllApplied(4))))
+    assert len(once.times) == len(always.times) > 200
+    for name in ("times", "states", "turning", "pressures", "torques", "reports"):
+        assert np.array_equal(getattr(once, name), getattr(always, name))
+
+
+@pytest.mark.full
+def test_the_stop_written_by_hand_is_the_bare_one():
+    gap, _ = ratio_of_stops(3.0, 1)
+    assert gap < 1e-11  # rounding; without the turning of a wheel's axes it would be 1e-5
