@@ -25,7 +25,8 @@ def choice_figure(found: list[Any], path: Path) -> None:
         _activity(axis, one) if active else _changes(axis, one)
     for axis in axes.flat[len(panels) :]:
         axis.set_visible(False)
-    figure.suptitle("Which effects matter for which question: change by leaving out one effect, against the tolerance",
+    gap = " " if columns > 1 else "\n"
+    figure.suptitle(f"Which effects matter for which question:{gap}change by leaving out one effect, against the tolerance",
                     x=0.01, ha="left", fontweight="bold")  # fmt: skip
     save(figure, path)
 
