@@ -54,11 +54,14 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         large = _alone(_large, job, MANY, forces / "large")
         found = large.pop("found")
         rows = [_path_row(forces, duration, found), *_scale_rows(large)]
-        rows += [_workers_row(job, found), _killed_row(job, found, forces / "killed")]
         with processes(2) as pool:
+            again, half = pool.submit(run_paths, job, SOME), pool.submit(_half_step_row, forces)
+            killed = _killed_row(job, found, forces / "killed")
+            rows += [_same_row("workers", f"{SOME} paths by 1 worker and by 2", found, again.result()), killed]
+            halved = half.result()  # nothing else runs while the engines are timed
             engines, prices = _engines(scene, truth, times, found, 4, pool)
         prices = {"reference, 2 processes": large["seconds"] / large["path-steps"], **prices}
-        rows += [*engines, _half_step_row(forces), *_price_rows(prices)]
+        rows += [*engines, halved, *_price_rows(prices)]
         return rows, _data(measured.states, times, found, large, prices)
 
 
@@ -92,10 +95,6 @@ def _same_row(id: str, what: str, one: Arrays, other: Arrays) -> Row:
     equal = all(np.array_equal(one[name][:count], other[name], equal_nan=True) for name in one)
     return behaves(f"ensemble.{id}", SYSTEM, what, SAME if equal else "different bits", SAME,
                    "a sample belongs to seed, path and place alone", "shared kernel")  # fmt: skip
-
-
-def _workers_row(job: NoisePaths, found: Arrays) -> Row:
-    return _same_row("workers", f"{SOME} paths by 1 worker and by 2", found, run_paths(job, SOME))
 
 
 def _interrupted_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
