@@ -4,9 +4,11 @@ numba numbers the files of a function's signatures from its index. Two processes
 then write the same file, and each later loads the other's machine code. Nor does numba see a change in a function
 that another file gives to a kernel. Both are wrong answers without a word. So here every file has a name of its own
 (if an entry of the index is lost, the function is compiled again), and machine code is as old as the newest of its
-folder, of the vehicles' equations, of the marches and of the contact's kernels.
+folder, of the vehicles' equations, of the marches, of the contact's kernels, and of the kernels that its file imports
+from elsewhere.
 """
 
+import re
 import zlib
 from collections.abc import Callable
 from functools import cache
@@ -18,6 +20,8 @@ import numba
 
 COMMON = tuple(Path(__file__).parent / name for name in ("vehicles", "engines", "contact"))
 """Folders whose functions are compiled into kernels of other folders."""
+ROOT = Path(__file__).parents[1]
+IMPORT = re.compile(r"^from ((?:models|validation)[.\w]*) import (?:\(([^)]*)\)|(.*))", re.MULTILINE)
 
 
 def njit(**options: Any) -> Callable[[Callable], Any]:
@@ -48,7 +52,7 @@ def _kept_apart(compiled: Any) -> Any:
     if file is not None:
         stem = file._index_name.removesuffix(".nbi")
         file._data_name = lambda number: f"{stem}.{uuid4().hex[:12]}.nbc"
-        file._source_stamp = checksum(Path(compiled.py_func.__code__.co_filename).parent)
+        file._source_stamp = stamp(*_files(compiled.py_func))
     return compiled
 
 
@@ -63,3 +67,39 @@ def checksum(folder: Path) -> int:
     """Of the sources that a kernel of this folder may be made of."""
     sources = (path for place in sorted({folder, *COMMON}) for path in sorted(place.glob("*.py")))
     return zlib.crc32(b"".join(path.read_bytes() for path in sources))
+
+
+def _files(function: Any) -> list[Path]:
+    """A function's file, and those of compiled functions that are its globals."""
+    called = [function.__globals__.get(name) for name in function.__code__.co_names]
+    own = [function, *(one.py_func for one in called if hasattr(one, "py_func"))]
+    return [Path(one.__code__.co_filename) for one in own]
+
+
+def stamp(file: Path, *others: Path) -> int:
+    """Of the sources that a kernel of this file may be made of: its folder's, and kernels of those others and of what
+    all of them import."""
+    made_of = {*others, *(path for one in (file, *others) for path in _imported(one))}
+    elsewhere = sorted(path for path in made_of if path.parent not in (file.parent, *COMMON))
+    return zlib.crc32(b"".join(path.read_bytes() for path in elsewhere), checksum(file.parent))
+
+
+def _imported(file: Path) -> set[Path]:
+    """Files with kernels that a file imports, and those that they import."""
+    found, left = set[Path](), [file]
+    while left:
+        new = _kernels(left.pop()) - found
+        found |= new
+        left += new
+    return found
+
+
+@cache
+def _kernels(file: Path) -> frozenset[Path]:
+    """Files with kernels that a file names in its imports, be it they or what is in them; read and not imported."""
+    if not file.is_file():
+        return frozenset()
+    places = [ROOT.joinpath(*module.split("."), *name) for module, *names in IMPORT.findall(file.read_text())
+              for name in ((), *((one.split()[0],) for one in "".join(names).split(",") if one.strip()))]
+    files = {place.with_suffix(".py") for place in places}
+    return frozenset(path for path in files if path.is_file() and "from models.compiled import" in path.read_text())

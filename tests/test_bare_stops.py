@@ -23,4 +23,4 @@ def test_a_steady_controller_is_asked_once_and_drives_as_one_that_is_asked_in_ev
 @pytest.mark.full
 def test_the_stop_written_by_hand_is_the_bare_one():
     gap, _ = ratio_of_stops(3.0, 1)
-    assert gap < 1e-11  # rounding; without the turning of a wheel's axes it would be 1e-5
+    assert gap < 1e-11  # rounding

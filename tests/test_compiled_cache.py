@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import models
+from models import compiled
 from models.engines.reference import derivative_of, march_of
 
 MODES = (("road", "exact"), ("road", "linear"), ("force", "exact"), ("force-body", "exact"),
@@ -96,3 +97,28 @@ def test_a_change_of_the_equations_is_seen(tmp_path):
     equations = copy / "vehicles" / "pitch_plane_equations.py"
     equations.write_text(equations.read_text().replace("p[1] * f3 - p[0] * f4", "p[1] * f3 + p[0] * f4"))
     assert first == again and answer() != first
+
+
+def test_machine_code_is_as_old_as_the_kernels_that_its_file_imports_from_other_folders(tmp_path, monkeypatch):
+    for name, text in (("a/mine.py", "from models.b.theirs import (  # both\n    f,\n    g,\n)"),
+                       ("b/theirs.py", "from models.c import deep as d"), ("c/deep.py", ""), ("c/other.py", "")):
+        path = tmp_path / "models" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"from models.compiled import lean\n{text}\n")
+    monkeypatch.setattr(compiled, "ROOT", tmp_path)
+    found = {}
+    for changed in ("a/mine.py", "b/theirs.py", "c/deep.py", "c/other.py"):
+        before = compiled.stamp(tmp_path / "models" / "a" / "mine.py")
+        path = tmp_path / "models" / changed
+        path.write_text(path.read_text() + "# changed\n")
+        compiled.checksum.cache_clear()
+        found[changed] = compiled.stamp(tmp_path / "models" / "a" / "mine.py") != before
+    assert found == {"a/mine.py": True, "b/theirs.py": True, "c/deep.py": True, "c/other.py": False}
+
+
+def test_a_kernel_that_is_given_another_one_is_as_old_as_that():
+    from models.braking.sprung_step import compiled as stepping
+    from models.engines.mujoco_native import accelerate, march
+
+    files = compiled._files(stepping(accelerate, march, "in_a_test").py_func)
+    assert {file.name for file in files} >= {"sprung_step.py", "sprung_forces.py", "mujoco_native.py"}
