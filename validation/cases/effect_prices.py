@@ -29,7 +29,7 @@ ROUNDS, PRICED = {True: 7, False: 80}, {True: 5, False: 15}
 """Rounds of these runs, and of those that tell what an effect adds, by ``quick``."""
 UNJUDGED = 4
 """Of how many rounds what no row judges is in the first."""
-RIDES = {"reference": {True: 50, False: 1000}, "exudyn": {True: 50, False: 400}, "mujoco": {True: 500, False: 1000}}
+RIDES = {"reference": {True: 50, False: 500}, "exudyn": {True: 50, False: 300}, "mujoco": {True: 500, False: 1000}}
 """Steps of rides: one of Exudyn takes as long as eight of MuJoCo or of the reference's copies together."""
 WRITTEN = {"reference": "the same copies one after the other, equations written out",
            "exudyn": "a car of its items whose path passes the same guard",
@@ -117,7 +117,7 @@ def _rides(quick: bool) -> list[Row]:
     """A car with seven freedoms on a rough road, against one written for each engine, or as equations."""
     rows = []
     for engine, steps in RIDES.items():
-        gap, ratio = ratio_of_rides(engine, steps[quick], ROUNDS[quick])
+        gap, ratio = ratio_of_rides(engine, steps[quick], 3 if quick else ROUNDS[quick])
         rows += [
             at_most(f"effect_prices.same.ride.{engine}", SYSTEM, f"{engine}: states of a bare ride against those of "
                     f"{WRITTEN[engine]}", gap, "m, rad, m/s, rad/s", 1e-11, "the same vehicle on the same road; forces "
