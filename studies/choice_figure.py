@@ -26,8 +26,8 @@ def choice_figure(found: list[Any], path: Path) -> None:
     for axis in axes.flat[len(panels) :]:
         axis.set_visible(False)
     gap = " " if columns > 1 else "\n"
-    figure.suptitle(f"Which effects matter for which question:{gap}change by leaving out one effect, against the tolerance",
-                    x=0.01, ha="left", fontweight="bold")  # fmt: skip
+    figure.suptitle(f"Which effects matter for which question:{gap}change by leaving out one effect, against the "
+                    "tolerance", x=0.01, ha="left", fontweight="bold")  # fmt: skip
     save(figure, path)
 
 
