@@ -15,6 +15,7 @@ from validation.absence.bare_cars import ratio_of_cars
 from validation.absence.bare_rides import ratio_of_rides
 from validation.absence.bare_stops import ratio_of_stops
 from validation.absence.hand_built import exudyn_run, mujoco_run
+from validation.absence.hand_built_contact import ratio_of_contacts
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import EFFECTS, ENGINES, STEP, change, changes, model, pair, scene, write_files
 from validation.rows import Row, System, Table, at_most, finding
@@ -52,7 +53,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
                  for i, effect in enumerate(EFFECTS) for j, engine in enumerate(ENGINES)
                  if not quick or i % len(ENGINES) == j]  # fmt: skip
     rows = [row for engine, ratio in ratios.items() for row in _machinery(engine, ratio, STEPS[quick], quick)]
-    rows += _wheelset(STEPS[quick] // 4, quick) + _rides(quick) + _cars(STEPS[quick] // 20, quick) + _stops(quick)
+    rows += _wheelset(STEPS[quick] // 4, quick) + _rides(quick) + _contact(quick)
+    rows += _cars(STEPS[quick] // 20, quick) + _stops(quick)
     return rows, {"price": price, "ratios": ratios}
 
 
@@ -151,6 +153,20 @@ def _stops(quick: bool) -> list[Row]:
                 1e-11, "the same equations, sums in another order", "none"),
         slower("effect_prices.ratio.braking", "time of a bare stop by that of the written one", ratio, "what a step of "
                "any braked vehicle in the plane costs where no effect is named", judged=False),
+    ]  # fmt: skip
+
+
+def _contact(quick: bool) -> list[Row]:
+    """FASTSIM on one ellipse without spin, called from Python; its march by the least of its arithmetic is judged by
+    ``fastsim.speed.plain``."""
+    gap, ratio = ratio_of_contacts(ROUNDS[quick])
+    return [
+        at_most("effect_prices.same.contact", SYSTEM, "forces of FASTSIM on a bare ellipse, by friction times load, "
+                "against one written out for that alone", gap, "", 1e-13, "the same cells, sums in another order",
+                "none"),
+        slower("effect_prices.ratio.contact", "time of a call of FASTSIM on a bare ellipse by that of the written one",
+               ratio, "what spin, other shapes, marches and friction cost where nothing asks for them",
+               judged=not quick),
     ]  # fmt: skip
 
 

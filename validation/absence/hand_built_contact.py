@@ -1,0 +1,74 @@
+"""FASTSIM written out for one round contact without spin: the march of 1982, strip after strip, and nothing else.
+
+The product's own call serves any ellipse, load and creepage with spin, in three marches and with friction that falls;
+this one has neither a choice nor a moment.
+"""
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from models.compiled import njit
+from models.contact.fastsim import Ellipse
+from models.contact.fastsim_grid import grid
+from models.contact.linear_theory import flexibilities
+from models.contact.material import Pair
+from validation.timing import interleave, paired_ratio
+
+CELLS, AXIS, LOAD, FRICTION = 21, 5e-3, 8e4, 0.3
+"""Cells of a strip, semi-axes (m), load (N), coefficient of friction."""
+CREEP = (1e-3, 5e-4)
+CALLS = 200
+"""In a turn."""
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def forces(axis, load, friction, creep_x, creep_y, flexible_x, flexible_y, strips, bound):
+    """fx, fy (N) of a contact of two equal semi-axes (m); strips (2, n): half length by the axis, share of the load;
+    bound (cells,): traction that a cell may bear by that in the strip's middle."""
+    cells, count, fx, fy = bound.size, strips.shape[1], 0.0, 0.0
+    for k in range(count):
+        half, share = strips[0, k], strips[1, k]
+        middle = friction * load * share / half * cells * count / (4.0 * axis * axis)
+        step = 2.0 * axis * half / cells / middle
+        u, v, x, y, sum_x, sum_y = step * creep_x / flexible_x, step * creep_y / flexible_y, 0.0, 0.0, 0.0, 0.0
+        for i in range(cells):
+            x, y = x - u, y - v
+            size = math.sqrt(x * x + y * y)
+            if size > bound[i]:
+                x, y = x * bound[i] / size, y * bound[i] / size
+            sum_x, sum_y = sum_x + x, sum_y + y
+        fx, fy = fx + share * sum_x, fy + share * sum_y
+    return friction * load * fx, friction * load * fy
+
+
+def calls() -> tuple[Callable[[], np.ndarray], Callable[[], np.ndarray]]:
+    """The product's call and the written one, CALLS times: fx, fy (N)."""
+    pair = Pair()
+    own = Ellipse(1.0, pair, cells=CELLS, march="plain", flexibilities="three")
+    flexible = [float(value) for value in flexibilities(AXIS, AXIS, pair)]
+    net = grid(CELLS, own.net.strips.shape[1], "intermediate")
+    strips, bound = net.strips[[1, 3]].copy(), net.cells[1].copy()
+
+    def ours() -> np.ndarray:
+        for _ in range(CALLS):
+            found = own(AXIS, LOAD, FRICTION, *CREEP, 0.0)
+        return np.array(found[:2])
+
+    def theirs() -> np.ndarray:
+        for _ in range(CALLS):
+            found = forces(AXIS, LOAD, FRICTION, *CREEP, flexible[0], flexible[1], strips, bound)
+        return np.array(found)
+
+    return ours, theirs
+
+
+def ratio_of_contacts(rounds: int) -> tuple[float, tuple[float, float, float]]:
+    """Largest difference of the forces by the largest force there can be, and the ratio of seconds with its interval.
+    """
+    jobs = calls()
+    ours, theirs = (job() for job in jobs)
+    gap = float(np.abs(ours - theirs).max()) / (FRICTION * LOAD)
+    return gap, paired_ratio(*interleave(jobs, rounds, 5e-3, clock=time.process_time))
