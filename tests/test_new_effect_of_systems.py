@@ -28,7 +28,7 @@ from models.vehicles.vehicle_file import load_vehicle
 from studies.asked import SCENES
 from validation.absence.contact import BARE as CONTACT
 from validation.absence.of_systems import added, bare, declared, seen
-from validation.price import effects
+from validation.price import effects, effects_of_ride
 from validation.price.effects import price_list
 
 
@@ -186,7 +186,7 @@ def test_a_new_effect_of_ride_is_in_every_linear_vehicle_and_in_both_engines(new
     assert np.abs(one - two).max() < 1e-12 * np.abs(one).max() < np.abs(two - rough.run.positions).max()
 
 
-def test_new_effects_of_ride_are_priced_and_chosen_among(new_file):
+def test_new_effects_of_ride_are_priced_and_chosen_among(new_file, monkeypatch):
     """Exactly: each is left out of the equations themselves. What needs another one goes with it."""
     new_file("ride", DAMPERS.name, DAMPERS.text)
     new_file("ride", "tread", NEW["ride"].text.replace('COST', 'NEEDS = ("delay", "dampers")\nCOST', 1))
@@ -200,6 +200,7 @@ def test_new_effects_of_ride_are_priced_and_chosen_among(new_file):
     other = Held(scene, vehicle_of(scene))
     known = Whole(other, 20.0).reduced(without_effects(other, [there["tyre damping"]]))
     assert np.abs(rest.system.A - known.system.A).max() < 1e-12 * np.abs(known.system.A).max()
+    monkeypatch.setattr(effects_of_ride, "STEPS", 20)
     prices = {price.name: price for price in price_list(own).prices}
     assert prices["tread"].counts[1]["states"] - prices["tread"].counts[0]["states"] == 4 and prices["dampers"].why
     assert prices["tread"].changes[0].relative > 0.01
