@@ -126,8 +126,9 @@ def _reported(change: Callable[[Chooser, frozenset[str], int], np.ndarray]) -> C
 
     def confirm(chooser: Chooser, chosen: frozenset[str]) -> np.ndarray:
         times = chooser.reach(chosen)
-        chooser._confirmed[chosen] = times, change(chooser, chosen, times)
-        return chooser._confirmed[chosen][1]
+        found = change(chooser, chosen, times)
+        chooser._confirmed[chosen] = times, found, np.zeros_like(found)
+        return found
 
     return lambda real: confirm
 

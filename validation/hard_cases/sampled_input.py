@@ -15,7 +15,7 @@ from models.road.polyline import PolylineProfile
 from models.road.profile import SplineProfile
 from models.road.signal import RoadUnderWheels
 from models.scene import build as build_scene
-from models.signals import Sampled
+from models.signals import SNAP, Sampled
 from models.simulate import simulate
 from models.time_series import write_time_series
 from validation.hard_cases import setups
@@ -88,8 +88,8 @@ class ByTime(Sampled):
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values at start + i step."""
-        index, _ = self._place((start + step * np.arange(count)) / self.period)
-        return self.values[index]
+        periods = (start + step * np.arange(count)) / self.period
+        return self.values[np.floor(periods + SNAP).astype(int).clip(0, len(self.values) - 1)]
 
 
 def halved_naive(folder: Path) -> str:
