@@ -12,7 +12,7 @@ from models.engines.spatial_protocol import INTEGRATORS, METHODS, build, jacobia
 from models.engines.spatial_reference import SpatialReference
 from models.engines.spatial_speeds import at_speeds
 from models.errors import InputError, Refused, RunFailed
-from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre
+from models.vehicles.spatial import AntiRollBar, Body, SpatialVehicle, SpringDamper, TurnOutput, Tyre
 from models.vehicles.spatial_linear import linearise
 from validation.cases.ride_engines import GRAVITY, SPEED, curved, difference, of_name, random_state, relative
 
@@ -60,6 +60,22 @@ def test_accelerations_agree_with_the_equations_by_hand():
         expected = reference.acceleration(*state)
         assert relative(exudyn.acceleration(*state), expected) < 1e-12
         assert relative(mujoco_.acceleration(*state), expected) < 1e-12
+
+
+def test_a_wheel_that_only_slides_is_linearised_wherever_its_spring_and_its_tyre_are():
+    """Points of the spring beside the tyre's, an axis that leans, outputs of none or of turning; a bar on a body of one
+    coordinate. Exudyn once asked for markers that it had not."""
+    roller = Body("roller", 400.0, (0.0, 0.0, 0.6), ("rx",), ((30.0, 0.0, 0.0), (0.0, 30.0, 0.0), (0.0, 0.0, 30.0)))
+    wheel = Body("wheel", 40.0, (0.0, 0.7, 0.3), ("z",))
+    springs = tuple(SpringDamper(f"{i}", "roller", "wheel", (0.0, 0.6, 0.6), (0.0, 0.6, 0.3), axis, 3e4, 1e3)
+                    for i, axis in enumerate([(0.0, 0.0, 1.0), (0.0, 0.6, 0.8)]))  # fmt: skip
+    bar = AntiRollBar("bar", "roller", "wheel", "roller", (0.0, 0.7, 0.3), (0.0, -0.7, 0.6), 1e4, 10.0)
+    tyre = Tyre("tyre", "wheel", (0.0, 0.7, 0.3), 0, 2e5)
+    turning = TurnOutput("turn", "angle", "wheel", (1.0, 0.0, 0.0))
+    for outputs in ((), (turning,)):
+        vehicle = SpatialVehicle("odd", (roller, wheel), springs, (tyre,), (0.0,), (bar,), outputs=outputs)
+        for engine in ENGINES:
+            assert difference(build(engine, vehicle).linearise(), linearise(vehicle)) < 1e-9
 
 
 def test_equations_by_hand_keep_energy():

@@ -100,7 +100,8 @@ class Build:
 
     def marker(self, body: str | None, point: Vector, turning: bool = False) -> Any:
         """Marker of a point, made once; ``turning``: it is asked for its axes or its turning, too."""
-        key = (body, point, turning and body is not None and self.links[body][1] is None)
+        apart = turning and body is not None and self.links[body][1] is None
+        key = (body, point, apart or (body, point, True) in self.markers)
         if key not in self.markers:
             self.markers[key] = self.mbs.AddMarker(self._new_marker(*key))
         return self.markers[key]
@@ -120,6 +121,8 @@ class Build:
         if (body, freedom) not in self.places:
             return lambda: 0.0
         read, (node, index) = self.mbs.GetNodeOutput, self.places[body, freedom]
+        if sum(node == own for own, _ in self.places.values()) == 1:  # Exudyn gives a number, no array
+            return lambda: read(node, kind)
         return lambda: read(node, kind)[index]
 
     def own(self, body: str | None, vector: np.ndarray) -> np.ndarray:
@@ -369,6 +372,8 @@ def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadTable) -> B
         built.mbs.AddObject(items.CartesianSpringDamper(
             markerNumbers=[built.marker(None, centre), built.marker(drag.body, centre)],
             damping=[drag.coefficient * float(speed or 0.0), 0, 0]))  # fmt: skip
+    for tyre in vehicle.tyres:
+        built.marker(tyre.body, tyre.point)
     for output in vehicle.outputs:
         if isinstance(output, PointOutput):
             built.marker(output.body, output.point)
