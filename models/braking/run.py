@@ -153,8 +153,8 @@ def _tell(told: Told, command: Command, braked: bool) -> None:
 
 def _take(rows: list[np.ndarray], kept: Kept) -> None:
     """Put what was recorded to the rows."""
-    rows.append(kept.rows[: kept.count[0]].copy())
-    kept.count[0] = 0
+    rows.append(kept.rows[: kept.left[0]].copy())
+    kept.left[0] = 0
 
 
 @contextmanager

@@ -29,11 +29,11 @@ class Told(NamedTuple):
 
 class Kept(NamedTuple):
     """What is recorded: now (k,), the moment as numbers of which the first is the time (s); rows (m, k), such moments,
-    of which the first count (1,) have not been taken; until (s): the last sample ends then or after."""
+    of which the first ``left`` (1,) have not been taken; until (s): the last sample ends then or after."""
 
     now: np.ndarray
     rows: np.ndarray
-    count: np.ndarray
+    left: np.ndarray
     until: float
 
 
@@ -71,8 +71,8 @@ def samples(told, kept, sample, braking, state, turning, *others):
             if status not in (FINE, AT_REST):
                 break
             kept.now[0] = time
-            kept.rows[kept.count[0]] = kept.now
-            kept.count[0] += 1
+            kept.rows[kept.left[0]] = kept.now
+            kept.left[0] += 1
             if status == AT_REST or time >= kept.until:
                 break
 

@@ -29,7 +29,8 @@ def settle(now, course, regular, starts, truck, angles, known):
     """Fill what is known (4, 11) of the wheels at a state ``now`` (6,): x, y, heading and their rates."""
     x, y = truck[:2]
     vx, vy, r = now[3], now[4], now[5]
-    c, s, ahead, aslant = *course, math.cos(now[2]), math.sin(now[2])
+    c, s = course
+    ahead, aslant = math.cos(now[2]), math.sin(now[2])
     e, f = ahead * c - aslant * s, aslant * c + ahead * s
     for i in range(4):
         if i == 2:
