@@ -16,6 +16,7 @@ from models.engines.mujoco_layout import check, offset
 from models.engines.mujoco_native import Native, native
 from models.engines.spatial_mujoco import Numbers, _spec, _weigh
 from models.errors import RunFailed
+from models.vehicles.spatial import Body, SpatialVehicle
 
 
 @cache
@@ -32,19 +33,37 @@ def timed_law(kernel: Any) -> Any:
     return law
 
 
+def carriers(vehicle: SpatialVehicle) -> dict[str, str]:
+    """Bodies that MuJoCo need not know apart from the only body that rides on each, by that one's name.
+
+    They have no mass, or are points about which the other does no more than turn: either way the other's mass and
+    inertia, with the point's mass, move as both do.
+    """
+    found = {}
+    for body in vehicle.bodies:
+        riders = [rider for rider in vehicle.bodies if rider.parent == body.name]
+        if len(riders) == 1 and not np.any(body.inertia) and (not body.mass or _turns_about(body, riders[0])):
+            found[body.name] = riders[0].name
+    return found
+
+
+def _turns_about(body: Body, rider: Body) -> bool:
+    return rider.position == body.position and all(freedom.startswith("r") for freedom in rider.freedoms)
+
+
 class FreeMujoco(FreeModel):
     """One free vehicle in one MuJoCo model; the callback's numbers lie in the model."""
 
     ENGINE = "mujoco"
 
     def __init__(self, driven: Driven) -> None:
-        self.driven, numbers = driven, driven.numbers
-        spec = _spec(driven.vehicle, 1e-3)
+        self.driven, numbers, merged = driven, driven.numbers, carriers(driven.vehicle)
+        spec = _spec(driven.vehicle, 1e-3, merged)
         spec.option.gravity = driven.gravity
         spec.add_numeric(name="vehicle", size=numbers.size, data=[0.0])
         self.model = spec.compile()
         self.model.numeric_data[:] = numbers
-        own = Numbers(driven.vehicle, self.model)
+        own = Numbers(driven.vehicle, self.model, merged)
         if not np.array_equal(own.columns, np.arange(driven.size)):
             raise ValueError("the bodies are not in the order of a walk through their tree")
         _weigh(self.model, own, driven.vehicle.bodies)

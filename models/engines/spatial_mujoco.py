@@ -6,7 +6,7 @@ written into the compiled model: MuJoCo refuses bodies without inertia, even whe
 no distribution of mass has, which published vehicles contain.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -21,7 +21,7 @@ from models.engines.mujoco_layout import check
 from models.engines.mujoco_quiet import quiet
 from models.engines.protocol import Settings, guard
 from models.engines.spatial_mujoco_callback import HEADER, PER_TIME, ROAD, spatial_law
-from models.engines.spatial_mujoco_numbers import AXES, Numbers, elements, packed
+from models.engines.spatial_mujoco_numbers import AXES, NONE, Numbers, elements, packed
 from models.engines.spatial_protocol import (
     EngineKinematics,
     SpatialRun,
@@ -37,10 +37,11 @@ from models.ride.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle, Vector
 
 
-def _spec(vehicle: SpatialVehicle, step: float) -> mujoco.MjSpec:
+def _spec(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = NONE) -> mujoco.MjSpec:
     """Bodies and joints, with masses and inertias of 1 for the moment (see ``_weigh``).
 
-    Their names are numbers: a user's body may be called "world".
+    Their names are numbers: a user's body may be called "world". carriers : bodies that are one with the only one that
+    rides on them, whose frame and name they get.
     """
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     spec = mujoco.MjSpec()
@@ -49,16 +50,26 @@ def _spec(vehicle: SpatialVehicle, step: float) -> mujoco.MjSpec:
     spec.option.timestep, spec.option.integrator = step, mujoco.mjtIntegrator.mjINT_RK4
     off = mujoco.mjtDisableBit
     spec.option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT
-    for body in vehicle.bodies:
-        below = spec.worldbody if body.parent is None else spec.body(numbers[body.parent])
-        origin = (0.0, 0.0, 0.0) if body.parent is None else vehicle.body(body.parent).position
+    for body in (body for body in vehicle.bodies if body.name not in carriers):
+        joined, parent = [body], body.parent
+        while parent is not None and parent in carriers:
+            joined.insert(0, vehicle.body(parent))
+            parent = joined[0].parent
+        below = spec.worldbody if parent is None else spec.body(numbers[parent])
+        origin = (0.0, 0.0, 0.0) if parent is None else vehicle.body(parent).position
         own = below.add_body(name=numbers[body.name], pos=np.subtract(body.position, origin), ipos=[0, 0, 0], mass=1.0,
                              iquat=_principal(body)[1], inertia=[1.0, 1.0, 1.0], explicitinertial=True)  # fmt: skip
-        for freedom in (freedom for freedom in FREEDOMS if freedom in body.freedoms):
-            turns = freedom.startswith("r")
-            kind = mujoco.mjtJoint.mjJNT_HINGE if turns else mujoco.mjtJoint.mjJNT_SLIDE
-            own.add_joint(name=f"{numbers[body.name]} {freedom}", type=kind, axis=AXES[freedom])
+        for one in joined:
+            _join(own, one, numbers[one.name], np.subtract(one.position, body.position))
     return spec
+
+
+def _join(own: Any, body: Body, number: str, place: np.ndarray) -> None:
+    """Joints of a vehicle's body in one of MuJoCo's, at a place (m) there."""
+    for freedom in (freedom for freedom in FREEDOMS if freedom in body.freedoms):
+        turns = freedom.startswith("r")
+        kind = mujoco.mjtJoint.mjJNT_HINGE if turns else mujoco.mjtJoint.mjJNT_SLIDE
+        own.add_joint(name=f"{number} {freedom}", type=kind, axis=AXES[freedom], pos=place)
 
 
 def _principal(body: Body) -> tuple[np.ndarray, np.ndarray]:
@@ -73,10 +84,12 @@ def _principal(body: Body) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _weigh(model: mujoco.MjModel, numbers: Numbers, bodies: tuple[Body, ...]) -> None:
-    """Give the bodies their masses and principal inertias."""
+    """Give the bodies their masses and principal inertias, summed where they are one."""
+    model.body_mass[1:] = model.body_inertia[1:] = 0.0
     for body in bodies:
         number = numbers.bodies[body.name]
-        model.body_mass[number], model.body_inertia[number] = body.mass, _principal(body)[0]
+        model.body_mass[number] += body.mass
+        model.body_inertia[number] += _principal(body)[0]
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 

@@ -1,5 +1,6 @@
 """The numbers of a vehicle in space as MuJoCo's callback reads them: what moves, and what acts between it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import chain
 
@@ -13,19 +14,30 @@ from models.vehicles.spatial_linear import preloads
 
 UP: Vector = (0.0, 0.0, 1.0)
 AXES = {freedom: np.eye(3)[i % 3].tolist() for i, freedom in enumerate(FREEDOMS)}
+NONE: Mapping[str, str] = {}
 Place = tuple[str | None, Vector, Vector]
 """Body, point and axis."""
 
 
 class Numbers:
-    """Where MuJoCo keeps a vehicle's bodies and coordinates: ids by name, columns (n,) by the vehicle's order."""
+    """Where MuJoCo keeps a vehicle's bodies and coordinates: ids by name, columns (n,) by the vehicle's order.
 
-    def __init__(self, vehicle: SpatialVehicle, model: mujoco.MjModel) -> None:
+    carriers : bodies that are one there with the only one that rides on them, by its name.
+    """
+
+    def __init__(self, vehicle: SpatialVehicle, model: mujoco.MjModel, carriers: Mapping[str, str] = NONE) -> None:
         order = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
-        self.bodies = {name: int(model.body(number).id) for name, number in order.items()}
+        self.bodies = {name: int(model.body(order[_last(carriers, name)]).id) for name in order}
         self.joints: dict[tuple[str, str], int] = {
             (name, freedom): int(model.joint(f"{order[name]} {freedom}").id) for name, freedom in vehicle.coordinates()}
         self.columns = np.array(list(self.joints.values()))
+
+
+def _last(carriers: Mapping[str, str], name: str) -> str:
+    """The body that a body is one with in MuJoCo."""
+    while name in carriers:
+        name = carriers[name]
+    return name
 
 
 @dataclass(frozen=True)

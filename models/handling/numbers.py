@@ -147,12 +147,12 @@ class _Points:
 
 
 def _joints(vehicle: SpatialVehicle, points: _Points) -> np.ndarray:
-    """Rows of all coordinates; those that turn what nothing else is on are loose."""
-    rows = joints(vehicle)
+    """Rows of all coordinates, with their counts in a body; those that turn what nothing else is on are loose."""
+    rows, counts = joints(vehicle), [len(body.freedoms) for body in vehicle.bodies for _ in body.freedoms]
     bears = {*rows[:, tree.BELOW], *(row[tree.JOINT] for row in points.rows)}
-    loose = [j >= 3 and row[tree.KIND] >= 3.0 and j not in bears for j, row in enumerate(rows)]
+    loose = [counts[j] == 1 and row[tree.KIND] >= 3.0 and j not in bears for j, row in enumerate(rows)]
     rows[loose, tree.KIND] = tree.LOOSE
-    return rows.ravel()
+    return np.column_stack([rows, counts]).ravel()
 
 
 def _place(vehicle: SpatialVehicle, body: str, point: Vector) -> tuple[int, np.ndarray]:

@@ -1,8 +1,9 @@
-"""The tree of a free vehicle's coordinates, walked outwards for places and velocities and inwards for forces, compiled.
+"""The tree of a free vehicle's bodies, walked outwards for places and velocities and inwards for forces, compiled.
 
 All is in the axes of the carrier (see ``models.vehicles.free_vehicle``), the first three coordinates. A link is a row
-of numbers for each coordinate, a spot one for each point where something acts; both lie in a room that the caller has
-on its stack, together with what pushes the carrier from outside. Nothing here makes an array.
+of numbers for each coordinate, whole for the last one of a body only: others have no more than their axis. A spot is
+one for each point where something acts. Both lie in a room that the caller has on its stack, together with what pushes
+the carrier from outside. Nothing here makes an array.
 """
 
 import math
@@ -10,13 +11,14 @@ import math
 from models.compiled import lean
 from models.contact.stack import row
 
-KIND, BELOW, ARM, PER_JOINT = 0, 1, 2, 5
-"""Of a coordinate in the table, as ``joints`` has it; ``LOOSE``: a kind that turns, and carries no point."""
+KIND, BELOW, ARM, COUNT, PER_JOINT = 0, 1, 2, 5, 6
+"""Of a coordinate in the table, as ``joints`` has it, and how many its body has; ``LOOSE``: a kind that turns, alone
+on a body that carries no point."""
 LOOSE = 6.0
 JOINT, LOCAL, PER_POINT = 0, 1, 4
 """Of a point in the table: the coordinate that moves it last, its place from there (m)."""
 TURNED, PLACE, AXIS, SPEED, TURNING, PUSHED, TWISTED, PER_LINK = 0, 9, 12, 15, 18, 21, 24, 27
-"""Of a link: rotation, row by row; joint; its axis; velocity of the body behind it where that would pass the carrier's
+"""Of a link: rotation, by axes; joint; its axis; velocity of the body behind it where that would pass the carrier's
 origin, beside the carrier, and its turning; force that was gathered there, and its moment about the carrier's origin.
 """
 WHERE, RATE, PUSH, PER_SPOT = 0, 3, 6, 9
@@ -71,40 +73,41 @@ def add(numbers, first, a):
 
 @lean
 def outwards(joints, n, q, v, links):
-    """Fill all links of ``joints``, the table's rows at a pointer; no forces yet."""
-    for j in range(n):
-        of, own = row(joints, PER_JOINT, j), row(links, PER_LINK, j)
-        if j < 3:
-            _begin(own, int(of[KIND]) % 3)
-        elif of[KIND] != LOOSE:
-            _follow(of, row(links, PER_LINK, int(of[BELOW])), q[j], v[j], own)
-
-
-@lean
-def _begin(own, axis):
-    """The carrier's own: zeros but for directions."""
+    """Fill the links of ``joints``, the table's rows at a pointer, body by body; no forces yet."""
+    carrier = row(links, PER_LINK, 2)
     for k in range(PER_LINK):
-        own[k] = 0.0
-    own[TURNED], own[TURNED + 4], own[TURNED + 8] = 1.0, 1.0, 1.0
-    own[AXIS + axis] = 1.0
+        carrier[k] = 0.0
+    carrier[TURNED] = carrier[TURNED + 4] = carrier[TURNED + 8] = 1.0
+    j = 3
+    while j < n:
+        of = row(joints, PER_JOINT, j)
+        count = int(of[COUNT])
+        if of[KIND] != LOOSE:
+            _follow(joints, j, j + count, row(links, PER_LINK, int(of[BELOW])), q, v, links)
+        j += count
 
 
 @lean
-def _follow(of, below, position, rate, own):
-    """A link, from that below it."""
-    kind = int(of[KIND])
-    along = kind if kind < 3 else kind - 3
-    axis = below[TURNED + along], below[TURNED + 3 + along], below[TURNED + 6 + along]
-    place, speed, turning = plus(three(below, PLACE), out(below, of, ARM)), three(below, SPEED), three(below, TURNING)
-    for k in range(9):
-        own[TURNED + k] = below[TURNED + k]
-    if kind < 3:
-        place, speed = plus(place, times(axis, position)), plus(speed, times(axis, rate))
-    else:
-        _turn(own, along, position)
-        turning, speed = plus(turning, times(axis, rate)), plus(speed, times(cross(place, axis), rate))
+def _follow(joints, first, end, below, q, v, links):
+    """A body's link, from that below it, and the axes of its coordinates, of which slides come first."""
+    x, y, z = three(below, TURNED), three(below, TURNED + 3), three(below, TURNED + 6)
+    place, speed = plus(three(below, PLACE), out(below, row(joints, PER_JOINT, first), ARM)), three(below, SPEED)
+    turning = three(below, TURNING)
+    for j in range(first, end):
+        kind = row(joints, PER_JOINT, j)[KIND]
+        along = kind if kind < 3.0 else kind - 3.0
+        axis = x if along == 0.0 else (y if along == 1.0 else z)
+        put(row(links, PER_LINK, j), AXIS, axis)
+        if kind < 3.0:
+            place, speed = plus(place, times(axis, q[j])), plus(speed, times(axis, v[j]))
+        else:
+            turning, speed = plus(turning, times(axis, v[j])), plus(speed, times(cross(place, axis), v[j]))
+            x, y, z = _turned(along, x, y, z, math.cos(q[j]), math.sin(q[j]))
+    own = row(links, PER_LINK, end - 1)
+    put(own, TURNED, x)
+    put(own, TURNED + 3, y)
+    put(own, TURNED + 6, z)
     put(own, PLACE, place)
-    put(own, AXIS, axis)
     put(own, SPEED, speed)
     put(own, TURNING, turning)
     put(own, PUSHED, (0.0, 0.0, 0.0))
@@ -112,22 +115,20 @@ def _follow(of, below, position, rate, own):
 
 
 @lean
-def out(own, local, first):
-    """Three numbers along a link's axes as a vector of the carrier's."""
-    x, y, z = three(local, first)
-    return (own[TURNED] * x + own[TURNED + 1] * y + own[TURNED + 2] * z,
-            own[TURNED + 3] * x + own[TURNED + 4] * y + own[TURNED + 5] * z,
-            own[TURNED + 6] * x + own[TURNED + 7] * y + own[TURNED + 8] * z)  # fmt: skip
+def _turned(along, x, y, z, cosine, sine):
+    """Three axes, turned about one of them."""
+    if along == 0.0:
+        return x, plus(times(y, cosine), times(z, sine)), plus(times(z, cosine), times(y, -sine))
+    if along == 1.0:
+        return plus(times(x, cosine), times(z, -sine)), y, plus(times(z, cosine), times(x, sine))
+    return plus(times(x, cosine), times(y, sine)), plus(times(y, cosine), times(x, -sine)), z
 
 
 @lean
-def _turn(own, axis, angle):
-    """Turn a link's axes about one of them."""
-    one, two = TURNED + (axis + 1 if axis < 2 else 0), TURNED + (axis + 2 if axis < 1 else axis - 1)
-    cosine, sine = math.cos(angle), math.sin(angle)
-    for k in range(0, 9, 3):
-        first, second = own[one + k], own[two + k]
-        own[one + k], own[two + k] = cosine * first + sine * second, cosine * second - sine * first
+def out(own, local, first):
+    """Three numbers along a link's axes as a vector of the carrier's."""
+    return plus(plus(times(three(own, TURNED), local[first]), times(three(own, TURNED + 3), local[first + 1])),
+                times(three(own, TURNED + 6), local[first + 2]))  # fmt: skip
 
 
 @lean
@@ -170,15 +171,17 @@ def inwards(joints, n, points, count, tree, f):
         force = three(spot, PUSH)
         add(own, PUSHED, force)
         add(own, TWISTED, cross(three(spot, WHERE), force))
-    for j in range(n - 1, 2, -1):
+    j = n - 1
+    while j > 2:
         of, own = row(joints, PER_JOINT, j), row(links, PER_LINK, j)
-        if of[KIND] == LOOSE:
-            continue
-        pushed, twisted = three(own, PUSHED), three(own, TWISTED)
-        if of[KIND] < 3.0:
-            f[j] += dot(three(own, AXIS), pushed)
-        else:
-            f[j] += dot(three(own, AXIS), twisted) - dot(three(own, AXIS), cross(three(own, PLACE), pushed))
-        below = row(links, PER_LINK, int(of[BELOW]))
-        add(below, PUSHED, pushed)
-        add(below, TWISTED, twisted)
+        first = j + 1 - int(of[COUNT])
+        if of[KIND] != LOOSE:
+            pushed, twisted = three(own, PUSHED), three(own, TWISTED)
+            moment = plus(twisted, cross(pushed, three(own, PLACE)))
+            for k in range(first, j + 1):
+                turns = row(joints, PER_JOINT, k)[KIND] >= 3.0
+                f[k] += dot(three(row(links, PER_LINK, k), AXIS), moment if turns else pushed)
+            below = row(links, PER_LINK, int(row(joints, PER_JOINT, first)[BELOW]))
+            add(below, PUSHED, pushed)
+            add(below, TWISTED, twisted)
+        j = first - 1
