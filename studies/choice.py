@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.choice.choose import Choice, Chooser
+from models.choice.choose import RUNS, Choice, Chooser
 from models.choice.variants import system_of
 from models.errors import InputError
 from models.strict import Strict, read
@@ -101,7 +101,7 @@ def chosen(scene: Any, engines: tuple[str, ...]) -> Found:
     engine = engine_of(scene, engines)
     chooser = Chooser(scene, engine, scene.quantities, scene.tolerance)
     choice, none = chooser.choose(), chooser.work(frozenset())
-    alone = [Alone(one, chooser.screen.predicted(frozenset([one])), none / chooser.work(frozenset([one])))
+    alone = [Alone(one, chooser.teller.predicted(frozenset([one])), none / chooser.work(frozenset([one])))
              for one in chooser.effects]  # fmt: skip
     return Found(scene, engine, choice, alone, chooser.further(frozenset(choice.left_out)), {})
 
@@ -187,6 +187,8 @@ def lines(one: Found, named: bool) -> list[str]:
                     f"steps with all effects; CPU seconds {faster:.3g} times fewer")  # fmt: skip
     rows += [f"    {name} would matter no more at a tolerance above {percent(change)}"
              for name, change in sorted(one.further.items(), key=lambda item: item[1])]  # fmt: skip
+    if choice.ended:
+        rows.append(f"    the search ended at the calls of {RUNS} runs of the scene: larger sets were not tried")
     if choice.more:
         rows.append(f"    chance alone stands in the way of more: {choice.more:.2g} times as many samples would tell")
     rows += misled(one)

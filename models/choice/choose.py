@@ -7,6 +7,10 @@ allowed) for what it adds to the error. Work is counted and not timed, so that t
 is left is run over the whole scene, beside the scene as it is. Where it is not within the tolerance, steps become
 shorter; if that does not help, the step of the path that breaks it is found by halving and taken back for good, and the
 choice goes on without it. So what is reported was confirmed, always; the scene as it is holds with no error at all.
+
+Where quantities are means of samples that are alike, few samples find the set, and all of them tell what it changes.
+The search ends where it has taken as many calls as so many runs of the scene: what it has found by then is confirmed,
+and larger sets were not tried.
 """
 
 import math
@@ -25,7 +29,9 @@ BUDGET = 0.8
 """Share of the tolerance that predictions may use."""
 FINE = 0.05
 """Share of the tolerance that the steps of screened runs may cost."""
-SHARPER = 4
+ROUGH = 0.15
+"""The same where samples are compared that met the same roads: what a step costs is in both of them."""
+SHARPER = 8
 """Steps so many times as short tell what the longest ones cost."""
 WINDOW = 0.25
 """Share of a run by which these steps are chosen."""
@@ -35,6 +41,8 @@ SHORTER = 2
 """Times that steps become shorter where a confirmation fails, before effects are taken back."""
 ROUNDS = 30
 """Sets that are confirmed at most."""
+RUNS = 100
+"""Runs of the scene, by their calls, that the search may take."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +53,7 @@ class Choice:
     add so much to that, where quantities are means of samples; kept : each sum of both is within the tolerance. calls
     and seconds (CPU) of the scene, of that with longer steps alone, and of what is left. rounds : runs of the whole
     scene that confirmed or did not; spent : calls of all runs. more : times as many samples would let more go, about, 0
-    where chance alone stands in nothing's way.
+    where chance alone stands in nothing's way. ended : the search was, before all that might go was tried.
     """
 
     candidates: tuple[str, ...]
@@ -61,6 +69,7 @@ class Choice:
     rounds: int
     spent: int
     more: float
+    ended: bool = False
 
 
 class Chooser:
@@ -70,24 +79,37 @@ class Chooser:
                  window: float = WINDOW) -> None:  # fmt: skip
         self.tolerance = tolerance
         self.whole = Screen(Variants(scene, engine), quantities)
-        self.own, self.error = self._steps(window)
-        coarse = self.whole.variants.changed(frozenset(), self.own)
-        self.screen = self.whole if self.own == 1 else Screen(Variants(coarse, engine), quantities)
+        self.alike = self.whole.sampled == set(quantities)
+        part = self._part(window)
+        self.own, self.error = self._steps(part)
+        self.teller = self._coarse(self.whole)
+        self.screen = self._coarse(part) if self.alike else self.teller
         self.lengths = [self.own * k for k in self.screen.variants.lengths()]
         self.effects = self.whole.variants.effects
         self._reach: dict[Set, int] = {}
         self._confirmed: dict[Set, tuple[int, np.ndarray, np.ndarray]] = {}
         self._pairs: list[Set] | None = None
-        self.rounds, self._doubtful = 0, list[float]()
+        self.rounds, self._doubtful, self.ended = 0, list[float](), False
 
-    def _steps(self, window: float) -> tuple[int, np.ndarray]:
-        """Longest steps for the screen, by the scene's own, and the relative changes (quantities,) by them."""
+    def _part(self, window: float) -> Screen:
+        """The first part of the scene, or few of its samples."""
         whole = self.whole.variants
         steps = math.ceil(window * whole.system.steps(whole.scene))
         part = whole.window(steps) if whole.system.WINDOWED else whole
-        screen = self.whole if part is whole else Screen(part, self.whole.quantities)
-        lengths = [k for k in whole.lengths() if k in part.lengths()]
-        longest, error = self._longest(screen, frozenset(), lengths, FINE * self.tolerance)
+        return self.whole if part is whole else Screen(part, self.whole.quantities)
+
+    def _coarse(self, screen: Screen) -> Screen:
+        """In the steps of the screen."""
+        runs = screen.variants
+        coarse = Variants(runs.changed(frozenset(), self.own), runs.engine)
+        return screen if self.own == 1 else Screen(coarse, screen.quantities)
+
+    def _steps(self, part: Screen) -> tuple[int, np.ndarray]:
+        """Longest steps for the screen, by the scene's own, and the relative changes (quantities,) by them."""
+        whole = self.whole.variants
+        lengths = [k for k in whole.lengths() if k in part.variants.lengths()]
+        allowed = (ROUGH if self.alike else FINE) * self.tolerance
+        longest, error = self._longest(part, frozenset(), lengths, allowed)
         while whole.of(times=longest) is None:  # its run fails after that part
             longest = max(k for k in lengths if k < longest)
         return longest, error
@@ -154,7 +176,7 @@ class Chooser:
         if not self.holds(self.confirm(none)):
             self._confirmed[none] = 1, *np.zeros((2, len(self.whole.quantities)))
         kept, banned = [none], set[Set]()
-        while self.rounds < ROUNDS:
+        while self.rounds < ROUNDS and not self.ended:
             path = self.path(kept, banned)
             if path == kept:
                 break
@@ -185,18 +207,28 @@ class Chooser:
         seconds = [run.counts["calls"] * self.screen.variants.per_call(left_out)
                    for run, (left_out, _) in zip(runs, shown, strict=True)]  # fmt: skip
         calls = [run.counts["calls"] for run in runs]
-        spent = whole.calls + (0 if self.screen is self.whole else self.screen.variants.calls)
-        return Choice(self.effects, tuple(sorted(chosen)), times, self.told(chosen, times),
-                      self.screen.remainder(chosen), found, chance, self.holds(found + chance), tuple(calls),
-                      tuple(seconds), self.rounds, spent, min(self._doubtful, default=0.0))  # fmt: skip
+        told, rest = self.told(chosen, times), self.teller.remainder(chosen)
+        return Choice(self.effects, tuple(sorted(chosen)), times, told, rest, found, chance,
+                      self.holds(found + chance), tuple(calls), tuple(seconds), self.rounds, self._spent(),
+                      min(self._doubtful, default=0.0), self.ended)  # fmt: skip
+
+    def _spent(self) -> int:
+        """Calls of all runs so far."""
+        return sum({id(one): one.variants.calls for one in (self.whole, self.teller, self.screen)}.values())
+
+    def _exhausted(self) -> bool:
+        """Whether the search has taken as many calls as it may; from then on it has ``ended``."""
+        own = self.whole.variants.of()
+        self.ended = self.ended or self._spent() > RUNS * (own.counts["calls"] if own else 0)
+        return self.ended
 
     def told(self, chosen: Set, times: int) -> np.ndarray:
         """Predicted changes (quantities,) of a set and a step together: that of the step by a shorter one."""
-        screen, runs = self.screen, self.whole.variants
+        screen, runs = self.teller, self.whole.variants
         change = screen.change(chosen) if chosen else None
         if times == 1:
             return screen.predicted(chosen)
-        shorter = [k for k in reversed(runs.lengths()) if SHARPER * k <= times or k == 1]
+        shorter = [k for k in reversed(runs.lengths()) if times % k == 0 and (SHARPER * k <= times or k == 1)]
         step = screen.between(runs.of(chosen, times), next(filter(None, (runs.of(chosen, k) for k in shorter)), None))
         if change is None or step is None or times % self.own:
             return screen.predicted(chosen) + screen.shares(step)
@@ -228,7 +260,9 @@ class Chooser:
         if self._pairs is None:
             alone = {one: self.share(frozenset([one])) for one in self.effects}
             pairs = [pair for pair in combinations(self.effects, 2) if max(alone[one] for one in pair) > BUDGET]
-            self._pairs = [frozenset(pair) for pair in pairs if self.share(frozenset(pair)) <= BUDGET]
+            pairs.sort(key=lambda pair: sum(alone[one] for one in pair))
+            self._pairs = [frozenset(pair) for pair in pairs
+                           if not self._exhausted() and self.share(frozenset(pair)) <= BUDGET]
         return self._pairs
 
     def _next(self, chosen: Set, banned: set[Set], steps: list[Set]) -> Set:
@@ -237,7 +271,7 @@ class Chooser:
         now, work = self.share(chosen), self.work(chosen)
         for step in steps:
             further = chosen | step
-            if further == chosen or step - chosen in banned or step in banned:
+            if further == chosen or step - chosen in banned or step in banned or self._exhausted():
                 continue
             share = self.share(further)
             saved = math.log(work / self.work(further)) if share <= BUDGET else 0.0
