@@ -1,8 +1,13 @@
 """A bare car beside one written for it alone, and the arrays that its forces and those of hubs must not make."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from models.engines import free_vehicle_mujoco
+from models.engines.free_vehicle_mujoco import FreeMujoco
+from models.handling.in_engines import driven_by
 from models.handling.numbers import Handling
 from validation.absence import bare_cars, hand_built_handling, machinery
 
@@ -24,6 +29,26 @@ def test_a_car_of_other_springs_is_another_one(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(hand_built_handling, "numbers_of", softer)
     ours, theirs = (job() for job in bare_cars.cars(20))
     assert np.abs(ours - theirs).max() > 1e-7
+
+
+def test_bodies_that_are_one_in_mujoco_move_as_they_do_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    own, q, v = bare_cars.start()
+    rng = np.random.default_rng(1)
+    q, v = q + rng.normal(0.0, 0.05, len(q)), v + rng.normal(0.0, 0.2, len(v))
+    one = FreeMujoco(driven_by(own))
+    merged = free_vehicle_mujoco.carriers(own.vehicle)
+    assert {"carrier", "sway"} < set(merged) and len(merged) == 6  # and the four wheels, whose rotors ride on them
+    monkeypatch.setattr(free_vehicle_mujoco, "carriers", lambda vehicle: {})
+    apart = FreeMujoco(driven_by(own))
+    assert apart.model.nbody - one.model.nbody == 6
+    np.testing.assert_allclose(one.acceleration(0.0, q, v), apart.acceleration(0.0, q, v), rtol=1e-10, atol=1e-10)
+
+
+def test_a_wheel_with_inertia_of_its_own_does_not_spin_with_its_rotor() -> None:
+    own, _, _ = bare_cars.start()
+    heavy = tuple(replace(body, inertia=((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 1.0))) if body.name == "fl"
+                  else body for body in own.vehicle.bodies)  # fmt: skip
+    assert "fl" not in free_vehicle_mujoco.carriers(replace(own.vehicle, bodies=heavy))
 
 
 def test_forces_of_cars_and_hubs_make_no_array() -> None:
