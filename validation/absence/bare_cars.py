@@ -14,7 +14,7 @@ from validation.timing import interleave, paired_ratio
 
 STEP, SPEED = 1e-3, 15.0
 """Step of the runs (s); speed (m/s)."""
-Job = Callable[[], np.ndarray]
+Job = Callable[[], tuple[np.ndarray, ...]]
 
 
 def start() -> tuple[Handling, np.ndarray, np.ndarray]:
@@ -26,19 +26,19 @@ def start() -> tuple[Handling, np.ndarray, np.ndarray]:
 
 
 def cars(steps: int) -> tuple[Job, Job]:
-    """Runs of a bare car and of the written one, whose states (steps + 1, 46) pass the same guard."""
+    """Runs of a bare car and of the written one, which pass the same guard, to positions and rates (steps + 1, 23)."""
     own, q, v = start()
     model, by_hand, times = build("mujoco", own), hand_built_handling.run(own, q, v, STEP, steps), STEP * np.arange(
         steps + 1)  # fmt: skip
 
-    def ours() -> np.ndarray:
+    def ours() -> tuple[np.ndarray, ...]:
         found = model.run(q, v, steps * STEP, STEP)
-        return np.hstack([found.positions, found.rates])
+        return found.positions, found.rates
 
-    def theirs() -> np.ndarray:
+    def theirs() -> tuple[np.ndarray, ...]:
         states = by_hand()
         guard("mujoco", times, states, steps * STEP)
-        return states
+        return tuple(np.split(states, 2, axis=1))
 
     return ours, theirs
 
@@ -46,5 +46,5 @@ def cars(steps: int) -> tuple[Job, Job]:
 def ratio_of_cars(steps: int, rounds: int) -> tuple[float, tuple[float, float, float]]:
     """Largest difference of states (m, rad, m/s, rad/s), and the ratio of seconds with its interval."""
     jobs = cars(steps)
-    ours, theirs = (job() for job in jobs)
+    ours, theirs = (np.hstack(job()) for job in jobs)
     return float(np.abs(ours - theirs).max()), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))
