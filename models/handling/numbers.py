@@ -118,8 +118,10 @@ def _table(own: Handling) -> np.ndarray:
     free, chassis, of, points = own.vehicle, chassis_of(own.given), net(own.tyres.cells), _Points(own.vehicle)
     parts = [*_springs(own, points), *_bars(own, points)]
     tyres, knots = [_tyre(own, i, points) for i in range(len(free.tyres))], _knots(own.controls, own.pushes)
-    sections = [_joints(free, points), np.ravel(points.rows), np.ravel([row for row, _ in parts]), np.ravel(tyres),
-                _pushes(own), knots.ravel(), own.waves.ravel(), of.cells.ravel(), of.strips.ravel()]  # fmt: skip
+    pushes = _pushes(own)
+    held = {*pushes[at.PUSHED_BY : -1 : at.PER_PUSH], *(row[tree.JOINT] for row in points.rows)}
+    sections = [_joints(free, held), np.ravel(points.rows), np.ravel([row for row, _ in parts]), np.ravel(tyres),
+                pushes, knots.ravel(), own.waves.ravel(), of.cells.ravel(), of.strips.ravel()]  # fmt: skip
     begins = at.HEADER + np.cumsum([0, *(section.size for section in sections)])
     curves = _put_curves(parts, sections[2], int(begins[-1]))
     joint, place = _place(free, chassis.name, chassis.position)
@@ -146,10 +148,13 @@ class _Points:
         return self.rows.index(row)
 
 
-def _joints(vehicle: SpatialVehicle, points: _Points) -> np.ndarray:
-    """Rows of all coordinates, with their counts in a body; those that turn what nothing else is on are loose."""
+def _joints(vehicle: SpatialVehicle, held: set[float]) -> np.ndarray:
+    """Rows of all coordinates, with their counts in a body; those that turn what nothing else is on are loose.
+
+    held : coordinates that are the last to move a point where something acts.
+    """
     rows, counts = joints(vehicle), [len(body.freedoms) for body in vehicle.bodies for _ in body.freedoms]
-    bears = {*rows[:, tree.BELOW], *(row[tree.JOINT] for row in points.rows)}
+    bears = {*rows[:, tree.BELOW], *held}
     loose = [counts[j] == 1 and row[tree.KIND] >= 3.0 and j not in bears for j, row in enumerate(rows)]
     rows[loose, tree.KIND] = tree.LOOSE
     return np.column_stack([rows, counts]).ravel()
