@@ -70,10 +70,12 @@ def _mujoco(model: Any, positions: np.ndarray) -> Poses:
 
 
 def _exudyn(model: Any, positions: np.ndarray) -> Poses:
-    markers = {body.name: model.built.marker(body.name, body.position) for body in model.vehicle.bodies}
+    markers = {body.name: model.built.marker(body.name, body.position, True) for body in model.vehicle.bodies}
     model.mbs.Assemble()
     asked = {name: partial(model.mbs.GetMarkerOutput, marker) for name, marker in markers.items()}
-    return of_exudyn(model.mbs, asked, np.array([model._all(row) for row in positions]))
+    places, turns = of_exudyn(model.mbs, asked, np.array([model._all(row) for row in positions]))
+    own = {name: np.transpose([model.built.own(name, axis) for axis in np.eye(3)]) for name in markers}
+    return places, {name: turn @ own[name] for name, turn in turns.items()}  # a mass that slides has other axes
 
 
 def arrows(vehicle: SpatialVehicle, run: SpatialRun, road: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
