@@ -136,7 +136,11 @@ def _rides(quick: bool) -> list[Row]:
 
 
 def _cars(steps: int, quick: bool) -> list[Row]:
-    """A car of the handling scenes that rolls freely on a flat road in MuJoCo, against one written for that alone."""
+    """A car of the handling scenes that rolls freely on a flat road in MuJoCo, against one written for that alone.
+
+    Not judged: MuJoCo's own step is the same and so is the march of the tyres' cells, three fifths of the time; what is
+    left, a microsecond of every call of the forces, is the walk through a table that any vehicle has.
+    """
     gap, ratio = ratio_of_cars(steps, ROUNDS[quick])
     return [
         at_most("effect_prices.same.handling", SYSTEM, "MuJoCo: states of a bare car of a scene of handling against "
