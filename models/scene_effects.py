@@ -69,13 +69,29 @@ def _files(system: str) -> dict[str, Path]:
 
 def listing(system: str) -> dict[str, str]:
     """First sentence of every effect of a system, read and not imported."""
-    texts = {name: ast.get_docstring(ast.parse(file.read_text())) or "" for name, file in _files(system).items()}
-    return {name: text.partition("\n")[0].rstrip(".") for name, text in sorted(texts.items())}
+    return {name: _says(file) for name, file in sorted(_files(system).items())}
+
+
+def _says(file: Path) -> str:
+    try:
+        text = ast.get_docstring(ast.parse(file.read_text())) or ""
+    except SyntaxError as error:
+        return f"(cannot be read: line {error.lineno}: {error.msg})"
+    return text.partition("\n")[0].rstrip(".")
 
 
 def module_of(system: str, name: str) -> Any:
-    """``Effect`` of a name; any other attribute is its file's own."""
-    return Effect(import_module(f"{SYSTEMS[system].effects}.{name}"))
+    """``Effect`` of a name; any other attribute is its file's own. Raises InputError for a file that is none."""
+    try:
+        file = import_module(f"{SYSTEMS[system].effects}.{name}")
+    except (ImportError, SyntaxError) as error:
+        raise InputError(f"{name}.py", "", None, f"is no effect of {system} that can be imported: {error}") from None
+    own = ("PLACE", "leave_out") if hasattr(file, "named") else ("Parameters", "extend")
+    missing = [key for key in ("COST", *own) if not hasattr(file, key)]
+    if missing:
+        raise InputError(f"{name}.py", "", None, f"has no {' and no '.join(missing)}: models/scene_effects.py says "
+                         "what the file of an effect holds")  # fmt: skip
+    return Effect(file)
 
 
 def named(scene: Any) -> tuple[str, ...]:
@@ -119,6 +135,8 @@ def extended(built: Any, scene: Any) -> Any:
     """What a system built of a scene, with the scene's tables [effects.NAME] in it."""
     for name, own in tables_of(scene).items():
         built = module_of(scene.system, name).extend(built, own)
+        if built is None:
+            raise InputError(f"{name}.py", "extend", None, "returns nothing: it must give back what it gets, changed")
     return built
 
 
@@ -176,14 +194,20 @@ def own_table(scene: Any) -> Table:
 
 
 def without(scene: Any, *left_out: str) -> Any:
-    """The scene less these effects; raises InputError where one cannot be left out, or others need it."""
+    """The scene less these effects; raises InputError where one cannot be left out, or others would go with it."""
     table = own_table(scene)
     for name in sorted(left_out, key=lambda name: _depth(name, scene.system), reverse=True):
         if name in tables_of(scene):
             del table["effects"][name]
         else:
             module_of(scene.system, name).leave_out(table, scene)
-    return _confirmed(rebuilt(table, scene), left_out, False)
+    found = _confirmed(rebuilt(table, scene), left_out, False)
+    still = (*named(found), *left_out)
+    gone = [name for name in named(scene) if name not in still]
+    if gone:
+        raise InputError(scene.file, "", None, f"{' and '.join(left_out)} cannot be left out alone: leave out "
+                         f"{' and '.join(gone)}, too, which would go with it")  # fmt: skip
+    return found
 
 
 def _depth(name: str, system: str) -> int:

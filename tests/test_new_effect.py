@@ -3,9 +3,11 @@
 from importlib import import_module
 
 import numpy as np
+import pytest
 
+from models.errors import InputError
 from models.plan import describe
-from models.scene_effects import beside, names_of
+from models.scene_effects import beside, extended, names_of, own_table, rebuilt
 from models.simulate import simulate
 from models.systems import DEFAULT, SYSTEMS
 from studies.command_line import list_scenes
@@ -82,6 +84,24 @@ def test_a_new_effect_of_another_system(new_file, capsys):
     assert found == declared("braking", "slow_chambers", ["reference"])
     scene = beside(bare("braking"), "slow_chambers")
     assert "effect     slow_chambers" in import_module(SYSTEMS["braking"].plan).describe(scene)
+
+
+@pytest.mark.parametrize(("text", "told"), [
+    ("x = (", r"is no effect of braking that can be imported: .* was never closed"),
+    ("import nothing_there", "can be imported: No module named 'nothing_there'"),
+    ('"""Half a file."""', "has no COST and no Parameters and no extend"),
+    (SLOW.partition("    slow = ")[0] + "    pass", "extend: returns nothing"),
+    (SLOW.replace("COST", "NEEDS = ('storm',)\nCOST"), "storm.py: is no effect of braking"),
+])  # fmt: skip
+def test_a_file_that_is_no_effect_is_told_by_name(text, told, new_file, capsys):
+    new_file("braking", "slow_chambers", text)
+    list_scenes()
+    assert "slow_chambers" in capsys.readouterr().out
+    table = {**own_table(bare("braking")), "effects": {"slow_chambers": {"time": 0.2}}}
+    with pytest.raises(InputError, match=told) as found:
+        scene = rebuilt(table, bare("braking"))
+        extended("what a system built", scene)
+    assert ".py" in found.value.file
 
 
 def test_the_file_is_all_that_made_it():
