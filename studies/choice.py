@@ -3,14 +3,15 @@
 import csv
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydantic import Field
 
-from models.choice.choose import RUNS, Choice, Chooser
-from models.choice.variants import system_of
+from models.choice.choose import BUDGET, ROUNDS, RUNS, Choice, Chooser
+from models.choice.variants import Variants, system_of
 from models.errors import InputError
 from models.strict import Strict, read
 from studies.asked import ANY, load_scene, plan_of
@@ -73,12 +74,18 @@ def told(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Pr
         progress(own.title, i / len(scenes))
         linear, asked = has_closed_form(own), engines if own is scene else ()
         plan_of(own).check(own, () if linear else (engine_of(own, asked),))
-        found.append(_linear(own) if linear else chosen(own, asked))
+        said = partial(_spent, progress, f"{own.title}, of at most {RUNS} runs", i, len(scenes))
+        found.append(_linear(own) if linear else chosen(own, asked, said))
         _save(found[-1], folder / f"{i + 1}_{own.system.replace('-', '_')}.csv")
     progress("figure", 1.0)
     choice_figure(found, folder / "choice.png")
     return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": [_answer(one) for one in found],
             "table": [line for one in found for line in lines(one, len(found) > 1)]}  # fmt: skip
+
+
+def _spent(progress: Progress, title: str, done: int, of: int, share: float) -> None:
+    """Pass on what is spent of a scene's search, after some of so many scenes."""
+    progress(title, (done + share) / of)
 
 
 def has_closed_form(scene: Any) -> bool:
@@ -96,10 +103,19 @@ def engine_of(scene: Any, engines: tuple[str, ...]) -> str:
     return usual if not engines or usual in engines else engines[0]
 
 
-def chosen(scene: Any, engines: tuple[str, ...]) -> Found:
+def search(scene: Any) -> str:
+    """How far the search for a scene's choice may go, beforehand."""
+    if has_closed_form(scene):
+        return "  choice     by a closed form, without runs in time"
+    runs = Variants(scene, engine_of(scene, ()))
+    return (f"  choice     among {len(runs.effects)} effects; the search ends at the calls of {RUNS} runs of the "
+            f"scene, of {runs.system.steps(runs.scene):,} steps each, and confirms {ROUNDS} sets at most")  # fmt: skip
+
+
+def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None) -> Found:
     """A scene's choice by one implementation."""
     engine = engine_of(scene, engines)
-    chooser = Chooser(scene, engine, scene.quantities, scene.tolerance)
+    chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress)
     choice, none = chooser.choose(), chooser.work(frozenset())
     alone = [Alone(one, chooser.teller.predicted(frozenset([one])), none / chooser.work(frozenset([one])))
              for one in chooser.effects]  # fmt: skip
@@ -165,6 +181,13 @@ def _between(change: float, beside: float) -> str:
     return percent(change) + (f" +- {percent(beside)}" if beside else "")
 
 
+def _stays(change: float, one: Found) -> str:
+    """Why an effect stays whose going would change quantities by so much, with all that went."""
+    if change > BUDGET * one.scene.tolerance or one.watts or one.choice.ended:
+        return f"would matter no more at a tolerance above {percent(change)}"
+    return f"stays at {percent(change)}: steps would have to be shorter for it to go, or whole runs did not confirm it"
+
+
 def lines(one: Found, named: bool) -> list[str]:
     """The choice in words."""
     choice, scene = one.choice, one.scene
@@ -185,7 +208,7 @@ def lines(one: Found, named: bool) -> list[str]:
         faster = choice.seconds[0] / choice.seconds[2]
         rows.append(f"    calls {saved}, by steps {choice.times} times as long; {before / step:.3g} times by longer "
                     f"steps with all effects; CPU seconds {faster:.3g} times fewer")  # fmt: skip
-    rows += [f"    {name} would matter no more at a tolerance above {percent(change)}"
+    rows += [f"    {name} {_stays(change, one)}"
              for name, change in sorted(one.further.items(), key=lambda item: item[1])]  # fmt: skip
     if choice.ended:
         rows.append(f"    the search ended at the calls of {RUNS} runs of the scene: larger sets were not tried")

@@ -108,12 +108,19 @@ def show(
         return print(describe(Path(scene)))
     loaded = load_scene(scene, changes)
     if not price:
-        return print(plan_of(loaded).describe(loaded))
+        return print("\n".join([plan_of(loaded).describe(loaded), *_search(loaded)]))
     from validation.price.effects import price_list
     from validation.price.effects_text import as_dict, lines
 
     found = price_list(loaded, None if engine is None else engines_of(engine, loaded.system)[0])
     print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(lines(found, loaded.quantities)))
+
+
+def _search(scene: Any) -> list[str]:
+    """What the search for a choice may take, where a scene asks for one."""
+    from studies.choice import search
+
+    return [] if scene.tolerance is None else [search(scene)]
 
 
 @app.command()

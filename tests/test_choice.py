@@ -90,6 +90,32 @@ def test_a_pair_is_found_of_which_one_alone_ruins(monkeypatch):
     assert choice.left_out == ("a", "b") and choice.kept and choice.confirmed[0] == pytest.approx(0.01)
 
 
+def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
+    """40 effects of which each alone ruins and no pair helps: 780 pairs. What goes by itself is confirmed."""
+    names = tuple(f"e{i:02}" for i in range(40))
+
+    def quantity(left_out, times):
+        return 100.0 + (0.1 if "e00" in left_out else 0.0) + 50.0 * len(left_out - {"e00"})
+
+    found, shares = chooser(monkeypatch, quantity, names), []
+    found.progress = shares.append
+    choice = found.choose()
+    own = found.whole.variants.of().counts["calls"]
+    assert choice.ended and choice.left_out == ("e00",) and choice.kept
+    assert choose.RUNS * own < choice.spent < (choose.RUNS + 10) * own and max(shares) == 1.0
+    assert not chooser(monkeypatch, quantity, names[:5]).choose().ended
+
+
+def test_what_steps_change_is_told_by_shorter_ones_that_have_the_same_times(monkeypatch):
+    """25 times as long is told by 1, not by 2, whose rows fall between."""
+    found = chooser(monkeypatch, lambda left_out, times: 100.0 + 0.01 * times, ("a",))
+    monkeypatch.setattr(found.whole.variants, "lengths", lambda: [1, 2, 5, 25])
+    asked = []
+    monkeypatch.setattr(found.whole.variants, "of", lambda left_out=(), times=1: asked.append(times))
+    found.told(frozenset(), 25)
+    assert 2 not in asked and 1 in asked
+
+
 def test_what_the_confirmation_breaks_is_taken_back(monkeypatch):
     """Longer steps hide what an effect does: the screen takes them, the whole run at its own step does not."""
 

@@ -91,6 +91,19 @@ def test_a_choice_is_kept_and_says_what_chance_may_add():
     assert scene.tolerance - choice.confirmed[0] >= choice.chance[0] > 0.0
 
 
+def test_few_copies_find_what_all_of_them_tell():
+    scene = quarter_car(options={"copies": 48, "lasting": 2.0})
+    own = Chooser(scene, "reference", scene.quantities, scene.tolerance)
+    copies = [one.variants.scene.samples.copies for one in (own.screen, own.teller, own.whole)]
+    assert copies == [12, 48, 48] and own.screen.variants.scene.times == own.teller.variants.scene.times == own.own
+
+
+def test_what_a_search_may_take_is_shown_beforehand(twinrig, capsys):
+    assert twinrig("show", "ride_choice", "--set", "vehicle.file=quarter_car_nonlinear", "--set",
+                   "quantities=['body front']") == 0  # fmt: skip
+    assert "among 4 effects; the search ends at the calls of 100 runs" in capsys.readouterr().out
+
+
 def test_a_choice_that_chance_alone_could_break_is_refused():
     asked = drawn_bent(4)
     with pytest.raises(InputError, match="times as many samples would tell"):

@@ -14,6 +14,7 @@ and larger sets were not tried.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -73,11 +74,13 @@ class Choice:
 
 
 class Chooser:
-    """A scene's effects in one implementation, for quantities (see ``models.choice.answer``) and a tolerance."""
+    """A scene's effects in one implementation, for quantities (see ``models.choice.answer``) and a tolerance.
 
-    def __init__(self, scene: Any, engine: str, quantities: list[str], tolerance: float,
-                 window: float = WINDOW) -> None:  # fmt: skip
-        self.tolerance = tolerance
+    progress(share) is told the share that is spent of the runs that the search may take."""
+
+    def __init__(self, scene: Any, engine: str, quantities: list[str], tolerance: float, window: float = WINDOW,
+                 progress: Callable[[float], None] = lambda share: None) -> None:  # fmt: skip
+        self.tolerance, self.progress = tolerance, progress
         self.whole = Screen(Variants(scene, engine), quantities)
         self.alike = self.whole.sampled == set(quantities)
         part = self._part(window)
@@ -219,7 +222,9 @@ class Chooser:
     def _exhausted(self) -> bool:
         """Whether the search has taken as many calls as it may; from then on it has ``ended``."""
         own = self.whole.variants.of()
-        self.ended = self.ended or self._spent() > RUNS * (own.counts["calls"] if own else 0)
+        share = self._spent() / (RUNS * own.counts["calls"]) if own else 1.0
+        self.ended = self.ended or share >= 1.0
+        self.progress(min(share, 1.0))
         return self.ended
 
     def told(self, chosen: Set, times: int) -> np.ndarray:
