@@ -16,8 +16,8 @@ from models.braking.advance import FINE, advance
 from models.braking.plane_step import FORCE_X, FORCE_Y
 from models.braking.plane_vehicle import Plane
 from models.braking.samples import moved
-from models.compiled import njit
-from models.contact.stack import at, beyond, start
+from models.compiled import lean, njit
+from models.contact.stack import array, at, beyond, start
 from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.vehicles.spatial import Body, SpatialVehicle
 
@@ -51,11 +51,12 @@ def held(numbers, time, q, v, f):
                 force[2 + a] += moment
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def fill(block, n, numbers):
     """``held`` in a block of doubles at an address: f, q and v (n,), of which f is cleared before."""
     f = at(block)
-    carray(f, (n,))[:] = 0.0
+    force = array(f, (n,))
+    force[:] = 0.0
     held(start(numbers), 0.0, beyond(f, n), beyond(f, 2 * n), f)
 
 

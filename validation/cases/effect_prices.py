@@ -153,7 +153,11 @@ def _cars(steps: int, quick: bool) -> list[Row]:
 
 
 def _stops(quick: bool) -> list[Row]:
-    """A truck that brakes in a turn on snow by the reference, against one that was written for that alone."""
+    """A truck that brakes in a turn on snow by the reference, against one that was written for that alone.
+
+    Not judged: a step compiled for any number of tyre tables and of their loads, where the written one has one of each,
+    takes a third longer; asking for samples and recording them adds a tenth.
+    """
     gap, ratio = ratio_of_stops(3.0 if quick else 10.0, ROUNDS[quick])
     return [
         at_most("effect_prices.same.braking", SYSTEM, "states, wheels, forces and brakes of a bare stop against those "
