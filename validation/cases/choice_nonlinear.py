@@ -27,8 +27,8 @@ NOISY, FINE = 4, 0.005
 """A ride, and a tolerance for which its copies are too few if they are the fewest."""
 RESAMPLED, UNSURE = 4000, 0.0015
 """Of copies, to tell what they are sure of: this quantile is left below."""
-QUICK = 3
-"""Scenes of the pitch plane alone in the quick share."""
+QUICK = (0, 2, 3)
+"""Scenes of the pitch plane alone in the quick share, by both implementations."""
 TOLD = (1e-4, 0.05)
 """Confirmed changes whose predictions are judged: as for linear scenes."""
 
@@ -99,11 +99,11 @@ def _change(whole: tuple[np.ndarray, ...], rest: tuple[np.ndarray, ...]) -> floa
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Random scenes of four systems; the quick share has three of the pitch plane."""
-    counts = {"pitch-plane": QUICK} if quick else COUNTS
-    found = [judged(system, seed) for system, count in counts.items() for seed in range(count)]
-    rows = [*_kept(found), _predictions(found, quick), *(row for system in counts for row in _saving(found, system))]
+    seeds = {"pitch-plane": QUICK} if quick else {system: range(count) for system, count in COUNTS.items()}
+    found = [judged(system, seed) for system, own in seeds.items() for seed in own]
+    rows = [*_kept(found), _predictions(found, quick), *(row for system in seeds for row in _saving(found, system))]
     rows += [] if quick else [_refused()]
-    return rows, {"scenes": [_shown(one) for one in found], "systems": list(counts)}
+    return rows, {"scenes": [_shown(one) for one in found], "systems": list(seeds)}
 
 
 def _kept(found: list[Judged]) -> list[Row]:
