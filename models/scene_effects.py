@@ -194,7 +194,7 @@ def own_table(scene: Any) -> Table:
 
 
 def without(scene: Any, *left_out: str) -> Any:
-    """The scene less these effects; raises InputError where one cannot be left out, or others would go with it."""
+    """The scene less these effects; raises InputError where one cannot be left out, or others need it."""
     table = own_table(scene)
     for name in sorted(left_out, key=lambda name: _depth(name, scene.system), reverse=True):
         if name in tables_of(scene):
@@ -202,11 +202,12 @@ def without(scene: Any, *left_out: str) -> Any:
         else:
             module_of(scene.system, name).leave_out(table, scene)
     found = _confirmed(rebuilt(table, scene), left_out, False)
-    still = (*named(found), *left_out)
-    gone = [name for name in named(scene) if name not in still]
+    needy = [name for name in named(scene) if set(left_out) & {*module_of(scene.system, name).NEEDS}]
+    gone = [name for name in needy if name not in (*left_out, *named(found))]
     if gone:
+        need = "it needs" if len(gone) == 1 else "they need"
         raise InputError(scene.file, "", None, f"{' and '.join(left_out)} cannot be left out alone: leave out "
-                         f"{' and '.join(gone)}, too, which would go with it")  # fmt: skip
+                         f"{' and '.join(gone)}, too, for {need} it")  # fmt: skip
     return found
 
 

@@ -33,11 +33,8 @@ def test_a_sensor_needs_a_port(full):
     assert "signal_noise" not in named(bare("braking", port={"signals": {"seed": 3}}))  # a seed is no noise
 
 
-def test_what_would_go_with_another_effect_is_told_and_not_taken_along(full):
-    """Deleting [port] deletes its sensors; brakes without push-out have no second line, either."""
+def test_what_needs_another_effect_is_told_and_not_taken_along(full):
+    """Deleting [port] would delete its sensors."""
     with pytest.raises(InputError, match=r"port cannot be left out alone: leave out pressure_calibration and .* too"):
         without(full, "port")
     assert named(without(full, "port", *SENSORS)) == ()
-    brakes = bare("braking", brakes={"front": {"gradient": 1500.0, "push_out": 0.75, "release": 0.71}})
-    with pytest.raises(InputError, match="leave out hysteresis, too"):
-        without(brakes, "push_out")

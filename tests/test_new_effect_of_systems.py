@@ -28,8 +28,8 @@ from models.vehicles.vehicle_file import load_vehicle
 from studies.asked import SCENES
 from validation.absence.contact import BARE as CONTACT
 from validation.absence.of_systems import added, bare, declared, seen
-from validation.price import effects, effects_of_ride
-from validation.price.effects import price_list
+from validation.price import effects, effects_of_ride, effects_text
+from validation.price.effects import Changed, price_list
 
 
 @dataclass(frozen=True)
@@ -201,9 +201,13 @@ def test_new_effects_of_ride_are_priced_and_chosen_among(new_file, monkeypatch):
     known = Whole(other, 20.0).reduced(without_effects(other, [there["tyre damping"]]))
     assert np.abs(rest.system.A - known.system.A).max() < 1e-12 * np.abs(known.system.A).max()
     monkeypatch.setattr(effects_of_ride, "STEPS", 20)
+    monkeypatch.setattr(effects_of_ride, "absent", lambda scene: ("gravity_and_preload", "drag", "weighting"))
     prices = {price.name: price for price in price_list(own).prices}
     assert prices["tread"].counts[1]["states"] - prices["tread"].counts[0]["states"] == 4 and prices["dampers"].why
-    assert prices["tread"].changes[0].relative > 0.01
+    assert prices["tread"].changes[0].relative > 0.01 and prices["tread"].changes[0].unit == "m/s^2"
+    assert prices["tread"].there and not (more := prices["gravity_and_preload"]).there
+    assert 0.0 < next(c for c in more.changes if c.name == "pitch acceleration").relative < 0.1
+    assert "name it in the scene" in prices["drag"].why and prices["weighting"].gone == ("body centre Wk",)
 
 
 RAIN = New("rain", "spin", "share", 0.5, "{}", """
@@ -283,3 +287,9 @@ def test_a_new_effect_has_a_price_there_and_absent(new_file, monkeypatch):
         price = next(price for price in price_list(scene).prices if price.name == "soft_bodies")
         assert (price.why, price.there) == ("", bool(scene.effects)) and np.isfinite(price.micros[0])
         assert 0.1 < price.changes[0].relative < 1.1  # half the modulus halves the forces on a given ellipse
+
+
+def test_a_large_number_of_a_price_has_no_exponent():
+    changed = effects_text._changed(Changed("slip [1]", "N", 10_712.0, 2.904, 0.121))
+    assert changed == "slip by 10,700 N (290 % +- 12 %)" and effects_text._micros((4139.0, 96.0)) == "4,140 +- 100 us"
+    assert effects_text._changed(Changed("slip", "1", 0.0123, np.inf)) == "slip by 0.0123 (from nothing)"

@@ -14,6 +14,7 @@ from models.ride.choice.held import Effect, Held, effects_of, illegal, without
 from models.ride.choice.reduced import Reduced, Whole
 from models.ride.choice.screen import confirmed
 from models.ride.of_scene import told_by, vehicle_of
+from models.scene_effects import absent, beside, listing
 from validation.price.effects import ROUNDS, SEED, Changed, Price, PriceList, spread
 from validation.timing import paired_ratio
 
@@ -31,11 +32,14 @@ def price_list_of_ride(scene: Any) -> PriceList:
         whole = Whole(held, float(speeds[len(speeds) // 2]))
         effects = effects_of(held)
         rests = {effect.name: _rest(whole, effect) for effect in effects}
-    systems = {"": whole.full} | {name: rest for name, rest in rests.items() if isinstance(rest, Reduced)}
+    more = {name: _beside(scene, name, whole.speed) for name in absent(scene)}
+    systems = {name: one for name, one in ({"": whole.full} | rests | more).items() if isinstance(one, Reduced)}
     micros = _turns(systems)
-    prices = tuple(_price(whole, effect, rests[effect.name], micros) for effect in effects)
-    return PriceList(f"{scene.title}, at {whole.speed:g} m/s", "closed form", STEPS, STEPS, _counts(whole.full),
-                     spread(micros[""]), prices)  # fmt: skip
+    says = listing(scene.system)
+    prices = [_price(whole, effect.name, effect.says, rests[effect.name], micros) for effect in effects]
+    prices += [_price(whole, name, says[name], more[name], micros, there=False) for name in more]
+    return PriceList(f"{scene.title} (at {whole.speed:g} m/s)", "closed form", STEPS, STEPS, _counts(whole.full),
+                     spread(micros[""]), tuple(prices))  # fmt: skip
 
 
 def _rest(whole: Whole, effect: Effect) -> Reduced | str:
@@ -45,6 +49,15 @@ def _rest(whole: Whole, effect: Effect) -> Reduced | str:
         return why
     try:
         return whole.reduced(without(whole.held, [effect]))
+    except InputError as error:
+        return error.allowed
+
+
+def _beside(scene: Any, name: str, speed: float) -> Reduced | str:
+    """The scene with one more effect at its usual values, or why there is none."""
+    try:
+        other = beside(scene, name)
+        return Whole(Held(other, vehicle_of(other)), speed).full
     except InputError as error:
         return error.allowed
 
@@ -78,23 +91,29 @@ def _timed(A: np.ndarray) -> float:
     return 1e6 * (time.process_time() - begun) / STEPS
 
 
-def _price(whole: Whole, effect: Effect, rest: Reduced | str, micros: dict[str, np.ndarray]) -> Price:
-    if isinstance(rest, str):
-        return Price(effect.name, True, effect.says, rest)
-    own, without_it = micros[""], micros[effect.name]
-    return Price(effect.name, True, effect.says, "", (_counts(rest), _counts(whole.full)), spread(own - without_it),
-                 paired_ratio(own.tolist(), without_it.tolist()), _changes(whole, rest))  # fmt: skip
+def _price(whole: Whole, name: str, says: str, other: Reduced | str, micros: dict[str, np.ndarray],
+           there: bool = True) -> Price:  # fmt: skip
+    """Of an effect that is ``there``, by the scene without it, or of one more, by the scene with it."""
+    if isinstance(other, str):
+        return Price(name, there, says, other)
+    without_it, with_it = ((other, micros[name]), (whole.full, micros[""]))[:: 1 if there else -1]
+    gone = tuple(key for key in with_it[0].system.names if key not in without_it[0].system.names)
+    return Price(name, there, says, "", (_counts(without_it[0]), _counts(with_it[0])),
+                 spread(with_it[1] - without_it[1]), paired_ratio(with_it[1].tolist(), without_it[1].tolist()),
+                 _changes(whole, other), gone)  # fmt: skip
 
 
 def _changes(whole: Whole, rest: Reduced) -> tuple[Changed, ...]:
     """Standard deviations, exact; infinite where white noise reaches a quantity."""
     names = whole.full.system.names
-    rows = list(range(len(names)))
+    own = [output.unit for output in whole.linear.outputs]
+    units = [*own, *["m/s^2"] * (len(names) - len(own))]  # weighted accelerations come last
     try:
         with np.errstate(invalid="ignore"):
-            full, left = (np.sqrt(confirmed(system, rows)) for system in (whole.full, rest))
+            full, left = (np.sqrt(confirmed(system, list(range(len(names))))) for system in (whole.full, rest))
     except InputError:
         return ()
-    found = [Changed(name, "", float(abs(b - a)), float(abs(b / a - 1.0)))
-             for name, a, b in zip(names, full, left, strict=True) if np.isfinite(a) and a > 0.0]  # fmt: skip
+    rows = zip(names, units, full, left, strict=True)
+    found = [Changed(name, unit, float(abs(b - a)), float(abs(b / a - 1.0)))
+             for name, unit, a, b in rows if np.isfinite(a) and a > 0.0]  # fmt: skip
     return tuple(sorted(found, key=lambda one: -one.relative))

@@ -38,7 +38,13 @@ def _absent(found: PriceList, quantities: list[str]) -> list[str]:
 
 
 def _micros(spread: tuple[float, float]) -> str:
-    return f"{spread[0]:.3g} +- {spread[1]:.1g} us"
+    return f"{_number(spread[0], 3)} +- {_number(spread[1], 1)} us"
+
+
+def _number(value: float, digits: int) -> str:
+    """So many digits, without an exponent where a number is large."""
+    large = np.isfinite(value) and abs(float(f"{value:.{digits}g}")) >= 10.0**digits
+    return f"{float(f'{value:.{digits}g}'):,.0f}" if large else f"{value:.{digits}g}"
 
 
 def _price(one: Price, quantities: list[str]) -> list[str]:
@@ -47,7 +53,8 @@ def _price(one: Price, quantities: list[str]) -> list[str]:
     if one.why:
         return [f"{name}no price: {one.why}"]
     ratio = f"{one.ratio[0]:.3g} times ({one.ratio[1]:.3g} to {one.ratio[2]:.3g})"
-    cost = f"{name}{one.micros[0]:+.3g} +- {one.micros[1]:.1g} us a step, {ratio}{_counts(one)}"
+    plus = "+" if one.micros[0] >= 0.0 else ""
+    cost = f"{name}{plus}{_micros(one.micros)} a step, {ratio}{_counts(one)}"
     new = f"; there with it alone: {', '.join(one.gone[:SHOWN])}{', ...' if len(one.gone) > SHOWN else ''}"
     return [cost, f"    {'':<{WIDTH}} {_changes(one, quantities)}{new if one.gone else ''}"]
 
@@ -69,9 +76,9 @@ def _changes(one: Price, quantities: list[str]) -> str:
 def _changed(change: Changed) -> str:
     unit = f" {change.unit}" if change.unit and change.unit != "1" else ""
     name = change.name.partition(" [")[0]
-    beside = f" +- {100 * change.chance:.2g} %" if change.chance else ""
-    share = f"{100 * change.relative:.2g} %{beside}" if np.isfinite(change.relative) else "from nothing"
-    return f"{name} by {change.absolute:.3g}{unit} ({share})"
+    beside = f" +- {_number(100 * change.chance, 2)} %" if change.chance else ""
+    share = f"{_number(100 * change.relative, 2)} %{beside}" if np.isfinite(change.relative) else "from nothing"
+    return f"{name} by {_number(change.absolute, 3)}{unit} ({share})"
 
 
 def as_dict(found: PriceList) -> dict[str, Any]:
