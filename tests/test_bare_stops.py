@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.braking.controller import AllApplied
+from models.braking.controller import AllApplied, Command
 from models.braking.port.ask import Asked
 from models.braking.procedures import ready
 from validation.absence.bare_stops import ratio_of_stops
@@ -18,6 +18,16 @@ def test_a_steady_controller_is_asked_once_and_drives_as_one_that_is_asked_in_ev
     assert len(once.times) == len(always.times) > 200
     for name in ("times", "states", "turning", "pressures", "torques", "reports"):
         assert np.array_equal(getattr(once, name), getattr(always, name))
+
+
+def test_a_controller_derived_from_a_steady_one_is_asked_in_every_sample():
+    class Releasing(AllApplied):
+        def sample(self, given):
+            return Command(valves=np.full(self.wheels, 1 if given.number < 10 else -1))
+
+    vehicle, start = ready(bare("braking"), STOP)
+    always, given = (vehicle.run(own, start, 1.0) for own in (AllApplied(4), Releasing(4)))
+    assert given.torques[-1].max() < always.torques[-1].min()
 
 
 @pytest.mark.full

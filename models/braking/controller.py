@@ -1,5 +1,6 @@
 """What stands at the port: a controller is asked once per sample, and answers with what its valves do."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Protocol
 
@@ -37,12 +38,19 @@ class Command(NamedTuple):
 class Controller(Protocol):
     """A controller, whatever it runs in.
 
-    One that has ``steady = True`` answers alike to every sample in which the switch is closed, and is asked once.
+    A class that has ``steady = True`` beside its ``sample`` answers alike to every sample in which the switch is
+    closed, and is asked once.
     """
 
     def sample(self, given: Sample) -> Command:
         """Answer to one sample."""
         ...
+
+
+def is_steady(controller: Controller) -> bool:
+    """Whether it need be asked only once: what a steady class says does not hold for a ``sample`` derived from it."""
+    own: Mapping[str, object] = next((vars(kind) for kind in type(controller).__mro__ if "sample" in vars(kind)), {})
+    return bool(own.get("steady", False))
 
 
 @dataclass(frozen=True)

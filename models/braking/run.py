@@ -10,7 +10,7 @@ import numpy as np
 
 from models.braking.advance import AT_REST, FINE, LIFTED, NOT_FOUND
 from models.braking.brake import Brakes
-from models.braking.controller import SAMPLE, Command, Controller, Sample
+from models.braking.controller import SAMPLE, Command, Controller, Sample, is_steady
 from models.braking.plane_vehicle import Plane
 from models.braking.port.ask import ask
 from models.braking.pressure import RELEASE, Chambers, still
@@ -103,7 +103,7 @@ class Braked:
         now = row(given.state.shape[1], wheels)
         now.state[:], now.turning[:] = given.state, given.turning
         told = Told(np.ones(1, dtype=np.int64), np.full(wheels, RELEASE), np.full(wheels, math.nan), self.steer.copy())
-        steady = self.steering is None and getattr(controller, "steady", False)
+        steady = self.steering is None and is_steady(controller)
         most = int(min(duration / self.sample + 2.0, MOST)) if steady else 1
         kept = Kept(now.whole, np.empty((most, now.whole.size)), np.zeros(1, dtype=np.int64), duration - 1e-9)
         rows, status, number = [now.whole[None].copy()], FINE, 0
