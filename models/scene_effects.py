@@ -15,6 +15,7 @@ remedy where it cannot be. Where an effect is a choice of method, to leave it ou
 
 import ast
 import re
+import traceback
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from functools import cache
@@ -23,7 +24,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from models.errors import InputError
+from models.errors import InputError, RunFailed
 from models.strict import read
 from models.systems import SYSTEMS
 
@@ -134,10 +135,22 @@ def with_own(scene: Any) -> Any:
 def extended(built: Any, scene: Any) -> Any:
     """What a system built of a scene, with the scene's tables [effects.NAME] in it."""
     for name, own in tables_of(scene).items():
-        built = module_of(scene.system, name).extend(built, own)
-        if built is None:
-            raise InputError(f"{name}.py", "extend", None, "returns nothing: it must give back what it gets, changed")
+        built = _extend(name, module_of(scene.system, name), built, own)
     return built
+
+
+def _extend(name: str, module: Any, built: Any, own: Any) -> Any:
+    try:
+        found = module.extend(built, own)
+    except (InputError, RunFailed):
+        raise
+    except Exception as error:
+        lines = [one.lineno for one in traceback.extract_tb(error.__traceback__) if one.filename == module.__file__]
+        allowed = f"line {lines[-1]} stops with {type(error).__name__}: {error}"
+        raise InputError(f"{name}.py", "extend", None, allowed) from error
+    if found is None:
+        raise InputError(f"{name}.py", "extend", None, "returns nothing: it must give back what it gets, changed")
+    return found
 
 
 def _read(name: str, values: Any, system: str, file: str) -> Any:
