@@ -135,7 +135,8 @@ def _save_activity(watts: dict[str, float], path: Path) -> None:
 
 def percent(value: float) -> str:
     """A relative change in words."""
-    return f"{100 * value:+.2g} %" if np.isfinite(value) else "without end"
+    digits = "+.2g" if abs(value) < 0.1 else "+,.0f"
+    return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
 
 
 def _table(scene: RideScene, choice: Choice, alone: list[Alone], further: dict[Effect, float],
