@@ -99,7 +99,8 @@ def slower(row: str, what: str, ratio: tuple[float, float, float], why: str, jud
     quantity = f"{what}, 95 % interval {low:.3f} to {high:.3f}"
     if judged:
         return at_most(row, SYSTEM, quantity, value, "", DEAREST, why, "native")
-    return finding(row, SYSTEM, quantity, value, "", f"at most {DEAREST}", f"{why}; reported, not judged", "native")
+    wanted = f"at most {DEAREST}{'' if value <= DEAREST else ', not met'}"
+    return finding(row, SYSTEM, quantity, value, "", wanted, f"{why}; reported, not judged", "native")
 
 
 def _wheelset(steps: int, quick: bool) -> list[Row]:
