@@ -75,13 +75,13 @@ def test_a_clock_that_keeps_its_last_sample_is_found(monkeypatch, tmp_path):
 
 @pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
 def test_a_sample_read_one_late_is_found(implementation, monkeypatch, tmp_path):
-    right = signals.Sampled._place
+    right = signals._placed
 
-    def late(self, position):
-        index, part = right(self, position)
+    def late(*grid):
+        index, part = right(*grid)
         return np.maximum(index - 1, 0), part
 
-    monkeypatch.setattr(signals.Sampled, "_place", late)
+    monkeypatch.setattr(signals, "_placed", late)
     assert found(sampled_input, "replay of a ramp", implementation, tmp_path) == "SILENT"
 
 
