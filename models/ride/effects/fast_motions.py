@@ -11,7 +11,7 @@ from models.ride.choice.held import Effect, Held, holds, of_vehicle
 from models.ride.operating_point import poles
 from models.vehicles.spatial_linear import linearise
 
-APART = 1.04
+APART = 1.15
 """Motions whose rates differ by less than this factor go together."""
 
 PLACE = "vehicle.file"
