@@ -37,8 +37,8 @@ COUNTS = (1, 4, 8)
 EVALUATIONS = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
 """Calls of the callback per step."""
 ENGINES = {"mujoco": ("Euler", "RK4"), "exudyn": ("ExplicitEuler", "RK44")}
-ROUNDS, SELDOM = 48, 8
-"""Rounds, and of how many what no row judges is in the first."""
+ROUNDS, SHOWN = 48, 6
+"""Rounds of what rows judge, timed by itself, as work between its turns slows short ones; of all, for the table."""
 LEAST = 0.001
 WHY = "median of the ratios within interleaved rounds, seconds of the processor; start of a run taken out"
 
@@ -92,8 +92,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     data: dict[str, Any] = {"slow": [asdict(run) for run in done]}
     if quick:
         return rows, data
-    prices = Prices(every(), ROUNDS)
-    return rows + _price_rows(prices), {**data, "points": [prices.point(one) for one in prices.setups]}
+    setups = every()
+    judged = [one for one in setups if one.judged]
+    rows += _price_rows(Prices([*judged, *(one.without for one in judged)], ROUNDS))
+    shown = Prices(setups, SHOWN)
+    return rows, {**data, "points": [shown.point(one) for one in setups]}
 
 
 def every() -> list[Setup]:
@@ -116,20 +119,15 @@ class Prices:
         kernels = sorted({(one.law, one.count) for one in setups if one.law is not None})
         runs, loops = [_job(one) for one in setups], [_kernel_job(law, count) for law, count in kernels]
         jobs = [part for march, steps in runs for part in (partial(march, steps), partial(march, 1))]
-        judged = [one for one in setups if one.judged]
-        often = {*judged, *(one.without for one in judged), *((one.law, one.count) for one in judged)}
-        turns = [one for one in setups for _ in range(2)] + kernels
-        seconds = interleave([*jobs, *(job for job, _ in loops)], rounds, LEAST, clock=time.process_time,
-                             every=[1 if one in often else SELDOM for one in turns])  # fmt: skip
+        seconds = interleave([*jobs, *(job for job, _ in loops)], rounds, LEAST, clock=time.process_time)
         whole, first, alone = seconds[: len(jobs) : 2], seconds[1 : len(jobs) : 2], seconds[len(jobs) :]
         self._steps = {one: (a, b, steps - 1) for one, a, b, (_, steps) in zip(setups, whole, first, runs, strict=True)}
         self._calls = {kernel: one / calls for kernel, one, (_, calls) in zip(kernels, alone, loops, strict=True)}
 
     def step(self, one: Setup, rounds: bool = False) -> Any:
-        """Seconds per step: of each round, NaN of those without it, or by the least of all, as whatever else a machine
-        does only adds."""
+        """Seconds per step: of each round, or by the least of all, as whatever else a machine does only adds."""
         whole, first, steps = self._steps[one]
-        return (whole - first) / steps if rounds else float(np.nanmin(whole) - np.nanmin(first)) / steps
+        return (whole - first) / steps if rounds else float(whole.min() - first.min()) / steps
 
     def own(self, one: Setup, rounds: bool = False) -> Any:
         """The same without contact: the engine's own."""
@@ -141,11 +139,10 @@ class Prices:
             return 0.0
         calls = 1 if one.bridge == "before each step" else EVALUATIONS[one.method]
         found = calls * self._calls[one.law, one.count]
-        return found if rounds else float(np.nanmin(found))
+        return found if rounds else float(found.min())
 
     def interval(self, ratios: Array) -> tuple[float, float, float]:
         """Median of the ratios of the rounds with its 95 % interval, bootstrapped."""
-        ratios = ratios[np.isfinite(ratios)]
         _, low, high = interval(np.median(ratios[resamples(len(ratios))], axis=1))
         return float(np.median(ratios)), low, high
 
@@ -293,8 +290,8 @@ def tables(data: dict[str, Any]) -> list[Table]:
     note = ("Microseconds per step, least of interleaved rounds, as whatever else a machine does only adds to a time; "
             "start of a run taken out. Kernel: the forces of all wheels in a compiled loop, times the calls per step. "
             "Bridge: what the step takes beyond the engine's own and the kernel, for plain Python its slower kernel "
-            "too. Share: of the bridge in the step, median of the rounds with its 95 % interval; what is judged is in "
-            f"{ROUNDS} rounds, the rest in {ROUNDS // SELDOM}.")  # fmt: skip
+            "too. Share: of the bridge in the step, median of the rounds with its 95 % interval. Rows time what they "
+            f"judge by itself, in {ROUNDS} rounds; here are {SHOWN} of all.")  # fmt: skip
     heads = ("engine", "method", "wheels", "bridge", "law", "step", "engine's own", "kernel", "bridge's", "share [%]")
     rows = tuple((p["engine"], p["method"], str(p["wheels"]), p["bridge"], p["law"],
                   *(f"{1e6 * p[part]:.2f}" for part in ("step", "own", "kernel", "over")),
