@@ -45,6 +45,21 @@ def exudyn_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run
     spring(wheels[1], 0.0, ground, p.k2, p.d2)
     spring(chassis, p.b, wheels[0], p.k3, p.d3)
     spring(chassis, -p.a, wheels[1], p.k4, p.d4)
+    march = exudyn_march(container, mbs, nodes, step, steps)
+
+    def run() -> np.ndarray:
+        read = march()
+        return np.column_stack([read[0][:, 2], read[1][:, 2], read[2][:, 2], read[2][:, 3],
+                                read[3][:, 2], read[4][:, 2], read[5][:, 2], read[5][:, 3]])  # fmt: skip
+
+    return run
+
+
+def exudyn_march(container: Any, mbs: Any, nodes: list[Any], step: float, steps: int) -> Callable[[], list[np.ndarray]]:
+    """Runge-Kutta 4; one run gives the coordinates of every node, then their rates, each with times first."""
+    import exudyn as exu
+    import exudyn.itemInterface as items
+
     kinds = exu.OutputVariableType
     sensors = [mbs.AddSensor(items.SensorNode(
         nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind))
@@ -58,13 +73,11 @@ def exudyn_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run
     ti.adaptiveStep = False
     ti.explicit.computeEndOfStepAccelerations = False
 
-    def run(owner=container) -> np.ndarray:  # the system lives as long as its container
+    def march(owner: Any = container) -> list[np.ndarray]:  # the system lives as long as its container
         mbs.SolveDynamic(options, solverType=exu.DynamicSolverType.RK44)
-        read: list[Any] = [mbs.GetSensorStoredData(sensor) for sensor in sensors]
-        return np.column_stack([read[0][:, 2], read[1][:, 2], read[2][:, 2], read[2][:, 3],
-                                read[3][:, 2], read[4][:, 2], read[5][:, 2], read[5][:, 3]])  # fmt: skip
+        return [mbs.GetSensorStoredData(sensor) for sensor in sensors]
 
-    return run
+    return march
 
 
 def mujoco_model(p: Parameters, step: float) -> Any:

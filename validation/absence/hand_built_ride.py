@@ -16,6 +16,7 @@ import numpy as np
 
 from models.compiled import lean, njit
 from models.vehicles.spatial import SpatialVehicle
+from validation.absence.hand_built import exudyn_march
 
 Run = Callable[[], np.ndarray]
 """One run from rest; returns the states (steps + 1, 14): z, roll and pitch of the body, the wheels, then all rates."""
@@ -74,23 +75,8 @@ def exudyn_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
     mbs.AddObject(items.ObjectGenericODE2(
         nodeNumbers=nodes[1:], massMatrix=np.zeros((4, 4)), stiffnessMatrix=car.tyre * np.eye(4),
         forceUserFunction=lambda mbs, t, item, q, v: forces[round(t * per_time)]))  # fmt: skip
-    sensors = [mbs.AddSensor(items.SensorNode(
-        nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind))
-        for kind in (exu.OutputVariableType.Coordinates, exu.OutputVariableType.Coordinates_t) for node in nodes]
-    mbs.Assemble()
-    options = exu.SimulationSettings()
-    options.solution.file.write = False
-    options.solution.sensors.writePeriod = step
-    ti = options.timeIntegration
-    ti.numberOfSteps, ti.endTime, ti.verboseMode = steps, step * steps, 0
-    ti.adaptiveStep = False
-    ti.explicit.computeEndOfStepAccelerations = False
-
-    def run(owner=container) -> np.ndarray:  # the system lives as long as its container
-        mbs.SolveDynamic(options, solverType=exu.DynamicSolverType.RK44)
-        return np.hstack([mbs.GetSensorStoredData(sensor)[:, 1:] for sensor in sensors])
-
-    return run
+    march = exudyn_march(container, mbs, nodes, step, steps)
+    return lambda: np.hstack([found[:, 1:] for found in march()])
 
 
 def mujoco_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
