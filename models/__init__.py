@@ -26,3 +26,7 @@ Noise
     A standard deviation of samples always comes with its sampling rate; noise is drawn before a run
     and belongs to the samples, never to the integrator's step.
 """
+
+from models.threads import use_one_thread
+
+use_one_thread()

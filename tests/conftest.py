@@ -5,6 +5,8 @@ from importlib import import_module
 
 import pytest
 
+import models  # noqa: F401  before any test imports numpy: it sets the threads of linear algebra
+
 
 @pytest.fixture
 def empty_folder(tmp_path, monkeypatch):

@@ -18,9 +18,6 @@ M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
 KEPT_MEMORY = 1 << 28
 """Bytes that a worker keeps for its next array."""
 
-THREADS = "OPENBLAS_NUM_THREADS"
-"""How many threads numpy takes in a process, read when it is first imported there."""
-
 
 class Processes(Executor):
     """A process pool that starts fresh workers where some have died, and takes them along when it ends in an error.
@@ -42,7 +39,7 @@ class Processes(Executor):
         """
         pool = ProcessPoolExecutor(self._workers, mp_context=self._context, initializer=_prepare_worker,
                                    initargs=(self._theirs,))  # fmt: skip
-        with _interrupts_held(), one_thread_each():
+        with _interrupts_held():
             for _ in range(self._workers):
                 pool.submit(os.getpid)
         return pool
@@ -71,21 +68,6 @@ class Processes(Executor):
 def processes(workers: int) -> Processes:
     """Workers that start fresh: engines and compilers keep threads that no fork survives."""
     return Processes(workers)
-
-
-@contextmanager
-def one_thread_each() -> Iterator[None]:
-    """Processes that start within the block compute linear algebra in a thread of their own.
-
-    Threads of several processes that wait for one another on the same cores make small matrices ten times slower.
-    """
-    before = os.environ.get(THREADS)
-    os.environ[THREADS] = before or "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[THREADS]
 
 
 @contextmanager

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from models.ensemble.workers import one_thread_each
 from models.errors import InputError, RunFailed
 from validation.price.own_scene import unseen_systems
 from validation.price.own_scene.unseen import ENGINES, Verdict, drawn, judge
@@ -43,7 +42,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _shared(folder: Path) -> list[Judged]:
     """The same by as many processes as there are processors, two at most; long ones first."""
     context = get_context("spawn")  # an engine's threads do not survive a fork
-    with one_thread_each(), ProcessPoolExecutor(min(2, os.cpu_count() or 1), mp_context=context) as pool:
+    with ProcessPoolExecutor(min(2, os.cpu_count() or 1), mp_context=context) as pool:
         return [one.result() for one in [pool.submit(judged, system, n, folder)
                                          for system in reversed(SCENES) for n in range(SCENES[system])]]  # fmt: skip
 
