@@ -191,7 +191,7 @@ def test_the_price_list_reads_as_a_table():
 
 
 def test_a_ride_has_no_more_than_it_names():
-    assert [(row.id, row.reason) for row in ride.rows() if row.status != "passed"] == []
+    assert [(row.id, row.reason) for row in ride.rows() if row.status in ("failed", "not run")] == []
 
 
 @pytest.mark.full

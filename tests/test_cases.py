@@ -29,7 +29,7 @@ def test_every_row_of_the_quick_case_passes(name, measured):
     assert rows
     for row in rows:
         assert row.status != "failed", f"{row.id}: {row.reason}"
-        assert row.status == "passed" or "TWINRIG_DATA" in row.reason
+        assert row.status != "not run" or "TWINRIG_DATA" in row.reason
 
 
 @pytest.mark.full

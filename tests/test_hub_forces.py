@@ -24,7 +24,7 @@ ALL = {"title": "t", "system": "hub-forces", "study": "hub_forces", "vehicle": {
 
 def test_the_quick_share_passes(tmp_path):
     rows, _ = case.measure(True, tmp_path)
-    assert [row.id for row in rows if row.status != "passed"] == []
+    assert [row.id for row in rows if row.status in ("failed", "not run")] == []
 
 
 def test_without_symmetry_the_engines_agree_too():

@@ -33,7 +33,7 @@ SECONDS = 0.2
 
 def test_the_quick_share_passes(tmp_path):
     rows, _ = case.measure(True, tmp_path)
-    assert [row.id for row in rows if row.status != "passed"] == []
+    assert [row.id for row in rows if row.status in ("failed", "not run")] == []
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from models.errors import InputError
-from validation.rows import Row
+from validation.rows import STATUSES, Row, of_saved
 
 ROUNDING = 1e-9
 """Relative change that rounding explains."""
@@ -35,7 +35,7 @@ def read(path: Path) -> dict[str, Any]:
 
 def _rows(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Rows by id; ValueError for an id that stands there twice: of two rows only one would be compared."""
-    rows = {row["id"]: {name: row[name] for name in Row.__dataclass_fields__} for row in content["rows"]}
+    rows = {row["id"]: of_saved({name: row[name] for name in Row.__dataclass_fields__}) for row in content["rows"]}
     if len(rows) < len(content["rows"]):
         raise ValueError("an id stands there twice")
     return rows
@@ -74,7 +74,12 @@ def changes(before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any]])
     """Changed rows by id, in the order of KINDS and, within values, the largest share of a tolerance first."""
     found = [change for id in (*before, *(id for id in after if id not in before))
              for change in _of(id, before.get(id), after.get(id))]  # fmt: skip
-    return sorted(found, key=lambda one: (KINDS.index(one["kind"]), one["after"] == "passed", -one["size"]))
+    return sorted(found, key=lambda one: (KINDS.index(one["kind"]), _rank(one["after"]), -one["size"]))
+
+
+def _rank(status: Any) -> int:
+    """What is worse now is told first; a value that is no status has no rank."""
+    return STATUSES.index(status) if status in STATUSES else 0
 
 
 def _of(id: str, old: dict[str, Any] | None, new: dict[str, Any] | None) -> Iterator[Change]:

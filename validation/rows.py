@@ -1,7 +1,7 @@
 """Rows of the validation report: one quantity each, with what was expected and why."""
 
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 System = Literal[
     "pitch-plane", "drift", "contact", "ride", "rolling-vehicle", "anti-lock", "measured", "hard-cases", "cost",
@@ -10,9 +10,12 @@ System = Literal[
 Independence = Literal["native", "shared kernel", "closed form", "published", "none"]
 """How far the two sides are apart: separate force laws, the same force code, an exact answer, a published
 figure, or no second side."""
-Status = Literal["passed", "failed", "not run"]
-REPORTED = "reported, not judged"
-"""Reason of a row that stands beside a figure without being judged by it."""
+Status = Literal["failed", "missed", "not run", "reported", "passed"]
+"""In the order in which they are told. ``failed`` and ``passed`` are judged, the same on any machine; ``missed`` is a
+stated aim that was not reached, as by seconds of a slow machine; ``reported`` stands without being judged."""
+STATUSES: tuple[Status, ...] = get_args(Status)
+Side = Literal["at most", "at least"]
+"""On which side of its bound an aim is reached."""
 
 
 @dataclass(frozen=True)
@@ -73,10 +76,27 @@ def behaves(id: str, system: System, quantity: str, found: str, expected: str, w
 
 def finding(id: str, system: System, quantity: str, value: float, unit: str, expected: float | str, why: str,
             independence: Independence = "published") -> Row:  # fmt: skip
-    """Row that reports a figure beside a published one without judging it; it passes by being measured."""
-    return Row(id, system, quantity, value, unit, expected, None, why, independence, "passed", REPORTED)
+    """Row that reports a figure beside a published one without judging it."""
+    return Row(id, system, quantity, value, unit, expected, None, why, independence, "reported")
+
+
+def aim(id: str, system: System, quantity: str, value: float, unit: str, bound: float, why: str,
+        side: Side = "at most") -> Row:  # fmt: skip
+    """Row of a figure that is aimed at and that the machine decides, as seconds, their ratios and memory are: reported
+    where it is reached, missed where it is not or the value is not a number.
+    """
+    reached = value <= bound if side == "at most" else value >= bound
+    status: Status = "reported" if reached else "missed"
+    reason = "" if reached else f"{value:.3g}, aimed at {side} {bound:,.4g}"
+    return Row(id, system, quantity, value, unit, f"{side} {bound:,.4g}", None, why, "none", status, reason)
 
 
 def not_run(id: str, system: System, quantity: str, reason: str) -> Row:
     """Row for something that could not be measured here, with the reason."""
     return Row(id, system, quantity, None, "", "", None, "", "none", "not run", reason)
+
+
+def of_saved(row: dict[str, Any]) -> dict[str, Any]:
+    """A row of saved results; those of older reports called "passed" what they did not judge."""
+    unjudged = row["status"] == "passed" and row["reason"] == "reported, not judged"
+    return row | {"status": "reported", "reason": ""} if unjudged else row

@@ -17,7 +17,7 @@ from models.result import provenance
 from validation.changes import against, lines
 from validation.kept_cases import Cases, Outcomes, measured
 from validation.report.shares import full
-from validation.rows import REPORTED, Row
+from validation.rows import STATUSES, Row
 
 CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "growth",
          "drift_off", "drift_solvers", "holding_spring", "point_mass",
@@ -168,16 +168,11 @@ def save(folder: Path, rows: list[Row], source: dict[str, Any], earlier: dict[st
 
 
 def say(rows: list[Row], seconds: float | None, page: Path) -> int:
-    """Print the verdict and every row that did not pass."""
-    failed = [row for row in rows if row.status == "failed"]
-    skipped = [row for row in rows if row.status == "not run"]
-    told = [row for row in rows if row.reason == REPORTED]
-    passed = len(rows) - len(failed) - len(skipped) - len(told)
-    print(
-        f"{len(rows)} rows: {passed} passed, {len(told)} reported without being judged, {len(failed)} failed, "
-        f"{len(skipped)} not run{'' if seconds is None else f', {seconds:.0f} s'}"
-    )
-    for row in failed + skipped:
+    """Print how many rows have which status, and every row that failed, was missed or was not run; how many failed."""
+    of = {status: [row for row in rows if row.status == status] for status in STATUSES}
+    counts = ", ".join(f"{len(of[status])} {status}" for status in reversed(STATUSES))
+    print(f"{len(rows)} rows: {counts}{'' if seconds is None else f'; {seconds:.0f} s'}")
+    for row in (*of["failed"], *of["missed"], *of["not run"]):
         print(f"  {row.status}: {row.id}: {row.quantity}: {row.reason}")
     print(f"report: {page}")
-    return len(failed)
+    return len(of["failed"])

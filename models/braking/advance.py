@@ -3,7 +3,7 @@
 from models.braking.plane_step import step_on
 from models.braking.surfaces import even, under_wheels
 from models.compiled import lean
-from models.contact.stack import array, doubles
+from models.stack import array, doubles
 
 FINE, AT_REST, NOT_FOUND, LIFTED = range(4)
 """How a sample ended: still moving; standing; loads not found; a wheel without load, which the plane cannot have."""

@@ -15,7 +15,7 @@ from models.braking.plane_chain import ALONE, factor, headings, inertia, rows, s
 from models.braking.tyre_table import across, place
 from models.braking.wheel_step import wheel_step
 from models.compiled import inlined, lean
-from models.contact.stack import array, doubles
+from models.stack import array, doubles
 
 CLOSE = 1e-7
 """What is left of the accelerations' error (m/s^2, and rad/s^2 times 1 m) when the loads are taken to be found."""

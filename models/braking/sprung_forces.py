@@ -23,7 +23,6 @@ from models.braking.plane_step import (
 )
 from models.braking.tyre_table import place
 from models.compiled import lean
-from models.contact.stack import array, at, beyond, doubles, row, start
 from models.handling.forces import (
     AXLE,
     CHASSIS,
@@ -47,6 +46,7 @@ from models.handling.forces import (
 )
 from models.handling.kernel import enter, leave, room
 from models.handling.tree import PER_LINK, dot, three, times, twist
+from models.stack import array, at, beyond, doubles, row, start
 
 STEER, HELD_X, HELD_Y, SPUN, ROW = range(5)
 """Columns of a wheel's row."""

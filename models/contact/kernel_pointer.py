@@ -20,8 +20,8 @@ from numba import cfunc, types
 from models.contact.inputs import Array
 from models.contact.kernel import contact, net
 from models.contact.kernel_simplified import table
-from models.contact.stack import DOUBLES
 from models.contact.undeformed_distance import Distance
+from models.stack import DOUBLES
 
 SIGNATURE = types.int32(types.int32, DOUBLES, DOUBLES, DOUBLES)
 HEADER = Path(__file__).with_name("kernel.h")

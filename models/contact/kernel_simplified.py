@@ -48,9 +48,9 @@ from models.contact.simplified_kernels import (
     tangential_fit,
 )
 from models.contact.simplified_theory import ABOUT, FITS, LEAST_CELLS, PLAIN, SHAPES, Options
-from models.contact.stack import DOUBLES, beyond
 from models.contact.undeformed_distance import Distance
 from models.errors import InputError
+from models.stack import DOUBLES, beyond
 
 _CELLS, _LAW, _NET, _SHAPE, _FIT, _LOW, _EDGE, _X, _Y, _DX, _DY, _BOTTOM_X, _BOTTOM_Y = range(13)
 _LINES_X, _LINES_Y, _ROWS, _COLUMNS, _HEAD = range(13, 18)

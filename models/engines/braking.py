@@ -17,8 +17,8 @@ from models.braking.plane_step import FORCE_X, FORCE_Y
 from models.braking.plane_vehicle import Plane
 from models.braking.samples import moved
 from models.compiled import lean, njit
-from models.contact.stack import array, at, beyond, start
 from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.stack import array, at, beyond, start
 from models.vehicles.spatial import Body, SpatialVehicle
 
 HEADER, ROW = 2, 6

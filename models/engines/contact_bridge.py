@@ -51,11 +51,11 @@ from models.contact.kernel import (
 from models.contact.kernel_simplified import table
 from models.contact.material import Pair
 from models.contact.simplified_theory import press
-from models.contact.stack import at, beyond, doubles, start
 from models.contact.undeformed_distance import Distance, quadratic
 from models.engines.stability import GROWTH, LONG_RUN, Linear, growth, limit
 from models.errors import InputError, Refused
 from models.rail.wheel_forces import REGULAR
+from models.stack import at, beyond, doubles, start
 
 X, Y, Z, YAW = range(4)
 FREEDOMS = 4

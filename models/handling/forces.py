@@ -13,7 +13,6 @@ import math
 
 from models.compiled import lean
 from models.contact.fastsim_many import LOAD, MU, A, B
-from models.contact.stack import row
 from models.handling.inputs import height
 from models.handling.tree import (
     PER_LINK,
@@ -33,6 +32,7 @@ from models.handling.tree import (
     twist,
 )
 from models.handling.tyre import FIRST
+from models.stack import row
 
 (COUNT, JOINTS, POINTS, PARTS, TYRES, KNOTS, WAVES, CHASSIS, DRAG, DRAG_X, DRAG_Y, DRAG_Z, CELLS, STRIPS, MIDDLE,
  OF_POINTS, OF_PARTS, OF_TYRES, OF_KNOTS, OF_WAVES, OF_CELLS, OF_STRIPS, HEADER) = range(23)  # fmt: skip

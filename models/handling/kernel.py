@@ -8,7 +8,6 @@ worked out on the way lies on the stack: no array is made.
 import math
 
 from models.compiled import lean
-from models.contact.stack import array, at, beyond, doubles, row, start
 from models.handling.forces import (
     AXLE,
     BRAKE,
@@ -77,6 +76,7 @@ from models.handling.tree import (
     times,
 )
 from models.handling.tyre import tyre_forces
+from models.stack import array, at, beyond, doubles, row, start
 
 
 @lean

@@ -7,8 +7,8 @@ share of a coordinate, less what it is at rest; its force draws both together.
 import math
 
 from models.compiled import lean
-from models.contact.stack import beyond, row
 from models.handling.tree import PER_SPOT, PUSH, RATE, WHERE, add, dot, plus, three, times
+from models.stack import beyond, row
 
 (STIFFNESS, DAMPING, HELD, FRICTION, FRICTION_RATE, REST, OWN, OWN_GAIN, ONE, TWO, AXIS, ON_TRAVEL, ON_RATE,
  PER_PART) = (*range(11), 13, 14, 15)  # fmt: skip

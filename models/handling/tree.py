@@ -9,7 +9,7 @@ the carrier from outside. Nothing here makes an array.
 import math
 
 from models.compiled import lean
-from models.contact.stack import row
+from models.stack import row
 
 KIND, BELOW, ARM, COUNT, PER_JOINT = 0, 1, 2, 5, 6
 """Of a coordinate in the table, as ``joints`` has it, and how many its body has; ``LOOSE``: a kind that turns, alone

@@ -20,8 +20,8 @@ from models.compiled import lean
 from models.contact.fastsim import KINDS, MARCHES
 from models.contact.fastsim_grid import Grid, grid, strips_of
 from models.contact.fastsim_many import LOAD, MU, PER_SLIP, ROOM, SPIN, XI_X, XI_Y, A, B, forces, forces_within
-from models.contact.stack import array, doubles
 from models.errors import InputError
+from models.stack import array, doubles
 
 SLOW = 0.1
 """Speed (m/s) of the tread below which slip is relative to it."""

@@ -8,7 +8,6 @@ elements, hubs, then the inputs of every half step.
 import numpy as np
 
 from models.compiled import lean, njit
-from models.contact.stack import array, at, beyond, doubles, start
 from models.hub_forces.cut_vehicle import HEADING, PITCH, ROLL
 from models.hub_forces.mechanics import (
     PARENT,
@@ -25,6 +24,7 @@ from models.hub_forces.mechanics import (
     solve,
     turned,
 )
+from models.stack import array, at, beyond, doubles, start
 
 (JOINTS, BODIES, ELEMENTS, HUBS, ROAD, FRAME, GUIDE, PER_TIME, ROWS, COLUMNS, GRAVITY, CHASSIS, SPEED, ROLL_STIFFNESS,
  ROLL_DAMPING, PITCH_STIFFNESS, PITCH_DAMPING, HOLDING, ALL, HEADER) = range(20)  # fmt: skip

@@ -8,7 +8,7 @@ principle, with axes and anchors of joints as the columns of its rows.
 import math
 
 from models.compiled import lean
-from models.contact.stack import array, doubles
+from models.stack import array, doubles
 
 PARENT, TURNS, AXIS, OFFSET, PER_JOINT = 0, 1, 2, 3, 6
 """Numbers of a joint: the one below it (-1: the ground), whether it turns, its axis, where it is on what is below."""

@@ -16,13 +16,13 @@ from mujoco import rollout
 
 from models.compiled import lean
 from models.contact.fastsim_many import PER_SLIP, ROOM, forces_within
-from models.contact.stack import array, beyond, doubles, row
 from models.engines.contact_bridge_mujoco import native_law
 from models.engines.mujoco_callback import installed
 from models.engines.spatial_mujoco import _principal
 from models.handling.numbers import Handling
 from models.handling.tree import cross, dot, plus, three, times
 from models.handling.tyre import ORDER, THREE, net, shape_factor
+from models.stack import array, beyond, doubles, row
 from models.vehicles.free_vehicle import SPECK
 
 SIZE, CELLS = 23, 21

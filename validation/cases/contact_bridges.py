@@ -16,11 +16,11 @@ from models.contact.hertz import by_approach
 from models.contact.inputs import Array
 from models.contact.patches import separate
 from models.contact.simplified_theory import press, roll
-from models.contact.stack import start
 from models.engines.contact_bridge import FREEDOMS, SUNK, YAW, Theory, Wheels, X, Y, Z, add_forces, forces
 from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law, python_law
 from models.engines.mujoco_callback import installed
+from models.stack import start
 from validation.contact import slow_wheels
 from validation.rows import Row, System, Table, at_most, behaves
 from validation.timing import interleave, interval, resamples

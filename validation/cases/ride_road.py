@@ -20,7 +20,7 @@ from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.ride.fitted_roads import HALF_TRACK, fits_table, made, measured
 from validation.ride.road_figure import coherency_figure
-from validation.rows import REPORTED, Row, System, Table, at_most, finding
+from validation.rows import Row, System, Table, at_most, finding
 
 TITLE = "Ride: roads under two tracks"
 SYSTEM: System = "ride"
@@ -178,7 +178,7 @@ def _route_rows(road: TwoTrackRoad) -> list[Row]:
                     f"{SPEED:g} m/s: isotropic road over two-track road of the same track spectrum",
                     float(one / other),
                     "",
-                    REPORTED,
+                    "",
                     why,
                 )
             )

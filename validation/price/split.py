@@ -14,13 +14,13 @@ from numba import carray
 
 from models.assembly import assemble
 from models.compiled import njit
-from models.contact.stack import at, beyond
 from models.engines.contact_bridge import Wheels, forces
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law
 from models.engines.mujoco_callback import installed
 from models.engines.protocol import Settings
 from models.engines.reference import derivative_of
+from models.stack import at, beyond
 from studies.figures import LABELS
 from validation.price.compiled_forces import CompiledForces, law
 from validation.price.instructions_run import exudyn_marches

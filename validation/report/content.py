@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import Any, get_args
 
 from validation.report.numbers import margin
-from validation.rows import Independence, System
+from validation.rows import STATUSES, Independence, System
 from validation.run import CASES
 
 Results = dict[str, Any]
@@ -28,25 +28,23 @@ assert set(KINDS) == set(get_args(Independence))
 
 
 def verdict(results: Results) -> dict[str, Any]:
-    """Counts by outcome, the rows that need reading, the tightest passed row and the time."""
+    """Rows by status, what a reader must know first of where they are from, the tightest passed row and the time."""
     rows = results["rows"]
-    judged = [row for row in rows if row["status"] == "passed" and not reported(row)]
-    margins = [(ratio, row) for row in judged if (ratio := margin(row)) is not None]
-    worst = max(margins, key=lambda pair: pair[0], default=None)
+    of = {status: [row for row in rows if row["status"] == status] for status in STATUSES}
+    margins = [(ratio, row) for row in of["passed"] if (ratio := margin(row)) is not None]
     return {
         "count": len(rows),
-        "passed": len(judged),
-        "reported": sum(map(reported, rows)),
-        "failed": [row for row in rows if row["status"] == "failed"],
-        "not_run": [row for row in rows if row["status"] == "not run"],
-        "worst": worst,
+        "of": of,
+        "worst": max(margins, key=lambda pair: pair[0], default=None),
         "seconds": results["provenance"]["wall"],
+        "source": _source(results["provenance"]),
     }
 
 
-def reported(row: dict[str, Any]) -> bool:
-    """Whether a row reports a figure without judging it."""
-    return row["status"] == "passed" and row["tolerance"] is None and row["reason"] != ""
+def _source(provenance: dict[str, Any]) -> list[tuple[str, str]]:
+    """Version, commit, date, machine and data, as (name, value)."""
+    known = {"version": "twinrig", "commit": "commit", "date": "date", "machine": "machine", "data": "data"}
+    return [(name, str(provenance.get(key) or "not saved")) for name, key in known.items()]
 
 
 def silent_systems(rows: list[dict[str, Any]]) -> list[str]:
@@ -79,6 +77,7 @@ def _cases(rows: list[dict[str, Any]], results: Results) -> Iterator[dict[str, A
                        for why in dict.fromkeys(row["why"] for row in own)],
             "count": len(own),
             "failed": sum(row["status"] == "failed" for row in own),
+            "missed": sum(row["status"] == "missed" for row in own),
         }
 
 

@@ -15,6 +15,7 @@ from validation.report import content
 from validation.report.numbers import duration, margin, marked, number, numeric_columns, powers, share
 from validation.report.shares import shares
 from validation.report.shown import shown
+from validation.rows import of_saved
 
 TEMPLATE = "page.html.jinja"
 BLANK: dict[str, Any] = {"quick": False, "command": "", "versions": {}, "seconds": {}, "wall": None}
@@ -38,7 +39,7 @@ def read(path: Path) -> dict[str, Any]:
     """Saved results; raises InputError if the file is not one."""
     try:
         results = json.loads(path.read_text(encoding="utf-8"))
-        return {"provenance": {**BLANK, **results["provenance"]}, "rows": list(results["rows"]),
+        return {"provenance": {**BLANK, **results["provenance"]}, "rows": [of_saved(row) for row in results["rows"]],
                 "against": results.get("against")}  # fmt: skip
     except FileNotFoundError:
         raise InputError(path, "", None, "no such file: `twinrig validate` writes it") from None
@@ -55,7 +56,7 @@ def page(results: dict[str, Any], data: Path, each: Callable[..., Iterable[Any]]
                               trim_blocks=True, lstrip_blocks=True)  # fmt: skip
     environment.filters |= {"number": number, "share": share, "duration": duration, "powers": powers, "marked": marked,
                             "numeric_columns": numeric_columns}  # fmt: skip
-    environment.globals |= {"margin": margin, "reported": content.reported, "case_of": content.case_of}
+    environment.globals |= {"margin": margin, "case_of": content.case_of}
     names = list(dict.fromkeys(map(content.case_of, results["rows"])))
     drawn = dict(zip(names, each(partial(shown, data), names), strict=True))
     systems = content.systems(results)
