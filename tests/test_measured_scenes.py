@@ -189,6 +189,32 @@ def test_guesses(name, unit, found):
     assert (own and (own.quantity, own.at, own.component)) == found
 
 
+@pytest.mark.parametrize("name, unit, family, reason", [
+    ("Strut_FL_F", "N", "", "strut"), ("Damper force FL", "kN", "", "damper"), ("Federbein VL", "kN", "", "federbein"),
+    ("shock_rr", "N", "", "shock"), ("Stoßdämpferkraft HL", "N", "", "stoßdämpferkraft"), ("TieRodFL", "N", "", "tie"),
+    ("Fz", "N", "Damper FL", "damper"), ("Strut FL Mx", "N m", "", "strut"), ("Bellows FL", "N", "", "bellows"),
+])  # fmt: skip
+def test_forces_of_struts_are_not_guessed_to_be_hub_forces(tmp_path, name, unit, family, reason):
+    own = guess(Channel(name, unit, "", 0, 10, None, family=family))
+    assert own.at == "" and f"({reason}" in own.left_out
+    own = guess(Channel("Unheard of FL", "N", "", 0, 10, None))
+    assert "'unheard'" in own.left_out
+    t = np.arange(200) * 1e-2
+    write_csv(tmp_path / "a.csv", t, **{"FL_Fz__N": t, f"{name}__{unit}": t})
+    if not family:
+        rows = tomllib.loads(describe(tmp_path / "a.csv"))["files"][0]["channels"]
+        assert [row["channel"] for row in rows] == ["FL_Fz"]
+
+
+@pytest.mark.parametrize("name, unit, family, at", [
+    ("Fz", "N", "WFT VL", "fl"), ("My", "N m", "Rear right wheel", "rr"), ("Instrument FR Fz", "N", "", "fr"),
+    ("spring travel FL", "mm", "", "front left"), ("Radkraft vorne links", "N", "", "fl"),
+])  # fmt: skip
+def test_groups_and_words_that_only_sound_like_parts_are_guessed(name, unit, family, at):
+    own = guess(Channel(name, unit, "", 0, 10, None, family=family))
+    assert own.at == at and not own.left_out
+
+
 def test_what_show_prints_is_a_scene(tmp_path):
     t = np.arange(200) * 1e-2
     write_csv(tmp_path / "monday.csv", t, **{"FL_Fz__kN": t, "speed__km/h": t})

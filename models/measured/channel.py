@@ -20,6 +20,7 @@ class Channel:
 
     group : channels of one group share their sampling times. count : samples. period : s as the file says, None where
     it lists times instead. resolution : what values are rounded to, in ``unit``; 0 where they are floating point.
+    family : name of the group that the file has the channel in, a wheel's say; empty where it has none.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Channel:
     count: int
     period: float | None
     resolution: float = 0.0
+    family: str = ""
 
 
 @dataclass(frozen=True)

@@ -29,12 +29,24 @@ WORDS: dict[Quantity, str] = {
 }  # fmt: skip
 AXES = {"x": r"[fmaw]?x|long(itudinal)?|längs", "y": r"[fmaw]?y|lat(eral)?|quer",
         "z": r"[fmaw]?z|vert(ical)?|hoch|vertikal"}  # fmt: skip
+PARTS = (r"strut|damper|shock|absorber|spring|coil ?over|feder|d(ä|ae|a)mpf|sto(ß|ss)d|bellow|balg|top ?mount|domlager|"
+         r"bump ?stop|puffer|tie ?rod|track ?rod|push ?rod|pull ?rod|spurstange|druckstrebe|lenker|\barm\b|wishbone|"
+         r"\blink\b|stange|(roll|sway|torsion) ?bar|stabi|bush|buchse|ball ?joint|gelenk|sub ?frame|hilfsrahmen|"
+         r"lagerung|mount\b|\b(shk|spr|dmp|dmpr|damp|arb|coil|mcpherson|leaf)\b")
+"""Parts of a suspension in names, whose forces are not those of a hub."""
+WHEEL = r"(mess)?rad(last|kraft)?|wheel(force|load)?|wft|rmr|hub|spindle|naben?(kraft)?|tyre|tire|reifen"
+"""A wheel in names."""
+PLAIN = r"f|fw|vert(ical)?|dyn(amic)?|stat(ic)?|total|sum|gesamt|measured|meas|gemessen|signal|ch|chan|channel|kanal"
+"""Words that say nothing of where a force is."""
 TURNS = {"roll": r"roll.*|wank.*|w?x", "pitch": r"pitch.*|nick.*|w?y", "yaw": r"yaw.*|gier.*|heading|w?z"}
 
 
 @dataclass(frozen=True)
 class Guess:
-    """Of one channel; ``unit`` is empty where the file's own will do, ``doubt`` is a word on what is not sure."""
+    """Of one channel; ``unit`` is empty where the file's own will do, ``doubt`` is a word on what is not sure.
+
+    ``at`` is empty where no place can be named. ``left_out`` says why the guess is not to be used as it stands.
+    """
 
     channel: str
     quantity: Quantity
@@ -42,26 +54,51 @@ class Guess:
     component: str
     unit: str
     doubt: str
+    left_out: str = ""
 
 
 def guess(channel: Channel) -> Guess | None:
     """None where nothing can be made of a channel; what is missing in a guess is empty."""
-    words = " ".join(re.findall(r"[a-zäöü]+", re.sub(r"([a-zäöü])([A-Z])", r"\1 \2", channel.name).lower()))
+    words, family = _words(channel.name), _words(channel.family)
     kinds = _by_unit(channel.unit) or tuple(WORDS)
     what = next((kind for kind in kinds if _has(WORDS[kind], words)), kinds[0] if len(kinds) == 1 else None)
     if what is None:
         return None
-    corner = next((hub for hub, names in CORNERS.items() if _has(names, words)), "")
+    corner = next((hub for text in (words, family) for hub, names in CORNERS.items() if _has(names, text)), "")
     axes = TURNS if what in ("angular rate", "angle") else AXES if what in ("force", "moment", "acceleration") else {}
     component = next((axis for axis, names in axes.items() if _has(names, words)), "")
     unit = "" if channel.unit.strip() or what == "strain" else UNITS[what]
     doubts = [f"the file names no unit: is it {unit}?"] if unit else []
+    part = _part(words, family) if what in ("force", "moment") else ""
+    if part:
+        return Guess(channel.name, what, "", "", unit, " ".join(doubts), f"left out: of a part of the suspension "
+                     f"({part}), not of a hub; at a connector it can be compared with")  # fmt: skip
+    strange = _strange(words) if what == "force" and corner and not component else ""
     if what == "force" and corner and not component:
         component = "z"
         doubts.append("vertical?")
     if what == "acceleration":
         doubts.append("where? name the place under [sensors]")
-    return Guess(channel.name, what, _place(what, corner, channel.name), component, unit, " ".join(doubts))
+    left_out = f"left out: is {strange!r} at the hub?" if strange else ""
+    return Guess(channel.name, what, _place(what, corner, channel.name), component, unit, " ".join(doubts), left_out)
+
+
+def _words(name: str) -> str:
+    """Words of a name in small letters, parted by spaces."""
+    return " ".join(re.findall(r"[a-zäöüß]+", re.sub(r"([a-zäöüß])([A-Z])", r"\1 \2", name).lower()))
+
+
+def _part(*texts: str) -> str:
+    """Words of a name, or of its group's, that name a part of a suspension; empty where none does."""
+    found = next((match for text in texts if (match := re.search(rf"[^ ]*({PARTS})[^ ]*", text))), None)
+    return found.group() if found else ""
+
+
+def _strange(words: str) -> str:
+    """First word of a force's name that is neither a corner, a force, a wheel nor one that says nothing."""
+    for known in (*CORNERS.values(), WORDS["force"], WHEEL, PLAIN):
+        words = re.sub(rf"(?<![^ ])(?:{known})(?![^ ])", "", words)
+    return next((word for word in words.split() if len(word) > 1), "")
 
 
 def _place(what: Quantity, corner: str, name: str) -> str:
@@ -102,12 +139,13 @@ def _row(name: str, own: Guess | None) -> str:
     """An entry of the map, as a comment where anything is missing."""
     if own is None:
         return f"  # {{ channel = {_quoted(name)} }},  # not known"
-    free = own.quantity in ("travel", "strain")
+    free = own.quantity in ("travel", "strain") or bool(own.left_out and not own.at)
     entries = {"channel": name, "quantity": own.quantity, "at": own.at or "?",
                "component": own.component or ("" if free else "?"), "unit": own.unit}  # fmt: skip
     text = ", ".join(f"{key} = {_quoted(value)}" for key, value in entries.items() if value)
-    told = f"  # {own.doubt}" if own.doubt else ""
-    return f"  {'# ' if '?' in entries.values() else ''}{{ {text} }},{told}"
+    told = " ".join(word for word in (own.doubt, own.left_out) if word)
+    unsure = own.left_out or "?" in entries.values()
+    return f"  {'# ' if unsure else ''}{{ {text} }},{f'  # {told}' if told else ''}"
 
 
 def _quoted(text: str) -> str:

@@ -156,14 +156,23 @@ def _listed(path: Path, mdf: Any, version: int, found: list[Finding]) -> MdfFile
     if not places:
         raise InputError(path, "channels", None, "; ".join(["no channel of numbers over time is in the file",
                                                              *(one.text for one in found)]))  # fmt: skip
-    names, repeated = told_apart(path, [channel.name for channel in channels])
+    groups = [_groups(mdf.groups[g].channel_group, channel) for channel, (g, _) in zip(channels, places, strict=True)]
+    names, repeated = told_apart(path, [channel.name for channel in channels], *zip(*groups, strict=True))
     listed = tuple(
         Channel(name, channel.unit or "", _plain(channel.comment), g, mdf.groups[g].channel_group.cycles_nr, None,
-                _resolution(channel, version))
-        for name, channel, (g, _) in zip(names, channels, places, strict=True)
+                _resolution(channel, version), next(filter(None, texts), ""))
+        for name, channel, (g, _), texts in zip(names, channels, places, groups, strict=True)
     )  # fmt: skip
     start, notes = _start(path, mdf.header, version)
     return MdfFile(path, listed, start, _plain(mdf.header.comment), tuple(found + repeated + notes), tuple(places))
+
+
+def _groups(group: Any, channel: Any) -> tuple[str, str, str, str]:
+    """What can name a channel's group: as acquired, its source, the first line of its comment, the channel's source."""
+    sources = [f"{getattr(one, 'name', '')} {getattr(one, 'path', '')}".strip()
+               for one in (getattr(group, "acq_source", None), getattr(channel, "source", None))]  # fmt: skip
+    comment = _plain(group.comment or "").partition("\n")[0]
+    return (getattr(group, "acq_name", None) or "").strip(), sources[0], comment.strip(), sources[1]
 
 
 def _useless(mdf: Any, g: int, version: int) -> str:

@@ -100,20 +100,44 @@ def notice(path: Path, weight: Weight, text: str, place: str = "") -> Finding:
     return Finding("file", weight, place or path.name, text)
 
 
-def told_apart(path: Path, names: Sequence[str]) -> tuple[list[str], list[Finding]]:
-    """Names of which each occurs once: a repeated ``Fz`` becomes ``Fz (1)``, ``Fz (2)``, and that is said."""
-    uses, taken, own = Counter(names), set(names), []
+def told_apart(path: Path, names: Sequence[str], *groups: Sequence[str]) -> tuple[list[str], list[Finding]]:
+    """Names of which each occurs once, and what is to be said of repeated ones.
+
+    A repeated ``Fz`` becomes ``WFT VL/Fz``, ``WFT VR/Fz`` by the first of ``groups`` (one text per name each) that
+    tells all its channels apart, and ``Fz (1)``, ``Fz (2)`` where none does.
+    """
+    by_group = _with_groups(names, groups)
+    unique = _numbered(by_group)
+    said = []
+    for name in (name for name, uses in Counter(names).items() if uses > 1):
+        new = [i for i, each in enumerate(names) if each == name]
+        weight: Weight = "doubt" if any(unique[i] != by_group[i] for i in new) else "note"
+        said.append(notice(path, weight, f"{len(new)} channels are called {name!r}: they are read as "
+                           + ", ".join(repr(unique[i]) for i in new), name))  # fmt: skip
+    return unique, said
+
+
+def _with_groups(names: Sequence[str], groups: Sequence[Sequence[str]]) -> list[str]:
+    """Names with their group before those that are repeated, where groups tell all of these apart."""
+    new = list(names)
+    for name in (name for name, uses in Counter(names).items() if uses > 1):
+        places = [i for i, each in enumerate(names) if each == name]
+        telling = next((texts for texts in groups if len({texts[i] for i in places}) == len(places)), [])
+        for i, group in enumerate(telling):
+            new[i] = f"{group}/{name}" if group and i in places else new[i]
+    return new
+
+
+def _numbered(names: Sequence[str]) -> list[str]:
+    """Names with a number behind those that are repeated."""
+    uses, taken, unique = Counter(names), set(names), []
     for name in names:
-        if uses[name] == 1:
-            own.append(name)
-            continue
-        numbers = (f"{name} ({k})" for k in range(1, len(names) + len(taken) + 1))
-        own.append(next(text for text in numbers if text not in taken))
-        taken.add(own[-1])
-    found = [notice(path, "doubt", f"{uses[name]} channels are called {name!r}: they are read as "
-                    + ", ".join(repr(n) for n, o in zip(own, names, strict=True) if o == name), name)
-             for name in uses if uses[name] > 1]  # fmt: skip
-    return own, found
+        if uses[name] > 1:
+            numbers = (f"{name} ({k})" for k in range(1, len(names) + len(taken) + 1))
+            name = next(text for text in numbers if text not in taken)
+            taken.add(name)
+        unique.append(name)
+    return unique
 
 
 def zoned(path: Path, text: str) -> tuple[datetime | None, list[Finding]]:

@@ -144,10 +144,10 @@ def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     if cut:
         counts = [min(n for n, one in zip(counts, clocks, strict=True) if one == clock) for clock in clocks]
     keys = list(zip(clocks, counts, strict=True))
-    names, repeated = told_apart(path, [place.name for _, place in own])
+    names, repeated = told_apart(path, [place.name for _, place in own], [place.group for _, place in own])
     channels = tuple(
         Channel(name, _text(channel, *UNITS), _text(channel, "description"), keys.index(key), key[1],
-                None if place.clock else place.increment, _resolution(channel))
+                None if place.clock else place.increment, _resolution(channel), place.group)
         for name, key, (channel, place) in zip(names, keys, own, strict=True)
     )  # fmt: skip
     comment = str(data.properties.get("description", "")).strip()

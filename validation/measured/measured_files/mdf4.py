@@ -23,8 +23,9 @@ def usual_file(folder: Path) -> Path:
 
 
 def signals(*groups: dict[str, Any], version: str = "4.10", compression: Literal[0, 2] = 0,
-            start: datetime | None = None, times: np.ndarray = TIMES) -> Callable[[Path], Path]:  # fmt: skip
-    """Make a file of groups, name -> samples or keywords of asammdf's Signal."""
+            start: datetime | None = None, times: np.ndarray = TIMES,
+            families: tuple[str, ...] = ()) -> Callable[[Path], Path]:  # fmt: skip
+    """Make a file of groups, name -> samples or keywords of asammdf's Signal; ``families`` are their names."""
 
     def make(folder: Path) -> Path:
         from asammdf import MDF, Signal
@@ -33,10 +34,11 @@ def signals(*groups: dict[str, Any], version: str = "4.10", compression: Literal
         file = MDF(version=version)
         if start is not None:
             file.header.start_time = start
-        for group in groups:
+        for group, family in zip(groups, families or [""] * len(groups), strict=True):
             plain = {name: own if isinstance(own, dict) else {"samples": own} for name, own in group.items()}
             file.append([Signal(name=name, timestamps=times[: len(own["samples"])], **own)
-                         for name, own in plain.items()], common_timebase=True)  # fmt: skip
+                         for name, own in plain.items()], acq_name=family, comment=family,
+                        common_timebase=True)  # fmt: skip
         with unheard():
             file.save(path, compression=compression)
             file.close()
@@ -207,6 +209,9 @@ FILES = (
         only("Fz", FZ)),
     Odd("MDF 4 with the same name twice", "one in each group", signals({"Fz": FZ}, {"Fz": FX}), "named",
         "2 channels are called 'Fz'", {"Fz (1)": (TIMES, FZ), "Fz (2)": (TIMES, FX)}),
+    *(Odd(f"MDF {version[0]} whose groups are wheels", "every wheel has an Fz", signals({"Fz": FZ}, {"Fz": FX},
+          version=version, families=("WFT VL", "WFT HR")), "named", "'WFT HR/Fz'",
+          {"WFT VL/Fz": (TIMES, FZ), "WFT HR/Fz": (TIMES, FX)}) for version in ("4.10", "3.30")),
     Odd("MDF 4 with umlauts", "names beyond ASCII", signals({"Kraft Räder/Ω": FZ}), "right",
         truth=only("Kraft Räder/Ω", FZ)),
     Odd("MDF 4 of 300 channels", "long records", lambda folder: written(folder / "odd.mf4", WIDE, MANY), "right",

@@ -170,7 +170,11 @@ FILES = (
     Odd("TDMS of whole numbers", "16 bits of a converter", channels(one("Fz",
         (1000 + np.arange(COUNT)).astype("i2"))), "right", truth=prefix(Fz=1000.0 + np.arange(COUNT))),
     Odd("TDMS with the same name twice", "one in each group", channels(("a", "Fz", FZ, CLOCK), ("b", "Fz", FX,
-        CLOCK)), "named", "2 channels are called 'Fz'", prefix(**{"Fz (1)": FZ, "Fz (2)": FX})),
+        CLOCK)), "named", "2 channels are called 'Fz'", prefix(**{"a/Fz": FZ, "b/Fz": FX})),
+    Odd("TDMS whose groups are wheels", "every wheel has an Fz", channels(*((group, name, values, CLOCK)
+        for group in ("WFT VL", "WFT HR") for name, values in (("Fz", FZ), ("Fx", FX)))), "named", "'WFT HR/Fz'",
+        prefix(**{f"{group}/{name}": values for group in ("WFT VL", "WFT HR")
+                  for name, values in (("Fz", FZ), ("Fx", FX))})),
     Odd("TDMS with umlauts and quotes", "paths within the file are quoted", channels(("Größe 'a'", "Kraft 'Räder'/Ω",
         FZ, CLOCK)), "right", truth=prefix(**{"Kraft 'Räder'/Ω": FZ})),
     Odd("TDMS of 300 channels", "a long description", lambda folder: written(folder / "odd.tdms", WIDE, MANY),
