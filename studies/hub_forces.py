@@ -116,6 +116,11 @@ def damages(found: Found, run: HubRun) -> dict[str, float]:
             for i, element in enumerate(found.vehicle.elements)}  # fmt: skip
 
 
+def beside(found: Found) -> str:
+    """What errors and damages are taken against: without a virtual measurement nobody knows the true run."""
+    return "the true run" if found.truth is not None else "the run with the filter; the true one is not known"
+
+
 def drift_off(found: Found, run: HubRun) -> float:
     """First time (s) at which roll or pitch is off by DRIFTED; infinite if never."""
     off = np.abs(errors(found, run)[:, :2]).max(axis=1) > DRIFTED
@@ -123,8 +128,9 @@ def drift_off(found: Found, run: HubRun) -> float:
 
 
 def answer(found: Found) -> dict[str, Any]:
-    """Per run: largest errors, rms of the stabiliser's moments, damage of every element."""
-    out: dict[str, Any] = {name: {"failed": text} for name, text in found.failed.items()}
+    """Per run: largest errors, rms of the stabiliser's moments, damage of every element; all against ``beside``."""
+    out: dict[str, Any] = {"beside": beside(found)}
+    out |= {name: {"failed": text} for name, text in found.failed.items()}
     for name, run in found.runs.items():
         off = np.abs(errors(found, run)).max(axis=0)
         out[name] = {
@@ -143,18 +149,23 @@ def engines_apart(found: Found) -> float:
 
 
 def _table(scene: HubScene, found: Found) -> list[str]:
+    off, damage = (("largest error", "damage / true damage") if found.truth is not None else
+                   ("largest difference", "damage / that with the filter"))  # fmt: skip
     lines = [f"  forces in the frame {scene.forces.frame!r}; innovations squared {found.tilt.surprise:.2f} times",
              f"  {'':<18}{'roll':>9}{'pitch':>9}{'heading':>9}{'x':>8}{'y':>8}{'z':>8}{'drift-off':>11}"
-             f"{'moments rms':>16}   damage / true",
-             f"  {'largest error':<18}{'[mrad]':>9}{'[mrad]':>9}{'[mrad]':>9}{'[m]':>8}{'[m]':>8}{'[m]':>8}{'[s]':>11}"
+             f"{'moments rms':>16}   {damage}",
+             f"  {off:<18}{'[mrad]':>9}{'[mrad]':>9}{'[mrad]':>9}{'[m]':>8}{'[m]':>8}{'[m]':>8}{'[s]':>11}"
              f"{'[N m]':>16}   least, most"]  # fmt: skip
     for name, run in found.runs.items():
-        off, (roll, pitch) = np.abs(errors(found, run)).max(axis=0), np.sqrt(np.mean(run.moments**2, axis=0))
+        largest, (roll, pitch) = np.abs(errors(found, run)).max(axis=0), np.sqrt(np.mean(run.moments**2, axis=0))
         ratios = damages(found, run).values()
-        lines.append(f"  {name:<18}" + "".join(f"{1e3 * v:>9.3g}" for v in off[:3])
-                     + "".join(f"{v:>8.2g}" for v in off[3:])
+        lines.append(f"  {name:<18}" + "".join(f"{1e3 * v:>9.3g}" for v in largest[:3])
+                     + "".join(f"{v:>8.2g}" for v in largest[3:])
                      + f"{_told(drift_off(found, run)):>11}{roll:>8.3g}{pitch:>8.3g}   "
                      + f"{min(ratios):.3g}, {max(ratios):.3g}")  # fmt: skip
+    if found.truth is None:
+        lines.append("  nothing here is beside the truth, which is not known: angles beside the filter's estimate, damage "
+                     "beside the run with the filter")  # fmt: skip
     lines += [f"  {name}: {text}" for name, text in found.failed.items()]
     if len(found.runs) > len(METHODS):
         lines.append(f"  engines before drift-off: {engines_apart(found):.1e}")

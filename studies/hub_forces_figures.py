@@ -26,7 +26,7 @@ def _shown(found: "Found") -> dict[str, str]:
 
 
 def drift_figure(found: "Found", title: str, path: Path) -> None:
-    """Roll, pitch, heading and position of every run beside the true ones."""
+    """Roll, pitch, heading and position of every run, beside the true ones where these are known."""
     figure, axes = plt.subplots(2, 3, figsize=(11, 5.6), sharex=True)
     panels = [(name, i, 1e3, "mrad") for name, i in ANGLES.items()]
     panels += [("x, beside steady travel", X, 1.0, "m"), ("y, to the left", Y, 1.0, "m"), ("z, up", Z, 1.0, "m")]
@@ -46,7 +46,7 @@ def drift_figure(found: "Found", title: str, path: Path) -> None:
 
 
 def damage_figure(found: "Found", title: str, path: Path) -> None:
-    """Pseudo-damage of every section force by the true one."""
+    """Pseudo-damage of every section force by the true one, or without a truth by that of the run with the filter."""
     from studies.hub_forces import damages
 
     figure, axis = plt.subplots(figsize=(11, 4.6))

@@ -55,6 +55,19 @@ def white(count: int = 5000, seed: int = 3) -> np.ndarray:
     return np.random.default_rng(seed).normal(size=count)
 
 
+@pytest.mark.parametrize("seconds", [1.0, 1.5, 3.0])
+def test_a_short_recording_that_is_right_is_not_accused(seconds, ridden, tmp_path):
+    samples = ridden.samples(Faults(noise=case.NOISE), 3)[: round(seconds / PERIOD)]
+    turning_alone = [i for i, s in enumerate(ridden.signals) if s.quantity != "acceleration"]
+    few = replace(ridden, signals=tuple(ridden.signals[i] for i in turning_alone))
+    assert not case.findings(few, samples[:, turning_alone], tmp_path)
+    hubs = [i for i in turning_alone if ridden.signals[i].at in ridden.vehicle.hubs]
+    others = samples[::-1, turning_alone].copy()  # the motion backwards: by these forces nobody moves so
+    others[:, : len(hubs)] = samples[:, hubs]
+    said = case.findings(few, others, tmp_path)
+    assert seconds < 2.0 or any(one.check in ("swapped", "shift", "sign") for one in said)
+
+
 @pytest.mark.parametrize("fault", case.QUICK, ids=lambda fault: fault.name)
 def test_a_planted_fault_is_named_with_its_size(fault, ridden, tmp_path):
     assert all(row.status == "passed" for row in case._rows(fault, case.planted(fault, ridden, tmp_path)))

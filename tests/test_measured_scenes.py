@@ -13,10 +13,12 @@ from models.measured.clock import record
 from models.measured.formats import open_source
 from models.measured.guess import guess
 from models.measured.listing import describe
+from models.measured.no_value import without_absurd
 from models.measured.places import Places
 from models.measured.plan import check
 from models.measured.resampling import onto
 from models.measured.scene import build
+from models.measured.signal import Signal
 from models.measured.timing import timing
 from models.measured.units import conversion
 from studies.recording import run
@@ -67,7 +69,7 @@ def force(channel: str, at: str, **more: object) -> dict:
 
 def recorded(own, folder: Path):
     sources = [open_source(own.path(file.file)) for file in own.files]
-    (folder / "work").mkdir()
+    (folder / "work").mkdir(exist_ok=True)
     return record(own, sources, signals(own, sources, PLACES), HUBS, folder / "work")
 
 
@@ -138,6 +140,51 @@ def test_times_that_are_late_repeated_or_go_back(tmp_path):
     assert len(again.times) == 100 and again.findings[0].weight == "error" and again.findings[0].size == t[-1]
     with pytest.raises(InputError, match="two samples or more"):
         timing(np.zeros(3), "a.csv")
+
+
+@pytest.mark.parametrize("rate, digits, way", [(1000, 2, np.round), (1024, 3, np.round), (400, 3, np.round),
+                                               (1000, 2, np.floor), (2000, 3, np.ceil)])  # fmt: skip
+def test_rounded_times_are_those_of_an_even_clock(rate, digits, way):
+    t = np.arange(1500) / rate
+    found = timing(way(np.round(t * 10**digits, 6)) / 10**digits, "a.csv")
+    assert found.order is None and len(found.times) == 1500 and found.rate == pytest.approx(rate, rel=1e-12)
+    assert np.ptp(found.times - t) < 1e-9 and [finding.weight for finding in found.findings] == ["note"]
+
+
+def test_times_that_no_even_clock_explains_are_not_believed():
+    t = np.delete(np.arange(1500) * 1e-3, slice(700, 760))
+    broken = timing(np.round(t, 2), "a.csv")  # rounded, and a gap: where it lies, nobody can tell
+    assert broken.findings[0].weight == "error" and "1294 of 1440 times" in broken.findings[0].text
+    one_lost = timing(np.delete(np.arange(1500) * 1e-3, 700), "a.csv")
+    assert len(one_lost.times) == 1499 and one_lost.findings[0].check == "clock gaps"
+    mark = np.arange(1500) * 1e-3
+    mark[77] = 9.9e34
+    left = timing(mark, "a.csv")
+    assert len(left.times) == 1499 and left.times[-1] == mark[-1] and "number 78" in left.findings[0].text
+
+
+@pytest.mark.parametrize("mark", [9.9e34, -1e30, 3.4e38, 4e7])
+def test_marks_for_no_value_are_told_and_not_measured(tmp_path, mark):
+    t = np.arange(1000) * 1e-3
+    load = 3e3 + 300 * np.sin(20 * t)
+    load[[400, 401, 700]] = mark
+    own = scene(tmp_path, {"file": write_csv(tmp_path / "a.csv", t, fl__N=load), "channels": [force("fl", "fl")]})
+    for _ in range(2):  # a run that goes on where it was killed says the same
+        found = recorded(own, tmp_path)
+        values = found.samples(found.signals[0])
+        assert np.flatnonzero(np.isnan(values)).tolist() == [400, 401, 700]
+        told = next(finding for finding in found.noticed if finding.check == "no value")
+        assert told.size == 3 and told.times == pytest.approx((0.4, 0.7)) and "a.csv, fl: 3 samples" in told.text
+        assert "at 0.4 s" in told.text
+
+
+def test_a_wrong_unit_and_a_rough_road_are_no_marks(tmp_path):
+    t = np.arange(1000) * 1e-3
+    load = 3e3 * (1 + 0.5 * np.sin(20 * t))
+    for values in (1e3 * load, np.where(np.arange(1000) == 500, 9e4, load)):
+        signal = Signal("fl", "a.csv", "fl", "force", "fl", "z", "hub", 1, "N", 1.0)
+        kept, said = without_absurd(signal, values, t)
+        assert said is None and kept is values
 
 
 def test_jitter_is_measured(tmp_path):

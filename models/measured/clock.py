@@ -9,7 +9,7 @@ gap of more than 1.5 of its own periods, or outside its file, is NaN.
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from models.errors import InputError
 from models.measured.channel import BLOCK, Source
 from models.measured.columns import Columns
 from models.measured.finding import Finding, Weight
+from models.measured.no_value import without_absurd
 from models.measured.recording import Recording
 from models.measured.resampling import SAME, onto
 from models.measured.scene import MeasuredScene
@@ -27,7 +28,7 @@ from models.measured.timing import EVEN, Timing, timing
 from models.scene_effects import extended
 
 Progress = Callable[[str, float], None]
-COLUMNS, RAW, SOURCES = "recording.columns", "raw.columns", "sources.json"
+COLUMNS, RAW, SOURCES, ABSURD = "recording.columns", "raw.columns", "sources.json", "no_value.json"
 LEAST = 100
 """Samples of the shortest recording."""
 
@@ -96,15 +97,24 @@ def record(scene: MeasuredScene, sources: Sequence[Source], signals: Sequence[Si
     noticed += [finding for group in groups for finding in (*group.timing.findings, *_outside(scene, group, grid))]
     columns = _columns(folder, signals, sources, grid)
     if columns.done < grid.count:
+        absurd = list[Finding]()
         for i, group in enumerate(groups):
             progress(f"reading {group.source.path.name}", i / len(groups))
-            (_direct if _even(group, grid) else _resampled)(group, grid, columns, folder)
+            absurd += (_direct if _even(group, grid) else _resampled)(group, grid, columns, folder)
+        (folder / ABSURD).write_text(json.dumps([asdict(finding) for finding in absurd]))
         columns.close(grid.count)
+    noticed += _absurd(folder)
     began = start + timedelta(seconds=grid.start) if start else None
     comment = "\n".join(source.comment for source in sources if source.comment)
     said = [finding for source in sources for finding in source.noticed]
     said += [*noticed, _rule(scene, groups, grid)]
     return extended(Recording(tuple(signals), columns, grid.period, began, comment, tuple(said)), scene)
+
+
+def _absurd(folder: Path) -> list[Finding]:
+    """What was absurd when the columns were written, in this run or in one that was killed."""
+    rows = json.loads((folder / ABSURD).read_text())
+    return [Finding(**{**row, "signals": tuple(row["signals"]), "times": tuple(row["times"])}) for row in rows]
 
 
 def _rule(scene: MeasuredScene, groups: list[Group], grid: Grid) -> Finding:
@@ -211,11 +221,11 @@ def _even(group: Group, grid: Grid) -> bool:
     return own.order is None and abs(own.period / grid.period - 1) <= EVEN and bool((off <= EVEN * grid.period).all())
 
 
-def _direct(group: Group, grid: Grid, columns: Columns, folder: Path) -> None:
-    """Samples that are on the clock already, block by block, with NaN between them."""
+def _direct(group: Group, grid: Grid, columns: Columns, folder: Path) -> list[Finding]:
+    """Samples that are on the clock already, block by block, with NaN between them; what of them is absurd."""
     names, done = tuple(signal.name for signal in group.signals), 0
     for block in group.source.blocks(group.names):
-        at = grid.places(block.times / (1 + group.drift) + group.shift)
+        at = grid.places(group.timing.times[block.first : block.first + len(block.values)])
         inside = (at >= done) & (at < grid.count)
         if inside.any():
             last = int(at[inside][-1]) + 1
@@ -228,17 +238,28 @@ def _direct(group: Group, grid: Grid, columns: Columns, folder: Path) -> None:
             done = last
     for first in range(done, grid.count, BLOCK):
         columns.put(names, first, np.full((min(BLOCK, grid.count - first), len(names)), np.nan))
+    absurd = list[Finding]()
+    for signal in group.signals:
+        values, finding = without_absurd(signal, columns.read(signal.name), grid.times() - grid.start)
+        if finding:
+            columns.put((signal.name,), 0, values[:, None])
+            absurd.append(finding)
+    return absurd
 
 
-def _resampled(group: Group, grid: Grid, columns: Columns, folder: Path) -> None:
-    """Samples of another clock, first as they are, then one signal after another onto this one."""
+def _resampled(group: Group, grid: Grid, columns: Columns, folder: Path) -> list[Finding]:
+    """Samples of another clock, first as they are, then one signal after another onto this one; what of them is
+    absurd."""
     count = next(channel.count for channel in group.source.channels if channel.name == group.names[0])
     raw = Columns(folder / RAW, group.names, count)
     for block in group.source.blocks(group.names):
         raw.put(group.names, block.first, group.si(block.values))
-    times, order = grid.times(), group.timing.order
+    times, order, absurd = grid.times(), group.timing.order, list[Finding]()
     for signal in group.signals:
         values = raw.read(signal.channel)
-        values = values if order is None else values[order]
+        values, finding = without_absurd(signal, values if order is None else values[order],
+                                         group.timing.times - grid.start)  # fmt: skip
+        absurd += [finding] if finding else []
         columns.put((signal.name,), 0, onto(group.timing.times, values, group.timing.period, times)[:, None])
     raw.remove()
+    return absurd

@@ -1,7 +1,7 @@
 """When the samples of one group were taken: sorted, repeated ones dropped, gaps, jitter and rate found."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,16 @@ EVEN = 0.01
 """Of a period: samples as near to an even clock are on it; farther off, the clock jitters."""
 JITTER = 0.1
 """Of a period: a standard deviation of the steps that is worth a doubt."""
+
+
+SLIPS = 5
+"""Repeated times, or steps that are off, from which on rounding may be what makes them: one is a row written twice."""
+DIGITS = range(1, 9)
+"""Of the rate of an even clock: the fewest that explain all rounded times."""
+BEYOND = 1e4
+"""Lengths of the whole measurement: a time that is farther from the middle one is no time."""
+SEVERAL = 0.01
+"""Part of all samples that may share their time with another one: what is dropped then does no harm."""
 
 
 Say = Callable[[str, Weight, str, float, str, Iterable[float]], None]
@@ -47,6 +57,30 @@ class Timing:
 
 def timing(times: np.ndarray, place: str, signals: tuple[str, ...] = ()) -> Timing:
     """Timing of samples (n,) in the order of the file ``place``; InputError for fewer than two different times."""
+    wrong = _no_times(times)
+    if wrong.any():
+        kept, first = timing(times[~wrong], place, signals), int(np.argmax(wrong))
+        text = (f"{place}: {np.count_nonzero(wrong)} samples have no time, the first is number {first + 1} with "
+                f"{times[first]:.4g} s; they are left out.")  # fmt: skip
+        order = np.flatnonzero(~wrong) if kept.order is None else np.flatnonzero(~wrong)[kept.order]
+        absurd = Finding("time", "doubt", place, text, float(np.count_nonzero(wrong)), "samples", signals)
+        return replace(kept, order=order, findings=(absurd, *kept.findings))
+    return _of_times(times, place, signals)
+
+
+def _no_times(times: np.ndarray) -> np.ndarray:
+    """Whether each of these (n,) cannot be a time (s): no number, or far beyond all others."""
+    finite = np.isfinite(times)
+    if np.count_nonzero(finite) < 3:
+        return ~finite
+    length = len(times) * float(np.median(np.abs(np.diff(times[finite]))))
+    with np.errstate(invalid="ignore"):
+        far = np.abs(times - np.median(times[finite])) > BEYOND * length
+    return ~finite | (far if length > 0 else False)
+
+
+def _of_times(times: np.ndarray, place: str, signals: tuple[str, ...]) -> Timing:
+    """The same, of what can be times."""
     findings, whole = list[Finding](), len(times)
 
     def say(check: str, weight: Weight, text: str, size: float, unit: str, at: Iterable[float]) -> None:
@@ -57,6 +91,13 @@ def timing(times: np.ndarray, place: str, signals: tuple[str, ...] = ()) -> Timi
     rising = steps[steps > 0]
     if not len(rising):
         raise InputError(place, "time", None, "two samples or more at different times are needed")
+    even = rounded(times)
+    if even is not None:
+        same = whole - 1 - len(rising)
+        say("time", "note", f"the times are rounded{f', so that {same} of {whole} repeat themselves' if same else ''}: "
+            f"an even clock of {1 / even[1]:.9g} Hz explains them all, and is taken with all {whole} samples",
+            float(same), "samples", (times[0], times[-1]))  # fmt: skip
+        return Timing(even[0] + even[1] * np.arange(whole), None, even[1], tuple(findings))
     period = float(f"{np.median(rising):.9g}")
     if (steps < 0).any():
         deepest, at = -float(steps.min()), int(np.argmax(steps < -SHUFFLED * period))
@@ -72,15 +113,54 @@ def timing(times: np.ndarray, place: str, signals: tuple[str, ...] = ()) -> Timi
         order = keep
     again = np.diff(times[keep]) == 0
     if again.any():
-        first = float(times[keep][1:][again][0])
-        say("time", "doubt", f"{np.count_nonzero(again)} times are there more than once, the first at {first:.6g} s; "
-            "of each the first sample is taken", float(np.count_nonzero(again)), "samples", (first, first))
+        first, count = float(times[keep][1:][again][0]), int(np.count_nonzero(again))
+        text = f"{count} of {len(keep)} times are there more than once, the first at {first:.6g} s; "
+        if count > SEVERAL * len(keep):
+            say("time", "error", f"{text}no even clock explains them, and without these samples the forces are others: "
+                "export the times with more digits, or mend them", float(count), "samples", (first, first))
+        else:
+            say("time", "doubt", f"{text}of each the first sample is taken", float(count), "samples", (first, first))
         keep = keep[np.concatenate(([True], ~again))]
         order = keep
     own = times[keep]
     _gaps(own, period, say)
     _jitter(own, period, say)
     return Timing(own, order, period, tuple(findings))
+
+
+def rounded(times: np.ndarray) -> tuple[float, float] | None:
+    """Start and period (s) of an even clock whose times (n,) were rounded so coarsely that some repeat themselves, or
+    that the clock seems to jitter; None where rounding is fine, or where no even clock explains the times.
+
+    Rounding, up or down or to the nearest, moves a time by less than the spacing of rounded ones. So all times less
+    those of the clock lie in a band that wide, which few clocks fit: with the fewest digits of its rate it is taken.
+    """
+    width, count = _spacing(times), np.arange(len(times))
+    if width is None:
+        return None
+    slope = float(np.polyfit(count - count.mean(), times - times.mean(), 1)[0])
+    for period in [*(1 / float(f"{1 / slope:.{digits}g}") for digits in DIGITS), slope]:
+        off = times - period * count
+        if np.ptp(off) <= width * (1 + 1e-6):
+            return float(0.5 * (off.min() + off.max())), period
+    return None
+
+
+def _spacing(times: np.ndarray) -> float | None:
+    """Spacing (s) of times (n,) that are rounded coarsely: that of the different ones, or a power of ten."""
+    steps = np.diff(times)
+    if not np.isfinite(times).all() or (steps < 0).any():
+        return None
+    if np.count_nonzero(steps == 0) >= SLIPS:
+        return float(np.median(steps[steps > 0]))
+    middle = float(np.median(steps))
+    if (steps == 0).any() or np.count_nonzero(np.abs(steps - middle) > EVEN * middle) < SLIPS:
+        return None
+    for digits in range(7):
+        whole = times * 10.0**digits
+        if (np.abs(whole - np.rint(whole)) < 1e-6).all():
+            return 10.0**-digits if 10.0**-digits > EVEN * middle else None
+    return None
 
 
 def _gaps(times: np.ndarray, period: float, say: Say) -> None:

@@ -198,11 +198,11 @@ class Agreement:
 
     def _wrong(self, group: Group, weights: np.ndarray) -> Iterator[Fault]:
         cross, power = ((weights * part).sum() for part in self.share(group))
-        if not power > 0:
+        ratio = float(cross.real / power) if power > 0 else 0.0
+        if ratio == 0.0:
             return
-        ratio = float(cross.real / power)
         fall, error = float(power) * (ratio - 1) ** 2, float(2 * power) ** -0.5
-        factor = 1 / ratio if group.forces and ratio else ratio
+        factor = 1 / ratio if group.forces else ratio
         if fall > CERTAIN and abs(ratio - 1) > max(SMALL_FACTOR, 4 * error):
             yield Fault("factor", group.name, self._signals(group), factor, error * abs(factor / ratio), fall)
 
