@@ -89,6 +89,11 @@ def test_every_promise_that_is_broken_fails_its_row(row, change):
     assert good[f"recommendation.{row}"] == "passed" and bad[f"recommendation.{row}"] == "failed"
 
 
+def test_a_recommendation_that_is_slow_by_the_clock_misses_an_aim_and_fails_no_row():
+    bad = {row.id: row.status for row in case._rows([[replace(GOOD, slower=True, kind="seconds")]] * 10, [])}
+    assert bad.pop("recommendation.slower.seconds") == "missed" and "failed" not in bad.values()
+
+
 def test_a_default_that_the_race_forgot_is_seen_by_the_verdict(monkeypatch):
     real = recommendation._timed
     whole = recommend(Whole(), LOOSE)

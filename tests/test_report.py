@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -13,11 +14,14 @@ import pytest
 
 from models.errors import InputError
 from validation.cases import point_mass
+from validation.changes import changes
+from validation.changes import read as read_earlier
 from validation.report import page as report
 from validation.report import shares
 from validation.report.numbers import margin, number, numeric_columns, powers, share
-from validation.rows import Row, at_most, behaves, finding, not_run, within
+from validation.rows import STATUSES, Row, aim, at_most, behaves, finding, not_run, within
 from validation.run import save as _save
+from validation.run import say
 
 ODD = '<script>alert("1")</script> & "quotes" µ'
 FAILED = at_most("audit.mujoco.broken", "pitch-plane", "acceleration of a broken model", 3e-3, "of the largest", 1e-12,
@@ -234,3 +238,51 @@ def test_columns_of_numbers_go_to_the_right():
     lines = [("1", "1e-06", "not so", "+1.5 +/- 0.2"), ("2", "–", "3", "72.4*")]
     assert numeric_columns(lines, 4) == [False, True, False, True]
     assert numeric_columns([], 2) == [False, False], "a table without lines"
+
+
+def test_page_json_and_csv_say_the_same_of_every_row(tmp_path):
+    missed = aim("fastsim.speed", "contact", "one call", 7.25, "us", 5.0, "asked")
+    reached = aim("braking.speed", "anti-lock", "the truck", 210.0, "times real time", 100.0, "asked", "at least")
+    own = [*rows(), missed, reached, aim("odd.nan", "cost", "nothing", float("nan"), "s", 1.0, "asked")]
+    save(tmp_path, own)
+    page = report.write(tmp_path).read_text(encoding="utf-8")
+    row = r'<tr id="row-.*?<span class="id">([^<]*)</span>.*?<span class="chip [^"]*">([^<]*)</span>'
+    shown = re.findall(row, page, re.DOTALL)
+    with (tmp_path / "results.csv").open(newline="") as file:
+        table = [(line["id"], line["status"]) for line in csv.DictReader(file)]
+    saved = [(row["id"], row["status"]) for row in json.loads((tmp_path / "results.json").read_text())["rows"]]
+    assert sorted((unescape(id), status) for id, status in shown) == sorted(saved) == sorted(table)
+    assert {status for _, status in saved} == set(STATUSES)
+    counts = re.findall(r"<b>(\d+)</b><span>(passed|failed|missed|reported|not run)", page)
+    wanted = {status: str(sum(row.status == status for row in own)) for status in STATUSES}
+    assert {status: count for count, status in counts} == wanted
+
+
+def test_missed_aims_are_counted_and_told_in_the_verdict_and_fail_nothing(tmp_path, capsys):
+    own = [rows()[0], aim("fastsim.speed", "contact", "one call", 7.25, "us", 5.0, "asked")]
+    top = report.write(save(tmp_path, own)).read_text(encoding="utf-8").partition("What is not covered</h2>")[0]
+    assert "No row failed; 1 stated aim was missed." in top and "7.25 us; the aim is at most 5" in top
+    assert say(own, None, tmp_path) == 0
+    assert "1 passed, 0 reported, 0 not run, 1 missed, 0 failed" in capsys.readouterr().out
+
+
+def test_the_first_screen_tells_version_commit_date_machine_and_data(tmp_path):
+    save(tmp_path, rows())
+    found = json.loads((tmp_path / "results.json").read_text())
+    found["provenance"] |= {"twinrig": "1.2", "date": "2026-01-02 03:04 UTC", "machine": "x86_64, 2 cores",
+                            "data": "3 files"}  # fmt: skip
+    (tmp_path / "results.json").write_text(json.dumps(found))
+    top = report.write(tmp_path).read_text(encoding="utf-8").partition('<div class="tiles">')[0]
+    told = dict(re.findall(r"<dt>(\w+)</dt><dd>([^<]*)</dd>", top))
+    assert told == {"version": "1.2", "commit": "abc", "date": "2026-01-02 03:04 UTC", "machine": "x86_64, 2 cores",
+                    "data": "3 files"}  # fmt: skip
+
+
+def test_rows_that_an_older_report_called_passed_without_judging_them_are_reported(folder):
+    found = json.loads((folder / "results.json").read_text())
+    for row in found["rows"]:
+        if row["status"] == "reported":
+            row |= {"status": "passed", "reason": "reported, not judged"}
+    (folder / "old.json").write_text(json.dumps(found))
+    assert changes(read_earlier(folder / "old.json")["rows"], {row.id: row.as_dict() for row in rows()}) == []
+    assert report.read(folder / "old.json")["rows"] == [row.as_dict() for row in rows()]

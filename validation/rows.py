@@ -87,8 +87,9 @@ def aim(id: str, system: System, quantity: str, value: float, unit: str, bound: 
     """
     reached = value <= bound if side == "at most" else value >= bound
     status: Status = "reported" if reached else "missed"
-    reason = "" if reached else f"{value:.3g}, aimed at {side} {bound:,.4g}"
-    return Row(id, system, quantity, value, unit, f"{side} {bound:,.4g}", None, why, "none", status, reason)
+    wanted = f"{side} {bound:,.4g}"
+    reason = "" if reached else f"{value:,.4g}{f' {unit}' if unit else ''}; the aim is {wanted}"
+    return Row(id, system, quantity, value, unit, wanted, None, why, "none", status, reason)
 
 
 def not_run(id: str, system: System, quantity: str, reason: str) -> Row:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 from concurrent.futures.process import BrokenProcessPool
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from validation.changes import against, lines
 from validation.kept_cases import Cases, Outcomes, measured
 from validation.report.shares import full
 from validation.rows import STATUSES, Row
+from validation.scenes import data_folder
 
 CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "growth",
          "drift_off", "drift_solvers", "holding_spring", "point_mass",
@@ -33,9 +35,9 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
 
 
 ALONE = {True: ("recommendation",), False: ("effect_prices", "price", "recommendation", "ensemble", "contact_bridges")}
-"""Cases that begin when all others have ended, and have the machine alone, by ``quick``: those that judge by seconds,
-and, in full, those that take all processors themselves; what others time is told as it comes. Seconds of the processor
-alone do not spare a case that: of small steps, beside others that empty the caches, a ratio rises by a quarter."""
+"""Cases that begin when all others have ended, and have the machine alone, by ``quick``: those that tell seconds first
+of all, and, in full, those that take all processors themselves. Seconds of the processor alone do not spare a case
+that: of small steps, beside others that empty the caches, a ratio rises by a quarter."""
 WORKERS = 2
 """Processes that measure the other cases."""
 
@@ -46,18 +48,27 @@ def validate(folder: Path, quick: bool, command: str, earlier: dict[str, Any] | 
 
     resumed : the folder may hold cases that have ended; the time of them all together is then not known.
     """
-    start = time.perf_counter()
+    start, begun = time.perf_counter(), datetime.now(UTC)
     (folder / "data").mkdir(exist_ok=True)
     with locked(folder), processes(min(WORKERS, os.cpu_count() or 1)) as pool:
         found = _outcomes(pool, quick, folder)
         rows = [row for name in CASES for row in found[name][0]]
         seconds = {name: found[name][1] for name in CASES}
         wall = None if resumed else time.perf_counter() - start
-        source = provenance(command)
+        source = {**provenance(command), "date": f"{begun:%Y-%m-%d %H:%M} UTC", "data": _data()}
         save(folder, rows, {**source, "seeds": _in(pool, seeds), "quick": quick, "seconds": seconds, "wall": wall},
              earlier)  # fmt: skip
         path = _written(pool, folder)
     return say(rows, time.perf_counter() - start, path)
+
+
+def _data() -> str:
+    """The measured files that rows may be of."""
+    folder = data_folder()
+    if folder is None:
+        return "no measured files: TWINRIG_DATA names no folder; the rows that need some are not run"
+    sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]
+    return f"{len(sizes)} measured files of {sum(sizes) / 1e6:.3g} MB, in the folder that TWINRIG_DATA names"
 
 
 def _outcomes(pool: Executor, quick: bool, folder: Path) -> Outcomes:

@@ -20,7 +20,7 @@ from models.braking.tyre_table import Tables, TyreTable, stacked
 from models.braking.written import Turned, turned
 from models.engines.braking import Carried
 from validation.braking.braked_truck import ICE, sideways_with_locked_front_wheels, transfer_errors
-from validation.rows import Row, System, Table, at_most, finding
+from validation.rows import Row, System, Table, aim, at_most
 
 TITLE = "Braking in a turn, in engines and with a trailer"
 SYSTEM: System = "anti-lock"
@@ -42,9 +42,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
                     "the same vehicle by other equations and another method", "native" if name == "written out"
                     else "shared kernel") for name, other in beside.items()]  # fmt: skip
     rows += [*_symmetry_rows(until, own), *_load_rows(), *_trailer_rows(quick)]
-    rows += [finding(f"braking_engines.speed.{steps}", SYSTEM, "compiled truck on ice, slip bang-bang in the loop, "
-                     f"samples of 5.5 ms in {steps} step(s)", speed(steps), "times real time", 100.0,
-                     "asked for; by the processor's time, which wanders", "none") for steps in (1, 4)]  # fmt: skip
+    rows += [aim(f"braking_engines.speed.{steps}", SYSTEM, "compiled truck on ice, slip bang-bang in the loop, "
+                 f"samples of 5.5 ms in {steps} step(s), once", speed(steps), "times real time", 100.0,
+                 "asked for; by the processor's time, which wanders", "at least") for steps in (1, 4)]  # fmt: skip
     turns = {"compiled step": own, **beside}
     return rows, {name: list(where) for name, where in turns.items()}
 

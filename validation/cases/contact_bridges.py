@@ -22,7 +22,7 @@ from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, nati
 from models.engines.mujoco_callback import installed
 from models.stack import start
 from validation.contact import slow_wheels
-from validation.rows import Row, System, Table, at_most, behaves
+from validation.rows import Row, System, Table, aim, at_most, behaves
 from validation.timing import interleave, interval, resamples
 
 TITLE = "What a contact kernel costs inside an engine"
@@ -38,7 +38,7 @@ EVALUATIONS = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
 """Calls of the callback per step."""
 ENGINES = {"mujoco": ("Euler", "RK4"), "exudyn": ("ExplicitEuler", "RK44")}
 ROUNDS, SHOWN = 48, 6
-"""Rounds of what rows judge, timed by itself, as work between its turns slows short ones; of all, for the table."""
+"""Rounds of what rows tell, timed by itself, as work between its turns slows short ones; of all, for the table."""
 LEAST = 0.001
 WHY = "median of the ratios within interleaved rounds, seconds of the processor; start of a run taken out"
 
@@ -63,8 +63,8 @@ class Setup:
         return f"FASTSIM, {cells} cells" if theory == "fastsim" else NAMES[theory]
 
     @property
-    def judged(self) -> bool:
-        """Whether a row judges what it costs."""
+    def told(self) -> bool:
+        """Whether a row tells what it costs."""
         return (self.law, self.count) == (MAIN, 4) and self.bridge in ("native", ROUTES[0])
 
     @property
@@ -85,7 +85,7 @@ NAMES = {"linear": "linear theory", "simplified": "non-Hertzian"}
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Whether threads and engines agree, and low speed; in the full run also the price of every law and bridge.
 
-    Prices are only judged in the full run: the least of a few rounds is not the least.
+    Prices are only told by the full run: the least of a few rounds is not the least.
     """
     rows, done = slow_wheels.rows(quick)
     rows += [_threads_row(), _agreement_row()]
@@ -93,8 +93,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, data
     setups = every()
-    judged = [one for one in setups if one.judged]
-    rows += _price_rows(Prices([*judged, *(one.without for one in judged)], ROUNDS))
+    told = [one for one in setups if one.told]
+    rows += _price_rows(Prices([*told, *(one.without for one in told)], ROUNDS))
     shown = Prices(setups, SHOWN)
     return rows, {**data, "points": [shown.point(one) for one in setups]}
 
@@ -241,7 +241,7 @@ def _motion(wheels: Wheels, q: Array, v: Array, k: int) -> tuple[float, float, f
 def _price_rows(prices: Prices) -> list[Row]:
     rows = []
     for one in prices.setups:
-        if not one.judged:
+        if not one.told:
             continue
         step, own, kernel = (part(one, True) for part in (prices.step, prices.own, prices.kernel))
         name, calls = f"contact_bridges.{one.engine}.{one.method}", EVALUATIONS[one.method]
@@ -253,7 +253,7 @@ def _price_rows(prices: Prices) -> list[Row]:
             what, bound = "share of the bridge", 0.25
         what = (f"{ENGINE_NAMES[one.engine]}, {one.method}: step with FASTSIM at four wheels (21 x 21, native, "
                 f"{1e6 * prices.step(one):.1f} us), {what}, 95 % interval {low:.3f} to {high:.3f}")  # fmt: skip
-        rows.append(at_most(name, SYSTEM, what, value, "", bound, WHY, "none"))
+        rows.append(aim(name, SYSTEM, what, value, "", bound, WHY))
     return rows
 
 
@@ -291,7 +291,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
             "start of a run taken out. Kernel: the forces of all wheels in a compiled loop, times the calls per step. "
             "Bridge: what the step takes beyond the engine's own and the kernel, for plain Python its slower kernel "
             "too. Share: of the bridge in the step, median of the rounds with its 95 % interval. Rows time what they "
-            f"judge by itself, in {ROUNDS} rounds; here are {SHOWN} of all.")  # fmt: skip
+            f"tell by itself, in {ROUNDS} rounds; here are {SHOWN} of all.")  # fmt: skip
     heads = ("engine", "method", "wheels", "bridge", "law", "step", "engine's own", "kernel", "bridge's", "share [%]")
     rows = tuple((p["engine"], p["method"], str(p["wheels"]), p["bridge"], p["law"],
                   *(f"{1e6 * p[part]:.2f}" for part in ("step", "own", "kernel", "over")),

@@ -18,7 +18,7 @@ from validation.absence.hand_built import exudyn_run, mujoco_run
 from validation.absence.hand_built_contact import ratio_of_contacts
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import EFFECTS, ENGINES, STEP, change, changes, model, pair, scene, write_files
-from validation.rows import Row, System, Table, at_most, finding
+from validation.rows import Row, System, Table, aim, at_most
 from validation.timing import describe, interleave, paired_ratio
 
 TITLE = "What the machinery costs, and each effect"
@@ -28,8 +28,8 @@ STEPS = {True: 2000, False: 4000}
 enough for both of a pair to meet the machine in one mood."""
 ROUNDS, PRICED = {True: 7, False: 80}, {True: 5, False: 15}
 """Rounds of these runs, and of those that tell what an effect adds, by ``quick``."""
-UNJUDGED = 4
-"""Of how many rounds what no row judges is in the first."""
+SELDOM = 4
+"""Of how many rounds the unchecked run is in the first."""
 RIDES = {"reference": {True: 50, False: 500}, "exudyn": {True: 50, False: 300}, "mujoco": {True: 500, False: 1000}}
 """Steps of rides: one of Exudyn takes as long as eight of MuJoCo or of the reference's copies together."""
 WRITTEN = {"reference": "the same copies one after the other, equations written out",
@@ -52,7 +52,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         price = [_price(effect, engine, place, PRICED[quick])
                  for i, effect in enumerate(EFFECTS) for j, engine in enumerate(ENGINES)
                  if not quick or i % len(ENGINES) == j]  # fmt: skip
-    rows = [row for engine, ratio in ratios.items() for row in _machinery(engine, ratio, STEPS[quick], quick)]
+    rows = [row for engine, ratio in ratios.items() for row in _machinery(engine, ratio, STEPS[quick])]
     rows += _wheelset(STEPS[quick] // 4, quick) + _rides(quick) + _contact(quick)
     rows += _cars(STEPS[quick] // 20, quick) + _stops(quick)
     return rows, {"price": price, "ratios": ratios}
@@ -74,12 +74,12 @@ def _ratio(engine: str, folder: Path, steps: int, rounds: int) -> dict[str, Any]
     ours, theirs, times = model(own, engine), hand_built(engine, own), STEP * np.arange(steps + 1)
     gap = float(np.abs(ours.run().states - theirs()).max())
     jobs = [ours.run, lambda: guard(engine, times, theirs(), own.run.duration), theirs]
-    seconds = interleave(jobs, rounds, every=(1, 1, UNJUDGED), clock=time.process_time)
+    seconds = interleave(jobs, rounds, every=(1, 1, SELDOM), clock=time.process_time)
     return {"ratio": paired_ratio(seconds[0], seconds[1]), "gap": gap,
-            "unchecked": paired_ratio(seconds[0, ::UNJUDGED], seconds[2, ::UNJUDGED])}
+            "unchecked": paired_ratio(seconds[0, ::SELDOM], seconds[2, ::SELDOM])}
 
 
-def _machinery(engine: str, found: dict[str, Any], steps: int, quick: bool) -> list[Row]:
+def _machinery(engine: str, found: dict[str, Any], steps: int) -> list[Row]:
     why = (f"interleaved runs of {steps:,} steps, seconds of the processor, median of paired ratios: what the "
            "machinery costs where no effect is named")
     return [
@@ -87,20 +87,16 @@ def _machinery(engine: str, found: dict[str, Any], steps: int, quick: bool) -> l
                 found["gap"], "m, rad, m/s, rad/s", 0.0, "the same items in the same order give the same numbers",
                 "native"),
         slower(f"effect_prices.ratio.{engine}", f"{engine}: time of a bare scene by that of a hand-built model whose "
-               "result passes the same guard", found["ratio"], why, judged=not quick),
+               "result passes the same guard", found["ratio"], why),
         slower(f"effect_prices.unchecked.{engine}", f"{engine}: time of a bare scene by that of a hand-built model "
-               "whose result nobody checks", found["unchecked"], why, judged=False),
+               "whose result nobody checks", found["unchecked"], why),
     ]  # fmt: skip
 
 
-def slower(row: str, what: str, ratio: tuple[float, float, float], why: str, judged: bool) -> Row:
-    """A ratio with its interval."""
+def slower(row: str, what: str, ratio: tuple[float, float, float], why: str) -> Row:
+    """A ratio of seconds with its interval."""
     value, low, high = ratio
-    quantity = f"{what}, 95 % interval {low:.3f} to {high:.3f}"
-    if judged:
-        return at_most(row, SYSTEM, quantity, value, "", DEAREST, why, "native")
-    wanted = f"at most {DEAREST}{'' if value <= DEAREST else ', not met'}"
-    return finding(row, SYSTEM, quantity, value, "", wanted, f"{why}; reported, not judged", "native")
+    return aim(row, SYSTEM, f"{what}, 95 % interval {low:.3f} to {high:.3f}", value, "", DEAREST, why)
 
 
 def _wheelset(steps: int, quick: bool) -> list[Row]:
@@ -111,16 +107,15 @@ def _wheelset(steps: int, quick: bool) -> list[Row]:
                 "load, against one written out for linear creep on cones alone", gap, "m, rad, m/s, rad/s", 1e-11,
                 "the same equations, sums in another order", "none"),
         slower("effect_prices.ratio.wheelset", "time of a bare wheelset by that of the written one, whose path passes "
-               "the same checks", ratio, "what the kernel of all wheelsets costs where no effect is named",
-               judged=not quick),
+               "the same checks", ratio, "what the kernel of all wheelsets costs where no effect is named"),
     ]  # fmt: skip
 
 
 def _rides(quick: bool) -> list[Row]:
     """A car with seven freedoms on a rough road, against one written for each engine, or as equations.
 
-    In MuJoCo the suspension is of site actuators, as XML has them. Not judged: all forces of this car alone in one
-    callback, by hand, on addresses in MuJoCo's memory, beat the general callback by an eighth.
+    In MuJoCo the suspension is of site actuators, as XML has them. All forces of this car alone in one callback, by
+    hand, on addresses in MuJoCo's memory, beat the general callback by an eighth.
     """
     rows = []
     for engine, steps in RIDES.items():
@@ -131,7 +126,7 @@ def _rides(quick: bool) -> list[Row]:
                     "are summed in another order", "none" if engine == "reference" else "native"),
             slower(f"effect_prices.ratio.ride.{engine}", f"{engine}: time of a bare ride by that of "
                    f"{WRITTEN[engine]}", ratio, "what the machinery of all vehicles in space costs where no effect is "
-                   "named", judged=not quick),
+                   "named"),
         ]  # fmt: skip
     return rows
 
@@ -139,7 +134,7 @@ def _rides(quick: bool) -> list[Row]:
 def _cars(steps: int, quick: bool) -> list[Row]:
     """A car of the handling scenes that rolls freely on a flat road in MuJoCo, against one written for that alone.
 
-    Not judged: MuJoCo's own step is the same and so is the march of the tyres' cells, three fifths of the time; what is
+    MuJoCo's own step is the same and so is the march of the tyres' cells, three fifths of the time; what is
     left, a microsecond of every call of the forces, is the walk through a table that any vehicle has.
     """
     gap, ratio = ratio_of_cars(steps, ROUNDS[quick])
@@ -149,14 +144,14 @@ def _cars(steps: int, quick: bool) -> list[Row]:
                 1e-11, "the same equations, sums in another order", "native"),
         slower("effect_prices.ratio.handling", "MuJoCo: time of a bare car of a scene of handling by that of the "
                "written one, whose path passes the same guard", ratio, "what walking through any vehicle's tree costs "
-               "where no effect is named", judged=False),
+               "where no effect is named"),
     ]  # fmt: skip
 
 
 def _stops(quick: bool) -> list[Row]:
     """A truck that brakes in a turn on snow by the reference, against one that was written for that alone.
 
-    Not judged: a step compiled for any number of tyre tables and of their loads, where the written one has one of each,
+    A step compiled for any number of tyre tables and of their loads, where the written one has one of each,
     takes a third longer; asking for samples and recording them adds a tenth.
     """
     gap, ratio = ratio_of_stops(3.0 if quick else 10.0, ROUNDS[quick])
@@ -165,12 +160,12 @@ def _stops(quick: bool) -> list[Row]:
                 "of one written for a truck of fixed loads on one surface alone", gap, "m, rad, m/s, rad/s, shares",
                 1e-11, "the same equations, sums in another order", "none"),
         slower("effect_prices.ratio.braking", "time of a bare stop by that of the written one", ratio, "what a step of "
-               "any braked vehicle in the plane costs where no effect is named", judged=False),
+               "any braked vehicle in the plane costs where no effect is named"),
     ]  # fmt: skip
 
 
 def _contact(quick: bool) -> list[Row]:
-    """FASTSIM on one ellipse without spin, called from Python; its march by the least of its arithmetic is judged by
+    """FASTSIM on one ellipse without spin, called from Python; its march by the least of its arithmetic is told by
     ``fastsim.speed.plain``."""
     gap, ratio = ratio_of_contacts(ROUNDS[quick])
     return [
@@ -178,8 +173,7 @@ def _contact(quick: bool) -> list[Row]:
                 "against one written out for that alone", gap, "", 1e-13, "the same cells, sums in another order",
                 "none"),
         slower("effect_prices.ratio.contact", "time of a call of FASTSIM on a bare ellipse by that of the written one",
-               ratio, "what spin, other shapes, marches and friction cost where nothing asks for them",
-               judged=not quick),
+               ratio, "what spin, other shapes, marches and friction cost where nothing asks for them"),
     ]  # fmt: skip
 
 

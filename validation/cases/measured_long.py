@@ -18,7 +18,7 @@ from models.measured.sections import Sections, guided
 from models.rainflow_cycles import cycles
 from validation.cases.hub_forces import _anywhere, _shaken, twin
 from validation.measured.long_recording import SEED, answers_of, killed, run_of
-from validation.rows import Row, System, Table, at_most, behaves, finding, within
+from validation.rows import Row, System, Table, aim, at_most, behaves, within
 from validation.spatial.joint_forces import exudyn_guides, mujoco_guides
 
 TITLE = "Long recordings, section forces, what is handed on"
@@ -141,12 +141,12 @@ def _memory(folder: Path) -> list[Row]:
     half, last = lines[len(lines) // 2], lines[-1]
     growth = (last[1] - half[1]) / (last[0] - half[0])
     return [
-        at_most("measured_long.memory", SYSTEM, f"memory for 60 channels at 1 kHz: the largest over {LONG:g} s in ten "
-                "blocks, and an hour of its growth over the second half", float(last[1] + growth * 3600.0), "B", 2e9,
-                "only a block is in memory", "closed form"),
-        finding("measured_long.speed", SYSTEM, "seconds of recording per second of processor, MuJoCo, step 2 ms, all "
-                "sections", float((last[0] - lines[1, 0]) / (last[2] - lines[1, 2])), "1", "above 1",
-                "how long an hour takes", "none"),
+        aim("measured_long.memory", SYSTEM, f"memory for 60 channels at 1 kHz, once: the largest over {LONG:g} s in "
+            "ten blocks, and an hour of its growth over the second half", float(last[1] + growth * 3600.0), "B", 2e9,
+            "only a block is in memory"),
+        aim("measured_long.speed", SYSTEM, "seconds of recording per second of processor, once, MuJoCo, step 2 ms, all "
+            "sections", float((last[0] - lines[1, 0]) / (last[2] - lines[1, 2])), "1", 1.0, "how long an hour takes",
+            "at least"),
     ]  # fmt: skip
 
 

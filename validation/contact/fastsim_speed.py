@@ -12,7 +12,7 @@ from models.contact.fastsim import Ellipse, fastsim
 from models.contact.fastsim_grid import grid
 from models.contact.fastsim_kernels import LANES, ROWS, march_plain, march_second_order
 from models.contact.material import Pair
-from validation.rows import Row, System, at_most
+from validation.rows import Row, System, aim
 
 SYSTEM: System = "contact"
 CELLS = 21
@@ -42,15 +42,14 @@ def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], l
     took = _least(jobs)
     ratio = {name: took[name] / took["bound"] for name in took}
     rows = [
-        at_most("fastsim.speed.plain", SYSTEM, "plain march per cell, by a root and a division", ratio["plain"], "",
-                1.8, WHY, "none"),
-        at_most("fastsim.speed.second", SYSTEM, "second-order march per cell, by a root and a division",
-                ratio["second"], "", 4.0, WHY, "none"),
-        at_most("fastsim.speed.call.1", SYSTEM, "one call from Python, 12 cells per strip (0.8 % of mu N)",
-                took["call 12"] * 1e6, "us",
-                5.0, WHY, "none"),
-        at_most("fastsim.speed.call.04", SYSTEM, "one call from Python, 21 cells per strip (0.4 % of mu N)",
-                took[f"call {CELLS}"] * 1e6, "us", 10.0, WHY, "none"),
+        aim("fastsim.speed.plain", SYSTEM, "plain march per cell, by a root and a division", ratio["plain"], "",
+            1.8, WHY),
+        aim("fastsim.speed.second", SYSTEM, "second-order march per cell, by a root and a division",
+            ratio["second"], "", 4.0, WHY),
+        aim("fastsim.speed.call.1", SYSTEM, "one call from Python, 12 cells per strip (0.8 % of mu N)",
+            took["call 12"] * 1e6, "us", 5.0, WHY),
+        aim("fastsim.speed.call.04", SYSTEM, "one call from Python, 21 cells per strip (0.4 % of mu N)",
+            took[f"call {CELLS}"] * 1e6, "us", 10.0, WHY),
     ]  # fmt: skip
     table = [[name, f"{seconds * 1e6:.2f} us" if "call" in name else f"{seconds * 1e9:.2f} ns per cell",
               "" if "call" in name else f"{ratio[name]:.2f}"] for name, seconds in took.items()]  # fmt: skip

@@ -5,6 +5,7 @@ The scene has a closed form, y' = y cos t, hence y = exp(sin t), so what each se
 
 import math
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -14,7 +15,7 @@ import numpy as np
 
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
-from validation.price.own_scene import Answer, Ladder, recommendation
+from validation.price.own_scene import Answer, Ladder, recommendation, search, truth
 from validation.price.own_scene.recommendation import Choice, Recommendation
 from validation.price.own_scene.truth import Truth, at
 from validation.price.problems import Setting
@@ -27,8 +28,24 @@ STAGES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
 """Places of stages within a step, each from the one before, and weights."""
 LOOSE, TIGHT = 0.03, 6e-7
 """Tolerances: the first is met most cheaply by the default method as it comes, the second by another one."""
-TURN = 1e-3
-"""s: turns of the races, of runs as short as these."""
+CALL = 1e-6
+"""s, of a force call by the clock of these checks."""
+
+
+class _Clock:
+    """Moves on by force calls alone, so that the setting recommended by seconds is the same on any machine."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def process_time(self) -> float:
+        """Seconds."""
+        return self.now
+
+    perf_counter = process_time
+
+
+CLOCK = _Clock()
 
 
 @dataclass(frozen=True)
@@ -58,6 +75,7 @@ class Swing:
         values = [1.0]
         for i in range(n):
             values.append(_step(i * setting.value, values[-1], setting.value, places, weights))
+        CLOCK.now += CALL * len(places) * n
         times = setting.value * np.arange(n + 1)
         found = np.where(times < 0.1, np.exp(np.sin(times)), np.nan) if setting.method == "broken" else values
         return times, np.array(found), len(places) * n
@@ -97,7 +115,10 @@ def _least(tolerance: float) -> int:
 
 
 def _found(tolerance: float) -> Recommendation:
-    with patch.object(recommendation, "LEAST", TURN):
+    with ExitStack() as patched:
+        for module in (recommendation, search, truth):
+            patched.enter_context(patch.object(module, "time", CLOCK))
+        patched.enter_context(patch.object(recommendation, "LEAST", 0.0))  # a turn is a run
         return recommendation.recommend(Swing(), tolerance)
 
 
@@ -124,7 +145,8 @@ CHECKS = {
     "told": Check("logarithm of predicted by true error", "", 0.1, lambda: _worst(_told, "", (LOOSE, TIGHT))),
     "calls": Check("force calls beyond the fewest that hold the tolerance", "", 1e-12,
                    lambda: _worst(_dear, "calls", (LOOSE, TIGHT))),
-    "seconds": Check("the same of the setting recommended by seconds, where a call costs the same in all", "", 2.0,
+    "seconds": Check("the same of the setting recommended by seconds, where a call costs the same in all", "",
+                     recommendation.SLOWER - 1.0,
                      lambda: _worst(_dear, "seconds")),
 }  # fmt: skip
 

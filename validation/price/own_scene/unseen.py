@@ -56,7 +56,7 @@ class Drawn:
 @dataclass(frozen=True)
 class Verdict:
     """Of one recommended setting. errors in the quantity's unit; floor : how well the search knew the truth; slower :
-    than the engine's default that meets the tolerance, in seconds beyond doubt, or in force calls."""
+    than the engine's default that meets the tolerance, in force calls, or beyond doubt in seconds, as ``kind`` says."""
 
     title: str
     curve: str
@@ -66,6 +66,7 @@ class Verdict:
     true: float
     floor: float
     slower: bool
+    kind: str = "calls"
 
     @property
     def meets(self) -> bool:
@@ -153,7 +154,8 @@ def judge(one: Drawn, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
     found = recommend(scene, one.tolerance)
     errors = true_errors(scene, [choice.tried.setting for choice in found.winners.values()])
     return [Verdict(one.scene.title, choice.tried.setting.curve, choice.tried.setting.label(), one.tolerance,
-                    choice.error, errors[choice.tried.setting], found.truth.uncertainty, slower(found, key, choice))
+                    choice.error, errors[choice.tried.setting], found.truth.uncertainty, slower(found, key, choice),
+                    key[1])
             for key, choice in found.winners.items()]  # fmt: skip
 
 

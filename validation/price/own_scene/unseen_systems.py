@@ -79,7 +79,8 @@ def judge(one: Drawn) -> list[Verdict]:
     errors = {setting: _error(scene, found, setting)
               for setting in dict.fromkeys(choice.tried.setting for choice in found.winners.values())}  # fmt: skip
     return [Verdict(one.scene.title, choice.tried.setting.curve, choice.tried.setting.label(), one.tolerance,
-                    choice.error, errors[choice.tried.setting], found.truth.uncertainty, slower(found, key, choice))
+                    choice.error, errors[choice.tried.setting], found.truth.uncertainty, slower(found, key, choice),
+                    key[1])
             for key, choice in found.winners.items()]  # fmt: skip
 
 
