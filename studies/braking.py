@@ -127,7 +127,7 @@ def compared(paths: dict[str, Path], seconds: dict[str, float]) -> list[str]:
         x, y, yaw = path.states[-1, 0, :3]
         clock = f"; {path.clock}" if path.clock else ""
         rows.append(f"    {engine:<12}x {x:8.3f} m, y {y:8.3f} m, yaw {np.degrees(yaw):8.3f} deg after "
-                    f"{path.times[-1]:.3f} s; {len(path.times) - 1} samples in {seconds[engine]:.2f} s{clock}")
+                    f"{path.times[-1]:.3f} s; {len(path.times) - 1} samples in {seconds[engine]:.2f} s, once{clock}")
     return rows
 
 

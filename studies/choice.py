@@ -208,7 +208,7 @@ def lines(one: Found, named: bool) -> list[str]:
     else:
         faster = choice.seconds[0] / choice.seconds[2]
         rows.append(f"    calls {saved}, by steps {choice.times} times as long; {before / step:.3g} times by longer "
-                    f"steps with all effects; CPU seconds {faster:.3g} times fewer")  # fmt: skip
+                    f"steps with all effects; CPU seconds {faster:.3g} times fewer, once")  # fmt: skip
     rows += [f"    {name} {_stays(change, one)}"
              for name, change in sorted(one.further.items(), key=lambda item: item[1])]  # fmt: skip
     if choice.ended:

@@ -284,7 +284,7 @@ def _print(summary: dict[str, Any]) -> None:
     for engine, line in summary.get("runs", {}).items():
         steps, calls = line["counts"].get("steps", 0), line["counts"].get("force calls", 0)
         print(f"  {engine:<10} {line['integrator']:<17} step {line['step']:g} s  {steps} steps, "
-              f"{calls} force calls, {line['seconds']:.3f} s")
+              f"{calls} force calls, {line['seconds']:.3f} s once")
     for engine, reason in summary.get("failed", {}).items():
         print(f"  {engine:<10} FAILED: {reason}")
     for pair, gap in summary.get("largest difference of states", {}).items():

@@ -13,8 +13,8 @@ from models.contact.accuracy import Error, rolled
 from models.contact.of_scene import built_of, contact, creepages, touches
 from models.contact.scene import ContactScene, Method
 from models.contact.theories import Contact, ExactOnEllipse, Fastsim, Linear, Motion, OnEllipse, Rolled
-from models.contact.work_precision import duration
 from models.errors import InputError
+from models.seconds import cost, duration
 from models.strict import Strict, read
 from models.tables import write_table
 
@@ -52,11 +52,12 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     start = time.perf_counter()
     body = contact(scene)
     pressed = time.perf_counter()
-    found = []
+    found, marks = [], [pressed]
     for i, motion in enumerate(motions):
         progress("rolling", i / len(motions))
         found.append(rolled(body, motion, cells))
-    times = pressed - start, (time.perf_counter() - pressed) / len(motions)
+        marks.append(time.perf_counter())
+    times = pressed - start, np.diff(marks)
     found[-1] = shown
     _save(motions, found, folder)
     progress("figures", 0.9)
@@ -108,16 +109,16 @@ def doubted(used: np.ndarray) -> str:
 
 
 def _table(scene: ContactScene, body: Contact, motions: list[Motion], found: list[tuple[Rolled, Error]],
-           times: tuple[float, float]) -> list[str]:  # fmt: skip
+           times: tuple[float, np.ndarray]) -> list[str]:  # fmt: skip
     """Normal contact, then forces with their errors: all of one creepage, or some rows of a sweep.
 
-    times : of pressing, and of rolling at one creepage with its errors (s)
+    times : of pressing, and of rolling at each creepage with its errors (s)
     """
     p, limit = body.pressing, body.friction * body.pressing.load
     size = f"a = {1e3 * body.a:.3f} mm, b = {1e3 * body.b:.3f} mm, " if isinstance(body, OnEllipse) else ""
     lines = [f"  normal load {p.load:,.0f} N, approach {1e6 * p.approach:.2f} um, {size}area {1e6 * p.area:.2f} mm^2, "
              f"largest pressure {1e-6 * p.peak:,.0f} MPa", *_places(scene),
-             f"  pressed in {duration(times[0])}, rolled in {duration(times[1])} at each creepage, errors included",
+             f"  pressed in {duration(times[0])} once, rolled in {cost(times[1])} at each creepage, errors included",
              f"  forces on the wheel by {theory(scene.method)}; mu N = {limit:,.0f} N",
              f"    {'xi_x [-]':>10}{'xi_y [-]':>10}{'spin [1/m]':>11}{'Fx [N]':>10}{'Fy [N]':>10}{'Mz [N m]':>10}"
              f"{'stick':>7}{'loss [N]':>10}   errors: of cells, of theory [% of mu N], of Mz [N m]"]  # fmt: skip

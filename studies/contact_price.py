@@ -9,8 +9,9 @@ from pydantic import Field
 
 from models.contact.of_scene import built_of, hertz_of
 from models.contact.scene import ContactScene
-from models.contact.work_precision import WAYS, cheapest_lines, duration, ellipse_cases, exact, measure
+from models.contact.work_precision import WAYS, cheapest_lines, ellipse_cases, exact, measure
 from models.errors import InputError
+from models.seconds import cost
 from models.strict import Strict, read
 
 SYSTEM = "contact"
@@ -68,9 +69,9 @@ def _table(points: list[Any], count: int, uncertain: float) -> list[str]:
     """All points, then the cheapest for each target."""
     lines = [f"  error of the tangential force in % of mu N over {count} contacts (exact ones known to "
              f"{100 * uncertain:.2g} %)",
-             f"    {'':<28}{'cells':>6}{'mean':>8}{'95 of 100':>11}{'largest':>9}{'time':>10}"]  # fmt: skip
+             f"    {'':<28}{'cells':>6}{'mean':>8}{'95 of 100':>11}{'largest':>9}   time of contacts"]  # fmt: skip
     lines += [f"    {one.name:<28}{one.cells:>6}{100 * one.mean:>8.2f}{100 * one.most:>11.2f}"
-              f"{100 * max(one.errors):>9.2f}{duration(one.seconds):>10}" for one in points]  # fmt: skip
+              f"{100 * max(one.errors):>9.2f}   {cost((one.seconds, *one.range))}" for one in points]  # fmt: skip
     lines.append("  cheapest that meets      in the mean; in 95 of 100 contacts")
     return lines + [f"    {target:>6}  {mean};  {most}" for target, mean, most in cheapest_lines(points)]
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from models.contact.cases_table import answer, compile_first
 from models.contact.scene import ContactScene
-from models.contact.work_precision import duration
 from models.errors import InputError
 from models.scene_effects import extended
+from models.seconds import duration
 
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]
@@ -67,7 +67,7 @@ def told(rows: int, wrong: int, name: str, seconds: float) -> list[str]:
     state = f"; {wrong:,} of them wrong, see their status" if wrong else sound
     each = f", {duration(seconds / rows)} a row" if rows > 1 else ""
     return [f"  {rows:,} row{'s' * (rows > 1)} of {name}{state}",
-            f"  {duration(seconds)}{each}: reading, forces twice for the error of the cells, writing"]  # fmt: skip
+            f"  {duration(seconds)}{each}, once: reading, forces twice for the error of cells, writing"]  # fmt: skip
 
 
 if __name__ == "__main__":

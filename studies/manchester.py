@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from models.contact.wheel_on_rail import DEEP
-from models.contact.work_precision import duration
 from models.errors import InputError, RunFailed
 from models.rail.benchmark_plan import case_text
 from models.rail.benchmark_scene import WheelRailScene
 from models.rail.contact_table import Contact, Place, Placed, rolling_radius_difference
+from models.seconds import cost
 from models.tables import write_table
 
 SYSTEM = "wheel-rail"
@@ -46,13 +46,14 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
     failed: dict[str, str] = {}
     table: list[str] = []
     for k, (name, case) in enumerate(scene.cases.items()):
-        contact, shifts, start = scene.contact(case), scene.positions.values(), time.perf_counter()
+        contact, shifts, marks = scene.contact(case), scene.positions.values(), [time.perf_counter()]
         found[name] = []
         for i, shift in enumerate(shifts):
             progress(f"{name} at {1e3 * shift:g} mm", (k + i / shifts.size) / len(scene.cases))
             _try(contact, float(shift), case.yaw, name, found[name], failed)
-        each = (time.perf_counter() - start) / shifts.size
-        table += [f"  {name}: {case_text(case.yaw, case.friction)}; {duration(each)} a position", *_table(found[name])]
+            marks.append(time.perf_counter())
+        table += [f"  {name}: {case_text(case.yaw, case.friction)}; {cost(np.diff(marks))} a position",
+                  *_table(found[name])]  # fmt: skip
         _save(name, found[name], folder)
     if any(found.values()):
         figure(scene.title, {name: (scene.cases[name], placed) for name, placed in found.items()},

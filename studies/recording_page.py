@@ -242,7 +242,7 @@ def _provenance(found: Found) -> list[str]:
     versions = ", ".join(f"{name} {version(name)}" for name in dict.fromkeys(names))
     times = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in found.seconds.items())
     return [f"Command: {' '.join(sys.argv)}", f"Versions: {versions}, Python {platform.python_version()}",
-            f"Engine: {found.engine}, Runge-Kutta 4", f"Time taken: {times}",
+            f"Engine: {found.engine}, Runge-Kutta 4", f"Time taken, once: {times}",
             *([f"Comment of the files: {found.recording.comment}"] if found.recording.comment else [])]  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from models.ride.choice.in_time import Samples, goes_in_time
 from models.ride.choice.reduced import Reduced, Whole
 from models.ride.of_scene import told_by, vehicle_of
 from models.ride.scene import RideScene
+from models.seconds import cost
 from models.strict import read
 from studies.choice import told
 
@@ -95,15 +96,15 @@ def _answer(scene: RideScene, choice: Choice, further: dict[Effect, float]) -> d
     }  # fmt: skip
 
 
-def _seconds(chooser: Chooser, choice: Choice, whole: Whole) -> tuple[float, float]:
-    """Seconds of a time run of the whole scene and of what is left."""
+def _seconds(chooser: Chooser, choice: Choice, whole: Whole) -> tuple[list[float], list[float]]:
+    """Seconds of time runs of the whole scene and of what is left."""
     rest = whole.reduced(without(chooser.held, choice.left_out))
     return _timed(whole.full, choice.before.step), _timed(rest, choice.after.step)
 
 
-def _timed(reduced: Reduced, step: float) -> float:
-    """Seconds for SECONDS of free motion by the classical Runge-Kutta method, the shortest of three."""
-    A, best = reduced.system.A[: reduced.states, : reduced.states], np.inf
+def _timed(reduced: Reduced, step: float) -> list[float]:
+    """Seconds for SECONDS of free motion by the classical Runge-Kutta method, of three runs."""
+    A, taken = reduced.system.A[: reduced.states, : reduced.states], []
     for _ in range(3):
         x, start = np.ones(len(A)), time.perf_counter()
         for _ in range(int(SECONDS / step)):
@@ -111,8 +112,8 @@ def _timed(reduced: Reduced, step: float) -> float:
             k2 = A @ (x + step / 2 * k1)
             k3 = A @ (x + step / 2 * k2)
             x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + A @ (x + step * k3))
-        best = min(best, time.perf_counter() - start)
-    return best
+        taken.append(time.perf_counter() - start)
+    return taken
 
 
 def _save(scene: RideScene, alone: list[Alone], choice: Choice, path: Path) -> None:
@@ -140,7 +141,7 @@ def percent(value: float) -> str:
 
 
 def _table(scene: RideScene, choice: Choice, alone: list[Alone], further: dict[Effect, float],
-           seconds: tuple[float, float]) -> list[str]:  # fmt: skip
+           seconds: tuple[list[float], list[float]]) -> list[str]:  # fmt: skip
     """The choice in words."""
     before, after = choice.before, choice.after
     names = ", ".join(effect.name for effect in choice.left_out) or "nothing"
@@ -151,8 +152,8 @@ def _table(scene: RideScene, choice: Choice, alone: list[Alone], further: dict[E
                      f"{100 * (scene.tolerance or 0):g} %")  # fmt: skip
     lines += [f"  states {before.states} -> {after.states}; step limit {1e3 * before.step:.3g} -> "
               f"{1e3 * after.step:.3g} ms; calls per second of motion {before.calls:.4g} -> {after.calls:.4g}, "
-              f"{before.calls / after.calls:.3g} times fewer; {SECONDS:g} s of motion in {1e3 * seconds[0]:.3g} -> "
-              f"{1e3 * seconds[1]:.3g} ms"]  # fmt: skip
+              f"{before.calls / after.calls:.3g} times fewer; {SECONDS:g} s of motion in {cost(seconds[0])} -> "
+              f"{cost(seconds[1])}"]  # fmt: skip
     lines += ["  alone, what leaving it out changes (confirmed):"]
     lines += [f"    {one.effect.name}: {', '.join(map(percent, one.confirmed))}"
               + (f" ({one.illegal})" if one.illegal else "") for one in alone]  # fmt: skip

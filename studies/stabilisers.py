@@ -283,6 +283,7 @@ def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
         f"{options.limits.damage_error:.0%},",
         f"  pitch within {options.limits.pitch_error:g} rad, artificial moment up to 15 Hz at most "
         f"{options.limits.artificial_share:.0%} of I pitch''. The vertical f3 is never judged: it is blind.",
+        "  * seconds by those of the free run, each run once",
     ]
     for engine, road in dict.fromkeys((row["engine"], row["road"]) for row in rows):
         own = [row for row in rows if (row["engine"], row["road"]) == (engine, road)]
@@ -299,7 +300,7 @@ def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
 HEADS = (f"  {'':<25}{'damage ratio':^28}{'vertical':>9}{'pitch error':>16}{'artificial moment':>21}{'cost':>8}"
          f"{'verdict':>11}{'without':>11}")  # fmt: skip
 UNITS = (f"  {'method':<25}{'f3x':>7}{'f3z':>7}{'f4x':>7}{'f4z':>7}{'f3':>9}{'max':>9}{'rms':>7}"
-         f"{'rms':>7}{'max N m':>8}{'share':>6}{'x free':>8}{'':>11}{'truth':>11}")  # fmt: skip
+         f"{'rms':>7}{'max N m':>8}{'share':>6}{'x free*':>8}{'':>11}{'truth':>11}")  # fmt: skip
 
 
 def _line(row: Row, free: float) -> str:

@@ -244,7 +244,8 @@ def test_rows_are_counted_in_words_that_fit():
 
 
 def test_the_cheapest_is_the_fastest_that_meets_the_target():
-    points = [Point("slow", 9, (0.001,), 1.0), Point("fast", 9, (0.01,), 0.1), Point("rough", 9, (0.2,), 0.01)]
+    points = [Point("slow", 9, (0.001,), 1.0, (0.9, 1.2)), Point("fast", 9, (0.01,), 0.1, (0.1, 0.1)),
+              Point("rough", 9, (0.2,), 0.01, (0.01, 0.02))]  # fmt: skip
     assert [getattr(cheapest(points, target, lambda one: one.mean), "name", None)
             for target in (0.5, 0.05, 0.005, 0.0001)] == ["rough", "fast", "slow", None]  # fmt: skip
 

@@ -19,6 +19,7 @@ from models.contact.material import Pair
 from models.contact.of_scene import interpenetrating
 from models.contact.theories import Contact, ExactOnEllipse, Linear, Motion, Simplified
 from models.errors import RunFailed
+from models.seconds import cost
 
 Parts = tuple[float, float, float]
 KINDS: dict[str, Parts] = {"x": (1, 0, 0), "y": (0, 1, 0), "spin": (0, 0, 1), "x+y": (1, 1, 0), "x+spin": (1, 0, 1),
@@ -154,12 +155,14 @@ WAYS = (
 
 @dataclass(frozen=True)
 class Point:
-    """One way on one number of cells. errors : (cases,) by mu N. seconds : of one evaluation."""
+    """One way on one number of cells. errors : (cases,) by mu N. seconds : of one evaluation, median over the cases;
+    range : the least and the most of them."""
 
     name: str
     cells: int
     errors: tuple[float, ...]
     seconds: float
+    range: tuple[float, float]
 
     @property
     def mean(self) -> float:
@@ -173,7 +176,7 @@ class Point:
 
 
 def measure(way: Way, cells: int, cases: list[Case], repeats: int = 3) -> Point:
-    """Errors on all cases, and seconds: the least of ``repeats`` for each case, their median over the cases."""
+    """Errors on all cases, and seconds: the median of ``repeats`` for each case, and that of the cases."""
     errors, seconds = [], []
     for case in cases:
         roll, motion = way.rolled(case, cells), case.motion
@@ -181,7 +184,7 @@ def measure(way: Way, cells: int, cases: list[Case], repeats: int = 3) -> Point:
         force = np.array(found[0][:2]) if isinstance(found[0], tuple) else found[0].force
         errors.append(float(np.linalg.norm(force / case.limit - case.force)))
         seconds.append(found[1])
-    return Point(way.name, cells, tuple(errors), float(np.median(seconds)))
+    return Point(way.name, cells, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds)))
 
 
 LEAST = 2e-5
@@ -192,13 +195,13 @@ def _timed(roll: Roll, motion: Motion, repeats: int) -> tuple[Any, float]:
     start = time.perf_counter()
     found = roll(motion)
     count = max(1, int(LEAST / max(time.perf_counter() - start, 1e-7)))
-    best = np.inf
+    taken = []
     for _ in range(repeats if count > 1 else 1):
         start = time.perf_counter()
         for _ in range(count):
             found = roll(motion)
-        best = min(best, (time.perf_counter() - start) / count)
-    return found, best
+        taken.append((time.perf_counter() - start) / count)
+    return found, float(np.median(taken))
 
 
 def cheapest(points: list[Point], target: float, error: Callable[[Point], float]) -> Point | None:
@@ -228,12 +231,4 @@ def cheapest_lines(points: list[Point]) -> list[tuple[str, ...]]:
 def _told(one: Point | None, error: Callable[[Point], float]) -> str:
     if one is None:
         return "none"
-    return f"{one.name}, {one.cells} cells: {duration(one.seconds)} ({100 * error(one):.2g} %)"
-
-
-def duration(seconds: float) -> str:
-    """A time in the unit that fits it."""
-    for factor, unit in ((1.0, "s"), (1e3, "ms")):
-        if factor * seconds >= 1.0:
-            return f"{factor * seconds:.3g} {unit}"
-    return f"{1e6 * seconds:.3g} us"
+    return f"{one.name}, {one.cells} cells: {cost((one.seconds, *one.range))} ({100 * error(one):.2g} %)"

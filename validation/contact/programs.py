@@ -8,7 +8,8 @@ from models.contact.fastsim import fastsim
 from models.contact.hertz import by_axes
 from models.contact.simplified_theory import CELLS, PAPER, NormalContact, press, roll
 from models.contact.undeformed_distance import quadratic
-from models.contact.work_precision import Case, duration
+from models.contact.work_precision import Case
+from models.seconds import duration
 from validation.rows import Table
 from validation.timing import interleave
 

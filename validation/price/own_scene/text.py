@@ -3,6 +3,7 @@
 from collections import defaultdict
 from typing import Any
 
+from models.seconds import cost
 from studies.figures import LABELS
 from validation.price.own_scene.recommendation import Choice, Recommendation
 from validation.price.own_scene.search import Tried
@@ -10,7 +11,7 @@ from validation.price.problems import Setting
 
 SAME = 0.005
 """Ratios so near to one are not worth a word."""
-HEAD = f"  {'':<24}{'setting':<36}{'error':>11}{{counted:>16}}{'seconds':>11}"
+HEAD = f"  {'':<24}{'setting':<36}{'error':>11}{{counted:>16}}   time"
 
 
 def lines(found: Recommendation) -> list[str]:
@@ -43,11 +44,11 @@ def _table(found: Recommendation) -> list[str]:
     for (engine, kinds), one in _merged(found.winners).items():
         who = f"{LABELS.get(engine, engine) if engine else 'all'}, by {kinds}"
         rows.append(f"  {who:<24}{_named(one.tried.setting, not engine):<36}{one.error:>9.2g} {unit}"
-                    f"{one.calls:>16,.0f}{one.seconds:>9.2g} s")  # fmt: skip
+                    f"{one.calls:>16,.0f}   {cost(one.rounds or (one.seconds,))}")  # fmt: skip
     how = "measured over the whole run" if _whole(found) or all(
         one.confirmed for one in found.winners.values()) else "measured"
-    return [*rows, f"  errors are {how}, against the truth; seconds are those of this machine's processor, model built "
-            "anew"]
+    return [*rows, f"  errors are {how}, against the truth; times are those of this machine's processor, model built "
+            "anew: median and range of interleaved runs, or of one run"]
 
 
 def _merged(winners: dict[tuple[str, str], Choice]) -> dict[tuple[str, str], Choice]:

@@ -1,0 +1,22 @@
+"""Seconds as they are told: of several runs the median with the range, of a single run with the word "once"."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+
+def duration(seconds: float) -> str:
+    """A time (s) in the unit that fits it."""
+    for factor, unit in ((1.0, "s"), (1e3, "ms")):
+        if factor * seconds >= 1.0:
+            return f"{factor * seconds:.3g} {unit}"
+    return f"{1e6 * seconds:.3g} us"
+
+
+def cost(seconds: Sequence[float] | np.ndarray) -> str:
+    """What runs of these seconds cost: "12 ms (11 ms to 15 ms)", or "12 ms once"."""
+    values = np.asarray(seconds, float)
+    middle = duration(float(np.median(values)))
+    if values.size == 1:
+        return f"{middle} once"
+    return f"{middle} ({duration(float(values.min()))} to {duration(float(values.max()))})"
