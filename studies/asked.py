@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from models.errors import InputError
+from models.measured.file_kinds import is_measurement
 
 SCENES = Path(__file__).parent / "scenes"
 
@@ -33,6 +34,9 @@ def scene_path(name: str) -> Path:
         return SCENES / f"{name}.toml"
     if not name.endswith(".toml") and not os.path.lexists(name):
         raise InputError("", "scene", name, "no such scene, and no such file", names)
+    if is_measurement(Path(name)):
+        raise InputError(name, "", None, f"this is no scene: `twinrig show {name}` says what is in a measurement and "
+                         "prints a scene for it")  # fmt: skip
     return Path(name)
 
 

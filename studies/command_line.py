@@ -14,10 +14,8 @@ import typer
 from typer.exceptions import TyperException
 
 from models.errors import InputError, RunFailed
+from models.measured.file_kinds import is_measurement
 from studies.asked import SCENES, engines_of, load_scene, plan_of, ready
-
-MEASURED = (".csv", ".txt", ".mf4", ".mdf", ".dat", ".rsp", ".tdms")
-"""Files that ``show`` takes for measurements."""
 
 app = typer.Typer(
     add_completion=False, pretty_exceptions_enable=False,
@@ -102,7 +100,7 @@ def show(
     """Print what a scene will compute, without running it, or what is in a measurement file, with a scene for it."""
     if not price and (engine is not None or as_json):
         raise InputError("--engine" if engine else "--json", "", engine, "belongs to --price here: name it too")
-    if Path(scene).suffix.lower() in MEASURED:
+    if is_measurement(Path(scene)):
         from models.measured.listing import describe
 
         return print(describe(Path(scene)))

@@ -8,7 +8,7 @@ import pytest
 
 from models.errors import InputError
 from models.measured.formats import csv as csv_format
-from models.measured.formats import mdf4, open_source, tdms, write
+from models.measured.formats import csv_rows, mdf4, open_source, tdms, write
 from models.measured.formats.opened import Opened
 from models.measured.formats.writing import Group
 from validation.cases import measured_formats as case
@@ -232,7 +232,7 @@ def test_shortest_and_longest_decimals_are_read_to_the_last_bit(tmp_path):
 
 
 def test_without_the_count_of_columns_a_short_row_is_filled_up(tmp_path, monkeypatch):
-    monkeypatch.setattr(csv_format, "_even", lambda *_: None)
+    monkeypatch.setattr(csv_rows, "_even", lambda *_: None)
     assert odd(csv_files, "CSV with a short row").error(tmp_path) == np.inf
 
 

@@ -6,10 +6,9 @@ Names are read in English and German, as FL_Fx, WFT_RR_MZ, Radkraft vorne links,
 import re
 from dataclasses import dataclass
 
-from models.errors import InputError
 from models.measured.channel import Channel, Source
 from models.measured.signal import UNITS, Quantity
-from models.measured.units import conversion
+from models.measured.units import quantities
 
 CORNERS = {
     "fl": r"fl|lf|vl|lv|front ?left|left ?front|vorne? ?links|links ?vorne?",
@@ -60,7 +59,7 @@ class Guess:
 def guess(channel: Channel) -> Guess | None:
     """None where nothing can be made of a channel; what is missing in a guess is empty."""
     words, family = _words(channel.name), _words(channel.family)
-    kinds = _by_unit(channel.unit) or tuple(WORDS)
+    kinds = quantities(channel.unit) or tuple(WORDS)
     what = next((kind for kind in kinds if _has(WORDS[kind], words)), kinds[0] if len(kinds) == 1 else None)
     if what is None:
         return None
@@ -111,18 +110,6 @@ def _place(what: Quantity, corner: str, name: str) -> str:
 
 def _has(names: str, words: str) -> bool:
     return re.search(rf"(?:^| )(?:{names})(?: |$)", words) is not None
-
-
-def _by_unit(unit: str) -> tuple[Quantity, ...]:
-    """Quantities of which this can be the unit; none for no unit, which says nothing."""
-    found = list[Quantity]()
-    for kind in UNITS if unit.strip() else ():
-        try:
-            conversion(unit, kind, "", "")
-            found.append(kind)
-        except InputError:
-            pass
-    return tuple(found)
 
 
 def scene_text(source: Source) -> str:

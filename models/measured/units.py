@@ -44,6 +44,18 @@ def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float
     return float(_registry().Quantity(1.0, found).to(_si(quantity)).magnitude)
 
 
+def quantities(unit: str) -> tuple[Quantity, ...]:
+    """Quantities of which this can be the unit; none for no unit, which says nothing."""
+    found = list[Quantity]()
+    for kind in UNITS if unit.strip() else ():
+        try:
+            conversion(unit, kind, "", "")
+            found.append(kind)
+        except InputError:
+            pass
+    return tuple(found)
+
+
 @cache
 def _registry() -> Any:
     import pint

@@ -8,7 +8,7 @@ import numpy as np
 from models.measured.formats.mdf4 import opened as mdf4_opened
 from models.measured.formats.tdms import Bounded, opened
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
-from validation.measured.measured_files import csv, mdf4, rpc3, tdms
+from validation.measured.measured_files import csv, csv_forms, kinds, mdf4, rpc3, tdms
 from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, Odd, Sweep, cut
 
 CHECKS = {
@@ -71,6 +71,6 @@ def of_sweep(sweep: Sweep) -> Case:
 
 
 CASES = (
-    *(of_file(odd) for module in (csv, mdf4, rpc3, tdms) for odd in module.FILES),
+    *(of_file(odd) for module in (csv, csv_forms, kinds, mdf4, rpc3, tdms) for odd in module.FILES),
     *(of_sweep(Sweep(extension)) for extension in (".csv", ".mf4", ".rsp", ".tdms")),
 )

@@ -8,22 +8,15 @@ from pathlib import Path
 
 from models.errors import InputError, similar_file
 from models.measured.channel import Source
+from models.measured.file_kinds import KNOWN, by_extension, format_of, usual_of
 from models.measured.formats.opened import Opened, notice
 from models.measured.formats.writing import Group, check_names, check_start, whole_file
 
 READERS = {"CSV": ("csv", "open_csv"), "ASAM MDF": ("mdf4", "open_mdf"), "RPC III": ("rpc3", "open_rpc"),
            "TDMS": ("tdms", "open_tdms")}  # fmt: skip
 """Format -> module and function; imported when such a file is opened."""
-MAGIC = {
-    b"MDF ": "ASAM MDF", b"UnFinMF": "ASAM MDF", b"TDSm": "TDMS", b"PK\x03\x04": "a spreadsheet or an archive",
-    b"\x89HDF": "HDF5", b"MATLAB": "MATLAB", b"\x1f\x8b": "packed",
-    b"\xff\xfe": "text in UTF-16, which has to be saved as UTF-8", b"\xfe\xff": "text in UTF-16, which has to be saved "
-    "as UTF-8", b"TDSh": "the index of a TDMS file, whose data are in the .tdms file beside it",
-}  # fmt: skip
-"""First bytes of a file -> what it is."""
-EXTENSIONS = {".csv": "CSV", ".txt": "CSV", ".mf4": "ASAM MDF", ".mdf": "ASAM MDF", ".dat": "ASAM MDF",
-              ".rsp": "RPC III", ".rpc": "RPC III", ".drv": "RPC III", ".tim": "RPC III", ".tdms": "TDMS"}  # fmt: skip
-KNOWN = "CSV, ASAM MDF (.mf4), MTS RPC III (.rsp) and TDMS can be read"
+DRIVE = ("a .drv file usually holds what drives the actuators of a rig, not what was measured: name the response "
+         "(.rsp) of the same run")  # fmt: skip
 
 
 def open_source(path: str | Path) -> Source:
@@ -38,27 +31,25 @@ def open_source(path: str | Path) -> Source:
     InputError : naming the file, and the byte, line or sample where it cannot be read
     """
     path = Path(path)
-    form, reader = _reader(path, _head(path))
-    source = reader(path)
-    usual = EXTENSIONS.get(path.suffix.lower(), form)
-    if usual == form:
-        return source
-    said = notice(path, "doubt", f"the extension {path.suffix} is that of {usual}, but the file is read as {form}")
-    return replace(source, noticed=(said, *source.noticed))
+    form = format_of(path, _head(path))
+    source = _read(path, form)
+    usual = usual_of(path.suffix.lower(), form)
+    said = [notice(path, "doubt", text) for text in (
+        f"the extension {path.suffix} is that of {usual}, but the file is read as {form}" if usual != form else "",
+        DRIVE if form == "RPC III" and path.suffix.lower() == ".drv" else "") if text]  # fmt: skip
+    return replace(source, noticed=(*said, *source.noticed))
 
 
-def _reader(path: Path, head: bytes) -> tuple[str, Callable[[Path], Opened]]:
-    """Format by the first bytes of a file, and the function that opens it."""
-    found = next((what for magic, what in MAGIC.items() if head.startswith(magic)), "")
-    if head[:32].split(b"\0")[0].strip() == b"FORMAT":
-        found = "RPC III"
-    if found and found not in READERS:
-        raise InputError(path, "", None, f"this is {found}; {KNOWN}")
-    if not found and b"\0" in head:
-        raise InputError(path, "byte 0", head[:8].hex(" "), f"this is the beginning of no known format; {KNOWN}")
-    form = found or "CSV"
+def _read(path: Path, form: str) -> Opened:
+    """Open a file by the reader of its format; what is said of text that is no CSV knows the extension."""
     module, name = READERS[form]
-    return form, getattr(import_module(f"models.measured.formats.{module}"), name)
+    reader: Callable[[Path], Opened] = getattr(import_module(f"models.measured.formats.{module}"), name)
+    try:
+        return reader(path)
+    except InputError as error:
+        if form != "CSV" or not by_extension(path):
+            raise
+        raise InputError(path, error.place, error.value, error.allowed + by_extension(path)) from None
 
 
 WRITERS = {".csv": "write_csv", ".mf4": "write_mdf4:write_mdf", ".rsp": "write_rpc3:write_rpc", ".tdms": "write_tdms"}

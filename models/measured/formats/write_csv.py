@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from models.csv_header import heading
 from models.errors import InputError
-from models.measured.formats.csv import CLOCKS, heading
+from models.measured.formats.csv_layout import is_clock
 from models.measured.formats.writing import Group, one_group
 
 
@@ -18,7 +19,7 @@ def write_csv(path: Path, part: Path, groups: Sequence[Group], start: datetime |
     """Write the header to the file ``part``, then rows of shortest numbers, block by block."""
     group = one_group(path, groups, "CSV")
     for name, unit in zip(group.names, group.units, strict=True):
-        if name.casefold() in CLOCKS:
+        if is_clock(name):
             raise InputError(path, "channel", name, "a CSV file has one column of times: give the channel another name")
         if heading(f"{name} [{unit}]") != (name, unit) or not unit.isprintable():
             raise InputError(path, f"channel {name!r}, unit", unit, "a unit in CSV has no brackets and no line ends")

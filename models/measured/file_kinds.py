@@ -1,0 +1,146 @@
+"""What a file is, by its first bytes or its extension, and what to do with one whose samples cannot be read here."""
+
+import re
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from models.errors import InputError
+
+EXTENSIONS = {".csv": "CSV", ".txt": "CSV", ".tsv": "CSV", ".mf4": "ASAM MDF", ".mdf": "ASAM MDF", ".dat": "ASAM MDF",
+              ".rsp": "RPC III", ".rpc": "RPC III", ".drv": "RPC III", ".tim": "RPC III", ".tdms": "TDMS"}  # fmt: skip
+"""Extension of a file that can be read -> its usual format."""
+READABLE = {b"MDF ": "ASAM MDF", b"UnFinMF": "ASAM MDF", b"TDSm": "TDMS", b"FORMAT\0": "RPC III"}
+"""First bytes of a file that can be read -> its format; any other text is read as CSV."""
+KNOWN = "CSV, ASAM MDF (.mf4), MTS RPC III (.rsp) and TDMS can be read"
+AS_CSV = "save its channels as CSV with a column time [s]"
+BEGINS = {"ASAM MDF": "ASAM MDF, which begins with MDF", "TDMS": "TDMS, which begins with TDSm",
+          "RPC III": "MTS RPC III (response .rsp, drive .drv, time history .tim), which begins with FORMAT"}
+"""Format -> what it is called and how it begins."""
+AGAIN = f"write it anew from the software that has it, or {AS_CSV}"
+DECODE = "decode its messages with their database (.dbc) into MDF 4, with asammdf or the logger's software"
+UNPACK = "unpack it, and name the file inside"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file that cannot be read: what it is, what a user can do, a pattern of its first bytes, extensions."""
+
+    name: str
+    remedy: str
+    begins: bytes
+    extensions: tuple[str, ...] = ()
+
+
+KINDS = (
+    Kind("an Excel or OpenDocument workbook", "save the sheet as CSV UTF-8", rb"(?!)", (".xlsx", ".xlsm", ".ods")),
+    Kind("an Excel workbook of 1997 to 2003", "save the sheet as CSV UTF-8", rb"\xd0\xcf\x11\xe0", (".xls",)),
+    Kind("text in UTF-32", "save it as UTF-8", rb"\xff\xfe\0\0|\0\0\xfe\xff"),
+    Kind("a MATLAB file", "write its channels as CSV with a column time [s]: writetable in MATLAB, scipy.io.loadmat in "
+         "Python", rb"MATLAB", (".mat",)),
+    Kind("HDF5", "write its channels as CSV with a column time [s], or as MDF 4: h5py in Python opens it", rb"\x89HDF",
+         (".h5", ".hdf5", ".hdf")),
+    Kind("Parquet", "write it as CSV with a column time [s]: pandas.read_parquet(...).to_csv(...) in Python", rb"PAR1",
+         (".parquet",)),
+    Kind("Arrow or Feather", "write it as CSV with a column time [s]: pandas.read_feather(...).to_csv(...) in Python",
+         rb"ARROW1", (".feather", ".arrow")),
+    Kind("a trace of bus messages (Vector BLF)", DECODE, rb"LOGG", (".blf",)),
+    Kind("a trace of bus messages (Vector ASC)", DECODE, rb"(?i)(date [^\n]*\n\s*base (hex|dec)|base (hex|dec) )",
+         (".asc",)),
+    Kind("a trace of bus messages (PEAK)", DECODE, rb";\$FILEVERSION", (".trc",)),
+    Kind("a trace of bus messages (candump)", DECODE, rb"\s*\(\d+\.\d+\)\s+\w+\s", ()),
+    Kind("the header of a DIAdem data set, whose samples are in other files", "export the data set as TDMS",
+         rb"(?i)(DIAEXTENDED|DIADEM|#BEGINGLOBALHEADER)", ()),
+    Kind("the header of a DIAdem or ASAM ODS data set, whose samples are in another file", "export the data set as "
+         "TDMS or MDF 4", rb"<\?xml[^>]*>\s*(<!--.*?-->\s*)*<(usi:tdm|atfx)", (".tdm", ".tdx", ".atfx")),
+    Kind("the index of a TDMS file", "name the .tdms file beside it, which has the data", rb"TDSh", (".tdms_index",)),
+    Kind("a LabVIEW measurement file", f"write TDMS in LabVIEW, or {AS_CSV}", rb"LabVIEW Measurement", (".lvm",)),
+    Kind("a universal file of modal analysis", AS_CSV, rb"\s{1,4}-1\s", (".unv", ".uff")),
+    Kind("imc FAMOS", "export it as MDF 4 or CSV from the software that wrote it", rb"\|CF,", (".raw",)),
+    Kind("a Dewesoft file", "export it as MDF 4 or CSV from Dewesoft", rb"(?!)", (".dxd", ".d7d")),
+    Kind("an nCode time series", "export it as RPC III or CSV", rb"(?!)", (".s3t", ".dac")),
+    Kind("a CarMaker result file", "export it as MDF 4 or CSV", rb"(?!)", (".erg",)),
+    Kind("a numpy array", AS_CSV, rb"\x93NUMPY", (".npy", ".npz")),
+    Kind("packed by gzip", UNPACK, rb"\x1f\x8b", (".gz", ".tgz")),
+    Kind("packed by bzip2", UNPACK, rb"BZh", (".bz2",)),
+    Kind("packed by xz", UNPACK, rb"\xfd7zXZ", (".xz",)),
+    Kind("packed by zstd", UNPACK, rb"\x28\xb5\x2f\xfd", (".zst",)),
+    Kind("a 7-Zip archive", UNPACK, rb"7z\xbc\xaf", (".7z",)),
+    Kind("a RAR archive", UNPACK, rb"Rar!", (".rar",)),
+    Kind("a zip archive", UNPACK, rb"PK\x03\x04|PK\x05\x06", (".zip",)),
+    Kind("a web page", AS_CSV, rb"(?i)\s*<(!doctype )?html", (".html", ".htm")),
+    Kind("XML", AS_CSV, rb"<\?xml", (".xml",)),
+    Kind("JSON", AS_CSV, rb"\s*[\[{]\s*[\[{\"]", (".json",)),
+    Kind("a PDF", AS_CSV, rb"%PDF", (".pdf",)),
+    Kind("sound", AS_CSV, rb"RIFF....WAVE", (".wav",)),
+    Kind("an SQLite database", AS_CSV, rb"SQLite format 3", (".db", ".sqlite")),
+)  # fmt: skip
+"""What measurements come as, beside the formats that can be read; the first that fits is the one."""
+WORKBOOK, ARRAYS = KINDS[0], next(kind for kind in KINDS if ".npz" in kind.extensions)
+
+
+def format_of(path: Path, head: bytes) -> str:
+    """Format of a file by its first bytes; raises InputError that names what cannot be read, with what to do."""
+    form = next((form for magic, form in READABLE.items() if head.startswith(magic)), "")
+    if form:
+        return form
+    if head[:32].split(b"\0")[0].strip() == b"FORMAT":
+        return "RPC III"
+    kind = next((kind for kind in KINDS if re.match(kind.begins, head.removeprefix(b"\xef\xbb\xbf"), re.DOTALL)), None)
+    if kind is not None:
+        raise InputError(path, "", None, f"this is {_inside(path, kind)}; {KNOWN}")
+    if is_text(head):
+        return "CSV"
+    allowed = f"this is the beginning of no known format{by_extension(path)}; {KNOWN}"
+    raise InputError(path, "byte 0", head[:8].hex(" "), allowed)
+
+
+def is_text(head: bytes) -> bool:
+    """Whether the first bytes of a file can be text: UTF-16 has its mark, all else no zero byte."""
+    return head.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" not in head
+
+
+def usual_of(suffix: str, form: str) -> str:
+    """What files of an extension usually are; ``form``, what this one is, where tables have that extension, too."""
+    if suffix in EXTENSIONS or suffix == ".asc":
+        return EXTENSIONS.get(suffix, form)
+    return next((kind.name for kind in KINDS if suffix in kind.extensions), form)
+
+
+def by_extension(path: Path) -> str:
+    """Phrase on what files of this extension usually are; empty where nothing is known."""
+    suffix = path.suffix.lower()
+    kind = next((kind for kind in KINDS if suffix in kind.extensions), None)
+    if kind is not None:
+        return f", and its extension {path.suffix} is that of {kind.name}: {kind.remedy}"
+    usual = BEGINS.get(EXTENSIONS.get(suffix, ""), "")
+    return usual and f", and its extension {path.suffix} is that of {usual}: it is damaged or something else; {AGAIN}"
+
+
+def is_measurement(path: Path) -> bool:
+    """Whether a file is a measurement, or what measurements come as, by its extension or by being no text."""
+    if path.suffix.lower() in (*EXTENSIONS, *(each for kind in KINDS for each in kind.extensions)):
+        return True
+    if path.suffix.lower() in ("", ".toml") or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return not is_text(file.read(256))
+
+
+def _inside(path: Path, kind: Kind) -> str:
+    """What a file is and its remedy; archives are looked into."""
+    if kind.extensions == (".zip",):
+        kind = _of_archive(path) or kind
+    return f"{kind.name}: {kind.remedy}"
+
+
+def _of_archive(path: Path) -> Kind | None:
+    """What a zip archive is the packing of: a workbook or arrays."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+    except (zipfile.BadZipFile, OSError, ValueError):
+        return WORKBOOK if path.suffix.lower() in WORKBOOK.extensions else None
+    if any(name.startswith("xl/") or name == "content.xml" for name in names):
+        return WORKBOOK
+    return ARRAYS if names and all(name.endswith(".npy") for name in names) else None

@@ -1,0 +1,320 @@
+"""How a CSV file is written, from its first lines: comments, headings, units, separator, decimal sign, clock."""
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from models.csv_header import (
+    MARKS,
+    SEPARATORS,
+    TIMED,
+    Head,
+    Line,
+    find_head,
+    find_headings,
+    heading,
+    is_number,
+    split,
+)
+from models.errors import InputError
+from models.measured.finding import Finding
+from models.measured.formats.csv_rows import Layout
+from models.measured.formats.csv_times import find_stamps
+from models.measured.formats.opened import notice
+
+LONGEST = 1 << 20
+"""Bytes among which the first rows of numbers must be."""
+MOST = 2000
+"""Lines among which they must be."""
+CLOCKS = ("time", "zeit", "t")
+OTHER_CLOCKS = ("timestamp", "timestamps", "time stamp", "zeitstempel", "uhrzeit", "date time", "datetime",
+                "datum zeit", "datum uhrzeit", "elapsed time", "relative time", "absolute time", "rel time", "abs time",
+                "time rel", "time abs", "test time", "run time", "messzeit", "time axis", "zeitachse",
+                "x value")  # fmt: skip
+"""Names of the column of time, and those that are it where none is called so."""
+TIME_UNITS = {"s": 1.0, "sec": 1.0, "secs": 1.0, "second": 1.0, "seconds": 1.0, "sekunden": 1.0, "ms": 1e-3,
+              "msec": 1e-3, "milliseconds": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}  # fmt: skip
+"""In small letters -> s."""
+_RATE = re.compile(r"\d\s*k?hz\b|(rate|freq|abtast|sampl|interval|period|increment|delta[ _]?t)\D*\d", re.IGNORECASE)
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+_DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
+_BEGUN = re.compile(r"[+-]?[.,]?\d")
+_SEPARATOR_LINE = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
+NEEDED = "a CSV file needs a header line name [unit], ... and rows of numbers, as text"
+
+
+@dataclass
+class Top:
+    """What the first lines of a file say.
+
+    lines : those that are neither empty nor comments. hashed : comments that begin with ``#``. separator : as a line
+    ``sep=`` says. foreign : numbers of lines that are no UTF-8. unit : of characters. stopped : number of the line
+    that could not be read, 0 for none.
+    """
+
+    unit: np.dtype
+    lines: list[Line] = field(default_factory=list)
+    hashed: list[Line] = field(default_factory=list)
+    separator: str = ""
+    foreign: list[Line] = field(default_factory=list)
+    stopped: int = 0
+
+
+@dataclass
+class Remarks:
+    """What the comments of a file say."""
+
+    comments: list[str] = field(default_factory=list)
+    start: str = ""
+    samples: int | None = None
+    of_channels: dict[str, list[str]] = field(default_factory=dict)
+
+    def add(self, path: Path, line: int, text: str) -> None:
+        """Take one comment line, without its ``#``."""
+        key, _, value = text.partition(":")
+        if key == "start":
+            self.start = value.strip()
+        elif key == "samples":
+            if not value.strip().isdecimal():
+                raise InputError(path, f"line {line}, samples", value.strip(), "a number of rows is needed")
+            self.samples = int(value)
+        elif (found := re.fullmatch(r'channel ("(?:[^"\\]|\\.)*"): ?(.*)', text)) is not None:
+            self.of_channels.setdefault(_text(path, line, found[1]), []).append(found[2])
+        else:
+            self.comments.append(value.removeprefix(" ") if key == "comment" else text)
+
+
+def _text(path: Path, line: int, quoted: str) -> str:
+    """Return a name in quotes, as JSON writes it."""
+    try:
+        return str(json.loads(quoted))
+    except ValueError:
+        raise InputError(path, f"line {line}", quoted, "a channel's name in quotes is needed") from None
+
+
+def read_top(path: Path) -> Top:
+    """First lines of a file; InputError where it has none that are text."""
+    with path.open("rb") as file:
+        data = file.read(LONGEST)
+    codec, begin = next(((codec, len(mark)) for mark, codec in
+                         ((b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"), (b"\xef\xbb\xbf", "utf-8"))
+                         if data.startswith(mark)), ("utf-8", 0))  # fmt: skip
+    top = Top(np.dtype({"utf-16-le": "<u2", "utf-16-be": ">u2"}.get(codec, "u1")))
+    for line in _lines(data, begin, codec, top):
+        shown = line.text.strip()
+        if line.number == 1 and (found := _SEPARATOR_LINE.fullmatch(line.text.rstrip(" "))) is not None:
+            top.separator = found[1]
+        elif shown.startswith("#"):
+            top.hashed.append(line)
+        elif shown:
+            top.lines.append(line)
+    if top.separator and top.separator not in SEPARATORS:
+        raise InputError(path, "line 1", top.separator, f"{', '.join(SEPARATORS.values())} can part the columns")
+    if not top.lines and not (top.hashed and not top.stopped):
+        old = b"\r" in data and b"\n" not in data
+        hint = ": lines end as on an old Macintosh, and have to be saved with line ends of today" if old else ""
+        raise InputError(path, f"line {top.stopped or len(top.hashed) + 1}", None, NEEDED + hint)
+    return top
+
+
+def _lines(data: bytes, begin: int, codec: str, top: Top) -> Iterator[Line]:
+    """Whole lines of text, until one that holds a zero character or has no end."""
+    size = top.unit.itemsize
+    ends = (np.flatnonzero(np.frombuffer(data[: len(data) // size * size], top.unit) == ord("\n")) + 1) * size
+    for number, end in enumerate(ends[:MOST].tolist(), start=1):
+        try:
+            text, foreign = data[begin:end].decode(codec), False
+        except UnicodeDecodeError:
+            text, foreign = data[begin:end].decode("cp1252", errors="replace"), True
+        if "\0" in text:
+            top.stopped = number
+            return
+        line = Line(number, text.rstrip("\r\n"), begin, end)
+        if foreign:
+            top.foreign.append(line)
+        yield line
+        begin = end
+    top.stopped = len(ends) + 1 if len(ends) < MOST else 0
+
+
+def find_headings_of(path: Path, top: Top) -> tuple[Head, int, Remarks, list[Finding]]:
+    """What stands above the numbers, the column of time, the comments, and what is said of these lines."""
+    head, known = _head(path, top)
+    clocks = [i for i, name in enumerate(head.names) if known(name)]
+    if len(clocks) != 1:
+        raise InputError(path, f"line {head.header.number} (header)", ", ".join(head.names),
+                         f"one column time [s] is needed, found {len(clocks)}")
+    remarks = Remarks()
+    above = [line for line in (*top.hashed, *head.titles) if line.number <= head.line and line != head.header]
+    for line in sorted(above):
+        if line in top.hashed:
+            remarks.add(path, line.number, line.text.strip()[1:].strip())
+        else:
+            remarks.comments.append(line.text.strip(' ",;\t'))
+    said = [notice(path, "doubt", f"line {line.number} is not UTF-8 and is read as Windows-1252: "
+                   f"{line.text.strip()[:60]!r}") for line in top.foreign if line.number <= head.line]  # fmt: skip
+    if top.unit.itemsize > 1:
+        said.append(notice(path, "note", "the text is UTF-16"))
+    if head.titles:
+        said.append(notice(path, "note", f"{len(head.titles)} line(s) above the headings in line {head.header.number} "
+                           "are kept as the comment"))  # fmt: skip
+    return head, clocks[0], remarks, said
+
+
+Known = Callable[[str], bool]
+
+
+def _head(path: Path, top: Top) -> tuple[Head, Known]:
+    """What stands above the numbers, by the first reading that makes sense of it; numpy writes headings behind #."""
+    signs = (top.separator,) if top.separator else tuple(SEPARATORS)
+    bare = [line._replace(text=line.text.strip().lstrip("# ")) for line in top.hashed]
+    every = sorted((*top.lines, *bare))
+    for find, lines in ((find_head, top.lines), (find_head, every), (find_headings, top.lines)):
+        for known in (is_clock, is_other_clock):
+            heads = find(lines, known, signs)
+            if len(heads) == 1:
+                return heads[0], known
+            if heads:
+                what = " and ".join(SEPARATORS[head.separator] for head in heads)
+                place, text = f"line {heads[0].header.number} (header)", heads[0].header.text
+                raise InputError(path, place, text, "commas alone (or semicolons, or tabs) must part the columns, "
+                                 f"found {what}")  # fmt: skip
+    raise _without_clock(path, top, signs)
+
+
+def _without_clock(path: Path, top: Top, signs: tuple[str, ...]) -> InputError:
+    """Why no line is one of headings, and what to write."""
+    lines = top.lines or top.hashed
+    first = next((line for line in lines if any(sign in line.text for sign in signs)), lines[0])
+    place, text = f"line {first.number} (header)", first.text.strip()
+    rate = next((line for line in (*top.lines, *top.hashed) if _RATE.search(line.text)), None)
+    if rate is not None:
+        return InputError(path, place, text, f"one column time [s] is needed, found 0: line {rate.number} "
+                          f"({rate.text.strip()[:40]!r}) speaks of the sampling; write the time of every row")
+    if not any(sign in first.text for sign in signs):
+        return InputError(path, place, text, f"commas alone (or semicolons, or tabs) must part the columns, found no "
+                          f"separator; {NEEDED}")  # fmt: skip
+    if any(all(map(is_number, cells)) for sign in signs if len(cells := split(text, sign)) > 1):
+        return InputError(path, place, text, "the file begins with numbers: write a header line time [s], name [unit], "
+                          "... above them")  # fmt: skip
+    return InputError(path, place, text, "one column time [s] is needed, found 0: call it so in the header line")
+
+
+def clock_heading(text: str) -> tuple[str, str]:
+    """Name and unit of the heading of a clock: in brackets, or as ``time (s)``, ``time / s``, ``time_s``."""
+    name, unit = heading(text)
+    found = re.fullmatch(r"(.*?)\s*(?:\(([^()]*)\)|[/_,]\s*([^\W\d]+))", name) if not unit else None
+    if found is not None and (found[2] is not None or found[3].casefold() in TIME_UNITS):
+        return found[1], (found[2] or found[3] or "").strip()
+    return name, unit
+
+
+def is_clock(text: str) -> bool:
+    """Whether a heading is that of the column of time."""
+    return clock_heading(text)[0].casefold() in CLOCKS
+
+
+def is_other_clock(text: str) -> bool:
+    """Whether a heading can be that of the column of time where none is called so."""
+    name = clock_heading(text)[0]
+    return " ".join(re.findall(r"[^\W_]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name).casefold())) in OTHER_CLOCKS or (
+        " ".join(re.findall(r"[^\W_]+", name.casefold())) in OTHER_CLOCKS)
+
+
+def first_rows(top: Top, head: Head) -> list[list[str]]:
+    """Cells of each column in the first rows of numbers; a row of another width is told when it is read."""
+    lines = [line for line in top.lines if line.number > head.line]
+    rows = [cells for line in lines if len(cells := split(line.text, head.separator)) == head.width]
+    return [[row[i] for row in rows] for i in range(len(head.names))]
+
+
+def find_layout(
+    path: Path, top: Top, head: Head, clock: int, units: tuple[str, ...]
+) -> tuple[Layout, list[Finding]]:
+    """How the rows are written, from the first ones; InputError where two readings make sense."""
+    columns = first_rows(top, head)
+    first = next(iter(columns[clock]), "")
+    stamps = find_stamps(path, first, head.line + 1, head.names[clock]) if is_stamp(first) else None
+    nameless = tuple(i for i, name in enumerate(head.names) if not heading(name)[0])
+    texts = tuple(i for i, cells in enumerate(columns) if i not in (clock, *nameless) and _is_text(cells))
+    taken = tuple(sorted({*texts, *nameless, *((clock,) if stamps else ())}))
+    numbers = {cell: None for i, cells in enumerate(columns) if i not in taken for cell in cells}
+    decimal = _decimal(path, head, list(numbers))
+    layout = Layout(head.separator, decimal, head.begin, head.line, head.names, head.width, taken, clock, stamps,
+                    top.unit)  # fmt: skip
+    said = [notice(path, "doubt" if units[i] or heading(head.names[i])[1] else "note",
+                   f"left out, no numbers: {head.names[i]!r}") for i in texts]  # fmt: skip
+    said += [notice(path, "note" if _counts(columns[i]) else "doubt", f"column {i + 1} has no name and is left out")
+             for i in nameless]  # fmt: skip
+    return layout, said + [notice(path, "note", text) for text in _how(layout, list(numbers))]
+
+
+def _how(layout: Layout, cells: list[str]) -> Iterator[str]:
+    """Sentences on whatever is not commas between columns of numbers with decimal points."""
+    stamps = layout.stamps
+    if stamps is not None:
+        wraps = "; they go on past midnight" if stamps.form == "hh:mm:ss.fff" else ""
+        yield (f"{layout.names[layout.clock]!r} holds times of the clock ({stamps.form}); seconds are counted from the "
+               f"first, {stamps.first}{wraps}")  # fmt: skip
+    marks = [repr(cell) for cell in cells if cell.casefold() not in ("", "nan") and MARKS.fullmatch(cell)]
+    if marks:
+        yield f"cells {', '.join(marks)} are read as not measured"
+    sign = "comma" if layout.decimal == "," else "point"
+    if layout.separator != "," or layout.decimal == ",":
+        yield f"{SEPARATORS[layout.separator]} part the columns and the decimal sign is a {sign}"
+
+
+def is_stamp(cell: str) -> bool:
+    """Whether a cell is a time of the clock."""
+    return not is_number(cell) and TIMED.fullmatch(cell) is not None
+
+
+def _counts(cells: list[str]) -> bool:
+    """Whether a column counts the rows."""
+    return bool(cells) and cells[0] in ("0", "1") and cells == [str(i + int(cells[0])) for i in range(len(cells))]
+
+
+def _is_text(cells: list[str]) -> bool:
+    """Whether a column holds texts or dates: nothing in it can be meant as a number."""
+    said = [cell for cell in cells if not MARKS.fullmatch(cell)]
+    return bool(said) and all(TIMED.fullmatch(cell) or _DATE.fullmatch(cell) or not _BEGUN.match(cell)
+                              for cell in said)  # fmt: skip
+
+
+def _decimal(path: Path, head: Head, cells: list[str]) -> str:
+    """Decimal sign of the first rows."""
+    commas = [cell for cell in cells if "," in cell]
+    place = f"line {head.line + 1} and after"
+    if commas and any("." in cell for cell in cells if is_number(cell.replace(",", ""))):
+        raise InputError(path, place, commas[0], "the numbers hold points and commas: write them with one decimal sign "
+                         "and nothing else, without separators of thousands")  # fmt: skip
+    if commas and head.separator == "," and all(_THOUSANDS.fullmatch(cell) for cell in commas):
+        raise InputError(path, place, commas[0], "the comma can be a decimal sign or one of thousands: write numbers "
+                         "with a decimal point and nothing else")  # fmt: skip
+    return "," if commas else "."
+
+
+def find_units(path: Path, top: Top, head: Head, clock: int) -> tuple[tuple[str, ...], list[Finding]]:
+    """Units of the columns from a row beneath the headings; empty where there is none."""
+    stamped = any(map(is_stamp, first_rows(top, head)[clock][:1]))
+    rows = [(line, [_bare(cell) for cell in head.cells(line)]) for line in head.between]
+    found = next((row for row in rows if row[1][clock].casefold() in TIME_UNITS or stamped), None)
+    if found is None:
+        said = [notice(path, "note", f"line {line.number}, beneath the headings, is not read: "
+                       f"{line.text.strip()[:60]!r}") for line, _ in rows]  # fmt: skip
+        return ("",) * len(head.names), said
+    line, units = found
+    for name, unit in zip(head.names, units, strict=True):
+        if unit and heading(name)[1] not in ("", unit):
+            raise InputError(path, f"line {line.number}", unit, f"the heading says {name!r}: name one unit")
+    return tuple(units), [notice(path, "note", f"line {line.number}, beneath the headings, is read as units")]
+
+
+def _bare(cell: str) -> str:
+    """A unit without the brackets around it."""
+    found = re.fullmatch(r"\s*[\[(](.*)[\])]\s*", cell)
+    return (found[1] if found else cell).strip()

@@ -1,0 +1,91 @@
+"""Times of the clock in a CSV file, turned into seconds since the first one."""
+
+import re
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from models.errors import InputError
+
+CLOCK = r"(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2})(?:[.,:](?P<f>\d{1,9}))?"
+ZONE = r"(?P<zone>Z|[+-]\d{2}:?\d{2})?"
+FORMS = {
+    "hh:mm:ss.fff": re.compile(CLOCK),
+    "ISO 8601": re.compile(rf"(?P<y>\d{{4}})[-/](?P<o>\d{{1,2}})[-/](?P<d>\d{{1,2}})[ T]+{CLOCK} ?{ZONE}"),
+    "dd.mm.yyyy hh:mm:ss.fff": re.compile(rf"(?P<d>\d{{1,2}})\.(?P<o>\d{{1,2}})\.(?P<y>\d{{4}})[ T]+{CLOCK}"),
+}
+"""Notations that have one meaning."""
+DAY = 86_400_000_000_000
+"""ns."""
+
+
+@dataclass(frozen=True)
+class Stamps:
+    """Times of the clock in one notation; ``zero`` is the first one, ns since 1970 or since midnight."""
+
+    form: str
+    zone: str
+    zero: int
+    first: str
+
+    @property
+    def start(self) -> datetime | None:
+        """When time was 0; None where the file names no zone."""
+        if not self.zone:
+            return None
+        text = str(np.datetime64(self.zero, "ns").astype("datetime64[us]"))
+        return datetime.fromisoformat(text + self.zone.replace("Z", "+00:00"))
+
+    def seconds(self, path: Path, cells: list[str], line: int, name: str) -> np.ndarray:
+        """Seconds (n,) since the first stamp, of the cells of some rows, the first of which is ``line``.
+
+        Times of the day go on past midnight, for a day at most. Raises InputError at the first one that is none.
+        """
+        try:
+            stamps = np.array([self._written(cell) for cell in cells], "datetime64[ns]").astype(np.int64)
+        except (ValueError, TypeError):
+            raise self._culprit(path, cells, line, name) from None
+        passed = stamps - self.zero
+        return np.asarray((passed % DAY if self.form == "hh:mm:ss.fff" else passed) / 1e9)
+
+    def _written(self, cell: str) -> str:
+        """A cell as numpy reads a time; ValueError where it is of another notation or zone."""
+        found = FORMS[self.form].fullmatch(cell.strip())
+        if found is None or (found.groupdict().get("zone") or "") != self.zone:
+            raise ValueError(cell)
+        return _iso(found)
+
+    def _culprit(self, path: Path, cells: list[str], line: int, name: str) -> InputError:
+        """Error at the first cell that is no time in this notation."""
+        for i, cell in enumerate(cells):
+            try:
+                np.datetime64(self._written(cell), "ns")
+            except ValueError:
+                where = f" with the zone {self.zone}" if self.zone else ""
+                return InputError(path, f"line {line + i}, column {name!r}", cell.strip(),
+                                  f"a time such as {self.first} is needed ({self.form}{where}, as in the first row)")
+        return InputError(path, f"line {line} and after, column {name!r}", None, "times of the clock are needed")
+
+
+def find_stamps(path: Path, cell: str, line: int, name: str) -> Stamps:
+    """Notation of a column of times, from its first cell; InputError, with what to write, where it has two meanings."""
+    cell = cell.strip()
+    for form, pattern in FORMS.items():
+        found = pattern.fullmatch(cell)
+        if found is not None:
+            plain = Stamps(form, found.groupdict().get("zone") or "", 0, cell)
+            try:
+                zero = int(np.datetime64(_iso(found), "ns").astype(np.int64))
+            except ValueError:
+                raise plain._culprit(path, [cell], line, name) from None
+            return Stamps(form, plain.zone, zero, cell)
+    raise InputError(path, f"line {line}, column {name!r}", cell, "this notation of times has two meanings or none: "
+                     "write 2026-03-02T09:30:00.000, 09:30:00.000, or seconds in a column time [s]")  # fmt: skip
+
+
+def _iso(found: re.Match[str]) -> str:
+    part = found.groupdict()
+    year, month, day = (part.get("y") or "1970", part.get("o") or "01", part.get("d") or "01")
+    return f"{year}-{month:0>2}-{day:0>2}T{part['h']:0>2}:{part['m']}:{part['s']}.{part['f'] or '0'}"
