@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 
 from models.damage import pseudo_damage
+from models.errors import InputError
 from models.measured.channel import Source
 from models.measured.formats import open_source, write
 from models.measured.formats.writing import Group
 from models.noise import normal
-from validation.measured.measured_files.odd import read
+from validation.measured.measured_files import csv_forms, kinds
+from validation.measured.measured_files.odd import Odd, read
 from validation.measured.measured_files.own_libraries import LIBRARIES
 from validation.rows import Row, System, Table, aim, at_most, behaves, finding, not_run, within
 
@@ -79,6 +81,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             lines.append(line)
         rows += [two_rates(Path(name) / f"rates{extension}", extension) for extension in (".mf4", ".tdms")]
         rows += resolution(Path(name))
+        rows += forms(Path(name))
         if not quick:
             rows += [row for extension in (".mf4", ".rsp", ".tdms")
                      for row in memory(Path(name) / f"long{extension}", extension)]  # fmt: skip
@@ -125,6 +128,37 @@ def two_rates(path: Path, extension: str) -> Row:
     f"{FORMATS[extension]}: two groups of 1 kHz and 50 Hz, "
                    "times and values there and back", max(errors), "s or N", 1e-12, "each group has a clock of its own",
                    "closed form")  # fmt: skip
+
+
+def forms(folder: Path) -> list[Row]:
+    """CSV in the forms of loggers, spreadsheets and scripts, and files of other kinds: read to the bit, or refused."""
+    files = (*csv_forms.FILES, *kinds.FILES)
+    ends = [_ended(odd, folder / f"form {i}") for i, odd in enumerate(files)]
+    crashed = sorted({odd.name for odd, end in zip(files, ends, strict=True) if isinstance(end, str)})
+    read = [(odd, end) for odd, end in zip(files, ends, strict=True) if odd.wanted != "refused"]
+    errors = [end if isinstance(end, float) else float("inf") for _, end in read]
+    silent = sum(end is not None for odd, end in zip(files, ends, strict=True) if odd.wanted == "refused")
+    why = "all of them are hard cases of their own"
+    bits = f"{why}; half a bit of a time of 0.4 s, and less than the last bit of any force"
+    return [
+        at_most("measured_formats.forms.values", SYSTEM, f"{len(read)} forms of CSV and of names of files: times and "
+                "values beside those of the plain file", max(errors), "s or N", 1e-16, bits, "closed form"),
+        at_most("measured_formats.forms.silent", SYSTEM, f"{len(files) - len(read)} forms with two meanings and files "
+                "of other kinds: read without a word", silent, "files", 0.0, f"{why}; each refusal says what to do",
+                "none"),
+        behaves("measured_formats.forms.crashes", SYSTEM, f"{len(files)} such files: errors that are no refusal, or "
+                "that say too little", ", ".join(crashed) or "none", "none", why),
+    ]  # fmt: skip
+
+
+def _ended(odd: Odd, folder: Path) -> float | str | None:
+    """Difference to the truth, None where a file is refused and says why; the error where there is another one."""
+    try:
+        return odd.error(folder)
+    except InputError:
+        return None
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
 
 
 def wheel_force() -> np.ndarray:

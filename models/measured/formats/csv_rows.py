@@ -176,7 +176,8 @@ def _without(text: bytes, begins: np.ndarray, ends: np.ndarray) -> bytes:
 def _parted(layout: Layout, text: bytes) -> tuple[bytes, list[str]]:
     """Rows without the columns of text, and the cells of the clock."""
     bounds, kept = _bounds(layout, text), [i for i in range(layout.width) if i not in layout.texts]
-    cells = [text[a + 1 : b].decode("latin-1") for a, b in bounds[:, layout.clock : layout.clock + 2].tolist()]
+    cells = [text[a + 1 : b].replace(_WRONG, layout.separator.encode()).decode("latin-1")
+             for a, b in bounds[:, layout.clock : layout.clock + 2].tolist()]  # fmt: skip
     inner = [i for i in layout.texts if i < kept[-1]]
     begins, ends = bounds[:, inner].ravel() + 1, bounds[:, [i + 1 for i in inner]].ravel() + 1
     if kept[-1] + 1 < layout.width:  # the last ones go with the separator before them
