@@ -34,6 +34,7 @@ class Assembly:
         each stage's time (never held); None if there is none
     outputs : functions of the run that add channels to its result, one per effect that asks for any
     sensors : the same, of the run and of the model that made it, for effects that read accelerations
+    doubts : sentences on what contradicts the scene, with size and remedy: told before the run and saved with it
     """
 
     scene: Scene
@@ -45,6 +46,7 @@ class Assembly:
     outputs: tuple[Any, ...] = ()
     moment: Signal | None = None
     sensors: tuple[Any, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     @property
     def guided(self) -> tuple[int, ...]:

@@ -37,7 +37,7 @@ def describe(scene: Scene) -> str:
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
     lines += [_line("motion", _motion(scene, assembly))]
     lines += _vehicle(scene, assembly) + effect_lines(scene)
-    lines += [_line("channels", ", ".join(_channels(assembly))), *trust_line(assembly), "", *_engines(scene, assembly)]
+    lines += [_line("channels", ", ".join(_channels(assembly))), *trust_line(assembly), *doubt_lines(assembly), "", *_engines(scene, assembly)]
     return "\n".join(lines)
 
 
@@ -85,6 +85,11 @@ def trust_line(assembly: Assembly) -> list[str]:
 
     found = trust(assembly)
     return [] if found is None else [_line("trust", str(found))]
+
+
+def doubt_lines(assembly: Assembly) -> list[str]:
+    """What contradicts the scene, a line each."""
+    return [_line("doubt", text) for text in assembly.doubts]
 
 
 HEADINGS = ("engine", "integrator", "order", "step", "steps", "freedoms", "native items", "callbacks")

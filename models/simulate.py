@@ -54,7 +54,8 @@ def _label(assembly: Assembly, engine: str, settings: Settings, run: Trajectory,
     data.attrs = {
         "title": assembly.scene.title, "scene": assembly.scene.file, "system": assembly.scene.system,
         "mode": assembly.mode, "engine": engine, "integrator": settings.integrator, "step": settings.step,
-        "status": "complete", "counts": json.dumps(run.counts), "seconds": seconds,
+        "status": "complete, in doubt" if assembly.doubts else "complete", "doubts": json.dumps(assembly.doubts),
+        "counts": json.dumps(run.counts), "seconds": seconds,
         "scene_table": json.dumps(assembly.scene.table()), "provenance": json.dumps(provenance()),
     }  # fmt: skip
     return Result(data)

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.assembly import assemble
 from models.errors import RunFailed
-from models.plan import trust_line
+from models.plan import doubt_lines, trust_line
 from models.result import Result
 from models.scene import Scene
 from models.simulate import simulate, state_names, summary
@@ -29,6 +29,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
             continue
         results[engine].save(folder / f"{engine}.nc")
     progress("figure", 1.0)
+    assembly = assemble(scene)
     if results:
         _figure(scene, results, folder / "states.png")
     return {
@@ -37,7 +38,8 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "runs": {engine: _line(result) for engine, result in results.items()},
         "failed": failed,
         "largest difference of states": agreement(results),
-        "table": trust_line(assemble(scene)),
+        "doubts": list(assembly.doubts),
+        "table": [*trust_line(assembly), *doubt_lines(assembly)],
     }
 
 

@@ -54,6 +54,7 @@ class Estimate:
     used, missed : (n,) measured values that were taken in, and that were no numbers
     surprises : (n,) normalised innovation squared, chi-square of ``used`` degrees of freedom where the filter is
         consistent; NaN where nothing was measured
+    innovations : (n, columns), whitened: independent and of deviation 1 where it is; NaN where nothing was measured
     """
 
     period: float
@@ -63,6 +64,7 @@ class Estimate:
     used: np.ndarray
     missed: np.ndarray
     surprises: np.ndarray
+    innovations: np.ndarray
 
     def errors(self) -> np.ndarray:
         """Covariance (n, 7, 7) of the states' errors."""
@@ -102,16 +104,17 @@ class PitchFilter(ExtendedKalmanFilter):
         push = early + self.F.dot(self.late)
         self.Q, self.late = self.intensity * push.dot(push.T), late
 
-    def measure(self, number: int) -> tuple[int, float]:
-        """Take in what is a number in a row of the measurement: how many, and the normalised innovation squared."""
-        there = self._there[number]
+    def measure(self, number: int) -> np.ndarray:
+        """Take in what is a number in a row of the measurement: the whitened innovations (columns,), NaN where none."""
+        white, there = np.full(len(self.measured.columns), math.nan), self._there[number]
         if not there:
-            return 0, math.nan
+            return white
         chosen, rows, own = self._seen[there]
         late = rows.dot(self.late)
         values = self.measured.values[number, chosen]
         self.update(values, lambda x: rows, rows.dot, R=own + self.intensity * late.dot(late.T))
-        return len(values), float(self.y.dot(self.SI).dot(self.y))
+        white[chosen] = np.linalg.cholesky(self.SI).T.dot(self.y)
+        return white
 
     def _of(self, there: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Columns that the bits of a number name, what each sees of the state (m, 7), and its noise (m, m)."""
@@ -147,7 +150,7 @@ def _march(own: PitchFilter) -> tuple[Estimate, _Steps]:
     every, width = round(measured.period / period), len(measured.columns)
     states, pending, predictions = np.empty((n, 7)), np.empty((n, 7, 2)), np.empty((n, 7))
     covariances, transitions, noises = (np.empty((n, 7, 7)) for _ in range(3))
-    used, missed, surprises = np.zeros(n, dtype=int), np.zeros(n, dtype=int), np.full(n, np.nan)
+    missed, innovations = np.zeros(n, dtype=int), np.full((n, width), np.nan)
     for i in range(n):
         if i:
             own.predict(i - 1)
@@ -155,11 +158,13 @@ def _march(own: PitchFilter) -> tuple[Estimate, _Steps]:
             raise RunFailed("kalman filter", "the estimate became infinite or not a number", i * period)
         predictions[i], transitions[i], noises[i] = own.x, own.F, own.Q
         if i % every == 0 and i // every < len(measured.values):
-            used[i], surprises[i] = own.measure(i // every)
-            missed[i] = width - used[i]
+            innovations[i] = own.measure(i // every)
+            missed[i] = np.count_nonzero(np.isnan(innovations[i]))
         states[i], covariances[i], pending[i] = own.x, own.P, own.late
     pending *= math.sqrt(own.intensity)
-    found = Estimate(period, states, covariances, pending, used, missed, surprises)
+    used = np.count_nonzero(np.isfinite(innovations), axis=1)
+    surprises = np.where(used > 0, np.nansum(innovations**2, axis=1), np.nan)
+    found = Estimate(period, states, covariances, pending, used, missed, surprises, innovations)
     return found, _Steps(predictions, transitions, noises)
 
 

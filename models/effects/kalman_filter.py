@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import Field
 
 from models.assembly import Assembly
+from models.drift.innovations import Consistency, consistency
 from models.drift.growth import rigid_pitch
 from models.errors import InputError
 from models.signals import Sampled, Smooth
@@ -80,7 +81,8 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     spring = PitchSpring("chassis", stiffness, damping)
     vehicle = replace(assembly.vehicle, pitch_springs=(*assembly.vehicle.pitch_springs, spring))
     guided = replace(assembly, vehicle=vehicle).with_moment(Sampled(moment, guide.period, held=False))
-    return replace(guided, outputs=(*guided.outputs, partial(_channels, guide, stiffness, damping)))
+    return replace(guided, outputs=(*guided.outputs, partial(_channels, guide, stiffness, damping)),
+                   doubts=(*guided.doubts, *_doubts(p, guide)))  # fmt: skip
 
 
 def pull(assembly: Assembly, p: Parameters) -> tuple[float, float]:
@@ -98,6 +100,7 @@ class Guide:
     inertia : (n,), share by which 1/I is estimated above the model's; lacking : (n,), the moment (N m) to it
     used, missed : (n,), measured values so far
     surprise : (n,), sum of the normalised innovations squared so far
+    consistency : what all innovations say of the filter
     """
 
     period: float
@@ -109,6 +112,7 @@ class Guide:
     used: np.ndarray
     missed: np.ndarray
     surprise: np.ndarray
+    consistency: Consistency
 
 
 _LATEST: dict[str, Guide] = {}
@@ -125,18 +129,19 @@ def guide_of(assembly: Assembly, p: Parameters) -> Guide:
         found = estimate(assembly, measured, p.force_deviation, start_deviation=p.start_deviation,
                          inertia_deviation=p.inertia_deviation, smoother=p.smoother)  # fmt: skip
         _LATEST.clear()
-        _LATEST[key] = _read(assembly, found)
+        _LATEST[key] = _read(assembly, found, measured)
     return _LATEST[key]
 
 
-def _read(assembly: Assembly, found: "Estimate") -> Guide:
+def _read(assembly: Assembly, found: "Estimate", measured: "Measurement") -> Guide:
     from models.drift.pitch_filter import INERTIA, PITCH, RATE, suspension_moment
 
     deviations = np.sqrt(found.errors()[:, [PITCH, RATE], [PITCH, RATE]])
-    share = found.states[:, INERTIA]
+    share, names = found.states[:, INERTIA], {PITCH: "pitch", RATE: "pitch_rate"}
+    fits = consistency(found.innovations, [names[column] for column in measured.columns])
     return Guide(found.period, found.states, found.states[:, [PITCH, RATE]], deviations, share,
                  share * suspension_moment(assembly, found.states), np.cumsum(found.used), np.cumsum(found.missed),
-                 np.nancumsum(found.surprises))
+                 np.nancumsum(found.surprises), fits)
 
 
 def _digest(assembly: Assembly, measured: "Measurement", p: Parameters) -> str:
@@ -187,6 +192,17 @@ def _check_surprise(assembly: Assembly, p: Parameters, guide: Guide) -> None:
         raise InputError(assembly.scene.file, "effects.kalman_filter", None,
                          f"{p.file} contradicts forces and model: the squares of the innovations are {mean:.3g} times "
                          f"what the deviations allow (at most {SURPRISE:g}): check sign and unit, or state larger ones")
+
+
+def _doubts(p: Parameters, guide: Guide) -> tuple[str, ...]:
+    """What the filter's own innovations say against it."""
+    if guide.consistency.consistent:
+        return ()
+    square = guide.consistency.figures[0]
+    known = f"the stated deviation of the pitch, up to {guide.deviations[:, 0].max():.2g} rad, is not to be relied upon"
+    remedy = ("the stated deviations are too large: state smaller ones" if square.value < square.low else
+              f"check {p.file} for a bias, a delay and its unit, the inertia, and the stated deviations")  # fmt: skip
+    return (f"the filter contradicts {p.file}: {guide.consistency}; {known}; {remedy}",)
 
 
 def _check_bandwidth(assembly: Assembly, p: Parameters, guide: Guide) -> None:

@@ -81,7 +81,7 @@ def free_run(assembly: Assembly, duration: float, period: float) -> np.ndarray:
 
 
 def consistency(folder: Path, duration: float, seed: int, scales: dict[str, tuple[float, float]]) -> dict[str, Any]:
-    """One run without model error: NEES and NIS of filters whose Q and R are scaled, by name.
+    """One run without model error: NEES, NIS and innovations of filters whose Q and R are scaled, by name.
 
     The true vehicle starts turned by a random angle, which the filter knows the deviation of. NEES (6 states) is
     taken once a second from the second one on, far beyond the estimate's memory of some 0.2 s.
@@ -99,7 +99,8 @@ def consistency(folder: Path, duration: float, seed: int, scales: dict[str, tupl
     for name, (q, r) in scales.items():
         own = Measurement(seen[:, None], COARSE, (PITCH,), (angle * np.sqrt(r),))
         filtered = estimate(noisy, own, force * np.sqrt(q), start_deviation=START)
-        found[name] = (nees(filtered, states), filtered.surprises[round(1 / COARSE) :])
+        first = round(1 / COARSE)
+        found[name] = (nees(filtered, states), filtered.surprises[first:], filtered.innovations[first:])
     return found
 
 

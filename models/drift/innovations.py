@@ -1,0 +1,99 @@
+"""Are the innovations of a filter what its model and its stated noise make of them: as large, without mean, and white?
+
+Of a filter that is right, the innovations divided by the root of their covariance are independent and normal with
+deviation 1, whatever the measurement was. Three figures of a run are held against that law, each with its own share of
+a level that is stated for the run as a whole: their mean square (a chi-square sample), the mean of every column (a bias
+of the sensor, an offset of the forces), and its correlation over the next samples (a wrong inertia, a late sensor).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+LEVEL = 1e-3
+"""Share of the runs of a right filter that are called inconsistent all the same."""
+LAGS = 20
+"""Samples over which correlation is looked for."""
+FEWEST = 100
+"""Innovations of a column below which its mean and correlation are not judged."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a run beside the interval that holds it in all but a share of LEVEL of right runs."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+
+    @property
+    def inside(self) -> bool:
+        """Whether it is as a right filter's."""
+        return self.low <= self.value <= self.high
+
+    def __str__(self) -> str:
+        """With its interval, for an engineer."""
+        return f"{self.name} {self.value:.3g} ({self.low:.3g} to {self.high:.3g})"
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """Figures of a run, the mean square of all normalised innovations first."""
+
+    figures: tuple[Figure, ...]
+
+    @property
+    def consistent(self) -> bool:
+        """Whether all are as a right filter's."""
+        return all(figure.inside for figure in self.figures)
+
+    def __str__(self) -> str:
+        """One sentence: what is wrong, with the interval of a right filter, or that nothing is."""
+        if self.consistent:
+            return f"its innovations are as stated: {self.figures[0]}"
+        wrong = "; ".join(map(str, (figure for figure in self.figures if not figure.inside)))
+        return (f"its innovations are not what model and stated deviations make: {wrong}; in brackets where those "
+                f"of a right filter lie, but for one run in {1 / LEVEL:.0f}")  # fmt: skip
+
+
+def consistency(innovations: np.ndarray, names: Sequence[str]) -> Consistency:
+    """Of normalised innovations (n, columns), independent and of deviation 1 where the filter is right; NaN where
+    nothing was measured."""
+    known = np.isfinite(innovations)
+    tail = LEVEL / (1 + 2 * len(names)) / 2
+    count = int(known.sum())
+    if not count:
+        return Consistency(())
+    square = float(np.mean(innovations[known] ** 2))
+    figures = [Figure("mean square", square, *(chi2.ppf([tail, 1 - tail], count) / count).tolist())]
+    for name, column in zip(names, innovations.T, strict=True):
+        if np.isfinite(column).sum() >= FEWEST:
+            figures += [_mean(name, column, tail), _correlation(name, column, tail)]
+    return Consistency(tuple(figures))
+
+
+def _mean(name: str, column: np.ndarray, tail: float) -> Figure:
+    """In deviations of an innovation."""
+    own = column[np.isfinite(column)]
+    wide = float(norm.isf(tail)) / math.sqrt(len(own))
+    return Figure(f"mean of {name}", float(own.mean()), -wide, wide)
+
+
+def _correlation(name: str, column: np.ndarray, tail: float) -> Figure:
+    """Root of the mean squared correlation with the next LAGS samples, of those that are LAGS or fewer apart.
+
+    Of white samples every correlation is normal, of variance one by the number of pairs (Box and Pierce).
+    """
+    whole = np.where(np.isfinite(column), column, 0.0)
+    there = np.isfinite(column).astype(float)
+    lags = range(1, min(LAGS, len(column) // 5) + 1)
+    pairs = np.array([float(there[lag:] @ there[:-lag]) for lag in lags])
+    power = float(whole @ whole) / there.sum()
+    each = np.array([float(whole[lag:] @ whole[:-lag]) for lag in lags]) / np.maximum(pairs, 1.0) / power
+    size = math.sqrt(float(np.sum(pairs * each**2)) / float(pairs.sum()))
+    high = math.sqrt(float(chi2.isf(tail, len(lags))) / float(pairs.sum()))
+    return Figure(f"correlation of {name}", size, 0.0, high)
