@@ -37,7 +37,8 @@ def describe(scene: Scene) -> str:
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
     lines += [_line("motion", _motion(scene, assembly))]
     lines += _vehicle(scene, assembly) + effect_lines(scene)
-    lines += [_line("channels", ", ".join(_channels(assembly))), *trust_line(assembly), *doubt_lines(assembly), "", *_engines(scene, assembly)]
+    lines += [_line("channels", ", ".join(_channels(assembly))), *trust_line(assembly), *doubt_lines(assembly)]
+    lines += ["", *_engines(scene, assembly)]
     return "\n".join(lines)
 
 

@@ -164,7 +164,7 @@ def _table(scene: HubScene, found: Found) -> list[str]:
                      + f"{_told(drift_off(found, run)):>11}{roll:>8.3g}{pitch:>8.3g}   "
                      + f"{min(ratios):.3g}, {max(ratios):.3g}")  # fmt: skip
     if found.truth is None:
-        lines.append("  the true run is not known: angles are beside the filter's estimate, damage beside the run with it")
+        lines.append("  the true run is not known: angles are beside the filter's estimate, damage beside that run's")
     lines += [f"  {name}: {text}" for name, text in found.failed.items()]
     if len(found.runs) > len(METHODS):
         lines.append(f"  engines before drift-off: {engines_apart(found):.1e}")

@@ -4,14 +4,15 @@ import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from models.drift.score import Verdict, rms
 from models.drift.trust import ANGLE, Trust
-from models.errors import RunFailed
+from models.errors import InputError, RunFailed
 from models.hub_forces.cut_vehicle import CutVehicle
 from models.hub_forces.kernel import WRENCH
 from models.measured import plan
@@ -22,6 +23,7 @@ from models.measured.checks.place import Place
 from models.measured.checks.weight import moments
 from models.measured.clock import record
 from models.measured.comparison import Compared, checks, compare
+from models.measured.consequences import Consequence, consequences, judged
 from models.measured.counting import Counted, count
 from models.measured.finding import Finding
 from models.measured.hand_on import NAME, forces, hand_on
@@ -40,6 +42,9 @@ from models.measured.verdict import judge, surprised
 from models.measured.virtual import VirtualMeasurement, virtual_measurement
 from models.strict import Strict, read
 from models.systems import load
+
+if TYPE_CHECKING:
+    from models.measured.pitch_plane import PlaneJob
 
 SYSTEM = "measured"
 BLOCKS = "work"
@@ -67,6 +72,7 @@ class Found:
     trust: tuple[tuple[str, Trust], ...] = ()
     runs: dict[str, Outcome] = field(default_factory=dict)
     verdicts: dict[str, Verdict] = field(default_factory=dict)
+    consequences: tuple[Consequence, ...] = ()
     compared: tuple[Compared, ...] = ()
     handed: tuple[Path, ...] = ()
     failed: dict[str, str] = field(default_factory=dict)
@@ -109,6 +115,8 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
     found = compute(scene, engines[-1], folder, progress)
     page = write(found, folder / "recording.html")
     return {"scene": found.scene.title, "folder": str(folder), "failed": _failed(found), "page": str(page),
+            "verdicts": {name: [own.word, own.reason] for name, own in found.verdicts.items()},
+            "effects": [str(one) for one in found.consequences],
             "doubts": sum(finding.weight == "doubt" for finding in found.findings), "channels": _sizes(found),
             "table": [*_told(found), f"  the page: {page}"]}  # fmt: skip
 
@@ -136,6 +144,9 @@ def compute(scene: MeasuredScene, engine: str, folder: Path, progress: Progress 
             said = {(finding.check, finding.signals, finding.place) for finding in found.findings}
             found.findings += tuple(f for f in found.held.findings if (f.check, f.signals, f.place) not in said)
             found.findings += surprised(found.held)
+            progress("what the findings do", 0.9)
+            _weighed(found, work)
+            watch.lap("what the findings do")
             progress("files", 0.95)
             _handed(found, folder)
             watch.lap("files")
@@ -152,22 +163,27 @@ def _in_space(found: Found, work: Path, progress: Progress) -> None:
 
 def _in_plane(found: Found, work: Path, progress: Progress) -> None:
     """Predict, run and judge the pitch plane."""
-    from models.measured.pitch_plane import PlaneJob
     from models.measured.pitch_plane import run as run_plane
 
-    assert found.scene.vehicle.parameters is not None
-    for i, (name, hold) in enumerate(_holds(found).items()):
+    for i, name in enumerate(_holds(found)):
         progress(f"{name} run", 0.2 + 0.35 * i)
-        job = PlaneJob(found.recording, found.scene.vehicle.parameters, found.engine, hold, found.scene.run.step,
-                       found.scene.file)  # fmt: skip
         try:
-            own = run_plane(job, _fresh(work / name), found.scene.limits)
+            own = run_plane(_plane_job(found, name), _fresh(work / name), found.scene.limits)
         except RunFailed as error:
             found.failed[name] = str(error)
             continue
         found.runs[name], found.verdicts[name] = own.outcome, own.verdict
         if name == FREE and own.trust is not None:
             found.trust = (("pitch", own.trust),)
+
+
+def _plane_job(found: Found, name: str) -> "PlaneJob":
+    """A run of the pitch plane to be made."""
+    from models.measured.pitch_plane import PlaneJob
+
+    assert found.scene.vehicle.parameters is not None
+    return PlaneJob(found.recording, found.scene.vehicle.parameters, found.engine, _holds(found)[name],
+                    found.scene.run.step, found.scene.file)  # fmt: skip
 
 
 def _fresh(folder: Path) -> Path:
@@ -240,6 +256,10 @@ def _run(found: Found, work: Path, progress: Progress) -> None:
             found.failed[name] = str(error)
             if isinstance(error.partial, Outcome):
                 found.runs[name] = error.partial
+        except InputError as error:  # what the filter refuses, the findings may explain
+            if all(finding.weight == "note" for finding in found.findings):
+                raise
+            found.failed[name] = str(error)
 
 
 def _holds(found: Found) -> dict[str, Hold]:
@@ -274,6 +294,26 @@ def _judged(found: Found) -> None:
                                      {s.name: noise(own, s) for s in own.signals if s.check})  # fmt: skip
         if name == found.chosen:
             found.compared = beside
+
+
+def _weighed(found: Found, work: Path) -> None:
+    """What the findings do to the section forces that are handed on, and the verdicts that follow from it."""
+    assert found.held is not None
+    make = _make_in_space if found.rig.vehicle else _make_in_plane
+    found.consequences = consequences(found.findings, found.recording, partial(make, found),
+                                      handed_on(found, found.held), work / "findings")  # fmt: skip
+    found.verdicts = {name: judged(verdict, found.consequences) for name, verdict in found.verdicts.items()}
+
+
+def _make_in_space(found: Found, recording: Recording, folder: Path) -> Outcome:
+    """The run that is handed on, of another recording."""
+    return march(replace(_job(found, found.chosen), recording=recording), folder / "run")
+
+
+def _make_in_plane(found: Found, recording: Recording, folder: Path) -> Outcome:
+    from models.measured.pitch_plane import run as run_plane
+
+    return run_plane(replace(_plane_job(found, found.chosen), recording=recording), folder / "run").outcome
 
 
 def _handed(found: Found, folder: Path) -> None:
@@ -342,6 +382,7 @@ def _told(found: Found) -> list[str]:
     for name, outcome in found.runs.items():
         end = found.failed.get(name, "to the end")
         lines.append(f"  {name} run: {outcome.period * (outcome.done - 1):.6g} s, {end}")
+    lines += [f"  effect of {one}" for one in found.consequences]
     lines += [f"  verdict on the {name} run: {own.word} ({own.reason})" for name, own in found.verdicts.items()]
     return lines
 

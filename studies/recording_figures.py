@@ -35,7 +35,8 @@ def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
     return _spectrum(evidence, signals, path) if finding.check == "noise" else _times(finding, evidence, signals, path)
 
 
-KINDS = {"late": ("shift",), "factor": ("sign", "unit", "gain"), "swapped": ("swapped",)}
+KINDS = {"late": ("shift",), "factor": ("sign", "unit", "gain"), "swapped": ("swapped",),
+         "lever": ("lever",)}  # fmt: skip
 """Checks that tell a kind of fault."""
 
 

@@ -14,6 +14,7 @@ from typing import Any
 from models.damage import SLOPE
 from models.drift.trust import Trust
 from models.measured.comparison import Band
+from models.measured.consequences import DAMAGE, FORCE
 from models.measured.counting import Counted
 from models.measured.finding import Finding
 from models.measured.section_run import Outcome
@@ -109,7 +110,9 @@ def _verdict(found: Found) -> dict[str, str]:
             "threshold": f"Threshold: held to measured angles with an artificial moment of at most "
                          f"{limits.artificial_share:.0%} of what turns the {found.rig.chassis} (up to 15 Hz), "
                          f"angles known to {limits.pitch_error:g} rad, and no check channel off by more than "
-                         f"{DISAGREES:.0%}; or free, and shorter than it can be trusted."}  # fmt: skip
+                         f"{DISAGREES:.0%}; or free, and shorter than it can be trusted. A doubt that changes a "
+                         f"section force by {FORCE[0]:.0%} to {FORCE[1]:.0%} of its rms or {DAMAGE[0]:.0%} to "
+                         f"{DAMAGE[1]:.0%} of its damage is said, one that changes more rejects."}  # fmt: skip
 
 
 def _ended(found: Found, name: str) -> str:
@@ -130,7 +133,8 @@ def _tiles(found: Found) -> list[dict[str, str]]:
 def _finding(found: Found, one: Finding, folder: Path, i: int) -> dict[str, Any]:
     """A finding and its figure, where there is anything to draw."""
     drawn = figure(one, found.evidence, folder / f"finding_{i}.png")
-    return {"weight": one.weight, "text": one.text, "figure": _figure(drawn, "") if drawn else None}
+    effect = next((f" {own}." for own in found.consequences if own.finding == one and own.section), "")
+    return {"weight": one.weight, "text": one.text + effect, "figure": _figure(drawn, "") if drawn else None}
 
 
 def _parts(found: Found, folder: Path) -> list[Part]:

@@ -40,7 +40,7 @@ CONFIDENCE = 0.999
 LEAST, COARSEST = 100, 5e-3
 """Rows and spacing (s) that a balance of moments over each step takes: a quarter of a wave at 50 Hz."""
 
-Word = Literal["accepted", "rejected", "stabilise"]
+Word = Literal["accepted", "accepted with doubt", "rejected", "stabilise"]
 
 
 class Limits(Strict):

@@ -18,8 +18,8 @@ import numpy as np
 from pydantic import Field
 
 from models.assembly import Assembly
-from models.drift.innovations import Consistency, consistency
 from models.drift.growth import rigid_pitch
+from models.drift.innovations import Consistency, consistency
 from models.errors import InputError
 from models.signals import Sampled, Smooth
 from models.steps import divides

@@ -95,12 +95,13 @@ def record(scene: MeasuredScene, sources: Sequence[Source], signals: Sequence[Si
                          "vehicle")  # fmt: skip
     grid = _grid(scene, leading)
     noticed += [finding for group in groups for finding in (*group.timing.findings, *_outside(scene, group, grid))]
-    columns = _columns(folder, signals, sources, grid)
+    columns = _columns(folder, scene, signals, sources, grid)
     if columns.done < grid.count:
         absurd = list[Finding]()
         for i, group in enumerate(groups):
             progress(f"reading {group.source.path.name}", i / len(groups))
             absurd += (_direct if _even(group, grid) else _resampled)(group, grid, columns, folder)
+        _referred(scene, signals, columns)
         (folder / ABSURD).write_text(json.dumps([asdict(finding) for finding in absurd]))
         columns.close(grid.count)
     noticed += _absurd(folder)
@@ -109,6 +110,17 @@ def record(scene: MeasuredScene, sources: Sequence[Source], signals: Sequence[Si
     said = [finding for source in sources for finding in source.noticed]
     said += [*noticed, _rule(scene, groups, grid)]
     return extended(Recording(tuple(signals), columns, grid.period, began, comment, tuple(said)), scene)
+
+
+def _referred(scene: MeasuredScene, signals: Sequence[Signal], columns: Columns) -> None:
+    """Moments about points above or below hubs, brought to the hubs: (Mx - r Fy, My + r Fx) of a point r above."""
+    for hub, lever in scene.levers.items():
+        own = {(s.quantity, s.component): s for s in signals if s.at == hub and not s.check}
+        for axis, other, sign in (("x", "y", -1.0), ("y", "x", 1.0)):
+            moment, force = own.get(("moment", axis)), own.get(("force", other))
+            if moment is not None and force is not None:
+                values = columns.read(moment.name) + sign * lever * columns.read(force.name)
+                columns.put((moment.name,), 0, values[:, None])
 
 
 def _absurd(folder: Path) -> list[Finding]:
@@ -200,11 +212,12 @@ def _outside(scene: MeasuredScene, group: Group, grid: Grid) -> Iterator[Finding
                       (group.signals[0].name,))  # fmt: skip
 
 
-def _columns(folder: Path, signals: Sequence[Signal], sources: Sequence[Source], grid: Grid) -> Columns:
+def _columns(folder: Path, scene: MeasuredScene, signals: Sequence[Signal], sources: Sequence[Source],
+             grid: Grid) -> Columns:  # fmt: skip
     """Columns of this recording, or those begun from the same files; InputError where the folder holds others."""
     files = {source.path.name: [(at := source.path.stat()).st_size, at.st_mtime_ns] for source in sources}
     own = [[s.channel, s.sign, s.factor, s.zero] for s in signals]
-    now = {"files": files, "map": own, "clock": [grid.start, grid.period]}
+    now = {"files": files, "map": own, "clock": [grid.start, grid.period], "levers": scene.levers}
     path = folder / SOURCES
     if path.is_file() and json.loads(path.read_text()) != now:
         raise InputError(path, "", None, "was written from other files or by another map: choose a new folder")

@@ -53,6 +53,8 @@ def _check_names(scene: MeasuredScene, rig: Rig) -> None:
         if sensor.body not in rig.places.bodies:
             raise InputError(scene.file, f"sensors.{name}.body", sensor.body, "the vehicle has no such body",
                              rig.places.bodies)  # fmt: skip
+    for name in (name for name in scene.levers if name not in rig.hubs):
+        raise InputError(scene.file, "levers", name, "the vehicle has no such hub", rig.hubs)
     for name in scene.hand_on.sections or ():
         if name not in rig.sections:
             raise InputError(scene.file, "hand_on.sections", name, "the vehicle has no such section", rig.sections)

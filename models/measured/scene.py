@@ -109,6 +109,8 @@ class MeasuredScene(SceneFile):
     vehicle: Vehicle
     files: list[MeasuredFile] = Field(default=[], description="what was measured")
     virtual: VirtualTable | None = Field(default=None, description="a virtual measurement in place of files")
+    levers: dict[str, float] = Field(default={}, description="hub -> m by which the point that its moments are about "
+                                                             "lies above it; of the contact patch minus the radius")
     sensors: dict[str, Sensor] = Field(default={}, description="where accelerometers sit")
     clock: Clock = Clock()
     noise: Deviations = Deviations()

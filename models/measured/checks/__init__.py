@@ -14,6 +14,7 @@ from models.measured.checks import (
     factor,
     gaps,
     gravity,
+    lever,
     noise,
     rigid,
     shift,
@@ -28,12 +29,12 @@ from models.measured.finding import Finding, Weight
 from models.measured.recording import Recording
 
 CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
-    gaps.check, clipped.check, spikes.check, gravity.check, swapped.check, weight.check, factor.check, drift.check,
-    shift.check, turning.check, rigid.check, noise.check,
+    gaps.check, clipped.check, spikes.check, gravity.check, swapped.check, weight.check, lever.check, factor.check,
+    drift.check, shift.check, turning.check, rigid.check, noise.check,
 )  # fmt: skip
 """In this order: what an earlier one has named, a later one does not name again."""
 FAMILIES = defaultdict(frozenset[str], {
-    **dict.fromkeys(("sign", "unit", "gain", "offset", "weight", "gravity"), frozenset({"size"})),
+    **dict.fromkeys(("sign", "unit", "gain", "offset", "weight", "gravity", "lever"), frozenset({"size"})),
     **dict.fromkeys(("drift", "shift"), frozenset({"time"})),
     "clipped": frozenset({"value"}), "spikes": frozenset({"size", "value"}), "noise": frozenset({"size", "value"}),
     "rigid": frozenset({"size", "time", "value"}),

@@ -16,7 +16,7 @@ import numpy as np
 
 from models.measured.signal import Signal
 
-Kind = Literal["late", "factor", "swapped"]
+Kind = Literal["late", "factor", "swapped", "lever"]
 KNOWN = 0.03
 """Share of an expected reading by which a vehicle file is taken to be wrong at the least: no one knows a car better."""
 REACH, GRID = 0.25, 5e-4
@@ -24,8 +24,8 @@ REACH, GRID = 0.25, 5e-4
 TIMES = GRID * np.arange(-round(REACH / GRID), round(REACH / GRID) + 1)
 CERTAIN = 40.0
 """Fall of chi square that one more parameter must bring: chance does so once in 10^9."""
-SMALL_DELAY, SMALL_FACTOR = 5e-4, 0.01
-"""s and a share: what is smaller does no harm, and no vehicle file is good enough to tell."""
+SMALL_DELAY, SMALL_FACTOR, SMALL_LEVER = 5e-4, 0.01, 0.01
+"""s, a share and m: what is smaller does no harm, and no vehicle file is good enough to tell."""
 WORTH = 0.35
 """Part of what is unexplained in some reading that a delay or factor must explain: springs that are 20 % stiffer than
 in the vehicle file, or dampers 30 % weaker, leave a sixth of the readings unexplained, and wrong delays explain up to
@@ -48,7 +48,8 @@ class Group:
 
 @dataclass(frozen=True)
 class Fault:
-    """late : size in s; factor : recorded by true value; swapped : size is the share that is explained only then.
+    """late : size in s; factor : recorded by true value; swapped : size is the share that is explained only then;
+    lever : size in m by which the point that moments are about lies above the hub.
 
     error : standard error of the size, of random errors alone; of swapped the share that is left when they are put
     right. fall : of chi square. exchanged : hubs, each with the one whose channels it has.
@@ -125,6 +126,9 @@ class Agreement:
         response = self.response.copy()
         if fault.kind == "swapped":
             return replace(self, response=response[:, :, self._order(dict(fault.exchanged))])
+        if fault.kind == "lever":
+            hubs = tuple(dict.fromkeys(s.at for s in fault.signals))
+            return replace(self, response=response + fault.size * self._levers(hubs))
         forces, turn = fault.signals[0] in self.inputs, 2j * np.pi * self.frequencies
         wrong = np.exp(-turn * fault.size) if fault.kind == "late" else np.full(len(turn), fault.size, complex)
         pick = [(self.inputs if forces else self.outputs).index(s) for s in fault.signals]
@@ -140,6 +144,7 @@ class Agreement:
                 if self._worth(self.without(fault), weights):
                     yield fault
         yield from self._swapped(weights)
+        yield from self._about(weights)
 
     def groups(self) -> Iterator[Group]:
         """Every signal alone, those of one hub or sensor, of one file, and all readings: the fewer the earlier."""
@@ -205,6 +210,36 @@ class Agreement:
         factor = 1 / ratio if group.forces else ratio
         if fall > CERTAIN and abs(ratio - 1) > max(SMALL_FACTOR, 4 * error):
             yield Fault("factor", group.name, self._signals(group), factor, error * abs(factor / ratio), fall)
+
+    def _about(self, weights: np.ndarray) -> Iterator[Fault]:
+        """Moments about another point than the hub, above or below, of one hub, of two, or of all alike."""
+        hubs = tuple(dict.fromkeys(s.at for s in self.inputs))
+        for some in (hubs, *combinations(hubs, 2), *((hub,) for hub in hubs)):
+            signals = tuple(s for s in self.inputs if s.at in some and s.quantity == "moment" and s.component in "xy")
+            levers = self._levers(some)
+            power = float((weights * _power(levers, self.forces)).sum())
+            if not power > 0:
+                continue
+            rest = self.between - self._told
+            size = float((weights * np.einsum("fkc,fkc->fk", rest, levers.conj()).real).sum()) / power
+            fault = Fault("lever", " and ".join(some), signals, size, (2 * power) ** -0.5, power * size**2)
+            large = fault.fall > CERTAIN and abs(size) > max(SMALL_LEVER, 4 * fault.error)
+            if large and self._worth(self.without(fault), weights):
+                yield fault
+
+    def _levers(self, hubs: tuple[str, ...]) -> np.ndarray:
+        """What the response (f, k, c) gains, per m by which the moments of hubs are about a point above them.
+
+        About a point r above the hub a force adds (r Fy, -r Fx) to the moments about it, which the response undoes.
+        """
+        places = {(s.at, s.quantity, s.component): i for i, s in enumerate(self.inputs)}
+        out = np.zeros_like(self.response)
+        for hub in hubs:
+            for axis, other, sign in (("x", "y", -1.0), ("y", "x", 1.0)):
+                moment, force = places.get((hub, "moment", axis)), places.get((hub, "force", other))
+                if moment is not None and force is not None:
+                    out[:, :, force] += sign * self.response[:, :, moment]
+        return out
 
     def _swapped(self, weights: np.ndarray) -> Iterator[Fault]:
         """Two hubs as a whole, or two and two."""
