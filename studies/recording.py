@@ -144,9 +144,10 @@ def compute(scene: MeasuredScene, engine: str, folder: Path, progress: Progress 
             said = {(finding.check, finding.signals, finding.place) for finding in found.findings}
             found.findings += tuple(f for f in found.held.findings if (f.check, f.signals, f.place) not in said)
             found.findings += surprised(found.held)
-            progress("what the findings do", 0.9)
-            _weighed(found, work)
-            watch.lap("what the findings do")
+        progress("what the findings do", 0.9)
+        _weighed(found, work)
+        watch.lap("what the findings do")
+        if found.held is not None:
             progress("files", 0.95)
             _handed(found, folder)
             watch.lap("files")
@@ -297,23 +298,26 @@ def _judged(found: Found) -> None:
 
 
 def _weighed(found: Found, work: Path) -> None:
-    """What the findings do to the section forces that are handed on, and the verdicts that follow from it."""
-    assert found.held is not None
+    """What the findings do to the section forces that are handed on, and the verdicts that follow from it: by the run
+    with the stabiliser, or by the free one where that failed."""
+    name = found.chosen if found.chosen in found.runs and found.chosen not in found.failed else FREE
+    if name not in found.runs:
+        return
     make = _make_in_space if found.rig.vehicle else _make_in_plane
-    found.consequences = consequences(found.findings, found.recording, partial(make, found),
-                                      handed_on(found, found.held), work / "findings")  # fmt: skip
+    found.consequences = consequences(found.findings, found.recording, partial(make, found, name),
+                                      handed_on(found, found.runs[name]), work / "findings")  # fmt: skip
     found.verdicts = {name: judged(verdict, found.consequences) for name, verdict in found.verdicts.items()}
 
 
-def _make_in_space(found: Found, recording: Recording, folder: Path) -> Outcome:
-    """The run that is handed on, of another recording."""
-    return march(replace(_job(found, found.chosen), recording=recording), folder / "run")
+def _make_in_space(found: Found, name: str, recording: Recording, folder: Path) -> Outcome:
+    """A run of another recording, held as the one of this name."""
+    return march(replace(_job(found, name), recording=recording), folder / "run")
 
 
-def _make_in_plane(found: Found, recording: Recording, folder: Path) -> Outcome:
+def _make_in_plane(found: Found, name: str, recording: Recording, folder: Path) -> Outcome:
     from models.measured.pitch_plane import run as run_plane
 
-    return run_plane(replace(_plane_job(found, found.chosen), recording=recording), folder / "run").outcome
+    return run_plane(replace(_plane_job(found, name), recording=recording), folder / "run").outcome
 
 
 def _handed(found: Found, folder: Path) -> None:

@@ -24,7 +24,7 @@ LOUD, QUIET, MARK = "#d55e00", "#222222", "#f0e442"
 def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
     """Draw what a finding says into ``path``; None where there is nothing to draw."""
     fault = next((f for f in evidence.faults if {s.name for s in f.signals} == set(finding.signals)
-                  and finding.check in KINDS[f.kind]), None)  # fmt: skip
+                  and finding.check in KINDS.get(f.kind, ())), None)  # fmt: skip
     signals = tuple(s for s in evidence.recording.signals if s.name in finding.signals)
     if not signals:
         return None
@@ -35,8 +35,7 @@ def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
     return _spectrum(evidence, signals, path) if finding.check == "noise" else _times(finding, evidence, signals, path)
 
 
-KINDS = {"late": ("shift",), "factor": ("sign", "unit", "gain"), "swapped": ("swapped",),
-         "lever": ("lever",)}  # fmt: skip
+KINDS = {"late": ("shift",), "factor": ("sign", "unit", "gain"), "swapped": ("swapped",)}
 """Checks that tell a kind of fault."""
 
 

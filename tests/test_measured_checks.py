@@ -272,3 +272,13 @@ def test_what_was_noticed_while_reading_is_carried_and_errors_come_first(ridden,
     found = check(replace(made(tmp_path, force_z=lost), noticed=(noticed,)), None)
     assert [one.weight for one in found[:2]] == ["error", "doubt"]
     assert found[1] is noticed
+
+
+@pytest.mark.parametrize("hubs, lever", [(("fl", "fr", "rl", "rr"), -0.3), (("rr",), -0.34), (("fl", "fr"), 0.3)])
+def test_moments_about_the_contact_patch_are_recognised(hubs, lever, ridden, tmp_path):
+    samples = ridden.samples(Faults(noise=case.NOISE), case.SEED)
+    said = case.findings(ridden, case.referred(lever, *hubs)(ridden, samples), tmp_path)
+    assert [one.check for one in said] == ["lever"]
+    # the fit has a standard error of 0.01 m here, and the vehicle is not linear
+    assert said[0].size == pytest.approx(lever, abs=0.04)
+    assert f"levers = {{ {hubs[0]} = " in said[0].text and ("contact patch" in said[0].text)

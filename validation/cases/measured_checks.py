@@ -118,6 +118,19 @@ def _clipped(name: str, part: float) -> Samples:
     return change
 
 
+def referred(lever: float, *hubs: str) -> Samples:
+    """Moments of hubs about a point so far (m) above them: (Mx + r Fy, My - r Fx)."""
+
+    def change(found: VirtualMeasurement, samples: np.ndarray) -> np.ndarray:
+        for hub in hubs:
+            fx, fy, mx, my = _columns(found, *(f"{hub}_{name}" for name in ("fx", "fy", "mx", "my")))
+            samples[:, mx] += lever * samples[:, fy]
+            samples[:, my] -= lever * samples[:, fx]
+        return samples
+
+    return change
+
+
 VERTICAL = tuple(f"{hub}_fz" for hub in ("fl", "fr", "rl", "rr"))
 QUICK = (
     Planted("3 ms late, one force", "shift", "fl_fz", 3e-3, "s", {"delay": {"fl_fz": 3e-3}}),
@@ -150,6 +163,11 @@ FULL = (
     Planted("wheels swapped across", "swapped", "fl with rr", 1.0, "", {}, _exchanged(("fl", "rr"))),
     Planted("sides swapped, both axles", "swapped", "fl with fr and rl with rr", 1.0, "", {},
             _exchanged(("fl", "fr"), ("rl", "rr"))),
+    Planted("moments about the contact patch, all wheels", "lever", "fl and fr and rl and rr", -0.3, "m", {},
+            referred(-0.3, "fl", "fr", "rl", "rr")),
+    Planted("moments about the contact patch, one wheel", "lever", "rr", -0.34, "m", {}, referred(-0.34, "rr")),
+    Planted("moments referred to the hub twice, one axle", "lever", "fl and fr", 0.3, "m", {},
+            referred(0.3, "fl", "fr")),
     Planted("clipped, 0.5 % of samples", "clipped", "fl_fz", 0.5, "%", {}, _clipped("fl_fz", 0.005)),
     Planted("value held for 0.3 s", "clipped", "rl_mx", 0.3, "s", {}, _held("rl_mx", 4.0, 0.3)),
     Planted("value held for 0.06 s", "clipped", "fl_fz", 0.06, "s", {}, _held("fl_fz", 4.0, 0.06)),
