@@ -77,6 +77,19 @@ def resamples(rounds: int, count: int = RESAMPLES, seed: int = SEED) -> np.ndarr
     return np.random.default_rng(seed).integers(rounds, size=(count, rounds))
 
 
+def median(samples: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
+    """The median of the rounds with its bootstrap 95 % interval."""
+    values = np.asarray(samples, float)
+    _, low, high = interval(np.median(values[resamples(len(values))], axis=1))
+    return float(np.median(values)), low, high
+
+
+def spelled(samples: Sequence[float] | np.ndarray, scale: float = 1.0, form: str = ".3g") -> str:
+    """A median with its interval as tables have it: "12.3 (11.9 to 12.8)"."""
+    middle, low, high = (f"{scale * value:{form}}" for value in median(samples))
+    return f"{middle} ({low} to {high})"
+
+
 def paired_ratio(a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
     """Ratio a / b as the median of the paired log ratios, with its bootstrap 95 % interval."""
     logs = np.log(np.asarray(a) / np.asarray(b))

@@ -152,7 +152,7 @@ def _saving(found: list[Judged], system: str) -> list[Row]:
             float(np.median(calls[:, 0] / calls[:, 2])), "times", 5.0, note, "at least"),
         finding(f"{name}.step", SYSTEM, "the same by longer steps alone, with all effects",
                 float(np.median(calls[:, 0] / calls[:, 1])), "times", "", "what is left is due to effects", "none"),
-        finding(f"{name}.seconds", SYSTEM, "CPU seconds saved, median",
+        finding(f"{name}.seconds", SYSTEM, "CPU seconds saved, each run once, median of the scenes",
                 float(np.median(seconds[:, 0] / seconds[:, 2])), "times", "", "of calls, and of what a call takes",
                 "none"),
     ]  # fmt: skip

@@ -23,7 +23,7 @@ from models.engines.mujoco_callback import installed
 from models.stack import start
 from validation.contact import slow_wheels
 from validation.rows import Row, System, Table, aim, at_most, behaves
-from validation.timing import interleave, interval, resamples
+from validation.timing import interleave, median, spelled
 
 TITLE = "What a contact kernel costs inside an engine"
 SYSTEM: System = "rolling-vehicle"
@@ -85,7 +85,7 @@ NAMES = {"linear": "linear theory", "simplified": "non-Hertzian"}
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Whether threads and engines agree, and low speed; in the full run also the price of every law and bridge.
 
-    Prices are only told by the full run: the least of a few rounds is not the least.
+    Prices are only told by the full run: a few rounds tell little.
     """
     rows, done = slow_wheels.rows(quick)
     rows += [_threads_row(), _agreement_row()]
@@ -125,9 +125,10 @@ class Prices:
         self._calls = {kernel: one / calls for kernel, one, (_, calls) in zip(kernels, alone, loops, strict=True)}
 
     def step(self, one: Setup, rounds: bool = False) -> Any:
-        """Seconds per step: of each round, or by the least of all, as whatever else a machine does only adds."""
+        """Seconds per step: of each round, or their median."""
         whole, first, steps = self._steps[one]
-        return (whole - first) / steps if rounds else float(whole.min() - first.min()) / steps
+        found = (whole - first) / steps
+        return found if rounds else float(np.median(found))
 
     def own(self, one: Setup, rounds: bool = False) -> Any:
         """The same without contact: the engine's own."""
@@ -139,21 +140,17 @@ class Prices:
             return 0.0
         calls = 1 if one.bridge == "before each step" else EVALUATIONS[one.method]
         found = calls * self._calls[one.law, one.count]
-        return found if rounds else float(found.min())
-
-    def interval(self, ratios: Array) -> tuple[float, float, float]:
-        """Median of the ratios of the rounds with its 95 % interval, bootstrapped."""
-        _, low, high = interval(np.median(ratios[resamples(len(ratios))], axis=1))
-        return float(np.median(ratios)), low, high
+        return found if rounds else float(np.median(found))
 
     def point(self, one: Setup) -> dict[str, Any]:
         """A step and what it is made of, in seconds: engine, kernel, bridge; the share of the bridge."""
         step, own, kernel = self.step(one), self.own(one), self.kernel(one)
         a, b, c = (part(one, True) for part in (self.step, self.own, self.kernel))
-        share = self.interval((a - b - c) / a)
+        share = median((a - b - c) / a)
         return {"engine": one.engine, "method": one.method, "bridge": one.bridge, "law": one.what(),
                 "wheels": one.count, "main": one.law == MAIN, "step": step, "own": own, "kernel": kernel,
-                "over": step - own - kernel, "share": share}  # fmt: skip
+                "over": step - own - kernel, "share": share,
+                "range": median(a)[1:]}  # fmt: skip
 
 
 def _kernel_job(law: tuple[str, int], count: int) -> tuple[Callable[[], Any], int]:
@@ -246,13 +243,13 @@ def _price_rows(prices: Prices) -> list[Row]:
         step, own, kernel = (part(one, True) for part in (prices.step, prices.own, prices.kernel))
         name, calls = f"contact_bridges.{one.engine}.{one.method}", EVALUATIONS[one.method]
         if one.engine == "mujoco":
-            value, low, high = prices.interval(step / (own + kernel))
+            value, low, high = median(step / (own + kernel))
             what, bound = f"by the step without contact and {4 * calls} kernel times", 1.3
         else:
-            value, low, high = prices.interval((step - own - kernel) / step)
+            value, low, high = median((step - own - kernel) / step)
             what, bound = "share of the bridge", 0.25
         what = (f"{ENGINE_NAMES[one.engine]}, {one.method}: step with FASTSIM at four wheels (21 x 21, native, "
-                f"{1e6 * prices.step(one):.1f} us), {what}, 95 % interval {low:.3f} to {high:.3f}")  # fmt: skip
+                f"{spelled(step, 1e6)} us), {what}, 95 % interval {low:.3f} to {high:.3f}")  # fmt: skip
         rows.append(aim(name, SYSTEM, what, value, "", bound, WHY))
     return rows
 
@@ -287,14 +284,15 @@ def tables(data: dict[str, Any]) -> list[Table]:
     slow = slow_wheels.table(data["slow"])
     if "points" not in data:
         return [slow]
-    note = ("Microseconds per step, least of interleaved rounds, as whatever else a machine does only adds to a time; "
+    note = ("Microseconds per step, median of interleaved rounds, that of the step with its 95 % interval; "
             "start of a run taken out. Kernel: the forces of all wheels in a compiled loop, times the calls per step. "
             "Bridge: what the step takes beyond the engine's own and the kernel, for plain Python its slower kernel "
             "too. Share: of the bridge in the step, median of the rounds with its 95 % interval. Rows time what they "
             f"tell by itself, in {ROUNDS} rounds; here are {SHOWN} of all.")  # fmt: skip
     heads = ("engine", "method", "wheels", "bridge", "law", "step", "engine's own", "kernel", "bridge's", "share [%]")
     rows = tuple((p["engine"], p["method"], str(p["wheels"]), p["bridge"], p["law"],
-                  *(f"{1e6 * p[part]:.2f}" for part in ("step", "own", "kernel", "over")),
+                  "{:.2f} ({:.2f} to {:.2f})".format(*(1e6 * value for value in (p["step"], *p["range"]))),
+                  *(f"{1e6 * p[part]:.2f}" for part in ("own", "kernel", "over")),
                   "{:.0f} ({:.0f} to {:.0f})".format(*(100.0 * share for share in p["share"])))
                  for p in data["points"])  # fmt: skip
     return [Table("Cost per step of a contact kernel inside an engine", note, heads, rows), slow]

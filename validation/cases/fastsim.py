@@ -218,7 +218,8 @@ def tables(data: dict[str, Any]) -> list[Table]:
                                                      for row in data["model"])))  # fmt: skip
     if "speed" in data:
         found.append(Table("FASTSIM: price", "Beside the time that a root and a division per cell take on this "
-                           "machine, its lower bound.", ("what", "time", "by the bound"),
+                           "machine, its lower bound: median of rounds with its 95 % interval.",
+                           ("what", "time", "by the bound"),
                            tuple(tuple(row) for row in data["speed"])))  # fmt: skip
     return found
 

@@ -145,8 +145,8 @@ def _file_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
 
 def _price_rows(each: dict[str, float]) -> list[Row]:
     why = "geometry, roll, exact normal contact; rolling also the speed of spin"
-    return [finding(f"manchester.price.{name}", SYSTEM, f"processor time of one position, both wheels, case {name}",
-                    seconds, "s", "-", why) for name, seconds in each.items()]  # fmt: skip
+    return [finding(f"manchester.price.{name}", SYSTEM, f"processor time of one position, both wheels, case {name}, "
+                    "all of them once", seconds, "s", "-", why) for name, seconds in each.items()]  # fmt: skip
 
 
 def _told(placed: Placed) -> dict[str, Any]:

@@ -221,5 +221,5 @@ def tables(data: dict[str, Any]) -> list[Table]:
             "have one sampling rate, MDF 4 and TDMS one per group.")
     rows = tuple((one["format"], f"{one['values']:.1e}", f"{one['times']:.1e}", f"{one['library']}: {one['own']:.1e}",
                   f"{one['size'] / 1e3:.0f}", f"{one['rate'] / 1e6:.1f}") for one in data["formats"])  # fmt: skip
-    headings = ("format", "values", "times, s", "own library", "kB", "million values per s, there and back")
+    headings = ("format", "values", "times, s", "own library", "kB", "million values per s, there and back, once")
     return [Table(TITLE, note, headings, rows)]

@@ -154,8 +154,10 @@ def _speed_rows(data: dict[str, Any]) -> list[Row]:
             rows.append(aim(f"price.callback.{integrator}.{key.replace(' ', '-')}", SYSTEM,
                             f"MuJoCo {integrator}, {words}: paired seconds, 95 % interval {low:.3f} to {high:.3f}",
                             ratio, "times", 1.2, why))  # fmt: skip
-    for key, factor in ((key, data["real time"][key]) for key in ("with table", "without table")):
-        what = f"reference RK4 at 1 ms, {key.replace('table', 'making its road table')}"
+    for key, found in ((key, data["real time"][key]) for key in ("with table", "without table")):
+        factor, low, high = found
+        what = (f"reference RK4 at 1 ms, {key.replace('table', 'making its road table')}, 95 % interval {low:,.0f} to "
+                f"{high:,.0f}")  # fmt: skip
         rows.append(aim(f"price.real-time.{key.replace(' ', '-')}", SYSTEM, what, factor, "times real time", 1000.0,
                         why, "at least"))  # fmt: skip
     return rows

@@ -198,6 +198,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     """What a simulated second costs."""
     if not data["price"]:
         return []
-    note = "CPU milliseconds per simulated second of R19-ride, RK4 at 1 ms on a random road, and functions called back."
+    note = ("CPU milliseconds, once, per simulated second of R19-ride, RK4 at 1 ms on a random road, and functions "
+            "called back.")
     heads = ("engine", "springs", "ms per s", "callbacks")
     return [Table("R19-ride in time", note, heads, tuple(tuple(row) for row in data["price"]))]

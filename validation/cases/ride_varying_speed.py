@@ -175,7 +175,7 @@ def _constant() -> list[Row]:
         finding("ride_varying_speed.constant.error", SYSTEM, "the same: standard error of these standard deviations, "
                 "relative", error, "", "falls as 1 / sqrt(copies x length)", "what its time buys", "none"),
         finding("ride_varying_speed.cost", SYSTEM, "the same: processor seconds of Monte Carlo for a standard error of "
-                "1e-3, by those of the covariance, which is exact", slow * (error / 1e-3) ** 2 / fast, "",
+                "1e-3, by those of the covariance, which is exact, each once", slow * (error / 1e-3) ** 2 / fast, "",
                 "hundreds", "every further digit costs Monte Carlo a hundredfold, the covariance nothing", "none"),
     ]  # fmt: skip
 

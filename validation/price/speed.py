@@ -10,7 +10,7 @@ from models.assembly import Assembly, assemble
 from models.engines.protocol import Settings, build
 from models.scene import build as build_scene
 from validation.price.compiled_forces import CompiledForces
-from validation.timing import describe, interleave, paired_ratio
+from validation.timing import describe, interleave, median, paired_ratio
 
 STEP = 1e-3
 
@@ -49,5 +49,5 @@ def real_time(driven: Assembly, duration: float, rounds: int, least: float) -> d
     assert signal is not None
     model = build("reference", driven, Settings("RK4", STEP, duration))
     run, table = interleave([model.run, lambda: signal.sample(0.0, STEP / 2, 2 * steps + 1)], rounds, least)
-    return {"with table": duration / float(np.median(run)), "without table": duration / float(np.median(run - table)),
+    return {"with table": median(duration / run), "without table": median(duration / (run - table)),
             "seconds": describe(run)}  # fmt: skip
