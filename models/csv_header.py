@@ -8,7 +8,10 @@ import csv
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
+
+from models.errors import InputError
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 BETWEEN = 3
@@ -20,6 +23,7 @@ MARKS = re.compile(r"\s*([+-]?nan(\(ind\))?|#?n/?a|n\.a\.|null|none|-+|inv(alid)
 TIMED = re.compile(r"\s*(\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T]+)?\d{1,3}:\d{2}(:\d{2})?([.,:]\d+)?\s*(z|[+-]\d{2}:?\d{2}|"
                    r"am|pm)?\s*", re.IGNORECASE)  # fmt: skip
 """Cells that are a time of the clock, in whatever notation."""
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _HEADING = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?", re.DOTALL)
 
 
@@ -86,6 +90,24 @@ def trimmed(cells: Sequence[str]) -> list[str]:
     """Cells without those that are empty at the end."""
     used = max((i for i, cell in enumerate(cells, start=1) if cell), default=0)
     return list(cells[:used])
+
+
+def separator_line(text: str) -> str:
+    """Separator that a first line ``sep=;`` names; empty where it is no such line."""
+    found = re.fullmatch(r'\s*"?sep=(.)"?\s*', text, re.IGNORECASE)
+    return found[1] if found else ""
+
+
+def decimal_sign(path: str | Path, line: int, separator: str, cells: Sequence[str]) -> str:
+    """Decimal sign of cells, the first of which are in ``line``; InputError where commas have two meanings."""
+    commas = [cell for cell in cells if "," in cell]
+    if commas and any("." in cell for cell in cells if is_number(cell.replace(",", ""))):
+        raise InputError(path, f"line {line} and after", commas[0], "the numbers hold points and commas: write them "
+                         "with one decimal sign and nothing else, without separators of thousands")  # fmt: skip
+    if commas and separator == "," and all(_THOUSANDS.fullmatch(cell) for cell in commas):
+        raise InputError(path, f"line {line} and after", commas[0], "the comma can be a decimal sign or one of "
+                         "thousands: write numbers with a decimal point and nothing else")  # fmt: skip
+    return "," if commas else "."
 
 
 def is_number(cell: str) -> bool:

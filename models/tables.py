@@ -1,10 +1,12 @@
 """Tables of measured values: CSV with the unit of every column in its header, read strictly.
 
-The accepted text, in full: UTF-8; lines that start with ``#`` and empty lines are skipped; the first
-other line is the header, ``name [unit], name [unit], ...`` in any order; every further line holds one
-finite number per column (or none, or ``nan``, where the reader allows gaps), comma between columns, point
-as decimal sign; the last line ends with a line end, because without one nobody can tell a complete last
-number from one that was cut off.
+The accepted text, in full: UTF-8, or UTF-16 with its mark; lines that start with ``#`` and empty lines are
+skipped; the first other line is the header, ``name [unit], name [unit], ...`` in any order; every further
+line holds one finite number per column (or none, or ``nan``, where the reader allows gaps), comma between
+columns, point as decimal sign; the last line ends with a line end, because without one nobody can tell a
+complete last number from one that was cut off. What spreadsheets and loggers make of such a table (semicolons
+and decimal commas, tabs, quotes, titles above, units in a row beneath the headings, a line ``sep=``) is
+turned into that form first, by ``models.csv_plain``, where it has one meaning.
 """
 
 import math
@@ -31,6 +33,10 @@ RADIANS_PER_SECOND = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
 GAPS = ("", "nan")
 """Cells that say that nothing was measured, where that is allowed."""
 
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+"""Marks that text in UTF-16 begins with."""
+HEAD = 100_000
+"""Characters among which the headings of a plain table are."""
 KEPT = 4
 """Texts whose numbers are kept: every engine and every method of a comparison reads the same few files."""
 
@@ -63,6 +69,10 @@ def read_table(
     InputError : naming file, line (counted from 1), column, value, what is allowed and the nearest match
     """
     text = whole_text(path)
+    if not _is_plain(text, columns):
+        from models.csv_plain import plain_text
+
+        text = plain_text(path, text, tuple(columns))
     header, rows = _header_and_rows(path, text)
     names, factors = headings(path, header, columns)
     raw = _numbers(path, text, tuple(gaps and name != increasing for name in names))
@@ -85,11 +95,20 @@ def write_table(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]])
 def whole_text(path: str | Path) -> str:
     """Whole text of a file; whatever prevents reading it is the user's to repair."""
     try:
-        return Path(path).read_bytes().decode("utf-8-sig")
+        data = Path(path).read_bytes()
+        return data.decode("utf-16" if data.startswith(UTF_16) else "utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(path, f"byte {error.start}", None, "the file must be text in UTF-8") from None
     except OSError as error:
         raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
+
+
+def _is_plain(text: str, columns: Columns) -> bool:
+    """Whether the first line of a text is one of headings with units, and no cell is in quotes."""
+    first = next((line for line in text[:HEAD].split("\n") if line.strip() and not line.startswith("#")), "")
+    names = [cell.partition("[")[0].strip() for cell in first.split(",")]
+    strange = '"' in text or ";" in first or "\t" in first or "[" not in first or names[-1] == ""
+    return not strange and any(name in columns for name in names)
 
 
 @lru_cache(KEPT)

@@ -111,7 +111,7 @@ def test_the_case_sees_a_form_that_is_read_wrong(tmp_path, monkeypatch):
 
 
 def test_the_case_sees_a_form_that_is_read_without_a_word(tmp_path, monkeypatch):
-    monkeypatch.setattr(csv_layout, "_decimal", lambda path, head, cells: ",")
+    monkeypatch.setattr(csv_layout, "decimal_sign", lambda path, line, separator, cells: ",")
     monkeypatch.setattr(csv_rows, "_unquoted", lambda path, layout, text, line: text.replace(b'"', b""))
     assert any(row.status == "failed" for row in case.forms(tmp_path))
 

@@ -14,10 +14,12 @@ from models.csv_header import (
     TIMED,
     Head,
     Line,
+    decimal_sign,
     find_head,
     find_headings,
     heading,
     is_number,
+    separator_line,
     split,
 )
 from models.errors import InputError
@@ -40,10 +42,8 @@ TIME_UNITS = {"s": 1.0, "sec": 1.0, "secs": 1.0, "second": 1.0, "seconds": 1.0, 
               "msec": 1e-3, "milliseconds": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}  # fmt: skip
 """In small letters -> s."""
 _RATE = re.compile(r"\d\s*k?hz\b|(rate|freq|abtast|sampl|interval|period|increment|delta[ _]?t)\D*\d", re.IGNORECASE)
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
 _BEGUN = re.compile(r"[+-]?[.,]?\d")
-_SEPARATOR_LINE = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
 NEEDED = "a CSV file needs a header line name [unit], ... and rows of numbers, as text"
 
 
@@ -106,8 +106,8 @@ def read_top(path: Path) -> Top:
     top = Top(np.dtype({"utf-16-le": "<u2", "utf-16-be": ">u2"}.get(codec, "u1")))
     for line in _lines(data, begin, codec, top):
         shown = line.text.strip()
-        if line.number == 1 and (found := _SEPARATOR_LINE.fullmatch(line.text.rstrip(" "))) is not None:
-            top.separator = found[1]
+        if line.number == 1 and separator_line(line.text):
+            top.separator = separator_line(line.text)
         elif shown.startswith("#"):
             top.hashed.append(line)
         elif shown:
@@ -243,7 +243,7 @@ def find_layout(
     texts = tuple(i for i, cells in enumerate(columns) if i not in (clock, *nameless) and _is_text(cells))
     taken = tuple(sorted({*texts, *nameless, *((clock,) if stamps else ())}))
     numbers = {cell: None for i, cells in enumerate(columns) if i not in taken for cell in cells}
-    decimal = _decimal(path, head, list(numbers))
+    decimal = decimal_sign(path, head.line + 1, head.separator, list(numbers))
     layout = Layout(head.separator, decimal, head.begin, head.line, head.names, head.width, taken, clock, stamps,
                     top.unit)  # fmt: skip
     said = [notice(path, "doubt" if units[i] or heading(head.names[i])[1] else "note",
@@ -283,19 +283,6 @@ def _is_text(cells: list[str]) -> bool:
     said = [cell for cell in cells if not MARKS.fullmatch(cell)]
     return bool(said) and all(TIMED.fullmatch(cell) or _DATE.fullmatch(cell) or not _BEGUN.match(cell)
                               for cell in said)  # fmt: skip
-
-
-def _decimal(path: Path, head: Head, cells: list[str]) -> str:
-    """Decimal sign of the first rows."""
-    commas = [cell for cell in cells if "," in cell]
-    place = f"line {head.line + 1} and after"
-    if commas and any("." in cell for cell in cells if is_number(cell.replace(",", ""))):
-        raise InputError(path, place, commas[0], "the numbers hold points and commas: write them with one decimal sign "
-                         "and nothing else, without separators of thousands")  # fmt: skip
-    if commas and head.separator == "," and all(_THOUSANDS.fullmatch(cell) for cell in commas):
-        raise InputError(path, place, commas[0], "the comma can be a decimal sign or one of thousands: write numbers "
-                         "with a decimal point and nothing else")  # fmt: skip
-    return "," if commas else "."
 
 
 def find_units(path: Path, top: Top, head: Head, clock: int) -> tuple[tuple[str, ...], list[Finding]]:
