@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from models.errors import InputError
+from models.whole_files import write_whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,11 +66,9 @@ class Result:
 
 def write(data: "xr.Dataset", path: Path) -> None:
     """Write netCDF whole or not at all; numbers with checksums, so that whoever reads a damaged file is told."""
-    part = path.with_name(f".{path.name}.part")
     checked = {name: {"fletcher32": True} for name, own in data.variables.items() if own.size and own.ndim
                and own.dtype.kind in "fiu"}  # fmt: skip
-    data.to_netcdf(part, engine="h5netcdf", encoding=checked)
-    os.replace(part, path)
+    write_whole(path, data.to_netcdf(engine="h5netcdf", encoding=checked))  # HDF5 itself crashes on a full disk
 
 
 def load(path: Path) -> Result:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.assembly import Assembly, assemble
+from models.engines.catalogue import OUTSIDE
 from models.engines.protocol import Model, Settings, Trajectory, build, settings_of
 from models.errors import InputError
 from models.result import Result, provenance
@@ -17,7 +18,10 @@ Channels = dict[str, tuple[str, str, np.ndarray]]
 
 
 def simulate(scene: Scene, engine: str, settings: Settings | None = None) -> Result:
-    """Run a scene in one engine; raises InputError, Refused or RunFailed, never returns a partial run."""
+    """Run a scene in one engine; raises InputError, Refused or RunFailed, never returns a partial run.
+
+    A run of an engine from outside the tree is compared with the reference, and says so in "beside reference".
+    """
     assembly = assemble(scene)
     own = settings or settings_of(scene, engine)
     keep = _keep_every(scene, own)
@@ -25,7 +29,12 @@ def simulate(scene: Scene, engine: str, settings: Settings | None = None) -> Res
     start = time.perf_counter()
     trajectory = model.run()
     seconds = time.perf_counter() - start
-    return _label(assembly, engine, own, trajectory, outputs(assembly, trajectory, model), keep, seconds)
+    result = _label(assembly, engine, own, trajectory, outputs(assembly, trajectory, model), keep, seconds)
+    if engine in OUTSIDE:
+        from models.engines.beside_reference import beside_reference
+
+        result.data.attrs["beside reference"] = beside_reference(engine, assembly, own, trajectory)
+    return result
 
 
 def _keep_every(scene: Scene, settings: Settings) -> int:

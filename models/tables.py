@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from models.errors import InputError
+from models.whole_files import write_whole
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 DISTANCES = {"m": 1.0, "km": 1e3}
@@ -89,7 +90,7 @@ def write_table(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]])
     names = [f"{name} [{unit}]" for name, (unit, _) in columns.items()]
     line = ",".join(["%.17g"] * len(names)) + "\n"
     rows = zip(*(np.asarray(values).tolist() for _, values in columns.values()), strict=True)
-    Path(path).write_text(",".join(names) + "\n" + "".join([line % row for row in rows]), encoding="utf-8")
+    write_whole(Path(path), ",".join(names) + "\n" + "".join([line % row for row in rows]))
 
 
 def whole_text(path: str | Path) -> str:

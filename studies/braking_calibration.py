@@ -18,6 +18,7 @@ from models.ensemble.runner import run_paths
 from models.ensemble.workers import processes
 from models.errors import InputError, RunFailed
 from models.strict import Strict, quantity, read
+from models.whole_files import write_whole
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
@@ -84,7 +85,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         found = _means(last, options, options.last, pool, options.seed + 1)
     rows = ["scale,steer [rad],deceleration [m/s^2],aside [m]"]
     rows += [",".join(f"{value:.9g}" for value in step) for step in steps]
-    (folder / "calibration.csv").write_text("\n".join(rows) + "\n")
+    write_whole(folder / "calibration.csv", "\n".join(rows) + "\n")
     stop = Stop(drive(last, options.procedure))
     save(last, options.procedure, stop.path, folder / "calibration.nc")
     stop_figure(last, options.procedure, stop, folder / "calibration.png")

@@ -15,6 +15,7 @@ from models.braking.scene import BrakingScene, ControllerTable, RoadTable, Stret
 from models.braking.stop_report import Stop
 from models.errors import RunFailed
 from models.strict import Strict, read
+from models.whole_files import write_whole
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
@@ -114,7 +115,7 @@ def _save(found: list[tuple[Case, dict[str, float]]], file: Path) -> None:
     rows = [",".join(["surface", "procedure", "controller", *heads])]
     rows += [",".join([case.surface, case.procedure, case.controller, *(f"{values[head]:.17g}" for head in heads)])
              for case, values in found]  # fmt: skip
-    file.write_text("\n".join(rows) + "\n")
+    write_whole(file, "\n".join(rows) + "\n")
 
 
 PANELS = {"v0^2/2d [m/s^2]": "Equivalent deceleration", "yaw [deg]": "Final yaw angle"}

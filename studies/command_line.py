@@ -15,6 +15,7 @@ from typer.exceptions import TyperException
 
 from models.errors import InputError, RunFailed
 from models.measured.file_kinds import is_measurement
+from models.whole_files import reason_of
 from studies.asked import SCENES, engines_of, load_scene, plan_of, ready
 
 app = typer.Typer(
@@ -52,7 +53,7 @@ def main() -> None:
     except MemoryError:
         _end("the run failed: it does not fit into the memory of this machine; use a longer step or shorten it", 1)
     except OSError as error:
-        _end(f"the results could not be written: {error}", 1)
+        _end(f"the results could not be written: {reason_of(error)}", 1)
 
 
 def _end(message: str, code: int) -> NoReturn:

@@ -10,6 +10,7 @@ import numpy as np
 
 from models.errors import InputError
 from models.result import load
+from models.whole_files import whole_file
 
 SUFFIXES = (".nc", ".csv")
 SHOWN = 20
@@ -261,7 +262,7 @@ def report(one: Path, two: Path, folder: Path) -> dict[str, Any]:
 
 
 def _save(path: Path, found: list[Difference]) -> None:
-    with path.open("w", newline="") as file:
+    with whole_file(path) as part, part.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("quantity", "unit", "largest difference", "at", "rms difference", "share of largest value"))
         writer.writerows((d.name, d.unit, d.largest, d.where, d.rms, d.share)

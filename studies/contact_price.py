@@ -13,6 +13,7 @@ from models.contact.work_precision import WAYS, cheapest_lines, ellipse_cases, e
 from models.errors import InputError
 from models.seconds import cost
 from models.strict import Strict, read
+from models.whole_files import write_whole
 
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]
@@ -55,7 +56,7 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
         progress(way.name, 0.5 + 0.5 * i / len(WAYS))
         points += [measure(way, cells, known) for cells in way.cells]
     table = _table(points, len(known), max(case.error for case in known))
-    (folder / "table.txt").write_text("\n".join(table) + "\n")
+    write_whole(folder / "table.txt", "\n".join(table) + "\n")
     from studies.contact_figures import price_figure
     from studies.figures import save
 

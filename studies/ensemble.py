@@ -30,6 +30,7 @@ from models.scene import Scene
 from models.simulate import state_names
 from models.steps import divides
 from models.strict import Strict, quantity, read
+from models.whole_files import write_whole
 from studies.virtual_measurement import check_road, follower, measure, stride, write_measurement
 
 Progress = Callable[[str, float], None]
@@ -99,7 +100,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     _save(folder, scene, job, times, found)
     rows = _rows(options, times, found["states"] - true)
     table = text(options, scene, rows, found, gaps)
-    (folder / "table.txt").write_text("\n".join(table) + "\n")
+    write_whole(folder / "table.txt", "\n".join(table) + "\n")
     _figure(times, found["states"][:, :, 3] - true[:, 3], found["drift_off"], options, folder)
     told = {engine: None if math.isnan(worst) else worst for engine, worst in gaps.items()}
     return {"scene": scene.title, "folder": str(folder), "paths": options.paths, "rows": rows, "gaps": told,

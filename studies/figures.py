@@ -10,6 +10,7 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
 import studies.log_axis  # noqa: F401  the scale "log" of every figure
+from models.whole_files import whole_file
 
 
 class _Colours(dict[str, str]):
@@ -37,6 +38,7 @@ plt.rcParams.update({
 def save(figure: Figure, path: Path) -> Path:
     """Write ``path`` (.svg or .png) without a date, close the figure and return the path."""
     metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-    figure.savefig(path, metadata=metadata)
+    with whole_file(path) as part:
+        figure.savefig(part, metadata=metadata)
     plt.close(figure)
     return path

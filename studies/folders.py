@@ -7,6 +7,7 @@ from itertools import count
 from pathlib import Path
 
 from models.errors import InputError
+from models.whole_files import FULL
 
 COMMAND = "command.txt"
 """First file of a folder that the user named: what made the others."""
@@ -27,7 +28,7 @@ def new_folder(wanted: Path | None, name: str) -> Path:
             raise InputError("--out", "", str(wanted), "is a file: name a folder")
         free = _made(wanted) or not any(wanted.iterdir())
     except OSError as error:
-        raise InputError("--out", "", str(wanted), f"cannot be used: {error.strerror}") from None
+        raise _unusable(wanted, "cannot be used", error) from None
     if not free or not _marked(wanted):
         allowed = "holds files already and is left as it is: name a new or empty folder"
         raise InputError("--out", "", str(wanted), allowed)
@@ -50,6 +51,10 @@ def _marked(folder: Path) -> bool:
             file.write(" ".join(sys.argv) + "\n")
     except FileExistsError:
         return False
+    except OSError as error:
+        (folder / COMMAND).unlink(missing_ok=True)
+        error.filename = str(folder / COMMAND)
+        raise
     return True
 
 
@@ -76,5 +81,10 @@ def _made(path: Path) -> bool:
     except FileExistsError:
         return False
     except OSError as error:
-        raise InputError("--out", "", str(path), f"cannot be made: {error.strerror}") from None
+        raise _unusable(path, "cannot be made", error) from None
     return True
+
+
+def _unusable(folder: Path, what: str, error: OSError) -> Exception:
+    """A full disk is no mistake of what the user wrote."""
+    return error if error.errno in FULL else InputError("--out", "", str(folder), f"{what}: {error.strerror}")

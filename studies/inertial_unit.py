@@ -25,6 +25,7 @@ from models.section_forces import CHANNELS, section_forces
 from models.sensors.gyro import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR, angle_variance, bias
 from models.simulate import simulate
 from models.strict import Strict, quantity, read
+from models.whole_files import write_whole
 
 Progress = Callable[[str, float], None]
 Positive = Annotated[float, Field(gt=0)]
@@ -90,7 +91,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     pairs = [(grade, minutes) for grade in range(len(options.grades)) for minutes in options.durations]
     rows = [_row(options, grade, minutes, paths, curves) for grade, minutes in pairs]
     table = text(rows, options, tuple(curves))
-    (folder / "table.txt").write_text("\n".join(table) + "\n")
+    write_whole(folder / "table.txt", "\n".join(table) + "\n")
     if curves:
         _figures(rows, options, next(iter(curves.values())), folder)
     return {"scene": scene.title, "folder": str(folder), "rows": rows, "cheapest": cheapest(rows, options),

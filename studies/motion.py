@@ -25,6 +25,7 @@ from models.simulate import simulate
 from models.strict import Strict, quantity, read
 from models.tables import ACCELERATIONS
 from models.time_series import read_time_series, write_time_series
+from models.whole_files import write_whole
 
 Progress = Callable[[str, float], None]
 CHANNELS = {"pitch": ("pitch", "rad"), "rate": ("pitch_rate", "rad/s"), "heave": ("z3", "m")}
@@ -82,7 +83,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         _save(source, folder)
         sources.append(source)
     table = [*_on_array(array), *(line for source in sources for line in _lines(source, p)), *_closing(options)]
-    (folder / "table.txt").write_text("\n".join(table) + "\n")
+    write_whole(folder / "table.txt", "\n".join(table) + "\n")
     progress("figure", 1.0)
     if sources:
         _figure(sources[0], folder / "motion.png")

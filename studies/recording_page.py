@@ -2,7 +2,6 @@
 
 import base64
 import math
-import os
 import platform
 import sys
 from dataclasses import dataclass, field
@@ -20,6 +19,7 @@ from models.measured.finding import Finding
 from models.measured.section_run import Outcome
 from models.measured.sections import Answer
 from models.measured.verdict import DISAGREES, errors
+from models.whole_files import write_whole
 from studies import recording_runs as draw
 from studies.recording import FREE, Found, handed_on
 from studies.recording_figures import figure
@@ -64,9 +64,7 @@ def write(found: Found, path: Path) -> Path:
     """Write the page, whole or not at all; returns its path."""
     with TemporaryDirectory() as folder:
         text = page(found, Path(folder))
-    part = path.with_suffix(".part")
-    part.write_text(text, encoding="utf-8")
-    os.replace(part, path)
+    write_whole(path, text)
     return path
 
 

@@ -33,6 +33,7 @@ from models.road.isotropic import isotropic_like, spectral_matrix
 from models.strict import Strict, quantity, read
 from models.vehicles.spatial import PartOutput, PointOutput, SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import preloads, wheels
+from models.whole_files import write_whole
 
 SYSTEM = "ride"
 Progress = Callable[[str, float], None]
@@ -149,7 +150,7 @@ def _save(scene: RideScene, vehicle: SpatialVehicle, linear: Linear, found: dict
     data["unit"] = ("output", list(units(vehicle, linear(speed), one)))
     data.attrs = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
     write(data, folder / "deviations.nc")
-    data["deviation"].to_dataframe().to_csv(folder / "deviations.csv")
+    write_whole(folder / "deviations.csv", data["deviation"].to_dataframe().to_csv())
     at = linear(speed)
     system = weighted(excited(at, excitation_of(scene, at.wheels), speed), scene.weighting)
     save(system, stationary(system), folder / "system")

@@ -39,7 +39,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "failed": failed,
         "largest difference of states": agreement(results),
         "doubts": list(assembly.doubts),
-        "table": [*trust_line(assembly), *doubt_lines(assembly)],
+        "table": [*trust_line(assembly), *doubt_lines(assembly), *_beside_reference(results)],
     }
 
 
@@ -52,6 +52,12 @@ def _line(result: Result) -> dict[str, Any]:
         "counts": result.counts(),
         "channels": summary(result),
     }
+
+
+def _beside_reference(results: dict[str, Result]) -> list[str]:
+    """How far engines from outside the tree are from the reference, a line each."""
+    texts = {engine: result.data.attrs.get("beside reference") for engine, result in results.items()}
+    return [f"  {engine}: {text}" for engine, text in texts.items() if text]
 
 
 def agreement(results: dict[str, Result]) -> dict[str, float]:

@@ -17,6 +17,7 @@ from models.result import Result
 from models.scene import Scene
 from models.simulate import simulate
 from models.strict import Strict, quantity, read
+from models.whole_files import write_whole
 from studies.virtual_measurement import PAPER, check_road, follower, measure, stride, write_measurement
 
 Progress = Callable[[str, float], None]
@@ -58,7 +59,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         runs[engine][name].every(KEPT).save(folder / f"{engine} {name}.nc")
     found = [row(engine, name, measured, result) for engine in engines for name, result in runs[engine].items()]
     table = text(found, engines, options, deviation)
-    (folder / "table.txt").write_text("\n".join(table) + "\n")
+    write_whole(folder / "table.txt", "\n".join(table) + "\n")
     progress("figures", 1.0)
     if not failed:
         _figures(measured, runs[engines[0]], folder)

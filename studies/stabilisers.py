@@ -42,6 +42,7 @@ from models.simulate import simulate
 from models.strict import Strict, quantity, read
 from models.time_series import write_time_series
 from models.vehicles.pitch_plane import Parameters
+from models.whole_files import whole_file, write_whole
 from studies.virtual_measurement import (
     PAPER,
     check_road,
@@ -93,7 +94,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     progress("sweep of stiffness and cut-off", len(benches) / (len(benches) + 1))
     sweep = {bench.road: bench.sweep() for bench in benches}
     table = text(rows, benches, options)
-    (folder / "table.txt").write_text("\n".join(table) + "\n")
+    write_whole(folder / "table.txt", "\n".join(table) + "\n")
     _write_csv(folder / "score.csv", rows)
     from studies.figures import save
     from studies.stabiliser_figures import decision, stiffness
@@ -319,7 +320,7 @@ def _ratio(value: float | None) -> str:
 
 
 def _write_csv(path: Path, rows: list[Row]) -> None:
-    with path.open("w", newline="") as file:
+    with whole_file(path) as part, part.open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)

@@ -62,8 +62,7 @@ def _page(job: "Points", panels: list[tuple[str, dict[str, list[Any]]]], failure
                for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}  # fmt: skip
     figure.legend(handles.values(), handles.keys(), loc="outside upper right", ncols=max(1, len(handles)))
     figure.suptitle(f"{job.scene.rpartition('/')[2]} over {job.key}: {note}", x=0.01, ha="left", fontweight="bold")
-    part = job.folder / f".{name}.part.png"
-    save(figure, part).replace(job.folder / name)
+    save(figure, job.folder / name)
 
 
 def _places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:

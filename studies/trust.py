@@ -25,6 +25,7 @@ from models.result import Result
 from models.scene import Scene, build
 from models.simulate import simulate
 from models.strict import Strict, quantity, read
+from models.whole_files import write_whole
 from studies.virtual_measurement import check_road, check_steps, follower, measure, stride, write_measurement
 
 Progress = Callable[[str, float], None]
@@ -68,7 +69,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     spread = _ensemble(base, deviation, options, engines[0])
     rows = _rows(curves, runs, spread, options)
     table = _text(rows, options, deviation, growth(assembly).rate, base, curves)
-    (folder / "table.txt").write_text("\n".join(table) + "\n")
+    write_whole(folder / "table.txt", "\n".join(table) + "\n")
     progress("figure", 0.9)
     _figure(curves, runs, spread, options, folder / "error_growth.png")
     return {"scene": scene.title, "folder": str(folder), "rows": rows, "failed": {}, "table": table}

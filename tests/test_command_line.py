@@ -160,7 +160,7 @@ def test_a_machine_that_is_too_small_is_said_so(twinrig, error, monkeypatch, cap
     monkeypatch.setattr(single_run, "simulate", _failing("reference", error))
     assert twinrig("run", "release", *SHORT) == 1
     said = capsys.readouterr().err
-    assert said.startswith("twinrig: ") and said.count("\n") == 1 and ("memory" in said or "No space" in said)
+    assert said.startswith("twinrig: ") and said.count("\n") == 1 and ("memory" in said or "disk is full" in said)
 
 
 def test_the_console_command_is_this_one():

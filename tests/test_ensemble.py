@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from models import whole_files
 from models.engines import protocol
 from models.ensemble import store
 from models.ensemble.engines import gap, mujoco_threads
@@ -207,7 +208,7 @@ def test_an_interrupt_while_workers_start_reaches_none_of_them():
 
 def test_a_full_disk_ends_the_run_at_once_and_keeps_what_is_finished(folder, expected, tmp_path, monkeypatch):
     """What was half written is not there; with room again, the run goes on."""
-    monkeypatch.setattr(store.os, "fsync", _full_after(3))  # the note and two blocks
+    monkeypatch.setattr(whole_files.os, "fsync", _full_after(3))  # the note and two blocks
     with pytest.raises(RunFailed, match=r"the disk is full.*finished blocks are kept.*make room and resume"):
         run_paths(job(folder), PATHS, tmp_path, block=BLOCK)
     monkeypatch.undo()
@@ -232,7 +233,7 @@ def _full_after(writes):
 def test_two_processes_never_work_in_one_folder(folder, tmp_path):
     with store.locked(tmp_path), pytest.raises(InputError, match="another process is at work"):
         run_paths(job(folder), 2, tmp_path)
-    (tmp_path / store.PART.format("block 000000.npz", 1)).touch()  # of a process that was killed
+    (tmp_path / whole_files.PART.format("block 000000.npz", 1, ".npz")).touch()  # of a process that was killed
     run_paths(job(folder), 2, tmp_path)
     assert not list(tmp_path.glob("*.part")) and not list(tmp_path.glob(".*.part"))
 

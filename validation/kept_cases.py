@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from models.ensemble.runner import AHEAD, run_paths
-from models.ensemble.store import Arrays, code, write_whole
+from models.ensemble.store import Arrays, code
+from models.whole_files import write_whole
 from validation.rows import Row
 from validation.scenes import data_folder
 

@@ -12,9 +12,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from models.ensemble.store import locked, write_whole
+from models.ensemble.store import locked
 from models.ensemble.workers import processes
 from models.result import provenance
+from models.whole_files import whole_file, write_whole
 from validation.changes import against, lines
 from validation.kept_cases import Cases, Outcomes, measured
 from validation.report.shares import full
@@ -172,7 +173,7 @@ def save(folder: Path, rows: list[Row], source: dict[str, Any], earlier: dict[st
         content["against"] = against(earlier, table, source)
         print("\n".join(lines(content["against"])))
     write_whole(folder / "results.json", json.dumps(content, indent=1).encode())
-    with (folder / "results.csv").open("w", newline="") as file:
+    with whole_file(folder / "results.csv") as part, part.open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(Row.__dataclass_fields__))
         writer.writeheader()
         writer.writerows(table)

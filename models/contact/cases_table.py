@@ -20,6 +20,7 @@ from models.contact.scene import Method
 from models.errors import InputError
 from models.table_stream import Block, blocks
 from models.tables import METRES, NEWTONS, PER_METRE, SHARES
+from models.whole_files import whole_file
 
 MOTION = {"load": NEWTONS, "friction": SHARES, "xi_x": SHARES, "xi_y": SHARES, "spin": PER_METRE}
 BY_AXES = {"a": METRES, "b": METRES, **MOTION}
@@ -43,7 +44,7 @@ def answer(path: Path, out: Path, pair: Pair, method: Method, progress: Progress
     counts = {"rows": 0, "wrong": 0}
     reading = blocks(path, (BY_AXES, BY_CURVATURES))
     first = next(reading, None)
-    with out.open("w") as file:
+    with whole_file(out) as part, part.open("w") as file:
         file.write(",".join(HEADER) + "\n")
         for block in _with(first, reading):
             found, wrong = _answered(block, pair, method, extend)

@@ -6,7 +6,6 @@ cut into blocks of fixed size; each finished block is saved whole, and all of th
 their numbers.
 """
 
-import errno
 import math
 import time
 from collections import Counter, deque
@@ -21,6 +20,7 @@ import numpy as np
 
 from models.ensemble.store import Arrays, Store
 from models.errors import RunFailed
+from models.whole_files import FULL, reason_of
 
 BLOCK = 50
 """Paths per block: half a second of work of the pitch plane over 60 s, which a killed run may lose."""
@@ -30,8 +30,6 @@ TOLD = 5
 """Failed blocks that a message names."""
 LIVES = 3
 """Times that a block may lose its worker: among others, again among others, and alone, where it is to blame."""
-FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
-"""What a disk says that takes no more."""
 
 
 class Job(Protocol):
@@ -173,12 +171,12 @@ def _keep(store: Store | _Memory, block: int, arrays: Arrays) -> None:
     except OSError as error:
         if error.errno not in FULL:
             raise
-        raise _full(str(error), store) from None
+        raise _full(reason_of(error), store) from None
 
 
 def _full(reason: str, store: Store | _Memory) -> RunFailed:
     kept = f"; the finished blocks are kept in {store.folder}: make room and resume" if isinstance(store, Store) else ""
-    return RunFailed("ensemble", f"the disk is full: {reason}{kept}")
+    return RunFailed("ensemble", f"{reason}{kept}")
 
 
 def _submitted(executor: Executor, job: Job, paths: range) -> Future:

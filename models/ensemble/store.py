@@ -3,7 +3,6 @@
 import hashlib
 import io
 import json
-import os
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,14 +16,13 @@ import numpy as np
 
 from models.errors import InputError
 from models.result import PACKAGES
+from models.whole_files import PART, write_whole
 
 Arrays = dict[str, np.ndarray]
 JOB = "job.json"
 """What the blocks of a folder belong to."""
 LOCK = ".lock"
 """File that the process at work in a folder holds."""
-PART = ".{}.{}.part"
-"""Name of a file while it is written, by its own name and that of the process."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ class Store:
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         with locked(self.folder):
-            for part in self.folder.glob(PART.format("*", "*")):
+            for part in self.folder.glob(PART.format("*", "*", "*")):
                 part.unlink(missing_ok=True)  # of a process that was killed while it wrote
             self._claim(fingerprint(facts))
             yield
@@ -79,20 +77,6 @@ class Store:
                 return {name: file[name] for name in file.files}
         except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
             raise InputError(self.path(block), "", None, f"is damaged ({error}): delete it and resume") from None
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all, even if the machine stops or the disk is full."""
-    part = path.with_name(PART.format(path.name, os.getpid()))
-    try:
-        with part.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from models.errors import InputError
 from models.measured.recording import Recording
 from models.measured.signal import Signal
+from models.whole_files import write_whole
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,7 @@ class Checkpoint:
         """Replace what was saved by these arrays."""
         buffer = BytesIO()
         np.savez(buffer, of=np.array(json.dumps(self.of)), **arrays)  # type: ignore[arg-type]
-        part = self.path.with_suffix(".part")
-        with part.open("wb") as file:
-            file.write(buffer.getbuffer())
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, self.path)
+        write_whole(self.path, buffer.getvalue())
 
 
 def digest(*parts: object) -> str:

@@ -26,6 +26,7 @@ from models.measured.scene import MeasuredScene
 from models.measured.signal import Signal
 from models.measured.timing import EVEN, Timing, timing
 from models.scene_effects import extended
+from models.whole_files import write_whole
 
 Progress = Callable[[str, float], None]
 COLUMNS, RAW, SOURCES, ABSURD = "recording.columns", "raw.columns", "sources.json", "no_value.json"
@@ -221,7 +222,7 @@ def _columns(folder: Path, scene: MeasuredScene, signals: Sequence[Signal], sour
     path = folder / SOURCES
     if path.is_file() and json.loads(path.read_text()) != now:
         raise InputError(path, "", None, "was written from other files or by another map: choose a new folder")
-    path.write_text(json.dumps(now))
+    write_whole(path, json.dumps(now))
     return Columns(folder / COLUMNS, tuple(signal.name for signal in signals), grid.count)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from models.errors import InputError
+from models.whole_files import write_whole
 
 ITEM = np.dtype("<f8")
 
@@ -37,9 +38,7 @@ class Columns:
         """Say that the first ``done`` samples of every signal are complete."""
         self.done = done
         text = json.dumps({"names": list(self.names), "count": self.count, "done": done})
-        part = self._journal.with_suffix(".part")
-        part.write_text(text)
-        os.replace(part, self._journal)
+        write_whole(self._journal, text)
 
     def put(self, names: tuple[str, ...], first: int, values: np.ndarray) -> None:
         """Samples (n, names) of some signals from sample ``first`` on; the journal does not count them."""

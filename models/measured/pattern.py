@@ -10,6 +10,7 @@ from models.measured.formats import write
 from models.measured.formats.writing import Group
 from models.measured.scene import MeasuredScene
 from models.measured.virtual import VirtualMeasurement, map_lines
+from models.whole_files import write_whole
 
 BEGAN = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)
 """When a virtual measurement began: the same in every one, so that it repeats bit for bit."""
@@ -29,7 +30,7 @@ def write_pattern(scene: MeasuredScene, found: VirtualMeasurement, samples: np.n
                   found.period, len(samples), blocks)  # fmt: skip
     file = write(folder / f"measured.{scene.virtual.format}", [group], BEGAN, f"{COMMENT}: {scene.title}")
     path = folder / "scene.toml"
-    path.write_text(_text(scene, found, file.name), encoding="utf-8")
+    write_whole(path, _text(scene, found, file.name))
     return path
 
 

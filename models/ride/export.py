@@ -7,6 +7,7 @@ import numpy as np
 
 from models.ride.covariance import Covariance
 from models.ride.delayed_system import DelayedSystem
+from models.whole_files import whole_file
 
 if TYPE_CHECKING:
     import control
@@ -28,8 +29,10 @@ def save(system: DelayedSystem, covariance: Covariance, stem: Path) -> list[Path
 
     content = matrices(system, covariance)
     paths = [stem.with_suffix(".npz"), stem.with_suffix(".mat")]
-    np.savez(paths[0], **content)
-    savemat(paths[1], {**content, "outputs": content["outputs"].astype(object)})
+    with whole_file(paths[0]) as part:
+        np.savez(part, allow_pickle=False, **content)
+    with whole_file(paths[1]) as part:
+        savemat(part, {**content, "outputs": content["outputs"].astype(object)})
     return paths
 
 

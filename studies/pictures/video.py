@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.image import imsave
 
+from models.whole_files import whole_file
+
 PACKAGES = ("imageio", "imageio_ffmpeg")
 
 
@@ -25,7 +27,7 @@ def write(path: Path, frames: Iterable[np.ndarray], per_second: int) -> Path:
     gif: dict[str, Any] = {"duration": 1000.0 / per_second, "loop": 0}
     mp4: dict[str, Any] = {"fps": per_second, "codec": "libx264", "quality": 7}
     writer: Any
-    with imageio.get_writer(path, **(gif if path.suffix == ".gif" else mp4)) as writer:
+    with whole_file(path) as part, imageio.get_writer(part, **(gif if path.suffix == ".gif" else mp4)) as writer:
         for frame in frames:
             writer.append_data(frame)
     return path
@@ -34,5 +36,6 @@ def write(path: Path, frames: Iterable[np.ndarray], per_second: int) -> Path:
 def still(path: Path, image: np.ndarray) -> Path:
     """Write one image (h, w, 3) to a PNG file, the same bytes from the same image."""
     metadata: Any = {"Software": None}
-    imsave(path, np.ascontiguousarray(image), metadata=metadata)
+    with whole_file(path) as part:
+        imsave(part, np.ascontiguousarray(image), metadata=metadata)
     return path

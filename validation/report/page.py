@@ -4,13 +4,13 @@
 """
 
 import json
-import os
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from models.errors import InputError
+from models.whole_files import write_whole
 from validation.report import content
 from validation.report.numbers import duration, margin, marked, number, numeric_columns, powers, share
 from validation.report.shares import shares
@@ -29,9 +29,7 @@ def write(folder: Path, each: Callable[..., Iterable[Any]] = map) -> Path:
     """
     results = read(folder / "results.json")
     path = folder / "report.html"
-    part = folder / ".report.html.part"
-    part.write_text(page(results, folder / "data", each), encoding="utf-8")
-    os.replace(part, path)
+    write_whole(path, page(results, folder / "data", each))
     return path
 
 

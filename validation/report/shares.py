@@ -11,8 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, get_args
 
-from models.ensemble.store import write_whole
 from models.errors import InputError
+from models.whole_files import write_whole
 from validation.rows import System
 
 KEPT = Path(__file__).with_name("full_report.json")

@@ -10,7 +10,7 @@ from models.errors import InputError, similar_file
 from models.measured.channel import Source
 from models.measured.file_kinds import KNOWN, by_extension, format_of, usual_of
 from models.measured.formats.opened import Opened, notice
-from models.measured.formats.writing import Group, check_names, check_start, whole_file
+from models.measured.formats.writing import Group, check_names, check_start, new_file
 
 READERS = {"CSV": ("csv", "open_csv"), "ASAM MDF": ("mdf4", "open_mdf"), "RPC III": ("rpc3", "open_rpc"),
            "TDMS": ("tdms", "open_tdms")}  # fmt: skip
@@ -82,7 +82,7 @@ def write(
     check_start(path, start)
     module, _, name = WRITERS[path.suffix.lower()].partition(":")
     writer = getattr(import_module(f"models.measured.formats.{module}"), name or module)
-    with whole_file(path) as part:
+    with new_file(path) as part:
         writer(path, part, groups, start, comment)
     return path
 

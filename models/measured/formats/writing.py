@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from models.errors import InputError
+from models.whole_files import FULL
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ def check_start(path: Path, start: datetime | None) -> None:
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
+def new_file(path: Path) -> Iterator[Path]:
     """Path to write to, beside ``path`` and with its extension; ``path`` itself appears when all is written.
 
     Raises InputError where ``path`` exists, before or after, or nothing can be written; then nothing is left behind.
@@ -87,6 +88,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     except FileExistsError:
         raise _exists(path) from None
     except OSError as error:
+        if error.errno in FULL:
+            raise
         raise InputError(path, "", None, f"the file cannot be written: {error.strerror or error}") from None
     finally:
         part.unlink(missing_ok=True)

@@ -1,0 +1,44 @@
+"""Files that are written whole or not at all, even if the disk is full, the process is killed or the machine stops."""
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+PART = ".{}.{}.part{}"
+"""Name of a file while it is written: its final name, the number of the process, and its extension again."""
+FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG)
+"""What a system says where nothing more can be stored: the disk, the user's share of it, or a file is full."""
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Path of a part file beside ``path``, which takes the name ``path`` when the block has ended without an error.
+
+    An earlier file of that name is replaced. After an error nothing of the part is left, and the error goes on; if it
+    is one of the system's, it names ``path``.
+    """
+    part = path.with_name(PART.format(path.name, os.getpid(), path.suffix))
+    try:
+        yield part
+        with part.open("rb") as file:
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    except BaseException as error:
+        part.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            error.filename = str(path)
+        raise
+
+
+def write_whole(path: Path, content: bytes | memoryview | str) -> None:
+    """Write a file of these bytes, or of this text in UTF-8 with its line ends as they are."""
+    with whole_file(path) as part:
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def reason_of(error: OSError) -> str:
+    """What the system says of a file that could not be written, as a phrase with the file."""
+    reason = "the disk is full" if error.errno in FULL else error.strerror or str(error)
+    return " ".join(reason.split()) + (f" ({error.filename})" if error.filename else "")
