@@ -101,7 +101,8 @@ def _engines(scene: Scene, assembly: Assembly) -> list[str]:
     rows = [HEADINGS, *(_engine(scene, assembly, engine) for engine in CATALOGUE)]
     widths = [max(len(row[i]) for row in rows if len(row) > 2) for i in range(len(HEADINGS))]
     padded = [[cell.ljust(width) for cell, width in zip(row, widths, strict=False)] for row in rows]
-    return ["  " + "  ".join(row).rstrip() for row in padded]
+    note = ["  exudyn is handed M, D and K of the linear vehicle: no spring of its own takes part"]
+    return ["  " + "  ".join(row).rstrip() for row in padded] + (note if scene.vehicle.geometry == "linear" else [])
 
 
 def _engine(scene: Scene, assembly: Assembly, engine: str) -> tuple[str, ...]:

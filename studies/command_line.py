@@ -108,11 +108,19 @@ def show(
     loaded = load_scene(scene, changes)
     if not price:
         return print("\n".join([plan_of(loaded).describe(loaded), *_search(loaded)]))
+    _say_user_code(loaded)
     from validation.price.effects import price_list
     from validation.price.effects_text import as_dict, lines
 
     found = price_list(loaded, None if engine is None else engines_of(engine, loaded.system)[0])
     print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(lines(found, loaded.quantities)))
+
+
+def _say_user_code(scene: Any) -> None:
+    """Say on the terminal that code of the user's is about to run, which a price calls many times."""
+    code = getattr(plan_of(scene), "user_code", lambda scene: "")(scene)
+    if code:
+        print(f"twinrig: this runs your own code, many times: [port] {code}", file=sys.stderr, flush=True)
 
 
 def _search(scene: Any) -> list[str]:
@@ -181,6 +189,7 @@ def price(
     from validation.price.own_scene.text import as_dict, lines
 
     loaded = load_scene(scene, changes)
+    _say_user_code(loaded)
     found = price_of(loaded, tolerance, quantity, engines_of(engine, loaded.system))
     print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(lines(found)))
     if not found.winners:

@@ -166,3 +166,19 @@ def test_a_machine_that_is_too_small_is_said_so(twinrig, error, monkeypatch, cap
 def test_the_console_command_is_this_one():
     (command,) = entry_points(group="console_scripts", name="twinrig")
     assert command.load() is command_line.main
+
+
+def test_a_price_says_before_it_runs_code_of_the_user(twinrig, empty_folder, capsys, monkeypatch):
+    (empty_folder / "scene.toml").write_text('title = "t"\nsystem = "braking"\n[procedures.p]\nspeed = 11.1\n'
+                                             '[port]\ncallable = "mine.py:Mine"\n')
+    (empty_folder / "mine.py").write_text("class Mine: pass\n")
+    said = []
+
+    def stop(*given):
+        said.append(capsys.readouterr().err)
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("validation.price.effects.price_list", stop)
+    with pytest.raises(ZeroDivisionError):
+        twinrig("show", "scene.toml", "--price")
+    assert said == ["twinrig: this runs your own code, many times: [port] callable mine.py:Mine\n"]

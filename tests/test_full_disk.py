@@ -1,24 +1,13 @@
 """A full disk: one sentence, code 1, and every file that is there is whole."""
 
 import errno
-import resource
-from contextlib import contextmanager
 
 import pytest
 
 from models.whole_files import reason_of, whole_file, write_whole
 from studies.folders import COMMAND
-
-
-@contextmanager
-def files_of_at_most(size):
-    """No file of this process grows beyond ``size`` bytes, as on a disk that is full."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+from validation import full_disk
+from validation.full_disk import files_of_at_most
 
 
 def sizes(folder):
@@ -59,3 +48,11 @@ def test_earlier_file_survives(tmp_path):
 
 def test_other_reasons_keep_their_words():
     assert reason_of(PermissionError(errno.EACCES, "Permission denied", "x.csv")) == "Permission denied (x.csv)"
+
+
+def test_a_writer_that_leaves_its_part_is_seen(tmp_path, monkeypatch):
+    """The fault to be seen: the file appears under its own name as it is written."""
+    (tmp_path / "right").mkdir(), (tmp_path / "wrong").mkdir()
+    assert full_disk.damage(tmp_path / "right") == 0
+    monkeypatch.setattr("models.result.write_whole", lambda path, content: path.write_bytes(content))
+    assert full_disk.damage(tmp_path / "wrong") > full_disk.MOMENTS // 2

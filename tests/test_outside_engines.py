@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from models.assembly import assemble
+from models.engines import beside_reference
 from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED
 from models.engines.outside import register
 from models.engines.protocol import Settings, build
 from models.errors import InputError, Refused, RunFailed
 from models.simulate import simulate
-from validation import checks, conformity
+from validation import checks, conformity, wrong_engines
 from validation.scenes import force_scene, road_scene, write_forces
 
 
@@ -165,6 +166,20 @@ def test_a_name_that_leads_nowhere_is_refused_by_the_command(name, said, twinrig
     (empty_folder / "leaving.py").write_text("import sys\nsys.exit(3)\n")
     assert twinrig("run", "study_road", "--engine", name) == 2 == twinrig("validate", "--engine", name)
     assert said in capsys.readouterr().err and not (empty_folder / "results").exists()
+
+
+def test_wrong_integrators_are_told_in_a_run_and_right_ones_say_how_near_they_are(own, twinrig, capsys):
+    assert wrong_engines.passed() == []
+    assert wrong_engines.passed((wrong_engines.Right,)) == ["Right"]
+    assert twinrig("run", "study_road", "--engine", own(Scipy), "--set", "run.duration=0.2") == 0
+    assert "of the largest motion from the reference" in capsys.readouterr().out
+
+
+def test_the_comparison_with_the_reference_can_see(monkeypatch):
+    """The fault to be seen: an allowance that explains everything."""
+    monkeypatch.setattr(beside_reference, "_expected", lambda *given: 1e9)
+    monkeypatch.setattr(beside_reference, "CEILING", 1e9)
+    assert len(wrong_engines.passed()) == len(wrong_engines.WRONG)
 
 
 def test_an_engine_of_its_own_runs_and_what_it_cannot_do_is_refused(own, tmp_path):

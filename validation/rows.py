@@ -7,9 +7,9 @@ System = Literal[
     "pitch-plane", "drift", "contact", "ride", "rolling-vehicle", "anti-lock", "measured", "hard-cases", "cost",
     "effects",
 ]
-Independence = Literal["native", "shared kernel", "closed form", "published", "none"]
-"""How far the two sides are apart: separate force laws, the same force code, an exact answer, a published
-figure, or no second side."""
+Independence = Literal["native", "handed over", "shared kernel", "closed form", "published", "none"]
+"""How far the two sides are apart: separate force laws, an engine that is handed matrices, the same force code, an
+exact answer, a published figure, or no second side."""
 Status = Literal["failed", "missed", "not run", "reported", "passed"]
 """In the order in which they are told. ``failed`` and ``passed`` are judged, the same on any machine; ``missed`` is a
 stated aim that was not reached, as by seconds of a slow machine; ``reported`` stands without being judged."""

@@ -83,6 +83,12 @@ def describe(scene: BrakingScene) -> str:
     return "\n".join([*lines, *effect_lines(scene)])
 
 
+def user_code(scene: BrakingScene) -> str:
+    """Code of the user's that a run of the scene executes, "" if there is none."""
+    named = [key for key in ("callable", "command", "fmu") if getattr(scene.port, key, None) is not None]
+    return f"{named[0]} {getattr(scene.port, named[0])}" if named else ""
+
+
 def behind(scene: BrakingScene) -> str:
     """What answers at the port, or sets the pressures without being asked."""
     if scene.measured is not None:

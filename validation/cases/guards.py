@@ -11,6 +11,7 @@ import numpy as np
 from models.assembly import Assembly
 from models.engines.catalogue import CATALOGUE, MISSING
 from models.errors import InputError, RunFailed
+from validation import full_disk, wrong_engines
 from validation.hard_cases import prescribed_pitch, sampled_input, setups
 from validation.rows import Row, System, Table, at_most, behaves
 
@@ -130,7 +131,26 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             )
         )
     rows += [_reduced_row(engine) for engine in ("reference", "mujoco")]
-    return rows, {"unstable": endings}
+    return [*rows, *_outside_rows(), _disk_row(folder)], {"unstable": endings}
+
+
+def _outside_rows() -> list[Row]:
+    """Wrong integrators from outside the tree are told in every run; a right one passes."""
+    silent, right = wrong_engines.passed(), wrong_engines.passed((wrong_engines.Right,))
+    names = ", ".join(kind.__name__ for kind in wrong_engines.WRONG)
+    return [
+        at_most("guards.outside.silent", SYSTEM, f"wrong integrators from outside the tree that run without a word, of "
+                f"{names}", len(silent), "", 0.0, "every such run is held against the reference", "native"),
+        behaves("guards.outside.right", SYSTEM, "a right integrator from outside the tree, in the same comparison",
+                "answered" if right else "raised", "answered", "a check that refuses everything is no check"),
+    ]  # fmt: skip
+
+
+def _disk_row(folder: Path) -> Row:
+    """Files that a full disk leaves half written."""
+    return at_most("guards.full_disk", SYSTEM, f"moments, of {full_disk.MOMENTS}, at which a full disk leaves a file "
+                   "that is not whole, or goes unnoticed", full_disk.damage(folder), "", 0.0,
+                   "files are written whole or not at all", "none")  # fmt: skip
 
 
 def _unstable_rows(engine: str, endings: dict[str, Any], quick: bool) -> list[Row]:

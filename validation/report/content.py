@@ -19,6 +19,8 @@ Results = dict[str, Any]
 
 KINDS = {
     "native": "both sides have force laws of their own; what they share is the description of the vehicle",
+    "handed over": "the engine is handed M, D and K of the description: what is tested is these and the integrator, no "
+                   "spring of the engine's own",
     "shared kernel": "both sides call the same force code: nothing is learned about that code",
     "closed form": "the other side is an exact answer",
     "published": "the other side is a figure from the literature",
