@@ -145,6 +145,12 @@ def test_a_unit_in_parentheses_is_known_and_stays_in_the_name(tmp_path):
     assert [(one.name, one.unit) for one in source.channels] == [("Fz (kN)", "kN"), ("Fx (1)", "")]
 
 
+def test_units_beneath_the_headings_reach_the_channels(tmp_path):
+    for headings, row in ((BARE, "s,[kN],N m"), (("time [s]", "Fz", "Fx"), "-,kN,N m"), (BARE, "s;kN;N m")):
+        form = Form(headings, between=(row,), separator=";" if ";" in row else ",")
+        assert [one.unit for one in open_source(form.make(tmp_path)).channels] == ["kN", "N m"]
+
+
 def test_groups_above_the_headings_are_known_where_names_differ(tmp_path):
     source = open_source(Form(above=(",WFT VL,",)).make(tmp_path))
     assert [(one.name, one.family) for one in source.channels] == [("Fz", "WFT VL"), ("Fx", "WFT VL")]

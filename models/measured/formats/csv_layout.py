@@ -289,14 +289,15 @@ def find_units(path: Path, top: Top, head: Head, clock: int) -> tuple[tuple[str,
     """Units of the columns from a row beneath the headings; empty where there is none."""
     stamped = any(map(is_stamp, first_rows(top, head)[clock][:1]))
     rows = [(line, [_bare(cell) for cell in head.cells(line)]) for line in head.between]
-    found = next((row for row in rows if row[1][clock].casefold() in TIME_UNITS or stamped), None)
+    known = {*TIME_UNITS, "", "-"} if clock_heading(head.names[clock])[1] else set(TIME_UNITS)
+    found = next((row for row in rows if row[1][clock].casefold() in known or stamped), None)
     if found is None:
         said = [notice(path, "note", f"line {line.number}, beneath the headings, is not read: "
                        f"{line.text.strip()[:60]!r}") for line, _ in rows]  # fmt: skip
         return ("",) * len(head.names), said
     line, units = found
-    for name, unit in zip(head.names, units, strict=True):
-        if unit and heading(name)[1] not in ("", unit):
+    for i, (name, unit) in enumerate(zip(head.names, units, strict=True)):
+        if unit not in ("", "-") and heading(name)[1] not in ("", unit) and not (stamped and i == clock):
             raise InputError(path, f"line {line.number}", unit, f"the heading says {name!r}: name one unit")
     return tuple(units), [notice(path, "note", f"line {line.number}, beneath the headings, is read as units")]
 
