@@ -6,11 +6,13 @@ from scipy.linalg import expm
 
 from models.assembly import assemble
 from models.drift import pitch_filter, pitch_step
+from models.drift.innovations import LEVEL, consistency
 from models.drift.pitch_filter import INERTIA, PITCH, RATE, Measurement, estimate
 from models.drift.pitch_step import KEPT, RELATIVE, PitchStep
 from models.engines.protocol import Settings, build
 from models.engines.stability import first_order, linearised
 from models.errors import InputError, RunFailed
+from models.plan import describe
 from models.scene import build as build_scene
 from models.simulate import simulate
 from models.tables import NEWTONS
@@ -283,3 +285,48 @@ def test_a_measurement_that_contradicts_the_forces_is_refused(folder, wrong):
     own = {"pitch_deviation": ANGLE / 10} if wrong == "pitch_deviation" else {}
     with pytest.raises(InputError, match="contradicts forces and model"):
         assemble(scene(folder, drawn(folder, **own)))
+
+
+def test_right_innovations_are_called_wrong_as_seldom_as_stated():
+    rng, runs = np.random.default_rng(7), 3000
+    wrong = sum(not consistency(rng.standard_normal((400, 2)), ("pitch", "rate")).consistent for _ in range(runs))
+    # 3 of 3000 are expected; the tests of a run hang together a little; Poisson: more than 10 are seen once in 3000
+    assert wrong <= 10 and LEVEL == 1e-3
+    gaps = rng.standard_normal((4000, 1))
+    gaps[rng.random(4000) < 0.3] = np.nan
+    assert consistency(gaps, ("pitch",)).consistent
+
+
+@pytest.mark.parametrize("plant, named", [
+    (lambda w: 1.2 * w, "mean square"), (lambda w: 0.8 * w, "mean square"), (lambda w: w + 0.2, "mean of pitch"),
+    (lambda w: (w[1:] + 0.3 * w[:-1]) / 1.044, "correlation of pitch"),
+])  # fmt: skip
+def test_wrong_innovations_are_named(plant, named):
+    found = consistency(plant(np.random.default_rng(8).standard_normal((2000, 1))), ("pitch",))
+    assert not found.consistent and named in str(found)
+
+
+def measured_pitch(folder, bias=0.0):
+    """The pitch on forces with noise of 16 N, which the scene does not see, and an angle with a bias from 1 s on."""
+    clean, noise = free(folder)[:, 3], np.random.default_rng(3).standard_normal(401)
+    late = np.arange(401) >= 200
+    write_time_series(folder / "p.csv", {"pitch": ("rad", clean + ANGLE * noise + bias * late)}, PERIOD)
+    forces = read_time_series(folder / "f.csv", {"front": NEWTONS, "rear": NEWTONS})[0]
+    forces = forces + 16.0 * np.random.default_rng(4).standard_normal(forces.shape)
+    write_time_series(folder / "f.csv", {"front": ("N", forces[:, 0]), "rear": ("N", forces[:, 1])}, PERIOD)
+
+
+def test_a_filter_that_contradicts_its_measurement_is_named_by_plan_and_result(folder):
+    measured_pitch(folder)
+    assert assemble(scene(folder, drawn(folder))).doubts == ()
+    assert simulate(scene(folder, drawn(folder)), "reference").data.attrs["status"] == "complete"
+
+
+def test_a_biased_angle_and_wrong_deviations_are_named(folder):
+    measured_pitch(folder, bias=4 * ANGLE)
+    for changes in ({}, {"pitch_deviation": 2 * ANGLE}):
+        own = scene(folder, drawn(folder, **changes))
+        (text,) = assemble(own).doubts
+        assert "the filter contradicts p.csv" in text and "doubt      the filter" in describe(own)
+        result = simulate(own, "reference")
+        assert "in doubt" in result.data.attrs["status"] and "contradicts" in result.data.attrs["doubts"]

@@ -1,6 +1,7 @@
 """Verdicts on recordings follow from what their findings do to the section forces, held against planted truth."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,7 @@ def of(ridden: VirtualMeasurement, faults: dict, finding: Finding, folder: Path)
     samples = [ridden.samples(Faults(**one, noise=case.NOISE), case.SEED) for one in (faults, {})]
     own, right = (recording(ridden, values, folder / f"{i}.columns") for i, values in enumerate(samples))
     answers = [a for a in Sections(ridden.vehicle).answers if a.name == SECTION]
-    (found,) = consequences([finding], own, lambda each, place: made(ridden, each, place), answers, folder / "work")
+    (found,) = consequences([finding], own, partial(made, ridden), answers, folder / "work")
     wrong, true = (made(ridden, each, folder / name).samples(answers[0])[500:]
                    for each, name in ((own, "wrong"), (right, "true")))  # fmt: skip
     return found, rms(wrong - true) / rms(true - true.mean()), damage_ratio(wrong, true, SLOPE)
@@ -72,9 +73,9 @@ def test_lost_samples_are_judged_by_what_their_bridging_is_known_to(ridden, tmp_
         folder = tmp_path / str(length)
         folder.mkdir()
         answers = [a for a in Sections(ridden.vehicle).answers if a.name == SECTION]
-        own_recording, finding = recording(ridden, lossy, folder / "a.columns"), named(ridden, "gaps", 0.0, "s", "rr")
-        (found,) = consequences([finding], own_recording, lambda each, place: made(ridden, each, place), answers,
-                                folder / "work")  # fmt: skip
+        silent = recording(ridden, lossy, folder / "a.columns")
+        finding = named(ridden, "gaps", 0.0, "s", "rr")
+        (found,) = consequences([finding], silent, partial(made, ridden), answers, folder / "work")
         grades.append(found.grade)
     assert grades[0] == 0 and grades[1] > 0
 
@@ -82,7 +83,8 @@ def test_lost_samples_are_judged_by_what_their_bridging_is_known_to(ridden, tmp_
 def test_words_follow_the_bounds():
     finding, good = Finding("shift", "doubt", "fl", ""), Verdict("accepted", "held")
     one = Consequence(finding, "a", FORCE[0], 1.0 + 0.9 * DAMAGE[0])
-    words = [judged(good, [each]).word for each in (one, replace(one, force=2 * FORCE[0]), replace(one, damage=0.7),
-                                                    replace(one, force=2 * FORCE[1]), Consequence(finding))]  # fmt: skip
+    several = (one, replace(one, force=2 * FORCE[0]), replace(one, damage=0.7), replace(one, force=2 * FORCE[1]),
+               Consequence(finding))  # fmt: skip
+    words = [judged(good, [each]).word for each in several]
     assert words == ["accepted", "accepted with doubt", "rejected", "rejected", "accepted with doubt"]
     assert judged(good, []) is good and judged(Verdict("stabilise", ""), [one]).word == "stabilise"

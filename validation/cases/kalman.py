@@ -1,11 +1,14 @@
 """The Kalman filter of the pitch: consistency, stationary covariance, gaps, and what is left of the damage."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
 
+from models.drift.innovations import LEVEL as ALARMS
+from models.drift.innovations import consistency
 from models.drift.pitch_filter import PITCH, RATE
 from models.section_forces import CHANNELS
 from validation.drift import kalman_runs as runs
@@ -57,10 +60,32 @@ def _consistency_rows(folder: Path, count: int, duration: float, filters: tuple[
     )
     each, every = f"{count} runs, once a second", f"{count} runs, all innovations"
     rows = [_band_row("nees", "normalised error squared of 6 states", errors["right"], 6, each),
-            _band_row("nis", "normalised innovation squared", surprises["right"], 1, every)]
+            _band_row("nis", "normalised innovation squared", surprises["right"], 1, every),
+            *_named_rows([one[2] for one in found["right"]])]
     if "Q" in filters:
         rows += [_outside_row("wrong-q", "NEES", "force noise", errors["Q"], 6),
                  _outside_row("wrong-r", "NIS", "measurement noise", surprises["R"], 1)]
+    return rows
+
+
+BIAS, SLUGGISH = 0.2, 0.3
+"""Planted into the innovations of right filters: a mean, in deviations, and a correlation with the sample before."""
+
+
+def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
+    """Right filters that are called inconsistent, and wrong ones that are not."""
+    count = len(innovations)
+    alarms = sum(not consistency(one, ("pitch",)).consistent for one in innovations)
+    planted: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "larger by a quarter": lambda w: 1.25 * w, f"with a mean of {BIAS:g} deviations": lambda w: w + BIAS,
+        f"correlated by {SLUGGISH:g}": lambda w: np.vstack([w[:1], w[1:] + SLUGGISH * w[:-1]]),
+    }  # fmt: skip
+    rows = [at_most("kalman.alarms", SYSTEM, "right filters called inconsistent", alarms, "", 1,
+                    f"of {count} runs; stated level {ALARMS:g} of all runs", "closed form")]
+    for words, plant in planted.items():
+        silent = sum(consistency(plant(one), ("pitch",)).consistent for one in innovations)
+        rows.append(at_most(f"kalman.named.{words.split()[0]}", SYSTEM, f"filters whose innovations are {words}, not "
+                            "named", silent, "", 0, f"of {count} runs", "closed form"))  # fmt: skip
     return rows
 
 
