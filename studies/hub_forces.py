@@ -62,6 +62,7 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
     drift_figure(found, scene.title, folder / "drift.png")
     damage_figure(found, scene.title, folder / "damage.png")
     return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": answer(found),
+            "doubts": list(found.tilt.doubts),
             "table": _table(scene, found)}  # fmt: skip
 
 
@@ -165,6 +166,7 @@ def _table(scene: HubScene, found: Found) -> list[str]:
                      + f"{min(ratios):.3g}, {max(ratios):.3g}")  # fmt: skip
     if found.truth is None:
         lines.append("  the true run is not known: angles are beside the filter's estimate, damage beside that run's")
+    lines += [f"  doubt: {text}" for text in found.tilt.doubts]
     lines += [f"  {name}: {text}" for name, text in found.failed.items()]
     if len(found.runs) > len(METHODS):
         lines.append(f"  engines before drift-off: {engines_apart(found):.1e}")

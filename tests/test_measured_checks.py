@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from models.hub_forces.rigid import rigid
+from models.hub_forces.tilt_filter import TiltFilter
 from models.measured.checks import check, clipped, drift, findings, gaps, gravity, noise, spikes, turning, weight
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.means import mean
@@ -17,11 +18,12 @@ from models.measured.checks.response import Response
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults
 from models.measured.finding import Finding
+from models.measured.inputs import Inputs
 from models.measured.recording import Recording
 from models.measured.section_run import Outcome
 from models.measured.signal import Quantity, Signal
 from models.measured.verdict import surprised
-from models.measured.virtual import VirtualMeasurement
+from models.measured.virtual import VirtualMeasurement, recording
 from validation.cases import measured_checks as case
 from validation.cases.hub_forces import r19
 
@@ -282,3 +284,15 @@ def test_moments_about_the_contact_patch_are_recognised(hubs, lever, ridden, tmp
     # the fit has a standard error of 0.01 m here, and the vehicle is not linear
     assert said[0].size == pytest.approx(lever, abs=0.04)
     assert f"levers = {{ {hubs[0]} = " in said[0].text and ("contact patch" in said[0].text)
+
+
+@pytest.mark.parametrize("bias, named", [({}, ""), ({"pitch_rate": 3e-3}, "innovations of pitch "),
+                                         ({"roll_rate": -5e-3}, "innovations of roll ")])  # fmt: skip
+def test_a_filter_names_a_biased_gyro_and_no_right_one(bias, named, ridden, tmp_path):
+    samples = ridden.samples(Faults(noise=case.NOISE, bias=bias), case.SEED)
+    own = recording(ridden, samples, tmp_path / "a.columns")
+    inputs = Inputs(own, ridden.vehicle)
+    forces = np.tile(np.repeat([case.NOISE["force"], case.NOISE["moment"]], 3), 4)
+    followed = TiltFilter(ridden.vehicle, "hub", own.period, forces, (1.75e-3, 5e-3), 10.0)
+    followed.advance(inputs.wrenches(0, own.count), inputs.tilt(0, own.count))
+    assert [named in text for text in followed.doubts()] == [True] * bool(bias)

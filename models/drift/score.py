@@ -37,6 +37,11 @@ LEVEL = ("pitch_spring", "high_pass")
 CONFIDENCE = 0.999
 """Of the band in which a filter's innovations must lie."""
 
+SURPRISED = 2.0
+"""Mean of the normalised innovation squared from which on the measurements of a filter of roll and pitch are doubted: 1
+is right, and noise that is estimated is right to a third. An axle force 0.5 % too large, which takes a third off the
+damage along the vehicle, makes 2."""
+
 LEAST, COARSEST = 100, 5e-3
 """Rows and spacing (s) that a balance of moments over each step takes: a quarter of a wave at 50 Hz."""
 

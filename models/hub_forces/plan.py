@@ -43,8 +43,19 @@ def describe(scene: HubScene) -> str:
     lines.append(_line("run", f"{scene.run.duration:g} s, Runge-Kutta 4, {scene.run.step:g} s"))
     if scene.study == COMPARING:
         lines.append(_line("compared", "free, with kalman_filter, with prescribed_angles: a scene each"))
+    lines += [_line("doubt", text) for text in doubts(scene)]
     never = "drag, tyres that roll, curves and friction of springs"
     return "\n".join([*lines, *effect_lines(scene), _line("never", never)])
+
+
+def doubts(scene: HubScene) -> tuple[str, ...]:
+    """What the Kalman filter says against files that it would follow; a virtual measurement is not made for it."""
+    if scene.forces.file is None or (scene.stabilise.method != "kalman" and scene.study != COMPARING):
+        return ()
+    from models.hub_forces.stabilised import Stabilised
+
+    vehicle = scene.cut_vehicle()
+    return Stabilised(scene, vehicle, *scene.measured(vehicle)).tilt.doubts
 
 
 def _noise(scene: HubScene) -> str:

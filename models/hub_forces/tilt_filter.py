@@ -11,6 +11,7 @@ from typing import get_args
 
 import numpy as np
 
+from models.drift.score import SURPRISED
 from models.errors import InputError
 from models.hub_forces.cut_vehicle import CutVehicle
 from models.hub_forces.measurement import Angles, HubForces
@@ -23,6 +24,10 @@ from models.signals import Sampled
 SURPRISE = 4.0
 """Largest mean of the normalised innovation squared, per measured value: errors twice as large as stated."""
 
+BIASED, SURE = 0.1, 4.0
+"""Mean of a value's innovations, in deviations, and in its own standard errors, from which on it is called biased. One
+right run in 4000 passes the second; a gyro wrong by 0.1 degree/s has -0.35 and 27 in 15 s."""
+VALUES = "roll", "pitch", "roll_rate", "pitch_rate"
 UNEXPLAINED = 0.65
 """Largest part of the measured rates that the hub forces do not explain. The rigid vehicle leaves 0.3 to 0.45 of them
 on rough roads, for its springs give; forces in another frame than stated leave 0.8, exchanged hubs 2 and more."""
@@ -36,23 +41,26 @@ REMEDY = "check signs, units, order of the hubs and frame, or state larger devia
 @dataclass(frozen=True)
 class Tilt:
     """Estimated roll, pitch and rates (m, 4), their standard deviations, and the mean of the normalised innovation
-    squared per measured value: 1 where the stated deviations are right."""
+    squared per measured value: 1 where the stated deviations are right. doubts : what contradicts the measurement."""
 
     states: np.ndarray
     deviations: np.ndarray
     period: float
     surprise: float
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass
 class FilterState:
     """What a filter knows after a sample: state (4,), its covariance (4, 4), the sum of the normalised innovations
-    squared and their count, and the squares (2, 2) of unexplained and of whole rates of roll and pitch."""
+    squared and their count, the squares (2, 2) of unexplained and of whole rates of roll and pitch, and the sums (5, 4)
+    of innovations that ``tilt_march.march`` keeps."""
 
     x: np.ndarray = field(default_factory=lambda: np.full(4, np.nan))
     p: np.ndarray = field(default_factory=lambda: np.full((4, 4), np.nan))
     surprise: np.ndarray = field(default_factory=lambda: np.zeros(2))
     rates: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
+    sums: np.ndarray = field(default_factory=lambda: np.zeros((5, 4)))
 
 
 class TiltFilter:
@@ -87,7 +95,8 @@ class TiltFilter:
         turning = turning @ self.inverse.T
         self._check_balance(turning, angles[:, 2:])
         states, spread = np.empty((count, 4)), np.empty((count, 4))
-        own.surprise += march(own.x, own.p, turning, angles, self.period, self.noise, self.variances, states, spread)
+        given = turning, angles, self.period, self.noise, self.variances
+        own.surprise += march(own.x, own.p, *given, own.sums, states, spread)
         if not self.surprise <= SURPRISE:
             raise InputError(self.file, "angles", None, "contradict the hub forces: the squares of the innovations are "
                              f"{self.surprise:.3g} times what the deviations allow (at most {SURPRISE:g}): {REMEDY}")
@@ -97,6 +106,30 @@ class TiltFilter:
     def surprise(self) -> float:
         """Mean of the normalised innovations squared per measured value."""
         return float(self.state.surprise[0] / max(self.state.surprise[1], 1.0))
+
+    def biases(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean (4,) of the normalised innovations of roll, pitch and their rates, and its standard error (4,).
+
+        The springs of the vehicle, which the filter takes for noise, make innovations that hang together: by their
+        correlation with the one before as many fewer are independent.
+        """
+        count, total, squares, products, _ = self.state.sums
+        number = np.maximum(count, 1.0)
+        variance = np.maximum(squares / number - (total / number) ** 2, 0.0)
+        along = np.clip(products / np.maximum(squares, 1e-300), 0.0, 0.999)
+        return total / number, np.sqrt(variance * (1 + along) / (1 - along) / number)
+
+    def doubts(self) -> tuple[str, ...]:
+        """What the innovations say against the measurement: too large, or with a mean; an angle that is wrong by a
+        constant leaves no trace in them."""
+        large = (f"the filter's innovations squared are {self.surprise:.3g} times what the stated deviations allow (up "
+                 f"to {SURPRISED:g} is not said): {REMEDY}")  # fmt: skip
+        mean, error = self.biases()
+        biased = [f"the filter's innovations of {name} have a mean of {own:+.2g} deviations (of a right filter at most "
+                  f"{BIASED:g}, and {SURE * wide:.2g} by chance): a gyro or forces have an offset, or an angle drifts"
+                  for name, own, wide in zip(VALUES, mean, error, strict=True)
+                  if abs(own) > max(BIASED, SURE * wide)]  # fmt: skip
+        return (*([large] if self.surprise > SURPRISED else []), *biased)
 
     def _check_balance(self, turning: np.ndarray, rates: np.ndarray) -> None:
         """Refuse hub forces whose moments, integrated, are not the measured rates of roll and pitch.
@@ -158,7 +191,7 @@ def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, force_devia
         raise InputError(file, "angles", None, "hold no number: there is nothing to follow")
     own = TiltFilter(vehicle, forces.frame, forces.period, force_deviation, angle_deviations, model, file)
     states, spread = own.advance(forces.samples, angles.samples)
-    return Tilt(states, spread, forces.period, own.surprise)
+    return Tilt(states, spread, forces.period, own.surprise, own.doubts())
 
 
 def _level(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:

@@ -6,12 +6,14 @@ from models.compiled import njit
 
 
 @njit(cache=True, error_model="numpy")
-def march(x, p, turning, measured, dt, noise, variances, states, spread):
+def march(x, p, turning, measured, dt, noise, variances, sums, states, spread):
     """Filter samples 1, 2, ... from state ``x`` (4,) and covariance ``p`` (4, 4) at sample 0, both left at the last.
 
     turning (n, 2) : rad/s^2, held from each sample on; measured (n, 4), NaN where nothing was; noise (4, 4) : what
-    the covariance gains in a step of dt (s); variances (4,) of measured values. Writes the states (n, 4) and their
-    deviations. Returns the sum of the normalised innovations squared and how many there were.
+    the covariance gains in a step of dt (s); variances (4,) of measured values. Adds to sums (5, 4), of every value's
+    normalised innovations: how many, their sum, that of their squares, that of their products with the one before, and
+    the last one. Writes the states (n, 4) and their deviations. Returns the sum of the normalised innovations squared
+    and how many there were.
     """
     gain, surprise, used = np.empty(4), 0.0, 0
     for i in range(len(measured)):
@@ -21,6 +23,12 @@ def march(x, p, turning, measured, dt, noise, variances, states, spread):
                 if np.isnan(measured[i, j]):
                     continue
                 s, off = p[j, j] + variances[j], measured[i, j] - x[j]
+                white = off / np.sqrt(s)
+                sums[0, j] += 1.0
+                sums[1, j] += white
+                sums[2, j] += white * white
+                sums[3, j] += white * sums[4, j]
+                sums[4, j] = white
                 surprise += off * off / s
                 used += 1
                 for k in range(4):

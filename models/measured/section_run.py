@@ -81,7 +81,8 @@ class SectionRun:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Answers of a run, ``period`` (s) apart, of which ``done`` are there; ``surprise`` of the filter, NaN without."""
+    """Answers of a run, ``period`` (s) apart, of which ``done`` are there; ``surprise`` of the filter, NaN without,
+    and what it says against its measurements."""
 
     columns: Columns
     answers: tuple[Answer, ...]
@@ -89,6 +90,7 @@ class Outcome:
     done: int
     surprise: float
     findings: tuple[Finding, ...]
+    doubts: tuple[str, ...] = ()
 
     def samples(self, answer: Answer) -> np.ndarray:
         """Samples (done,) of one answer."""
@@ -152,7 +154,8 @@ class _March:
         """What there is until now."""
         grid = self.own.grid
         return Outcome(self.columns, self.own.sections.answers, grid.period * grid.skip, self.done,
-                       self.filter.surprise if self.filter else math.nan, tuple(self.inputs.findings))  # fmt: skip
+                       self.filter.surprise if self.filter else math.nan, tuple(self.inputs.findings),
+                       self.filter.doubts() if self.filter else ())  # fmt: skip
 
     def advance(self) -> None:
         """March a block and save it; RunFailed with the outcome until then."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from models.damage import SLOPE, damage_ratio
 from models.drift import score
-from models.drift.score import Errors, Limits, Own, Verdict, low_pass, rms
+from models.drift.score import SURPRISED, Errors, Limits, Own, Verdict, low_pass, rms
 from models.hub_forces.cut_vehicle import PITCH, ROLL, CutVehicle, Z
 from models.hub_forces.rigid import rigid
 from models.measured.comparison import Compared
@@ -30,10 +30,6 @@ DISAGREES = 0.15
 wrong by 5 % and a delay of 2 ms at 10 Hz together stay below it."""
 LOUD = 1 / 3
 """Part of a check channel that may be noise."""
-SURPRISED = 2.0
-"""Mean of the normalised innovation squared from which on a filter's measurements are doubted: 1 is right, and noise
-that is estimated is right to a third. An axle force 0.5 % too large, which takes a third off the damage along the
-vehicle, makes 2."""
 WORDS = {"I pitch''": "what turns the chassis", "the measured pitch": "measured roll and pitch",
          "pitch wrong": "roll or pitch wrong", "pitch known": "roll or pitch known", "pitch of": "roll or pitch of"}
 """What ``score`` says of the pitch plane, and what it means here."""
@@ -60,9 +56,9 @@ def judge(run: Outcome, vehicle: CutVehicle, hold: Hold, sampled: float, limits:
 
 
 def surprised(run: Outcome) -> tuple[Finding, ...]:
-    """A doubt where the filter that held a run was surprised by its measurements."""
+    """Doubts where the filter that held a run was surprised by its measurements, or calls them biased."""
     if not run.surprise > SURPRISED:
-        return ()
+        return tuple(Finding("filter", "doubt", "recording", f"{text[0].upper()}{text[1:]}.") for text in run.doubts)
     text = (f"The filter's innovations squared are {run.surprise:.3g} times what the noise of forces and angles "
             "allows: a channel is off by a little (gain, offset, delay, a spike, a held value, a load that is not in "
             "the vehicle file), and forces along the vehicle, which small angles make, may be wrong by much.")
