@@ -5,11 +5,13 @@ from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build, settings_of
 from models.engines.protocol import check as check_engine
 from models.errors import Refused
+from models.measured.finding import Finding
 from models.scene import Scene
 from models.scene_effects import lines as effect_lines
 from models.scene_effects import module_of
 from models.simulate import state_names
 from models.systems import DEFAULT
+from models.vehicles.plausible_plane import plausible_plane
 
 MODES = {
     "free": "free motion on the flat road",
@@ -29,6 +31,12 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
             check_engine(engine, assembly, settings_of(scene, engine))
         except Refused as error:
             raise Refused(error.engine, error.why, scene.file) from None
+
+
+def findings(scene: Scene) -> tuple[Finding, ...]:
+    """Queries about the vehicle, and doubts about what drives and what holds it."""
+    doubts = (Finding("input", "doubt", scene.file, text) for text in assemble(scene).doubts)
+    return (*plausible_plane(scene.vehicle_parameters(), scene.vehicle.accept), *doubts)
 
 
 def describe(scene: Scene) -> str:
@@ -85,7 +93,11 @@ def trust_line(assembly: Assembly) -> list[str]:
     from models.drift.trust import trust
 
     found = trust(assembly)
-    return [] if found is None else [_line("trust", str(found))]
+    if found is None:
+        return []
+    if found.until is None and assembly.doubts:
+        return [_line("trust", "only as far as the doubts about the wheel forces allow")]
+    return [_line("trust", str(found))]
 
 
 def doubt_lines(assembly: Assembly) -> list[str]:

@@ -13,7 +13,7 @@ from models.errors import InputError
 from models.scene_effects import read_tables
 from models.scene_file import SceneFile, checked, existing, parse
 from models.steps import MOST_STEPS, divides, fitting
-from models.strict import Strict, quantity, read
+from models.strict import Query, Strict, accepted, quantity, read
 from models.systems import DEFAULT
 from models.vehicles import pitch_plane
 from models.vehicles.description import Geometry
@@ -32,6 +32,7 @@ class VehicleTable(Strict):
     parameters: str = Field(default="itwm_drift", description="a parameter set, or a TOML file with one")
     geometry: Geometry = Field(default="exact", description="sin and cos of pitch, or linearised")
     override: dict[str, float] = Field(default_factory=dict, description="parameters that differ from the set")
+    accept: list[Query] = accepted()
 
 
 class RunTable(Strict):
@@ -64,7 +65,7 @@ class Scene(SceneFile):
 
     def vehicle_parameters(self) -> pitch_plane.Parameters:
         """The parameter set with the scene's overrides; each is judged under its own file's name."""
-        base = _parameter_set(self.vehicle.parameters, self.file, Path(self.folder))
+        base = parameter_set(self.vehicle.parameters, self.file, Path(self.folder))
         values = {**base.model_dump(), **self.vehicle.override}
         p = read(pitch_plane.Parameters, values, self.file, "vehicle.override")
         _check_rest(p, self)
@@ -88,7 +89,7 @@ class Scene(SceneFile):
         return engine == "exudyn" and not {"prescribed_pitch", "prescribed_heave_and_pitch"}.isdisjoint(self.effects)
 
 
-def _parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
+def parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
     """A published set by its name, or the user's own from a TOML file."""
     if name.endswith(".toml"):
         return read(pitch_plane.Parameters, parse(existing(name, folder, file, "vehicle.parameters")), name)

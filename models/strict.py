@@ -1,7 +1,7 @@
 """Reading a user's values strictly: unknown or non-physical ones become one clear message."""
 
 from collections.abc import Mapping
-from typing import Any, TypeVar, get_origin
+from typing import Any, Literal, TypeVar, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
@@ -13,6 +13,15 @@ class Strict(BaseModel):
     """Base of everything a user may write: frozen, finite, no unknown key, no silent conversion."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+
+Query = Literal["mass", "size", "inertia", "strut", "load", "stiffness", "frequency", "damping"]
+"""Checks of what a usual vehicle has (``models.vehicles.plausible``)."""
+
+
+def accepted() -> Any:
+    """Field of the queries about a vehicle that its user has seen, and means so."""
+    return Field(default=[], description="queries about the vehicle that are meant so: they are not told again")
 
 
 LARGEST = 1e15

@@ -3,12 +3,15 @@
 The accepted text, in full: UTF-8, or UTF-16 with its mark; lines that start with ``#`` and empty lines are
 skipped; the first other line is the header, ``name [unit], name [unit], ...`` in any order; every further
 line holds one finite number per column (or none, or ``nan``, where the reader allows gaps), comma between
-columns, point as decimal sign; the last line ends with a line end, because without one nobody can tell a
-complete last number from one that was cut off. What spreadsheets and loggers make of such a table (semicolons
-and decimal commas, tabs, quotes, titles above, units in a row beneath the headings, a line ``sep=``) is
-turned into that form first, by ``models.csv_plain``, where it has one meaning.
+columns, point as decimal sign. A last line without a line end is taken as it is if its last number goes on
+from those before it, and ``ended`` says so; one that was cut off in a number is refused. What spreadsheets
+and loggers make of such a table (semicolons and decimal commas, tabs, quotes, titles above, units in a row
+beneath the headings, a line ``sep=``) is turned into that form first, by ``models.csv_plain``, where it has
+one meaning.
 """
 
+import io
+import itertools
 import math
 import re
 from collections.abc import Mapping
@@ -40,6 +43,9 @@ HEAD = 100_000
 """Characters among which the headings of a plain table are."""
 KEPT = 4
 """Texts whose numbers are kept: every engine and every method of a comparison reads the same few files."""
+
+RUN, LEAP = 8, 3.0
+"""Rows before a last one without a line end, and how much further than they it may go on."""
 
 Columns = Mapping[str, Mapping[str, float]]
 Lines = list[tuple[int, str]]
@@ -119,10 +125,33 @@ def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Line
     used = [(i, line) for i, line in lines if line and not line.startswith("#")]
     if not used:
         raise InputError(path, "", None, "the file is empty: a header line and rows of numbers are needed")
-    if not text.endswith("\n"):
+    if not text.endswith("\n") and _cut_off([line for _, line in used]):
         place = f"line {len(lines)}"
-        raise InputError(path, place, lines[-1][1], "the last line has no line end and may be cut off: add one")
+        raise InputError(path, place, lines[-1][1], "the last line has no line end and was cut off: add one, or delete "
+                         "the line")  # fmt: skip
     return used[0], used[1:]
+
+
+def ended(path: str | Path) -> bool:
+    """Whether the last line of a file has a line end; where not, its last number may lack digits."""
+    with Path(path).open("rb") as file:
+        size = file.seek(0, io.SEEK_END)
+        file.seek(max(size - 1, 0))
+        return file.read() in (b"\n", b"")
+
+
+def _cut_off(lines: list[str]) -> bool:
+    """Whether a last line without a line end lacks a cell, or a last number that is shorter than the one before and
+    leaps further from it than any of the last rows."""
+    *before, last = [line.rpartition(",") for line in lines]
+    if last[0].count(",") != lines[0].rpartition(",")[0].count(",") or len(before) < 2:
+        return True
+    try:
+        value, *earlier = (float(cell) for _, _, cell in (last, *before[:0:-1][:RUN]))
+    except ValueError:
+        return True
+    leaps = [abs(a - b) for a, b in itertools.pairwise(earlier)]
+    return len(last[2]) < len(before[-1][2]) and abs(value - earlier[0]) > LEAP * max(leaps, default=0.0)
 
 
 def headings(path: str | Path, header: tuple[int, str], columns: Columns) -> tuple[list[str], list[float]]:

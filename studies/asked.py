@@ -1,12 +1,14 @@
 """What the user asked for on the command line: a scene, its study and the engines that run it."""
 
 import os
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from models.errors import InputError
 from models.measured.file_kinds import is_measurement
+from models.measured.finding import Finding
 
 SCENES = Path(__file__).parent / "scenes"
 
@@ -54,6 +56,36 @@ def plan_of(scene: Any) -> Any:
     from models.systems import SYSTEMS
 
     return import_module(SYSTEMS[scene.system].plan)
+
+
+def findings_of(scene: Any) -> tuple[Finding, ...]:
+    """Doubts about what a scene puts in, before anything is run; raises InputError for what cannot be."""
+    look = getattr(plan_of(scene), "findings", None)
+    own = () if scene.system == "measured" else _unended(scene)  # whose files are remarked on as recordings
+    return (*(look(scene) if look else ()), *own)
+
+
+def _unended(scene: Any) -> Iterator[Finding]:
+    """Remarks on the CSV files that a scene names whose last line has no line end."""
+    from models.tables import ended
+
+    for name in dict.fromkeys(_files(scene.table())):
+        try:
+            path = scene.path(name)
+        except InputError:  # a file that is written, not read
+            continue
+        if not ended(path):
+            yield Finding("file", "note", name, f"{name}: the last line has no line end; if the file was cut off, its "
+                          "last number may lack digits.")  # fmt: skip
+
+
+def _files(table: Any) -> Iterator[str]:
+    """Names of CSV files anywhere in nested tables."""
+    if isinstance(table, dict | list):
+        for value in table.values() if isinstance(table, dict) else table:
+            yield from _files(value)
+    elif isinstance(table, str) and table.lower().endswith(".csv"):
+        yield table
 
 
 def engines_of(name: str | None, system: str) -> tuple[str, ...]:

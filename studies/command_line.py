@@ -15,8 +15,9 @@ from typer.exceptions import TyperException
 
 from models.errors import InputError, RunFailed
 from models.measured.file_kinds import is_measurement
-from models.whole_files import reason_of
-from studies.asked import SCENES, engines_of, load_scene, plan_of, ready
+from models.measured.finding import Finding, lines, queries
+from models.whole_files import reason_of, write_whole
+from studies.asked import SCENES, engines_of, findings_of, load_scene, plan_of, ready
 
 app = typer.Typer(
     add_completion=False, pretty_exceptions_enable=False,
@@ -107,13 +108,15 @@ def show(
         return print(describe(Path(scene)))
     loaded = load_scene(scene, changes)
     if not price:
-        return print("\n".join([plan_of(loaded).describe(loaded), *_search(loaded)]))
+        plan = plan_of(loaded).describe(loaded)
+        return print("\n".join([plan, *_untold(findings_of(loaded), plan), *_search(loaded)]))
     _say_user_code(loaded)
     from validation.price.effects import price_list
-    from validation.price.effects_text import as_dict, lines
+    from validation.price.effects_text import as_dict
+    from validation.price.effects_text import lines as price_lines
 
     found = price_list(loaded, None if engine is None else engines_of(engine, loaded.system)[0])
-    print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(lines(found, loaded.quantities)))
+    print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(price_lines(found, loaded.quantities)))
 
 
 def _say_user_code(scene: Any) -> None:
@@ -147,7 +150,8 @@ def run(
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
     module = ready(loaded, engines)
     folder = _folder(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
-    _finish(lambda progress: module.run(loaded, engines, folder, progress), folder, as_json)
+    doubts = findings_of(loaded)
+    _finish(lambda progress: module.run(loaded, engines, folder, progress), folder, as_json, doubts)
 
 
 def _conformity(engine: str, more: bool, out: Path | None) -> None:
@@ -186,12 +190,13 @@ def price(
 ) -> None:
     """Find the cheapest engine, integrator and step that hold a scene's quantity to a tolerance."""
     from validation.price.own_scene.recommendation import price as price_of
-    from validation.price.own_scene.text import as_dict, lines
+    from validation.price.own_scene.text import as_dict
+    from validation.price.own_scene.text import lines as price_lines
 
     loaded = load_scene(scene, changes)
     _say_user_code(loaded)
     found = price_of(loaded, tolerance, quantity, engines_of(engine, loaded.system))
-    print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(lines(found)))
+    print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(price_lines(found)))
     if not found.winners:
         sys.exit(1)
 
@@ -240,13 +245,20 @@ def validate(
     sys.exit(1 if failed else 0)
 
 
-def _finish(work: Callable[[Any], dict[str, Any]], folder: Path, as_json: bool) -> None:
-    """Do the work, whose results go into ``folder``, with a progress bar, and print its summary."""
+def _finish(work: Callable[[Any], dict[str, Any]], folder: Path, as_json: bool,
+            doubts: tuple[Finding, ...] = ()) -> None:  # fmt: skip
+    """Do the work, whose results go into ``folder``, with a progress bar, and print its summary.
+
+    doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results.
+    """
     from studies.folders import drop_if_empty
 
     try:
         with _progress(as_json) as progress:
             summary = work(progress)
+        if doubts:
+            summary["queries"] = queries(doubts)
+            write_whole(folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
     except KeyboardInterrupt:
         _end(f"interrupted; finished results are kept in {folder}", 130)
     finally:
@@ -254,7 +266,7 @@ def _finish(work: Callable[[Any], dict[str, Any]], folder: Path, as_json: bool) 
     if as_json:
         print(json.dumps(summary, indent=1))
     else:
-        _print(summary)
+        _print(summary, doubts)
     if summary.get("failed"):
         sys.exit(1)
 
@@ -286,7 +298,12 @@ def _progress(silent: bool) -> Iterator[Any]:
         yield lambda text, part: bar.update(task, description=text, completed=part)
 
 
-def _print(summary: dict[str, Any]) -> None:
+def _untold(findings: tuple[Finding, ...], told: str) -> list[str]:
+    """Lines of those findings that a plan or a study has not told."""
+    return lines(finding for finding in findings if finding.text not in told)
+
+
+def _print(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None:
     """Summary as a person reads it."""
     print(summary["scene"])
     for engine, line in summary.get("runs", {}).items():
@@ -297,7 +314,8 @@ def _print(summary: dict[str, Any]) -> None:
         print(f"  {engine:<10} FAILED: {reason}")
     for pair, gap in summary.get("largest difference of states", {}).items():
         print(f"  {pair}: states differ by at most {gap:.1e}")
-    for line in summary.get("table", []):
+    table = summary.get("table", [])
+    for line in (*_untold(doubts, "\n".join(table)), *table):
         print(line)
     kept = Path(summary["folder"]).exists()
     print(f"  results in {summary['folder']}" if kept else "  nothing was saved")

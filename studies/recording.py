@@ -132,7 +132,7 @@ def compute(scene: MeasuredScene, engine: str, folder: Path, progress: Progress 
         watch.lap("virtual measurement")
     recording = _read(scene, scene.rig(), work, progress)
     watch.lap("reading")
-    evidence = Evidence(recording, rig.vehicle, _places(scene), _claimed(scene, recording))
+    evidence = Evidence(recording, rig.vehicle, _places(scene), _claimed(scene, recording), scene.plane())
     found = Found(scene, rig, engine, recording, evidence, virtual, seconds=watch.seconds)
     progress("checks", 0.2)
     found.findings = findings_of(evidence)

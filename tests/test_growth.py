@@ -41,7 +41,9 @@ def states(assembly):
 @pytest.mark.parametrize("mode", ["force", "force-body"])
 @pytest.mark.parametrize("parameters", VEHICLES)
 def test_tangent_is_the_difference_of_two_runs(folder, mode, parameters):
-    assembly = replace(assemble(force_scene(folder, parameters, 1e-3, 2.0)), mode=mode)
+    forces = {"file": "wheel_forces.csv", "interpolation": "linear", "accept": ["weight", "balance", "swapped"]}
+    scene = force_scene(folder, parameters, 1e-3, 2.0, effects={"wheel_forces": forces})
+    assembly = replace(assemble(scene), mode=mode)
     small = 1e-6 * np.array([1.0, -2.0, 0.5, 1.0, 3.0, -1.0, 0.2, 1.0])
     _, columns = path_of(assembly).carry(small[None] / 1e-6)
     moved = [states(replace(assembly, initial=assembly.initial + sign * small)) for sign in (1, -1)]

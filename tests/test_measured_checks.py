@@ -13,12 +13,12 @@ from models.measured.checks import check, clipped, drift, findings, gaps, gravit
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.means import mean
 from models.measured.checks.place import Place
-from models.measured.checks.ratios import wrong
 from models.measured.checks.response import Response
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults
 from models.measured.finding import Finding
 from models.measured.inputs import Inputs
+from models.measured.ratios import wrong
 from models.measured.recording import Recording
 from models.measured.section_run import Outcome
 from models.measured.signal import Quantity, Signal

@@ -229,7 +229,7 @@ def test_another_vehicle_or_a_missing_wheel_is_refused(planar: Recording, tmp_pa
     names = planar.columns.names
     light = Columns(tmp_path / "light.bin", names, planar.count)
     light.write(0, 0.8 * planar.columns.block(names, 0, planar.count))
-    with pytest.raises(InputError, match="another vehicle, or another unit"):
+    with pytest.raises(InputError, match="too little"):
         plane_run(PlaneJob(replace(planar, columns=light), "itwm_drift", hold=Hold("none")), tmp_path / "light")
     fewer = replace(planar, signals=planar.signals[1:])
     with pytest.raises(InputError, match="both 'front left' and 'front right'"):

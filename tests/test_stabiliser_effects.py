@@ -216,7 +216,7 @@ def noisy_pitch(folder, rng=0):
     true = 0.1 * np.sin(4.0 * t)
     noise = np.deg2rad(0.1) * np.random.default_rng(rng).standard_normal(len(t))
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", true + noise)}, 1e-3)
-    write_time_series(folder / "forces.csv", {"front": ("N", 0 * t + 4e3), "rear": ("N", 0 * t + 3e3)}, 1e-3)
+    write_time_series(folder / "forces.csv", {"front": ("N", 0 * t + 3825.9), "rear": ("N", 0 * t + 3825.9)}, 1e-3)
     return true
 
 
@@ -243,7 +243,7 @@ def test_bandwidth_is_a_zero_phase_low_pass_of_eighth_order(tmp_path, octaves):
     t = np.arange(0, 4.0005, 1e-3)
     wave = np.cos(2 * np.pi * 5.0 * 2**octaves * t)
     write_time_series(tmp_path / "pitch.csv", {"pitch": ("rad", 0.1 * wave)}, 1e-3)
-    write_time_series(tmp_path / "forces.csv", {"front": ("N", 0 * t + 4e3), "rear": ("N", 0 * t + 3e3)}, 1e-3)
+    write_time_series(tmp_path / "forces.csv", {"front": ("N", 0 * t + 3825.9), "rear": ("N", 0 * t + 3825.9)}, 1e-3)
     found = measured(tmp_path, bandwidth=5.0).input.sample(0.0, 1e-3, 2001)[:, 2]
     np.testing.assert_allclose(found[800:1200], 0.1 / (1 + 256**octaves) * wave[800:1200], atol=1e-5)
 
@@ -287,7 +287,7 @@ def test_the_plan_names_what_is_there(guided):
     scene = build_scene({"title": "t", "run": {"duration": DURATION, "step": STEP},
                          "effects": {"pitch_spring": {"stiffness": 5e4, "dead_band": 0.22}}}, "t", guided)  # fmt: skip
     assert "to the ground, beyond 0.22 rad" in describe(scene)
-    effects = {"wheel_forces": {"file": "forces.csv", "interpolation": "linear"},
+    effects = {"wheel_forces": {"file": "forces.csv", "interpolation": "linear", "accept": ["weight", "balance"]},
                "prescribed_heave_and_pitch": {"file": "motion.csv"}}
     scene = build_scene({"title": "t", "run": {"duration": DURATION, "step": STEP}, "effects": effects,
                          "engines": {"exudyn": {"integrator": "GeneralizedAlpha"}}}, "t", guided)  # fmt: skip

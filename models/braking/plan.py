@@ -1,12 +1,14 @@
 """What a scene of braking will compute: printed by ``twinrig show``, checked before any run."""
 
-from models.braking.of_scene import braked, controller_of, surfaces_of, vehicle_of
+from models.braking.of_scene import braked, controller_of, sprung_of, surfaces_of, vehicle_of
 from models.braking.port.setup import BEHIND, check_port
 from models.braking.procedures import check_engine, engines_of, port_of, ready
 from models.braking.scene import BrakingScene
 from models.braking.tyre_source import NAMES
 from models.errors import InputError
+from models.measured.finding import Finding
 from models.scene_effects import lines as effect_lines
+from models.vehicles.plausible import plausible
 
 PROCEDURES = {
     "straight": "straight braking",
@@ -57,6 +59,11 @@ def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     if scene.port is not None and scene.port.log is not None:
         allowed = f"the study {scene.study!r} drives many times: leave the log out"
         raise InputError(scene.file, "port.log", scene.port.log, allowed)
+
+
+def findings(scene: BrakingScene) -> tuple[Finding, ...]:
+    """Queries about a vehicle on its suspension."""
+    return () if scene.vehicle.file is None else plausible(sprung_of(scene).handling.given, scene.vehicle.accept)
 
 
 def describe(scene: BrakingScene) -> str:

@@ -14,7 +14,7 @@ from models.braking.trailer import Trailer
 from models.errors import InputError
 from models.scene_effects import check, read_tables
 from models.scene_file import SceneFile, checked
-from models.strict import Strict, quantity
+from models.strict import Query, Strict, accepted, quantity
 
 LARGEST_SPEED = 100.0
 """m/s; no road vehicle brakes from more."""
@@ -34,6 +34,7 @@ class VehicleTable(Strict):
     file: str | None = Field(default=None, description="in their place a vehicle on its suspension: one that comes "
                              "with twinrig, as r19_free, or a TOML file of your own")  # fmt: skip
     spin_inertia: float | None = quantity("kg m^2", "of a wheel about its axle, which that file lacks", default=None)
+    accept: list[Query] = accepted()
 
 
 class LoadTransfer(Strict):

@@ -159,5 +159,21 @@ def trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
     if added is not None and added.deviation > 0:
         named = f"noise of {added.deviation:g} N at {1 / forces.period:g} Hz"
         times[named] = noise(assembly, added.deviation).passes(angle)
+    times |= _steady(assembly, angle)
     times["rounding"] = rounding(assembly).passes(angle)
     return Trust(times, growth(assembly).rate, angle)
+
+
+def _steady(assembly: Assembly, angle: float) -> dict[str, float]:
+    """When the steady accelerations of doubtful forces have moved the vehicle: turned it by the angle, or made it fall
+    or rise by as much as that angle moves one axle against the other."""
+    if not assembly.doubts:
+        return {}
+    from models.measured.axle_forces import AxleForces, steady
+
+    path, p = path_of(assembly), assembly.parameters
+    found = steady(AxleForces(_covering(path), path.forces.period, p, ((), ()), assembly.scene.run.duration,
+                              turn=assembly.mode == "force-body"))  # fmt: skip
+    ways = {"mean of the wheel forces": angle * (p.a + p.b), "balance of the axles": angle}
+    return {name: math.sqrt(2 * way / abs(acceleration)) for (name, way), acceleration, seen in
+            zip(ways.items(), found.accelerations.tolist(), found.seen, strict=True) if seen}  # fmt: skip

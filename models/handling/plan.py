@@ -1,13 +1,20 @@
 """What a scene of handling will compute: printed by ``twinrig show``, checked before any run."""
 
 from models.handling.scene import HandlingScene
+from models.measured.finding import Finding
 from models.scene_effects import lines as effect_lines
+from models.vehicles.plausible import plausible
 
 
 def check(scene: HandlingScene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
     for name in scene.manoeuvres:
         scene.handling(name)
+
+
+def findings(scene: HandlingScene) -> tuple[Finding, ...]:
+    """Queries about the vehicle."""
+    return plausible(scene.handling(next(iter(scene.manoeuvres))).given, scene.vehicle.accept)
 
 
 def describe(scene: HandlingScene) -> str:

@@ -14,7 +14,7 @@ from models.road.iso8608 import level_of_class
 from models.scene_effects import extended, with_own
 from models.scene_file import SceneFile, checked
 from models.steps import MOST_STEPS, divides, fitting
-from models.strict import Strict, quantity
+from models.strict import Query, Strict, accepted, quantity
 from models.vehicles.vehicle_file import load_vehicle
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -26,6 +26,7 @@ class HandlingVehicle(Strict):
     """[vehicle]: a vehicle file with a chassis of six freedoms and a cornering stiffness of every tyre."""
 
     file: str = Field(default="r19_free", description="a vehicle that comes with twinrig, or a TOML file of your own")
+    accept: list[Query] = accepted()
 
 
 class TyreTable(Strict):

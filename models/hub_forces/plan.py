@@ -4,9 +4,12 @@ import numpy as np
 
 from models.engines.hub_forces import check_step
 from models.errors import InputError
+from models.hub_forces.judged import judged
 from models.hub_forces.rigid import rigid
 from models.hub_forces.scene import HubScene
+from models.measured.finding import Finding
 from models.scene_effects import lines as effect_lines
+from models.vehicles.plausible import plausible
 
 COMPARING = "hub_forces"
 """The study that runs a scene with every stabiliser and without, whichever it names."""
@@ -23,7 +26,14 @@ def check(scene: HubScene, engines: tuple[str, ...]) -> None:
                              f"must be above {growth:.3g} Hz: forces that keep their directions topple the vehicle so "
                              "fast")
     if scene.forces.file is not None:
-        scene.measured(vehicle)
+        judged(scene, vehicle)
+
+
+def findings(scene: HubScene) -> tuple[Finding, ...]:
+    """Queries about the vehicle, and doubts about measured forces."""
+    vehicle = scene.cut_vehicle()
+    doubts = judged(scene, vehicle) if scene.forces.file is not None else ()
+    return (*plausible(vehicle.whole, scene.vehicle.accept), *doubts)
 
 
 def describe(scene: HubScene) -> str:

@@ -13,7 +13,7 @@ from models.hub_forces.measurement import Angles, HubForces
 from models.scene_effects import extended, with_own
 from models.scene_file import SceneFile, checked
 from models.steps import divides, fitting
-from models.strict import Strict, quantity
+from models.strict import Query, Strict, accepted, quantity
 from models.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
 from models.time_series import read_time_series
 from models.vehicles.vehicle_file import load_vehicle
@@ -33,6 +33,7 @@ class Vehicle(Strict):
 
     file: str = Field(description="a vehicle that comes with twinrig, or a TOML file of your own")
     chassis: str = Field(default="body", description="the body with all six freedoms")
+    accept: list[Query] = accepted()
 
 
 class Run(Strict):
@@ -56,6 +57,7 @@ class Forces(Strict):
     file: str | None = Field(default=None, description="CSV: time [s], then HUB_fx [N] ... HUB_mz [N m] of every hub")
     frame: Frame = Field(default="hub", description="axes of what carries the wheel, of the chassis, or of the space")
     interpolation: Literal["linear", "smooth"] = Field(default="linear", description="between samples")
+    accept: list[str] = Field(default=[], description="findings of the checks of a file, by name, that are meant so")
     sampling_rate: float = quantity("Hz", "of the virtual measurement", default=500.0)
     noise: Noise = Field(default="white", description="of the virtual measurement; what is stated stays")
     force_deviation: float = quantity("N", "white noise of every force sample", default=8.0)
@@ -135,6 +137,8 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Hu
         raise InputError(file, missing, None, "is missing: forces and angles are measured together")
     if scene.forces.file is not None:
         _check_file_only(file, scene)
+    elif scene.forces.accept:
+        raise InputError(file, "forces.accept", scene.forces.accept, "is of forces.file: nothing else is checked")
     _check_steps(file, scene)
     return with_own(scene)
 

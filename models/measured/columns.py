@@ -68,3 +68,19 @@ class Columns:
         """Delete the file and its journal."""
         self.path.unlink()
         self._journal.unlink()
+
+
+class MemoryColumns:
+    """The same of samples (count, signals) that are in memory, to be read only."""
+
+    def __init__(self, names: tuple[str, ...], samples: np.ndarray) -> None:
+        self.names, self.count, self._samples = names, len(samples), samples
+
+    def read(self, name: str, first: int = 0, count: int | None = None) -> np.ndarray:
+        """Samples (n,) of one signal."""
+        last = self.count if count is None else first + count
+        return np.array(self._samples[first:last, self.names.index(name)])
+
+    def block(self, names: tuple[str, ...], first: int, count: int) -> np.ndarray:
+        """Samples (n, names) of several signals."""
+        return np.column_stack([self.read(name, first, count) for name in names])

@@ -1,7 +1,8 @@
 """What a check finds in a recording: one sentence with place and size."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 Weight = Literal["error", "doubt", "note"]
 """An error stops what follows, a doubt is carried into the report, a note says what was looked at and found good."""
@@ -24,3 +25,14 @@ class Finding:
     unit: str = ""
     signals: tuple[str, ...] = ()
     times: tuple[float, ...] = ()
+
+
+def queries(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+    """As plain values, for JSON."""
+    return [{"check": f.check, "weight": f.weight, "place": f.place, "text": f.text, "size": f.size, "unit": f.unit}
+            for f in findings]  # fmt: skip
+
+
+def lines(findings: Iterable[Finding]) -> list[str]:
+    """A line each, as plans and summaries print them."""
+    return [f"  {f.weight:<10} {f.text}" for f in findings]

@@ -18,6 +18,8 @@ from models.drift import trust as drift_trust
 from models.drift.score import Limits, Verdict
 from models.drift.trust import Trust
 from models.errors import InputError
+from models.measured import axle_forces
+from models.measured.axle_forces import AXLES, axle_signals, axles
 from models.measured.columns import Columns
 from models.measured.finding import Finding
 from models.measured.gaps import filled
@@ -32,15 +34,9 @@ from models.section_forces import section_forces
 from models.simulate import simulate
 from models.time_series import write_time_series
 
-AXLES = {"front": ("front", "front left", "front right"), "rear": ("rear", "rear left", "rear right")}
-"""Where vertical forces may be measured: at an axle, or at its wheels, whose forces are added."""
 CHASSIS = "chassis"
 STEP = 1e-3
 """s, the longest step: the fastest pole of the published vehicle needs one below 2.8 ms."""
-WEIGHT = 0.05
-"""Largest departure of the mean force from the weight; what is beyond falls or rises for ever."""
-RISE = 1.0
-"""m/s: as much may the vertical speed of the vehicle change from the first to the last sample."""
 UNSEEN = ("free, with forces that turn with the vehicle and no measured pitch: an offset, or forces of another frame, "
           "would drive it off unseen")  # fmt: skip
 EFFECTS = {"kalman": "kalman_filter", "prescribed": "prescribed_pitch"}
@@ -99,7 +95,7 @@ def _beside_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdic
     """
     found = job.recording.find("angle", CHASSIS, "pitch")
     if not found:
-        turns = any(signal.frame != "inertial" for axle in AXLES for signal in _signals(job.recording, axle))
+        turns = any(signal.frame != "inertial" for axle in AXLES for signal in axle_signals(job.recording, axle))
         return Verdict("stabilise", UNSEEN) if turns else verdict
     measured = job.recording.samples(found[0])
     known = np.flatnonzero(np.isfinite(measured))
@@ -116,19 +112,20 @@ def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
     period, said = job.recording.period, list[Finding]()
     forces = {axle: ("N", _axle(job, axle, said)) for axle in AXLES}
     write_time_series(folder / "wheel_forces.csv", forces, period)
-    frames = {signal.frame for axle in AXLES for signal in _signals(job.recording, axle)}
+    frames = {signal.frame for axle in AXLES for signal in axle_signals(job.recording, axle)}
     if len(frames & {"inertial"}) != len(frames) and "inertial" in frames:
         raise InputError(job.file, "files.channels", None, "vertical forces must all keep their direction in space, or "
                          "all turn with the vehicle")  # fmt: skip
     fixed = frames == {"inertial"} or job.hold.method == "prescribed"  # an enforced pitch does not feel the frame
     effects: dict[str, Any] = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "smooth",
-                                                "frame": "inertial" if fixed else "body"}}  # fmt: skip
+                                                "frame": "inertial" if fixed else "body",
+                                                "accept": list(axle_forces.CHECKS)}}  # fmt: skip
     if job.effect:
         effects[job.effect] = _held(job, folder, said)
     step = job.step or period / math.ceil(period / STEP * (1 - 1e-9))
     scene = build({"title": "recording", "vehicle": {"parameters": job.parameters}, "effects": effects,
                    "run": {"duration": job.recording.duration, "step": step}}, job.file, folder)  # fmt: skip
-    _check_weight(job, scene, forces["front"][1] + forces["rear"][1])
+    _check_axles(job, scene)
     return scene, tuple(said)
 
 
@@ -143,15 +140,8 @@ def trusted(scene: Scene, deviation: float) -> Trust | None:
     return replace(found, times={**found.times, f"noise of {deviation:g} N": noise})
 
 
-def _signals(recording: Recording, axle: str) -> list[Signal]:
-    """Vertical forces of an axle: its own, or those of both wheels."""
-    found = [s for at in AXLES[axle] for s in recording.find("force", at, "z") if not s.check]
-    whole = [signal for signal in found if signal.at == axle]
-    return whole or found
-
-
 def _axle(job: PlaneJob, axle: str, said: list[Finding]) -> np.ndarray:
-    signals = _signals(job.recording, axle)
+    signals = axle_signals(job.recording, axle)
     if len(signals) != (1 if signals and signals[0].at == axle else 2):
         raise InputError(job.file, "files.channels", None, f"the vertical force is needed at {AXLES[axle][0]!r}, or at "
                          f"both {AXLES[axle][1]!r} and {AXLES[axle][2]!r}")  # fmt: skip
@@ -186,16 +176,16 @@ def _held(job: PlaneJob, folder: Path, said: list[Finding]) -> dict[str, Any]:
     write_time_series(folder / "pitch.csv", columns, job.recording.period)
     if hold.method == "prescribed":
         return {"file": "pitch.csv", "bandwidth": hold.smoothing}
-    noise = hold.force * math.sqrt(max(len(_signals(job.recording, axle)) for axle in AXLES))
+    noise = hold.force * math.sqrt(max(len(axle_signals(job.recording, axle)) for axle in AXLES))
     return {"file": "pitch.csv", "force_deviation": noise, "start_deviation": hold.angle, **deviations}
 
 
-def _check_weight(job: PlaneJob, scene: Scene, whole: np.ndarray) -> None:
-    p = scene.vehicle_parameters()
-    weight = (p.m1 + p.m2 + p.m3) * p.g
-    if abs(float(whole.mean()) / weight - 1) > WEIGHT + RISE / (p.g * job.recording.duration):
-        raise InputError(job.file, "vehicle.parameters", job.parameters, f"weighs {weight:.5g} N, but the vertical "
-                         f"forces are {float(whole.mean()):.5g} N on average: this is another vehicle, or another unit")
+def _check_axles(job: PlaneJob, scene: Scene) -> None:
+    """Refuse forces that cannot be this vehicle's; doubts are told by the checks of the recording."""
+    own = axles(job.recording, scene.vehicle_parameters())
+    errors = [each.text for each in axle_forces.check(own) if each.weight == "error"] if own else []
+    if errors:
+        raise InputError(job.file, "vehicle.parameters", job.parameters, " ".join(errors))
 
 
 def _outcome(result: Result, said: tuple[Finding, ...], folder: Path) -> Outcome:

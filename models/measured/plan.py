@@ -5,12 +5,15 @@ from collections.abc import Sequence
 from models.errors import InputError
 from models.measured.channel import Source
 from models.measured.channel_map import signals
+from models.measured.finding import Finding
 from models.measured.formats import open_source
 from models.measured.rig import Rig
 from models.measured.scene import MeasuredScene
 from models.measured.signal import Signal
 from models.measured.virtual import check as check_virtual
 from models.scene_effects import lines as effect_lines
+from models.vehicles.plausible import plausible
+from models.vehicles.plausible_plane import plausible_plane
 
 MISSING = "no vertical force is mapped at {}: without it the vehicle falls"
 
@@ -58,6 +61,15 @@ def _check_names(scene: MeasuredScene, rig: Rig) -> None:
     for name in scene.hand_on.sections or ():
         if name not in rig.sections:
             raise InputError(scene.file, "hand_on.sections", name, "the vehicle has no such section", rig.sections)
+
+
+def findings(scene: MeasuredScene) -> tuple[Finding, ...]:
+    """Queries about the vehicle; what is found in the recording its study tells."""
+    accept, plane = scene.vehicle.accept, scene.plane()
+    if plane is not None:
+        return plausible_plane(plane, accept)
+    vehicle = scene.rig().vehicle
+    return () if vehicle is None else plausible(vehicle.whole, accept)
 
 
 def describe(scene: MeasuredScene) -> str:

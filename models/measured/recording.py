@@ -7,7 +7,7 @@ from datetime import datetime
 import numpy as np
 
 from models.measured.channel import BLOCK
-from models.measured.columns import Columns
+from models.measured.columns import Columns, MemoryColumns
 from models.measured.finding import Finding
 from models.measured.signal import Signal
 
@@ -22,7 +22,7 @@ class Recording:
     """
 
     signals: tuple[Signal, ...]
-    columns: Columns
+    columns: Columns | MemoryColumns
     period: float
     start: datetime | None = None
     comment: str = ""
@@ -56,6 +56,7 @@ class Recording:
     def changed(self, change: Callable[[Signal, np.ndarray], np.ndarray]) -> "Recording":
         """The same with other samples: ``change`` gives those (count,) of a signal by its own, SI, NaN where nothing
         was measured. They lie in a new file beside the old one, so that nothing is changed twice."""
+        assert isinstance(self.columns, Columns)
         path = self.columns.path.with_stem(f"{self.columns.path.stem}_changed")
         path.with_suffix(".json").unlink(missing_ok=True)
         columns = Columns(path, self.columns.names, self.count)

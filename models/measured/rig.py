@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from models.hub_forces.cut_vehicle import CutVehicle
-from models.measured.pitch_plane import AXLES, CHASSIS, SPRINGS
+from models.measured.axle_forces import AXLES
+from models.measured.pitch_plane import CHASSIS, SPRINGS
 from models.measured.places import Places
 from models.measured.sections import names
 

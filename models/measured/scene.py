@@ -13,9 +13,11 @@ from models.measured.rig import Rig, in_plane, in_space
 from models.measured.signal import Frame, Quantity
 from models.measured.verdict import LIMITS
 from models.measured.virtual import VirtualTable
+from models.scene import parameter_set
 from models.scene_effects import with_own
 from models.scene_file import SceneFile, checked
-from models.strict import Strict, quantity
+from models.strict import Query, Strict, accepted, quantity
+from models.vehicles.pitch_plane import Parameters
 from models.vehicles.vehicle_file import load_vehicle
 
 Engine = Literal["reference", "exudyn", "mujoco"]
@@ -27,6 +29,7 @@ class Vehicle(Strict):
     file: str | None = Field(default=None, description="a vehicle that comes with twinrig, or a TOML file of your own")
     chassis: str = Field(default="body", description="the body with all six freedoms")
     parameters: str | None = Field(default=None, description="of the pitch-plane vehicle: a set, or a TOML file")
+    accept: list[Query] = accepted()
 
 
 class MappedChannel(Strict):
@@ -128,6 +131,11 @@ class MeasuredScene(SceneFile):
             return in_plane(own.parameters)
         return in_space(cut(load_vehicle(own.file, self.folder, self.file, "vehicle.file"), own.chassis),
                         tuple(self.sensors))  # fmt: skip
+
+    def plane(self) -> Parameters | None:
+        """Parameters of the pitch-plane vehicle that is driven; None of a vehicle in space; raises InputError."""
+        own = self.vehicle.parameters
+        return None if own is None else parameter_set(own, self.file, Path(self.folder))
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> MeasuredScene:

@@ -3,11 +3,13 @@
 from dataclasses import replace
 
 from models.errors import InputError
+from models.measured.finding import Finding
 from models.ride.linear_vehicle import Wheel
 from models.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
 from models.ride.scene import RideScene
 from models.road.two_track import half_track
 from models.scene_effects import lines as effect_lines
+from models.vehicles.plausible import plausible
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 
@@ -27,6 +29,11 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
         if kinds[name] != "acceleration":
             allowed = f"weights accelerations, and this output is one of the kind {kinds[name]!r}"
             raise InputError(scene.file, f"weighting.{name}", scene.weighting[name], allowed)
+
+
+def findings(scene: RideScene) -> tuple[Finding, ...]:
+    """Queries about the vehicle."""
+    return plausible(vehicle_of(scene), scene.vehicle.accept)
 
 
 def describe(scene: RideScene) -> str:

@@ -13,7 +13,7 @@ from models.road.two_track import LEVEL, MEAN_CORNER, ROLL_CORNER
 from models.scene_effects import with_own
 from models.scene_file import SceneFile, checked
 from models.speeds import Speeds, check_speeds
-from models.strict import Strict, quantity
+from models.strict import Query, Strict, accepted, quantity
 
 LeftRight = Literal["modelled", "uncorrelated", "equal"]
 FrontRear = Literal["delayed", "uncorrelated", "equal"]
@@ -26,6 +26,7 @@ class RideVehicle(Strict):
     file: str = Field(description="a vehicle that comes with twinrig, or a TOML file of your own")
     small_motion: bool = Field(default=False, description="curves and friction of springs by their slopes at rest")
     operating_point: Literal["unloaded", "loaded"] = Field(default="unloaded", description="loaded: gravity, preload")
+    accept: list[Query] = accepted()
 
 
 class Road(Strict):

@@ -11,11 +11,12 @@ from models.measured.checks.agreement import Agreement, Fault
 from models.measured.checks.means import mean
 from models.measured.checks.noise_floor import noise
 from models.measured.checks.place import Place
-from models.measured.checks.ratios import wrong
 from models.measured.checks.response import AXES, Response
 from models.measured.checks.spectra import Spectra, spectra
+from models.measured.ratios import wrong
 from models.measured.recording import Recording
 from models.measured.signal import Signal
+from models.vehicles.pitch_plane import Parameters
 
 BAND = 1.0, 25.0
 """Hz: above the drift of a free vehicle, below the bending of its body."""
@@ -26,12 +27,16 @@ INERTIAL = ("acceleration", "angular rate", "angle")
 
 @dataclass(frozen=True)
 class Evidence:
-    """places : of accelerometers and gyros by name; claimed : white noise (SI) that is stated, by name of signal."""
+    """places : of accelerometers and gyros by name; claimed : white noise (SI) that is stated, by name of signal.
+
+    plane : of the pitch-plane vehicle, where the recording drives that and no vehicle in space.
+    """
 
     recording: Recording
     vehicle: CutVehicle | None
     places: Mapping[str, Place] = field(default_factory=dict)
     claimed: Mapping[str, float] = field(default_factory=dict)
+    plane: Parameters | None = None
 
     @cached_property
     def forces(self) -> tuple[Signal, ...]:
@@ -85,13 +90,17 @@ class Evidence:
         Of vertical forces against the static loads, of vertical accelerometers with gravity against that.
         """
         loads = dict(zip(self.vehicle.hubs, self.vehicle.loads, strict=True)) if self.vehicle else {}
-        ratios = {s: self.mean(s) / loads[hub] for hub, s in self.vertical().items()}
+        ratios = {s: self.mean(s) / loads[hub] for hub, s in self.vertical().items() if not self.empty(s)}
         ratios |= {s: self.mean(s) / GRAVITY for s in self.recording.find("acceleration", "", "z") if s.gravity}
         return {s: ratio for s, ratio in ratios.items() if wrong(ratio, s)[0] in ("sign", "unit") and abs(ratio) > FELT}
 
     def mean(self, signal: Signal) -> float:
         """Of all samples, under a window."""
         return float(mean([partial(self.recording.samples, signal)])[0][0])
+
+    def empty(self, signal: Signal) -> bool:
+        """Whether a force varies by more than its mean, which then says nothing of sign and unit."""
+        return abs(self.mean(signal)) <= float(np.nanstd(self.recording.samples(signal)))
 
     @cached_property
     def _spectra(self) -> Spectra | None:

@@ -2,9 +2,9 @@
 
 from models.measured.checks.agreement import Fault
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.ratios import sentence
 from models.measured.checks.spikes import spikes
 from models.measured.finding import Finding, Weight
+from models.measured.ratios import sentence
 
 TOLD = 0.02, 0.1
 """Errors of a factor of which it is said in how many channels they would be seen."""

@@ -2,8 +2,8 @@
 
 from models.hub_forces.cut_vehicle import GRAVITY
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.ratios import sentence
 from models.measured.finding import Finding
+from models.measured.ratios import sentence
 from models.measured.signal import Signal
 
 NAME = "gravity"

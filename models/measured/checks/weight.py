@@ -10,11 +10,12 @@ from scipy.linalg import null_space
 from models.hub_forces.cut_vehicle import GRAVITY, CutVehicle
 from models.hub_forces.kernel import WRENCH
 from models.hub_forces.rigid import rigid
+from models.measured import axle_forces
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.means import mean
-from models.measured.checks.ratios import sentence
 from models.measured.checks.response import AXES
 from models.measured.finding import Finding
+from models.measured.ratios import EMPTY, counted_from_load, sentence
 from models.measured.recording import Recording
 from models.measured.signal import Signal
 
@@ -51,6 +52,9 @@ class Balance:
 
 def check(evidence: Evidence) -> list[Finding]:
     """Sizes are shares of the load, in %, or recorded by true value where sign or unit is wrong."""
+    if evidence.plane is not None:
+        axles = axle_forces.axles(evidence.recording, evidence.plane)
+        return axle_forces.check(axles) if axles else []
     vehicle, own = evidence.vehicle, {evidence.hub(s): s for s in evidence.vertical().values()}
     if vehicle is None or set(own) != set(vehicle.hubs):
         text = "Not compared with the weight: this needs a vehicle in space and the vertical force of every hub."
@@ -59,7 +63,7 @@ def check(evidence: Evidence) -> list[Finding]:
     numbers = _numbers(evidence, vehicle)
     means = mean(_columns(evidence, vehicle))
     loads, at = means[0][[numbers.index(WRENCH * i + 2) for i in range(len(signals))]], vehicle.loads
-    coarse = [_coarse(s, load, static) for s, load, static in zip(signals, loads, at, strict=True)]
+    coarse = [_coarse(evidence, *each) for each in zip(signals, loads, at, strict=True)]
     if any(coarse):
         return [finding for finding in coarse if finding]
     return _fine(evidence, _balance(vehicle, numbers, *means), signals, at)
@@ -100,7 +104,10 @@ def _numbers(evidence: Evidence, vehicle: CutVehicle) -> list[int]:
             for s in evidence.forces]  # fmt: skip
 
 
-def _coarse(signal: Signal, load: float, static: float) -> Finding | None:
+def _coarse(evidence: Evidence, signal: Signal, load: float, static: float) -> Finding | None:
+    if abs(load) < EMPTY * static and evidence.empty(signal):
+        return Finding(NAME, "error", signal.name, counted_from_load(signal.name, load, static), load / static, "1",
+                       (signal.name,))  # fmt: skip
     kind, text = sentence(load / static, signal, f"the {static:.0f} N that rest on {signal.at} on average")
     if kind == "gain":
         return None

@@ -31,7 +31,7 @@ from models.measured.formats.csv_layout import (
     find_units,
     read_top,
 )
-from models.measured.formats.csv_rows import STRIDE, Layout, find_rows, numbers
+from models.measured.formats.csv_rows import STRIDE, Layout, find_rows, narrow, numbers
 from models.measured.formats.opened import Opened, Span, notice, readable, told_apart, zoned
 from models.tables import SECONDS
 
@@ -115,8 +115,9 @@ def _ends(path: Path, layout: Layout, remarks: Remarks, count: int, left: int) -
     if count == 0:
         raise InputError(path, f"line {layout.line + 1}", None, "rows of numbers are needed, and there is none")
     if left:
-        found.append(notice(path, "doubt", f"the last line has no line end and may be cut off: it is left out, and "
-                            f"{count} rows are used"))
+        whole = _cells_of_end(path, layout, left) == layout.width
+        found.append(notice(path, "note" if whole else "doubt", f"the last line has no line end and "
+                            f"{'may be' if whole else 'is'} cut off: it is left out, and {count} rows are used"))
     samples = remarks.samples
     if samples is not None and samples > count:
         found.append(notice(path, "doubt", f"the header announces {samples} rows, but {count} are there: "
@@ -124,6 +125,13 @@ def _ends(path: Path, layout: Layout, remarks: Remarks, count: int, left: int) -
     if samples is not None and samples < count:
         raise InputError(path, "samples", samples, f"the header announces fewer rows than there are ({count})")
     return found
+
+
+def _cells_of_end(path: Path, layout: Layout, left: int) -> int:
+    """Cells of what follows the last line end, its last ``left`` bytes."""
+    with path.open("rb") as file:
+        file.seek(-left, io.SEEK_END)
+        return narrow(file.read(), layout.unit).count(layout.separator.encode()) + 1
 
 
 def _factor(path: Path, head: Head, clock: int, unit: str) -> float:

@@ -1,5 +1,6 @@
 """What a channel that reads so many times the true value has wrong: its sign, its unit, or its calibration factor."""
 
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
@@ -19,6 +20,8 @@ NAMES: dict[Quantity, dict[str, float]] = {
 NEAR = 0.2
 """Part by which a ratio may differ from that of two units; a calibration is not wrong by more than GAIN."""
 GAIN = 0.25
+EMPTY = 0.05
+"""Share of the static load below which a mean is none, where the force varies by more."""
 Wrong = Literal["sign", "unit", "gain", "size"]
 
 
@@ -39,15 +42,30 @@ def wrong(ratio: float, signal: Signal) -> tuple[Wrong, str]:
     return ("unit", far[min(near)]) if near else ("size", "")
 
 
-def sentence(ratio: float, signal: Signal, against: str) -> tuple[Wrong, str]:
-    """What is wrong, and a complete sentence; ``against`` says what the true value was taken from."""
+def sentence(ratio: float, signal: Signal, against: str,
+             remedies: Mapping[Wrong, str] | None = None) -> tuple[Wrong, str]:  # fmt: skip
+    """What is wrong, and a complete sentence; ``against`` says what the true value was taken from.
+
+    remedies : what to do about each, None for those of a channel map.
+    """
     kind, unit = wrong(ratio, signal)
     reads = f"{signal.name} reads {ratio:.4g} times {against}"
     own = f"{signal.name} reads {abs(ratio - 1):.2%} too {'much' if ratio > 1 else 'little'} against {against}"
     texts: dict[Wrong, str] = {
-        "sign": f"{reads}: its sign is wrong; give sign = {-signal.sign} in the channel map.",
-        "unit": f"{reads}, as {unit} does: correct its unit in the channel map.",
-        "gain": f"{own}: check its calibration factor.",
-        "size": f"{reads}, which no usual unit explains: check its calibration factor and the vehicle file.",
-    }
-    return kind, texts[kind]
+        "sign": f"{reads}: its sign is wrong", "unit": f"{reads}, as {unit} does", "gain": own,
+        "size": f"{reads}, which no usual unit explains",
+    }  # fmt: skip
+    between = "; " if kind == "sign" else ": "
+    return kind, f"{texts[kind]}{between}{(remedies or _in_map(signal))[kind]}."
+
+
+def _in_map(signal: Signal) -> dict[Wrong, str]:
+    """Remedies of a channel map."""
+    return {"sign": f"give sign = {-signal.sign} in the channel map", "unit": "correct its unit in the channel map",
+            "gain": "check its calibration factor", "size": "check its calibration factor and the vehicle file"}
+
+
+def counted_from_load(name: str, mean: float, load: float) -> str:
+    """A sentence on a vertical force whose mean (N) is nothing beside the static load (N)."""
+    return (f"{name} reads {mean:.4g} N on average, less than it varies: it counts from the static load; add "
+            f"{load:.5g} N.")  # fmt: skip

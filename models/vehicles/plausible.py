@@ -1,0 +1,276 @@
+"""What no usual vehicle has: a mass in tonnes, springs in N/mm, a strut far from its wheel, a corner without one.
+
+Nothing here refuses: each finding names the entry, its value and what is usual, as the units of a file are named. Only
+what is far from every vehicle on wheels is queried, from a quarter of a small car to a loaded truck; a vehicle that is
+meant so is run as it is.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from models.errors import InputError
+from models.measured.finding import Finding
+from models.vehicles.kinematics import Kinematics
+from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre
+from models.vehicles.spatial_linear import mass, preloads, slopes_at_rest
+
+GRAVITY = 9.81
+MASS = 30.0, 60e3
+"""kg, of everything."""
+LIGHT = 0.7
+"""Sprung by unsprung mass at the least: the axle of an empty trailer."""
+SHARE = 0.03
+"""Of the weight, that an axle carries at the least, where there are several."""
+UNEVEN = 3.0
+"""Load, or stiffness, of one wheel of an axle by that of the other."""
+BOUNCE = 0.5, 6.0
+"""Hz, of the whole vehicle on springs and tyres, from how far it sinks under its weight."""
+HOP = 3.0, 60.0
+"""Hz, of a wheel or an axle between road and body."""
+DAMPING = 0.005, 5.0
+"""Of the critical one, of a damper beside its spring under its static load."""
+PRESSED = 5e-4, 0.25
+"""m, of a tyre under its static load."""
+FAR = 0.7
+"""m, from a strut to its wheel sideways or along, beyond the track of a rigid axle: levers bring it inwards."""
+WHEELBASE = 0.5, 25.0
+TRACK = 0.3, 4.0
+HEIGHT = 5.0
+"""m, of a centre of mass above the ground."""
+GYRATION = {"rx": (0.15, 1.5), "ry": (0.12, 1.2), "rz": (0.12, 1.2)}
+"""Radius of gyration of what is carried, by the track in roll, by the wheelbase in pitch and yaw."""
+UPRIGHT = 0.3
+"""Vertical part of a direction from which on a spring carries."""
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A vehicle with what is worked out of it once."""
+
+    vehicle: SpatialVehicle
+
+    @cached_property
+    def wheels(self) -> dict[str, tuple[Tyre, ...]]:
+        """Bodies that carry tyres, and these; not the one that is carried."""
+        names = dict.fromkeys(tyre.body for tyre in self.vehicle.tyres)
+        own = {name: tuple(t for t in self.vehicle.tyres if t.body == name) for name in names}
+        return own if len(own) < len(self.vehicle.bodies) else {}
+
+    @cached_property
+    def carried(self) -> Body:
+        """The heaviest body that is no wheel or axle."""
+        return max((b for b in self.vehicle.bodies if b.name not in self.wheels), key=lambda body: body.mass)
+
+    @cached_property
+    def total(self) -> float:
+        """Mass of everything, kg."""
+        return sum(body.mass for body in self.vehicle.bodies)
+
+    @cached_property
+    def held(self) -> dict[str, float]:
+        """Static force of every tyre and part, N: InputError where nothing carries a weight."""
+        own = preloads(replace(self.vehicle, gravity=GRAVITY))
+        return own.parts | own.tyres
+
+    @cached_property
+    def wheelbase(self) -> float:
+        """m; 0 of a single axle."""
+        return max(self.vehicle.axles) - min(self.vehicle.axles)
+
+    @cached_property
+    def track(self) -> float:
+        """m, the widest; 0 of a vehicle without width."""
+        return float(np.ptp([tyre.point[1] for tyre in self.vehicle.tyres]))
+
+    def struts(self, wheel: str) -> list[SpringDamper]:
+        """Springs and dampers that hold a wheel or an axle up to another body."""
+        return [s for s in self.vehicle.springs if s.two is not None and wheel in (s.one, s.two)
+                and abs(s.axis[2]) > UPRIGHT]  # fmt: skip
+
+
+def plausible(vehicle: SpatialVehicle, accept: Sequence[str] = ()) -> tuple[Finding, ...]:
+    """All queries about a vehicle, in SI, but for those of checks that the user accepts; empty for a usual one."""
+    whole = Whole(vehicle)
+    found = (query for look in (_masses, _sizes, _inertias, _struts, _statics) for query in look(whole))
+    return tuple(query for query in found if query.check not in accept)
+
+
+def _query(check: str, place: str, said: str, size: float, unit: str) -> Finding:
+    return Finding(check, "doubt", place, f"{place}: {said}.", size, unit)
+
+
+def _beyond(value: float, usual: tuple[float, float]) -> bool:
+    return not usual[0] <= value <= usual[1]
+
+
+def _masses(whole: Whole) -> Iterator[Finding]:
+    if _beyond(whole.total, MASS):
+        yield _query("mass", "mass of the vehicle", f"{whole.total:.4g} kg; usual are {MASS[0]:g} to {MASS[1]:g} kg. "
+                     f"{_tonnes(whole.total)}", whole.total, "kg")  # fmt: skip
+    unsprung = sum(whole.vehicle.body(name).mass for name in whole.wheels)
+    if whole.wheels and not _beyond(whole.total, MASS) and whole.total - unsprung < LIGHT * unsprung:
+        yield _query("mass", f"bodies[{whole.carried.name}].mass", f"{whole.carried.mass:.4g} kg; all that is carried "
+                     f"weighs {whole.total - unsprung:.4g} kg, wheels and axles {unsprung:.4g} kg. "
+                     f"{_tonnes(whole.carried.mass)}", whole.carried.mass, "kg")  # fmt: skip
+
+
+def _tonnes(value: float) -> str:
+    return "Masses are in kg, not in tonnes" if value < 100 else "Masses are in kg, not in g or lb"
+
+
+def _sizes(whole: Whole) -> Iterator[Finding]:
+    metres = "Lengths are in m, not in mm"
+    for name, value, usual in (("wheelbase", whole.wheelbase, WHEELBASE), ("track", whole.track, TRACK)):
+        if value and _beyond(value, usual):
+            yield _query("size", name, f"{value:.4g} m; usual are {usual[0]:g} to {usual[1]:g} m. {metres}", value, "m")
+    for body in whole.vehicle.bodies:
+        if _beyond(body.position[2], (-0.01, HEIGHT)):
+            yield _query("size", f"bodies[{body.name}].position", f"{body.position[2]:.4g} m above the ground; usual "
+                         f"are 0 to {HEIGHT:g} m. {metres}", body.position[2], "m")  # fmt: skip
+
+
+def _inertias(whole: Whole) -> Iterator[Finding]:
+    """Of the body that is carried: its freedoms of turning, and that no mass is negative anywhere in it."""
+    body, spans = whole.carried, {"rx": whole.track, "ry": whole.wheelbase, "rz": whole.wheelbase}
+    about = dict(zip(GYRATION, np.diag(body.inertia).tolist(), strict=True))
+    for freedom, usual in GYRATION.items():
+        span, own = spans[freedom], about[freedom]
+        radius = (own / body.mass) ** 0.5
+        if span and freedom in body.freedoms and own and _beyond(radius / span, usual):
+            yield _query("inertia", f"bodies[{body.name}].inertia", f"{own:.4g} kg m^2 about {freedom[1]} is a radius "
+                         f"of gyration of {radius:.3g} m, {radius / span:.2g} of the "
+                         f"{'track' if freedom == 'rx' else 'wheelbase'}; usual are {usual[0]:g} to {usual[1]:g}", own,
+                         "kg m^2")  # fmt: skip
+    for each in whole.vehicle.bodies:
+        low, middle, high = sorted(np.diag(each.inertia).tolist())
+        if low > 0 and high > 1.05 * (low + middle):
+            yield _query("inertia", f"bodies[{each.name}].inertia", f"{high:.4g} kg m^2 about one axis is more than "
+                         f"the sum of the other two, {low + middle:.4g}, which no body has", high,
+                         "kg m^2")  # fmt: skip
+
+
+def _struts(whole: Whole) -> Iterator[Finding]:
+    """Corners without a strut, and struts far from their wheels."""
+    for wheel, tyres in whole.wheels.items():
+        struts = whole.struts(wheel)
+        if not any(slopes_at_rest(strut)[0] for strut in struts) and wheel != whole.carried.name:
+            kind = "damper alone" if struts else "strut"
+            yield _query("strut", f"bodies[{wheel}]", f"{'a' if struts else 'no'} {kind} holds the body up on it: a "
+                         "spring between them is missing", float(len(struts)), "1")  # fmt: skip
+        for strut in struts:
+            apart = _apart(strut, wheel, tyres)
+            if apart > FAR:
+                point = strut.point_one if strut.one == wheel else strut.point_two
+                yield _query("strut", f"springs[{strut.name}]", f"its point {[round(x, 4) for x in point]} lies "
+                             f"{apart:.3g} m from the wheel or axle {wheel!r}; usual are at most {FAR:g} m", apart, "m")
+
+
+def _apart(strut: SpringDamper, wheel: str, tyres: tuple[Tyre, ...]) -> float:
+    """Distance (m) of a strut's point on a wheel from the line between its tyres, seen from above."""
+    x, y, _ = strut.point_one if strut.one == wheel else strut.point_two
+    beside = [tyre.point[1] for tyre in tyres]
+    return float(np.hypot(x - tyres[0].point[0], max(min(beside) - y, y - max(beside), 0.0)))
+
+
+def _statics(whole: Whole) -> Iterator[Finding]:
+    """Static loads and what follows from them; nothing where masses or lengths are beyond all vehicles already."""
+    if any(_masses(whole)) or any(_sizes(whole)):
+        return
+    try:
+        whole.held  # noqa: B018
+    except InputError as error:
+        yield _query("load", error.place, error.allowed, 0.0, "N")
+        return
+    yield from _loads(whole)
+    yield from _frequencies(whole)
+    yield from _dampers(whole)
+
+
+def _loads(whole: Whole) -> Iterator[Finding]:
+    weight, axles = whole.total * GRAVITY, dict[int, list[Tyre]]()
+    for tyre in whole.vehicle.tyres:
+        axles.setdefault(tyre.axle, []).append(tyre)
+        if whole.held[tyre.name] < 0:
+            yield _query("load", f"tyres[{tyre.name}]", f"its static load is {whole.held[tyre.name]:.4g} N: the wheel "
+                         "pulls on the road. The centre of mass lies beyond the axles, or an axle at a wrong place",
+                         whole.held[tyre.name], "N")  # fmt: skip
+    for tyres in axles.values():
+        loads = [whole.held[tyre.name] for tyre in tyres]
+        names = " and ".join(tyre.name for tyre in tyres)
+        if len(axles) > 1 and 0 <= sum(loads) < SHARE * weight:
+            yield _query("load", f"tyres[{names}]", f"carry {sum(loads):.4g} N of {weight:.4g} N, "
+                         f"{sum(loads) / weight:.1%}; usual are at least {SHARE:.0%} on an axle", sum(loads), "N")
+        for what, unit, own in (("load", "N", loads), ("stiffness", "N/m", [tyre.stiffness for tyre in tyres])):
+            if min(own) >= 0 and max(own) > UNEVEN * min(own):
+                yield _query(what, f"tyres[{names}]", f"the {what}s {min(own):.4g} and {max(own):.4g} {unit} of one "
+                             f"axle differ by more than {UNEVEN:g} times", max(own) / max(min(own), 1e-300), "1")
+
+
+def _frequencies(whole: Whole) -> Iterator[Finding]:
+    """Of the carried body from how far it sinks, of every wheel between road and body, and how far tyres give way."""
+    remedy = "Stiffness is in N/m, not in N/mm, mass in kg, not in tonnes"
+    sunk = _sunk(whole)
+    bounce = (GRAVITY / sunk) ** 0.5 / (2 * np.pi) if sunk > 0 else float("inf")
+    if _beyond(bounce, BOUNCE):
+        yield _query("frequency", f"bodies[{whole.carried.name}]", f"sinks {sunk:.4g} m under the vehicle's weight, a "
+                     f"natural frequency of {bounce:.3g} Hz; usual are {BOUNCE[0]:g} to {BOUNCE[1]:g} Hz. {remedy}",
+                     bounce, "Hz")  # fmt: skip
+    for wheel in whole.wheels:
+        hop = _hop(whole, wheel)
+        if hop is not None and _beyond(hop, HOP):
+            yield _query("frequency", f"bodies[{wheel}]", f"between road and body it hops at {hop:.3g} Hz; usual are "
+                         f"{HOP[0]:g} to {HOP[1]:g} Hz. {remedy}", hop, "Hz")  # fmt: skip
+    for tyre in whole.vehicle.tyres:
+        pressed = whole.held[tyre.name] / tyre.stiffness
+        if pressed > 0 and _beyond(pressed, PRESSED):
+            yield _query("frequency", f"tyres[{tyre.name}].stiffness", f"{tyre.stiffness:.4g} N/m gives way by "
+                         f"{pressed:.3g} m under {whole.held[tyre.name]:.4g} N; usual are {PRESSED[0]:g} to "
+                         f"{PRESSED[1]:g} m. {remedy}", pressed, "m")  # fmt: skip
+
+
+def _sunk(whole: Whole) -> float:
+    """How far (m) the carried body sinks under the weights, springs and tyres together."""
+    vehicle, motion = whole.vehicle, Kinematics(whole.vehicle)
+    stiffness = _stiffness(vehicle, motion)
+    weights = sum(body.mass * GRAVITY * motion.shift(body.name, body.position)[2] for body in vehicle.bodies)
+    moved = np.linalg.lstsq(stiffness, np.asarray(weights), rcond=1e-12)[0]
+    return float(motion.shift(whole.carried.name, whole.carried.position)[2] @ moved)
+
+
+def _hop(whole: Whole, wheel: str) -> float | None:
+    """Frequency (Hz) of a wheel's or an axle's own z with everything else at rest; None where it has none."""
+    vehicle, motion = whole.vehicle, Kinematics(whole.vehicle)
+    row = motion.coordinate(wheel, "z")
+    if not row.any() or wheel == whole.carried.name:
+        return None
+    return float(np.sqrt((row @ _stiffness(vehicle, motion) @ row) / (row @ mass(vehicle) @ row)) / (2 * np.pi))
+
+
+def _stiffness(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
+    """Of springs and tyres, at rest and without gravity; bars carry no weight."""
+    total = np.zeros((motion.size, motion.size))
+    for spring in vehicle.springs:
+        apart = motion.shift(spring.two, spring.point_two) - motion.shift(spring.one, spring.point_one)
+        row = np.array(spring.axis) @ apart
+        total += slopes_at_rest(spring)[0] * np.outer(row, row)
+    for tyre in vehicle.tyres:
+        row = motion.shift(tyre.body, tyre.point)[2]
+        total += tyre.stiffness * np.outer(row, row)
+    return total
+
+
+def _dampers(whole: Whole) -> Iterator[Finding]:
+    """Dampers of struts by the critical damping of what rests on them, and springs of one axle that differ."""
+    struts = {strut.name: strut for wheel in whole.wheels for strut in whole.struts(wheel)}
+    for name, strut in struts.items():
+        stiffness, load = slopes_at_rest(strut)[0], whole.held[name]
+        if not (strut.damping and stiffness > 0 and load > 0):
+            continue
+        share = strut.damping / (2 * (stiffness * load / GRAVITY) ** 0.5)
+        if _beyond(share, DAMPING):
+            yield _query("damping", f"springs[{name}].damping", f"{strut.damping:.4g} N s/m is {share:.2g} of the "
+                         f"critical damping of what rests on it; usual are {DAMPING[0]:g} to {DAMPING[1]:g}. Damping "
+                         "is in N s/m, not in N s/mm", share, "1")  # fmt: skip
