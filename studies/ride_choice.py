@@ -1,7 +1,6 @@
 """Which effects of a ride scene do its quantities call for: chosen within a tolerance, and confirmed."""
 
 import csv
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,19 +12,15 @@ from models.choice.systems.ride import opened
 from models.errors import InputError
 from models.ride.choice.activity import activity
 from models.ride.choice.choose import Choice, Chooser
-from models.ride.choice.held import Effect, Held, illegal, without
+from models.ride.choice.held import Effect, Held, illegal
 from models.ride.choice.in_time import Samples, goes_in_time
-from models.ride.choice.reduced import Reduced, Whole
 from models.ride.of_scene import told_by, vehicle_of
 from models.ride.scene import RideScene
-from models.seconds import cost
 from models.strict import read
 from studies.choice import told
 
 SYSTEM = "ride"
 Progress = Callable[[str, float], None]
-SECONDS = 2.0
-"""Motion (s) of the time runs that are timed, each at its own largest stable step."""
 
 
 class Options(Samples):
@@ -68,13 +63,12 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         progress("single effects", 0.7)
         further = chooser.further(frozenset(choice.left_out))
         alone = [_alone(chooser, effect) for effect in chooser.effects]
-        middle = chooser.wholes[len(chooser.wholes) // 2]
-        watts = activity(middle)
+        watts = activity(chooser.wholes[len(chooser.wholes) // 2])
     _save(scene, alone, choice, folder / "effects.csv")
     _save_activity(watts, folder / "activity.csv")
     choice_figure(scene, alone, choice, watts, folder / "choice.png")
     return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(scene, choice, further),
-            "table": _table(scene, choice, alone, further, _seconds(chooser, choice, middle))}  # fmt: skip
+            "table": _table(scene, choice, alone, further)}
 
 
 def _alone(chooser: Chooser, effect: Effect) -> Alone:
@@ -84,36 +78,19 @@ def _alone(chooser: Chooser, effect: Effect) -> Alone:
 
 def _answer(scene: RideScene, choice: Choice, further: dict[Effect, float]) -> dict[str, Any]:
     """What was chosen, and how right and how cheap that is."""
-    errors = zip(scene.quantities, choice.predicted.tolist(), choice.confirmed.tolist(), strict=True)
+    columns = {"predicted": choice.predicted, "confirmed": choice.confirmed, "between speeds": choice.between,
+               "parameters off": choice.off}  # fmt: skip
+    errors = {name: {key: float(values[i]) for key, values in columns.items()}
+              for i, name in enumerate(scene.quantities)}  # fmt: skip
     return {
         "left out": [effect.name for effect in choice.left_out],
         "stay": [effect.name for effect in choice.candidates if effect not in choice.left_out],
-        "errors": {name: {"predicted": predicted, "confirmed": found} for name, predicted, found in errors},
-        "kept": choice.kept, "states": [choice.before.states, choice.after.states],
-        "step limit": [choice.before.step, choice.after.step], "calls": [choice.before.calls, choice.after.calls],
+        "errors": errors, "kept": choice.kept, "states": [choice.before.states, choice.after.states],
+        "step": [choice.before.step, choice.after.step], "step limit": list(choice.stable),
+        "calls": [choice.before.calls, choice.after.calls], "said": list(choice.said),
         "confirmations": choice.rounds, "would matter no more above": {
             effect.name: change for effect, change in further.items()},
     }  # fmt: skip
-
-
-def _seconds(chooser: Chooser, choice: Choice, whole: Whole) -> tuple[list[float], list[float]]:
-    """Seconds of time runs of the whole scene and of what is left."""
-    rest = whole.reduced(without(chooser.held, choice.left_out))
-    return _timed(whole.full, choice.before.step), _timed(rest, choice.after.step)
-
-
-def _timed(reduced: Reduced, step: float) -> list[float]:
-    """Seconds for SECONDS of free motion by the classical Runge-Kutta method, of three runs."""
-    A, taken = reduced.system.A[: reduced.states, : reduced.states], []
-    for _ in range(3):
-        x, start = np.ones(len(A)), time.perf_counter()
-        for _ in range(int(SECONDS / step)):
-            k1 = A @ x
-            k2 = A @ (x + step / 2 * k1)
-            k3 = A @ (x + step / 2 * k2)
-            x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + A @ (x + step * k3))
-        taken.append(time.perf_counter() - start)
-    return taken
 
 
 def _save(scene: RideScene, alone: list[Alone], choice: Choice, path: Path) -> None:
@@ -140,27 +117,41 @@ def percent(value: float) -> str:
     return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
 
 
-def _table(scene: RideScene, choice: Choice, alone: list[Alone], further: dict[Effect, float],
-           seconds: tuple[list[float], list[float]]) -> list[str]:  # fmt: skip
+def _table(scene: RideScene, choice: Choice, alone: list[Alone], further: dict[Effect, float]) -> list[str]:
     """The choice in words."""
-    before, after = choice.before, choice.after
-    names = ", ".join(effect.name for effect in choice.left_out) or "nothing"
-    lines = [f"  left out: {names}"]
+    tolerance = f"{100 * (scene.tolerance or 0):g} %"
+    lines = [f"  left out: {', '.join(effect.name for effect in choice.left_out) or 'nothing'}"]
     lines += [f"    {effect.name}: {effect.says}" for effect in choice.left_out]
-    for name, predicted, found in zip(scene.quantities, choice.predicted, choice.confirmed, strict=True):
-        lines.append(f"  {name}: {percent(predicted)} predicted, {percent(found)} confirmed, tolerance "
-                     f"{100 * (scene.tolerance or 0):g} %")  # fmt: skip
-    lines += [f"  states {before.states} -> {after.states}; step limit {1e3 * before.step:.3g} -> "
-              f"{1e3 * after.step:.3g} ms; calls per second of motion {before.calls:.4g} -> {after.calls:.4g}, "
-              f"{before.calls / after.calls:.3g} times fewer; {SECONDS:g} s of motion in {cost(seconds[0])} -> "
-              f"{cost(seconds[1])}"]  # fmt: skip
+    stay = [effect.name for effect in choice.candidates if effect not in choice.left_out]
+    lines += [f"  stays: {', '.join(stay) or 'nothing'}", *(f"    {why}" for why in choice.said)]
+    for i, name in enumerate(scene.quantities if choice.left_out else ()):
+        told = map(percent, (choice.predicted[i], choice.confirmed[i], choice.between[i], choice.off[i]))
+        lines.append("  {}: {} predicted, {} confirmed; {} at the worst speed of the range, {} there with parameters "
+                     "5 % off; tolerance {}".format(name, *told, tolerance))  # fmt: skip
+    lines += saving(choice, tolerance)
     lines += ["  alone, what leaving it out changes (confirmed):"]
     lines += [f"    {one.effect.name}: {', '.join(map(percent, one.confirmed))}"
               + (f" ({one.illegal})" if one.illegal else "") for one in alone]  # fmt: skip
     for effect, change in sorted(further.items(), key=lambda item: item[1]):
-        lines.append(f"  {effect.name} would matter no more at a tolerance above {100 * change:.3g} %")
-    worst = float(abs(choice.confirmed).max())
+        idle = "  {} could go, too ({:.3g} %), but saves no calls, or does not hold nearby"
+        matters = "  {} would matter no more at a tolerance above {:.3g} %"
+        lines.append((idle if change <= (scene.tolerance or 0) else matters).format(effect.name, 100 * change))
+    worst = float(max(abs(choice.off).max(), abs(choice.between).max()))
     return [*lines, f"  the choice holds for tolerances down to {100 * worst:.3g} %"] if choice.left_out else lines
+
+
+def saving(choice: Choice, tolerance: str) -> list[str]:
+    """Steps and calls at equal accuracy, in words."""
+    before, after = choice.before, choice.after
+    lines = [f"  a run confirms {1e3 * before.step:.3g} ms as the longest step of the classical Runge-Kutta method "
+             f"that keeps standard deviations within {tolerance} of the exact ones: {before.calls:.4g} calls per "
+             f"second of motion (stable up to {1e3 * choice.stable[0]:.3g} ms)"]  # fmt: skip
+    if not choice.left_out:
+        return [*lines, "  nothing that may be left out saves calls"]
+    return [*lines, "  without what is left out, changes and steps together keep the same in steps of "
+            f"{1e3 * after.step:.3g} ms: {after.calls:.4g} calls, {before.calls / after.calls:.3g} times fewer at "
+            f"equal accuracy (stable up to {1e3 * choice.stable[1]:.3g} ms); states {before.states} -> {after.states}"
+            ]  # fmt: skip
 
 
 if __name__ == "__main__":

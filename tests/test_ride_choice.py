@@ -19,7 +19,6 @@ from models.ride.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from studies.asked import SCENES
-from validation.choice.all_subsets import fewest_calls
 from validation.ride.drawn_rides import drawn
 
 SPEED = 20.0
@@ -89,38 +88,15 @@ def test_roads_without_delay_and_second_corner():
     assert deviations(held(cutoff=50.0), "second corner of the road") == pytest.approx(deviations(held()), rel=1e-9)
 
 
-def test_fast_motions_follow_in_the_mean_and_slow_ones_keep_their_rates_and_covariance():
-    scene = held("seven_freedoms", 100.0, cutoff=50.0)
-    whole = Whole(scene, SPEED)
-    own = [effect for effect in effects_of(scene) if effect.name.startswith("motions")]
-    assert "cannot be left out alone" in illegal(own[1:2]) and not illegal(own[:2])
-    rest = whole.reduced(without(scene, own[:1]))
-    roads = len(whole.excitation.heights) * len(whole.excitation.F)
-    full, left, back = whole.full.system, rest.system, rest.left
-    rates, slow = (np.linalg.eigvals(s.A[: len(s.A) - roads, : len(s.A) - roads]) for s in (full, left))
-    assert len(slow) < len(rates)
-    assert np.sort(abs(slow)) == pytest.approx(np.sort(abs(rates))[: len(slow)], rel=1e-9)
-    assert back @ rest.T == pytest.approx(np.eye(len(left.A)), abs=1e-9)
-    P, known = stationary(full).P, stationary(left).P
-    assert known == pytest.approx(back @ P @ back.T, rel=1e-9, abs=1e-9 * abs(known).max())
-    untold = np.eye(len(P)) - rest.T @ back  # what is not told of the motions, by the whole state
-    size = np.sqrt(np.outer(P.diagonal(), known.diagonal()))
-    assert np.abs(untold @ P @ back.T).max() < 1e-9 * size.max() and np.abs((untold @ P @ back.T) / size).max() < 1e-6
-    lost = stationary(full).variance - stationary(left).variance
-    said = np.einsum("ij,jk,ik->i", full.C @ untold, P, full.C @ untold)
-    assert lost == pytest.approx(said, rel=1e-6, abs=1e-9 * stationary(full).variance.max()) and said.max() > 0
-    two, one = Screen(whole.full, [0, 4]).identity(rest)
-    assert np.abs(two / one - 1).max() < 1e-12
-
-
-def test_calls_never_rise_and_small_vehicles_reach_the_best_of_all_subsets():
+def test_what_saves_no_calls_stays():
     """A wheel without mass is a slower call than the hop that it saves: two states less, but 35 % more calls."""
     scene = held("quarter_car")
     mass = named(scene)["mass of all wheels"]
     chooser = Chooser(scene, [SPEED], ["travel front left"], 0.3)
     choice = chooser.choose()
-    assert chooser.cost(frozenset([mass])).calls > choice.before.calls >= choice.after.calls
-    assert choice.after.calls <= fewest_calls(chooser) * (1 + 1e-9)
+    assert chooser.holds(chooser.confirm(frozenset([mass]))) and not choice.left_out
+    assert chooser.cost(frozenset([mass])).calls > chooser.cost(frozenset()).calls
+    assert choice.after == choice.before
 
 
 def test_identity_and_screen_of_a_small_change():
@@ -153,8 +129,16 @@ def test_the_published_pair_is_found_and_reported(twinrig, capsys):
     assert twinrig("run", "ride_choice", "--out", "out", "--json") == 0
     found = json.loads(capsys.readouterr().out)["answer"]
     assert {"mass of all wheels", "tyre damping"} <= set(found["left out"]) and found["kept"]
-    assert all(abs(error["confirmed"]) <= 0.02 for error in found["errors"].values())
-    assert found["calls"][0] / found["calls"][1] > 28.3  # the published 691 and 24 1/s; fast motions may follow besides
+    assert all(abs(change) <= 0.03 for error in found["errors"].values() for change in error.values())
+    assert found["step limit"][1] / found["step limit"][0] > 28.3  # the published 691 and 24 1/s
+    assert found["calls"][0] / found["calls"][1] == pytest.approx(6.35, rel=0.05)  # by two runs of many copies
+
+
+def test_a_tolerance_that_holds_because_errors_cancel_is_refused_with_its_reason(twinrig, capsys):
+    """Together the pair changes pitch acceleration by 1.9 %, tyre damping alone by 2.5 %."""
+    assert twinrig("run", "ride_choice", "--set", "tolerance=0.02", "--out", "out", "--json") == 0
+    found = json.loads(capsys.readouterr().out)["answer"]
+    assert not found["left out"] and "tyre damping alone changes pitch acceleration by +2.51 %" in found["said"][0]
 
 
 def test_a_quantity_that_symmetry_silences_is_refused_not_held_to_its_rounding():
@@ -217,6 +201,8 @@ def test_a_tolerance_that_nothing_keeps_leaves_everything_and_says_what_would_ch
 def test_a_choice_whose_identity_is_not_exact_is_not_taken(monkeypatch):
     scene, exact = held(tyre_damping=100.0), Screen.identity
     name = excited(linearise(scene.vehicle), scene.excitation(), SPEED).names[0]
-    assert Chooser(scene, [SPEED], [name], 0.5).choose().left_out
+    chooser = Chooser(scene, [SPEED], [name], 0.5)
+    damping = frozenset([named(scene)["tyre damping"]])
+    assert chooser.kept(damping)
     monkeypatch.setattr(Screen, "identity", lambda own, rest: (exact(own, rest)[0] * (1 + 3e-12), exact(own, rest)[1]))
-    assert not Chooser(scene, [SPEED], [name], 0.5).choose().left_out
+    assert not chooser.kept(damping)

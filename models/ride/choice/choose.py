@@ -1,32 +1,37 @@
-"""Which effects a scene's quantities can do without: screened one by one and in pairs, chosen by what they save.
+"""Which effects a scene's quantities can do without: screened one by one, chosen by what they save, confirmed.
 
-A greedy choice: of all single effects, and of all pairs where no single one will do, the next to be left out is the
-one that saves most for the error that the screen predicts for the whole set: calls (their logarithm) and, where no step
-saves any, calls times states, if calls do not rise. A second choice saves calls times states throughout, and lets fast
-motions follow last of all; it is taken where it ends with fewer calls, or with fewer states for hardly more. The set is
-confirmed by the exact solve at every speed. Where it is not kept, the step of the path that breaks it is found by
-halving, taken back for good, and the choice goes on without it. What is reported was confirmed and certified, always.
+A greedy choice: the next effect to be left out is the one that saves most calls at the stable step (their logarithm)
+for the error that the screen predicts for the whole set; where none saves any, calls times states, if calls do not
+rise. What it takes must hold:
+
+- at every listed speed, by the exact solve, certified by the identity of covariance and adjoint;
+- between the speeds, and with all parameters off by a few per cent, wherever that is worst;
+- effect by effect: each one left out alone, and all but each one. An error that lives because two larger ones cancel
+  holds until one of them changes.
+
+Where a set does not hold, the step of the path that breaks it is found by halving, taken back for good, and the choice
+goes on without it. At last every effect comes back whose absence saves no calls at equal accuracy: of runs by the
+classical Runge-Kutta method, each in the longest steps that keep the tolerance. What is reported was confirmed, always.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
-from math import exp, inf, log
+from math import inf, log
 
 import numpy as np
 
 from models.errors import InputError
-from models.ride.choice.cost import Cost, cost
+from models.ride.choice.cost import STAGES, Cost, cost
 from models.ride.choice.held import Effect, Held, effects_of, illegal, without
+from models.ride.choice.march import March, longest_step
+from models.ride.choice.marched import confirms
+from models.ride.choice.neighbourhood import Neighbourhood
 from models.ride.choice.reduced import Reduced, Whole
 from models.ride.choice.screen import Screen, confirmed, silent
+from models.ride.effects import tyre_damping
 
-BUDGET = 1.0
-"""Share of the tolerance that predictions may use."""
 SCREENED = 3
 """Speeds at which effects are screened, from the slowest to the fastest; the choice is confirmed at all."""
-HOPELESS = 20.0
-"""A single effect that breaks the tolerance so many times is not tried in pairs, unless it is singular."""
 ROUNDS = 30
 """Choices that are confirmed at most."""
 CERTAIN = 1e-12
@@ -34,30 +39,38 @@ CERTAIN = 1e-12
 WORTH, EVEN = 0.05, 1e-3
 """Logarithm of calls up to which two sets cost the same; by how much, relative, a step that saves states may raise
 them."""
+SHORTER = 0.9
+"""A step that no run confirms becomes so many times as long."""
+LEAST = 1e-3
+"""Share of the tolerance below which an error counts as none."""
 
 Set = frozenset[Effect]
-Steps = Callable[[], list[Set]]
-Order = tuple[tuple[Callable[[Set, Set], float], Steps], ...]
-"""Measures of what a step saves, from a set to a larger one, each with the steps that it judges; a later one counts
-where no step saves by those before."""
+Saved = Callable[[Set, Set], float]
+"""What a step saves, from a set to a larger one."""
 
 
 @dataclass(frozen=True)
 class Choice:
     """Effects ``left_out`` of all ``candidates``; relative changes (quantities,) of standard deviations.
 
-    predicted and confirmed : the worst over speeds, with sign; kept : every confirmed change within the tolerance.
-    rounds : choices that were confirmed.
+    predicted and confirmed : the worst over the listed speeds, with sign; between : over all speeds of their range;
+    off : there with parameters that are off, where that is worst; kept : all of them within the tolerance.
+    before, after : cost at equal accuracy; stable : the longest stable steps (s) of both, which no accuracy bounds.
+    rounds : choices that were confirmed. said : why promising effects were not left out.
     """
 
     candidates: tuple[Effect, ...]
     left_out: tuple[Effect, ...]
     predicted: np.ndarray
     confirmed: np.ndarray
+    between: np.ndarray
+    off: np.ndarray
     kept: bool
     before: Cost
     after: Cost
+    stable: tuple[float, float]
     rounds: int
+    said: tuple[str, ...]
 
 
 class Chooser:
@@ -68,17 +81,27 @@ class Chooser:
         self.held, self.tolerance, self.effects = held, tolerance, effects_of(held)
         self.wholes = [Whole(held, float(speed)) for speed in speeds]
         names = self.wholes[0].full.system.names
-        self.rows = [names.index(name) for name in quantities]
+        self.quantities, self.rows = tuple(quantities), [names.index(name) for name in quantities]
         few = min(SCREENED, len(speeds))
         self.screened = [self.wholes[i] for i in np.linspace(0, len(speeds) - 1, few).round().astype(int)]
         self.full = [confirmed(whole.full, self.rows) for whole in self.wholes]
         self._check(quantities)
         Screen(self.wholes[0].full, self.rows)  # refuses a vehicle that cannot be screened
+        self.near = Neighbourhood(held, np.asarray(speeds, float), [self._plain(name) for name in quantities])
         self._screens: dict[tuple[int, Set], Screen] = {}
         self._systems: dict[tuple[int, Set], Reduced | None] = {}
         self._predicted: dict[Set, np.ndarray] = {}
         self._costs: dict[Set, Cost] = {}
-        self._promising: list[Set] | None = None
+        self._accurate: dict[Set, Cost] = {}
+        self._between: dict[Set, np.ndarray] = {}
+        self._off: dict[Set, np.ndarray] = {}
+        self.refused: dict[Set, str] = {}
+
+    def _plain(self, quantity: str) -> tuple[int, str]:
+        """Row of the vehicle's output, and its weighting or ""."""
+        weighted = {f"{name} {by}": (name, by) for name, by in self.held.scene.weighting.items()}
+        name, by = weighted.get(quantity, (quantity, ""))
+        return [output.name for output in self.held.vehicle.outputs].index(name), by
 
     def _check(self, quantities: Sequence[str]) -> None:
         for whole, variances in zip(self.wholes, self.full, strict=True):
@@ -87,12 +110,16 @@ class Chooser:
                     said = "has no finite standard deviation above zero in this scene, so nothing to hold it to"
                     raise InputError("", f"quantities.{name}", None, said)
 
+    def rest(self, chosen: Set) -> Held:
+        """The scene less these effects."""
+        return without(self.held, sorted(chosen, key=lambda effect: effect.name))
+
     def system(self, whole: Whole, chosen: Set) -> Reduced | None:
         """The scene less these effects at a speed; None where nothing sensible is left."""
         key = (id(whole), chosen)
         if key not in self._systems:
             try:
-                self._systems[key] = whole.reduced(without(self.held, sorted(chosen, key=lambda e: e.name)))
+                self._systems[key] = whole.reduced(self.rest(chosen))
             except InputError:
                 self._systems[key] = None
         return self._systems[key]
@@ -120,7 +147,7 @@ class Chooser:
         return self._predicted[chosen]
 
     def confirm(self, chosen: Set) -> np.ndarray:
-        """The same by the exact solve, of all speeds."""
+        """The same by the exact solve, of all listed speeds."""
         return self._worst(self.wholes, chosen, lambda whole, chosen, reduced: confirmed(reduced, self.rows))
 
     def certified(self, chosen: Set) -> np.ndarray:
@@ -151,50 +178,143 @@ class Chooser:
             except InputError:  # unstable
                 found = np.full(len(full), inf)
             changes.append(np.sqrt(found / full) - 1.0)
-        of = np.array(changes)
-        return of[abs(of).argmax(axis=0), np.arange(of.shape[1])]
+        return largest(np.array(changes))
+
+    def between(self, chosen: Set) -> np.ndarray:
+        """Changes (quantities,) of the worst speed of the range; inf where there is no system."""
+        if chosen not in self._between:
+            reduced = self.system(self.wholes[0], chosen)
+            finite = reduced is not None and all((d[self.rows] == 0).all() for d in reduced.system.D)
+            self._between[chosen] = (largest(self.near.changes(self.rest(chosen))) if finite
+                                     else np.full(len(self.rows), inf))  # fmt: skip
+        return self._between[chosen]
+
+    def off(self, chosen: Set) -> np.ndarray:
+        """The same with parameters off, in the corner that is worst for each quantity."""
+        if chosen not in self._off:
+            rest = self.rest(chosen)
+            found = [self.near.changes(rest, corner) for corner in self.near.corners(rest)]
+            self._off[chosen] = largest(np.concatenate(found))
+        return self._off[chosen]
+
+    def kept(self, chosen: Set) -> bool:
+        """Whether the tolerance holds without these effects, wherever and whatever of them is left out."""
+        if not chosen:
+            return True
+        if not (self.holds(self.certified(chosen)) and self.holds(self.between(chosen))):
+            return False
+        why = self._cancels(chosen)
+        off = np.zeros(len(self.rows)) if why else self.off(chosen)
+        if not self.holds(off):
+            why = f"changes {self._told(off)} with parameters 5 % off"
+        if why:
+            self.refused[chosen] = why
+        return not why
+
+    def _cancels(self, chosen: Set) -> str:
+        """Which effect alone, or which one's coming back, breaks the tolerance that all together keep; or empty.
+
+        Changes without end do not count: white noise that passes is nothing that another change could make up for.
+        """
+        parts = {f"{effect.name} alone changes": step
+                 for effect, step in zip(self.effects, self._singles(), strict=True) if step < chosen}  # fmt: skip
+        parts |= {f"all but {effect.name} change": chosen - {effect} for effect in chosen}
+        for said, part in parts.items():
+            found = np.zeros(len(self.rows)) if not part or illegal(part) else self.between(part)
+            if np.isfinite(found).all() and not self.holds(found):
+                return f"holds by errors that cancel: {said} {self._told(found)}"
+        return ""
+
+    def _told(self, changes: np.ndarray) -> str:
+        worst = int(abs(changes).argmax())
+        return f"{self.quantities[worst]} by {100 * changes[worst]:+.3g} %"
 
     def cost(self, chosen: Set) -> Cost:
-        """Of the dearest screened speed; without end where nothing sensible is left."""
+        """At the stable step of the dearest screened speed; without end where nothing sensible is left."""
         if chosen not in self._costs:
             systems = [self.system(whole, chosen) for whole in self.screened]
             costs = (Cost(0, 0.0, inf) if system is None else cost(system) for system in systems)
             self._costs[chosen] = max(costs, key=lambda c: c.calls)
         return self._costs[chosen]
 
-    def choose(self) -> Choice:
-        """Of two greedy choices, each confirmed, the one of fewer calls, or of fewer states for as good as no more: the
-        first saves calls wherever a step can, the second calls times states throughout, and leaves motions last."""
-        calls, work, one, two = self._calls_saved, self._work_saved, self._singles, self._pairs
-        both = [self._greedy(((calls, one), (calls, two), (work, one), (work, two))),
-                self._greedy(((work, self._firsts), (work, two), (work, one)))]  # fmt: skip
-        least = min(choice.after.calls for choice in both) * exp(WORTH)
-        return min((choice for choice in both if choice.after.calls <= least), key=lambda choice: choice.after.states)
+    def accurate(self, chosen: Set) -> Cost:
+        """At the longest step that keeps the tolerance at all screened speeds, what is left out and steps together."""
+        if chosen not in self._accurate:
+            exact = [np.sqrt(self.full[self.wholes.index(whole)]) for whole in self.screened]
+            step = longest_step(self.marches(chosen), exact, self.tolerance)
+            self._accurate[chosen] = self._at(chosen, step)
+        return self._accurate[chosen]
 
-    def _greedy(self, order: Order) -> Choice:
+    def marches(self, chosen: Set) -> list[March]:
+        """Runs at the screened speeds."""
+        weightings = tuple((row, by) for row, (_, by) in zip(self.rows, self.near.quantities, strict=True) if by)
+        systems = [whole.reduced(self.rest(chosen)) for whole in self.screened]
+        return [March(reduced, whole.speed, tuple(self.rows), weightings)
+                for reduced, whole in zip(systems, self.screened, strict=True)]  # fmt: skip
+
+    def _at(self, chosen: Set, step: float) -> Cost:
+        return Cost(self.cost(chosen).states, step, STAGES / step if step else inf)
+
+    def _by_run(self, chosen: Set) -> Cost:
+        """``accurate``, with a step that a run confirms, at the middle one of the screened speeds."""
+        step, marches = self.accurate(chosen).step, self.marches(chosen)
+        while step and not confirms(marches[len(marches) // 2], step):
+            step *= SHORTER
+        return self._at(chosen, step)
+
+    def choose(self) -> Choice:
+        """The greedy choice, confirmed, less what saves nothing at equal accuracy."""
+        chosen, rounds = self._greedy((self._calls_saved, self._work_saved))
+        chosen = self._worthwhile(chosen)
+        changes = [self.predicted(chosen), self.confirm(chosen), self.between(chosen),
+                   self.off(chosen) if chosen else np.zeros(len(self.rows))]  # fmt: skip
+        left_out = tuple(effect for effect in self.effects if effect in chosen)
+        none = frozenset[Effect]()
+        return Choice(self.effects, left_out, *changes, all(map(self.holds, changes[1:])), self._by_run(none),
+                      self._by_run(chosen), (self.cost(none).step, self.cost(chosen).step), rounds,
+                      self._reasons(chosen))  # fmt: skip
+
+    def _reasons(self, chosen: Set) -> tuple[str, ...]:
+        """Of the larger sets that kept the tolerance as they stood, and were refused all the same."""
+        found = {frozenset(refused - chosen): why for refused, why in self.refused.items() if refused - chosen}
+        return tuple(f"{' and '.join(sorted(effect.name for effect in more))} stays: without it, the choice {why}"
+                     for more, why in found.items())  # fmt: skip
+
+    def _greedy(self, measures: tuple[Saved, ...]) -> tuple[Set, int]:
+        """The set, and how many were confirmed."""
         kept: list[Set] = [frozenset()]
         banned: set[Set] = set()
-        rounds, found = 0, self.confirm(frozenset())
+        rounds = 0
         while rounds < ROUNDS:
-            path = self.path(kept, banned, order)
+            path = self.path(kept, banned, measures)
             if path == kept:
                 break
             rounds += 1
-            last = self.certified(path[-1])
-            if self.holds(last):
-                kept, found = path, last
+            if self.kept(path[-1]):
+                kept = path
                 continue
             low, high = len(kept) - 1, len(path) - 1  # path[low] is kept, path[high] is not
             while high - low > 1:
                 middle = (low + high) // 2
-                rounds, tried = rounds + 1, self.certified(path[middle])
-                low, high, found = (middle, high, tried) if self.holds(tried) else (low, middle, found)
+                rounds += 1
+                low, high = (middle, high) if self.kept(path[middle]) else (low, middle)
             banned.add(path[high] - path[low])
             kept = path[: low + 1]
-        chosen = kept[-1]
-        left_out = tuple(effect for effect in self.effects if effect in chosen)
-        return Choice(self.effects, left_out, self.predicted(chosen), found, self.holds(found),
-                      self.cost(frozenset()), self.cost(chosen), rounds)  # fmt: skip
+        return kept[-1], rounds
+
+    def _worthwhile(self, chosen: Set) -> Set:
+        """Less every effect that may come back for hardly more calls at equal accuracy, or without a shorter stable
+        step: calls that are fewer then are so because errors of what is left out and of steps make up for each other.
+        """
+        fewer = [chosen - {effect} for effect in chosen if not illegal(chosen - {effect})]
+        for less in sorted(fewer, key=lambda one: float(abs(self.between(one)).max())):
+            if self.cost(less).step < self.accurate(chosen).step * (1 - WORTH):
+                continue  # it alone bounds the step
+            same = self.cost(less).step >= self.cost(chosen).step * (1 - WORTH)
+            if same or self.accurate(less).calls <= self.accurate(chosen).calls * (1 + WORTH):
+                if self.kept(less):
+                    return self._worthwhile(less)
+        return chosen
 
     def further(self, chosen: Set) -> dict[Effect, float]:
         """Largest confirmed change if an effect that stayed went, too, with what it needs: at a tolerance above, it
@@ -209,17 +329,17 @@ class Chooser:
         """Whether all changes are within the tolerance."""
         return bool((abs(changes) <= self.tolerance).all())
 
-    def path(self, kept: list[Set], banned: set[Set], order: Order) -> list[Set]:
+    def path(self, kept: list[Set], banned: set[Set], measures: tuple[Saved, ...]) -> list[Set]:
         """The path that goes on from a kept one, step by step, as far as predictions allow."""
         path = list(kept)
-        while step := self._next(path[-1], banned, order):
+        while step := self._next(path[-1], banned, measures):
             path.append(path[-1] | step)
         return path
 
-    def _next(self, chosen: Set, banned: set[Set], order: Order) -> Set:
+    def _next(self, chosen: Set, banned: set[Set], measures: tuple[Saved, ...]) -> Set:
         """The next step: one that saves by the first of the measures by which one does; empty where none is within the
-        budget."""
-        found = (self._best(chosen, banned, steps(), saved) for saved, steps in order)
+        tolerance."""
+        found = (self._best(chosen, banned, saved) for saved in measures)
         return next((step for step in found if step), frozenset())
 
     def _calls_saved(self, chosen: Set, further: Set) -> float:
@@ -232,54 +352,35 @@ class Chooser:
         return log(now.work / then.work) if then.calls <= now.calls * (1 + EVEN) else 0.0
 
     def _singles(self) -> list[Set]:
-        """Every effect with those that it needs or that go before it."""
+        """Every effect with those that it needs."""
         named = {effect.name: effect for effect in self.effects}
-        return [frozenset([effect, *(named[name] for name in (*effect.needs, *effect.after))])
-                for effect in self.effects]  # fmt: skip
+        return [frozenset([effect, *(named[name] for name in effect.needs)]) for effect in self.effects]
 
-    def _firsts(self) -> list[Set]:
-        """The same of effects that none need go after."""
-        return [own for own in self._singles() if not any(effect.last for effect in own)]
+    def _steps(self) -> list[Set]:
+        """These, and where white noise would pass, the same with damping of the tyres, by which it comes."""
+        damping = frozenset(effect for effect in self.effects if effect.name == tyre_damping.NAME)
+        singles = self._singles()
+        return singles + [step | damping for step in singles if damping and not np.isfinite(self.predicted(step)).all()]
 
-    def _pairs(self) -> list[Set]:
-        """Pairs of which at least one breaks the tolerance alone, while both together hold it; of effects that others
-        go before, the first only."""
-        if self._promising is None:
-            alone = {one: self._share(one) for one in self._singles() if not any(effect.after for effect in one)}
-            tried = [one for one, share in alone.items() if share < HOPELESS or any(effect.singular for effect in one)]
-            found = [one | two for one, two in combinations(tried, 2) if max(alone[one], alone[two]) > BUDGET
-                     and not illegal(one | two) and not (one <= two or two <= one)]  # fmt: skip
-            self._promising = [pair for pair in found if self._glance(pair) <= BUDGET and self._share(pair) <= BUDGET]
-        return self._promising
-
-    def _glance(self, chosen: Set) -> float:
-        """Share of the tolerance at the middle one of the screened speeds."""
-        at = self.screened[len(self.screened) // 2]
-        return float(abs(self._worst([at], chosen, self._predict)).max()) / self.tolerance
-
-    def _best(self, chosen: Set, banned: set[Set], steps: list[Set], saved: Callable[[Set, Set], float]) -> Set:
-        """The step that saves most for what it adds to the predicted error; empty where none is within the budget."""
+    def _best(self, chosen: Set, banned: set[Set], saved: Saved) -> Set:
+        """The step that saves most for what it adds to the predicted error; empty where none is within the tolerance.
+        """
         best, most, now = frozenset[Effect](), 0.0, self._share(chosen)
-        for step in steps:
+        for step in self._steps():
             further = chosen | step
             if further == chosen or step - chosen in banned or step in banned or illegal(further):
                 continue
-            share = self._on_the_way(chosen, further)
-            score = saved(chosen, further) / max(share - now, LEAST) if share <= BUDGET else 0.0
+            share = self._share(further)
+            score = saved(chosen, further) / max(share - now, LEAST) if share <= 1.0 else 0.0
             if score > most:
                 best, most = step - chosen, score
         return best
-
-    def _on_the_way(self, chosen: Set, further: Set) -> float:
-        """Share of a set, or a larger one on the way to it, effect after effect: none that cancel later are kept."""
-        share = self._share(further)
-        last = max((effect for effect in further - chosen if effect.after), key=lambda e: len(e.after), default=None)
-        return share if last is None or share > BUDGET else max(share, self._on_the_way(chosen, further - {last}))
 
     def _share(self, chosen: Set) -> float:
         """Largest predicted change by the tolerance."""
         return float(abs(self.predicted(chosen)).max()) / self.tolerance
 
 
-LEAST = 1e-3
-"""Share of the tolerance below which an error counts as none."""
+def largest(changes: np.ndarray) -> np.ndarray:
+    """Of changes (n, quantities) the largest of each quantity, with its sign."""
+    return np.asarray(changes[abs(changes).argmax(axis=0), np.arange(changes.shape[1])])

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import inf
 from typing import Any
 
 from models.errors import InputError
@@ -18,8 +17,7 @@ from models.vehicles.spatial_linear import wheels
 
 @dataclass(frozen=True)
 class Held:
-    """Scene and vehicle, less what is left out: ``massless`` bodies, ``rigid`` springs, ``locked`` freedoms, the
-    vehicle's motions faster than ``fastest`` (1/s), which follow the rest and the road, and the
+    """Scene and vehicle, less what is left out: ``massless`` bodies, ``rigid`` springs, ``locked`` freedoms, and the
     laws of bent springs that are ``straight``: gains stand for them."""
 
     scene: RideScene
@@ -27,7 +25,6 @@ class Held:
     massless: frozenset[str] = frozenset()
     rigid: frozenset[str] = frozenset()
     locked: frozenset[tuple[str, Freedom]] = frozenset()
-    fastest: float = inf
     straight: frozenset[str] = frozenset()
 
     def on_road(self, **changes: object) -> "Held":
@@ -47,11 +44,9 @@ class Held:
 class Effect:
     """One thing that may be left out: its name, what leaving it out means, and with what it goes.
 
-    needs : effects that must be left out, too, and go with it; after : ones that must be left out, too, and go before;
-    excludes : effects that may not be left out beside it; ``why``, a phrase for all three. singular : no small change
-    in any respect, so that it is solved and not screened. last : left out of any set in one and the same way, and so
-    at times after all others. own : a table [effects.NAME], which goes before all others,
-    for without it the vehicle is another one.
+    needs : effects that must be left out, too, and go with it; excludes : effects that may not be left out beside it;
+    ``why``, a phrase for both. singular : no small change in any respect, so that it is solved and not screened.
+    own : a table [effects.NAME], which goes before all others, for without it the vehicle is another one.
     """
 
     name: str
@@ -61,8 +56,6 @@ class Effect:
     excludes: tuple[str, ...] = ()
     why: str = ""
     singular: bool = False
-    after: tuple[str, ...] = ()
-    last: bool = False
     own: bool = False
 
 
@@ -104,7 +97,7 @@ def illegal(chosen: Iterable[Effect]) -> str:
     chosen = tuple(chosen)
     names = {effect.name for effect in chosen}
     for effect in chosen:
-        missing = [name for name in (*effect.needs, *effect.after) if name not in names]
+        missing = [name for name in effect.needs if name not in names]
         if missing:
             return f"{effect.name} cannot be left out alone: leave out {' and '.join(missing)}, too, {effect.why}"
         clashing = [name for name in effect.excludes if name in names]

@@ -189,7 +189,7 @@ def _may_go(held: Held, effect: Effect) -> bool:
     """Whether a run in time can do without an effect and all that it takes along."""
     rest = effect.without(held)
     bushings = rest.rigid and any({s.one, s.two} & _wheels(held.vehicle) for s in _named(held.vehicle, rest.rigid))
-    return not (rest.massless or np.isfinite(rest.fastest) or bushings)
+    return not (rest.massless or bushings)
 
 
 def left(held: Held, moving: dict[str, BentSpring]) -> SpatialVehicle:

@@ -17,7 +17,6 @@ from scipy.linalg import block_diag, null_space
 
 from models.errors import InputError
 from models.ride.choice.held import Held
-from models.ride.choice.slow import Motions
 from models.ride.delayed_system import DelayedSystem
 from models.ride.excitation import Excitation
 from models.ride.linear_vehicle import LinearVehicle
@@ -48,12 +47,12 @@ class Reduced:
 
 @dataclass(frozen=True)
 class Unweighted:
-    """``Reduced`` before weightings, with all its motions."""
+    """``Reduced`` before weightings."""
 
     vehicle: LinearVehicle
     N: np.ndarray
     excitation: Excitation
-    motions: Motions
+    system: DelayedSystem
     T: np.ndarray
     left: np.ndarray
 
@@ -72,10 +71,7 @@ class Whole:
     def reduced(self, held: Held) -> Reduced:
         """What is left of the scene; raises InputError where it is no system."""
         rest = self._unweighted(held)
-        system, T, left = rest.motions.system, rest.T, rest.left
-        if held.fastest < np.inf:
-            system, G, back = rest.motions.slow(held.fastest)
-            T, left = T @ G, back @ left
+        system, T, left = rest.system, rest.T, rest.left
         states, weightings = len(system.A), self.held.scene.weighting
         if weightings:
             system = weighted(system, weightings)
@@ -84,7 +80,7 @@ class Whole:
         return Reduced(rest.vehicle, rest.N, rest.excitation, system, T, left, states)
 
     def _unweighted(self, held: Held) -> "Unweighted":
-        """Made once, however many of its fast motions are left out."""
+        """Made once."""
         key = (held.vehicle, *_road(held), held.massless, held.rigid, held.locked)
         if key not in self._made:
             self._made[key] = self._make(held)
@@ -105,8 +101,7 @@ class Whole:
         left[:inert, :n], left[inert : 2 * inert, n : 2 * n] = back[0] @ behind, back[0] @ behind
         left[2 * inert : x - Tf.shape[1], :n] = back[1] @ behind
         left[x - Tf.shape[1] :, 2 * n :] = left_f
-        motions = Motions(system, x - Tf.shape[1])
-        return Unweighted(constrained, N, excitation, motions, np.vstack([q, q @ system.A, f]), left)
+        return Unweighted(constrained, N, excitation, system, np.vstack([q, q @ system.A, f]), left)
 
     def _heights(self, held: Held) -> tuple[Excitation, np.ndarray, np.ndarray]:
         """The road that is left, and ``_of_road`` of it."""

@@ -18,10 +18,12 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from models.errors import InputError
 from models.ride.choice.reduced import Reduced
-from models.ride.choice.slow import still
 from models.ride.covariance import FINITE, Covariance, lyapunov, noise_of, silence, stationary
 from models.ride.delayed_system import DelayedSystem
 from models.ride.marginal import parts
+
+SLOWEST = 1e-9
+"""Decay, by the fastest rate, below which a motion counts as one that does not die out."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,12 @@ class Screen:
         C = system.C[self.rows].astype(np.longdouble)
         found = np.einsum("ki,ij,kj->k", C, P, C) + np.einsum("kij,ij->k", own.L, rest)
         return found.astype(float), own.variance.astype(float)
+
+
+def still(A: np.ndarray) -> bool:
+    """Whether x' = A x has a motion that does not die out, or not to speak of."""
+    values = np.linalg.eigvals(A)
+    return bool(values.real.max(initial=-np.inf) > -SLOWEST * abs(values).max(initial=0.0))
 
 
 def confirmed(reduced: Reduced, rows: list[int]) -> np.ndarray:
