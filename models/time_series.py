@@ -8,6 +8,9 @@ import numpy as np
 from models.errors import InputError
 from models.tables import SECONDS, read_table, write_table
 
+MARK = 1e28
+"""SI: what is beyond this nobody measured; exporters write 9.9E+34 and the like, in any unit."""
+
 
 def read_time_series(path: str | Path, columns: Mapping[str, Mapping[str, float]], *,
                      gaps: bool = False) -> tuple[np.ndarray, float]:  # fmt: skip
@@ -22,7 +25,18 @@ def read_time_series(path: str | Path, columns: Mapping[str, Mapping[str, float]
     if abs(time[0]) > 1e-6 * period:
         raise InputError(path, "first row, column 'time'", float(time[0]), "the first sample must lie at time 0")
     _check_even(path, time, period)
+    for name in columns:
+        _check_marks(path, name, table[name], time)
     return np.column_stack([table[name] for name in columns]), float(f"{period:.12g}")
+
+
+def _check_marks(path: str | Path, name: str, values: np.ndarray, time: np.ndarray) -> None:
+    """Refuse what exporters write where they have no value."""
+    marks = np.flatnonzero(np.abs(values) > MARK)
+    if len(marks):
+        raise InputError(path, f"column {name!r} at {time[marks[0]]:g} s", float(values[marks[0]]), "is an exporter's "
+                         f"mark for no value ({len(marks)} of {len(values)} samples are): mend the file, or leave "
+                         "such times out")
 
 
 def _check_even(path: str | Path, time: np.ndarray, period: float) -> None:

@@ -330,3 +330,11 @@ def test_a_biased_angle_and_wrong_deviations_are_named(folder):
         assert "the filter contradicts p.csv" in text and "doubt      the filter" in describe(own)
         result = simulate(own, "reference")
         assert "in doubt" in result.data.attrs["status"] and "contradicts" in result.data.attrs["doubts"]
+
+
+def test_a_mark_for_no_value_is_told_with_column_and_time(folder):
+    forces = read_time_series(folder / "f.csv", {"front": NEWTONS, "rear": NEWTONS})[0]
+    forces[100, 1] = 9.9e34
+    write_time_series(folder / "f.csv", {"front": ("N", forces[:, 0]), "rear": ("N", forces[:, 1])}, PERIOD)
+    with pytest.raises(InputError, match=r"column 'rear' at 0.5 s = 9.9e\+34: is an exporter's mark for no value"):
+        assemble(scene(folder))
