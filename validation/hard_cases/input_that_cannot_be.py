@@ -1,0 +1,95 @@
+"""Wheel forces and vehicles that cannot be: refused, or doubted before the run; true forces raise nothing.
+
+Forces of the asymmetric vehicle on hills for 20 s are spoilt; the error counts what is not named as it must be.
+"""
+
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+
+from models.errors import InputError
+from models.measured.axle_forces import IN_FILE, AxleForces, check
+from models.measured.signal import Signal
+from models.parameters.asymmetric_twin import PARAMETERS as TWIN
+from models.simulate import simulate
+from models.vehicles.plausible_plane import plausible_plane
+from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from validation.scenes import road_scene
+
+PERIOD, DURATION = 1e-3, 20.0
+WHEELS = np.array([TWIN.m1, TWIN.m2]) * TWIN.g
+LOADS = TWIN.m3 * TWIN.g * np.array([TWIN.a, TWIN.b]) / (TWIN.a + TWIN.b) + WHEELS
+Change = Callable[[np.ndarray], np.ndarray]
+REFUSED: dict[str, Change] = {
+    "wheel forces with the other sign": lambda f: -f,
+    "front wheel force with the other sign": lambda f: f * [-1, 1],
+    "rear wheel force with the other sign": lambda f: f * [1, -1],
+    "wheel forces in kN": lambda f: f / 1e3,
+    "wheel forces in daN": lambda f: f / 10,
+    "rear wheel force in kN": lambda f: f * [1, 1e-3],
+    "wheel forces of exchanged axles": lambda f: f[:, ::-1],
+    "wheel forces without the static load": lambda f: f - LOADS,
+    "front wheel force without the static load": lambda f: f - LOADS * [1, 0],
+    "wheel forces measured above the wheels": lambda f: f - WHEELS,
+    "wheel forces of one side": lambda f: f / 2,
+    "wheel forces 15 % low": lambda f: f * 0.85,
+}
+DOUBTED: dict[str, Change] = {
+    "wheel forces 5 % low": lambda f: f * 0.95,
+    "wheel forces 2 % high": lambda f: f * 1.02,
+    "front wheel force 2 % high": lambda f: f * [1.02, 1],
+    "offset of the rear wheel force": lambda f: f + np.array([0, 60.0]),
+    "front wheel force that never changes": lambda f: np.column_stack([np.full(len(f), LOADS[0]), f[:, 1]]),
+}
+QUERIED: dict[str, dict[str, float]] = {
+    "chassis in tonnes": {"m3": 1.35}, "wheelbase in mm": {"a": 1300.0, "b": 800.0}, "springs in N/mm":
+    {"k3": 90.0, "k4": 120.0}, "tyre in N/mm": {"k1": 190.0}, "dampers in N s/mm": {"d3": 9.0, "d4": 12.0},
+    "pitch inertia in t m^2": {"I": 0.54},
+}  # fmt: skip
+
+
+@cache
+def true() -> np.ndarray:
+    """Wheel forces (n, 2) of the asymmetric vehicle on hills, N."""
+    road = {"source": "hills", "speed": 20.0}
+    run = simulate(road_scene("asymmetric_twin", PERIOD, DURATION, road), "reference")
+    return np.column_stack([run["f1"], run["f2"]])
+
+
+def words(change: Change) -> list[str]:
+    """Errors and doubts about the forces, changed; InputError where there is an error."""
+    front, rear = (Signal(axle, "forces.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0)
+                   for axle in ("front", "rear"))  # fmt: skip
+    forces = np.ascontiguousarray(change(true()))
+    found = check(AxleForces(forces, PERIOD, TWIN, ((front,), (rear,)), DURATION, IN_FILE))
+    errors = [each.text for each in found if each.weight == "error"]
+    if errors:
+        raise InputError("forces.csv", "", None, " ".join(errors))
+    return [each.text for each in found if each.weight == "doubt"]
+
+
+def _forces(change: Change, doubted: bool, _: str, folder: Path) -> float:
+    return abs(len(words(change)) - doubted)
+
+
+def _vehicle(change: dict[str, float], _: str, folder: Path) -> float:
+    return float(not plausible_plane(TWIN.model_copy(update=change)))
+
+
+def _case(name: str, error: Callable[[str, Path], float], wanted: Word, said: str) -> Case:
+    expected: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, wanted) if wanted != "right" else {}
+    return Case(name, "engines run it without a word", said, "unnamed", 0.0, "it is named or it is not", error,
+                expected, once=True)  # fmt: skip
+
+
+CASES = (
+    *(_case(name, partial(_forces, change, True), "refused", "refused before the run, with what is wrong")
+      for name, change in REFUSED.items()),
+    *(_case(name, partial(_forces, change, True), "right", "one doubt before the run, with the fall or turn to come")
+      for name, change in DOUBTED.items()),
+    _case("true wheel forces", partial(_forces, lambda f: f, False), "right", "nothing is said"),
+    *(_case(name, partial(_vehicle, change), "right", "queried, with the value and what is usual")
+      for name, change in QUERIED.items()),
+)  # fmt: skip
