@@ -14,6 +14,7 @@ from models.ride.choice.activity import activity
 from models.ride.choice.choose import Choice, Chooser
 from models.ride.choice.held import Effect, Held, illegal
 from models.ride.choice.in_time import Samples, goes_in_time
+from models.ride.choice.reduced_files import SCENE, write
 from models.ride.of_scene import told_by, vehicle_of
 from models.ride.scene import RideScene
 from models.strict import read
@@ -49,7 +50,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Choose; saves ``effects.csv``, ``activity.csv`` and a figure; by runs where springs are bent."""
+    """Choose; saves ``effects.csv``, ``activity.csv``, a figure, files of what is left; by runs for bent springs."""
     from studies.ride_choice_figure import choice_figure
 
     check(scene, engines)
@@ -64,6 +65,8 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         further = chooser.further(frozenset(choice.left_out))
         alone = [_alone(chooser, effect) for effect in chooser.effects]
         watts = activity(chooser.wholes[len(chooser.wholes) // 2])
+    if choice.left_out:
+        write(chooser.rest(frozenset(choice.left_out)), folder)
     _save(scene, alone, choice, folder / "effects.csv")
     _save_activity(watts, folder / "activity.csv")
     choice_figure(scene, alone, choice, watts, folder / "choice.png")
@@ -150,8 +153,8 @@ def saving(choice: Choice, tolerance: str) -> list[str]:
         return [*lines, "  nothing that may be left out saves calls"]
     return [*lines, "  without what is left out, changes and steps together keep the same in steps of "
             f"{1e3 * after.step:.3g} ms: {after.calls:.4g} calls, {before.calls / after.calls:.3g} times fewer at "
-            f"equal accuracy (stable up to {1e3 * choice.stable[1]:.3g} ms); states {before.states} -> {after.states}"
-            ]  # fmt: skip
+            f"equal accuracy (stable up to {1e3 * choice.stable[1]:.3g} ms); states {before.states} -> {after.states}",
+            f"  {SCENE} beside the results runs what is left"]  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -5,11 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray
 
+from models.engines.spatial_protocol import build as build_engine
 from models.errors import InputError
 from models.ride.choice.choose import Chooser
 from models.ride.choice.cost import stable_step
 from models.ride.choice.held import Held, effects_of, illegal, without
+from models.ride.choice.march import March
+from models.ride.choice.marched import confirms, marched
+from models.ride.choice.neighbourhood import Neighbourhood, changed
 from models.ride.choice.reduced import Whole
 from models.ride.choice.screen import Screen, confirmed
 from models.ride.covariance import stationary
@@ -19,6 +24,7 @@ from models.ride.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from studies.asked import SCENES
+from validation.choice.nearby import measured_step, worst_nearby
 from validation.ride.drawn_rides import drawn
 
 SPEED = 20.0
@@ -206,3 +212,86 @@ def test_a_choice_whose_identity_is_not_exact_is_not_taken(monkeypatch):
     assert chooser.kept(damping)
     monkeypatch.setattr(Screen, "identity", lambda own, rest: (exact(own, rest)[0] * (1 + 3e-12), exact(own, rest)[1]))
     assert not chooser.kept(damping)
+
+
+def drawn_speeds(seed):
+    """A scene of a detailed vehicle, with what its choice leaves out as far as the tolerance of 2 % allows."""
+    drew = drawn(seed, 0.02)
+    chooser = Chooser(drew.held, [0.7 * drew.speed, drew.speed, 1.3 * drew.speed], drew.quantities, drew.tolerance)
+    return chooser, chooser.choose()
+
+
+def test_the_tolerance_holds_between_speeds_and_with_parameters_off():
+    chooser, choice = drawn_speeds(2)
+    chosen = frozenset(choice.left_out)
+    assert chosen and choice.kept and abs(choice.off).max() > abs(choice.between).max() >= abs(choice.confirmed).max()
+    assert 0.3 < worst_nearby(chooser, chosen, 6, 1) <= abs(choice.off).max() / 0.02
+    steps = [measured_step(chooser, one, cost.step)
+             for one, cost in ((frozenset(), choice.before), (chosen, choice.after))]  # fmt: skip
+    assert steps[1] / steps[0] == pytest.approx(choice.before.calls / choice.after.calls, rel=0.05)
+
+
+def test_spectra_near_a_scene_are_those_of_the_exact_solve():
+    drew = drawn(2)
+    rest = without(drew.held, [named(drew.held)["springs of part on body"]])
+    rows = [[output.name for output in drew.held.vehicle.outputs].index(name) for name in drew.quantities]
+    near = Neighbourhood(drew.held, np.array([10.0, 30.0]), [(row, "") for row in rows])
+    corner = near.corners(rest)[0]
+    for factors in ({}, corner):
+        found = near.changes(rest, factors)
+        for i in (0, len(near.speeds) // 2):
+            full, left = (replace(one, vehicle=changed(one.vehicle, factors)) for one in (drew.held, rest))
+            whole = Whole(full, float(near.speeds[i]))
+            exact = np.sqrt(confirmed(whole.reduced(left), rows) / confirmed(whole.full, rows)) - 1
+            assert found[i] == pytest.approx(exact, abs=2e-4)  # what the panels leave
+    assert abs(near.changes(rest, corner)[:, 0]).max() > abs(near.changes(rest)[:, 0]).max()
+
+
+def test_a_run_does_what_the_closed_form_of_runs_says():
+    """Steps of 80 % of the stable one change deviations by per cents; a planted 10 % longer step is seen."""
+    scene = held("half_car", cutoff=50.0)
+    march = March(Whole(scene, SPEED).full, SPEED, (0, 2), ())
+    step = 0.8 * march.longest
+    assert confirms(march, step)
+    run = marched(march, step)
+    wrong = march.deviations(1.1 * step) / march.deviations(step / 4)
+    assert (abs(run.ratio - wrong) > 4 * run.error).any()
+
+
+def test_the_reduced_vehicle_runs_as_it_stands(twinrig, capsys, empty_folder):
+    """Its deviations are those that were confirmed, by the study of the whole vehicle."""
+    assert twinrig("run", "ride_choice", "--out", "out", "--json") == 0
+    changes = json.loads(capsys.readouterr().out)["answer"]["errors"]
+    assert twinrig("run", "out/reduced.toml", "--out", "left", "--json") == 0
+    scene = SCENES / "vehicles" / "pitch_plane.toml"
+    (empty_folder / "whole.toml").write_text(f"""title = "w"
+system = "ride"
+[vehicle]
+file = "{scene}"
+[speeds]
+values = [20.0]
+""")
+    assert twinrig("run", "whole.toml", "--engine", "reference", "--out", "whole", "--json") == 0
+    with xarray.open_dataset("left/deviations.nc") as left, xarray.open_dataset("whole/deviations.nc") as full:
+        found = left.deviation[0, 0, 0].values / full.deviation[0, 0, 0].values - 1.0
+    assert found[:2] == pytest.approx([error["confirmed"] for error in changes.values()], rel=1e-6)
+
+
+@pytest.mark.parametrize(("table", "said"), [
+    ('massless = ["wheel"]', "no such body"), ('rigid = ["none"]', "no such spring"),
+    ('locked = [["body", "rz"]]', "no such freedom of a body"),
+])  # fmt: skip
+def test_limits_of_parts_that_a_vehicle_has_not(table, said, empty_folder):
+    text = (SCENES / "vehicles" / "pitch_plane.toml").read_text()
+    (empty_folder / "mine.toml").write_text(f"{text}\n[reduced]\n{table}\n")
+    with pytest.raises(InputError, match=said):
+        load_vehicle("mine.toml", empty_folder, reduced=True)
+
+
+def test_a_reduced_vehicle_is_refused_where_it_would_be_read_as_a_whole_one(empty_folder):
+    text = (SCENES / "vehicles" / "pitch_plane.toml").read_text()
+    (empty_folder / "mine.toml").write_text(f'{text}\n[reduced]\nmassless = ["front wheel"]\n')
+    with pytest.raises(InputError, match="only the study ride"):
+        load_vehicle("mine.toml", empty_folder)
+    with pytest.raises(InputError, match="reduced vehicle"):
+        build_engine("mujoco", load_vehicle("mine.toml", empty_folder, reduced=True))

@@ -73,6 +73,9 @@ def build(engine: str, vehicle: SpatialVehicle, settings: Settings | None = None
     speed : m/s, for side forces and drag; InputError where they miss it.
     road : heights (m) under the tyres, then their rates (m/s), at every half step: (2 steps + 1, 2 w); None: flat.
     """
+    if vehicle.limits:
+        raise Refused(engine, "a reduced vehicle has bodies without mass, rigid springs or locked freedoms, which only "
+                              "the closed form of the reference has: use --engine reference, or the whole vehicle")
     linear = linearise(vehicle, speed)
     if settings is not None:
         _check(engine, linear, settings, road)

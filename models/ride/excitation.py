@@ -8,6 +8,7 @@ import numpy as np
 from models.errors import InputError
 from models.ride.delayed_system import DelayedSystem
 from models.ride.linear_vehicle import LinearVehicle
+from models.ride.massless import first_order, singular
 
 
 @dataclass(frozen=True)
@@ -30,10 +31,12 @@ def excited(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> Del
 
     State (q, q', f of each axle). In time a filter reads f' = v F f + sqrt(v) G w; the height's rate is
     z' = H f', white noise in part where the filter is of first order: it reaches the wheels through tyre damping.
-    Raises InputError for a speed that is none.
+    Of bodies without mass fewer states are left. Raises InputError for a speed that is none.
     """
     if not 0.0 < speed < math.inf:
         raise InputError("", "speed", speed, "must be above 0, in m/s: at standstill no noise arrives")
+    if singular(vehicle.mass):
+        return first_order(vehicle, excitation, speed)[0]
     n, axles = len(vehicle.mass), len(excitation.heights)
     m, k = excitation.G.shape
     size = 2 * n + axles * m

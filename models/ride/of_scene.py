@@ -25,6 +25,8 @@ GRAVITY = 9.81
 """m/s^2, where a scene's operating point is the loaded one."""
 Linear = Callable[[float], LinearVehicle]
 """A linear vehicle at a speed (m/s)."""
+CLOSED = "ride"
+"""The study that reads reduced vehicles, by their closed form."""
 BESIDE = 1.0
 """Where (m) the one track of a vehicle without a width lies: its level is the same wherever that is."""
 
@@ -54,7 +56,8 @@ def vehicle_of(scene: RideScene) -> SpatialVehicle:
 
 
 def _built(scene: RideScene) -> Built:
-    return extended(Built(load_vehicle(scene.vehicle.file, scene.folder, scene.file, "vehicle.file")), scene)
+    return extended(Built(load_vehicle(scene.vehicle.file, scene.folder, scene.file, "vehicle.file",
+                                       reduced=scene.study == CLOSED)), scene)
 
 
 def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:

@@ -9,6 +9,7 @@ from models.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_
 from models.ride.scene import RideScene
 from models.road.two_track import half_track
 from models.scene_effects import lines as effect_lines
+from models.vehicles.limits import NONE
 from models.vehicles.plausible import plausible
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
@@ -105,7 +106,7 @@ def undamped(vehicle: SpatialVehicle) -> list[float]:
     import numpy as np
     from scipy.linalg import eigvalsh
 
-    linear = linearise(replace(vehicle, side_forces=(), drags=()))
+    linear = linearise(replace(vehicle, side_forces=(), drags=(), limits=NONE))
     squares = eigvalsh((linear.stiffness + linear.stiffness.T) / 2, linear.mass)
     return [float(f) for f in np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)]
 

@@ -58,8 +58,9 @@ def sweep(vehicle: Callable[[float], LinearVehicle], excitations: Mapping[str, E
     for j, speed in enumerate(speeds):
         at_speed = vehicle(speed)
         for i, excitation in enumerate(excitations.values()):
-            system = weighted(excited(at_speed, excitation, speed), filters or {})
-            states = 2 * len(at_speed.mass)
+            plain = excited(at_speed, excitation, speed)
+            system = weighted(plain, filters or {})
+            states = len(plain.A) - len(plain.B) * len(excitation.F)
             point = _quick(system, states, excitation, speed, shared, accuracy) if fast else ASKED
             if isinstance(point, str):
                 direct[point] = direct.get(point, 0) + 1

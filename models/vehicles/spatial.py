@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from models.vehicles.curve import Curve
+from models.vehicles.limits import NONE, Limits
 
 Vector = tuple[float, float, float]
 Freedom = Literal["x", "y", "z", "rx", "ry", "rz"]
@@ -191,7 +192,7 @@ class SpatialVehicle:
 
     ``gravity`` (m/s^2) acts along -z on every body. At 0 the vehicle is unloaded; above, the spring-dampers, bars
     and tyres carry the preloads that make the design position the equilibrium on a flat road. ``axles``: places x (m)
-    of the axles from the front.
+    of the axles from the front. ``limits`` : what a reduced vehicle has not, for closed forms of ride alone.
     """
 
     name: str
@@ -204,6 +205,7 @@ class SpatialVehicle:
     drags: tuple[Drag, ...] = ()
     outputs: tuple[SpatialOutput, ...] = ()
     gravity: float = 0.0
+    limits: Limits = NONE
 
     def coordinates(self) -> tuple[tuple[str, Freedom], ...]:
         """Coordinates in the order of the state: body by body, freedoms in the order of FREEDOMS."""

@@ -8,6 +8,7 @@ import numpy as np
 from models.errors import InputError
 from models.ride.linear_vehicle import LinearVehicle, Output, Wheel
 from models.vehicles.kinematics import Kinematics
+from models.vehicles.limits import limited
 from models.vehicles.spatial import (
     AntiRollBar,
     PartOutput,
@@ -44,7 +45,7 @@ def linearise(
         damping += c * np.outer(row, row)
     stiffness += _geometric(vehicle, motion)
     _speed_forces(vehicle, motion, speed, damping, stiffness)
-    return LinearVehicle(
+    whole = LinearVehicle(
         mass=mass(vehicle),
         damping=damping,
         stiffness=stiffness,
@@ -55,6 +56,7 @@ def linearise(
         outputs=outputs(vehicle, motion, gains),
         source="analytic, " + ("loaded" if vehicle.gravity else "unloaded"),
     )
+    return limited(whole, vehicle, vehicle.limits)[0] if vehicle.limits else whole
 
 
 def wheels(vehicle: SpatialVehicle) -> tuple[Wheel, ...]:

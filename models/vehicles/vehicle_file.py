@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from models.errors import InputError
 from models.scene_file import existing, parse
 from models.strict import read
 from models.vehicles.curve import Curve
+from models.vehicles.limits import Limits
 from models.vehicles.spatial import (
     AntiRollBar,
     Body,
@@ -32,6 +34,7 @@ from models.vehicles.vehicle_tables import (
     AxleTable,
     CurveTable,
     OutputTable,
+    ReducedTable,
     SeatTable,
     SpringTable,
     TyreTable,
@@ -47,18 +50,28 @@ def shipped() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in SHIPPED.glob("*.toml")))
 
 
-def load_vehicle(name: str, folder: str | Path = ".", file: str = "", place: str = "") -> SpatialVehicle:
+def load_vehicle(name: str, folder: str | Path = ".", file: str = "", place: str = "",
+                 reduced: bool = False) -> SpatialVehicle:  # fmt: skip
     """A vehicle that comes with twinrig, by its name, or a user's TOML file, relative to ``folder``; unloaded.
 
-    ``file`` and ``place`` say who asked for it, for the message if there is none. Raises InputError.
+    ``file`` and ``place`` say who asked for it, for the message if there is none. reduced : may it have [reduced]?
+    Raises InputError.
     """
+    path = vehicle_path(name, folder, file, place)
+    vehicle = build_vehicle(parse(path), path.name)
+    if vehicle.limits and not reduced:
+        raise InputError(file, place, name, "has a table [reduced], which only the study ride of linear vehicles "
+                         "reads: name the whole vehicle here")  # fmt: skip
+    return vehicle
+
+
+def vehicle_path(name: str, folder: str | Path = ".", file: str = "", place: str = "") -> Path:
+    """Where the file of a vehicle is, which ``load_vehicle`` reads; raises InputError."""
     if not name.endswith(".toml"):
         if name not in shipped():
             raise InputError(file, place, name, "no such vehicle; a file of your own ends in .toml", shipped())
-        path = SHIPPED / f"{name}.toml"
-    else:
-        path = existing(name, Path(folder), file, place)
-    return build_vehicle(parse(path), path.name)
+        return SHIPPED / f"{name}.toml"
+    return existing(name, Path(folder), file, place)
 
 
 def build_vehicle(table: Mapping[str, Any], file: str) -> SpatialVehicle:
@@ -115,7 +128,20 @@ class _Builder:
             outputs=tuple(self._output(output, parts) for output in self.tables.outputs),
         )
         check(vehicle, self.file)
-        return vehicle
+        return replace(vehicle, limits=self._limits(vehicle))
+
+    def _limits(self, vehicle: SpatialVehicle) -> Limits:
+        table = self.tables.reduced or ReducedTable()
+        springs = tuple(spring.name for spring in vehicle.springs)
+        known = tuple(" ".join(one) for one in vehicle.coordinates())
+        for body in table.massless:
+            self._body("reduced.massless", body)
+        for spring in table.rigid:
+            self._known("reduced.rigid", spring, "spring", springs)
+        for pair in table.locked:
+            self._known("reduced.locked", " ".join(pair), "freedom of a body", known)
+        locked = frozenset(one for one in vehicle.coordinates() if list(one) in table.locked)
+        return Limits(frozenset(table.massless), frozenset(table.rigid), locked)
 
     def _fault(self, place: str, value: Any, allowed: str, choices: Sequence[str] = ()) -> InputError:
         return InputError(self.file, place, value, allowed, tuple(choices))

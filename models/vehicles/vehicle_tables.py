@@ -139,6 +139,14 @@ class OutputTable(Strict):
     tyre: str | None = Field(None, description="tyre, for tyre force and deflection")
 
 
+class ReducedTable(Strict):
+    """[reduced]: what a choice of effects has left out, as limits; only the closed form of ride reads them."""
+
+    massless: list[Name] = Field(default_factory=list, description="bodies that count as having no mass")
+    rigid: list[Name] = Field(default_factory=list, description="springs, and NAME.x of mounts, that count as rigid")
+    locked: list[Names] = Field(default_factory=list, description="freedoms that count as locked: body and freedom")
+
+
 class VehicleTable(Strict):
     """A vehicle file."""
 
@@ -156,3 +164,4 @@ class VehicleTable(Strict):
     anti_roll_bars: list[BarTable] = Field(default_factory=list)
     drag: DragTable | None = None
     outputs: list[OutputTable] = Field(min_length=1, description="what is read")
+    reduced: ReducedTable | None = None

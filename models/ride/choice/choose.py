@@ -266,11 +266,13 @@ class Chooser:
         """The greedy choice, confirmed, less what saves nothing at equal accuracy."""
         chosen, rounds = self._greedy((self._calls_saved, self._work_saved))
         chosen = self._worthwhile(chosen)
-        changes = [self.predicted(chosen), self.confirm(chosen), self.between(chosen),
-                   self.off(chosen) if chosen else np.zeros(len(self.rows))]  # fmt: skip
+        if self.accurate(chosen).calls * (1 + WORTH) > self.accurate(frozenset()).calls:
+            chosen = frozenset()
+        found, between, none = self.confirm(chosen), self.between(chosen), frozenset[Effect]()
+        off = self.off(chosen) if chosen else np.zeros(len(self.rows))
         left_out = tuple(effect for effect in self.effects if effect in chosen)
-        none = frozenset[Effect]()
-        return Choice(self.effects, left_out, *changes, all(map(self.holds, changes[1:])), self._by_run(none),
+        return Choice(self.effects, left_out, self.predicted(chosen), found, between, off,
+                      self.holds(found) and self.holds(between) and self.holds(off), self._by_run(none),
                       self._by_run(chosen), (self.cost(none).step, self.cost(chosen).step), rounds,
                       self._reasons(chosen))  # fmt: skip
 
@@ -311,9 +313,9 @@ class Chooser:
             if self.cost(less).step < self.accurate(chosen).step * (1 - WORTH):
                 continue  # it alone bounds the step
             same = self.cost(less).step >= self.cost(chosen).step * (1 - WORTH)
-            if same or self.accurate(less).calls <= self.accurate(chosen).calls * (1 + WORTH):
-                if self.kept(less):
-                    return self._worthwhile(less)
+            same = same or self.accurate(less).calls <= self.accurate(chosen).calls * (1 + WORTH)
+            if same and self.kept(less):
+                return self._worthwhile(less)
         return chosen
 
     def further(self, chosen: Set) -> dict[Effect, float]:

@@ -11,6 +11,7 @@ from models.ride.of_scene import excitation_of, vehicle_of
 from models.ride.scene import RideScene
 from models.scene_effects import module_of, names_of, tables_of
 from models.scene_effects import without as without_own
+from models.vehicles.limits import Limits
 from models.vehicles.spatial import Freedom, SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 
@@ -26,6 +27,11 @@ class Held:
     rigid: frozenset[str] = frozenset()
     locked: frozenset[tuple[str, Freedom]] = frozenset()
     straight: frozenset[str] = frozenset()
+
+    @property
+    def limits(self) -> Limits:
+        """What the vehicle has not any more."""
+        return Limits(self.massless, self.rigid, self.locked)
 
     def on_road(self, **changes: object) -> "Held":
         """With other values in [road]."""

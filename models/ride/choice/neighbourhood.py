@@ -8,6 +8,7 @@ of the slopes name the corner of the box of parameters in which e is the largest
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigvals
@@ -43,18 +44,17 @@ def parameters(vehicle: SpatialVehicle) -> list[Parameter]:
 
 def changed(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) -> SpatialVehicle:
     """The vehicle with these values so many times as large; those that it has not are passed over."""
-    def part(group: str, own: object) -> object:
-        values = {key: _times(getattr(own, key), factors[group, own.name, key])  # type: ignore[attr-defined]
-                  for key in PARTS[group] if (group, own.name, key) in factors}  # type: ignore[attr-defined]
-        return replace(own, **values)  # type: ignore[type-var]
+    def part(group: str, own: Any) -> Any:
+        values = {key: _times(getattr(own, key), factors[group, own.name, key])
+                  for key in PARTS[group] if (group, own.name, key) in factors}  # fmt: skip
+        return replace(own, **values)
 
-    return replace(vehicle, **{group: tuple(part(group, own) for own in getattr(vehicle, group)) for group in PARTS})
+    groups: dict[str, Any] = {group: tuple(part(group, own) for own in getattr(vehicle, group)) for group in PARTS}
+    return replace(vehicle, **groups)
 
 
-def _times(value: object, factor: float) -> object:
-    if isinstance(value, tuple):
-        return tuple(_times(each, factor) for each in value)
-    return value * factor  # type: ignore[operator]
+def _times(value: Any, factor: float) -> Any:
+    return tuple(_times(each, factor) for each in value) if isinstance(value, tuple) else value * factor
 
 
 def speeds_between(held: Held, listed: np.ndarray) -> np.ndarray:
