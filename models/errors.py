@@ -25,6 +25,7 @@ class InputError(ValueError):
 
     def __init__(self, file: object, place: str, value: Any, allowed: str, choices: tuple[str, ...] = ()) -> None:
         self.file, self.place, self.value, self.allowed = str(file), place, value, allowed
+        self.choices = choices
         where = ": ".join(part for part in (str(file), place) if part)
         name = value if isinstance(value, str) else place.rpartition(".")[2]
         super().__init__(f"{where}{_shown(value)}: {allowed}{nearest(name, choices)}")

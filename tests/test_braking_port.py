@@ -21,7 +21,7 @@ from models.braking.magic_formula import surface
 from models.braking.plane_vehicle import PAPER, truck
 from models.braking.port import frame, socket_port
 from models.braking.port.ask import ControllerFailed, ask
-from models.braking.port.callable import Within, named_controller
+from models.braking.port.callable import named_controller
 from models.braking.port.client import serve
 from models.braking.port.example import Example
 from models.braking.port.faults import Fault, Faulty
@@ -148,6 +148,22 @@ def test_an_fmu_gives_the_same_bits(vehicle, tmp_path):
     assert same(path, vehicle.run(Example(4), 11.0, SHORT))
 
 
+@pytest.mark.parametrize(("does", "name"), [("raise ValueError", "crash"), ("while True: pass", "silence"),
+                                            ("os._exit(5)", "crash: .* status 5"), ("return False", "crash")])
+def test_a_hostile_fmu_ends_by_name_within_twice_its_time(does, name, tmp_path):
+    builder = pytest.importorskip("pythonfmu").FmuBuilder
+    source = (HERE / "example_slave.py").read_text()
+    source = source.replace("        wheels = np.array", f"        import os\n        {does}\n        wheels = np.array")
+    (tmp_path / "slave.py").write_text(source)
+    file = builder.build_FMU(tmp_path / "slave.py", dest=tmp_path)
+    table, run = PortTable(fmu=Path(file).name, timeout=0.5), Run(RADIUS, SAMPLE, folder=tmp_path)
+    with pytest.raises(ControllerFailed, match=name):
+        with opened(table, run, Example(4)) as (other, _):
+            begun = time.perf_counter()
+            ask(other, of())
+    assert time.perf_counter() - begun < 2 * 0.5
+
+
 def test_an_fmu_without_fmpy_names_the_extra(monkeypatch, tmp_path):
     (tmp_path / "a.fmu").touch()
     monkeypatch.setitem(sys.modules, "fmpy", None)
@@ -229,23 +245,9 @@ def _exits(given):
     raise SystemExit(0)
 
 
-def _sleeps(given):
-    time.sleep(5.0)
-
-
-def _loops(given):
-    while True:
-        try:
-            pass
-        except Exception:
-            continue
-
-
 @pytest.mark.parametrize(("answer", "name"), [
     (_raises, "crash: ValueError: no idea"),
     (_exits, "crash: SystemExit: 0"),
-    (_sleeps, "silence: no answer within 0.05 s"),
-    (_loops, "silence: no answer within 0.05 s"),
     (lambda given: None, "wrong frame"),
     (lambda given: Command(), "wrong frame"),
     (lambda given: Command(valves=np.ones(3)), "wrong length: 3 values for 4 wheels"),
@@ -256,10 +258,56 @@ def _loops(given):
     (lambda given: Command(pressures=["a"] * 4), "wrong frame"),
 ])  # fmt: skip
 def test_nonsense_of_a_callable_is_named(answer, name):
-    begun = time.perf_counter()
     with pytest.raises(ControllerFailed, match=name):
-        ask(Within(Says(answer), 0.05), of())
-    assert time.perf_counter() - begun < 0.5
+        ask(Says(answer), of(), most=6.0)
+
+
+HOSTILE = {
+    "sleeps, whatever is raised": ("silence: no answer within 0.3 s", "while True:\n            try: time.sleep(0.05)\n"
+                                   "            except BaseException: pass"),
+    "sleeps in C": ("silence", "ctypes.CDLL(None).sleep(1000)"),
+    "works in C": ("silence", "sum(iter(int, 1))"),
+    "hears no signal": ("silence", "[signal.signal(s, signal.SIG_IGN) for s in range(1, 32) if s not in (9, 19)]\n"
+                        "        while True: pass"),
+    "stops itself": ("silence", "os.kill(os.getpid(), signal.SIGSTOP)"),
+    "leaves a thread": (r"crash: ValueError: boom \(hostile.py, line 7\)", "threading.Thread(target=time.sleep, "
+                        "args=(1000,)).start(); raise ValueError('boom')"),
+    "ends its process": ("crash: .* ended with status 3", "os._exit(3)"),
+    "leaves by sys.exit": ("crash: SystemExit: 0", "sys.exit(0)"),
+    "crashes": ("crash: .* SIGSEGV", "ctypes.string_at(0)"),
+    "is killed": ("crash: .* SIGKILL", "os.kill(os.getpid(), signal.SIGKILL)"),
+    "closes everything": ("crash", "os.closerange(3, 256); time.sleep(1000)"),
+    "is late": ("silence", "time.sleep(0.4); return Command(valves=np.ones(4))"),
+    "is no array": ("silence", "class A:\n            def __array__(self, *a, **k):\n                while True: pass\n"
+                    "        return Command(pressures=A())"),
+    "answers complex numbers": ("wrong frame: complex", "return Command(pressures=np.full(4, 1j))"),
+    "presses more than there is": ("too high: a pressure of 299 bar, above the 6 bar",
+                                   "return Command(pressures=np.full(4, 299.0))"),
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_a_hostile_callable_ends_by_name_within_twice_its_time(kind, tmp_path):
+    name, does = HOSTILE[kind]
+    (tmp_path / "hostile.py").write_text(
+        "import ctypes, os, signal, sys, threading, time\nimport numpy as np\n"
+        "from models.braking.controller import Command\nclass Hostile:\n    def __init__(self, wheels): pass\n"
+        f"    def sample(self, given):\n        {does}\n")  # fmt: skip
+    table, run = PortTable(callable="hostile.py:Hostile", timeout=0.3), Run(RADIUS, SAMPLE, folder=tmp_path)
+    with pytest.raises(ControllerFailed, match=name):
+        with opened(table, run, Example(4)) as (other, _):
+            begun = time.perf_counter()
+            ask(other, of())
+    assert time.perf_counter() - begun < 2 * 0.3
+
+
+def test_a_callable_that_is_not_made_in_time_or_crashes_as_it_is_made(tmp_path):
+    for does, told in (("while True: pass", "silence: it was not made within"), ("import os; os._exit(4)", "status 4")):
+        (tmp_path / "made.py").write_text(f"class Made:\n    def __init__(self, wheels):\n        {does}\n"
+                                          "    def sample(self, given): pass\n")  # fmt: skip
+        table = PortTable(callable="made.py:Made", start=3.0)
+        with pytest.raises(RunFailed, match=told), opened(table, Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)):
+            pass
 
 
 @pytest.mark.parametrize("table", [{"signals": {"gain": 0.9}}, {"faults": [{"kind": "stuck"}]}, {"log": "a.log"}, {}])

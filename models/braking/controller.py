@@ -8,6 +8,8 @@ import numpy as np
 
 SAMPLE = 0.0055
 """Time between two samples (s): the paper's, 182 a second."""
+RELEASE, HOLD, APPLY, SLOW = -1, 0, 1, 2
+"""States of a valve; the last, apply slowly, only where the scene has such valves."""
 LARGEST_PRESSURE = 300.0
 """bar; no brake of a road vehicle holds more, by air some 10 and by fluid 200."""
 
@@ -16,7 +18,7 @@ class Sample(NamedTuple):
     """What goes to the controller.
 
     number : of the sample, from 0; time : ns since the start; wheels (W,) : wheel-speed signals times the wheel's
-    radius (m/s); brake : whether the switch at the pedal is closed; supply : pressure (bar); speed : of the vehicle
+    radius (m/s), never negative, as a toothed wheel does not tell which way it turns; brake : whether the switch at the pedal is closed; supply : pressure (bar); speed : of the vehicle
     (m/s) if the scene gives it away, else not a number.
     """
 
@@ -62,4 +64,4 @@ class AllApplied:
 
     def sample(self, given: Sample) -> Command:
         """Apply."""
-        return Command(valves=np.full(self.wheels, 1 if given.brake else -1))
+        return Command(valves=np.full(self.wheels, APPLY if given.brake else RELEASE))

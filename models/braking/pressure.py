@@ -1,7 +1,8 @@
 """Pressures in the brake chambers over one sample, and the torques that follow them in order.
 
 Mode V: the controller sets valves. A chamber then fills from the supply or empties to the air, each by a first-order
-law, exact over a step; a change of a valve takes effect after the valves' delay, also between two samples. The supply
+law, exact over a step; a valve that can apply slowly, by a throttle or by pulses too short to be told apart, fills it
+with a longer time constant; a change of a valve takes effect after the valves' delay, also between two samples. The supply
 is a reservoir: what a chamber takes in, p V, it gives. Mode P: the controller sets the pressures themselves, as the
 paper measured them, and each is held over the sample.
 """
@@ -12,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from models.braking.brake import torque
+from models.braking.controller import APPLY, RELEASE, SLOW
 from models.compiled import lean
 from models.errors import InputError
 
-RELEASE, HOLD, APPLY = -1, 0, 1
-"""States of a valve."""
 NONE = np.zeros(0)
 
 
@@ -24,7 +24,8 @@ class Chambers(NamedTuple):
     """How chambers (W,) fill and empty: time constants (s) of their first-order pressure; supply pressure (bar).
 
     volumes (W,) : of the chambers with their pistons out, and reservoir : of the supply, in litres; an infinite one
-    keeps its pressure and asks for no volumes. delay : of the valves (s).
+    keeps its pressure and asks for no volumes. delay : of the valves (s). slow (W,) : time constants (s) of filling by
+    valves that apply slowly, none where there are no such valves.
     """
 
     fill: np.ndarray
@@ -33,6 +34,7 @@ class Chambers(NamedTuple):
     volumes: np.ndarray = NONE
     reservoir: float = math.inf
     delay: float = 0.0
+    slow: np.ndarray = NONE
 
 
 class Air(NamedTuple):
@@ -61,7 +63,7 @@ def still(chambers: Chambers, sample: float) -> Air:
 @lean
 def chamber(pressure, valve, time, fill, empty, supply):
     """Pressure (bar) of a chamber after a time (s) with its valve in a state."""
-    if valve == APPLY:
+    if valve == APPLY or valve == SLOW:
         return supply + (pressure - supply) * math.exp(-time / fill) if fill > 0.0 else supply
     if valve == RELEASE:
         return pressure * math.exp(-time / empty) if empty > 0.0 else 0.0
@@ -74,9 +76,10 @@ def press(valves, time, air, chambers, brakes):
     taken = 0.0
     for i in range(valves.size):
         before = air.pressure[i]
-        after = chamber(before, valves[i], time, chambers.fill[i], chambers.empty[i], air.supply[0])
+        fill = chambers.slow[i] if valves[i] == SLOW else chambers.fill[i]
+        after = chamber(before, valves[i], time, fill, chambers.empty[i], air.supply[0])
         air.pressure[i], air.torque[i] = after, torque(i, after, air.torque[i], brakes)
-        if valves[i] == APPLY and chambers.reservoir < math.inf:
+        if valves[i] >= APPLY and chambers.reservoir < math.inf:
             taken += chambers.volumes[i] * (after - before)
     if taken > 0.0:
         air.supply[0] -= taken / chambers.reservoir

@@ -2,6 +2,7 @@
 
     frame.py        both frames byte by byte, for another process and for the log
     ask.py          one exchange: what a controller answers is checked, whatever it runs in
+    hosted.py       a callable or an FMU in a process of its own, ended when its time is over; host.py is its other end
     callable.py     a Python class, named as "module:Name" or "file.py:Name"
     socket_port.py  a second process over a loopback socket; client.py and client_example.c are its other end
     fmu_port.py     an FMU, FMI 2 co-simulation; example_slave.py is one

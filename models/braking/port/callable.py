@@ -1,18 +1,13 @@
 """A controller as a Python class or function that makes one, named as "module:Name" or "file.py:Name"."""
 
 import importlib.util
-import signal
-import threading
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from types import FrameType, ModuleType
+from types import ModuleType
 from typing import Any
 
-from models.braking.controller import Command, Controller, Sample
-from models.braking.port.ask import ControllerFailed
+from models.braking.controller import Controller
 from models.errors import InputError
 
 
@@ -51,50 +46,3 @@ def _of_file(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-@dataclass
-class Within:
-    """A controller in this process that has ``timeout`` seconds for each answer.
-
-    In the main thread of a Unix process Python code that goes on for longer is interrupted; elsewhere, and in foreign
-    code that does not come back, only an answer that comes late can be told. Raises ControllerFailed.
-    """
-
-    inner: Controller
-    timeout: float
-
-    def __post_init__(self) -> None:
-        self._alarm = hasattr(signal, "setitimer") and threading.current_thread() is threading.main_thread()
-
-    def sample(self, given: Sample) -> Command:
-        """Its answer, in time."""
-        start = time.perf_counter()
-        command = self._interrupted(given) if self._alarm else self.inner.sample(given)
-        if time.perf_counter() - start > self.timeout:
-            raise self._late(given)
-        return command
-
-    def _interrupted(self, given: Sample) -> Command:
-        before = signal.signal(signal.SIGALRM, _raise)
-        try:
-            try:
-                signal.setitimer(signal.ITIMER_REAL, self.timeout)
-                return self.inner.sample(given)
-            finally:
-                signal.setitimer(signal.ITIMER_REAL, 0.0)
-        except _Late:
-            raise self._late(given) from None
-        finally:
-            signal.signal(signal.SIGALRM, before)
-
-    def _late(self, given: Sample) -> ControllerFailed:
-        return ControllerFailed(given, "silence", f"no answer within {self.timeout:g} s")
-
-
-class _Late(BaseException):
-    """Raised in a controller whose time is over; no exception that it might catch by itself."""
-
-
-def _raise(number: int, frame: FrameType | None) -> None:
-    raise _Late

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from models.braking.controller import Command, Controller, Sample
+from models.braking.controller import APPLY, RELEASE, Command, Controller, Sample
 from models.strict import Strict, quantity
 
 
@@ -22,7 +22,7 @@ class Fault(Strict):
     end: float | None = quantity("s", "when it is over; never if not said", default=None)
     wheels: list[int] | None = Field(default=None, min_length=1, description="numbers from 0; all if not said")
     samples: int | None = Field(default=None, ge=1, le=1000, description="of the delay")
-    state: int | None = Field(default=None, ge=-1, le=1, description="of the stuck valve")
+    state: int | None = Field(default=None, ge=RELEASE, le=APPLY, description="of the stuck valve")
     tooth: int | None = Field(default=None, ge=0, description="number of the missing tooth, from 0")
 
     @model_validator(mode="after")

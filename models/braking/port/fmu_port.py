@@ -1,15 +1,14 @@
-"""A controller as an FMU (FMI 2.0, co-simulation), run in this process through fmpy.
+"""A controller as an FMU (FMI 2.0, co-simulation), run through fmpy.
 
 Inputs: ``wheel_1`` to ``wheel_W`` (real, m/s), and as far as the FMU has them ``brake`` (boolean), ``supply`` (real,
 bar) and ``speed`` (real, m/s; not a number if it is not given). Outputs: ``valve_1`` to ``valve_W`` (real or integer;
--1 release, 0 hold, 1 apply) or ``pressure_1`` to ``pressure_W`` (real, bar). At each sample the inputs are set, one
+-1 release, 0 hold, 1 apply, 2 apply slowly where the scene has such valves) or ``pressure_1`` to ``pressure_W`` (real, bar). At each sample the inputs are set, one
 step of a sample's length is done, and the outputs then are the answer to that sample.
 """
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -19,23 +18,23 @@ from models.errors import InputError
 
 
 @contextmanager
-def opened(path: Path, wheels: int, sample: float) -> Iterator["FmuPort"]:
-    """The controller of an FMU file for as long as the block lasts; sample: s. Raises InputError."""
+def opened(path: Path, folder: Path, wheels: int, sample: float) -> Iterator["FmuPort"]:
+    """The controller of an FMU file, unpacked to a folder, for as long as the block lasts; sample: s.
+
+    Raises InputError.
+    """
+    import fmpy
+
     try:
-        import fmpy
-    except ImportError:
-        raise InputError("", "fmu", str(path), "needs fmpy: pip install 'twinrig[fmi]'") from None
-    with TemporaryDirectory() as folder:
-        try:
-            description = fmpy.read_model_description(str(path))
-            fmpy.extract(str(path), folder)
-        except Exception as error:
-            raise InputError(path.name, "fmu", None, f"is no FMU: {type(error).__name__}: {error}") from None
-        if not description.fmiVersion.startswith("2.") or description.coSimulation is None:
-            raise InputError(path.name, "fmu", description.fmiVersion, "must be of FMI 2 with co-simulation")
-        names = _names(description, wheels, path.name)
-        with _slave(description, folder, path.name) as slave:
-            yield FmuPort(slave, names, wheels, sample)
+        description = fmpy.read_model_description(str(path))
+        fmpy.extract(str(path), str(folder))
+    except Exception as error:
+        raise InputError(path.name, "fmu", None, f"is no FMU: {type(error).__name__}: {error}") from None
+    if not description.fmiVersion.startswith("2.") or description.coSimulation is None:
+        raise InputError(path.name, "fmu", description.fmiVersion, "must be of FMI 2 with co-simulation")
+    names = _names(description, wheels, path.name)
+    with _slave(description, str(folder), path.name) as slave:
+        yield FmuPort(slave, names, wheels, sample)
 
 
 @contextmanager

@@ -18,7 +18,8 @@ Answer, 80 bytes, from the controller
     byte  type      what
     0     4 bytes   "TRA1"
     4     uint32    number of the sample that is answered
-    8     uint8     "V": states of valves, -1 release, 0 hold, 1 apply; "P": pressures in the chambers, bar
+    8     uint8     "V": states of valves, -1 release, 0 hold, 1 apply, 2 apply slowly where the scene has
+                      such valves; "P": pressures in the chambers, bar
     9     uint8     W
     10    6 bytes   zero
     16    double[8] one value per wheel; after W zero

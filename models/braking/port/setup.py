@@ -4,17 +4,20 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from models.braking.controller import Controller
-from models.braking.port import fmu_port, socket_port
-from models.braking.port.ask import Asked
-from models.braking.port.callable import Within, named_controller
+from models.braking.port import socket_port
+from models.braking.port.ask import STATES, WITH_SLOW, Asked
 from models.braking.port.faults import Fault, Faulty, missing_teeth
+from models.braking.port.host import Guest
+from models.braking.port.hosted import hosted
 from models.braking.port.log import Replay, logged, name_of, refusal
 from models.braking.port.pace import WallClock
 from models.braking.port.sensors import Conversion, sensed
@@ -37,7 +40,7 @@ class PortTable(Strict):
     fmu: str | None = Field(default=None, description="an FMU file, FMI 2 co-simulation")
     replay: str | None = Field(default=None, description="a log of this scene")
     timeout: float = quantity("s", "for one answer", default=1.0)
-    start: float = quantity("s", "for a process to connect", default=20.0)
+    start: float = quantity("s", "for a process to connect, for a callable or an FMU to be made", default=20.0)
     pace: Literal["simulated", "wall"] = Field(default="simulated", description="simulated, or wall: the clock's")
     log: str | None = Field(default=None, description="file to which every exchange is written")
     signals: Conversion = Conversion()
@@ -60,7 +63,8 @@ class PortTable(Strict):
 @dataclass(frozen=True)
 class Run:
     """What the port needs to know of a run. radius (W,): of the wheels, m; sample: s; scene: its text, by which a log
-    is known; folder: of its paths; file: its name, for messages; procedure, engine: names for those of its files.
+    is known; folder: of its paths; file: its name, for messages; procedure, engine: names for those of its files; slow: whether valves can
+    apply slowly.
     """
 
     radius: np.ndarray
@@ -70,6 +74,7 @@ class Run:
     file: str = ""
     procedure: str = ""
     engine: str = ""
+    slow: bool = False
 
     def path(self, name: str) -> Path:
         """A file that the table names."""
@@ -84,7 +89,7 @@ def opened(table: PortTable, run: Run, own: Controller) -> Iterator[tuple[Contro
     """
     check_port(table, run)
     with ExitStack() as stack:
-        inner = Asked(stack.enter_context(_behind(table, run, own)))
+        inner = Asked(stack.enter_context(_behind(table, run, own)), WITH_SLOW if run.slow else STATES)
         clock = WallClock(inner, run.sample) if table.pace == "wall" else None
         watched: Controller = inner if clock is None else clock
         if table.log is not None:
@@ -105,17 +110,17 @@ def _behind(table: PortTable, run: Run, own: Controller) -> Iterator[Controller]
                 link = socket_port.connected(table.command, table.port or 0, table.timeout, table.start, run.folder)
                 entered = stack.enter_context(link)
             yield entered
-        elif table.fmu is not None:
-            with _told_of_scene(table, run):
-                fmu = stack.enter_context(fmu_port.opened(run.path(table.fmu), run.radius.size, run.sample))
-            yield Within(fmu, table.timeout)
         elif table.replay is not None:
             with _told_of_scene(table, run):
                 replay = Replay(run.path(table.replay), name_of(run.scene))
             yield replay
-        elif table.callable is not None:
-            made = named_controller(table.callable, run.folder, run.radius.size, table.parameters, run.file)
-            yield Within(made, table.timeout)
+        elif table.callable is not None or table.fmu is not None:
+            folder = run.folder if table.fmu is None else Path(stack.enter_context(TemporaryDirectory()))
+            fmu = None if table.fmu is None else run.path(table.fmu).absolute()
+            guest = Guest(table.callable, fmu, folder, run.radius.size, run.sample, table.parameters, run.file)
+            with _told_of_scene(table, run):
+                made = stack.enter_context(hosted(guest, table.timeout, table.start))
+            yield made
         else:
             yield own
 
@@ -137,6 +142,8 @@ def check_port(table: PortTable, run: Run) -> None:
         name = getattr(table, key)
         if name is not None and not run.path(name).is_file():
             raise InputError(run.file, f"port.{key}", name, f"no such file, looked for as {str(run.path(name))!r}")
+    if table.fmu is not None and find_spec("fmpy") is None:
+        raise InputError(run.file, "port.fmu", table.fmu, "needs fmpy: pip install 'twinrig[fmi]'")
     reason = "" if table.log is None else refusal(run.path(table.log))
     if reason:
         raise InputError(run.file, "port.log", table.log, reason)

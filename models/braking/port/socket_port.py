@@ -18,15 +18,19 @@ from models.errors import InputError, RunFailed
 LOOPBACK = "127.0.0.1"
 """The only address that this port ever listens on."""
 GRACE = 0.5
-"""Seconds for a process to end by itself once its connection is closed."""
+"""Seconds for a process to end by itself once its connection is closed at the end of a run."""
 
 
 @dataclass
 class SocketPort:
-    """The controller at the other end of a connection; each answer must be whole within ``timeout`` seconds."""
+    """The controller at the other end of a connection; each answer must be whole within ``timeout`` seconds.
+
+    process : that answers, if it was started here.
+    """
 
     link: socket.socket
     timeout: float
+    process: subprocess.Popen[bytes] | None = None
 
     def sample(self, given: Sample) -> Command:
         """Its answer; raises ControllerFailed."""
@@ -37,8 +41,11 @@ class SocketPort:
             return command(self._frame(given, end), given.number)
         except WrongFrame as error:
             raise ControllerFailed(given, error.name, str(error)) from None
+        except TimeoutError:
+            raise ControllerFailed(given, "silence", f"it does not read within {self.timeout:g} s") from None
         except OSError as error:
-            raise ControllerFailed(given, "crash", f"the connection broke: {error.strerror or error}") from None
+            raise ControllerFailed(given, "crash", f"the connection broke: {error.strerror or error}"
+                                   f"{fate(self.process, self.timeout)}") from None  # fmt: skip
 
     def _frame(self, given: Sample, end: float) -> bytes:
         """Exactly one answer; bytes beyond it would belong to a question not yet asked."""
@@ -51,13 +58,30 @@ class SocketPort:
             if part is None or time.perf_counter() > end:
                 raise ControllerFailed(given, "silence", f"{_some(got)} within {self.timeout:g} s")
             if not part:
-                raise ControllerFailed(given, "crash", f"the connection was closed after {_some(got)}")
+                raise ControllerFailed(given, "crash", f"the connection was closed after {_some(got)}"
+                                       f"{fate(self.process, self.timeout)}")  # fmt: skip
             got += part
             if len(got) < ANSWER.size:
                 self.link.settimeout(max(end - time.perf_counter(), 1e-6))
         if len(got) > ANSWER.size:
             raise WrongFrame("wrong length", f"an answer of more than {ANSWER.size} bytes")
         return got
+
+
+def fate(process: subprocess.Popen[bytes] | None, patience: float) -> str:
+    """How a process ended whose connection is closed, "" if it did not within some seconds."""
+    if process is None:
+        return ""
+    with suppress(subprocess.TimeoutExpired):
+        status = process.wait(min(patience, GRACE))
+        return f", its process ended with status {status}" if status >= 0 else f", its process got {_signal(-status)}"
+    return ""
+
+
+def _signal(number: int) -> str:
+    with suppress(ValueError):
+        return signal.Signals(number).name
+    return f"signal {number}"
 
 
 def _some(got: bytes) -> str:
@@ -90,7 +114,7 @@ def connected(words: Sequence[str] | None, address: int, timeout: float, start: 
         link = _accepted(server, process, start)
         with link:
             link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            yield SocketPort(link, timeout)
+            yield SocketPort(link, timeout, process)
 
 
 def _accepted(server: socket.socket, process: subprocess.Popen[bytes] | None, start: float) -> socket.socket:
@@ -118,16 +142,18 @@ def _started(words: Sequence[str] | None, port: int, folder: Path) -> Iterator[s
         process = subprocess.Popen(said, cwd=folder, stdin=subprocess.DEVNULL, start_new_session=True)
     except OSError as error:
         raise InputError("", "command", list(words), f"cannot be started: {error.strerror}") from None
+    grace = 0.0
     try:
         yield process
+        grace = GRACE
     finally:
-        _ended(process)
+        _ended(process, grace)
 
 
-def _ended(process: subprocess.Popen[bytes]) -> None:
-    """Wait for it, then end it with all that it started."""
+def _ended(process: subprocess.Popen[bytes], grace: float) -> None:
+    """Wait for it for some seconds, then end it with all that it started."""
     with suppress(subprocess.TimeoutExpired):
-        process.wait(GRACE)
+        process.wait(grace)
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL) if hasattr(os, "killpg") else process.kill()
     process.wait()
