@@ -28,8 +28,11 @@ CLOSED = 1e-9
 
 PRESSURE, TORQUE, TURNING, TIME, IMPULSE = range(5)
 """What a wheel's state holds: bar, N m, rad/s, s, and the integral of the tyre's force over that time (N s)."""
-MET, LOCKS, ENDLESS = range(3)
-"""How a phase ends."""
+MET, BACK, LOCKS, ENDLESS = range(4)
+"""How a phase ends: the rim's acceleration is at its level; it has fallen to the other one, as phase 2 may; else it does
+not end."""
+RELEASE, CLIMB, SLOW = 1, 2, 5
+"""Phases in which pressure falls, in which the wheel gains speed, and that follows one in which it does so no more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,30 +106,39 @@ def corner(state, rate, brakes):
 
 
 @njit(cache=True, error_model="numpy")
-def phase(state, rate, sign, level, step, wheel):
-    """Move a state on at a rate of pressure (bar/s), by steps (s), until sign (r w' - level) is 0; how it ended."""
-    after, began = np.empty(5), state[TIME]
-    while sign * (rim(state, wheel) - level) < 0.0:
+def ended(state, sign, level, back, wheel):
+    """MET where sign (rim's acceleration - level) is 0 or more, BACK where it is at ``back`` (m/s^2) or below, else -1."""
+    now = rim(state, wheel)
+    return MET if sign * (now - level) >= 0.0 else BACK if now <= back else -1
+
+
+@njit(cache=True, error_model="numpy")
+def phase(state, rate, sign, level, back, step, wheel):
+    """Move a state on at a rate of pressure (bar/s), by steps (s), until it has ``ended``; how it ended.
+
+    A wheel that locks while pressure falls turns again later; another one does not.
+    """
+    after, began, end = np.empty(5), state[TIME], ended(state, sign, level, back, wheel)
+    while end < 0:
         time = min(step, corner(state, rate, wheel[3]))
         go_on(state, rate, time, wheel, after)
-        if sign * (rim(after, wheel) - level) >= 0.0:
+        end = ended(after, sign, level, back, wheel)
+        if end >= 0:
             low, high = 0.0, time
             while high - low > 1e-15:
                 middle = 0.5 * (low + high)
                 go_on(state, rate, middle, wheel, after)
-                if sign * (rim(after, wheel) - level) >= 0.0:
+                if ended(after, sign, level, back, wheel) >= 0:
                     high = middle
                 else:
                     low = middle
             go_on(state, rate, high, wheel, after)
-            state[:] = after
-            return MET
         state[:] = after
-        if not state[TURNING] > 0.0:
+        if end < 0 and not (state[TURNING] > 0.0 or rate < 0.0):
             return LOCKS
-        if state[TIME] - began > LONGEST_PHASE:
+        if end < 0 and state[TIME] - began > LONGEST_PHASE:
             return ENDLESS
-    return MET
+    return end
 
 
 @dataclass(frozen=True)
@@ -141,33 +153,45 @@ class Cycle:
 
 
 def limit_cycle(frozen: Frozen, controller: FivePhase, step: float = 2e-5, most: int = 60) -> Cycle:
-    """Limit cycle of the continuous controller, by steps of at most ``step`` (s).
+    """Limit cycle of the continuous controller from a rolling wheel, by steps of at most ``step`` (s).
 
-    Raises RunFailed if a phase does not end, the wheel locks, or ``most`` cycles do not close.
+    The brake is applied fast, as the driver does, and so the first release is another one than those of the cycle: a
+    phase 2 in which the wheel gains speed no more goes over to phase 5, as the controller does, and a wheel that this
+    locks is released.
+
+    Raises RunFailed if a phase does not end, the wheel locks while it is not released, or ``most`` cycles do not close.
     """
     state = frozen.rolling()
     _to_end(state, 0, controller, step, frozen)
     for _ in range(most):
         state[TIME] = state[IMPULSE] = 0.0
-        path = [state.copy()]
-        for number in (1, 2, 3, 4, 5):
-            _to_end(state, number, controller, step, frozen)
+        path, number = [state.copy()], RELEASE
+        while number <= SLOW:
+            end = _to_end(state, number, controller, step, frozen)
             path.append(state.copy())
+            number = SLOW if end == BACK else number + 1
         first, last = path[0], path[-1]
         if abs(last[TORQUE] / first[TORQUE] - 1.0) + abs(last[TURNING] / first[TURNING] - 1.0) < CLOSED:
-            at = np.array(path)
-            slips = 1.0 - frozen.radius * at[:, TURNING] / frozen.speed
-            return Cycle(float(last[TIME]), tuple(np.diff(at[:, TIME]).tolist()),
-                         float(last[IMPULSE] / last[TIME] / frozen.peak), tuple(slips.tolist()))  # fmt: skip
+            return _cycle(np.array(path), frozen)
     raise RunFailed("braking", f"{most} cycles of the five phases do not close")
 
 
-def _to_end(state: np.ndarray, number: int, controller: FivePhase, step: float, frozen: Frozen) -> None:
+def _cycle(at: np.ndarray, frozen: Frozen) -> Cycle:
+    """Of the states (6, 5) at the switches of one."""
+    last, slips = at[-1], 1.0 - frozen.radius * at[:, TURNING] / frozen.speed
+    return Cycle(float(last[TIME]), tuple(np.diff(at[:, TIME]).tolist()),
+                 float(last[IMPULSE] / last[TIME] / frozen.peak), tuple(slips.tolist()))  # fmt: skip
+
+
+def _to_end(state: np.ndarray, number: int, controller: FivePhase, step: float, frozen: Frozen) -> int:
+    """Move a state on to the end of a phase, MET or BACK; raises RunFailed."""
     sign, level = end_of(number, controller)
-    found = phase(state, rate(number, controller), sign, level, step, frozen.packed)
-    if found != MET:
-        what = f"the wheel locks in phase {number}" if found == LOCKS else f"phase {number} does not end"
+    back = controller.e4 if number == CLIMB else -math.inf
+    end: int = phase(state, rate(number, controller), sign, level, back, step, frozen.packed)
+    if end == ENDLESS or (end == LOCKS and number != 0):
+        what = f"the wheel locks in phase {number}" if end == LOCKS else f"phase {number} does not end"
         raise RunFailed("braking", what, float(state[TIME]))
+    return end
 
 
 def sampled(frozen: Frozen, controller: FivePhase, cycles: int = 30, substeps: int = 4, skip: int = 5) -> Cycle:
