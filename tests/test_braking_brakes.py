@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from models.braking.brake import Brake, of_wheels, torque
-from models.braking.controller import SAMPLE
-from models.braking.pressure import APPLY, HOLD, RELEASE, Air, Chambers, by_pressures, by_valves, still
+from models.braking.controller import APPLY, HOLD, RELEASE, SAMPLE
+from models.braking.pressure import Air, Chambers, by_pressures, by_valves, still
 from models.errors import InputError
 
 BRAKE = Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1800.0)

@@ -29,9 +29,9 @@ CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads"
          "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
          "contact_simplified", "contact_profiles", "manchester", "ride_road", "ride_covariance", "ride_engines",
          "ride_varying_speed", "ride_nonlinear", "choice_linear", "choice_nonlinear", "hub_forces",
-         "contact_price", "fastsim", "wheelset", "contact_bridges", "handling", "braking_stop", "braking_port",
-         "braking_controllers", "braking_engines", "braking_suspension", "measured_formats", "measured_virtual",
-         "measured_long", "measured_checks")  # fmt: skip
+         "contact_price", "fastsim", "wheelset", "contact_bridges", "handling", "braking_stop", "braking_limits",
+         "braking_port", "braking_controllers", "braking_engines", "braking_suspension", "measured_formats",
+         "measured_virtual", "measured_long", "measured_checks")  # fmt: skip
 """Case modules in the order of the report."""
 
 

@@ -18,8 +18,9 @@ class Sample(NamedTuple):
     """What goes to the controller.
 
     number : of the sample, from 0; time : ns since the start; wheels (W,) : wheel-speed signals times the wheel's
-    radius (m/s), never negative, as a toothed wheel does not tell which way it turns; brake : whether the switch at the pedal is closed; supply : pressure (bar); speed : of the vehicle
-    (m/s) if the scene gives it away, else not a number.
+    radius (m/s), never negative, as a toothed wheel does not tell which way it turns; brake : whether the switch at the
+    pedal is closed; supply : pressure (bar); speed : of the vehicle (m/s) if the scene gives it away, else not a
+    number.
     """
 
     number: int

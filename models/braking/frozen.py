@@ -29,8 +29,8 @@ CLOSED = 1e-9
 PRESSURE, TORQUE, TURNING, TIME, IMPULSE = range(5)
 """What a wheel's state holds: bar, N m, rad/s, s, and the integral of the tyre's force over that time (N s)."""
 MET, BACK, LOCKS, ENDLESS = range(4)
-"""How a phase ends: the rim's acceleration is at its level; it has fallen to the other one, as phase 2 may; else it does
-not end."""
+"""How a phase ends: the rim's acceleration is at its level; it has fallen to the other one, as phase 2 may; else it
+does not end."""
 RELEASE, CLIMB, SLOW = 1, 2, 5
 """Phases in which pressure falls, in which the wheel gains speed, and that follows one in which it does so no more."""
 
@@ -107,7 +107,7 @@ def corner(state, rate, brakes):
 
 @njit(cache=True, error_model="numpy")
 def ended(state, sign, level, back, wheel):
-    """MET where sign (rim's acceleration - level) is 0 or more, BACK where it is at ``back`` (m/s^2) or below, else -1."""
+    """MET where sign (rim's acceleration - level) is 0 or more, BACK where it is at most ``back`` (m/s^2), else -1."""
     now = rim(state, wheel)
     return MET if sign * (now - level) >= 0.0 else BACK if now <= back else -1
 

@@ -170,6 +170,7 @@ def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
     if own is None:
         return Chambers(none, none, scene.brakes.supply)
     held = Chambers(none + own.fill, none + own.empty, scene.brakes.supply, delay=own.delay)
+    held = held if own.slow is None else held._replace(slow=none + own.slow)
     return held if own.reservoir is None else held._replace(volumes=none + own.volume, reservoir=own.reservoir)
 
 
@@ -178,7 +179,12 @@ def measured_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPre
     if scene.measured is None:
         return None
     name = scene.measured.file.replace("{procedure}", procedure)
-    return read_pressures(scene.path(name, "measured.file"), wheels, scene.run.sample)
+    measured = read_pressures(scene.path(name, "measured.file"), wheels, scene.run.sample)
+    most, supply = float(measured.pressures.max()), scene.brakes.supply
+    if most > supply:
+        allowed = f"must be at least {most:g} bar, the largest pressure in {name}"
+        raise InputError(scene.file, "brakes.supply", supply, allowed)
+    return measured
 
 
 def controller_of(scene: BrakingScene, wheels: int, procedure: str) -> Controller:
@@ -194,6 +200,9 @@ def controller_of(scene: BrakingScene, wheels: int, procedure: str) -> Controlle
     for name, value in given.items():
         if name not in known:
             raise InputError(scene.file, f"controller.parameters.{name}", value, f"no parameter of {kind}", known)
+    if given.get("slow") is True and (scene.pressure is None or scene.pressure.slow is None):
+        allowed = "needs valves that can apply slowly: pressure.slow"
+        raise InputError(scene.file, "controller.parameters.slow", True, allowed)
     period = {"period": scene.run.sample} if kind != "none" else {}
     try:
         return make(wheels, **given, **period)

@@ -19,9 +19,12 @@ from models.stack import array, doubles
 
 CLOSE = 1e-7
 """What is left of the accelerations' error (m/s^2, and rad/s^2 times 1 m) when the loads are taken to be found."""
-HALF_ROUNDS, PATIENCE, MOST_ROUNDS = 1, 12, 200
+HALF_ROUNDS, PATIENCE, WINDOW, MOST_WINDOWS = 1, 12, 16, 60
 """Rounds of a half step, to whose loads those of the step before are close enough for order two; rounds after which
-Anderson's method gives way to a damped one; rounds after which there is no answer."""
+Anderson's method gives way to means; rounds between two looks at their progress; such windows without an answer."""
+SPREAD = 1e-3
+"""Width (m/s^2, and rad/s^2 times 1 m) to which a jump is closed in where loads have an answer only as a mean: some
+newtons of the load of a truck's wheel."""
 NEARLY = 0.98
 """Slip from which on the direction of the force goes over to that of a locked tyre: without a jump, which would leave
 some loads without an answer."""
@@ -29,19 +32,20 @@ FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE, LOCKED, TURNING = range(7)
 """Columns of what each wheel reports: mean forces on it (N) in its own axes, load (N), mean slip, slip angle (rad),
 time locked (s), speed of turning at the end (rad/s)."""
 REPORTED = 7
-KNOWN = 17
+KNOWN = 19
 (START, RATE, ALONG, ASIDE, ANGLE, CELL, PART, BASE, TURNED, RADIUS, SPIN, FIRST, SECOND, SHARE, LAGGED, COSINE,
- SINE) = range(KNOWN)
+ SINE, SIDE, BORNE) = range(KNOWN)
 """Columns of what is known of each wheel: speed of its centre along it at the start, what its rate has besides the
 accelerations, speeds along and across it where slip angles are taken, slip angle with its cell and part in the tables,
 load besides the accelerations, speed of turning at the start, radius, inertia, tables and the share of the second, tan
-of a slip angle that lags (NaN if it does not), cosine and sine of the angle by which it is steered."""
+of a slip angle that lags (NaN if it does not), cosine and sine of the angle by which it is steered, place to the left
+(m), load (N)."""
 
 
 class Frame(NamedTuple):
     """What a step's rounds have in common, for W wheels and n coordinates, of which those from ``free`` on are free.
 
-    along, across (W, n): see ``rows``; press (W, n): load by accelerations; known (W, 17): see above; units (U, 2): see
+    along, across (W, n): see ``rows``; press (W, n): load by accelerations; known (W, 19): see above; units (U, 2): see
     ``headings``; mass (n, n): the factor of the mass matrix; right (n,): forces besides the tyres' ones; tried (3, n):
     what a round gave, what the one before gave, and by how much that was off.
     """
@@ -67,10 +71,18 @@ def times(row, vector):
 
 
 @inlined
+def moved_to(row, place):
+    """Copy a row: an assignment of arrays would make one."""
+    for a in range(row.size):
+        place[a] = row[a]
+
+
+@inlined
 def begin(turning, surface, plane, known):
     """Fill what is known of the wheels and stays so for a whole step."""
     for i in range(turning.size):
         known[i, TURNED], known[i, RADIUS], known[i, SPIN] = turning[i], plane.radius[i], plane.spin[i]
+        known[i, SIDE] = plane.place[i, 1]
         for c in range(3):
             known[i, FIRST + c] = surface[i, c]
         known[i, LAGGED] = surface[i, 3] if surface.shape[1] > 3 else math.nan
@@ -139,16 +151,40 @@ def tyre(known, rate, load, torque0, torque1, step, tables, report):
     report[LOCKED], report[TURNING] = locked, sign * w
 
 
+@lean
+def share_out(known):
+    """Loads of vehicles of two axles of which a wheel would lift: it bears none, and the statics of the others hold.
+
+    The other wheel of its axle bears the axle's load, and the other axle what this one cannot take of the roll moment.
+    An axle that would lift leaves all its load to the other one. Beyond balance, both wheels of a side bear none.
+    """
+    for first in range(0, known.shape[0] - 3, 4):
+        front, rear = known[first : first + 2, BORNE], known[first + 2 : first + 4, BORNE]
+        width, behind = known[first, SIDE] - known[first + 1, SIDE], known[first + 2, SIDE] - known[first + 3, SIDE]
+        ahead, back, moved, moved_back = front[0] + front[1], rear[0] + rear[1], front[1] - front[0], rear[1] - rear[0]
+        ahead, back = max(ahead + min(back, 0.0), 0.0), max(back + min(ahead, 0.0), 0.0)
+        kept, kept_back = min(max(moved, -ahead), ahead), min(max(moved_back, -back), back)
+        more, more_back = (moved_back - kept_back) * behind / width, (moved - kept) * width / behind
+        kept, kept_back = min(max(kept + more, -ahead), ahead), min(max(kept_back + more_back, -back), back)
+        front[0], front[1] = 0.5 * (ahead - kept), 0.5 * (ahead + kept)
+        rear[0], rear[1] = 0.5 * (back - kept_back), 0.5 * (back + kept_back)
+
+
 @inlined
 def respond(found, torque0, torque1, step, tables, frame, out, report):
     """Fill ``out`` (n,) with the accelerations by the tyres' forces if they were ``found``: the map whose fixed point
-    is wanted. A wheel that would lift bears none."""
+    is wanted."""
+    lifts = False
     for a in range(out.size):
         out[a] = found[a] if a < frame.free else frame.right[a]
     for i in range(torque0.size):
+        frame.known[i, BORNE] = frame.known[i, BASE] + times(frame.press[i], found)
+        lifts = lifts or frame.known[i, BORNE] < 0.0
+    if lifts:
+        share_out(frame.known)
+    for i in range(torque0.size):
         known, along, aside = frame.known[i], frame.along[i], frame.across[i]
-        load = max(known[BASE] + times(frame.press[i], found), 0.0)
-        tyre(known, known[RATE] + times(along, found), load, torque0[i], torque1[i], step, tables, report[i])
+        tyre(known, known[RATE] + times(along, found), known[BORNE], torque0[i], torque1[i], step, tables, report[i])
         for a in range(frame.free, out.size):
             out[a] += along[a] * report[i, FORCE_X] + aside[a] * report[i, FORCE_Y]
     solve(frame.mass, frame.free, out)
@@ -158,8 +194,9 @@ def respond(found, torque0, torque1, step, tables, frame, out, report):
 def stage(torque0, torque1, step, most, tables, frame, found, report):
     """Mean accelerations over a step, into ``found`` (n,): what stands there is where the search begins.
 
-    Anderson's method of depth one, damped where that does not settle, for at most so many rounds. Returns what is left
-    of the error: the last change, which the round has made smaller as it did the change before.
+    Anderson's method of depth one for at most so many rounds, of which ``PATIENCE`` that do not settle give way to
+    means. Returns what is left of the error: the last change, which the round has made smaller as it did the change
+    before.
     """
     left, before, out, out0, off0 = math.inf, 0.0, frame.tried[0], frame.tried[1], frame.tried[2]
     for rounds in range(most):
@@ -175,11 +212,55 @@ def stage(torque0, torque1, step, most, tables, frame, found, report):
         mix = min(max(product / square, -2.0), 0.75) if rounds > 0 and square > 0.0 and not done else 0.0
         for a in range(out.size):
             off0[a] = out[a] - found[a]
-            found[a] = out[a] - mix * (out[a] - out0[a]) if done or rounds < PATIENCE else found[a] + 0.5 * off0[a]
+            found[a] = out[a] - mix * (out[a] - out0[a])
             out0[a] = out[a]
         if done:
             break
-    return left
+    return left if left <= CLOSE or most < PATIENCE else by_means(torque0, torque1, step, tables, frame, found, report)
+
+
+@lean
+def by_means(torque0, torque1, step, tables, frame, found, report):
+    """As ``stage``, where loads jump between two answers and have one only as a mean of them.
+
+    So it is of a slow wheel at the edge of locking: a little less load, and it locks at once; a little more, and it
+    rolls within a fraction of the step. Each round moves ``found`` by a share of its change, and the means of all
+    reports with it, so that forces and accelerations stay in balance; the share is halved where rounds go to and fro,
+    and doubled where they go on. The limit is Filippov's solution: the edge itself, locked for a part of the step.
+    Source: A. F. Filippov, Differential equations with discontinuous righthand sides (1988); W. R. Mann, Proc. AMS 4
+    (1953) 506-510; recalled, not checked.
+    """
+    wheels, size, share, change, out = torque0.size, found.size, 0.5, math.inf, frame.tried[0]
+    means, begun = array(doubles(wheels * REPORTED), (wheels, REPORTED)), array(doubles(size), (size,))
+    respond(found, torque0, torque1, step, tables, frame, out, report)
+    moved_to(out, found)
+    for i in range(wheels):
+        moved_to(report[i], means[i])
+    for _ in range(MOST_WINDOWS):
+        way, net = 0.0, 0.0
+        moved_to(found, begun)
+        for _ in range(WINDOW):
+            respond(found, torque0, torque1, step, tables, frame, out, report)
+            change = 0.0
+            for a in range(size):
+                change = max(change, abs(out[a] - found[a]))
+                way += share * abs(out[a] - found[a])
+            if not change > CLOSE:
+                moved_to(out, found)
+                return change
+            for a in range(size):
+                found[a] += share * (out[a] - found[a])
+            for i in range(wheels):
+                for c in range(REPORTED):
+                    means[i, c] += share * (report[i, c] - means[i, c])
+        for a in range(size):
+            net += abs(found[a] - begun[a])
+        if net < 0.5 * way and share * change <= SPREAD:
+            for i in range(wheels):
+                moved_to(means[i], report[i])
+            return 0.0
+        share = 0.5 * share if net < 0.5 * way else min(2.0 * share, 0.5) if net > 0.9 * way else share
+    return math.inf
 
 
 @inlined
@@ -229,7 +310,7 @@ def step_on(state, turning, torque0, torque1, step, steer, surface, regular, pla
     for half in (True, False):
         settle(state[0], state[1], steer, regular, half, plane, tables[0], frame, found)
         time, last = (0.5 * step, middle) if half else (step, torque1)
-        most = HALF_ROUNDS if half else MOST_ROUNDS
+        most = HALF_ROUNDS if half else PATIENCE
         if not stage(torque0, last, time, most, tables, frame, found, report) <= (math.inf if half else CLOSE):
             return -1.0
         rest = comes_to_rest(rate0, turning, found, step, plane) if half and not plane.hooked else -1.0

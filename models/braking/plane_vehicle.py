@@ -1,5 +1,6 @@
 """A vehicle in the plane as numbers for compiled functions: units, wheels, and how loads follow accelerations."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -45,8 +46,9 @@ class Plane(NamedTuple):
     masses, inertias (U,); reach (U, U): see ``plane_chain``; unit, group (W,): of each wheel, the group being the unit
     whose acceleration moves its load; place (W, 2): m, in its unit's axes; radius, spin (W,): m, kg m^2;
     static (W,): N; by_x, by_y (W,): change of load by the group's acceleration, N s^2/m; hooked: 1 if the first two
-    coordinates are prescribed; units (U,): their numbers, of one alone as a tuple, whose size compiled functions know
-    beforehand, so that none of them counts units where there is no trailer.
+    coordinates are prescribed; fold: rad, angle of a hinge beyond which a train jackknifes; units (U,): their
+    numbers, of one alone as a tuple, whose size compiled functions know beforehand, so that none of them counts units
+    where there is no trailer.
     """
 
     masses: np.ndarray
@@ -61,6 +63,7 @@ class Plane(NamedTuple):
     by_x: np.ndarray
     by_y: np.ndarray
     hooked: int
+    fold: float = math.inf
     units: np.ndarray | tuple[int] = (0,)
 
     @property
@@ -71,10 +74,19 @@ class Plane(NamedTuple):
 
 def truck(vehicle: Truck, transfer: bool = True) -> Plane:
     """Numbers of a vehicle of two axles; without ``transfer`` its loads stay as they are at rest."""
+    check_wheels(vehicle, vehicle.mass)
     none = np.zeros(4, dtype=np.int64)
     place, radius, spin, static, by_x, by_y = wheels(vehicle, transfer)
     return Plane(np.array([vehicle.mass]), np.array([vehicle.yaw_inertia]), np.zeros((1, 1)), none, none.copy(),
                  place, radius, spin, static, by_x, by_y, 0)  # fmt: skip
+
+
+def check_wheels(vehicle: Truck, mass: float) -> None:
+    """Refuse two axles whose wheels cannot be part of a mass (kg): no wheel is lighter than J / r^2, all in its rim."""
+    least = sum(2.0 * axle.spin_inertia / axle.radius**2 for axle in (vehicle.front, vehicle.rear))
+    if mass <= least:
+        allowed = f"must be above {least:.4g} kg: J / r^2 of its wheels, which cannot be lighter"
+        raise InputError("", "mass", mass, allowed)
 
 
 def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:

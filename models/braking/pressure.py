@@ -2,9 +2,9 @@
 
 Mode V: the controller sets valves. A chamber then fills from the supply or empties to the air, each by a first-order
 law, exact over a step; a valve that can apply slowly, by a throttle or by pulses too short to be told apart, fills it
-with a longer time constant; a change of a valve takes effect after the valves' delay, also between two samples. The supply
-is a reservoir: what a chamber takes in, p V, it gives. Mode P: the controller sets the pressures themselves, as the
-paper measured them, and each is held over the sample.
+with a longer time constant; a change of a valve takes effect after the valves' delay, also between two samples. The
+supply is a reservoir: what a chamber takes in, p V, it gives. Mode P: the controller sets the pressures themselves, as
+the paper measured them, and each is held over the sample.
 """
 
 import math
@@ -63,7 +63,7 @@ def still(chambers: Chambers, sample: float) -> Air:
 @lean
 def chamber(pressure, valve, time, fill, empty, supply):
     """Pressure (bar) of a chamber after a time (s) with its valve in a state."""
-    if valve == APPLY or valve == SLOW:
+    if valve >= APPLY:
         return supply + (pressure - supply) * math.exp(-time / fill) if fill > 0.0 else supply
     if valve == RELEASE:
         return pressure * math.exp(-time / empty) if empty > 0.0 else 0.0

@@ -126,8 +126,8 @@ def port_of(scene: BrakingScene, name: str, vehicle: Braked, engine: str) -> Run
     """What the port needs to know; a log is that of a vehicle and its drive, whatever answered."""
     known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}
     text = json.dumps([name, known], sort_keys=True)
-    return Run(vehicle.plane.radius, scene.run.sample, text, Folder(scene.folder), scene.file, name,
-               engine)  # fmt: skip
+    return Run(vehicle.plane.radius, scene.run.sample, text, Folder(scene.folder), scene.file, name, engine,
+               vehicle.chambers.slow.size > 0)  # fmt: skip
 
 
 def steered(vehicle: Braked, angle: float) -> np.ndarray:

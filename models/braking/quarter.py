@@ -7,6 +7,7 @@ truck: what stopping distances and times of locking show of the one holds for th
 from dataclasses import dataclass
 
 import numpy as np
+from pydantic import model_validator
 
 from models.braking.plane_step import LOCKED, REPORTED, step_on
 from models.braking.plane_vehicle import GRAVITY, Plane
@@ -29,6 +30,13 @@ class Quarter(Strict):
     mass: float = quantity("kg", "of vehicle and wheel together")
     radius: float = quantity("m", "of the wheel")
     spin_inertia: float = quantity("kg m^2", "of the wheel about its axle")
+
+    @model_validator(mode="after")
+    def _holds_its_wheel(self) -> "Quarter":
+        least = self.spin_inertia / self.radius**2
+        if self.mass <= least:
+            raise ValueError(f"mass must be above {least:.4g} kg: J / r^2 of the wheel, which cannot be lighter")
+        return self
 
     @property
     def plane(self) -> Plane:

@@ -15,9 +15,9 @@ import math
 
 import numpy as np
 
-from models.braking.advance import AT_REST, FINE, LIFTED, NOT_FOUND
+from models.braking.advance import AT_REST, FINE, NOT_FOUND, ended
 from models.braking.plane_chain import point
-from models.braking.plane_step import LOAD, step_on
+from models.braking.plane_step import step_on
 from models.braking.samples import compiled
 from models.braking.surfaces import under_wheels
 from models.braking.wheel_step import SLOWEST, phi_1
@@ -68,9 +68,9 @@ def advance_lagging(state, turning, torques, step, steer, slope, plane, kind, ro
         if used < step:
             return AT_REST, time
         lag_on(state, 0.5 * step, steer, plane, slope, length, lag, surface)
-        for i in range(turning.size):
-            if report[i, LOAD] <= 0.0:
-                return LIFTED, time
+        status = ended(state, plane, report)
+        if status != FINE:
+            return status, time
     return FINE, time
 
 

@@ -8,12 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from models.braking.advance import AT_REST, FINE, LIFTED, NOT_FOUND
+from models.braking.advance import AT_REST, FINE
 from models.braking.brake import Brakes
-from models.braking.controller import SAMPLE, Command, Controller, Sample, is_steady
+from models.braking.controller import LARGEST_PRESSURE, RELEASE, SAMPLE, Command, Controller, Sample, is_steady
+from models.braking.endings import ENDS, ending
 from models.braking.plane_vehicle import Plane
-from models.braking.port.ask import ask
-from models.braking.pressure import RELEASE, Chambers, still
+from models.braking.port.ask import STATES, WITH_SLOW, ask
+from models.braking.port.sensors import Sensed
+from models.braking.pressure import Chambers, still
 from models.braking.row import Row, parts, row
 from models.braking.samples import Braking, Kept, Told, by_steps
 from models.braking.surfaces import Road, check_way
@@ -106,30 +108,34 @@ class Braked:
         steady = self.steering is None and is_steady(controller)
         most = int(min(duration / self.sample + 2.0, MOST)) if steady else 1
         kept = Kept(now.whole, np.empty((most, now.whole.size)), np.zeros(1, dtype=np.int64), duration - 1e-9)
-        rows, status, number = [now.whole[None].copy()], FINE, 0
+        states = WITH_SLOW if self.chambers.slow.size else STATES
+        beyond = LARGEST_PRESSURE if isinstance(controller, Sensed) else 0.0  # noise of a sensor may exceed the supply
+        rows, status, number, rates = [now.whole[None].copy()], FINE, 0, np.zeros(2 + self.plane.masses.size)
         with _taken(rows, kept, now, self.coordinates):
-            for status, time, speed, supply in self._moving(told, kept, now):
-                if status in (NOT_FOUND, LIFTED):
-                    raise RunFailed("braking", "a wheel lifts off" if status == LIFTED else "no loads were found", time)
+            for status, time, speed, supply in self._moving(told, kept, now, rates):
+                if status in ENDS:
+                    raise RunFailed("braking", ending(status, self.plane, now.state, rates, now.report), time)
                 _take(rows, kept)
                 if status == AT_REST or time >= kept.until:
                     break
                 braked = time >= self.switch - 1e-9
                 told.samples[0] = most if braked else 1
                 known = speed if self.speed_given else math.nan
-                asked = Sample(number, round(time * 1e9), now.turning * self.plane.radius, braked, supply, known)
+                rims = np.abs(now.turning) * self.plane.radius
+                asked = Sample(number, round(time * 1e9), rims, braked, supply, known)
                 number += 1
-                _tell(told, ask(controller, asked), braked)
+                _tell(told, ask(controller, asked, states, max(beyond, supply)), braked)
                 if self.steering is not None:
                     told.steer[:] = self.steering(time + 0.5 * self.sample)
         return _path(rows, now, status == AT_REST, self.coordinates)
 
-    def _moving(self, told: Told, kept: Kept, now: Row) -> Iterator[tuple[int, float, float, float]]:
-        """The vehicle as it is ``now``, moved on sample by sample; see ``samples``."""
+    def _moving(self, told: Told, kept: Kept, now: Row,
+                rates: np.ndarray) -> Iterator[tuple[int, float, float, float]]:  # fmt: skip
+        """The vehicle as it is ``now`` with its accelerations (2 + U,), moved on sample by sample; see ``samples``."""
         air = still(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
-        torques, found = np.zeros((self.substeps + 1, self.plane.wheels)), np.zeros(2 + self.plane.masses.size)
+        torques = np.zeros((self.substeps + 1, self.plane.wheels))
         given = (told, kept, self.sample, Braking(air, self.chambers, self.brakes, torques), now.state, now.turning,
-                 self.slope, self.plane, self.kind, self.road, self.tables.packed, found, now.report)  # fmt: skip
+                 self.slope, self.plane, self.kind, self.road, self.tables.packed, rates, now.report)  # fmt: skip
         if self.engine is not None:
             moving: Iterator[tuple[int, float, float, float]] = self.engine.moving(*given)
             return moving

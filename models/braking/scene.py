@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from models.braking.controller import SAMPLE
+from models.braking.controller import LARGEST_PRESSURE, SAMPLE
 from models.braking.port.setup import PortTable
 from models.braking.trailer import Trailer
 from models.errors import InputError
@@ -18,6 +18,8 @@ from models.strict import Query, Strict, accepted, quantity
 
 LARGEST_SPEED = 100.0
 """m/s; no road vehicle brakes from more."""
+LARGEST_TORQUE = 1e6
+"""N m; no brake of one wheel gives more, by a factor of twenty."""
 LONGEST_STEP = 0.02
 """s: up to which light braking and braking from rolling were held to their closed forms."""
 Procedures = Literal["straight", "split", "turn", "j_turn"]
@@ -90,6 +92,8 @@ class PressureTable(Strict):
 
     fill: float = quantity("s", "time constant of filling", default=0.15)
     empty: float = quantity("s", "time constant of emptying", default=0.1)
+    slow: float | None = quantity("s", "time constant of filling by valves that can apply slowly, at least fill; not "
+                                  "said, no valve can", default=None)  # fmt: skip
     delay: float = quantity("s", "of the valves", default=0.0, zero=True)
     reservoir: float | None = quantity("l", "of the supply; not said, its pressure stays", default=None)
     volume: float = quantity("l", "of one chamber, which the reservoir fills", default=1.5)
@@ -163,6 +167,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Br
     for name, own in scene.procedures.items():
         _check_procedure(own, scene.file, f"procedures.{name}")
     _check_vehicle(scene)
+    _check_brakes(scene)
     _check_run(scene)
     check(scene)
     return scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, file)})
@@ -202,6 +207,20 @@ def _check_steering(knots: list[Pair], file: str, place: str) -> None:
         raise InputError(file, place, angles.tolist(), f"angles must be at most {STEEPEST:g} rad, of either sign")
 
 
+def _check_brakes(scene: BrakingScene) -> None:
+    """Refuse a supply that no vehicle has, and torques that no brake gives."""
+    own, file = scene.brakes, scene.file
+    if own.supply > LARGEST_PRESSURE:
+        raise InputError(file, "brakes.supply", own.supply, f"must be at most {LARGEST_PRESSURE:g} bar")
+    for axle in ("front", "rear", "trailer"):
+        table: BrakeTable = getattr(own, axle)
+        for key, value in (("gradient", table.gradient), ("falling", table.falling or 0.0)):
+            if value * own.supply > LARGEST_TORQUE:
+                most = LARGEST_TORQUE / own.supply
+                raise InputError(file, f"brakes.{axle}.{key}", value, f"must be at most {most:g} N m/bar: no brake "
+                                 f"gives more than {LARGEST_TORQUE:g} N m")  # fmt: skip
+
+
 def _check_vehicle(scene: BrakingScene) -> None:
     """A vehicle on its suspension has all that its file says."""
     own, file = scene.vehicle, scene.file
@@ -226,6 +245,9 @@ def _check_run(scene: BrakingScene) -> None:
                          f"than {LONGEST_STEP:g} s mistake stopping distances by percents")
     if scene.pressure is not None and scene.pressure.delay > 1.0:
         raise InputError(scene.file, "pressure.delay", scene.pressure.delay, "must be at most 1 s")
+    if scene.pressure is not None and scene.pressure.slow is not None and scene.pressure.slow < scene.pressure.fill:
+        raise InputError(scene.file, "pressure.slow", scene.pressure.slow, f"must be at least fill, "
+                         f"{scene.pressure.fill:g} s: it is that of filling slowly")  # fmt: skip
     if scene.run.duration < 2.0 * scene.run.sample:
         raise InputError(scene.file, "run.duration", scene.run.duration, f"must be at least {2.0 * scene.run.sample:g} "
                          "s, two samples")  # fmt: skip

@@ -18,7 +18,7 @@ from models.braking.sprung_forces import STEER, hold
 from models.braking.surfaces import under_wheels
 from models.compiled import named, njit
 
-OVER, GAVE_UP = 4, 5
+OVER, GAVE_UP = 6, 7
 """How a sample may end besides: the vehicle turns over; the engine gives up."""
 UPRIGHT = 0.5
 """Roll and pitch (rad) beyond which the vehicle turns over."""

@@ -6,6 +6,7 @@ of the body. The hook bears no load, and its force is taken to act at the ground
 the wheelbase from one axle to the other.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from pydantic import Field
 
 from models.braking.plane_chain import headings, inertia
 from models.braking.plane_step import FORCE_X, FORCE_Y, step_on
-from models.braking.plane_vehicle import GRAVITY, Axle, Plane, Truck, truck, wheels
+from models.braking.plane_vehicle import GRAVITY, Axle, Plane, Truck, check_wheels, truck, wheels
 from models.braking.tyre_table import Tables
 from models.compiled import njit
 from models.errors import InputError
@@ -27,12 +28,14 @@ class Trailer(Truck):
     drawbar_mass: float = quantity("kg", "of the drawbar with the front axle")
     drawbar_inertia: float = quantity("kg m^2", "of both about the vertical through the front axle")
     hook: float = Field(default=-3.5, description="m, of the hook ahead of the truck's centre of mass", lt=0.0)
+    fold: float = Field(default=math.pi / 2.0, gt=0.0, le=math.pi, description="rad, of the drawbar against the "
+                        "truck, and of the body against it: beyond it a train jackknifes, and a run ends")  # fmt: skip
 
 
 def hooked(trailer: Trailer, transfer: bool = True) -> Plane:
     """Numbers of a trailer whose hook, the first two coordinates, follows a prescribed motion."""
     reach = np.array([[-trailer.drawbar, 0.0], [-trailer.drawbar, -trailer.front.x]])
-    parts: list[Any] = [*_units(trailer), reach, *_wheels(trailer, 0, transfer), 1, np.arange(2)]
+    parts: list[Any] = [*_units(trailer), reach, *_wheels(trailer, 0, transfer), 1, trailer.fold, np.arange(2)]
     return Plane(*parts)
 
 
@@ -42,7 +45,7 @@ def train(vehicle: Truck, trailer: Trailer, transfer: bool = True) -> Plane:
     reach[1:, 0], reach[1:, 1], reach[2, 2] = trailer.hook, -trailer.drawbar, -trailer.front.x
     units = (np.concatenate((a, b)) for a, b in zip(own[:2], _units(trailer), strict=True))
     both = (np.concatenate((a, b)) for a, b in zip(own[3:11], _wheels(trailer, 1, transfer), strict=True))
-    parts: list[Any] = [*units, reach, *both, 0, np.arange(3)]
+    parts: list[Any] = [*units, reach, *both, 0, trailer.fold, np.arange(3)]
     return Plane(*parts)
 
 
@@ -52,6 +55,7 @@ def _units(trailer: Trailer) -> tuple[np.ndarray, np.ndarray]:
 
 def _wheels(trailer: Trailer, first: int, transfer: bool) -> tuple[np.ndarray, ...]:
     """Unit, group and what ``wheels`` gives, the front ones on the drawbar, which is unit ``first``."""
+    check_wheels(trailer, trailer.mass + trailer.drawbar_mass)
     place, radius, spin, static, by_x, by_y = wheels(trailer, transfer)
     place[:2, 0] = 0.0
     static[:2] += trailer.drawbar_mass * GRAVITY / 2.0

@@ -24,7 +24,7 @@ def wrong(kind: str, number: int, link: socket.socket) -> None:
     if kind == "died":
         os._exit(9)
     if kind == "late":
-        time.sleep(0.4)
+        time.sleep(0.8)
     link.sendall({
         "NaN": frame(number, mode=b"P", first=NAN), "infinite": frame(number, mode=b"P", first=float("inf")),
         "NaN as a valve": frame(number, first=NAN), "negative pressure": frame(number, mode=b"P", first=-1.0),

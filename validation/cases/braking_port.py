@@ -30,10 +30,10 @@ from validation.timing import median
 TITLE = "The controller port: same bits on every way, and controllers that fail"
 SYSTEM: System = "anti-lock"
 EXAMPLE = "models.braking.port.example:Example"
-TIMEOUT = 0.2
+TIMEOUT = 0.5
 """s for one answer of a controller that fails."""
-PATIENCE = 1.0
-"""s beyond that: a busy machine starts, wakes and ends processes late."""
+PATIENCE = TIMEOUT
+"""s beyond that."""
 FAULTS = {
     "NaN": "not a number", "infinite": "not a number", "NaN as a valve": "not a number",
     "negative pressure": "below zero", "valve in no state": "no state of a valve", "too few wheels": "wrong length",
@@ -44,6 +44,15 @@ FAULTS = {
 CLASSES = {
     "raises": ("crash", "raise KeyError('speed')"),
     "never comes back": ("silence", "while True: pass"),
+    "catches everything": ("silence", "while True:\n            try: time.sleep(0.05)\n"
+                           "            except BaseException: pass"),
+    "sleeps in C": ("silence", "ctypes.CDLL(None).sleep(1000)"),
+    "stops its process": ("silence", "os.kill(os.getpid(), signal.SIGSTOP)"),
+    "ends its process": ("crash", "os._exit(0)"),
+    "crashes its process": ("crash", "ctypes.string_at(0)"),
+    "leaves by sys.exit": ("crash", "raise SystemExit"),
+    "presses more than the supply": ("too high", "return Command(pressures=np.full(4, 299.0))"),
+    "answers complex numbers": ("wrong frame", "return Command(pressures=np.full(4, 1j))"),
     "returns nothing": ("wrong frame", "return None"),
     "returns NaN": ("not a number", "return Command(pressures=np.full(4, np.nan))"),
     "returns three": ("wrong length", "return Command(valves=np.ones(3))"),
@@ -63,7 +72,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
                      f"{high:.1f}", cost, "us", "", f"median of rounds of {ROUND} in which all ways have their turn",
                      "none") for name, (cost, low, high) in costs.items()]  # fmt: skip
     told = [_process(kind, folder) for kind in (QUICK if quick else FAULTS)]
-    told += [_class(kind, folder) for kind in (("never comes back",) if quick else CLASSES)]
+    told += [_class(kind, folder) for kind in (("catches everything",) if quick else CLASSES)]
+    told += [] if quick else [_slave(kind, folder) for kind in SLAVES]
     return rows + [row for one in told for row in _fault_rows(one)], {"costs": costs, "faults": told}
 
 
@@ -157,10 +167,29 @@ def _class(kind: str, folder: Path) -> dict[str, Any]:
     name, does = CLASSES[kind]
     well = f"        if given.number < {misbehaving_client.WELL}: return Command(valves=np.ones(4))\n"
     (folder / "fails.py").write_text(
-        "import numpy as np\nfrom models.braking.controller import Command\nclass Fails:\n"
+        "import ctypes, os, signal, time\nimport numpy as np\nfrom models.braking.controller import Command\n"
+        "class Fails:\n"
         "    def __init__(self, wheels): pass\n    def sample(self, given):\n" + well + f"        {does}\n"
     )
     return _failed(f"class that {kind}", name, {"callable": "fails.py:Fails"}, folder)
+
+
+SLAVES = {"raises": ("crash", "raise ValueError('boom')"), "never comes back": ("silence", "while True: pass"),
+          "ends its process": ("crash", "os._exit(0)"), "crashes its process": ("crash", "ctypes.string_at(0)"),
+          "returns an error": ("crash", "return False")}  # fmt: skip
+"""What an FMU does, and the name under which the run must end."""
+
+
+def _slave(kind: str, folder: Path) -> dict[str, Any]:
+    from pythonfmu import FmuBuilder
+
+    name, does = SLAVES[kind]
+    line = "        wheels = np.array"
+    well = f"        if self._number == {misbehaving_client.WELL}:\n            import ctypes, os\n            {does}\n"
+    source = (Path(port.__path__[0]) / "example_slave.py").read_text().replace(line, well + line)
+    (folder / "fails_slave.py").write_text(source)
+    return _failed(f"FMU that {kind}", name, {"fmu": FmuBuilder.build_FMU(folder / "fails_slave.py", dest=folder).name},
+                   folder)  # fmt: skip
 
 
 def _failed(kind: str, name: str, table: dict[str, Any], folder: Path) -> dict[str, Any]:

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from models.braking.advance import AT_REST, FINE, LIFTED, NOT_FOUND, advance
+from models.braking.advance import AT_REST, FINE, advance
 from models.braking.brake import PAPER_FRONT, Brake, of_wheels, torque
 from models.braking.controller import AllApplied, Command, Sample
+from models.braking.endings import ENDS, ending
 from models.braking.magic_formula import surface
 from models.braking.plane_chain import inertia
-from models.braking.plane_step import REPORTED
+from models.braking.plane_step import BORNE, KNOWN, REPORTED, SIDE, share_out
 from models.braking.plane_vehicle import GRAVITY, PAPER, Plane, truck
 from models.braking.port.ask import checked
 from models.braking.procedures import check_engine, drive, ready
@@ -49,10 +50,11 @@ def motion(implementation: str, plane: Plane, tyres: Tables, own: Road, torques:
     """Move state (2, 2 + U) and turning (W,) under torques (n + 1, W); whether it came to rest."""
     go = advance if implementation == "reference" else Carried(implementation, plane).advance
     angles = np.where(plane.place[:, 0] > 0.0, steer, 0.0)
+    rates, report = np.zeros(state.shape[1]), np.zeros((plane.wheels, REPORTED))
     status, used = go(state, turning, torques, step, angles, 10.0, plane, np.zeros(plane.wheels, dtype=np.int64), own,
-                      tyres.packed, np.zeros(state.shape[1]), np.zeros((plane.wheels, REPORTED)))  # fmt: skip
-    if status in (NOT_FOUND, LIFTED):
-        raise RunFailed(implementation, "a wheel lifts off" if status == LIFTED else "no loads were found", used)
+                      tyres.packed, rates, report)  # fmt: skip
+    if status in ENDS:
+        raise RunFailed(implementation, ending(status, plane, state, rates, report), used)
     if not (np.isfinite(state).all() and np.isfinite(turning).all()):
         return False
     return status == AT_REST and status != FINE
@@ -208,7 +210,7 @@ def lifting(implementation: str, folder: Path) -> float:
 
 def jackknifed(implementation: str, folder: Path) -> float:
     """A train folded by 100 degrees, all wheels locked on dry road: largest gain of energy over 0.4 s, by the first."""
-    plane = train(PAPER, CHOSEN, transfer=False)
+    plane = train(PAPER, CHOSEN.model_copy(update={"fold": np.pi}), transfer=False)
     state, spin = start(plane)[0], np.zeros(plane.wheels)
     state[0, 3:] = np.radians(-100.0)
 
@@ -273,6 +275,43 @@ def braking_scene(**tables: Any) -> BrakingScene:
     """The truck from 1.5 m/s on ice without anti-lock system."""
     plain = {"title": "hard", "system": "braking", "procedures": {"stop": {"speed": 1.5}}, "pressure": {}}
     return build({**plain, **tables})
+
+
+def at_the_edge_of_locking(implementation: str, folder: Path) -> float:
+    """A J-turn on dry road, stopped under full brakes: speeds that are left (m/s, rad/s)."""
+    scene = build({"title": "hard", "system": "braking", "load_transfer": {"front": 0.3}, "brakes": {"supply": 5.0},
+                   "road": {"stretches": [{"left": "dry"}]},
+                   "procedures": {"stop": {"kind": "j_turn", "speed": 15.0, "steer": 0.02}}})  # fmt: skip
+    path = drive(scene, "stop", implementation)
+    return float(np.abs(path.states[-1, 1]).max() + np.abs(path.turning[-1]).max()) if path.stands else np.inf
+
+
+def one_wheel_lifted(implementation: str, folder: Path) -> float:
+    """Loads of which one would be negative: weight, and moments along and across, that change (N, N m)."""
+    plane, known = truck(PAPER), np.zeros((4, KNOWN))
+    known[:, SIDE], known[:, BORNE] = plane.place[:, 1], (9e3, 24e3, -4e3, 26e3)
+
+    def balance() -> np.ndarray:
+        loads: np.ndarray = known[:, BORNE]
+        return np.array([loads.sum(), loads @ plane.place[:, 0], loads @ plane.place[:, 1]])
+
+    before = balance()
+    share_out(known)
+    return float(np.abs(balance() - before).max()) if known[:, BORNE].min() >= 0.0 else np.inf
+
+
+def turned_over(implementation: str, folder: Path) -> float:
+    """A truck twice as high as it is wide, steered on dry road."""
+    plane = truck(PAPER.model_copy(update={"height": 4.0}))
+    state, spin = start(plane, 20.0)
+    motion(implementation, plane, stacked([DRY]), EVEN, np.zeros((201, 4)), STEP, state, spin, 0.1)
+    return np.inf
+
+
+def beyond_the_supply(implementation: str, folder: Path) -> float:
+    """A controller that asks for 299 bar of a supply of 6."""
+    checked(Command(pressures=np.full(4, 299.0)), Sample(3, 16_500_000, np.ones(4), True, 6.0, 10.0), most=6.0)
+    return np.inf
 
 
 def below_push_out(implementation: str, folder: Path) -> float:
@@ -357,6 +396,14 @@ CASES = (
     Case("valves open for ever", "all wheels lock", "comes to rest", "m/s, rad/s", 0.0, "exact", all_open),
     Case("pressure below push-out", "hysteresis would pull it below 0", "no torque", "N m", 0.0, "exact",
          below_push_out),
+    Case("slow wheel at the edge of locking", "a little less load, and it stands within the step", "comes to rest",
+         "m/s, rad/s", 0.0, "exact", at_the_edge_of_locking),
+    Case("one wheel of four lifted", "the plane's loads follow its accelerations", "statics of three wheels", "N, N m",
+         1e-9, "rounding", one_wheel_lifted, once=True),
+    Case("truck that rolls over", "both wheels of a side bear nothing", "fails, and says when", "", 0.0, "exact",
+         turned_over, RAISED),
+    Case("299 bar of a supply of 6", "more than there is", "fails, and says when", "", 0.0, "exact",
+         beyond_the_supply, RAISED),
     Case("truck that lifts its rear wheels", "the plane has no lift-off", "fails, and says when", "", 0.0, "exact",
          lifting, RAISED),
     Case("controller answers not a number", "would spread to every state", "fails, and says when", "", 0.0, "exact",
@@ -373,6 +420,7 @@ CASES = (
           ("stretches shorter than a step", lambda: check_way(road([Stretch(0.0, 0, 0), Stretch(1.0, 1, 1),
                                                                     Stretch(1.01, 0, 0)]), 0.1)),
           ("brake that lets go too early", slippery_brake),
+          ("vehicle lighter than its wheels", lambda: truck(PAPER.model_copy(update={"mass": 100.0}))),
           ("roll shares that do not add up", lambda: truck(PAPER.model_copy(
               update={"front": PAPER.front.model_copy(update={"roll_share": 0.5})}))),
       )),

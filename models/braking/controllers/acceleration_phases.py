@@ -5,7 +5,7 @@
     release    until it falls no faster than -a: then recover
     recover    hold; above +A apply again, and once it has risen faster than +a and does so no more: step up
     overshoot  apply until it rises no faster than +A: then recover
-    step up    one sample of applying in ``pulse`` until it falls faster than -a: then release
+    step up    one sample of applying in ``pulse``, or applying slowly, until it falls faster than -a: then release
 
 A wheel that stays at a deep slip without rising (on ice it may lock, and then it does not fall either) is released
 again. Sources: U. Kiencke, L. Nielsen, Automotive control systems, ch. on anti-lock braking; Robert Bosch GmbH,
@@ -14,9 +14,9 @@ Automotive Handbook. Their figures are those of cars; these are for a truck with
 
 from dataclasses import dataclass
 
-from models.braking.controller import Command, Sample
-from models.braking.controllers.per_wheel import Common, PerWheel
-from models.braking.pressure import APPLY, HOLD, RELEASE
+from models.braking.controller import APPLY, HOLD, RELEASE, SLOW, Command, Sample
+from models.braking.controllers.per_wheel import ACCELERATION, SLIP, SMALLEST, Common, PerWheel
+from models.errors import InputError
 
 FIRST, WAIT, LET_GO, RECOVER, OVERSHOOT, STEP_UP = range(6)
 
@@ -24,7 +24,8 @@ FIRST, WAIT, LET_GO, RECOVER, OVERSHOOT, STEP_UP = range(6)
 @dataclass
 class AccelerationPhases(Common):
     """Thresholds of the wheel's acceleration (m/s^2): falls (-a), rises (+a), rises_fast (+A); of its slip: slip, and
-    deep, above which a wheel that does not rise is released; pulse : samples per step of pressure."""
+    deep, above which a wheel that does not rise is released; pulse : samples per step of pressure; slow : whether
+    valves that can apply slowly do so in place of these steps."""
 
     wheels: int
     falls: float = -20.0
@@ -33,10 +34,15 @@ class AccelerationPhases(Common):
     slip: float = 0.035
     deep: float = 0.1
     pulse: int = 4
+    slow: bool = False
 
     def __post_init__(self) -> None:
-        self.check(minus_falls=-self.falls, rises=self.rises, slip=self.slip, deep=self.deep, pulse=self.pulse,
-                   rises_fast=self.rises_fast)  # fmt: skip
+        self.check(falls=(-ACCELERATION[1], -SMALLEST), rises=ACCELERATION, rises_fast=ACCELERATION, slip=SLIP,
+                   deep=SLIP, pulse=(0.0, 1000.0))  # fmt: skip
+        for name, kind in (("pulse", int), ("slow", bool)):
+            if not isinstance(getattr(self, name), kind):
+                allowed = "must be a whole number" if kind is int else "must be true or false"
+                raise InputError("", f"controller.parameters.{name}", getattr(self, name), allowed)
         self._loop = PerWheel(self.wheels, self, lambda: _Logic(self))
 
     def sample(self, given: Sample) -> Command:
@@ -81,6 +87,8 @@ class _Logic:
     def _valve(self, phase: int) -> int:
         if phase in (FIRST, OVERSHOOT):
             return APPLY
+        if phase == STEP_UP and self._own.slow:
+            return SLOW
         if phase == STEP_UP:
             self._count += 1
             return APPLY if self._count % self._own.pulse == 1 % self._own.pulse else HOLD

@@ -17,7 +17,7 @@ speed no more (y <= e4) goes on with phase 5, and one at a deep slip with phase 
 from dataclasses import dataclass
 
 from models.braking.controller import Command, Sample
-from models.braking.controllers.per_wheel import Common, PerWheel
+from models.braking.controllers.per_wheel import ACCELERATION, PRESSURE_RATE, SLIP, Common, PerWheel
 from models.errors import InputError
 
 
@@ -37,7 +37,8 @@ class FivePhase(Common):
     deep: float = 0.3
 
     def __post_init__(self) -> None:
-        self.check(e1=self.e1, e5=self.e5, falling=self.falling, fast=self.fast, slow=self.slow, deep=self.deep)
+        self.check(**dict.fromkeys(("e1", "e2", "e3", "e5"), ACCELERATION), e4=(-1e4, 1e4), deep=SLIP,
+                   **dict.fromkeys(("falling", "fast", "slow"), PRESSURE_RATE))  # fmt: skip
         if not self.e1 < self.e2 or not self.e4 < self.e3 < self.e2:
             raise InputError("", "controller.parameters.e2", self.e2, "must be above e1 and e3, and e3 above e4")
         self._loop = PerWheel(self.wheels, self, lambda: _Logic(self), pressures=True)

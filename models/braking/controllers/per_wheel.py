@@ -6,13 +6,19 @@ from typing import Protocol
 
 import numpy as np
 
-from models.braking.controller import SAMPLE, Command, Sample
-from models.braking.pressure import APPLY, RELEASE
+from models.braking.controller import APPLY, RELEASE, SAMPLE, Command, Sample
 from models.braking.speed_estimate import SpeedEstimate, speed_of
 from models.errors import InputError
 
 MEMORY = 0.1
 """s"""
+SMALLEST = 5e-324
+"""What is above its negative is zero or more, and what is at most its negative is below zero."""
+ACCELERATION, PRESSURE_RATE = (0.0, 1e4), (0.0, 1e5)
+"""Bounds of thresholds of a wheel's acceleration (m/s^2) and of rates of pressure (bar/s): no wheel, no valve is
+faster."""
+SLIP = (0.0, 1.0)
+"""Bounds of thresholds of slip: a wheel that stands has 1."""
 
 
 class Logic(Protocol):
@@ -36,13 +42,19 @@ class Common:
     cut_off: float = 1.5
     period: float = SAMPLE
 
-    def check(self, **positive: float) -> None:
-        """Raise InputError for what is not above 0, and for axles that are none."""
-        for name, value in {"period": self.period, **positive}.items():
-            if not 0.0 < value < np.inf:
-                raise InputError("", f"controller.parameters.{name}", value, "must be above 0")
-        if not 0.0 <= self.cut_off < np.inf:
-            raise InputError("", "controller.parameters.cut_off", self.cut_off, "must be 0 or more")
+    def check(self, **bounds: tuple[float, float]) -> None:
+        """Refuse what is no number, or is outside the bounds of its name: above the first, up to the second.
+
+        Raises InputError; for axles that are none, ``PerWheel`` does.
+        """
+        for name, (above, most) in {"period": (0.0, 1.0), "cut_off": (-SMALLEST, 100.0), **bounds}.items():
+            value, place = getattr(self, name), f"controller.parameters.{name}"
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+                raise InputError("", place, value, "must be a number")
+            if not above < value <= most:
+                least = "0 or more" if above == -SMALLEST else f"above {above:g}"
+                largest = "below 0" if most == -SMALLEST else f"at most {most:g}"
+                raise InputError("", place, value, f"must be {least}, {largest}")
         self.select_low = tuple(self.select_low)
 
 

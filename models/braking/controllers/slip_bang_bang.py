@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass
 
-from models.braking.controller import Command, Sample
-from models.braking.controllers.per_wheel import Common, PerWheel
-from models.braking.pressure import APPLY, RELEASE
+from models.braking.controller import APPLY, RELEASE, Command, Sample
+from models.braking.controllers.per_wheel import SLIP, Common, PerWheel
 from models.errors import InputError
 
 
@@ -17,7 +16,7 @@ class SlipBangBang(Common):
     apply: float = 0.05
 
     def __post_init__(self) -> None:
-        self.check(release=self.release, apply=self.apply)
+        self.check(release=SLIP, apply=SLIP)
         if not self.apply <= self.release < 1.0:
             raise InputError("", "controller.parameters.apply", self.apply, "must be at most release, and that below 1")
         self._loop = PerWheel(self.wheels, self, lambda: _Logic(self))

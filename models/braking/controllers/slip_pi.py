@@ -6,12 +6,10 @@ Savaresi, M. Tanelli, Active braking control systems design for vehicles (2010),
 Solyom, A. Rantzer, J. Ludemann, Synthesis of a model-based tire slip controller, Vehicle System Dynamics 41 (2004).
 """
 
-import math
 from dataclasses import dataclass
 
 from models.braking.controller import Command, Sample
-from models.braking.controllers.per_wheel import Common, PerWheel
-from models.errors import InputError
+from models.braking.controllers.per_wheel import SLIP, SMALLEST, Common, PerWheel
 
 
 @dataclass
@@ -26,9 +24,7 @@ class SlipPI(Common):
     mix: float = 0.0
 
     def __post_init__(self) -> None:
-        self.check(target=self.target, gain=self.gain, reset=self.reset)
-        if not 0.0 <= self.mix < math.inf:  # what is no number at all raises TypeError, as the others do
-            raise InputError("", "controller.parameters.mix", self.mix, "must be 0 or more")
+        self.check(target=SLIP, gain=(0.0, 1e4), reset=(0.0, 1e3), mix=(-SMALLEST, 10.0))
         self._loop = PerWheel(self.wheels, self, lambda: _Logic(self), pressures=True)
 
     def sample(self, given: Sample) -> Command:

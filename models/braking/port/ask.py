@@ -39,7 +39,10 @@ class ControllerFailed(RunFailed):
 
 def ask(controller: Controller, given: Sample, states: frozenset[int] = STATES,
         most: float = LARGEST_PRESSURE) -> Command:  # fmt: skip
-    """A controller's answer, checked; most : pressure (bar). Raises ControllerFailed, whatever the controller raises."""
+    """A controller's answer, checked; most : largest pressure (bar).
+
+    Raises ControllerFailed, whatever the controller raises.
+    """
     try:
         command = controller.sample(given)
     except RunFailed:
@@ -98,9 +101,10 @@ def _listed(states: frozenset[int]) -> str:
 
 def _array(values: object, given: Sample) -> np.ndarray:
     try:
-        if np.iscomplexobj(values):
+        array = np.asarray(values)
+        if array.dtype.kind == "c":
             raise TypeError("complex numbers")
-        array = np.asarray(values, dtype=float)
+        array = array.astype(float)
     except (TypeError, ValueError) as error:
         raise ControllerFailed(given, "wrong frame", str(error)) from None
     if array.shape != given.wheels.shape:

@@ -2,8 +2,9 @@
 
 Inputs: ``wheel_1`` to ``wheel_W`` (real, m/s), and as far as the FMU has them ``brake`` (boolean), ``supply`` (real,
 bar) and ``speed`` (real, m/s; not a number if it is not given). Outputs: ``valve_1`` to ``valve_W`` (real or integer;
--1 release, 0 hold, 1 apply, 2 apply slowly where the scene has such valves) or ``pressure_1`` to ``pressure_W`` (real, bar). At each sample the inputs are set, one
-step of a sample's length is done, and the outputs then are the answer to that sample.
+-1 release, 0 hold, 1 apply, 2 apply slowly where the scene has such valves) or ``pressure_1`` to ``pressure_W`` (real,
+bar). At each sample the inputs are set, one step of a sample's length is done, and the outputs then are the answer to
+that sample.
 """
 
 from collections.abc import Iterator

@@ -66,7 +66,8 @@ class Hosted:
         except TimeoutError:
             raise ControllerFailed(given, "silence", f"no answer within {self.timeout:g} s") from None
         except (OSError, EOFError):
-            raise ControllerFailed(given, "crash", f"the controller was lost{fate(self.process, self.timeout)}") from None
+            lost = f"the controller was lost{fate(self.process, self.timeout)}"
+            raise ControllerFailed(given, "crash", lost) from None
 
     def _got(self, said: bytes, size: int, begins: bytes, seconds: float) -> bytes:
         """What comes back within so many seconds; raises Failed, TimeoutError, OSError, EOFError."""

@@ -63,8 +63,8 @@ class PortTable(Strict):
 @dataclass(frozen=True)
 class Run:
     """What the port needs to know of a run. radius (W,): of the wheels, m; sample: s; scene: its text, by which a log
-    is known; folder: of its paths; file: its name, for messages; procedure, engine: names for those of its files; slow: whether valves can
-    apply slowly.
+    is known; folder: of its paths; file: its name, for messages; procedure, engine: names for those of its files;
+    slow: whether valves can apply slowly.
     """
 
     radius: np.ndarray

@@ -1,0 +1,103 @@
+"""Where braking ends: wheels that lift, what rolls over or folds, valves that apply slowly, input beyond physics."""
+
+import numpy as np
+import pytest
+
+from models.braking.controller import SLOW, Command, Sample
+from models.braking.plane_step import BORNE, KNOWN, SIDE, share_out
+from models.braking.plane_vehicle import PAPER, truck
+from models.braking.port.ask import WITH_SLOW, ControllerFailed, checked
+from models.braking.procedures import drive, ready
+from models.braking.quarter import Quarter
+from models.braking.scene import build
+from models.braking.trailer import CHOSEN, train
+from models.errors import InputError, RunFailed
+from validation.braking.random_stops import random_stop
+from validation.cases import braking_limits as rows
+
+GIVEN = Sample(3, 16_500_000, np.ones(4), True, 6.0, 10.0)
+
+
+def scene(**tables):
+    return build({"title": "t", "system": "braking", "procedures": {"stop": {"speed": 2.0}}, **tables}, "t.toml")
+
+
+@pytest.mark.parametrize("loads", [(9e3, 24e3, -4e3, 26e3), (-1.0, 30e3, 8e3, 17e3), (20e3, 25e3, -2e3, 12e3)])
+def test_three_wheels_that_stay_hold_weight_and_moments(loads):
+    plane, known = truck(PAPER), np.zeros((4, KNOWN))
+    known[:, SIDE], known[:, BORNE] = plane.place[:, 1], loads
+    share_out(known)
+    found, place = known[:, BORNE], plane.place
+    assert found.min() >= 0.0 and found.sum() == pytest.approx(sum(loads), rel=1e-12)
+    assert found @ place == pytest.approx(np.array(loads) @ place, rel=1e-9)
+
+
+@pytest.mark.parametrize(("loads", "side"), [((-3e3, 30e3, -4e3, 26e3), (0, 2)), ((30e3, 25e3, -4e3, -2e3), (2, 3))])
+def test_beyond_balance_two_wheels_bear_nothing(loads, side):
+    known = np.zeros((4, KNOWN))
+    known[:, SIDE], known[:, BORNE] = truck(PAPER).place[:, 1], loads
+    share_out(known)
+    assert (known[list(side), BORNE] == 0.0).all() and known[:, BORNE].sum() == pytest.approx(sum(loads))
+
+
+def test_a_stop_at_the_edge_of_locking_finishes():
+    steered = {"stop": {"kind": "j_turn", "speed": 15.0, "steer": 0.02}}
+    path = drive(scene(load_transfer={"front": 0.3}, brakes={"supply": 5.0}, road={"stretches": [{"left": "dry"}]},
+                       procedures=steered), "stop")  # fmt: skip
+    assert path.stands and path.times[-1] == pytest.approx(2.301, abs=0.01)
+
+
+@pytest.mark.full
+def test_random_legal_stops_finish():
+    ends = [rows.finished(number) for number in range(rows.STOPS[False])]
+    assert [end for end in ends if end and not any(limit in end for limit in rows.LIMITS)] == []
+
+
+def test_random_stops_are_the_same_for_the_same_numbers_and_are_built():
+    assert random_stop(1, 2) == random_stop(1, 2) != random_stop(1, 3)
+    for number in range(20):
+        build(random_stop(5, number))
+
+
+def test_rows_of_limits_hold():
+    found = [rows._jackknife_row(), *rows._roll_rows(), rows._slow_apply_row(), rows._cycle_row(), rows._yaw_row(1.0)]
+    assert [row.id for row in found if row.status != "passed"] == []
+
+
+def test_valves_apply_slowly_only_where_the_scene_has_them():
+    with pytest.raises(ControllerFailed, match=r"2 is none of -1, 0, 1$|2 is none of -1, 0, 1 "):
+        checked(Command(valves=np.full(4, SLOW)), GIVEN)
+    assert (checked(Command(valves=np.full(4, SLOW)), GIVEN, WITH_SLOW).valves == SLOW).all()
+    phases = {"kind": "acceleration_phases", "parameters": {"slow": True}}
+    with pytest.raises(InputError, match=r"controller.parameters.slow.*pressure.slow"):
+        drive(scene(controller=phases), "stop")
+    with pytest.raises(InputError, match=r"pressure.slow = 0.01: must be at least fill, 0.15 s"):
+        scene(pressure={"slow": 0.01})
+    fast, slow = (drive(scene(controller=phases | {"parameters": {"slow": value, "cut_off": 0.0}},
+                              pressure={"slow": 2.0}, procedures={"stop": {"speed": 11.0}}, run={"duration": 2.0}),
+                        "stop") for value in (False, True))  # fmt: skip
+    assert not np.array_equal(fast.pressures, slow.pressures)
+
+
+def test_what_cannot_be_is_refused_with_its_value():
+    with pytest.raises(ControllerFailed, match="too high: a pressure of 299 bar, above the 6 bar"):
+        checked(Command(pressures=np.full(4, 299.0)), GIVEN, most=6.0)
+    with pytest.raises(ControllerFailed, match="wrong frame: complex"):
+        checked(Command(pressures=np.full(4, 1j)), GIVEN)
+    with pytest.raises(InputError, match=r"mass = 0.1: must be above 322.8 kg"):
+        ready(scene(vehicle={"override": {"mass": 0.1}}), "stop")
+    with pytest.raises(InputError, match=r"mass = 200.0: must be above"):
+        train(PAPER, CHOSEN.model_copy(update={"mass": 100.0, "drawbar_mass": 100.0}))
+    with pytest.raises(ValueError, match="J / r"):
+        Quarter(mass=50.0, radius=0.5, spin_inertia=13.35)
+    with pytest.raises(InputError, match=r"brakes.supply = 10000.0: must be at most 300 bar"):
+        scene(brakes={"supply": 1e4})
+    with pytest.raises(InputError, match=r"brakes.rear.gradient = 1000000000.0: must be at most"):
+        scene(brakes={"rear": {"gradient": 1e9}})
+
+
+def test_a_train_that_folds_ends_with_its_angle_and_keeps_its_path():
+    with pytest.raises(RunFailed, match=r"jackknifes: the drawbar against the truck at -?\d+\.\d deg, limit") as told:
+        drive(scene(trailer=CHOSEN.model_copy(update={"fold": 0.05}).model_dump(), run={"duration": 6.0},
+                    procedures={"stop": {"kind": "j_turn", "speed": 8.0, "steer": 0.1}}), "stop")  # fmt: skip
+    assert len(told.value.partial.times) > 3
