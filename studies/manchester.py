@@ -32,6 +32,7 @@ COLUMNS: dict[str, tuple[str, Callable[[Place], float]]] = {
     "touch_on_rail": ("mm", lambda p: 1e3 * (p.touch_y - p.top)),
     "touch_on_wheel": ("mm", lambda p: 1e3 * p.wheel_y), "touch_angle": ("deg", lambda p: float(np.degrees(-p.angle))),
     "fx": ("kN", lambda p: 1e-3 * p.fx), "fy": ("kN", lambda p: 1e-3 * p.fy), "mz": ("N m", lambda p: p.mz),
+    "mz_on_rail": ("mm", lambda p: 1e3 * (p.touch_y - p.top)), "mz_ahead": ("mm", lambda p: 1e3 * p.touch_x),
     "xi_x": ("-", lambda p: p.xi_x), "xi_y": ("-", lambda p: p.xi_y), "spin": ("1/m", lambda p: p.spin),
     "approach": ("um", lambda p: 1e6 * p.approach),
 }  # fmt: skip

@@ -9,11 +9,13 @@ from models.contact import hertz
 from models.contact.falling_friction import Falling
 from models.contact.fastsim import Ellipse, fastsim
 from models.contact.fastsim_derivatives import derivatives
+from models.contact.fastsim_fields import fastsim_fields
 from models.contact.fastsim_grid import POWERS, grid, strips_of
-from models.contact.linear_theory import flexibilities
+from models.contact.linear_theory import coefficients, flexibilities
 from models.contact.material import Pair
 from models.errors import InputError
 from validation.cases import fastsim as case
+from validation.contact.friction_limit import most_moment
 from validation.contact.fuzzed_creepage import OPTIONS, contacts, worst
 
 PAIR = Pair()
@@ -54,7 +56,7 @@ def plain_python(a, b, load, mu, xi_x, xi_y, spin, cells, power, half):
                 p = g * -w / abs(w) * complex(math.cos(psi), math.sin(psi))
             else:
                 p, slips = g * trial / abs(trial), True
-            total += (p.real, p.imag, x * p.imag * l2 / l3 - y * p.real * l1 / l3) * np.array(dx * 2 * b / strips)
+            total += (p.real, p.imag, x * p.imag - y * p.real) * np.array(dx * 2 * b / strips)
     return total
 
 
@@ -114,18 +116,40 @@ def test_no_load_no_force(load):
     assert not derivatives(**{**AT, "load": load}, pair=PAIR).slopes.any()
 
 
-def test_without_creepage_the_slopes_are_those_of_the_linear_theory():
+def test_without_creepage_the_slopes_are_those_of_the_linear_theory_and_of_the_bed():
+    """Forces by C11, C22 and C23; the moment is that of the bed's tractions, linear along every strip."""
     still = {**AT, "xi_x": 0.0, "xi_y": 0.0, "spin": 0.0}
     found = derivatives(**still, pair=PAIR)
     assert not found.forces.any() and np.isfinite(found.slopes).all()
-    from models.contact.linear_theory import coefficients
-
-    c, ab = coefficients(1.5, PAIR.nu), 24e-6
+    c, ab, (_, l2, l3) = coefficients(1.5, PAIR.nu), 24e-6, flexibilities(AT["a"], AT["b"], PAIR)
     # 21 cells: 0.4 %
     assert found.slopes[0, 0] == pytest.approx(-PAIR.G * ab * c.c11, rel=4e-3)
     assert found.slopes[1, 1] == pytest.approx(-PAIR.G * ab * c.c22, rel=4e-3)
     assert found.slopes[1, 2] == pytest.approx(-PAIR.G * ab**1.5 * c.c23, rel=4e-3)
-    assert found.slopes[2, 1] == pytest.approx(PAIR.G * ab**1.5 * c.c23, rel=4e-3)
+    assert found.slopes[2, 1] == pytest.approx(math.pi / 4 * AT["a"] ** 2 * ab / l2, rel=4e-3)
+    assert found.slopes[2, 2] == pytest.approx(-8 / 15 * ab**2 * AT["b"] / l3, rel=6e-3)  # and 24 strips
+
+
+@pytest.mark.parametrize("options", [{}, *OPTIONS, {"falling": Falling(floor=0.4, decay=0.6, speed=20.0)}])
+def test_the_moment_is_that_of_the_tractions(options):
+    """Of every bound, march and kind of flexibility, cell by cell."""
+    for scale in (0.1, 1.0, 10.0):
+        given = {**AT, **{name: scale * AT[name] for name in ("xi_x", "xi_y", "spin")}}
+        found, cells = fastsim(**given, pair=PAIR, **options), fastsim_fields(**given, pair=PAIR, **options)
+        area = cells.dx * cells.dy
+        moment = np.sum((cells.x * cells.py - cells.y * cells.px) * area)
+        assert found.fx == pytest.approx(np.sum(cells.px * area), rel=1e-11)
+        assert abs(found.mz - moment) <= 1e-12 * 24e3 * AT["a"]
+
+
+def test_the_moment_reaches_the_limit_of_friction_and_no_more():
+    """Pure spin that slides all over: 3 pi / 16 mu N a by Hertz's pressure on a circle, 8 / 15 by a parabola."""
+    round_patch = {"a": np.full(1, 5e-3), "b": np.full(1, 5e-3), "load": np.full(1, 8e4), "mu": np.full(1, 0.3)}
+    for bound, share in (("elliptic", 3 * math.pi / 16), ("parabolic", 8 / 15)):
+        most = most_moment(round_patch, 81, bound)
+        assert most == pytest.approx(share * 120, rel=5e-4)
+        spun = fastsim(5e-3, 5e-3, 8e4, 0.3, 0.0, 0.0, -1e3, PAIR, cells=81, bound=bound, flexibilities="one")
+        assert (1 - 2e-3) * most <= spun.mz <= (1 + 1e-12) * most
 
 
 @pytest.mark.parametrize("growing", [True, False])

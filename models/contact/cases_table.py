@@ -11,7 +11,15 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from models.contact.accuracy import band, moment_band, slenderness, spin_share, used_with_moment
+from models.contact.accuracy import (
+    band,
+    cells_error,
+    halved,
+    moment_band,
+    slenderness,
+    spin_share,
+    used_with_moment,
+)
 from models.contact.built import Built
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_load
@@ -108,20 +116,18 @@ def _forces(values: dict[str, Any], pair: Pair, method: Method, extend: Extend) 
     else:
         a, b = values["a"], values["b"]
     choices: dict[str, Any] = method.model_dump(include={"march", "bound", "flexibilities"})
-    half = (method.cells + 1) // 2
     fine, coarse = (fastsim(a, b, load, friction, xi_x, xi_y, spin, pair, cells=n, **choices)
-                    for n in (method.cells, half))  # fmt: skip
-    gained = (method.cells / half) ** method.order - 1.0
-    left = np.stack([np.hypot(fine.fx - coarse.fx, fine.fy - coarse.fy), np.abs(fine.mz - coarse.mz)]) / gained
+                    for n in (method.cells, halved(method.cells)))  # fmt: skip
     limit = friction * np.maximum(load, 0.0)
     a, b = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
     most, share = limit * np.maximum(a, b), spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu)
-    used, turned = (np.divide(size, whole, out=np.zeros_like(limit), where=limit > 0)
-                    for size, whole in ((np.hypot(fine.fx, fine.fy), limit), (fine.mz, most)))  # fmt: skip
-    wider = slenderness(a, b)
+    relative, other = (np.divide([one.fx, one.fy, one.mz], [limit, limit, most], out=np.zeros((3, limit.size)),
+                                 where=limit > 0) for one in (fine, coarse))  # fmt: skip
+    left = cells_error(relative, other, method.cells, method.order)
+    used, wider = np.hypot(relative[0], relative[1]), slenderness(a, b)
     theory = wider * limit * band(method.band, used, share)
-    moment = wider * most * moment_band(method.band, used_with_moment(used, turned), share)
-    return np.column_stack([fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation, left[0], theory, left[1],
+    moment = wider * most * moment_band(method.band, used_with_moment(used, relative[2]), share)
+    return np.column_stack([fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation, limit * left, theory, most * left,
                             moment]) + 0.0  # fmt: skip
 
 

@@ -26,6 +26,7 @@ from models.contact.fastsim_many import (
     MU,
     ONE,
     PART,
+    PER_SLIP,
     SPIN,
     SPREAD,
     XI_X,
@@ -89,14 +90,14 @@ def _to_load(contacts: Array, found: Array, slopes: Array, growing: bool) -> Non
 @njit(cache=True, error_model="numpy")
 def _slopes(contacts, rows, strips, cells, middle, kind, found, slopes):
     """Fill forces (n, 3) and their derivatives (n, 3, 4) to the creepages in the given rows."""
-    slip, sums, moved, total = np.empty(5), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    scale, weights = np.empty((3, 3)), np.empty((2, 3))
+    slip, sums, moved, total = np.empty(PER_SLIP), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    scale = np.empty((3, 3))
     for c in rows:
         own = contacts[c]
         if not touches(own):
             continue
         rigid_slip(own, cells.shape[1], middle, kind, slip)
-        _scale_slopes(own, cells.shape[1], middle, kind, scale, weights)
+        _scale_slopes(own, cells.shape[1], middle, kind, scale)
         total[:] = 0.0
         for s in range(strips.shape[1]):
             _strip(own, strips[:, s], cells, slip, sums, moved)
@@ -104,20 +105,19 @@ def _slopes(contacts, rows, strips, cells, middle, kind, found, slopes):
             arm, off = own[A] * strips[HALF, s], own[B] * strips[Y, s]
             found[c, 0] += part * sums[0]
             found[c, 1] += part * sums[1]
-            found[c, 2] += part * (slip[4] * arm * sums[2] - slip[3] * off * sums[0])
+            found[c, 2] += part * (arm * sums[2] - off * sums[0])
             for k in range(3):  # loops, as array expressions take seconds to compile
                 total[0, k] += part * moved[0, k]
                 total[1, k] += part * moved[1, k]
-                total[2, k] += part * (slip[4] * arm * moved[2, k] - slip[3] * off * moved[0, k])
-                slopes[c, 2, k] += part * (weights[1, k] * arm * sums[2] - weights[0, k] * off * sums[0])
+                total[2, k] += part * (arm * moved[2, k] - off * moved[0, k])
         for f in range(3):
             for k in range(3):
                 slopes[c, f, k] += total[f, 0] * scale[0, k] + total[f, 1] * scale[1, k] + total[f, 2] * scale[2, k]
 
 
 @njit(cache=True, error_model="numpy")
-def _scale_slopes(own, cells, middle, kind, scale, weights):
-    """Derivatives of the five numbers of ``rigid_slip`` to the creepages: (3, 3) of the first, (2, 3) of the last."""
+def _scale_slopes(own, cells, middle, kind, scale):
+    """Derivatives (3, 3) of the numbers of ``rigid_slip`` to the creepages."""
     a, c = own[A], math.sqrt(own[A] * own[B])
     bound = own[MU] * middle * own[LOAD] / (a * own[B])
     step, creep = 2.0 * a / (cells * bound), (own[XI_X], own[XI_Y], own[SPIN] * c)
@@ -138,8 +138,6 @@ def _scale_slopes(own, cells, middle, kind, scale, weights):
                 change[i] = unit * (blended[1 + j] * (1.0 / mean - 1.0 / own[L1 + i]) + blended[0] * d_one)
         for i in range(3):
             scale[i, j] = step * (change[i] * creep[i] / (c if i == 2 else 1.0) + (k[i] if i == j else 0.0))
-        for i in range(2):
-            weights[i, j] = (change[2] - change[i] * k[2] / k[i]) / k[i]
 
 
 @njit(cache=True, error_model="numpy")

@@ -10,14 +10,29 @@ import numpy as np
 
 from models.compiled import njit
 from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, MIDDLE, RATE, advance, cut
-from models.contact.fastsim_many import HALF, LOAD, MU, PART, SPIN, SPREAD, XI_X, XI_Y, A, B, Y, rigid_slip, touches
+from models.contact.fastsim_many import (
+    HALF,
+    LOAD,
+    MU,
+    PART,
+    PER_SLIP,
+    SPIN,
+    SPREAD,
+    XI_X,
+    XI_Y,
+    A,
+    B,
+    Y,
+    rigid_slip,
+    touches,
+)
 
 
 @njit(cache=True, error_model="numpy")
 def forces_falling(contacts, strips, cells, middle, kind, floor, decay, found):
     """As ``fastsim_many.forces`` with the second-order march, and friction that falls."""
     n, m = cells.shape[1], strips.shape[1]
-    slip, tractions = np.empty(5), np.empty((3, n))
+    slip, tractions = np.empty(PER_SLIP), np.empty((3, n))
     area = 0.0
     for s in range(m):
         area += strips[HALF, s]
@@ -39,7 +54,7 @@ def forces_falling(contacts, strips, cells, middle, kind, floor, decay, found):
             part, half = limit * strips[PART, s], strips[HALF, s]
             found[c, 0] += part * x
             found[c, 1] += part * y
-            found[c, 2] += part * (slip[4] * own[A] * half * turn - slip[3] * own[B] * strips[Y, s] * x)
+            found[c, 2] += part * (own[A] * half * turn - own[B] * strips[Y, s] * x)
             found[c, 3] += half * stuck / (n * area)
 
 

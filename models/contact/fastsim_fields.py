@@ -17,7 +17,7 @@ from models.contact.fastsim import (
 )
 from models.contact.fastsim_grid import Bound, grid, strips_of
 from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, MIDDLE, PLAIN, RATE, advance, cut
-from models.contact.fastsim_many import HALF, SPREAD, A, B, Y, rigid_slip
+from models.contact.fastsim_many import HALF, PER_SLIP, SPREAD, A, B, Y, rigid_slip
 from models.contact.fields import Fields
 from models.contact.material import Pair
 from models.errors import InputError
@@ -37,7 +37,7 @@ def fastsim_fields(a: float, b: float, load: float, mu: float, xi_x: float, xi_y
         raise InputError("", "a, b, load, mu, xi_x, xi_y, spin", list(given), "must be plain numbers: one ellipse")
     contact = contacts[0]
     net = grid(cells, int(strips_of(contact[A] / contact[B], cells)), bound)
-    slip = np.zeros(5)
+    slip = np.zeros(PER_SLIP)
     rigid_slip(contact, cells, net.middle, KINDS[flexibilities], slip)
     y, half, spread = (net.strips[row][:, None] for row in (Y, HALF, SPREAD))
     relative = np.zeros((3, y.size, cells))

@@ -9,8 +9,9 @@ import numpy as np
 from models.contact.inputs import Array
 
 Bound = Literal["intermediate", "parabolic", "elliptic"]
-POWERS = {"intermediate": 0.8, "parabolic": 1.0, "elliptic": 0.5}
-"""Of 1 - (x/a)^2 - (y/b)^2 in the bound of the traction; the first calibrated on 150 cases of the exact theory."""
+POWERS = {"intermediate": 0.75, "parabolic": 1.0, "elliptic": 0.5}
+"""Of 1 - (x/a)^2 - (y/b)^2 in the bound of the traction; the first calibrated on 1120 contacts of the exact theory:
+its forces are as near as with 0.8 and its moments a sixth nearer."""
 MOST_STRIPS = 3
 """Strips per cell along them, at most."""
 ROUNDED = 1.0 + 2e-15

@@ -28,7 +28,7 @@ A, B, LOAD, MU, XI_X, XI_Y, SPIN, L1, L2, L3 = range(10)
 """Columns of contacts; L1 to L3 are the flexibilities (m^3/N) along x, along y and in spin."""
 Y, HALF, SPREAD, PART = range(4)
 """Rows of the strips: y/b, half length by a, that by the bound in the strip's middle, share of the load per bound."""
-PER_SLIP, ROOM = 5, ROWS * LANES
+PER_SLIP, ROOM = 3, ROWS * LANES
 """Numbers of a rigid slip; of all lanes."""
 ONE, THREE, BLENDED = 0, 1, 2
 OF_X, OF_SPIN, AGAINST, REACH, GROWTH = 0.5, 0.52, 0.86, 1.9, 1.3
@@ -83,12 +83,10 @@ def touches(contact):
 
 @lean
 def rigid_slip(contact, cells, middle, kind, slip):
-    """Fill ``slip`` (5,) with what the march and the moment need.
+    """Fill ``slip`` (3,) with what the march needs.
 
-    First the traction by the bound in the ellipse's middle that each creepage builds up over one cell of the middle
-    strip, were there no slip; the third one is that of spin per metre. Then the weights in the moment of -y p_x and of
-    x p_y: a bed whose spin has another flexibility than its creepage along x sees the spin k3/k1 times as large there,
-    and the work of the moment must be that of the tractions. So C32 = -C23, and power is never positive.
+    The traction by the bound in the ellipse's middle that each creepage builds up over one cell of the middle strip,
+    were there no slip; the third one is that of spin per metre.
     """
     a, b, load, mu = contact[A], contact[B], contact[LOAD], contact[MU]
     if not touches(contact):
@@ -98,7 +96,6 @@ def rigid_slip(contact, cells, middle, kind, slip):
     k1, k2, k3 = stiffness(contact, bound, kind)
     step = 2.0 * a / (cells * bound)
     slip[0], slip[1], slip[2] = k1 * contact[XI_X] * step, k2 * contact[XI_Y] * step, k3 * contact[SPIN] * step
-    slip[3], slip[4] = k3 / k1, k3 / k2
 
 
 @lean
@@ -185,7 +182,7 @@ def _collect(lanes, first, count, contacts, strips, slips, found):
             x = lanes[SUM_X * LANES + j]
             found[c, 0] += part * x
             found[c, 1] += part * lanes[SUM_Y * LANES + j]
-            arm, off = slips[c, 4] * contacts[c, A] * half, slips[c, 3] * contacts[c, B] * strips[Y, s]
+            arm, off = contacts[c, A] * half, contacts[c, B] * strips[Y, s]
             found[c, 2] += part * (arm * lanes[SUM_T * LANES + j] - off * x)
             found[c, 3] += half * lanes[SLID * LANES + j]
         s += 1

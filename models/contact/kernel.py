@@ -29,6 +29,7 @@ from models.contact.fastsim_many import (
     L3,
     LOAD,
     MU,
+    PER_SLIP,
     SPIN,
     XI_X,
     XI_Y,
@@ -59,7 +60,7 @@ _CELLS, _FIRST, _COUNT, _ALONG = range(4)
 """Places in the net: cells per strip, strips of the first net, how many nets, where the rows of the cells begin."""
 _LAW = 1
 """Place of the law's address where the first number is below zero."""
-_LANES, _CONTACT, _SLIPS, _FOUND = ROWS * LANES, 10, 5, 4
+_LANES, _CONTACT, _SLIPS, _FOUND = ROWS * LANES, 10, PER_SLIP, 4
 
 
 @lru_cache(maxsize=64)

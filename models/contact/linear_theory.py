@@ -57,6 +57,13 @@ Twice as many cells change it by 2 % at most. The asymptote of the table's last 
 20 % at 100, for nu = 1/4."""
 NARROW_FADING, LONG_FADING = 1.5, 0.75
 """Powers of the slenderness with which the difference from the asymptotes vanishes below and above the table."""
+STIFFER_SPIN = 25.0
+"""(L2/L3 - 1) (a/b)^2 at most. Spin meets a stiffer bed than lateral creepage, so that the power of small tractions,
+
+    8/3 a^2 b xi_y^2 / L2 + pi/4 a^3 b (1/L3 - 1/L2) xi_y spin + 8/15 a^2 b^3 spin^2 / L3,
+
+could become negative where L2/L3 - 1 is beyond 3 b/a: with Kalker's coefficients from a/b = 15 on. With this bound,
+which they reach at a/b = 10.5, that is far off, and so it is on 21 cells up to a/b = 900."""
 LARGEST_PATCH = 0.5
 """sqrt(ab) in m: a larger one is usually in mm."""
 
@@ -107,9 +114,10 @@ def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair) -> tuple
 def flexibilities(a: Any, b: Any, pair: Pair) -> tuple[Array, Array, Array]:
     """Flexibilities L1, L2, L3 (m^3/N) of the simplified theory for xi_x, xi_y and spin: displacement by traction.
 
-    L1 = 8 a / (3 G C11), L2 = 8 a / (3 G C22), L3 = pi a sqrt(a/b) / (4 G C23) (Kalker 1982). a, b : semi-axes (m) of
-    shapes that broadcast; zero where nothing touches, and zero comes out. Raises InputError, also for too unlike a
-    pair.
+    L1 = 8 a / (3 G C11), L2 = 8 a / (3 G C22), L3 = pi a sqrt(a/b) / (4 G C23) (Kalker 1982), and beyond a/b = 10.5
+    as much more of L3 as passive tractions ask for (``STIFFER_SPIN``): 14 % at a/b = 20, 17 % from 50 on. a, b :
+    semi-axes (m) of shapes that broadcast; zero where nothing touches, and zero comes out. Raises InputError, also for
+    too unlike a pair.
     """
     pair.require_likeness()
     a, b = _axes(a, b)
@@ -161,7 +169,7 @@ def flexibilities_at(a: float, b: float, modulus: float, nu: float) -> tuple[flo
             across = 8.0 * unit / (3.0 * c)
         else:
             turning = math.pi * unit * math.sqrt(a / b) / (4.0 * c)
-    return along, across, turning
+    return along, across, max(turning, across / (1.0 + STIFFER_SPIN * (b / a) ** 2))
 
 
 @njit(cache=True)

@@ -15,7 +15,7 @@ for each mm. The load of 10 kN on each wheel and the steps of 0.5 mm are those t
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -40,6 +40,8 @@ BENCHMARK_LOAD, BENCHMARK_SPEED, BENCHMARK_FRICTION = 1.0e4, 2.0, 0.3
 Triple = tuple[float, float, float]
 ROLLS = 3
 """Times that the roll angle is found anew with the approaches of both wheels."""
+TURNS = 2
+"""Times that the speed of spin is found anew with the exact loads of the patches."""
 ITERATIONS = 60
 SLIDE = 0.05
 """Share of the nominal speed of spin within which the one without moment is looked for."""
@@ -63,10 +65,13 @@ class Place:
     of pressure (rad), negative where it falls towards the middle. rolling_radius : at first touch (m). below_tip : of
     first touch below the tip of the flange (m). curvature_x, curvature_y : second derivatives of the undeformed
     distance there, along and across (1/m). normal : N. vertical : part of it (N). fx, fy : creep forces on the wheel
-    (N), mz : N m. xi_x, xi_y, spin : creepages at first touch, spin in 1/m. peak : largest pressure (Pa). area : m^2.
-    length, width : of the rectangle about it, along the rail and across (m). approach : vertical, of the wheel (m).
+    (N). mz : their moment about the normal through first touch of the patch that carries most (N m), which lies at
+    touch_x ahead of the axle (m) and touch_y; patches that have grown together have the levers from there. xi_x, xi_y,
+    spin : creepages at first touch, spin in 1/m. peak : largest pressure (Pa). area : m^2. length, width : of the
+    rectangle about it, along the rail and across (m). approach : vertical, of the wheel (m).
     """
 
+    touch_x: float
     touch_y: float
     y: float
     top: float
@@ -114,7 +119,8 @@ class Placed:
 class Carried:
     """One wheel under its load: each patch pressed, and what rolling does to it (N, N, N m), in a mirror if left.
 
-    approach : vertical (m). normal : vertical part of the normal forces (N).
+    shares : what the patches carry by the exact normal contact, if that is known. approach : vertical (m). normal :
+    vertical part of the normal forces (N). moment : of the creep forces about the axle (N m).
     """
 
     touches: list[Touch]
@@ -124,6 +130,12 @@ class Carried:
     shares: list[Share]
     approach: float
     normal: float
+    moment: float
+
+    @property
+    def loads(self) -> list[float]:
+        """Along the patches' normals (N)."""
+        return [share.load for share in self.shares] or [_load(self.pressed, touch) for touch in self.touches]
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +167,15 @@ class Contact:
             if self.friction > 0.0:
                 rolling = self._free_spin(side, poses, (right, left))
         poses, touches = self._touching(side, pose)
-        near = self._both(side, poses, touches, rolling)
-        right, left = (self._exact(side, *one) for one in zip(poses, touches, near, strict=True))
-        return _standing(Placed(shift, yaw, pose.roll, rolling, _places(side, right), _places(side, left)))
+        wheels = self._both(side, poses, touches, rolling)
+        for _ in range(TURNS):
+            wheels = [self._exact(side, *one) for one in zip(poses, touches, wheels, strict=True)]
+            if self.friction == 0.0:
+                break
+            rolling = self._free_spin(side, poses, wheels)
+            wheels = [self._turned(side, *one, rolling) for one in zip(poses, wheels, strict=True)]
+        right, left = (_places(side, *one) for one in zip(poses, wheels, strict=True))
+        return _standing(Placed(shift, yaw, pose.roll, rolling, right, left))
 
     def _touching(self, side: Side, pose: Pose) -> tuple[list[Pose], list[list[Touch]]]:
         """Poses of the right wheel and of the left one in its mirror, each lowered until it touches, and the places."""
@@ -170,19 +188,20 @@ class Contact:
     def _both(self, side: Side, poses: list[Pose], touches: list[list[Touch]], spin: float) -> list[Carried]:
         return [self._carried(side, one, found, spin) for one, found in zip(poses, touches, strict=True)]
 
-    def _free_spin(self, side: Side, poses: list[Pose], wheels: tuple[Carried, Carried]) -> float:
+    def _free_spin(self, side: Side, poses: list[Pose], wheels: Sequence[Carried]) -> float:
         """Speed of spin (rad/s) at which the creep forces have no moment about the axle, pressed as the wheels are."""
 
-        def of(pose: Pose, one: Carried, spin: float) -> float:
-            creepages = [self._creepage(side, pose, touch, spin) for touch in one.touches]
-            loads = [_load(one.pressed, touch) for touch in one.touches]
-            return self._rolled(side, pose, one.touches, one.pressed, creepages, loads)[2]
-
         def moment(spin: float) -> float:
-            return sum(of(pose, one, spin) for pose, one in zip(poses, wheels, strict=True))
+            return sum(self._turned(side, *one, spin).moment for one in zip(poses, wheels, strict=True))
 
         rolling = -self.speed / side.wheelset.radius
-        return float(brentq(moment, rolling * (1.0 - SLIDE), rolling * (1.0 + SLIDE), xtol=1e-6))
+        return float(brentq(moment, rolling * (1.0 - SLIDE), rolling * (1.0 + SLIDE), xtol=1e-9))
+
+    def _turned(self, side: Side, pose: Pose, one: Carried, spin: float) -> Carried:
+        """A wheel that is pressed as it was and turns at another speed (rad/s)."""
+        creepages = [self._creepage(side, pose, touch, spin) for touch in one.touches]
+        forces, _, moment = self._rolled(side, pose, one.touches, one.pressed, creepages, one.loads)
+        return replace(one, creepages=creepages, forces=forces, moment=moment)
 
     def _carried(self, side: Side, pose: Pose, touches: list[Touch], spin: float) -> Carried:
         """One wheel by the simplified theory, with normal forces such that they and the creep forces carry its load."""
@@ -191,9 +210,9 @@ class Contact:
         for _ in range(ITERATIONS):
             pressed = press([touch.patch for touch in touches], self.pair, load=normal)
             loads = [_load(pressed, touch) for touch in touches]
-            forces, lifted, _ = self._rolled(side, pose, touches, pressed, creepages, loads)
+            forces, lifted, moment = self._rolled(side, pose, touches, pressed, creepages, loads)
             if abs(normal - lifted - self.load) < PRECISION * self.load:
-                return Carried(touches, pressed, creepages, forces, [], pressed.approach, normal)
+                return Carried(touches, pressed, creepages, forces, [], pressed.approach, normal, moment)
             normal *= self.load / (normal - lifted)
         raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
 
@@ -203,9 +222,9 @@ class Contact:
         for _ in range(ITERATIONS):
             shares, approach = press_exactly(patches, near.pressed.patches, normal, near.approach, self.pair)
             loads = [share.load for share in shares]
-            forces, lifted, _ = self._rolled(side, pose, touches, near.pressed, near.creepages, loads)
+            forces, lifted, moment = self._rolled(side, pose, touches, near.pressed, near.creepages, loads)
             if abs(normal - lifted - self.load) < PRECISION * self.load:
-                return Carried(touches, near.pressed, near.creepages, forces, shares, approach, normal)
+                return replace(near, forces=forces, shares=shares, approach=approach, normal=normal, moment=moment)
             normal *= self.load / (normal - lifted)
         raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
 
@@ -301,9 +320,19 @@ def _arm(side: Side, pose: Pose, touch: Touch) -> np.ndarray:
 
 def _moment(side: Side, pose: Pose, touch: Touch, force: Triple) -> float:
     """Moment (N m) of a patch's creep forces about the axle."""
+    return float(pose.turn[:, 1] @ _moments(_arm(side, pose, touch), touch, force))
+
+
+def _moment_at(side: Side, pose: Pose, main: Touch, touch: Touch, force: Triple) -> float:
+    """Moment (N m) of a patch's creep forces about the normal through another patch's first touch, ``main``."""
+    lever = _arm(side, pose, touch) - _arm(side, pose, main)
+    return float(_axes(main)[1] @ _moments(lever, touch, force))
+
+
+def _moments(lever: np.ndarray, touch: Touch, force: Triple) -> np.ndarray:
+    """Moment (3,) of a patch's creep forces and moment about a point from which the patch is at ``lever`` (m)."""
     across, into = _axes(touch)
-    whole = force[0] * np.array([1.0, 0.0, 0.0]) + force[1] * across
-    return float(pose.turn[:, 1] @ (np.cross(_arm(side, pose, touch), whole) + force[2] * into))
+    return np.cross(lever, force[0] * np.array([1.0, 0.0, 0.0]) + force[1] * across) + force[2] * into
 
 
 def _load(pressed: NormalContact, touch: Touch) -> float:
@@ -315,15 +344,15 @@ def _part(pressed: NormalContact, touch: Touch) -> PatchPressure | None:
     return next((part for part in pressed.patches if part.patch is touch.patch), None)
 
 
-def _places(side: Side, carried: Carried) -> tuple[Place, ...]:
+def _places(side: Side, pose: Pose, carried: Carried) -> tuple[Place, ...]:
     """What a wheel's patches report, those that carry something; patches that have grown together as one."""
     rows = list(zip(carried.touches, carried.creepages, carried.forces, carried.shares, strict=True))
     pieces = dict.fromkeys(share.piece for *_, share in rows if share.load > 0.0)
-    return tuple(_place(side, [row for row in rows if row[-1].piece == piece and row[-1].load > 0.0], carried.approach)
-                 for piece in pieces)  # fmt: skip
+    loaded = [[row for row in rows if row[-1].piece == piece and row[-1].load > 0.0] for piece in pieces]
+    return tuple(_place(side, pose, parts, carried.approach) for parts in loaded)
 
 
-def _place(side: Side, rows: list[tuple[Touch, Triple, Triple, Share]], approach: float) -> Place:
+def _place(side: Side, pose: Pose, rows: list[tuple[Touch, Triple, Triple, Share]], approach: float) -> Place:
     """One piece of the contact area: first touch and creepages are those of the patch that carries most."""
     touch, creep, _, _ = max(rows, key=lambda row: row[-1].load)
     top = float(side.rail.y[np.argmin(side.rail.z)])
@@ -331,14 +360,16 @@ def _place(side: Side, rows: list[tuple[Touch, Triple, Triple, Share]], approach
     y, x = (float(np.average(values, weights=loads)) for values in zip(
         *((one.rail_y + top + share.y * math.cos(one.angle), one.x + share.x) for one, _, _, share in rows),
         strict=True))  # fmt: skip
-    fx, fy, mz = (float(force) for force in np.sum([force for _, _, force, _ in rows], axis=0))
+    fx, fy = (float(sum(force[k] for _, _, force, _ in rows)) for k in (0, 1))
+    mz = sum(_moment_at(side, pose, touch, other, force) for other, _, force, _ in rows)
     vertical = sum(share.load * math.cos(one.angle) for one, _, _, share in rows)
     boxes = np.array([share.box for *_, share in rows])
     length, width = (float(boxes[:, k + 1].max() - boxes[:, k].min()) for k in (0, 2))
     tip = float(side.wheel.z.max() - side.wheel.curve(touch.wheel_y))
     along, across = _curvatures(touch.patch.distance)
-    return Place(touch.rail_y + top, y, top, x, touch.wheel_y, touch.angle, math.atan(float(side.rail.curve(y, 1))),
-                 _radius(side, touch), tip, along, across, float(loads.sum()), vertical, fx, fy, mz, *creep,
+    falling = math.atan(float(side.rail.curve(y, 1)))
+    return Place(touch.x, touch.rail_y + top, y, top, x, touch.wheel_y, touch.angle, falling, _radius(side, touch), tip,
+                 along, across, float(loads.sum()), vertical, fx, fy, mz, *creep,
                  max(share.peak for *_, share in rows),
                  sum(share.area for *_, share in rows), length, width, approach)  # fmt: skip
 

@@ -107,7 +107,10 @@ def _invariants(batches: int, count: int, first: int) -> list[Row]:
         for name, value in worst(contacts(SEED, first + i, count), options, PAIR).items():
             name += " coarse" if name == "power" and options.get("cells", 21) < 20 else ""
             found[name] = max(found.get(name, 0.0), value)
-    what = {"finite": "results that are not finite", "bound": "|F| beyond mu N", "reversal": "F(-creepage) + F",
+    what = {"finite": "results that are not finite", "bound": "|F| beyond mu N", "moment":
+            "moment beyond the sum of the traction's bound times the distance from the centre, by the longer semi-axis",
+            "limit": "power that friction takes beyond that of sliding all over, by creepage",
+            "reversal": "F(-creepage) + F",
             "mirror": "mirrored in y", "power": "power that friction would give, by creepage", "power coarse":
             "power that friction would give, by creepage, on 9 to 12 cells per strip",
             "zero": "force without load or creepage",

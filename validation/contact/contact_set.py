@@ -1,22 +1,23 @@
 """Hertzian contacts with forces by the exact theory, against which every faster theory is measured.
 
 The set: five ellipses, thirteen kinds of creepage and eight sizes of it. Drawn contacts: ellipses, directions and sizes
-at random, in two parts, of which one goes into the bands of error that are stated and the other one judges them. Forces
-are kept as shares of mu N and of mu N sqrt(ab), so that they hold for every load, size and friction of the same ellipse
-and Poisson's ratio. ``contact_set.csv`` and ``contact_drawn.csv`` hold them:
-``python -m validation.contact.contact_set`` computes both anew in half an hour, and every report
-does so for a few rows.
+at random. Wide ones: the same of a/b from 0.1 to 10 and of three Poisson's ratios, every creepage absent in a quarter
+of them. Drawn and wide ones have two parts, of which one goes into the bands of error that are stated and the other one
+judges them. Forces are kept as shares of mu N and of mu N sqrt(ab), so that they hold for every load, size and friction
+of the same ellipse and Poisson's ratio. ``contact_set.csv``, ``contact_drawn.csv`` and ``contact_wide.csv`` hold them:
+``python -m validation.contact.contact_set`` computes all anew in an hour, and every report does so for a few rows.
 """
 
 import csv
 from dataclasses import replace
+from itertools import cycle
 from math import cos, radians, sin
 from pathlib import Path
 
 import numpy as np
 
 from models.contact import work_precision
-from models.contact.material import Pair
+from models.contact.material import Material, Pair
 from models.contact.work_precision import Case, ellipse_cases, exact
 
 RATIOS = (0.2, 0.5, 1.0, 2.0, 5.0)
@@ -28,9 +29,14 @@ SIZE, LOAD, FRICTION, PAIR = 5e-3, 8e4, 0.3, Pair()
 """sqrt(ab) in m, N, coefficient of friction and materials with which the set is computed."""
 SEED, DRAWN, RANGE = 43, 300, (0.2, 10.0)
 """Of the drawn contacts: seed, how many in each part, and their sizes."""
+WIDE_RATIOS, WIDE_RANGE, POISSON = (0.1, 10.0), (0.05, 10.0), (0.0, 0.28, 0.5)
+"""Of the wide contacts: a/b, sizes of the creepages, and Poisson's ratios in turn."""
+WIDE, ABSENT = ((300, 450), (300,)), 0.25
+"""Wide contacts in each part, draw by draw; share of them that have no xi_x, no xi_y and no spin."""
 FITTED, JUDGED = 0, 1
 """Parts of the drawn contacts: one goes into the bands, the other one has never been seen by them."""
-FILE, DRAWN_FILE = Path(__file__).with_suffix(".csv"), Path(__file__).with_name("contact_drawn.csv")
+FILE = Path(__file__).with_suffix(".csv")
+DRAWN_FILE, WIDE_FILE = (FILE.with_name(f"contact_{name}.csv") for name in ("drawn", "wide"))
 ANSWERS = ("fx", "fy", "mz", "error")
 
 
@@ -51,6 +57,23 @@ def drawn(part: int) -> list[Case]:
     ]
 
 
+def wide(part: int) -> list[Case]:
+    """A part of the wide contacts, without their forces."""
+    first = 2 + len(WIDE[FITTED]) * part
+    return [case for stream, count in enumerate(WIDE[part], first) for case in _wide(stream, count)]
+
+
+def _wide(stream: int, count: int) -> list[Case]:
+    rng = np.random.default_rng((SEED, stream))
+    ratios, levels = (np.exp(rng.uniform(*np.log(ends), count)).tolist() for ends in (WIDE_RATIOS, WIDE_RANGE))
+    directions, present = rng.normal(size=(count, 3)), rng.uniform(size=(count, 3)) >= ABSENT
+    present[~present.any(axis=1)] = True
+    bodies = cycle([Material(E=PAIR.one.E, nu=nu) for nu in POISSON])
+    parts = (directions * present).tolist()
+    return [Case(*_axes(ratio), LOAD, FRICTION, Pair(body, body), "wide", (x, y, spin), level)
+            for ratio, level, (x, y, spin), body in zip(ratios, levels, parts, bodies, strict=False)]  # fmt: skip
+
+
 def _axes(ratio: float) -> tuple[float, float]:
     return SIZE * ratio**0.5, SIZE / ratio**0.5
 
@@ -63,6 +86,11 @@ def read() -> list[Case]:
 def read_drawn(part: int) -> list[Case]:
     """A part of the drawn contacts with their forces."""
     return _read(DRAWN_FILE, drawn(FITTED) + drawn(JUDGED))[part * DRAWN : (part + 1) * DRAWN]
+
+
+def read_wide(part: int) -> list[Case]:
+    """A part of the wide contacts with their forces."""
+    return _read(WIDE_FILE, wide(FITTED) + wide(JUDGED))[part * sum(WIDE[FITTED]) :][: sum(WIDE[part])]
 
 
 def _read(path: Path, asked: list[Case]) -> list[Case]:
@@ -89,3 +117,4 @@ def write(path: Path, asked: list[Case]) -> None:
 if __name__ == "__main__":
     write(FILE, cases())
     write(DRAWN_FILE, drawn(FITTED) + drawn(JUDGED))
+    write(WIDE_FILE, wide(FITTED) + wide(JUDGED))

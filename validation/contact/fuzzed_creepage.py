@@ -7,6 +7,7 @@ import numpy as np
 
 from models.contact.fastsim import fastsim
 from models.contact.material import Pair
+from validation.contact.friction_limit import most_moment, most_power
 
 OPTIONS: tuple[dict[str, Any], ...] = (
     {},
@@ -59,6 +60,7 @@ def worst(given: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) -> d
     arm = np.maximum(given["a"], given["b"])
     creep = np.hypot(given["xi_x"], given["xi_y"]) + np.abs(given["spin"]) * arm
     still = (creep == 0.0) | (limit == 0.0)
+    net = {name: options[name] for name in ("cells", "bound") if name in options}
     forces = np.stack([found.fx / least, found.fy / least, found.mz / (least * arm)])
     reverse = np.stack([back.fx / least, back.fy / least, back.mz / (least * arm)])
     mirrored = np.stack([mirror.fx / least, -mirror.fy / least, -mirror.mz / (least * arm)])
@@ -66,6 +68,8 @@ def worst(given: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) -> d
     return {
         "finite": 0.0 if all(np.isfinite(values).all() for values in vars(found).values()) else np.inf,
         "bound": _most(np.hypot(forces[0], forces[1]) - 1.0),
+        "moment": _most((np.abs(found.mz) - most_moment(given, **net)) / (least * arm)),
+        "limit": _most((found.dissipation - most_power(given, **net)) / (least * np.where(creep > 0.0, creep, 1.0))),
         "reversal": _most(np.abs(forces + reverse)),
         "mirror": _most(np.abs(forces - mirrored)),
         "power": _most(-found.dissipation / (least * np.where(creep > 0.0, creep, 1.0))),
