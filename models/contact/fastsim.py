@@ -51,8 +51,8 @@ class Creep:
 
     fx, fy : N. mz : N m, about the centre. stick : share of the area that sticks. dissipation : -(fx xi_x + fy xi_y +
     mz spin) in J per metre rolled, times the rolling speed the power in W; never negative (on fewer than 20 cells per
-    strip by up to 1e-5 of mu N times the creepage, on ellipses beyond a/b = 100, and beyond 900 on any). wear_number : |fx xi_x| + |fy xi_y|
-    in N (T gamma).
+    strip by up to 1e-5 of mu N times the creepage, on ellipses beyond a/b = 100; beyond 900 on any). wear_number :
+    |fx xi_x| + |fy xi_y| in N (T gamma).
     """
 
     fx: Array

@@ -174,8 +174,8 @@ class Contact:
                 break
             rolling = self._free_spin(side, poses, wheels)
             wheels = [self._turned(side, *one, rolling) for one in zip(poses, wheels, strict=True)]
-        right, left = (_places(side, *one) for one in zip(poses, wheels, strict=True))
-        return _standing(Placed(shift, yaw, pose.roll, rolling, right, left))
+        places = [_places(side, *one) for one in zip(poses, wheels, strict=True)]
+        return _standing(Placed(shift, yaw, pose.roll, rolling, *places))
 
     def _touching(self, side: Side, pose: Pose) -> tuple[list[Pose], list[list[Touch]]]:
         """Poses of the right wheel and of the left one in its mirror, each lowered until it touches, and the places."""

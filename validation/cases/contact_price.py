@@ -29,7 +29,7 @@ REPEATED = ((1.0, "x", 0.5), (1.0, "spin", 1.2), (0.5, "x+y", 0.8), (2.0, "y+spi
 """Cases of the set that are computed anew; a quick run takes the first two on coarser grids."""
 NETS = (7, 11, 21, 41)
 """Cells per strip whose stated errors are judged; a quick run takes 21 alone."""
-ALIKE = ({}, {"bound": "elliptic"}, {"march": "plain"}, {"flexibilities": "one"})
+ALIKE: tuple[dict[str, str], ...] = ({}, {"bound": "elliptic"}, {"march": "plain"}, {"flexibilities": "one"})
 """Choices of FASTSIM whose cells are judged, beside the best ones; a quick run takes the first alone."""
 REFERENCE = {True: 0.01, False: 0.005}
 """By mu N: the exact theory's own error on the grids of a quick and of a full run."""
@@ -39,8 +39,8 @@ MOMENTS = {"intermediate": (0.024, 0.06), "elliptic": (0.013, 0.045)}
 """Mean error of the moment by mu N sqrt(ab) that is asked for, and the error that 95 % are to keep to."""
 CONVERGED = 161
 """Cells that are taken for the truth about fewer."""
-SLENDER = ("asked for of the set's ellipses and steel; at nu = 0.5 and a/b = 0.1 or 10 the bed's linear moments are 0.3 "
-           "to 1.7 times Kalker's, and Hertz's bound does not make up for that as the others do")
+SLENDER = ("asked for of the set's ellipses and steel; at nu = 0.5 and a/b = 0.1 or 10 the bed's linear moments are "
+           "0.3 to 1.7 times Kalker's, and Hertz's bound does not make up for that as the others do")
 """Why the moments of the wide contacts by the elliptic bound are reported and not judged."""
 ROWS, SEED = 100_000, 41
 
