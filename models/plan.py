@@ -68,7 +68,9 @@ def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:
         lines.append(_line("  body", f"{body.name:<12} {body.mass:g} kg{inertia}"))
     for strut in vehicle.struts:
         ends = f"{strut.upper.body} - {strut.lower.body or 'ground'}"
-        lines.append(_line("  strut", f"{strut.name:<12} {strut.stiffness:g} N/m, {strut.damping:g} N s/m, {ends}"))
+        pushes = ", only pushes" if strut.pushes_only else ""
+        text = f"{strut.name:<12} {strut.stiffness:g} N/m, {strut.damping:g} N s/m, {ends}{pushes}"
+        lines.append(_line("  strut", text))
     for spring in vehicle.pitch_springs:
         band = f", beyond {spring.dead_band:g} rad" if spring.dead_band else ""
         text = f"{spring.body:<12} {spring.stiffness:g} N m/rad, {spring.damping:g} N m s/rad, to the ground{band}"

@@ -137,9 +137,11 @@ def _wheel_forces(assembly: Assembly, y: np.ndarray, inputs: np.ndarray | None) 
         assert inputs is not None
         return inputs[:, 0], inputs[:, 1]
     u = np.zeros((len(y), 4)) if inputs is None else inputs
-    f1 = p.k1 * (y[:, 0] - u[:, 0]) + p.d1 * (y[:, 4] - u[:, 2])
-    f2 = p.k2 * (y[:, 1] - u[:, 1]) + p.d2 * (y[:, 5] - u[:, 3])
-    return f1, f2
+    pressed = np.array([p.k1, p.k2]) * (y[:, :2] - u[:, :2])
+    forces = pressed + np.array([p.d1, p.d2]) * (y[:, 4:6] - u[:, 2:])
+    if any(tyre.pushes_only for tyre in assembly.vehicle.tyres):
+        forces = np.maximum(np.minimum(forces, 2.0 * pressed), 0.0)
+    return forces[:, 0], forces[:, 1]
 
 
 def state_names() -> tuple[str, ...]:

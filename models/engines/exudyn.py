@@ -6,7 +6,7 @@ becomes x **backward**, y down: then a positive rotation lifts the front, as it 
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import exudyn as exu
@@ -21,6 +21,8 @@ from models.vehicles.description import PitchSpring, Point, Strut
 from models.vehicles.linear import matrices
 
 exu.config.printToConsole = False
+Reader = Callable[[Any, float, float], float]
+"""What Exudyn asks at a stage's time: (system, s, constant load) -> value."""
 
 
 @dataclass
@@ -58,7 +60,7 @@ def _exact(assembly: Assembly) -> Build:
         built.places[body.name, "z"] = _marker(mbs, node, 1)
         weight = body.mass * assembly.vehicle.gravity
         mbs.AddLoad(items.LoadCoordinate(markerNumber=built.places[body.name, "z"], load=weight))
-    for strut in assembly.vehicle.struts:
+    for strut in (strut for strut in assembly.vehicle.struts if not strut.pushes_only):
         _strut(mbs, strut, lambda point: _point(built, bodies, point))
     for spring in assembly.vehicle.pitch_springs:
         _pitch_spring(built, spring)
@@ -108,7 +110,8 @@ def _linear(assembly: Assembly) -> Build:
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     built = Build(container, mbs)
-    mass, damping, stiffness = matrices(assembly.vehicle)
+    linear = tuple(strut for strut in assembly.vehicle.struts if not strut.pushes_only)
+    mass, damping, stiffness = matrices(replace(assembly.vehicle, struts=linear))
     zero = [0.0] * len(mass)
     node = mbs.AddNode(items.NodeGenericODE2(
         referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero,
@@ -135,16 +138,39 @@ def _drive(built: Build, assembly: Assembly, clock: Clock) -> None:
     if clock.held:
         built.mbs.SetPreStepUserFunction(clock.advance)
         built.callbacks += 1
-    tyres = {strut.upper.body: strut for strut in assembly.vehicle.struts if strut.lower.body is None}
+    tyres = {tyre.upper.body: tyre for tyre in assembly.vehicle.tyres}
     for i, axle in enumerate(assembly.vehicle.axles):
         if assembly.mode == "road":
             tyre = tyres[axle.wheel]
+            if tyre.pushes_only:
+                continue
             _load(built, (axle.wheel, "z"), clock.reader(i, tyre.stiffness))
             _load(built, (axle.wheel, "z"), clock.reader(2 + i, tyre.damping))
         elif assembly.mode == "force-body":
             _body_fixed(built, axle.wheel, axle.x, clock.reader(i, 1.0))
         else:
             _load(built, (axle.wheel, "z"), clock.reader(i, -1.0))
+
+
+def _pushing_tyre(built: Build, tyre: Strut, height: Reader, rate: Reader) -> None:
+    """A tyre that can lift, on a road of this height (m, down) and rate: Exudyn has no item for it that switches
+    within a step."""
+    k, d, wheel = tyre.stiffness, tyre.damping, str(tyre.upper.body)
+
+    def force(mbs: Any, t: float, item: int, place: float, speed: float, *_: float) -> float:
+        pressed = k * (place - height(mbs, t, 0.0))
+        return max(min(pressed + d * (speed - rate(mbs, t, 0.0)), 2.0 * pressed), 0.0)
+
+    ground = built.mbs.AddMarker(items.MarkerNodeCoordinate(
+        nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
+    built.mbs.AddObject(items.CoordinateSpringDamper(
+        markerNumbers=[ground, built.places[wheel, "z"]], springForceUserFunction=force))
+    built.callbacks += 1
+
+
+def _flat(mbs: Any, t: float, load: float) -> float:
+    """Height and rate of the road where there is no other."""
+    return 0.0
 
 
 def _load(built: Build, place: tuple[str, str], function: Any) -> None:
@@ -194,6 +220,10 @@ class ExudynModel:
         if assembly.input is not None:
             self.clock = Clock(assembly.input, settings)
             _drive(self.built, assembly, self.clock)
+        for i, tyre in enumerate(tyre for tyre in assembly.vehicle.tyres if tyre.pushes_only):
+            read = (_flat, _flat) if assembly.input is None else (self.clock.reader(i, 1.0),
+                                                                  self.clock.reader(2 + i, 1.0))  # fmt: skip
+            _pushing_tyre(self.built, tyre, *read)
         if assembly.moment is not None:
             _load(self.built, ("chassis", "pitch"), Clock(assembly.moment, settings).reader(0, 1.0))
         self.constraints = _prescribe(self.built, assembly, settings)

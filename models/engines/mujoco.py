@@ -52,7 +52,7 @@ def _spec(vehicle: Vehicle, settings: Settings, guided: Collection[int] = ()) ->
             own.add_joint(name=f"{body.name} z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
         if (body.name, "pitch") in joints:
             own.add_joint(name=f"{body.name} pitch", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
-    for strut in vehicle.struts:
+    for strut in (strut for strut in vehicle.struts if not strut.pushes_only):
         _tyre(spec, strut) if strut.lower.body is None else _suspension(spec, vehicle, strut, joints)
     for spring in (spring for spring in vehicle.pitch_springs if not spring.dead_band):
         joint = spec.joint(f"{spring.body} pitch")
@@ -94,24 +94,34 @@ def _held(spec: mujoco.MjSpec, vehicle: Vehicle, gear: float) -> None:
 
 @dataclass
 class Drive:
-    """How the input enters: a table (rows, columns) of generalised forces per half step, controls (n, 2), arms."""
+    """How the input enters: a table (rows, columns) of generalised forces per half step, controls (n, 2), arms.
+
+    Where tyres only push, the table has the road, heights and rates, and ``tyres`` stiffness and damping of each.
+    """
 
     table: np.ndarray | None = None
     controls: np.ndarray | None = None
     arms: np.ndarray | None = None
     law: Any = None
+    tyres: tuple[float, ...] = ()
 
 
 def _drive(assembly: Assembly, settings: Settings) -> Drive:
-    """The input, and a law where the model's own items cannot do it: tables, turning forces, dead bands."""
+    """The input, and a law where the model's own items cannot do it: tables, turning forces, what goes slack."""
     signal, h, n = assembly.input, settings.step, settings.steps
     slack = any(spring.dead_band for spring in assembly.vehicle.pitch_springs)
+    slack = slack or any(tyre.pushes_only for tyre in assembly.vehicle.tyres)
     held = signal.sample(0.0, h, n)[:, :2] if signal is not None and signal.held else None
     native = signal is None or (held is not None and assembly.mode == "force" and assembly.moment is None)
     if native and not slack:
         return Drive(controls=held)
-    from models.engines.mujoco_callback import body_fixed_law, table_law
+    from models.engines.mujoco_callback import body_fixed_law, pushing_law, table_law
 
+    pushing = tuple(number for tyre in assembly.vehicle.tyres if tyre.pushes_only
+                    for number in (tyre.stiffness, tyre.damping))  # fmt: skip
+    if pushing:
+        road = np.zeros((1, 4)) if signal is None else signal.sample(0.0, h / 2, 2 * n + 1)
+        return Drive(road, law=pushing_law(), tyres=pushing)
     if native or signal is None:
         return Drive(None, held, None, table_law())
     inputs = signal.sample(0.0, h / 2, 2 * n + 1)
@@ -128,7 +138,7 @@ def _drive(assembly: Assembly, settings: Settings) -> Drive:
 def _generalised(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
     """Forces (rows, 2 or 3) on the free heave coordinates that the input stands for; motors apply held ones."""
     if assembly.mode == "road":
-        tyres = [strut for strut in assembly.vehicle.struts if strut.lower.body is None]
+        tyres = assembly.vehicle.tyres
         return np.column_stack([tyre.stiffness * inputs[:, i] + tyre.damping * inputs[:, 2 + i]
                                 for i, tyre in enumerate(tyres)])
     held = assembly.input is not None and assembly.input.held
@@ -170,7 +180,7 @@ def _compiled(assembly: Assembly, settings: Settings, drive: Drive, guided: Coll
     slack = [spring for spring in assembly.vehicle.pitch_springs if spring.dead_band]
     springs = [value for spring in slack for value in (spring.stiffness, spring.damping, spring.dead_band)]
     header = [2.0 / settings.step, table.shape[1], len(table), motors, *arms, len(springs), *springs]
-    content = np.concatenate((header, table.ravel()))
+    content = np.concatenate((header, drive.tyres, table.ravel()))
     spec.add_numeric(name="input", size=len(content), data=[0.0])
     model = spec.compile()
     model.numeric_data[:] = content

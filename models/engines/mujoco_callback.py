@@ -2,7 +2,8 @@
 
 The table lives in the model's own numeric data, behind a header: rows per second, columns, rows, place of
 the wheels' motors among the controls (-1: no held forces), the two wheels' arms, and how many numbers of
-pitch springs with a dead band follow (stiffness, damping and band of each). So one compiled function serves
+pitch springs with a dead band follow (stiffness, damping and band of each); of tyres that only push stiffness and
+damping come behind those, and the table is their road. So one compiled function serves
 every model in the process, adds nothing to a model without a table, survives copies of the model, and holds
 no address that could go stale in numba's cache.
 """
@@ -20,8 +21,8 @@ from numba.extending import intrinsic, register_jitable
 from models.engines.mujoco_layout import offset
 from models.engines.mujoco_quiet import quiet
 
-HEADER = 7
-"""Numbers before those of the springs."""
+HEADER, PER_ROAD = 7, 4
+"""Numbers before those of the springs; of a row of the road (two heights, two rates), and of two tyres."""
 DOUBLES = types.CPointer(types.float64)
 _intrinsic: Any = intrinsic
 
@@ -74,6 +75,27 @@ def _compile_table(numeric, passive, time, position, velocity):
     return law
 
 
+def _compile_pushing(numeric, passive, time, position, velocity):
+    """Tyres that only push, on the road of the table or, where that has one row, on this height for ever."""
+
+    @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
+    def law(model, data):
+        header = carray(_array_at(model, numeric), (HEADER,))
+        rows, first = int(header[2]), HEADER + int(header[6])
+        numbers = carray(_array_at(model, numeric), (first + PER_ROAD * (1 + rows),))
+        force, place = carray(_array_at(data, passive), (4,)), carray(_array_at(data, position), (4,))
+        speed = carray(_array_at(data, velocity), (4,))
+        row = int(np.rint(carray(_double_at(data, time), (1,))[0] * header[0]))
+        road = first + PER_ROAD * (1 + min(max(row, 0), rows - 1))
+        for i in range(2):
+            pressed = numbers[first + 2 * i] * (place[i] - numbers[road + i])
+            whole = pressed + numbers[first + 2 * i + 1] * (speed[i] - numbers[road + 2 + i])
+            force[i] -= max(min(whole, 2.0 * pressed), 0.0)
+        _springs(numbers, force, place, speed)
+
+    return law
+
+
 def _compile_body_fixed(numeric, passive, time, position, velocity, control):
     """Forces along the chassis' vertical axis, from the table or, where they are held, from the controls.
 
@@ -112,6 +134,13 @@ def table_law():
     if "table" not in _COMPILED:
         _COMPILED["table"] = _compile_table(*_offsets("numeric_data", "qfrc_passive", "time", "qpos", "qvel"))
     return _COMPILED["table"]
+
+
+def pushing_law():
+    """Callback for tyres that only push, with the road under them, and the springs."""
+    if "pushing" not in _COMPILED:
+        _COMPILED["pushing"] = _compile_pushing(*_offsets("numeric_data", "qfrc_passive", "time", "qpos", "qvel"))
+    return _COMPILED["pushing"]
 
 
 def body_fixed_law():

@@ -74,6 +74,13 @@ def _sum(rhs, added):
     return register_jitable(named(total, rhs.__name__, added.__name__))
 
 
+def _equations(assembly: Assembly) -> str:
+    """Which right-hand side holds: a flat road is a road, too."""
+    if any(strut.pushes_only for strut in assembly.vehicle.struts):
+        return "lift-off"
+    return "road" if assembly.mode == "free" else assembly.mode
+
+
 @dataclass
 class Reference:
     """The vehicle as compiled equations."""
@@ -85,7 +92,7 @@ class Reference:
         own = self.assembly
         springs = own.vehicle.pitch_springs
         self._added = (*(("springs",) if springs else ()), *(("moment",) if own.moment is not None else ()))
-        self._key = ("road" if own.mode == "free" else own.mode, own.vehicle.geometry, *self._added)
+        self._key = (_equations(own), own.vehicle.geometry, *self._added)
         self._input = own.input if own.input is None or own.moment is None else Stacked((own.input, own.moment))
         self._p = numbers(own.parameters, own.vehicle)
 

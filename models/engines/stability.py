@@ -54,11 +54,12 @@ def coefficients(integrator: str) -> list[float] | None:
 
 
 def linearised(vehicle: Vehicle, guided: Collection[int] = ()) -> Linear:
-    """The vehicle's matrices about zero pitch without ``guided`` coordinates, springs as beyond their dead bands."""
-    grounded = tuple(strut for strut in vehicle.struts if strut.lower.body is None)
+    """The vehicle's matrices about zero pitch without ``guided`` coordinates, springs as beyond their dead bands and
+    tyres on the road: that is where they are stiffest."""
+    known = replace(vehicle, struts=tuple(strut for strut in vehicle.struts if not strut.pushes_only))
     taut = tuple(replace(spring, dead_band=0.0) for spring in vehicle.pitch_springs)
     mass, damping, stiffness = matrices(replace(vehicle, pitch_springs=taut))
-    native, joint = matrices(vehicle)[1], matrices(replace(vehicle, struts=grounded))[1]
+    native, joint = matrices(known)[1], matrices(replace(known, struts=known.tyres))[1]
     kept = [i for i in range(len(mass)) if i not in guided]
     pick = np.ix_(kept, kept)
     return mass[pick], damping[pick], stiffness[pick], native[pick], joint[pick]

@@ -34,8 +34,9 @@ class Point:
 class Strut:
     """A vertical spring and damper between two points, linear in their vertical distance.
 
-    Its force k (z_upper - z_lower) + d (z_upper' - z_lower') is positive in compression: it pushes the
-    upper point up and the lower one down. stiffness in N/m, damping in N s/m.
+    Its force k e + d e' with the compression e = z_upper - z_lower (m, z counts down) is positive in compression: it
+    pushes the upper point up and the lower one down. stiffness in N/m, damping in N s/m. A strut that ``pushes_only``
+    has the force max(0, min(k e + d e', 2 k e)) instead; ``models.effects.lift_off`` says why.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Strut:
     lower: Point
     stiffness: float
     damping: float
+    pushes_only: bool = False
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,11 @@ class Vehicle:
     gravity: float
     geometry: Geometry
     pitch_springs: tuple[PitchSpring, ...] = ()
+
+    @property
+    def tyres(self) -> tuple[Strut, ...]:
+        """The struts to the ground, in the order of ``struts``."""
+        return tuple(strut for strut in self.struts if strut.lower.body is None)
 
     def coordinates(self) -> tuple[tuple[str, str], ...]:
         """Degrees of freedom in the order of the state, as (body, "z" or "pitch")."""

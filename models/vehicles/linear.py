@@ -9,7 +9,7 @@ def matrices(vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """M, D, K of M q'' + D q' + K q = f, each (n, n) in the order of ``vehicle.coordinates()``.
 
     Units kg, N s/m and N/m for heave rows; pitch rows are moments (N m). Gravity is not in K, nor a spring with
-    a dead band, which is slack about zero pitch.
+    a dead band, which is slack about zero pitch. Tyres that can lift are on the road.
     """
     coordinates = vehicle.coordinates()
     inertias = {(body.name, "z"): body.mass for body in vehicle.bodies}

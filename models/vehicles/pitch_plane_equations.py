@@ -7,6 +7,7 @@ into a caller, which keeps them cacheable.
 | mode | input u | equation |
 |---|---|---|
 | road | zeta1, zeta2, zeta1', zeta2' | (38) |
+| lift-off | the same | (38) with tyres that only push |
 | force | f1, f2 | (37) |
 | pitch | f1, f2, beta, beta', beta'' | (39) |
 | heave-pitch | f1, f2, z3, beta, z3', beta', z3'', beta'' | (39) without its row of the chassis |
@@ -45,6 +46,15 @@ def tyres(y, u, p):
 
 
 @register_jitable
+def pushing_tyres(y, u, p):
+    """The same of tyres that never pull: ``models.effects.lift_off``. What is not a number stays so."""
+    e1, e2 = y[0] - u[0], y[1] - u[1]
+    f1 = max(min(p[6] * e1 + p[10] * (y[4] - u[2]), 2.0 * p[6] * e1), 0.0)
+    f2 = max(min(p[7] * e2 + p[11] * (y[5] - u[3]), 2.0 * p[7] * e2), 0.0)
+    return f1, f2
+
+
+@register_jitable
 def newton_euler(y, f1, f2, f3, f4, cosine, p, dy):
     """Balance of forces and moments, eq. (36)."""
     for i in range(4):
@@ -69,6 +79,23 @@ def road_linear(y, u, p, dy):
     """Road-excited vehicle, linearised about zero pitch (38 with A(0))."""
     f3, f4 = suspension(y, p, y[3], 1.0)
     f1, f2 = tyres(y, u, p)
+    newton_euler(y, f1, f2, f3, f4, 1.0, p, dy)
+
+
+@register_jitable
+def lift_off_exact(y, u, p, dy):
+    """Vehicle on tyres that only push, nonlinear in pitch."""
+    sine, cosine = math.sin(y[3]), math.cos(y[3])
+    f3, f4 = suspension(y, p, sine, cosine)
+    f1, f2 = pushing_tyres(y, u, p)
+    newton_euler(y, f1, f2, f3, f4, cosine, p, dy)
+
+
+@register_jitable
+def lift_off_linear(y, u, p, dy):
+    """The same, linearised about zero pitch."""
+    f3, f4 = suspension(y, p, y[3], 1.0)
+    f1, f2 = pushing_tyres(y, u, p)
     newton_euler(y, f1, f2, f3, f4, 1.0, p, dy)
 
 
@@ -142,6 +169,8 @@ def heave_pitch_linear(y, u, p, dy):
 RIGHT_HAND_SIDES = {
     ("road", "exact"): road_exact,
     ("road", "linear"): road_linear,
+    ("lift-off", "exact"): lift_off_exact,
+    ("lift-off", "linear"): lift_off_linear,
     ("force", "exact"): force_exact,
     ("force", "linear"): force_linear,
     ("force-body", "exact"): force_body,
