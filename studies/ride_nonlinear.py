@@ -1,4 +1,7 @@
-"""How much a vehicle with bent springs moves on a random road, and when its covariance is no longer good."""
+"""How much a vehicle with bent springs moves on a random road, and when its covariance is no longer good.
+
+Where tyres may lift, the answer is that of the copies: what stands for the vehicle over speed keeps them on the road.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,8 +23,8 @@ from models.ride.scene import RideScene
 from models.ride.statistical_linearisation import StatisticallyLinear, bent, statistically_linear
 from models.ride.time_averages import standard_errors
 from models.strict import Strict, quantity, read
-from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import wheels
+from models.vehicles.spatial import SpatialVehicle, TyreOutput
+from models.vehicles.spatial_linear import preloads, wheels
 
 SYSTEM = "ride"
 Progress = Callable[[str, float], None]
@@ -43,12 +46,16 @@ class Options(Strict):
 
 @dataclass(frozen=True)
 class Answer:
-    """By speed: the vehicle of small motion (N, p), the replaced one, and Monte Carlo where it was asked for."""
+    """By speed: the vehicle of small motion (N, p), the replaced one, and Monte Carlo where it was asked for.
+
+    lifts : whether tyres may lift, in Monte Carlo alone.
+    """
 
     speeds: np.ndarray
     small: np.ndarray
     found: list[StatisticallyLinear]
     copies: dict[float, Copies]
+    lifts: bool = False
 
     def of(self, part: str) -> np.ndarray:
         """One part (N, p) of what was found."""
@@ -65,8 +72,8 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     if scene.speeds is None:
         raise InputError(scene.file, "study", scene.study, "runs at constant speeds; with a drive use ride_drive")
     vehicle = vehicle_of(scene)
-    if not bent(vehicle):
-        allowed = "has neither curves nor friction: use ride, which is exact for it"
+    if not (bent(vehicle) or vehicle.lifts):
+        allowed = "has neither curves nor friction, nor tyres that lift: use ride, which is exact for it"
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
     for name, by in scene.weighting.items():
         raise InputError(scene.file, f"weighting.{name}", by, "is not read by this study: leave it out")
@@ -90,14 +97,15 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     road = excitation_of(scene, wheels(vehicle))
     speed = options.speed or float(speeds[len(speeds) // 2])
     answer = _swept(vehicle, road, speeds, options, options.beside or [speed], progress)
-    own = statistically_linear(vehicle, road, speed)
+    own = statistically_linear(vehicle.with_tyres(pushes_only=False), road, speed)
     runs = _in_engines(vehicle, road, speed, engines, options, progress)
     _save(scene, answer, folder / "nonlinear.nc")
     deviations_figure(answer, own.vehicle.outputs, scene.title, folder / "deviations.png")
     if runs:
         spectra_figure(runs, own.vehicle, road, speed, scene.title, folder / "spectra.png")
     return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(answer),
-            "table": _table(answer, own, speed) + _time_table(runs, own, road, speed)}  # fmt: skip
+            "table": _table(answer, own, speed) + _lifted(vehicle, answer, runs)
+            + _time_table(runs, own, road, speed)}  # fmt: skip
 
 
 def _options(scene: RideScene) -> Options:
@@ -107,16 +115,16 @@ def _options(scene: RideScene) -> Options:
 def _swept(vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, options: Options, beside: list[float],
            progress: Progress) -> Answer:  # fmt: skip
     """Small motion and statistical linearisation at all speeds, Monte Carlo at some."""
-    linear = linear_vehicle(vehicle)
+    linear, on_road = linear_vehicle(vehicle), vehicle.with_tyres(pushes_only=False)
     small, found, copies = [], [], {}
     for i, speed in enumerate(speeds):
         progress("statistical linearisation", 0.3 * i / len(speeds))
         small.append(stationary(excited(linear(speed), road, speed)).deviation)
-        found.append(statistically_linear(vehicle, road, speed))
+        found.append(statistically_linear(on_road, road, speed))
     for i, speed in enumerate(beside):
         progress(f"Monte Carlo at {speed:g} m/s", 0.3 + 0.4 * i / len(beside))
         copies[speed] = copies_in_time(vehicle, road, speed, options.lasting, copies=options.copies, seed=options.seed)
-    return Answer(speeds, np.array(small), found, copies)
+    return Answer(speeds, np.array(small), found, copies, vehicle.lifts)
 
 
 def _in_engines(vehicle: SpatialVehicle, road: Excitation, speed: float, engines: tuple[str, ...], options: Options,
@@ -147,14 +155,18 @@ def _save(scene: RideScene, answer: Answer, path: Path) -> None:
          "speed_of_copies": ("speed_of_copies", list(answer.copies), {"units": "m/s"})},
     )  # fmt: skip
     data["unit"] = ("output", [output.unit for output in answer.found[0].vehicle.outputs])
-    data.attrs = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
+    tyres = {"tyres": "lift in copies alone"} if answer.lifts else {}
+    data.attrs = {"title": scene.title, **tyres, **{key: str(value) for key, value in provenance().items()}}
     write(data, path)
 
 
 def _answer(answer: Answer) -> dict[str, Any]:
-    """Deviations and means at all speeds, SI; None where an output has none."""
-    out: dict[str, Any] = {"speed": answer.speeds.tolist()}
-    for key, values in (("deviation", answer.deviation), ("mean", answer.of("mean"))):
+    """Deviations and means at all speeds, SI; None where an output has none. Of tyres that lift, at the copies' speeds.
+    """
+    copies = list(answer.copies.values())
+    out: dict[str, Any] = {"speed": list(answer.copies) if answer.lifts else answer.speeds.tolist()}
+    for key, found in (("deviation", answer.deviation), ("mean", answer.of("mean"))):
+        values = np.array([getattr(each, key) for each in copies]) if answer.lifts else found
         out[key] = {name: [float(value) if np.isfinite(value) else None for value in values[:, i]]
                     for i, name in enumerate(answer.found[0].covariance.names)}  # fmt: skip
     return out
@@ -167,7 +179,8 @@ def _table(answer: Answer, own: StatisticallyLinear, speed: float) -> list[str]:
         k, c = spring.gains
         lines.append(f"    {name}: {k:.5g} N/m and {c:.5g} N s/m stand for it; its travel has the mean "
                      f"{1e3 * spring.travel:+.2f} mm and the deviation {1e3 * spring.deviation:.3g} mm")  # fmt: skip
-    lines += [f"    {sentence}" for sentence in own.sentences]
+    if not answer.lifts:
+        lines += [f"    {sentence}" for sentence in own.sentences]
     lines.append(f"    gains found in {len(own.changes)} iterations, to {own.distance:.0e}")
     for beside, copies in answer.copies.items():
         lines.append(f"  at {beside:g} m/s beside {len(copies.moments[0])} copies of {copies.duration:.0f} s: "
@@ -188,6 +201,29 @@ def _off(answer: Answer, speed: float, i: int) -> str:
     true = answer.copies[speed].deviation[i]
     small, found = (100 * (values[at[0], i] / true - 1) for values in (answer.small, answer.deviation))
     return f"   small motion {small:+.1f} %, statistical linearisation {found:+.1f} %"
+
+
+def _lifted(vehicle: SpatialVehicle, answer: Answer, runs: dict[str, Ride]) -> list[str]:
+    """Share of time for which each tyre would pull by its Gaussian law, and for which it is in the air in the engines'
+    runs; nothing where no tyre lifts.
+    """
+    from scipy.special import ndtr
+
+    if not vehicle.lifts:
+        return []
+    loads = preloads(vehicle).tyres
+    lines = ["  tyres lift in copies and engines; small motion and statistical linearisation keep them on the road and "
+             "are no answer where a tyre would pull"]  # fmt: skip
+    for spec in (spec for spec in vehicle.outputs if isinstance(spec, TyreOutput) and spec.kind == "tyre force"):
+        shares = [f"{engine} {100 * np.mean(run.of(spec.name) <= -loads[spec.tyre]):.2g} %"
+                  for engine, run in runs.items()]  # fmt: skip
+        worst = max(float(deviation[answer.found[0].covariance.names.index(spec.name)])
+                    for deviation in answer.deviation)  # fmt: skip
+        pulls = float(ndtr(-loads[spec.tyre] / worst))
+        told = f"; in the air {', '.join(shares)}" if shares else ""
+        lines.append(f"    {spec.name}: {loads[spec.tyre]:.4g} N at rest; on the road it would pull for up to "
+                     f"{100 * pulls:.2g} % of the time{told}")  # fmt: skip
+    return lines
 
 
 def _time_table(runs: dict[str, Ride], own: StatisticallyLinear, road: Excitation, speed: float) -> list[str]:

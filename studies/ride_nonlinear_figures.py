@@ -27,14 +27,16 @@ def deviations_figure(answer: "Answer", outputs: Sequence[Output], title: str, p
     for i, (axis, output) in enumerate(zip(axes, outputs, strict=False)):
         factor, unit = (1e3, "mm") if output.unit == "m" else (1.0, output.unit.replace("^2", "²"))
         axis.plot(answer.speeds, factor * answer.small[:, i], "--", color="0.6", label="slopes at rest (small motion)")
-        axis.plot(answer.speeds, factor * answer.deviation[:, i], color="#0072b2", label="statistical linearisation")
+        axis.plot(answer.speeds, factor * answer.deviation[:, i], color="#0072b2",
+                  label="statistical linearisation" + (", tyres on the road" if answer.lifts else ""))  # fmt: skip
         poor = left[:, i] > GRADES[-1][0]
         axis.plot(answer.speeds[poor], factor * answer.deviation[poor, i], "o", color="#0072b2", fillstyle="none",
                   label="no longer good by its own measure")  # fmt: skip
         for j, (speed, copies) in enumerate(answer.copies.items()):
             spread = copies.error[i] / copies.deviation[i]  # two standard errors of the deviation
             axis.errorbar([speed], [factor * copies.deviation[i]], [factor * spread], fmt="s", color="#d55e00",
-                          markersize=4, capsize=3, label="" if j else "Monte Carlo, 2 standard errors")  # fmt: skip
+                          markersize=4, capsize=3, label="" if j else "Monte Carlo, 2 standard errors"
+                          + (", tyres lift" if answer.lifts else ""))  # fmt: skip
         axis.set(xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None),
                  title=output.name.capitalize())  # fmt: skip
     axes[0].legend(fontsize=7.5)

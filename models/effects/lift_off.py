@@ -4,13 +4,13 @@ A tyre of stiffness k (N/m) and damping d (N s/m) that is compressed by e (m, th
 
     F = max(0, min(k e + d e', 2 k e)).
 
-While |d e'| <= k e this is the paper's tyre, k e + d e'. The cut at 0 is that of all tyre models in time (such as TMeasy
-of Rill, Road Vehicle Dynamics). A cut at 0 alone would push across the gap below a falling wheel, and a damper that
-begins at contact would jump to d e'; so the damper comes in with the depth, as in the function IMPACT of Adams and in
-Hunt and Crossley (J. Appl. Mech. 42, 1975): it is never stronger than the spring, which it meets after about d / k
-seconds at any speed of touch-down. It takes energy and never gives any.
+While |d e'| <= k e this is the paper's tyre, k e + d e'. The cut at 0 is that of tyre models in time (such as TMeasy,
+Rill, Road Vehicle Dynamics). A cut at 0 alone would push across the gap below a falling wheel, and a damper that began
+at contact would jump to d e'. So the damper comes in with the depth, as in the function IMPACT of Adams and in Hunt and
+Crossley (J. Appl. Mech. 42, 1975): it is never stronger than the spring, which outgrows it after about d / k seconds
+whatever the speed of touch-down. It takes energy and never gives any.
 
-F is continuous and has corners. A fixed step across one errs by the square of its length whatever its method's order.
+F is continuous and has corners. A fixed step across one errs by the square of its length, whatever its method's order.
 """
 
 from dataclasses import replace

@@ -330,15 +330,33 @@ def _steady_tyres(built: Build, tyres: list[Tyre], by_road: np.ndarray, road: Ro
     built.callbacks += 1
 
 
+def _pushing_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadTable) -> None:
+    """A tyre that may leave the road: one law of all of it; ``by_road`` (2 w, 2): the height and the rate under it."""
+    k, c, held, rest = tyre.stiffness, tyre.damping, built.held.tyres[tyre.name], tyre.point[2]
+    under = road.forces(by_road)
+
+    def law(mbs: Any, t: float, item: int, place: Any, speed: Any, *_: Any) -> list[float]:
+        height, rate = under.rows[round(t * road.per_time)]
+        elastic = held + k * (height - place[2] + rest)
+        return [0.0, 0.0, -max(min(elastic + c * (rate - speed[2]), 2.0 * elastic), 0.0)]
+
+    on_road = (tyre.point[0], tyre.point[1], 0.0)
+    built.mbs.AddObject(items.CartesianSpringDamper(
+        markerNumbers=[built.marker(None, on_road), built.marker(tyre.body, tyre.point)], springForceUserFunction=law))
+    built.callbacks += 1
+
+
 def _tyres(built: Build, road: RoadTable) -> None:
     """All tyres."""
-    tyres, turns = built.vehicle.tyres, built.vehicle.turns
+    tyres, turns, count = built.vehicle.tyres, built.vehicle.turns, len(built.vehicle.tyres)
     by_road = np.vstack([np.diag([tyre.stiffness for tyre in tyres]), np.diag([tyre.damping for tyre in tyres])])
-    steady = [i for i, tyre in enumerate(tyres) if not turns(tyre.body)]
+    steady = [i for i, tyre in enumerate(tyres) if not (tyre.pushes_only or turns(tyre.body))]
     if steady:
         _steady_tyres(built, [tyres[i] for i in steady], by_road[:, steady], road)
     for i, tyre in enumerate(tyres):
-        if i not in steady:
+        if tyre.pushes_only:
+            _pushing_tyre(built, tyre, np.eye(2 * count)[:, [i, count + i]], road)
+        elif i not in steady:
             _turning_tyre(built, tyre, by_road[:, i], road)
 
 

@@ -24,9 +24,9 @@ PARENT, NUMBER, FIRST, TURNING, LAST, POINT, BEYOND, PER_BODY = range(8)
 the one after its last, its first point and the one after its last."""
 ELEMENT, PLACE, AXIS, PER_POINT = 0, 1, 4, 7
 """Numbers of a point: the element whose travel it moves, where it is on the body, the axis of its motion."""
-LENGTH, STIFFNESS, DAMPING, HELD, TYRE, REST, MORE, SHARES = range(8)
-"""Numbers of an element: how many there are, its law, the tyre whose road it sees, its points' travel at rest, where it
-has more of a law than a line, 0 if nowhere, and its shares up to there or to its end."""
+LENGTH, STIFFNESS, DAMPING, HELD, TYRE, REST, ONE_SIDED, MORE, SHARES = range(9)
+"""Numbers of an element: how many there are, its law, the tyre whose road it sees, its points' travel at rest, whether
+it only pushes, where it has more of a law than a line, 0 if nowhere, and its shares up to there or to its end."""
 JOINT, SHARE, PER_SHARE = range(3)
 """Numbers of a share: a joint, and what its coordinate adds to the travel."""
 FRICTION, FRICTION_RATE, ONE, ONE_GAIN, TWO, TWO_GAIN, ON_TRAVEL, ON_RATE, CURVES = range(9)
@@ -158,7 +158,10 @@ def _act(e, count, road, tyres, q, v, moved, forces):
         if e[TYRE] >= 0.0:
             travel -= road[int(e[TYRE])]
             rate -= road[tyres + int(e[TYRE])]
-        force = e[HELD] + e[STIFFNESS] * travel + e[DAMPING] * rate
+        elastic = e[HELD] + e[STIFFNESS] * travel
+        force = elastic + e[DAMPING] * rate
+        if e[ONE_SIDED] != 0.0:
+            force = min(max(force, 2.0 * elastic), 0.0)
         if more > 0:
             force += _more(beyond(e, more), travel, rate, q)
         for k in range(SHARES, shares, PER_SHARE):

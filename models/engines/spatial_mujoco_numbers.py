@@ -45,7 +45,7 @@ class Element:
     """A force F against the travel s = own coordinate + sum of axis . point - value at rest, less the tyre's road.
 
     F = held + stiffness s + damping s' + curves + friction + sum of gain * coordinate (``steered``): what acts on
-    every coordinate q is -F ds/dq.
+    every coordinate q is -F ds/dq. A tyre that only pushes is ``one_sided``: F is negative where it does.
     """
 
     points: tuple[Place, ...]
@@ -58,6 +58,7 @@ class Element:
     steered: tuple[tuple[tuple[str, str], float], ...] = ()
     on_travel: Curve | None = None
     on_rate: Curve | None = None
+    one_sided: bool = False
 
 
 def elements(vehicle: SpatialVehicle, speed: float | None) -> list[Element]:
@@ -73,7 +74,7 @@ def elements(vehicle: SpatialVehicle, speed: float | None) -> list[Element]:
                              bar.damping, held.parts[bar.name], own=(bar.body, "rx")))  # fmt: skip
     for i, tyre in enumerate(vehicle.tyres):
         found.append(Element(((tyre.body, tyre.point, UP),), tyre.stiffness, tyre.damping,
-                             -held.tyres[tyre.name], tyre=i))  # fmt: skip
+                             -held.tyres[tyre.name], tyre=i, one_sided=tyre.pushes_only))  # fmt: skip
     for f in vehicle.side_forces:
         steered = (((f.chassis, "rx"), -f.stiffness * f.roll_steer), ((f.chassis, "rz"), -f.stiffness))
         found.append(Element(((f.body, f.point, (0.0, 1.0, 0.0)),), damping=f.stiffness / v, steered=steered))
@@ -140,7 +141,7 @@ def _element(element: Element, vehicle: SpatialVehicle, numbers: Numbers) -> lis
             shares[numbers.joints[place]] = shares.get(numbers.joints[place], 0.0) + share
     flat = [value for pair in shares.items() if pair[1] for value in pair]
     more = _more(element, numbers)
-    law = [element.stiffness, element.damping, element.held, element.tyre, rest]
+    law = [element.stiffness, element.damping, element.held, element.tyre, rest, element.one_sided]
     begins = SHARES + len(flat)
     return [begins + len(more), *law, begins if more else 0, *flat, *more]
 

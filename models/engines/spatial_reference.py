@@ -111,8 +111,9 @@ class SpatialReference:
             out += (moment + bar.damping * (roll - row) @ self.v) * (row - roll)
         for tyre, height, rate in zip(self.vehicle.tyres, heights, rates, strict=True):
             place, rows = self._point(tyre.body, tyre.point)
-            pressed = tyre.stiffness * (height - place[2] + tyre.point[2]) + tyre.damping * (rate - rows[2] @ self.v)
-            out += (self.held.tyres[tyre.name] + pressed) * rows[2]
+            elastic = self.held.tyres[tyre.name] + tyre.stiffness * (height - place[2] + tyre.point[2])
+            pressed = elastic + tyre.damping * (rate - rows[2] @ self.v)
+            out += (max(min(pressed, 2.0 * elastic), 0.0) if tyre.pushes_only else pressed) * rows[2]
         for side in self.vehicle.side_forces:
             rows = self._point(side.body, side.point)[1]
             roll, yaw = (self.q[self.index[side.chassis, f]] if (side.chassis, f) in self.index else 0.0

@@ -34,7 +34,7 @@ FRAMES = ("hub", "body", "inertial")
 NONE, PULLED, HELD = range(3)
 """Stabilisers: none; a moment towards an angle and its rate; a moment that enforces the acceleration of the angle."""
 ONE, POINT_ONE, TWO, POINT_TWO, AXIS, DESIGN, FORCE, STIFFNESS, DAMPING, PER_ELEMENT = 0, 1, 4, 5, 8, 11, 12, 13, 14, 15
-LAST, ARM, HEIGHT, LOAD, TYRE, TYRE_DAMPING, CORNERING, ROLL_STEER, PER_HUB = 0, 1, 4, 5, 6, 7, 8, 9, 10
+LAST, ARM, HEIGHT, LOAD, TYRE, TYRE_DAMPING, CORNERING, ROLL_STEER, ONE_SIDED, PER_HUB = 0, 1, 4, 5, 6, 7, 8, 9, 10, 11
 WRENCH, GUIDING = 6, 6
 """Columns of inputs: force (N) and moment (N m) of each hub; roll, pitch, their rates and their accelerations."""
 
@@ -61,7 +61,10 @@ def _element(e, joints, m, chassis, v, row, axis, end, by):
 
 @lean
 def _tyre(hub, joints, m, q, v, height, rate, speed, place, wrench):
-    """Write force and moment (space) at the hub by a tyre on a road of this height and rate under it."""
+    """Write force and moment (space) at the hub by a tyre on a road of this height and rate under it.
+
+    The side force of a tyre that only pushes goes with its load: in the air it has none.
+    """
     by, down, point = array(doubles(3), (3,)), array(doubles(3), (3,)), array(doubles(6), (6,))
     down[0], down[1], down[2] = 0.0, 0.0, -hub[HEIGHT]
     turned(m[ROLL + 1], down, 0, point, 0)
@@ -75,10 +78,13 @@ def _tyre(hub, joints, m, q, v, height, rate, speed, place, wrench):
         column(turns, m[j + 1], point, 3, by, 0)
         sideways += by[1] * v[j]
         j = int(joints[j, PARENT])
-    pressed = hub[TYRE] * (height - place[2] + hub[HEIGHT]) + hub[TYRE_DAMPING] * (rate - risen)
-    wrench[2] = hub[LOAD] + pressed
+    elastic, grip = hub[LOAD] + hub[TYRE] * (height - place[2] + hub[HEIGHT]), 1.0
+    wrench[2] = elastic + hub[TYRE_DAMPING] * (rate - risen)
+    if hub[ONE_SIDED] != 0.0:
+        wrench[2] = max(min(wrench[2], 2.0 * elastic), 0.0)
+        grip = wrench[2] / hub[LOAD]
     wrench[0] = -wrench[2] * rate / speed
-    wrench[1] = hub[CORNERING] * (hub[ROLL_STEER] * q[ROLL] + q[HEADING] - sideways / speed)
+    wrench[1] = grip * hub[CORNERING] * (hub[ROLL_STEER] * q[ROLL] + q[HEADING] - sideways / speed)
     wrench[3], wrench[4], wrench[5] = -point[2] * wrench[1], 0.0, point[0] * wrench[1]
 
 

@@ -93,6 +93,6 @@ def _hub(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:
     side = next((force for force in vehicle.whole.side_forces if force.name == tyre.name), None)
     law = (tyre.stiffness, tyre.damping, side.stiffness if side else 0.0, side.roll_steer if side else 0.0)
     arm = np.subtract(tyre.point, joined.origin[tyre.body])
-    return [joined.last[tyre.body], *arm, tyre.point[2], vehicle.loads[i], *law]
+    return [joined.last[tyre.body], *arm, tyre.point[2], vehicle.loads[i], *law, tyre.pushes_only]
 
 

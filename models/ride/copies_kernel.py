@@ -1,4 +1,6 @@
-"""Compiled loops over copies of a vehicle whose springs are bent: its laws, and steps of the Runge-Kutta method."""
+"""Compiled loops over copies of a vehicle whose springs are bent or whose tyres may lift: its laws, and steps of the
+Runge-Kutta method.
+"""
 
 import math
 from typing import NamedTuple
@@ -16,12 +18,14 @@ TOGETHER = 64
 
 
 class Laws(NamedTuple):
-    """Small motion of n coordinates over w wheels with s bent springs and p outputs.
+    """Small motion of n coordinates over w wheels with s bent springs, u tyres that only push, and p outputs.
 
-    rows (s, n): travel of each spring; motion (n, 2 n + 2 w + s): accelerations by positions, rates, road and bent
-    forces; read (p, 3 n + 2 w + s): outputs by positions, rates, road, accelerations and bent forces; lines (2, s, 2):
-    offset and first slope of the curves over travel and over rate; corners, bends (2, s, k): what they have at k
-    corners, a bend of 0 where they have fewer; friction (s, 2): N, and the rate (m/s) over which it turns.
+    rows (s, n): travel of each spring; motion (n, 2 n + 2 w + s + u): accelerations by positions, rates, road, bent
+    forces and what tyres that only push have beside linear ones; read (p, 3 n + 2 w + s + u): outputs by positions,
+    rates, road, accelerations and the same forces; lines (2, s, 2): offset and first slope of the curves over travel
+    and over rate; corners, bends (2, s, k): what they have at k corners, a bend of 0 where they have fewer; friction
+    (s, 2): N, and the rate (m/s) over which it turns; heights (u, n): rise of each tyre; tyres (u, 4): its wheel among
+    w, load at rest (N), stiffness (N/m), damping (N s/m).
     """
 
     rows: np.ndarray
@@ -31,6 +35,8 @@ class Laws(NamedTuple):
     corners: np.ndarray
     bends: np.ndarray
     friction: np.ndarray
+    heights: np.ndarray
+    tyres: np.ndarray
 
 
 @lean
@@ -55,11 +61,31 @@ def on_curve(kind, spring, argument, laws, force):
 
 
 @lean
+def off_road(u, x, road, laws, pressed, rate, lost):
+    """Fill what a tyre that only pushes has beside a linear one (copies,) in N: 0 on the road, its pull off it.
+
+    pressed, rate (copies,) are written over.
+    """
+    n, wheels, wheel = x.shape[0] // 2, road.shape[0] // 2, int(laws.tyres[u, 0])
+    load, stiffness, damping = laws.tyres[u, 1], laws.tyres[u, 2], laws.tyres[u, 3]
+    pressed[:], rate[:] = 0.0, 0.0
+    add(pressed, 1.0, road[wheel])
+    add(rate, 1.0, road[wheels + wheel])
+    for j in range(n):
+        add(pressed, -laws.heights[u, j], x[j])
+        add(rate, -laws.heights[u, j], x[n + j])
+    for c in range(lost.size):
+        elastic = load + stiffness * pressed[c]
+        whole = elastic + damping * rate[c]
+        lost[c] = max(min(whole, 2.0 * elastic), 0.0) - whole
+
+
+@lean
 def rates(x, road, laws, force, out, room):
-    """Fill the rates (2 n, copies) of states, positions, then rates, on roads (2 w, copies), and the bent forces
-    (s, copies) in N; room (2, copies) is written over."""
-    n, w = x.shape[0] // 2, road.shape[0]
-    for s in range(force.shape[0]):
+    """Fill the rates (2 n, copies) of states, positions, then rates, on roads (2 w, copies), and the forces
+    (s + u, copies) in N that are not linear; room (2, copies) is written over."""
+    n, w, springs = x.shape[0] // 2, road.shape[0], laws.rows.shape[0]
+    for s in range(springs):
         travel, slip, bent = room[TRAVEL], room[RATE], force[s]
         travel[:], slip[:], bent[:] = 0.0, 0.0, 0.0
         for j in range(n):
@@ -70,6 +96,8 @@ def rates(x, road, laws, force, out, room):
         if laws.friction[s, 0] != 0.0:
             for c in range(bent.size):
                 bent[c] += laws.friction[s, 0] * math.tanh(slip[c] / laws.friction[s, 1])
+    for u in range(laws.heights.shape[0]):
+        off_road(u, x, road, laws, room[TRAVEL], room[RATE], force[springs + u])
     for i in range(n):
         out[i], out[n + i] = 0.0, 0.0
         add(out[i], 1.0, x[n + i])
@@ -126,7 +154,8 @@ def march(states, roads, step, first, every, laws, sums):
         own = slice(copy, min(copy + TOGETHER, states.shape[1]))
         x, road = states[:, own].copy(), roads[:, :, own].copy()
         k1, k2, k3, k4, moved = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)
-        force, room = np.empty((laws.rows.shape[0], x.shape[1])), np.empty((2, x.shape[1]))
+        forces = laws.rows.shape[0] + laws.heights.shape[0]
+        force, room = np.empty((forces, x.shape[1])), np.empty((2, x.shape[1]))
         for i in range(road.shape[0] // 2):
             rates(x, road[2 * i], laws, force, k1, room)
             if i >= first and (i - first) % every == 0:

@@ -1,6 +1,6 @@
 """A vehicle on a random road in time, in both engines: everything nonlinear, gravity where the vehicle has it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from models.engines.spatial_protocol import INTEGRATORS, SpatialRun, build
 from models.ride.linear_vehicle import Output
 from models.ride.road_path import RoadPath, check_rates
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import linearise
+from models.vehicles.spatial_linear import linearise, preloads
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,15 @@ def ridden(engine: str, vehicle: SpatialVehicle, road: RoadPath, duration: float
     for i, spec in enumerate(vehicle.outputs):
         if spec.kind == "force" and _bent(vehicle, spec.part):
             outputs[:, i] = np.nan
+        elif spec.kind == "tyre force" and any(tyre.name == spec.tyre and tyre.pushes_only for tyre in vehicle.tyres):
+            elastic = rows @ row_of(replace(own[i], rate=0.0 * own[i].rate, road_rate=0.0 * own[i].road_rate))
+            outputs[:, i] = _pushing(outputs[:, i], elastic, preloads(vehicle).tyres[spec.tyre])
     return Ride(tuple(output.name for output in own), run, at * road.step - at[0] * road.step, outputs)
+
+
+def _pushing(force: np.ndarray, elastic: np.ndarray, load: float) -> np.ndarray:
+    """Force of a tyre that only pushes less its load at rest (N), by what a linear one and its spring have."""
+    return np.maximum(np.minimum(load + force, 2.0 * (load + elastic)), 0.0) - load
 
 
 def row_of(output: Output) -> np.ndarray:

@@ -1,7 +1,9 @@
-"""Monte Carlo of a vehicle whose springs are bent: many copies, each on a random road of its own, stepped in time.
+"""Monte Carlo of a vehicle whose springs are bent or whose tyres may lift: many copies, each on a random road of its
+own, stepped in time.
 
-Motion is small, as in ``spatial_linear``, but for the bent springs, whose forces are taken as they are. The classical
-Runge-Kutta method reads the road at half steps; curves have corners, so its error falls with the square of the step.
+Motion is small, as in ``spatial_linear``, but for these springs and tyres, whose forces are taken as they are. The
+classical Runge-Kutta method reads the road at half steps; these laws have corners, so its error falls with the square
+of the step.
 """
 
 from collections.abc import Sequence
@@ -15,8 +17,9 @@ from models.ride.linear_vehicle import LinearVehicle
 from models.ride.road_path import check_rates, road_path
 from models.ride.statistical_linearisation import bent, statistically_linear
 from models.vehicles.curve import Curve
-from models.vehicles.spatial import PartOutput, SpatialVehicle, SpringDamper
-from models.vehicles.spatial_linear import Gains, linearise
+from models.vehicles.kinematics import Kinematics
+from models.vehicles.spatial import PartOutput, SpatialOutput, SpatialVehicle, SpringDamper, Tyre, TyreOutput
+from models.vehicles.spatial_linear import Gains, linearise, preloads
 
 REACH, STEEPEST = 0.25, 0.5
 """Step times the fastest rate, at most: of the replaced vehicle, and of the one with its springs as steep as they get.
@@ -93,7 +96,7 @@ def copies_in_time(vehicle: SpatialVehicle, excitation: Excitation, speed: float
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
     check_rates(vehicle, excitation)
-    replaced = statistically_linear(vehicle, excitation, speed).vehicle
+    replaced = statistically_linear(vehicle.with_tyres(pushes_only=False), excitation, speed).vehicle
     road = road_path(excitation, speed, longest or usual_step(vehicle, speed, replaced))
     settling, counted = int(np.ceil(forgotten(replaced) / road.step)), int(np.ceil(duration / road.step))
     march = March(vehicle, speed, road.step, copies)
@@ -178,14 +181,31 @@ def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[Spring
     n = len(plain.mass)
     watched = replace(vehicle, outputs=tuple(PartOutput(s.name, "travel", s.name) for s in springs))
     rows = np.array([o.displacement for o in linearise(watched, speed).outputs]).reshape(-1, n)
-    forced = (-plain.stiffness, -plain.damping, plain.road_stiffness, plain.road_damping, -rows.T)
+    pushing = [tyre for tyre in vehicle.tyres if tyre.pushes_only]
+    kinematics = Kinematics(vehicle)
+    heights = np.array([kinematics.shift(tyre.body, tyre.point)[2] for tyre in pushing]).reshape(-1, n)
+    forced = (-plain.stiffness, -plain.damping, plain.road_stiffness, plain.road_damping, -rows.T, heights.T)
     motion = np.linalg.solve(plain.mass, np.hstack(forced))
-    read = np.array([[float(isinstance(o, PartOutput) and o.kind == "force" and o.part == s.name) for s in springs]
-                     for o in vehicle.outputs]).reshape(len(plain.outputs), -1)  # fmt: skip
+    own = [*(("force", s.name) for s in springs), *(("tyre force", tyre.name) for tyre in pushing)]
+    read = np.array([[float((o.kind, _part(o)) == force) for force in own] for o in vehicle.outputs])
     read = np.hstack([[np.concatenate([o.displacement, o.rate, o.road, o.road_rate, o.acceleration])
-                       for o in plain.outputs], read])  # fmt: skip
+                       for o in plain.outputs], read.reshape(len(plain.outputs), -1)])  # fmt: skip
     friction = np.array([(s.friction, s.friction_rate) for s in springs]).reshape(-1, 2)
-    return Laws(rows, motion, read, *_hinges([[s.travel_force, s.rate_force] for s in springs]), friction)
+    return Laws(rows, motion, read, *_hinges([[s.travel_force, s.rate_force] for s in springs]), friction, heights,
+                _of_tyres(vehicle, pushing))  # fmt: skip
+
+
+def _part(output: SpatialOutput) -> str:
+    """The spring or tyre that an output reads."""
+    return output.part if isinstance(output, PartOutput) else output.tyre if isinstance(output, TyreOutput) else ""
+
+
+def _of_tyres(vehicle: SpatialVehicle, pushing: Sequence[Tyre]) -> np.ndarray:
+    """``Laws.tyres`` of tyres that only push."""
+    if not pushing:
+        return np.empty((0, 4))
+    loads = preloads(vehicle).tyres
+    return np.array([(vehicle.tyres.index(t), loads[t.name], t.stiffness, t.damping) for t in pushing])
 
 
 def _hinges(curves: Sequence[Sequence[Curve | None]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -46,9 +46,13 @@ def vehicle_of(scene: RideScene) -> SpatialVehicle:
     """The scene's vehicle with its effects, and with gravity where its operating point is the loaded one.
 
     InputError for a loaded vehicle that may yaw: its preloaded springs keep their directions in space, not in it, so
-    that their moments about z would pull it back or push it on.
+    that their moments about z would pull it back or push it on; and for a tyre that may lift where small motion is
+    asked for.
     """
     vehicle = _built(scene).vehicle
+    if vehicle.lifts and scene.vehicle.small_motion:
+        allowed = "in small motion no wheel leaves the road: leave it out beside effects.lift_off"
+        raise InputError(scene.file, "vehicle.small_motion", True, allowed)
     if scene.vehicle.operating_point == "loaded" and vehicle.side_forces:
         allowed = "a vehicle with side forces may yaw, while preloads keep their directions in space: use unloaded"
         raise InputError(scene.file, "vehicle.operating_point", "loaded", allowed)
@@ -61,7 +65,11 @@ def _built(scene: RideScene) -> Built:
 
 
 def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:
-    """Refuse curves and friction where nobody has said that their slopes at rest shall stand for them."""
+    """Refuse curves and friction where nobody has said that their slopes at rest shall stand for them, and tyres that
+    may lift."""
+    if vehicle.lifts:
+        raise InputError(scene.file, "effects.lift_off", None, "has no covariance: use the study ride_nonlinear, whose "
+                         "copies and engines run in time, or leave it out")  # fmt: skip
     bent = [s.name for s in vehicle.springs if s.travel_force or s.rate_force or s.friction]
     if bent and not scene.vehicle.small_motion:
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file,

@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.errors import RunFailed
+from models.errors import InputError, RunFailed
 from models.ride.covariance import Covariance, stationary
 from models.ride.delayed_system import DelayedSystem
 from models.ride.excitation import Excitation, excited
@@ -101,8 +101,12 @@ def statistically_linear(vehicle: SpatialVehicle, excitation: Excitation, speed:
 
     scale : of the travels and rates that the first gains are taken at. Where different ones lead to different fixed
         points, the vehicle has several ways to move, and no one covariance.
+    InputError for tyres that may lift, which nothing linear stands for.
     Raises Unstable where a replaced vehicle leaves its equilibrium on its own, RunFailed where no fixed point is found.
     """
+    if vehicle.lifts:
+        raise InputError(vehicle.name, "tyres", None, "may lift, and no linear vehicle stands for that: take copies in "
+                         "time, or tyres that stay on the road")  # fmt: skip
     return _Search(vehicle, excitation, speed).found(scale)
 
 

@@ -5,7 +5,7 @@ lies in the **design position**, all coordinates zero, in which every body is pa
 exact, not linearised; "along a" always means along a direction fixed in space.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from models.vehicles.curve import Curve
@@ -100,7 +100,9 @@ class Tyre:
     """A wheel on the road: F = F0 + stiffness (zeta - h) + damping (zeta' - h'), up, at ``point`` of ``body``.
 
     h is how far the point has risen from its design position, zeta the height of the road under it (m). ``axle``
-    counts from the front, 0 first. The point is the centre of a wheel, or one end of a rigid axle. It never lifts off.
+    counts from the front, 0 first. The point is the centre of a wheel, or one end of a rigid axle. A tyre that
+    ``pushes_only`` has max(0, min(F, 2 S)) instead, S = F0 + stiffness (zeta - h) what its spring alone has: the law
+    of ``models.effects.lift_off``.
     """
 
     name: str
@@ -109,6 +111,7 @@ class Tyre:
     axle: int
     stiffness: float
     damping: float = 0.0
+    pushes_only: bool = False
 
 
 @dataclass(frozen=True)
@@ -210,6 +213,15 @@ class SpatialVehicle:
     def coordinates(self) -> tuple[tuple[str, Freedom], ...]:
         """Coordinates in the order of the state: body by body, freedoms in the order of FREEDOMS."""
         return tuple((body.name, freedom) for body in self.bodies for freedom in FREEDOMS if freedom in body.freedoms)
+
+    @property
+    def lifts(self) -> bool:
+        """Whether any tyre may leave the road."""
+        return any(tyre.pushes_only for tyre in self.tyres)
+
+    def with_tyres(self, pushes_only: bool) -> "SpatialVehicle":
+        """The vehicle with all tyres so."""
+        return replace(self, tyres=tuple(replace(tyre, pushes_only=pushes_only) for tyre in self.tyres))
 
     def body(self, name: str) -> Body:
         """The body of that name; KeyError if there is none."""

@@ -30,6 +30,7 @@ def linearise(
     """M q'' + D q' + K q = R z + S z' about the design position: without gravity unloaded, with it the equilibrium.
 
     speed : m/s, above 0, wanted by side forces and drag only; InputError where they miss it.
+    Tyres that may leave the road are on it.
     equivalent : stiffness (N/m) and damping (N s/m) that stand for springs of these names instead of their slopes at
     rest, as statistical linearisation finds them; InputError for a name that no spring has.
     """
@@ -103,7 +104,8 @@ def preloads(vehicle: SpatialVehicle) -> Preloads:
     """What holds the design position against gravity; a tyre's is its static wheel load.
 
     Shares that several could bear are those of the linear statics: what each would carry had the unloaded vehicle
-    sunk by K^-1 times the weights. InputError where no spring can carry a weight.
+    sunk by K^-1 times the weights. InputError where no spring can carry a weight, and for a tyre that only pushes
+    and would have to pull.
     """
     motion = Kinematics(vehicle)
     parts = _parts(vehicle, motion, {spring.name: slopes_at_rest(spring) for spring in vehicle.springs})
@@ -115,10 +117,12 @@ def preloads(vehicle: SpatialVehicle) -> Preloads:
     if left.max() > 1e-8 * np.abs(weight).max():
         name = ".".join(vehicle.coordinates()[int(left.argmax())])
         raise InputError(vehicle.name, name, None, "no spring carries the weight along this freedom")
-    return Preloads(
-        {name: k * float(row @ sunk) for name, (row, k, _) in parts.items()},
-        {name: -k * float(row @ sunk) for name, (row, k, _) in tyres.items()},
-    )
+    loads = {name: -k * float(row @ sunk) for name, (row, k, _) in tyres.items()}
+    for tyre in vehicle.tyres:
+        if tyre.pushes_only and not loads[tyre.name] > 0.0:
+            raise InputError(vehicle.name, f"tyres[{tyre.name}]", loads[tyre.name],
+                             "N is its load at rest: a tyre that only pushes must bear one")  # fmt: skip
+    return Preloads({name: k * float(row @ sunk) for name, (row, k, _) in parts.items()}, loads)
 
 
 Part = tuple[np.ndarray, float, float]

@@ -21,6 +21,7 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "virtual_measurement": ({}, ON_ROAD),
     "force_noise": (ON_ROAD, ON_ROAD | {"forces": {"frame": "inertial"}}),
     "angle_noise": (ON_ROAD, ON_ROAD | {"angles": {}}),
+    "lift_off": (ON_ROAD, ON_ROAD | {"effects": {"lift_off": {}}}),
 }
 
 
@@ -51,7 +52,9 @@ def seen(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
     within = drive.hubs[: round(2 * forces.period / own.step) + 1]  # a period of them, at half steps
     curved = np.abs(np.diff(within, n=2, axis=0)).max() > 1e-9 * np.abs(within).max()
     noisy = _noisy(scene, truth, forces, angles)
-    counts = {"runs on tyres": int(truth is not None), "noisy forces": noisy[0], "noisy angles": noisy[1],
+    lifting = sum(tyre.pushes_only for tyre in vehicle.whole.tyres)
+    counts = {"runs on tyres": int(truth is not None), "tyres that lift": lifting, "noisy forces": noisy[0],
+              "noisy angles": noisy[1],
               "pulled angles": 2 * int(table[kernel.GUIDE] == kernel.PULLED),
               "enforced angles": 2 * int(table[kernel.GUIDE] == kernel.HELD),
               "turning hubs": int(table[kernel.HUBS] * (table[kernel.FRAME] != kernel.FRAMES.index("inertial"))),

@@ -74,6 +74,11 @@ def seen(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
         return counts, varying_speed(linear(SPEED), road, scene.drive.profile()).deviation.tobytes()
     from models.ride.effects import curves
 
+    counts["tyres that lift"] = sum(tyre.pushes_only for tyre in vehicle.tyres)
+    if vehicle.lifts:
+        from models.ride.nonlinear_copies import copies_in_time
+
+        return counts, copies_in_time(vehicle, road, SPEED, 0.1, copies=2).variance.tobytes()
     if curves.named(scene):
         from models.ride.statistical_linearisation import bent, statistically_linear
 

@@ -161,13 +161,18 @@ def in_time(held: Held) -> InTime:
 
 
 def goes_in_time(scene: RideScene) -> bool:
-    """Whether springs of the scene's vehicle are bent and nobody said that their slopes shall stand for them."""
-    return not scene.vehicle.small_motion and bool(bent(vehicle_of(scene)))
+    """Whether springs of the scene's vehicle are bent and nobody said that their slopes shall stand for them, or tyres
+    may lift."""
+    return not scene.vehicle.small_motion and _in_time_only(vehicle_of(scene))
+
+
+def _in_time_only(vehicle: SpatialVehicle) -> bool:
+    return bool(bent(vehicle)) or vehicle.lifts
 
 
 def _check(held: Held) -> None:
     scene = held.scene
-    if scene.vehicle.small_motion or not bent(held.vehicle):
+    if scene.vehicle.small_motion or not _in_time_only(held.vehicle):
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, "is linear, and has a closed form")
     if scene.speeds is None:
         raise InputError(scene.file, "drive", None, "has no effects priced or chosen by runs: give [speeds]")
@@ -178,7 +183,7 @@ def _check(held: Held) -> None:
 
 def _pace(held: Held, speed: float, lasting: float) -> Pace:
     excitation = held.excitation()
-    found = statistically_linear(held.vehicle, excitation, speed)
+    found = statistically_linear(held.vehicle.with_tyres(pushes_only=False), excitation, speed)
     half = road_path(excitation, speed, usual_step(held.vehicle, speed, found.vehicle)).half
     unit = 2.0 * half * UNIT
     settling, counted = (UNIT * int(np.ceil(time / unit)) for time in (forgotten(found.vehicle), lasting))
