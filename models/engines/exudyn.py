@@ -155,16 +155,18 @@ def _drive(built: Build, assembly: Assembly, clock: Clock) -> None:
 def _pushing_tyre(built: Build, tyre: Strut, height: Reader, rate: Reader) -> None:
     """A tyre that can lift, on a road of this height (m, down) and rate: Exudyn has no item for it that switches
     within a step."""
-    k, d, wheel = tyre.stiffness, tyre.damping, str(tyre.upper.body)
+    wheel = str(tyre.upper.body)
 
-    def force(mbs: Any, t: float, item: int, place: float, speed: float, *_: float) -> float:
+    def force(mbs: Any, t: float, item: int, place: float, speed: float, k: float, d: float, offset: float) -> float:
         pressed = k * (place - height(mbs, t, 0.0))
         return max(min(pressed + d * (speed - rate(mbs, t, 0.0)), 2.0 * pressed), 0.0)
 
     ground = built.mbs.AddMarker(items.MarkerNodeCoordinate(
         nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
     built.mbs.AddObject(items.CoordinateSpringDamper(
-        markerNumbers=[ground, built.places[wheel, "z"]], springForceUserFunction=force))
+        markerNumbers=[ground, built.places[wheel, "z"]], stiffness=tyre.stiffness, damping=tyre.damping,
+        springForceUserFunction=force,
+    ))  # fmt: skip
     built.callbacks += 1
 
 
