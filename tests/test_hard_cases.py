@@ -9,6 +9,7 @@ from control import lyap
 
 from models import signals
 from models.effects import contact_points as contact_effect
+from models.effects import lift_off
 from models.engines import exudyn as exudyn_engine
 from models.engines import protocol, stability
 from models.rail import equations
@@ -24,6 +25,7 @@ from validation.hard_cases import (
     contact_points,
     extremes,
     invariants,
+    lifting,
     prescribed_pitch,
     ride,
     rolling,
@@ -129,6 +131,18 @@ def test_without_sizes_of_their_own_road_states_hide_an_undamped_motion(monkeypa
     monkeypatch.setattr(marginal, "_balanced", balanced)
     monkeypatch.setattr(marginal, "_of_undamped", lambda *own: undamped(*own[:-1], np.inf))
     assert found(ride, "no damping, road that next to walks", "reference", tmp_path) == "SILENT"
+
+
+@pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
+def test_without_its_check_a_step_that_jumps_over_landings_is_silent(implementation, monkeypatch, tmp_path):
+    monkeypatch.setattr(protocol, "check_resolved", lambda *_: None)
+    assert found(lifting, "tyres of 20 kN/mm, step of 2 ms", implementation, tmp_path) == "SILENT"
+
+
+@pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
+def test_tyres_that_pull_are_found(implementation, monkeypatch, tmp_path):
+    monkeypatch.setattr(lift_off, "extend", lambda assembly, p: assembly)
+    assert found(lifting, "both wheels in the air", implementation, tmp_path) == "SILENT"
 
 
 @pytest.mark.parametrize("implementation", IMPLEMENTATIONS)

@@ -23,7 +23,7 @@ from validation.rows import STATUSES, Row
 from validation.scenes import data_folder
 
 CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "growth",
-         "drift_off", "drift_solvers", "holding_spring", "point_mass",
+         "drift_off", "drift_solvers", "holding_spring", "point_mass", "lift_off",
          "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
          "planted_faults", "absent", "effect_prices", "price", "instruction_counts", "recommendation",
          "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",

@@ -16,7 +16,7 @@ import numpy as np
 from models.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.exudyn_clock import Clock
-from models.engines.protocol import Settings, Trajectory, balanced, guard
+from models.engines.protocol import Settings, Trajectory, balanced, guard, landings_followed
 from models.vehicles.description import PitchSpring, Point, Strut
 from models.vehicles.linear import matrices
 
@@ -332,6 +332,7 @@ class ExudynModel:
         times, states = self._recorded()
         enforced = self._enforced()
         guard("exudyn", times, states, self.settings.duration, note, enforced)
+        landings_followed("exudyn", self.assembly, self.settings, times, states)
         counts = counted(self.built.mbs)
         if enforced is not None:
             balanced("exudyn", times, enforced, lambda i: self._balance(times[i], states[i]))

@@ -18,7 +18,7 @@ from mujoco import rollout
 
 from models.assembly import Assembly
 from models.engines.mujoco_quiet import quiet
-from models.engines.protocol import Settings, Trajectory, guard
+from models.engines.protocol import Settings, Trajectory, guard, landings_followed
 from models.errors import RunFailed
 from models.vehicles.description import Strut, Vehicle
 
@@ -217,6 +217,7 @@ class MujocoModel:
             inputs = self._signal().sample(0.0, self.settings.step, n + 1)
             states[:, [*self.guided, *(4 + i for i in self.guided)]] = inputs[:, 2 : 2 + 2 * len(self.guided)]
         guard("mujoco", times, states, self.settings.duration, self.warnings())
+        landings_followed("mujoco", self.assembly, self.settings, times, states)
         enforced = self._enforced(times, states) if self.guided else None
         guard("mujoco", times, states, self.settings.duration, enforced=enforced)
         return Trajectory(times, states, enforced, self._counts())

@@ -14,6 +14,7 @@ import numpy as np
 from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE, Integrator
 from models.engines.stability import check_step
 from models.errors import Refused, RunFailed
+from models.resolved import check_resolved
 from models.signals import Signal
 from models.steps import divides, fitting
 
@@ -199,6 +200,20 @@ def _reason(finite: bool, sane: bool) -> str:
     if not finite:
         return "the state became infinite or not a number"
     return "time ran backwards" if sane else f"the state grew beyond {SIZE_BOUND:g}: no vehicle any more"
+
+
+def landings_followed(engine: str, assembly: "Assembly", settings: Settings, times: np.ndarray,
+                      states: np.ndarray) -> None:  # fmt: skip
+    """Raise RunFailed where fixed steps were too long for what tyres that only push met: a step that is stable on the
+    road may still jump over a landing.
+
+    times (n,) in s, states (n, 8); nothing is looked at where tyres cannot lift.
+    """
+    lifts = any(tyre.pushes_only for tyre in assembly.vehicle.tyres)
+    if not lifts or CATALOGUE[engine][settings.integrator].adaptive:
+        return
+    p = assembly.parameters
+    check_resolved(engine, times, states[:, :4], states[:, 4:], np.array([p.m1, p.m2, p.m3, p.I]))
 
 
 def balanced(engine: str, times: np.ndarray, enforced: np.ndarray,

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from models.assembly import Assembly
 from models.compiled import named, njit
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import Settings, Trajectory, guard
+from models.engines.protocol import Settings, Trajectory, guard, landings_followed
 from models.errors import RunFailed
 from models.signals import Stacked
 from models.vehicles.pitch_plane_equations import ADDED, RIGHT_HAND_SIDES, numbers
@@ -101,6 +101,7 @@ class Reference:
         adaptive = CATALOGUE["reference"][self.settings.integrator].adaptive
         times, states, counts = self._adaptive() if adaptive else self._fixed()
         guard("reference", times, states, self.settings.duration)
+        landings_followed("reference", self.assembly, self.settings, times, states)
         enforced = self._enforced(times, states)
         guard("reference", times, states, self.settings.duration, enforced=enforced)
         return Trajectory(times, states, enforced, counts)

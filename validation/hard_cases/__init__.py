@@ -10,9 +10,9 @@ from importlib import import_module
 from validation.hard_cases.case import Case
 
 FAMILIES = ("stepping", "sampled_input", "contact_points", "prescribed_pitch", "stabilisers", "invariants", "extremes",
-            "accelerometers", "random_input", "drift", "kalman", "covariance", "contact", "contact_limits", "ride",
-            "rolling", "rolling_contacts", "between_steps", "odd_values", "braking", "brake_loops", "recordings",
-            "measured_files", "input_that_cannot_be")  # fmt: skip
+            "lifting", "accelerometers", "random_input", "drift", "kalman", "covariance", "contact", "contact_limits",
+            "ride", "rolling", "rolling_contacts", "between_steps", "odd_values", "braking", "brake_loops",
+            "recordings", "measured_files", "input_that_cannot_be")  # fmt: skip
 
 
 def cases_by_family() -> tuple[tuple[str, Case], ...]:

@@ -1,0 +1,199 @@
+"""Tyres that only push: accelerations, whole paths, exact bounces, energy, and what the linear tyre pulls."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.assembly import assemble
+from models.engines.protocol import Settings, settings_of
+from models.engines.spatial_protocol import build as build_in_space
+from models.engines.spatial_reference import SpatialReference
+from models.hub_forces.cut_vehicle import cut
+from models.hub_forces.measurement import truth, two_tracks
+from models.result import Result
+from models.ride.in_engines import ridden
+from models.ride.of_scene import excitation_of, vehicle_of
+from models.ride.road_path import road_path
+from models.ride.scene import build as build_ride
+from models.road.iso8608 import iso8608_road
+from models.scene import Scene
+from models.scene import build as build_scene
+from models.scene_effects import without
+from models.simulate import simulate
+from models.vehicles.spatial_linear import wheels
+from models.vehicles.vehicle_file import load_vehicle
+from validation import checks
+from validation.bounces import Bounces, energy
+from validation.rows import Row, System, at_most, finding, within
+from validation.scenes import STUDY_ROAD, VEHICLES, gap
+
+TITLE = "Tyres that only push"
+SYSTEM: System = "pitch-plane"
+ENGINES = ("exudyn", "mujoco")
+ALL = ("reference", *ENGINES)
+STATES = "m, rad, m/s, rad/s"
+START = {"z1": -0.3, "z2": -0.2, "z3": -0.4, "pitch": 0.05}
+"""m, rad: both wheels in the air, one higher."""
+STEP, SEED, SPEED = 1e-4, 7, 20.0
+ROUNDING = "the same tableau and laws; sums are taken in another order"
+UNDAMPED = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """All rows; quick: one vehicle, half a second of bounces, short paths, no hub forces."""
+    vehicles = VEHICLES[-1:] if quick else VEHICLES
+    rows = [row for name in vehicles for row in (*_accelerations(name), *_paths(name, 1.5 if quick else 20.0))]
+    rows += [*_exact(0.5 if quick else 2.0), _order(4 if quick else 6), *_energy(0.5 if quick else 2.0)]
+    return [*rows, *_pulls(quick), *_in_space(quick), *([] if quick else _above_a_cut())], {}
+
+
+def scene(parameters: str = VEHICLES[-1], geometry: str = "exact", duration: float = 1.0, step: float = STEP,
+          road: bool = False, **override: float) -> Scene:  # fmt: skip
+    """The half car on tyres that only push: on the study road from rest, or dropped on a flat one."""
+    return build_scene({
+        "title": TITLE, "vehicle": {"parameters": parameters, "geometry": geometry, "override": override},
+        "run": {"duration": duration, "step": step}, "start": {} if road else START,
+        "effects": {"lift_off": {}, **({"road": STUDY_ROAD} if road else {})},
+    })  # fmt: skip
+
+
+def _accelerations(parameters: str) -> list[Row]:
+    """Both engines beside the written equations, at states that are half a metre and 3 m/s wide."""
+    rows = []
+    for geometry in ("exact", "linear"):
+        own = scene(parameters, geometry, 2.0, 1e-3, road=True)
+        assembly = assemble(own)
+        for engine in ENGINES:
+            error = checks.acceleration_gap(checks.engine(engine), assembly, settings_of(own, engine))
+            what = "acceleration at 100 random states, wheels in the air and hit among them"
+            rows.append(at_most(f"lift_off.audit.{engine}.{parameters}.{geometry}", SYSTEM, f"{what}, {engine} against "
+                                f"the written equations, {parameters}, {geometry} geometry", error, "of the largest",
+                                1e-12, "a dozen products of doubles; the law stands in each by itself", "native"))
+    return rows
+
+
+def _paths(parameters: str, duration: float) -> list[Row]:
+    """Whole paths on the study road at the same step; the least load of any of them."""
+    own = scene(parameters, duration=duration, step=5e-4, road=True)
+    runs = {engine: simulate(own, engine) for engine in ALL}
+    rows = [at_most(f"lift_off.path.{engine}.{parameters}", SYSTEM, f"states over {duration:g} s of the study road, "
+                    f"{engine} against reference, {parameters}", gap(runs[engine], runs["reference"]), STATES, 1e-11,
+                    f"{ROUNDING}; each landing makes the difference some times as large", "native")
+            for engine in ENGINES]  # fmt: skip
+    least = min(_loads(run).min() for run in runs.values())
+    return [*rows, within(f"lift_off.least.{parameters}", SYSTEM, f"least wheel load of these runs, {parameters}",
+                          float(least), "N", 0.0, 0.0, "wheels leave the road, and no tyre pulls", "none")]  # fmt: skip
+
+
+def _loads(run: Result) -> np.ndarray:
+    return np.array([run["f1"], run["f2"]])
+
+
+def _exact(duration: float) -> list[Row]:
+    """Bounces on the flat road beside matrix exponentials between the switches."""
+    rows = []
+    for what, override in (("as they are", {}), ("of 5 kN s/m", {"d1": 5e3, "d2": 5e3})):
+        own = scene(geometry="linear", duration=duration, **override)
+        assembly = assemble(own)
+        exact = Bounces(assembly, STEP).path(assembly.initial, round(duration / STEP))
+        for engine in ALL:
+            error = float(np.abs(simulate(own, engine).states - exact).max())
+            name = f"lift_off.exact.{engine}.{'stiff' if override else 'own'}"
+            rows.append(at_most(name, SYSTEM, f"vehicle dropped from 0.3 m, tyre dampers {what}: states beside matrix "
+                                f"exponentials between the switches, {engine} at 0.1 ms", error, STATES, 2e-4,
+                                "a corner within a step costs its square, at every landing", "closed form"))
+    return rows
+
+
+def _order(halvings: int) -> Row:
+    """Slope of the error over the step."""
+    own = scene(geometry="linear")
+    steps, coarse = 1e-3 / 2.0 ** np.arange(halvings), 1e-3
+    exact = Bounces(assemble(own), coarse).path(assemble(own).initial, round(1.0 / coarse))
+    errors = [float(np.abs(simulate(own, "reference", Settings("RK4", step, 1.0)).states[:: round(coarse / step)]
+                           - exact).max()) for step in steps]  # fmt: skip
+    slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
+    what = f"observed order of RK4 through landings, {halvings - 1} halvings of 1 ms"
+    why = "the force has corners: 2 on the average, 4 between them"
+    return finding("lift_off.order", SYSTEM, what, slope, "", 2.0, why, "closed form")
+
+
+def _energy(duration: float) -> list[Row]:
+    """What a bouncing vehicle gains, and what one without dampers loses."""
+    rows = []
+    for engine in ALL:
+        own = scene(duration=duration, **UNDAMPED)
+        states = simulate(own, engine).states
+        found = energy(assemble(own), states)
+        size = found[0] - energy(assemble(own), np.zeros((1, 8)))[0]  # by its fall to the road
+        rows.append(at_most(f"lift_off.energy.{engine}", SYSTEM, "change of energy of a bouncing vehicle without "
+                            f"dampers, {duration:g} s, {engine}", float(np.abs(found - found[0]).max() / size),
+                            "of the fall's", 1e-4, "the error of the step", "closed form"))
+        damped = scene(duration=duration, **(UNDAMPED | {"d1": 2e3, "d2": 500.0}))
+        found = energy(assemble(damped), simulate(damped, engine).states)
+        gain = float((found - np.minimum.accumulate(found)).max() / size)
+        rows.append(at_most(f"lift_off.gain.{engine}", SYSTEM, "the same with dampers in the tyres alone: gain of "
+                            f"energy, {engine}", gain, "of the fall's", 1e-4,
+                            "the damper takes energy and never gives any", "closed form"))
+    return rows
+
+
+def _pulls(quick: bool) -> list[Row]:
+    """What the paper's linear tyre does on the study road, and what difference it makes."""
+    own = scene(VEHICLES[0], duration=4.0 if quick else 20.0, step=5e-4, road=True)
+    lifting, linear = simulate(own, "reference"), simulate(without(own, "lift_off"), "reference")
+    loads = _loads(linear)
+    rms = [float(np.sqrt(np.mean((_loads(run) - loads.mean(axis=1)[:, None]) ** 2))) for run in (linear, lifting)]
+    what = f"the paper's vehicle and tyre on the study road, {own.run.duration:g} s"
+    return [
+        finding("lift_off.pull", SYSTEM, f"{what}: largest pull on the road", float(-loads.min()), "N", 0.0,
+                "a tyre pushes; the paper's is linear", "none"),
+        finding("lift_off.share", SYSTEM, "the same: share of time in which one or the other wheel pulls",
+                100.0 * float((loads < 0.0).any(axis=0).mean()), "%", 0.0, "a tyre pushes", "none"),
+        finding("lift_off.rms", SYSTEM, "rms of the dynamic wheel loads with tyres that lift, by that of linear ones",
+                rms[1] / rms[0], "", 1.0, "what the linear tyre costs", "none"),
+    ]  # fmt: skip
+
+
+def _in_space(quick: bool) -> list[Row]:
+    """R19-ride where its tyres lift: accelerations beside the written ones, and both engines on a random road."""
+    own = build_ride({"title": TITLE, "system": "ride", "vehicle": {"file": "r19_ride", "operating_point": "loaded"},
+                      "road": {"level": 3e-4}, "speeds": {"values": [SPEED]}, "effects": {"lift_off": {}}})  # fmt: skip
+    car, random, worst = vehicle_of(own), np.random.default_rng(SEED), dict.fromkeys(ENGINES, 0.0)
+    damped = replace(car, tyres=tuple(replace(tyre, damping=300.0 + i) for i, tyre in enumerate(car.tyres)))
+    written, n, w = SpatialReference(damped), len(car.coordinates()), len(car.tyres)
+    models = {engine: build_in_space(engine, damped) for engine in ENGINES}
+    for _ in range(30 if quick else 100):
+        q, v = random.uniform(-0.08, 0.08, n), random.uniform(-3.0, 3.0, n)
+        road = np.concatenate([random.uniform(-0.1, 0.1, w), random.uniform(-3.0, 3.0, w)])
+        wanted = written.acceleration(q, v, road)
+        for engine, model in models.items():
+            error = float(np.abs(model.acceleration(q, v, road) - wanted).max() / np.abs(wanted).max())
+            worst[engine] = max(worst[engine], error)
+    path = road_path(excitation_of(own, wheels(car)), SPEED, 1e-3)
+    one, two = (ridden(engine, car, path, 1.0 if quick else 10.0, seed=SEED, every=20).run for engine in ENGINES)
+    apart = max(np.abs(one.positions - two.positions).max(), np.abs(one.rates - two.rates).max())
+    return [
+        *(at_most(f"lift_off.space.{engine}", "ride", f"R19-ride, tyres in the air, pressed and hit: accelerations, "
+                  f"{engine} against the written ones", worst[engine], "of the largest", 1e-12,
+                  "each has the law in its code", "native") for engine in ENGINES),
+        at_most("lift_off.ride", "ride", "R19-ride on 20 times the paper's road: states, exudyn against mujoco",
+                float(apart), STATES, 1e-10, ROUNDING, "native"),
+    ]  # fmt: skip
+
+
+def _above_a_cut() -> list[Row]:
+    """Hub forces of a car whose wheels leave a road of class E."""
+    car, duration = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body"), 4.0
+    drive = two_tracks(car, *(iso8608_road("E", seed) for seed in (1, 2)), SPEED, 1e-3, round(duration / 1e-3))
+    runs = {engine: truth(engine, car, drive, "inertial", 1e-3, duration) for engine in ALL}
+    apart = max(float(np.abs(runs[engine].states - runs["reference"].states).max()) for engine in ENGINES)
+    loads = runs["reference"].wrenches[:, :, 2]
+    return [
+        at_most("lift_off.hubs", "drift", f"R19-free on a class E road, {duration:g} s: states of exudyn and mujoco "
+                "against the reference", apart, STATES, 1e-10, "one law, three mass matrices", "shared kernel"),
+        within("lift_off.hubs.least", "drift", "the same: least force of the road on a hub", float(loads.min()), "N",
+               0.0, 0.0, "wheels leave the road, and no tyre pulls", "none"),
+    ]  # fmt: skip

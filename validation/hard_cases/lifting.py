@@ -1,0 +1,196 @@
+"""Wheels that leave the road and land: both at once, from a height, on hard tyres, at the switch, on steps and on roads
+of few samples, in the first step, in space and above a cut.
+
+The half car on a flat road has an exact path, piece by piece between the switches (``validation.bounces``). Its error
+is a velocity, the coarsest of its states: a landing within a step costs the square of the step.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+from models.assembly import Assembly, assemble
+from models.engines import protocol
+from models.engines.spatial_protocol import INTEGRATORS
+from models.engines.spatial_protocol import build as build_in_space
+from models.engines.spatial_reference import SpatialReference
+from models.hub_forces.cut_vehicle import cut
+from models.hub_forces.measurement import truth, two_tracks
+from models.road.iso8608 import iso8608_road
+from models.road.polyline import PolylineProfile
+from models.road.signal import RoadUnderWheels
+from models.scene import build as build_scene
+from models.signals import Signal
+from models.tables import write_table
+from models.vehicles.kinematics import Kinematics
+from models.vehicles.vehicle_file import load_vehicle
+from validation.bounces import Bounces, energy
+from validation.hard_cases import setups
+from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+
+TWIN = "asymmetric_twin"
+STEP, LASTING = 1e-4, 0.6
+"""s: of most runs, and how long they last: several landings of both wheels."""
+FALLING = np.array([-0.3, -0.2, -0.4, 0.05, 0.0, 0.0, 0.0, 0.0])
+"""Both wheels in the air, one higher."""
+Error = Callable[[str, Path], float]
+
+
+def vehicle(start: np.ndarray | None = None, geometry: str = "linear", **override: float) -> Assembly:
+    """The half car without symmetry on tyres that only push, over the flat road."""
+    return setups.vehicle(TWIN, geometry, FALLING if start is None else start, {"lift_off": {}}, **override)
+
+
+def exactly(step: float = STEP, start: np.ndarray | None = None, **override: float) -> Error:
+    """Largest error of a run beside the exact path (m, rad, m/s, rad/s)."""
+
+    def error(engine: str, folder: Path) -> float:
+        assembly = vehicle(start, **override)
+        found = setups.run(engine, assembly, step, LASTING).states
+        every = max(1, round(step / STEP))
+        exact = Bounces(assembly, STEP if every > 1 else step).path(assembly.initial, every * (len(found) - 1))
+        return setups.largest(found - exact[::every])
+
+    return error
+
+
+def gained(**override: float) -> Error:
+    """Largest gain of energy over that of the motion, of a vehicle that falls and bounces."""
+
+    def error(engine: str, folder: Path) -> float:
+        assembly = vehicle(geometry="exact", **override)
+        states = setups.run(engine, assembly, STEP, LASTING).states
+        own = energy(assembly, states)
+        return float((own - np.minimum.accumulate(own)).max() / np.ptp(states[:, 6] ** 2 * assembly.parameters.m3 / 2))
+
+    return error
+
+
+def at_the_switch(engine: str, folder: Path) -> float:
+    """Without gravity the wheels rest on the road at no load: nothing may move, and no noise of rounding grow."""
+    assembly = vehicle(np.zeros(8), g=0.0)
+    return setups.largest(setups.run(engine, assembly, 1e-3, 1.0).states)
+
+
+def thrown_up(engine: str, folder: Path) -> float:
+    """Wheels that are thrown up from their rest at 5 m/s."""
+    start = setups.vehicle(TWIN, "linear").initial + np.array([0, 0, 0, 0, -5.0, -5.0, 0, 0])
+    return exactly(start=start)(engine, folder)
+
+
+def on_road(scene: dict[str, Any], folder: Path, step: float, duration: float) -> Assembly:
+    """The half car without symmetry on a road of a scene."""
+    return assemble(build_scene({
+        "title": "hard case", "vehicle": {"parameters": TWIN}, "run": {"duration": duration, "step": step},
+        "effects": {"road": scene, "lift_off": {}}}, "", folder))  # fmt: skip
+
+
+def beside_tight(engine: str, assembly: Assembly, step: float, duration: float) -> float:
+    """Largest error of a run beside the solution at tight tolerance; infinite if no wheel left the road."""
+    found, exact = setups.run(engine, assembly, step, duration).states, setups.tight(assembly, step, duration).states
+    air = exact[:, 0] < _heights(assembly.input, step, len(exact))
+    return setups.largest(found - exact) if air.any() else np.inf
+
+
+def _heights(road: Signal | None, step: float, count: int) -> np.ndarray:
+    """The road under the front wheel (m, down)."""
+    return np.zeros(count) if road is None else road.sample(0.0, step, count)[:, 0]
+
+
+def coarse_road(engine: str, folder: Path) -> float:
+    """Bumps of 80 mm in a file with a sample every half metre, at 25 m/s."""
+    s = 0.5 * np.arange(121)
+    height = 0.08 * np.maximum(np.sin(2 * np.pi * s / 7.3), 0.0) * (s > 3.0)
+    write_table(folder / "bumps.csv", {"s": ("m", s), "left": ("m", height), "right": ("m", height)})
+    road = {"source": "csv", "file": "bumps.csv", "track": "left", "speed": 25.0, "beyond_end": "refused"}
+    return beside_tight(engine, on_road(road, folder, STEP, 1.0), STEP, 1.0)
+
+
+def step_in_road(engine: str, folder: Path) -> float:
+    """A kerb of 0.1 m over 0.1 m, with corners, at 15 m/s: the front wheel is thrown off it."""
+    profile = PolylineProfile.through([-5.0, 3.0, 3.1, 20.0], [0.0, 0.0, -0.1, -0.1])
+    base = vehicle(setups.vehicle(TWIN).initial, "exact")
+    road = RoadUnderWheels(profile, 15.0, base.parameters.a + base.parameters.b, (3.0, 3.1))
+    return beside_tight(engine, base.with_input("road", road), STEP, 0.5)
+
+
+def in_space(engine: str, folder: Path) -> float:
+    """A car of 19 freedoms dropped from half a metre: largest difference of accelerations along its path to the written
+    ones, by the largest; of the written ones themselves, that of its centre of mass to gravity."""
+    car = replace(load_vehicle("r19_ride"), gravity=9.81).with_tyres(pushes_only=True)
+    n = len(car.coordinates())
+    start = np.array([0.5 if freedom == "z" and car.body(name).parent is None else 0.0
+                      for name, freedom in car.coordinates()])  # fmt: skip
+    written = SpatialReference(car)
+    if engine == "reference":
+        fall, motion = written.acceleration(start, np.zeros(n)), Kinematics(car)
+        pull = sum(body.mass * (motion.shift(body.name, body.position)[2] @ fall + 9.81) for body in car.bodies)
+        return float(abs(pull) / (9.81 * sum(body.mass for body in car.bodies)))
+    settings = setups.Settings(INTEGRATORS[engine], 5e-4, 0.5)
+    model = build_in_space(engine, car, settings)
+    run, worst = model.run(start, np.zeros(n)), 0.0
+    for q, v in list(zip(run.positions, run.rates, strict=True))[::50]:
+        wanted = written.acceleration(q, v)
+        worst = max(worst, float(np.abs(model.acceleration(q, v) - wanted).max() / np.abs(wanted).max()))
+    return worst
+
+
+def above_a_cut(engine: str, folder: Path) -> float:
+    """Hub forces on a road of class F: largest force that a wheel in the air has, or pull of any, N."""
+    car = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body")
+    drive = two_tracks(car, *(iso8608_road("F", seed) for seed in (1, 2)), 20.0, 1e-3, 1500)
+    wrenches = truth(engine, car, drive, "inertial", 1e-3, 1.5).wrenches
+    air = wrenches[:, :, 2] <= 0.0
+    return float(np.abs(wrenches[air]).max()) if air.any() else np.inf
+
+
+def linear_naive(folder: Path) -> str:
+    """The paper's tyre in the same fall."""
+    assembly = setups.vehicle(TWIN, "linear", FALLING)
+    states, p = setups.run("reference", assembly, STEP, LASTING).states, assembly.parameters
+    return f"the linear tyre pulls with up to {-(p.k1 * states[:, 0] + p.d1 * states[:, 4]).min():.0f} N"
+
+
+def hard_naive(folder: Path) -> str:
+    """A stable step that jumps over landings, without the check after the run."""
+    with mock.patch.object(protocol, "check_resolved", lambda *_: None):
+        off = exactly(2e-3, k1=2e7, k2=2e7)("reference", folder)
+    return f"stable, finite, a wheel's velocity off by {off:.2g} m/s"
+
+
+THROWN = "a corner of the force within a step costs its square"
+RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
+PATH, STATES = "exact path, piece by piece", "m, rad, m/s, rad/s"
+UNDAMPED = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
+HIGH = np.array([-5.0, -5.0, -5.0, 0.0, 12.0, 12.0, 12.0, 0.0])
+EXACT: tuple[tuple[str, str, float, Error], ...] = (
+    ("both wheels in the air", "no tyre holds anything", 1e-4, exactly()),
+    ("fall from five metres", "lands at 15 m/s, many times the tyres' depth at rest", 1e-3, exactly(start=HIGH)),
+    ("tyres without damping", "every landing is thrown back", 1e-4, exactly(d1=0.0, d2=0.0)),
+    ("tyre dampers of 5 kN s/m", "would pull before the spring lets go, and jump where it lands", 1e-4,
+     exactly(d1=5e3, d2=5e3)),
+    ("tyres of 20 kN/mm", "a landing lasts 3 ms", 2e-3, exactly(5e-5, k1=2e7, k2=2e7)),
+    ("thrown up in the first step", "the tyres let go at once", 1e-5, thrown_up),
+)
+CASES = (
+    *(Case(name, hard, PATH, STATES, tolerance, THROWN, error, naive=linear_naive if error is EXACT[0][3] else None)
+      for name, hard, tolerance, error in EXACT),
+    Case("bounce without any damper", "every error of a landing stays", "gains no energy", "of the motion", 1e-4,
+         THROWN, gained(**UNDAMPED)),
+    Case("tyres of 20 kN/mm, step of 2 ms", "stable on the road, but a landing has two steps", "fails, and says when",
+         "", 0.0, "exact", exactly(2e-3, k1=2e7, k2=2e7), RAISED, hard_naive),
+    Case("at rest at the switch", "no gravity: the load is zero, and every rounding switches", "stays at rest", STATES,
+         1e-15, "exact", at_the_switch),
+    Case("kerb with corners", "the road's rate jumps, and the wheels leave it", "tight tolerance", STATES, 2e-2,
+         "a jump of the rate within a step costs the step itself", step_in_road, against="native"),
+    Case("bumps in a file of few samples", "the spline between samples throws the wheels", "tight tolerance", STATES,
+         1e-4, THROWN, coarse_road, against="native"),
+    Case("car dropped in space", "four wheels in the air, pushed down by their springs", "written accelerations along "
+         "the path", "of the largest", 1e-11, "the order of additions, large forces on light wheels", in_space),
+    Case("wheels in the air above a cut", "a transducer feels nothing of the road", "no force, no moment", "N", 1e-9,
+         "the law has a zero there", above_a_cut),
+)  # fmt: skip
