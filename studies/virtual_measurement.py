@@ -20,6 +20,9 @@ PAPER = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
 LEAST = 8
 """Samples that a spline through the measured pitch needs."""
 
+MEASURING = ("road", "lift_off")
+"""Effects that the measurement may have; the runs on its files have no tyres."""
+
 Follow = Callable[[dict[str, float], dict[str, Any]], Scene]
 """Builder of a force-excited scene from overrides of parameters and further effects."""
 
@@ -32,7 +35,7 @@ def measure(scene: Scene) -> Result:
 def check_road(scene: Scene, engines: tuple[str, ...], sampling_rate: float) -> None:
     """Refuse a scene that is no virtual measurement, or that cannot be followed through all runs on its files."""
     for name in scene.effects:
-        if name != "road":
+        if name not in MEASURING:
             raise InputError(scene.file, f"effects.{name}", None, "this study measures on a road and names the effects "
                              "of the other runs itself: drop it")
     if "road" not in scene.effects:
