@@ -29,8 +29,8 @@ class Bounces:
         bare = replace(vehicle, struts=tuple(strut for strut in vehicle.struts if strut.lower.body is not None))
         mass, damping, stiffness = matrices(bare)
         weight = np.array([*(body.mass * vehicle.gravity for body in vehicle.bodies), 0.0])
-        self.rates = {states: _rates(mass, damping, stiffness, weight, _laws(self.p, states))
-                      for states in product(range(3), repeat=2)}  # fmt: skip
+        self.rates = {(i, j): _rates(mass, damping, stiffness, weight, _laws(self.p, (i, j)))
+                      for i, j in product(range(3), range(3))}  # fmt: skip
         self.moves = {states: expm(rate * step) for states, rate in self.rates.items()}
 
     def path(self, start: np.ndarray, count: int) -> np.ndarray:

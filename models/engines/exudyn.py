@@ -161,11 +161,12 @@ def _pushing_tyre(built: Build, tyre: Strut, height: Reader, rate: Reader) -> No
         pressed = k * (place - height(mbs, t, 0.0))
         return max(min(pressed + d * (speed - rate(mbs, t, 0.0)), 2.0 * pressed), 0.0)
 
+    law: Any = force  # its type hints do not know that a function is one
     ground = built.mbs.AddMarker(items.MarkerNodeCoordinate(
         nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
     built.mbs.AddObject(items.CoordinateSpringDamper(
         markerNumbers=[ground, built.places[wheel, "z"]], stiffness=tyre.stiffness, damping=tyre.damping,
-        springForceUserFunction=force,
+        springForceUserFunction=law,
     ))  # fmt: skip
     built.callbacks += 1
 

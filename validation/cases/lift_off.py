@@ -50,10 +50,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def scene(parameters: str = VEHICLES[-1], geometry: str = "exact", duration: float = 1.0, step: float = STEP,
-          road: bool = False, **override: float) -> Scene:  # fmt: skip
+          road: bool = False, override: dict[str, float] | None = None) -> Scene:  # fmt: skip
     """The half car on tyres that only push: on the study road from rest, or dropped on a flat one."""
     return build_scene({
-        "title": TITLE, "vehicle": {"parameters": parameters, "geometry": geometry, "override": override},
+        "title": TITLE, "vehicle": {"parameters": parameters, "geometry": geometry, "override": override or {}},
         "run": {"duration": duration, "step": step}, "start": {} if road else START,
         "effects": {"lift_off": {}, **({"road": STUDY_ROAD} if road else {})},
     })  # fmt: skip
@@ -94,8 +94,9 @@ def _loads(run: Result) -> np.ndarray:
 def _exact(duration: float) -> list[Row]:
     """Bounces on the flat road beside matrix exponentials between the switches."""
     rows = []
-    for what, override in (("as they are", {}), ("of 5 kN s/m", {"d1": 5e3, "d2": 5e3})):
-        own = scene(geometry="linear", duration=duration, **override)
+    dampers: dict[str, dict[str, float]] = {"as they are": {}, "of 5 kN s/m": {"d1": 5e3, "d2": 5e3}}
+    for what, override in dampers.items():
+        own = scene(geometry="linear", duration=duration, override=override)
         assembly = assemble(own)
         exact = Bounces(assembly, STEP).path(assembly.initial, round(duration / STEP))
         for engine in ALL:
@@ -124,14 +125,14 @@ def _energy(duration: float) -> list[Row]:
     """What a bouncing vehicle gains, and what one without dampers loses."""
     rows = []
     for engine in ALL:
-        own = scene(duration=duration, **UNDAMPED)
+        own = scene(duration=duration, override=UNDAMPED)
         states = simulate(own, engine).states
         found = energy(assemble(own), states)
         size = found[0] - energy(assemble(own), np.zeros((1, 8)))[0]  # by its fall to the road
         rows.append(at_most(f"lift_off.energy.{engine}", SYSTEM, "change of energy of a bouncing vehicle without "
                             f"dampers, {duration:g} s, {engine}", float(np.abs(found - found[0]).max() / size),
                             "of the fall's", 1e-4, "the error of the step", "closed form"))
-        damped = scene(duration=duration, **(UNDAMPED | {"d1": 2e3, "d2": 500.0}))
+        damped = scene(duration=duration, override=UNDAMPED | {"d1": 2e3, "d2": 500.0})
         found = energy(assemble(damped), simulate(damped, engine).states)
         gain = float((found - np.minimum.accumulate(found)).max() / size)
         rows.append(at_most(f"lift_off.gain.{engine}", SYSTEM, "the same with dampers in the tyres alone: gain of "
@@ -187,7 +188,8 @@ def _in_space(quick: bool) -> list[Row]:
 def _above_a_cut() -> list[Row]:
     """Hub forces of a car whose wheels leave a road of class E."""
     car, duration = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body"), 4.0
-    drive = two_tracks(car, *(iso8608_road("E", seed) for seed in (1, 2)), SPEED, 1e-3, round(duration / 1e-3))
+    left, right = (iso8608_road("E", seed) for seed in (1, 2))
+    drive = two_tracks(car, left, right, SPEED, 1e-3, round(duration / 1e-3))
     runs = {engine: truth(engine, car, drive, "inertial", 1e-3, duration) for engine in ALL}
     apart = max(float(np.abs(runs[engine].states - runs["reference"].states).max()) for engine in ENGINES)
     loads = runs["reference"].wrenches[:, :, 2]

@@ -40,16 +40,16 @@ FALLING = np.array([-0.3, -0.2, -0.4, 0.05, 0.0, 0.0, 0.0, 0.0])
 Error = Callable[[str, Path], float]
 
 
-def vehicle(start: np.ndarray | None = None, geometry: str = "linear", **override: float) -> Assembly:
+def vehicle(start: np.ndarray, geometry: str, override: dict[str, float]) -> Assembly:
     """The half car without symmetry on tyres that only push, over the flat road."""
-    return setups.vehicle(TWIN, geometry, FALLING if start is None else start, {"lift_off": {}}, **override)
+    return setups.vehicle(TWIN, geometry, start, {"lift_off": {}}, **override)
 
 
-def exactly(step: float = STEP, start: np.ndarray | None = None, **override: float) -> Error:
+def exactly(step: float = STEP, start: np.ndarray = FALLING, **override: float) -> Error:
     """Largest error of a run beside the exact path (m, rad, m/s, rad/s)."""
 
     def error(engine: str, folder: Path) -> float:
-        assembly = vehicle(start, **override)
+        assembly = vehicle(start, "linear", override)
         found = setups.run(engine, assembly, step, LASTING).states
         every = max(1, round(step / STEP))
         exact = Bounces(assembly, STEP if every > 1 else step).path(assembly.initial, every * (len(found) - 1))
@@ -62,7 +62,7 @@ def gained(**override: float) -> Error:
     """Largest gain of energy over that of the motion, of a vehicle that falls and bounces."""
 
     def error(engine: str, folder: Path) -> float:
-        assembly = vehicle(geometry="exact", **override)
+        assembly = vehicle(FALLING, "exact", override)
         states = setups.run(engine, assembly, STEP, LASTING).states
         own = energy(assembly, states)
         return float((own - np.minimum.accumulate(own)).max() / np.ptp(states[:, 6] ** 2 * assembly.parameters.m3 / 2))
@@ -72,7 +72,7 @@ def gained(**override: float) -> Error:
 
 def at_the_switch(engine: str, folder: Path) -> float:
     """Without gravity the wheels rest on the road at no load: nothing may move, and no noise of rounding grow."""
-    assembly = vehicle(np.zeros(8), g=0.0)
+    assembly = vehicle(np.zeros(8), "linear", {"g": 0.0})
     return setups.largest(setups.run(engine, assembly, 1e-3, 1.0).states)
 
 
@@ -113,7 +113,7 @@ def coarse_road(engine: str, folder: Path) -> float:
 def step_in_road(engine: str, folder: Path) -> float:
     """A kerb of 0.1 m over 0.1 m, with corners, at 15 m/s: the front wheel is thrown off it."""
     profile = PolylineProfile.through([-5.0, 3.0, 3.1, 20.0], [0.0, 0.0, -0.1, -0.1])
-    base = vehicle(setups.vehicle(TWIN).initial, "exact")
+    base = vehicle(setups.vehicle(TWIN).initial, "exact", {})
     road = RoadUnderWheels(profile, 15.0, base.parameters.a + base.parameters.b, (3.0, 3.1))
     return beside_tight(engine, base.with_input("road", road), STEP, 0.5)
 
@@ -142,7 +142,8 @@ def in_space(engine: str, folder: Path) -> float:
 def above_a_cut(engine: str, folder: Path) -> float:
     """Hub forces on a road of class F: largest force that a wheel in the air has, or pull of any, N."""
     car = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body")
-    drive = two_tracks(car, *(iso8608_road("F", seed) for seed in (1, 2)), 20.0, 1e-3, 1500)
+    left, right = (iso8608_road("F", seed) for seed in (1, 2))
+    drive = two_tracks(car, left, right, 20.0, 1e-3, 1500)
     wrenches = truth(engine, car, drive, "inertial", 1e-3, 1.5).wrenches
     air = wrenches[:, :, 2] <= 0.0
     return float(np.abs(wrenches[air]).max()) if air.any() else np.inf
