@@ -10,8 +10,9 @@ with y = r w' the acceleration of the wheel's rim. It begins with phase 3 until 
 Hybrid modeling and limit cycle analysis for a class of five-phase anti-lock brake algorithms, Vehicle System Dynamics
 44 (2006) 173-188; M. Gerard, W. Pasillas-Lepine, E. de Vries, M. Verhaegen, Adaptation of hybrid five-phase ABS
 algorithms for experimental validation, AAC 2010. e1 has to be large enough for the wheel not to lock in phase 2. Where
-one set of thresholds has to do for all roads two rules of ours hold the cycle together: a wheel that in phase 2 gains
-speed no more (y <= e4) goes on with phase 5, and one at a deep slip with phase 1.
+one set of thresholds has to do for all roads three rules of ours hold the cycle together: a wheel that in phase 2 gains
+speed no more (y <= e4), or in phase 1 has no pressure left and rolls, goes on with phase 5, and one at a deep slip
+with phase 1.
 """
 
 from dataclasses import dataclass
@@ -71,10 +72,16 @@ class _Logic:
         sign, level = end_of(self._phase, self._own)
         if sign * (gains - level) >= 0.0:
             self._phase = self._phase % 5 + 1
-        elif self._phase == 2 and gains <= self._own.e4:
+        elif self._rolls_on(slip, gains):
             self._phase = 5
         if self._phase != 1 and slip > self._own.deep:
             self._phase = 1
         raised = self._pressure + rate(self._phase, self._own) * self._own.period
         self._pressure = min(max(raised, 0.0), supply)
         return self._pressure
+
+    def _rolls_on(self, slip: float, gains: float) -> bool:
+        """Whether a wheel gains speed no more, or rolls with no pressure left."""
+        if self._phase == 1:
+            return self._pressure == 0.0 and slip <= self._own.deep
+        return self._phase == 2 and gains <= self._own.e4
