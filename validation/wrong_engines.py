@@ -66,13 +66,14 @@ WRONG = (Still, Boastful, Swapped, Weak)
 
 def passed(kinds: tuple[type, ...] = WRONG, duration: float = 0.5) -> list[str]:
     """Names of the integrators whose run on a road ends without a word against it."""
-    before = [dict(table) for table in (CATALOGUE, RECOMMENDED, OUTSIDE)]
+    tables: tuple[dict[str, Any], ...] = (CATALOGUE, RECOMMENDED, OUTSIDE)
+    before = [dict(table) for table in tables]
     try:
         return [kind.__name__ for kind in kinds if _answers(kind, duration)]
     finally:
-        for table, kept in zip((CATALOGUE, RECOMMENDED, OUTSIDE), before, strict=True):
+        for table, kept in zip(tables, before, strict=True):
             table.clear()
-            table.update(kept)  # type: ignore[arg-type]
+            table.update(kept)
 
 
 def _answers(kind: type, duration: float) -> bool:

@@ -153,7 +153,7 @@ REFUSED: dict[str, Callable[[], Any]] = {
     "a truck lighter than its wheels": lambda: drive(
         _scene(procedures={"p": {}}, vehicle={"override": {"mass": 0.1}}), "p"),
     "a gain of 1e12": lambda: SlipPI(4, gain=1e12),
-    "a complex threshold": lambda: FivePhase(4, e1=1j),
+    "a complex threshold": lambda: FivePhase(4, e1=1j),  # type: ignore[arg-type]
     "slow apply faster than apply": lambda: _scene(procedures={"p": {}}, pressure={"slow": 0.01}),
 }  # fmt: skip
 """What is beyond physics, and must be refused before it runs."""

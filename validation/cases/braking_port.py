@@ -212,7 +212,7 @@ class _Watch:
         import models.braking.run as run
 
         self.last, self._run, self._ask = time.perf_counter(), run, run.ask
-        run.ask = self._noted
+        run.ask = self._noted  # type: ignore[assignment]
         return self
 
     def __exit__(self, *_: object) -> None:
