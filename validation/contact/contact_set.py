@@ -65,7 +65,8 @@ def wide(part: int) -> list[Case]:
 
 def _wide(stream: int, count: int) -> list[Case]:
     rng = np.random.default_rng((SEED, stream))
-    ratios, levels = (np.exp(rng.uniform(*np.log(ends).tolist(), count)).tolist() for ends in (WIDE_RATIOS, WIDE_RANGE))
+    ratios, levels = (np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist()
+                      for low, high in (WIDE_RATIOS, WIDE_RANGE))  # fmt: skip
     directions, present = rng.normal(size=(count, 3)), rng.uniform(size=(count, 3)) >= ABSENT
     present[~present.any(axis=1)] = True
     bodies = cycle([Material(E=PAIR.one.E, nu=nu) for nu in POISSON])
