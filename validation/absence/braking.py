@@ -19,8 +19,8 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {"measured_pressures
 
 
 def write(folder: Path) -> None:
-    """Pressures that rise in all brakes."""
-    rows = (f"{time},{','.join([str(10.0 * time)] * 4)}" for time in (0.0, 0.5, 1.0))
+    """Pressures that rise in all brakes, within the supply of 6 bar."""
+    rows = (f"{time},{','.join([str(5.0 * time)] * 4)}" for time in (0.0, 0.5, 1.0))
     names = ",".join(f"pressure_{wheel} [bar]" for wheel in ("fl", "fr", "rl", "rr"))
     (folder / "pressures.csv").write_text("\n".join([f"time [s],{names}", *rows, ""]))
 
