@@ -11,6 +11,8 @@ from models.contact.hertz_cells import hertzian
 from models.contact.material import Material, Pair
 from models.contact.normal_problem import NormalSolution, centres, solve_normal
 from models.contact.rolling_problem import RollingSolution, solve_rolling, solve_shift
+from models.contact.work_precision import Case
+from models.errors import RunFailed
 from validation.rows import Row, System, Table, at_most, not_run, within
 from validation.scenes import data_folder
 
@@ -33,6 +35,8 @@ CASES: dict[str, tuple[float, float, float, float]] = {
     "spin, long": (5.0, 0.0, 0.0, 0.15),
 }
 """a/b, creepages by mu N / (G ab), spin by mu N / (G (ab)^(3/2))."""
+DRAWN, SEED = 12, 47
+"""Contacts that are drawn to see whether the solver converges: ellipses, creepages with spin and cells at random."""
 SHARE = 0.0075
 """Of mu N: the error that 40 cells along each axis are said to have at most, 80 half of it."""
 
@@ -45,6 +49,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows = [*_hertz_rows(), *_strip_rows(20 if quick else 80), *_shift_rows(), *_sliding_rows(), *_symmetry_rows(),
             *_refinement_rows(refined)]  # fmt: skip
     sample, sample_rows = _sample(quick)
+    rows += [] if quick else [_converged_row()]
     return rows + sample_rows, {"refined": refined, "sample": sample, "strip": _strip(40, 0.5)[:2]}
 
 
@@ -178,6 +183,26 @@ def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
     order = float(np.log2(changes[0] / changes[-1]) / (len(changes) - 1))
     return [*rows, within("contact_exact.order", SYSTEM, "order in the cells of the rolling forces, mean of the cases",
                           order, "", 1.5, 0.6, "2 where all slips, 1 where much sticks", "none")]  # fmt: skip
+
+
+def drawn_case(rng: np.random.Generator) -> tuple[Case, int]:
+    """A contact of a/b 0.2 to 5 and Poisson's ratio 0 to 0.5 with spin, without its forces, and 60 to 120 cells."""
+    ratio, level = (float(np.exp(rng.uniform(np.log(low), np.log(high)))) for low, high in ((0.2, 5.0), (0.1, 10.0)))
+    body = Material(E=2.1e11, nu=float(rng.uniform(0.0, 0.5)))
+    x, y, spin = (float(part) for part in rng.normal(size=3))
+    case = Case(SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, MU, Pair(body, body), "drawn", (x, y, spin), level)
+    return case, int(rng.integers(60, 121))
+
+
+def _converged_row() -> Row:
+    rng, failed = np.random.default_rng(SEED), 0
+    for case, cells in (drawn_case(rng) for _ in range(DRAWN)):
+        try:
+            solve_rolling(hertzian(case.a, case.b, LOAD, cells), MU, *case.motion, case.pair)
+        except RunFailed:
+            failed += 1
+    return _row("converged", f"{DRAWN} contacts drawn at random, a/b 0.2 to 5, with spin, 60 to 120 cells along each "
+                "axis: how many the solver gave up", float(failed), 0.0, "none is asked for", side="none")  # fmt: skip
 
 
 def _sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:

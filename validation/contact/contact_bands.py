@@ -1,7 +1,8 @@
 """Bands of error of the simplified theories, from their forces and moments on ``contact_set``.
 
 Those contacts are the set and one of the two parts of the drawn and of the wide ones; the other part judges. A band
-holds for every Poisson's ratio, as if there were no other.
+holds for every group of contacts by itself: each Poisson's ratio, spin with and against the lateral creepage, ellipses
+longer along the rolling direction and across it.
 
 ``python -m validation.contact.contact_bands`` prints what ``models.contact.accuracy`` keeps.
 """
@@ -21,9 +22,9 @@ from validation.contact.contact_set import FITTED, FRICTION, LOAD, read, read_dr
 
 CELLS = 101
 """In each strip of FASTSIM: its own error is then below 0.05 % of mu N."""
-SHARE, NEAR, FEW = 0.95, 0.96, 8
-"""Part of unseen contacts that a band is to hold; of the known ones of each Poisson's ratio between the neighbours of
-each knot; contacts that tell no quantile."""
+SHARE, NEAR, FEW = 0.95, 0.96, 12
+"""Part of unseen contacts that a band is to hold; of the known ones of each group between the neighbours of each knot;
+contacts that tell no quantile."""
 ROUNDING = 1e-9
 """Of a moment that is zero by symmetry."""
 FASTSIM = [f"{kind} {bound}" for kind in ("blended", "one", "three")
@@ -34,7 +35,8 @@ FASTSIM = [f"{kind} {bound}" for kind in ("blended", "one", "three")
 class Held:
     """A theory against the exact one: force (n, 2) by mu N, moment (n,) by mu N times the lever.
 
-    error, moment_error : (n,) of both, in the same units. spinning : (n,) share of spin. nu : (n,) Poisson's ratio.
+    error, moment_error : (n,) of both, in the same units. spinning : (n,) share of spin. group : (n,) numbers by
+    ``groups``.
     """
 
     force: np.ndarray
@@ -42,7 +44,7 @@ class Held:
     error: np.ndarray
     moment_error: np.ndarray
     spinning: np.ndarray
-    nu: np.ndarray
+    group: np.ndarray
 
     @property
     def used(self) -> np.ndarray:
@@ -86,13 +88,22 @@ def _simplified(case: Case) -> Simplified:
     return Simplified(interpenetrating(by_axes(case.a, case.b, case.pair, load=LOAD), case.pair), FRICTION)
 
 
+def groups(cases: list[Case]) -> np.ndarray:
+    """Number (n,) of the group of each contact, of which theories err in different ways: by Poisson's ratio, whether
+    spin is against the lateral creepage, and whether the ellipse is longer across the rolling direction.
+    """
+    told = [(c.pair.nu, c.parts[1] * c.parts[2] < 0, c.a < c.b) for c in cases]
+    return np.unique(np.array(told, dtype=float), axis=0, return_inverse=True)[1].ravel()
+
+
 def held(name: str, cases: list[Case], cells: int = CELLS) -> Held:
     """A theory's forces, moments and errors."""
     found, nu = forces(name, cases, cells), np.array([c.pair.nu for c in cases])
     axes, motions = _arrays(cases)
     exact = np.array([(*c.force, c.mz * np.sqrt(c.a * c.b) / max(c.a, c.b)) for c in cases])
     off, share = found - exact, spin_share(axes[0], axes[1], motions, nu)
-    return Held(found[:, :2], found[:, 2], np.linalg.norm(off[:, :2], axis=1), np.abs(off[:, 2]), share, nu)
+    return Held(found[:, :2], found[:, 2], np.linalg.norm(off[:, :2], axis=1), np.abs(off[:, 2]), share,
+                groups(cases))  # fmt: skip
 
 
 def kept(name: str, one: Held) -> tuple[float, float]:
@@ -103,16 +114,16 @@ def kept(name: str, one: Held) -> tuple[float, float]:
 
 
 def measured(error: np.ndarray, used: np.ndarray, one: Held) -> tuple[tuple[float, ...], ...]:
-    """Quantiles of the error at each knot, without spin and with it, of the Poisson's ratio with the largest."""
+    """Quantiles of the error at each knot, without spin and with it, of the group with the largest."""
     ends = (0.0, *KNOTS, 1.1)
     within = [(used >= low) & (used <= high) for low, high in zip(ends, ends[2:], strict=False)]
-    return tuple(tuple(_largest(error, rows & some, one.nu) for some in within)
+    return tuple(tuple(_largest(error, rows & some, one.group) for some in within)
                  for rows in (one.spinning < 0.5, one.spinning >= 0.5))  # fmt: skip
 
 
-def _largest(error: np.ndarray, rows: np.ndarray, nu: np.ndarray) -> float:
-    """Largest quantile of a Poisson's ratio with more than a few contacts; of all together where none has them."""
-    parts = [error[rows & (nu == value)] for value in np.unique(nu)]
+def _largest(error: np.ndarray, rows: np.ndarray, group: np.ndarray) -> float:
+    """Largest quantile of a group with more than a few contacts; of all together where none has them."""
+    parts = [error[rows & (group == value)] for value in np.unique(group)]
     told = [part for part in parts if part.size >= FEW] or [error[rows]]
     return round(max(float(np.quantile(part, NEAR)) for part in told), 4)
 
