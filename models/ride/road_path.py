@@ -8,6 +8,7 @@ one met a whole number of half steps before.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import ceil, log2
 
 import numpy as np
 from scipy.linalg import block_diag, expm, solve_continuous_lyapunov
@@ -98,11 +99,17 @@ def _axles(excitation: Excitation) -> tuple[np.ndarray, np.ndarray, tuple[np.nda
 
 
 def _over(F: np.ndarray, G: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Transition over a length (m) of road and root of the covariance of the noise met there (van Loan)."""
-    m = len(F)
-    block = expm(length * np.block([[-F, G @ G.T], [np.zeros((m, m)), F.T]]))
+    """Transition over a length (m) of road and root of the covariance of the noise met there (van Loan).
+
+    By doubling: over many decays at once, rounding would grow as their exponential.
+    """
+    m, halved = len(F), max(0, ceil(log2(max(length * float(np.linalg.norm(F)), 1.0))))
+    block = expm(length / 2**halved * np.block([[-F, G @ G.T], [np.zeros((m, m)), F.T]]))
     move = block[m:, m:].T
-    return move, _root(move @ block[:m, m:])
+    covariance = move @ block[:m, m:]
+    for _ in range(halved):
+        covariance, move = covariance + move @ covariance @ move.T, move @ move
+    return move, _root(covariance)
 
 
 def _start(F: np.ndarray, G: np.ndarray) -> np.ndarray:
