@@ -56,18 +56,26 @@ class Judged:
         return not self.choice.kept or bool((abs(found) <= self.scene.tolerance * (1 + 1e-2)).all())
 
 
+def asked(scene: Drawn) -> Chooser:
+    """Of a range of speeds about that of the scene."""
+    return Chooser(scene.held, [share * scene.speed for share in RANGE], scene.quantities, scene.tolerance)
+
+
+def changes_by_frequency(chooser: Chooser, choice: Choice) -> np.ndarray:
+    """Changes (quantities,) of the worst listed speed."""
+    left = without(chooser.held, choice.left_out)
+    ratios = [_by_frequency(whole, left, chooser.rows) / _by_frequency(whole, chooser.held, chooser.rows)
+              for whole in chooser.wholes]  # fmt: skip
+    return largest(np.sqrt(ratios) - 1)
+
+
 def judged(scene: Drawn, second: bool) -> Judged:
     """Choose, then certify by the identity and, where asked, by frequency."""
-    chooser = Chooser(scene.held, [share * scene.speed for share in RANGE], scene.quantities, scene.tolerance)
+    chooser = asked(scene)
     choice, whole = chooser.choose(), chooser.wholes[0]
-    left = without(scene.held, choice.left_out)
-    rest = whole.reduced(left)
+    rest = whole.reduced(without(scene.held, choice.left_out))
     two, one = Screen(whole.full, chooser.rows).identity(rest)
-    changes = None
-    if second:
-        ratios = [_by_frequency(whole, left, chooser.rows) / _by_frequency(whole, scene.held, chooser.rows)
-                  for whole in chooser.wholes]  # fmt: skip
-        changes = largest(np.sqrt(ratios) - 1)
+    changes = changes_by_frequency(chooser, choice) if second else None
     chosen, none = frozenset(choice.left_out), frozenset[Effect]()
     measured = 1.0
     if chosen:
