@@ -98,6 +98,7 @@ def test_what_cannot_be_is_refused_with_its_value():
 
 def test_a_train_that_folds_ends_with_its_angle_and_keeps_its_path():
     with pytest.raises(RunFailed, match=r"jackknifes: the drawbar against the truck at -?\d+\.\d deg, limit") as told:
-        drive(scene(trailer=CHOSEN.model_copy(update={"fold": 0.05}).model_dump(), run={"duration": 6.0},
+        drive(scene(trailer=CHOSEN.model_copy(update={"fold": 0.02}).model_dump(), run={"duration": 6.0},
+                    brakes={"supply": 2.0},
                     procedures={"stop": {"kind": "j_turn", "speed": 8.0, "steer": 0.1}}), "stop")  # fmt: skip
     assert len(told.value.partial.times) > 3

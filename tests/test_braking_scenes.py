@@ -13,7 +13,6 @@ from models.braking.controller import Command
 from models.braking.of_scene import braked
 from models.braking.plan import check, check_reference, describe
 from models.braking.port.ask import ControllerFailed
-from models.braking.port.example import Example
 from models.braking.procedures import drive, ready
 from models.braking.scene import build
 from models.braking.stop_report import Stop
@@ -122,15 +121,15 @@ def test_split_friction_turns_to_the_better_side_and_equal_friction_not_at_all()
     assert not straight.states[:, 0, 1:].any() and straight.states[-1, 1, 0] < 10.0
 
 
-def test_the_system_whose_adhesion_is_measured_is_the_one_behind_the_port(monkeypatch):
-    class Released(Example):
-        def sample(self, given):
-            return Command(pressures=np.full(4, 0.5))
-
-    monkeypatch.setattr("models.braking.port.example.Example", Released)
-    tables = {"run": {"duration": 60.0}, "controller": {"kind": "slip_bang_bang"}}
-    port = {"callable": "models.braking.port.example:Example"}
-    own, others = (utilisation(scene(**tables, **more), "ice", Adhesion(0.17, 0.17)).z for more in ({}, {"port": port}))
+def test_the_system_whose_adhesion_is_measured_is_the_one_behind_the_port(tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "import numpy as np\nfrom models.braking.controller import Command\nclass Released:\n"
+        "    def __init__(self, wheels): pass\n"
+        "    def sample(self, given): return Command(pressures=np.full(4, 0.5))\n")  # fmt: skip
+    tables = {**PLAIN, "run": {"duration": 60.0}, "controller": {"kind": "slip_bang_bang"}}
+    port = {"callable": "mine.py:Released", "timeout": 60.0, "start": 60.0}
+    own, others = (utilisation(build({**tables, **more}, "s.toml", tmp_path), "ice", Adhesion(0.17, 0.17)).z
+                   for more in ({}, {"port": port}))  # fmt: skip
     expected = 0.5 * 2 * (1500.0 + 1200.0) / 0.5 / (5640.0 * 9.81 + 2 * (13.35 + 27.0) / 0.25 * 9.81)
     assert others == pytest.approx(expected, rel=0.02) and own > 1.3 * others
 

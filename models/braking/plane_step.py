@@ -19,7 +19,7 @@ from models.stack import array, doubles
 
 CLOSE = 1e-7
 """What is left of the accelerations' error (m/s^2, and rad/s^2 times 1 m) when the loads are taken to be found."""
-HALF_ROUNDS, PATIENCE, WINDOW, MOST_WINDOWS = 1, 12, 16, 60
+HALF_ROUNDS, PATIENCE, WINDOW, MOST_WINDOWS = 1, 12, 16, 1000
 """Rounds of a half step, to whose loads those of the step before are close enough for order two; rounds after which
 Anderson's method gives way to means; rounds between two looks at their progress; such windows without an answer."""
 SPREAD = 1e-3
@@ -225,19 +225,20 @@ def by_means(torque0, torque1, step, tables, frame, found, report):
 
     So it is of a slow wheel at the edge of locking: a little less load, and it locks at once; a little more, and it
     rolls within a fraction of the step. Each round moves ``found`` by a share of its change, and the means of all
-    reports with it, so that forces and accelerations stay in balance; the share is halved where rounds go to and fro,
-    and doubled where they go on. The limit is Filippov's solution: the edge itself, locked for a part of the step.
+    reports with it, so that forces and accelerations stay in balance. The share is halved where rounds go to and fro,
+    or are thrown back from an edge that they approached, and never grows: forces that fall steeply with load would send
+    them to and fro again. The limit is Filippov's solution: the edge itself, locked for a part of the step.
     Source: A. F. Filippov, Differential equations with discontinuous righthand sides (1988); W. R. Mann, Proc. AMS 4
     (1953) 506-510; recalled, not checked.
     """
-    wheels, size, share, change, out = torque0.size, found.size, 0.5, math.inf, frame.tried[0]
+    wheels, size, share, before, out = torque0.size, found.size, 0.5, math.inf, frame.tried[0]
     means, begun = array(doubles(wheels * REPORTED), (wheels, REPORTED)), array(doubles(size), (size,))
     respond(found, torque0, torque1, step, tables, frame, out, report)
     moved_to(out, found)
     for i in range(wheels):
         moved_to(report[i], means[i])
     for _ in range(MOST_WINDOWS):
-        way, net = 0.0, 0.0
+        way, net, most, change = 0.0, 0.0, 0.0, 0.0
         moved_to(found, begun)
         for _ in range(WINDOW):
             respond(found, torque0, torque1, step, tables, frame, out, report)
@@ -248,6 +249,7 @@ def by_means(torque0, torque1, step, tables, frame, found, report):
             if not change > CLOSE:
                 moved_to(out, found)
                 return change
+            most = max(most, change)
             for a in range(size):
                 found[a] += share * (out[a] - found[a])
             for i in range(wheels):
@@ -255,11 +257,12 @@ def by_means(torque0, torque1, step, tables, frame, found, report):
                     means[i, c] += share * (report[i, c] - means[i, c])
         for a in range(size):
             net += abs(found[a] - begun[a])
-        if net < 0.5 * way and share * change <= SPREAD:
+        turns, thrown = net < 0.5 * way, change > before
+        if (turns and share * change <= SPREAD) or (thrown and share * most <= SPREAD):
             for i in range(wheels):
                 moved_to(means[i], report[i])
             return 0.0
-        share = 0.5 * share if net < 0.5 * way else min(2.0 * share, 0.5) if net > 0.9 * way else share
+        share, before = 0.5 * share if turns or thrown else share, change
     return math.inf
 
 
