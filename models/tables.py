@@ -44,6 +44,8 @@ HEAD = 100_000
 KEPT = 4
 """Texts whose numbers are kept: every engine and every method of a comparison reads the same few files."""
 
+NUMBER = re.compile(r"[-+]?(\d*)\.?(\d*)(?:[eE][-+]?(\d+))?")
+"""A number, its digits before the point, after it and in its exponent."""
 RUN, LEAP = 8, 3.0
 """Rows before a last one without a line end, and how much further than they it may go on."""
 
@@ -141,17 +143,23 @@ def ended(path: str | Path) -> bool:
 
 
 def _cut_off(lines: list[str]) -> bool:
-    """Whether a last line without a line end lacks a cell, or a last number that is shorter than the one before and
-    leaps further from it than any of the last rows."""
+    """Whether a last line without a line end lacks a cell or digits, or leaps further than any of the last rows.
+
+    A whole number has no fewer digits before the point, after it and in its exponent than all other rows have.
+    """
     *before, last = [line.rpartition(",") for line in lines]
-    if last[0].count(",") != lines[0].rpartition(",")[0].count(",") or len(before) < 2:
+    if last[0].count(",") != lines[0].rpartition(",")[0].count(",") or len(before) < 3:
         return True
-    try:
-        value, *earlier = (float(cell) for _, _, cell in (last, *before[:0:-1][:RUN]))
-    except ValueError:
+    numbers = [NUMBER.fullmatch(cell.strip()) for _, _, cell in (*before[1:], last)]
+    if None in numbers:
         return True
+    *others, own = [[len(part or "") for part in number.groups()] for number in numbers if number is not None]
+    fewest = [min(counts) for counts in zip(*others, strict=True)]
+    whole = own[1] >= fewest[1] and own[2] >= fewest[2] and (fewest[1] > 0 or own[0] >= fewest[0])
+    value, *earlier = (float(cell) for _, _, cell in (last, *before[:0:-1][:RUN]))
     leaps = [abs(a - b) for a, b in itertools.pairwise(earlier)]
-    return len(last[2]) < len(before[-1][2]) and abs(value - earlier[0]) > LEAP * max(leaps, default=0.0)
+    leaping = len(last[2]) < len(before[-1][2]) and abs(value - earlier[0]) > LEAP * max(leaps, default=0.0)
+    return not whole or leaping
 
 
 def headings(path: str | Path, header: tuple[int, str], columns: Columns) -> tuple[list[str], list[float]]:

@@ -171,16 +171,16 @@ def test_a_run_that_counts_otherwise_when_repeated_fails_its_row():
 
 
 def test_parts_of_a_step_from_three_runs():
-    """A step of 10 us: 4 in the engine, 1 over the bridge, 5 in the kernel, in the quietest round."""
+    """A step of 10 us: 4 in the engine, 1 over the bridge, 5 in the kernel, in the median round."""
     from validation.price import split
 
     noise, seconds = np.array([1.3, 1.0, 1.1]), 1e-6 * split.STEPS["road"]
     runs = zip(split.RUNS, (4, 5, 10), strict=True)
     saved = {"problem": "road", "engine": "mujoco",
              "seconds": {run: (total * seconds * noise).tolist() for run, total in runs}}  # fmt: skip
-    assert split.parts(saved) == pytest.approx([4, 1, 5])
+    assert split.parts(saved) == pytest.approx([4.4, 1.1, 5.5])
     assert split.share(saved) == pytest.approx((10, 10, 10))
-    assert split.table([saved], "road")[0].rows[0][2:5] == ("4.00", "1.00", "5.00")
+    assert split.table([saved], "road")[0].rows[0][2:5] == ("4.40", "1.10", "5.50")
     assert split.table([saved], "wheel") == []
 
 

@@ -40,7 +40,7 @@ def test_a_form_has_the_bits_of_the_plain_table(tmp_path, text, encoding):
 @pytest.mark.parametrize(("text", "says"), [
     (GERMAN.replace("1,5;", "1.001,5;"), "thousands"), (GERMAN.replace("3,0;", "x;"), "line 4, column 'left [mm]'"),
     (GERMAN.replace("3,0;", ""), "line 4"), (GERMAN.replace("3,0;", "NA;"), "line 4, column 'left [mm]'"),
-    (GERMAN[:-1], "no line end"), ("titles\nno table\n", "wanted"), (GERMAN.replace("[mm]", ""), "unit is missing"),
+    (GERMAN[:-5], "no line end"), ("titles\nno table\n", "wanted"), (GERMAN.replace("[mm]", ""), "unit is missing"),
     (QUOTED.replace('"1.5"', '"1,500"'), "thousands"), (GERMAN.replace("left", "lft"), "lft"),
     ("sep=|\n" + PLAIN.replace(",", "|"), "sep=|"), (PLAIN.replace("left", '"left"', 1).replace("1.5", "1 .5"), "1 .5"),
 ])  # fmt: skip

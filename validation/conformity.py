@@ -205,15 +205,17 @@ def _tightened(name: str, road: Assembly) -> float:
 
 
 def _guards(name: str, folder: Path) -> Row:
-    """Forces of a thousand times the weight throw the vehicle out of all bounds, which must not pass as an answer."""
+    """Forces of a million times the weight throw the vehicle out of all bounds, which must not pass as an answer."""
     throw = folder / "throw"
     throw.mkdir(exist_ok=True)
     run = simulate(road_scene(duration=DURATION), "reference")
     for channel in ("f1", "f2"):
         run.data[channel].values[:] *= 1e6
     write_forces(run, throw, STEP)
+    meant = {"file": "wheel_forces.csv", "interpolation": "linear", "accept": ["weight", "unit", "sign"]}
     try:
-        _run(name, assemble(force_scene(throw, duration=DURATION)), _settings(name))
+        scene = force_scene(throw, duration=DURATION, effects={"wheel_forces": meant})
+        _run(name, assemble(scene), _settings(name))
         found = "silent"
     except RunFailed:
         found = "raised"
