@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.ride.choice.choose import Chooser, Set
-from models.ride.choice.march import March
+from models.ride.choice.march import March, longest_step
 from models.ride.choice.marched import FINER, marched
 from models.ride.choice.neighbourhood import OFF, changed, parameters
 from models.ride.choice.reduced import Whole
@@ -13,8 +13,6 @@ from models.ride.choice.screen import confirmed
 
 COPIES = 192
 """Of a run that measures a step."""
-BESIDE = 0.98
-"""A step so many times as long tells how fast its error grows."""
 
 
 def worst_nearby(chooser: Chooser, chosen: Set, draws: int, seed: int) -> float:
@@ -32,21 +30,17 @@ def worst_nearby(chooser: Chooser, chosen: Set, draws: int, seed: int) -> float:
 
 
 def measured_step(chooser: Chooser, chosen: Set, step: float) -> float:
-    """Longest step (s) that keeps the tolerance, by a run at the speed where ``step`` comes nearest to breaking it.
-
-    The run tells the error of that step, the closed form how fast it grows; never beyond the stable step."""
+    """Longest step (s) that keeps the tolerance by runs: what a run in steps of ``step`` finds beside the closed form
+    is taken to hold about it. Never beyond the stable step; a run tells nothing of weightings."""
     marches = chooser.marches(chosen)
     exact = [np.sqrt(chooser.full[chooser.wholes.index(whole)]) for whole in chooser.screened]
-    errors = [abs(march.deviations(step) / own - 1.0) for march, own in zip(marches, exact, strict=True)]
-    at = int(np.argmax([own.max() for own in errors]))
-    march, own, q = replace(marches[at], weightings=()), exact[at], int(errors[at].argmax())
-    if marches[at].weightings:
-        return step  # a run tells nothing of weightings
-    ratio = marched(march, step, COPIES).ratio[q] * march.deviations(step / FINER)[q] / own[q]
-    slope = np.log(errors[at][q] / abs(march.deviations(BESIDE * step)[q] / own[q] - 1.0)) / -np.log(BESIDE)
-    by_run = step * (chooser.tolerance / abs(ratio - 1.0)) ** (1.0 / slope)
-    return float(min(by_run, _stable(marches)))
+    if marches[0].weightings:
+        return step
+    by_run = [own / _beside(march, step) for march, own in zip(marches, exact, strict=True)]
+    return longest_step(marches, by_run, chooser.tolerance)
 
 
-def _stable(marches: list[March]) -> float:
-    return min(march.longest for march in marches)
+def _beside(march: March, step: float) -> np.ndarray:
+    """Deviations (q,) of a run in steps (s) by those of the closed form, both by what shorter steps tell."""
+    ratio = marched(march, step, COPIES).ratio
+    return np.asarray(ratio * march.deviations(step / FINER) / march.deviations(step))

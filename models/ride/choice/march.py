@@ -20,9 +20,9 @@ from models.ride.choice.reduced import Reduced
 from models.ride.choice.waves import at_axles, filtered, frequencies
 from models.ride.weighting import WEIGHTINGS
 
-ALIKE = 6
-"""Waves to either side that look alike at the steps; the last two stand for all beyond, which fall with their square.
-"""
+ALIKE, BEYOND = 6, 6.0
+"""Waves to either side that look alike at the steps, at least, and so many times the road's last corner; the last two
+stand for all beyond, which fall with their square."""
 LOWEST = 1e-4
 """Where panels of frequencies begin, by the highest frequency that steps can tell."""
 SHORTEST, STEPS, FINER = 1 / 32, 8, 6
@@ -75,7 +75,8 @@ class March:
         """Standard deviations (q,) of what a run in steps (s) samples."""
         rates, seen, forced = self.motions
         omega, weights, apart = self._frequencies(step)
-        alike = np.arange(-ALIKE, ALIKE + 1)[:, None]
+        last = self._alike(step)
+        alike = np.arange(-last, last + 1)[:, None]
         road, noise = self._road((omega + 2 * np.pi * alike / step).ravel(), np.tile(apart, len(alike)), step)
         half = (np.exp(0.5j * step * omega) * (-1.0) ** alike).ravel()[:, None]
         z = (step * rates)[:, None, None]
@@ -87,9 +88,14 @@ class March:
             moved += (begin + middle + 1) * np.tensordot(forced[:, m:], noise, 1)
         moved *= step / 6 / (half**2 - grown)
         heard = np.tensordot(seen, moved, 1) + np.tensordot(self._read[:, self.vehicle :], road, 1)
-        count = np.where(abs(alike) < ALIKE - 1, 1.0, 1.0 + alike**2 / (2.0 * (abs(alike) + 1.0)))
+        count = np.where(abs(alike) < last - 1, 1.0, 1.0 + alike**2 / (2.0 * (abs(alike) + 1.0)))
         total = ((abs(heard) ** 2).sum(axis=2).reshape(len(seen), len(alike), -1) * count).sum(axis=1)
         return np.asarray(np.sqrt(total * abs(self._heard(omega)) ** 2 @ weights / np.pi))
+
+    def _alike(self, step: float) -> int:
+        """Waves to either side up to which not all of them fall with their square."""
+        corner = self.speed * abs(np.linalg.eigvals(self.reduced.excitation.F)).max()
+        return max(ALIKE, int(np.ceil(BEYOND * corner * step / (2 * np.pi))))
 
     def _frequencies(self, step: float) -> tuple[np.ndarray, ...]:
         """Up to those of which a step sees but two values."""
