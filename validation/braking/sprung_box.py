@@ -23,7 +23,7 @@ SPIN = 1.7
 TENSOR = ((400.0, 0.0, 0.0), (0.0, 1500.0, 0.0), (0.0, 0.0, 1700.0))
 LOCKS = 1e5
 """Torque (N m) that locks a wheel at once."""
-GRADIENT = 1e3
+GRADIENT = 2e4
 """Torque by pressure (N m/bar) of brakes whose torques are given."""
 
 
