@@ -17,11 +17,12 @@ from models.braking.tyre_table import across, place
 from models.braking.wheel_step import wheel_step
 from models.compiled import inlined, lean, njit
 
-CLOSE, NEARLY, PATIENCE, MOST = 1e-7, 0.98, 12, 200
+CLOSE, NEARLY, PATIENCE = 1e-7, 0.98, 12
 START, RATE, ALONG, ASIDE, ANGLE, CELL, PART, EAST, NORTH, ARM, SIDE = range(11)
 """Columns of what a step knows of each wheel: see ``models.braking.plane_step``; where it heads, and arms of its forces
 about the centre of mass."""
-COLUMNS = 7
+COLUMNS, LOCKED = 7, 5
+MOST_PARTS = 64
 
 
 @inlined
@@ -91,7 +92,7 @@ def rounds(turning, torque0, torque1, step, most, truck, tables, known, found, l
         mix = min(max(product / square, -2.0), 0.75) if n > 0 and square > 0.0 and not done else 0.0
         for a in range(3):
             last[1, a] = out[a] - found[a]
-            found[a] = out[a] - mix * (out[a] - last[0, a]) if done or n < PATIENCE else found[a] + 0.5 * last[1, a]
+            found[a] = out[a] - mix * (out[a] - last[0, a])
             last[0, a] = out[a]
         if done:
             break
@@ -122,7 +123,7 @@ def go(now, turning, torque0, torque1, step, course, regular, truck, tables, roo
     for half in (True, False):
         settle(now, course, regular, half, truck, tables[0], known)
         time, end = (0.5 * step, middle) if half else (step, torque1)
-        if not rounds(turning, torque0, end, time, 1 if half else MOST, truck, tables, known, found, last, report):
+        if not rounds(turning, torque0, end, time, 1 if half else PATIENCE, truck, tables, known, found, last, report):
             return -1.0
         rest = rests(first, turning, found, step, truck[5], truck[6]) if half else -1.0
         if rest >= 0.0:
@@ -138,6 +139,30 @@ def go(now, turning, torque0, torque1, step, course, regular, truck, tables, roo
     return step
 
 
+@lean
+def in_parts(parts, now, turning, torque0, torque1, step, course, regular, truck, tables, room, ends, sums, report):
+    """``go`` in equal parts of a step; the report is their mean, and of times locked the sum."""
+    piece, time = step / parts, 0.0
+    sums[:] = 0.0
+    for k in range(parts):
+        for i in range(4):
+            for side in range(2):
+                ends[side, i] = torque0[i] + (torque1[i] - torque0[i]) * (k + side) / parts
+        used = go(now, turning, ends[0], ends[1], piece, course, regular / parts, truck, tables, room, report)
+        if used < 0.0:
+            return used
+        time += used
+        for i in range(4):
+            for c in range(COLUMNS - 1):
+                sums[i, c] += report[i, c]
+        if used < piece:
+            return time
+    for i in range(4):
+        for c in range(COLUMNS - 1):
+            report[i, c] = sums[i, c] if c == LOCKED else sums[i, c] / parts
+    return step
+
+
 @njit(cache=True, error_model="numpy")
 def march(speed, course, torque, sample, steps, slope, truck, tables, times, states, turned, reports):
     """The whole stop: fills times (n,), states (n, 6), turning (n, 4) and reports (n, 4, 7) of the steps' ends, sample
@@ -145,13 +170,19 @@ def march(speed, course, torque, sample, steps, slope, truck, tables, times, sta
     step's end on."""
     now, turning, none, step = np.zeros(6), speed / truck[3], np.zeros(4), sample / steps
     room = np.empty((4, 11)), np.zeros(3), np.zeros((2, 3)), np.empty(6), np.empty(4)
+    ends, sums, regular = np.empty((2, 4)), np.empty((4, COLUMNS)), slope * 9.81 * step
     now[3], states[0], turned[0], times[0] = speed, 0.0, turning, 0.0
     states[0, 3] = speed
     for n in range(1, times.size):
         used = 0.0
         for k in range(steps):
             first = none if n == 1 and k == 0 else torque
-            part = go(now, turning, first, torque, step, course, slope * 9.81 * step, truck, tables, room, reports[n])
+            parts = int(min(math.ceil(regular / math.hypot(now[3], now[4])), MOST_PARTS))
+            if parts <= 1:
+                part = go(now, turning, first, torque, step, course, regular, truck, tables, room, reports[n])
+            else:
+                part = in_parts(parts, now, turning, first, torque, step, course, regular, truck, tables, room, ends,
+                                sums, reports[n])  # fmt: skip
             used += part
             if part < step:
                 break
