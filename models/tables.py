@@ -44,7 +44,7 @@ HEAD = 100_000
 KEPT = 4
 """Texts whose numbers are kept: every engine and every method of a comparison reads the same few files."""
 
-NUMBER = re.compile(r"[-+]?(\d*)\.?(\d*)(?:[eE][-+]?(\d+))?")
+NUMBER = re.compile(r"[-+]?(?=\.?\d)(\d*)\.?(\d*)(?:[eE][-+]?(\d+))?")
 """A number, its digits before the point, after it and in its exponent."""
 RUN, LEAP = 8, 3.0
 """Rows before a last one without a line end, and how much further than they it may go on."""
