@@ -82,8 +82,10 @@ def finding(id: str, system: System, quantity: str, value: float, unit: str, exp
 
 def aim(id: str, system: System, quantity: str, value: float, unit: str, bound: float, why: str,
         side: Side = "at most") -> Row:  # fmt: skip
-    """Row of a figure that is aimed at and that the machine decides, as seconds, their ratios and memory are: reported
-    where it is reached, missed where it is not or the value is not a number.
+    """Row of a stated aim that decides no verdict: reported where it is reached, missed otherwise or for no number.
+
+    So are figures that the machine decides, as seconds, their ratios and memory, and aims that the method is known not
+    to reach: ``why`` says for which of the two reasons.
     """
     reached = value <= bound if side == "at most" else value >= bound
     status: Status = "reported" if reached else "missed"
