@@ -1,18 +1,17 @@
-"""A choice looked at by other routes than its own: near its scene by the exact solve, and at equal accuracy by runs."""
+"""A choice looked at by other routes than its own: near its scene by the exact solve, and at equal accuracy by the
+covariance of what runs sample.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 
 from models.ride.choice.choose import Chooser, Set
-from models.ride.choice.march import March, longest_step
-from models.ride.choice.marched import FINER, marched
+from models.ride.choice.march import longest_step
 from models.ride.choice.neighbourhood import OFF, changed, parameters
 from models.ride.choice.reduced import Whole
 from models.ride.choice.screen import confirmed
-
-COPIES = 192
-"""Of a run that measures a step."""
+from validation.choice.sampled import Sampled
 
 
 def worst_nearby(chooser: Chooser, chosen: Set, draws: int, seed: int) -> float:
@@ -29,18 +28,8 @@ def worst_nearby(chooser: Chooser, chosen: Set, draws: int, seed: int) -> float:
     return worst / chooser.tolerance
 
 
-def measured_step(chooser: Chooser, chosen: Set, step: float) -> float:
-    """Longest step (s) that keeps the tolerance by runs: what a run in steps of ``step`` finds beside the closed form
-    is taken to hold about it. Never beyond the stable step; a run tells nothing of weightings."""
-    marches = chooser.marches(chosen)
+def measured_step(chooser: Chooser, chosen: Set) -> float:
+    """Longest step (s) that keeps the tolerance, by the covariance of what runs sample; no quantity is weighted."""
+    runs = [Sampled(march) for march in chooser.marches(chosen)]
     exact = [np.sqrt(chooser.full[chooser.wholes.index(whole)]) for whole in chooser.screened]
-    if marches[0].weightings:
-        return step
-    by_run = [own / _beside(march, step) for march, own in zip(marches, exact, strict=True)]
-    return longest_step(marches, by_run, chooser.tolerance)
-
-
-def _beside(march: March, step: float) -> np.ndarray:
-    """Deviations (q,) of a run in steps (s) by those of the closed form, both by what shorter steps tell."""
-    ratio = marched(march, step, COPIES).ratio
-    return np.asarray(ratio * march.deviations(step / FINER) / march.deviations(step))
+    return longest_step(runs, exact, chooser.tolerance)

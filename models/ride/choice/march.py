@@ -10,8 +10,10 @@ A wave e^(i w t) of the road moves x by e^(i w h) - R, and what a run samples is
 its steps, w + 2 pi m / h: the variance is an integral from 0 to pi / h, and no run and no chance is in it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -121,7 +123,18 @@ class March:
         return met.transpose(1, 0, 2), noise.transpose(1, 0, 2)
 
 
-def longest_step(marches: list[March], exact: list[np.ndarray], tolerance: float) -> float:
+class Run(Protocol):
+    """Runs in time of a scene at a speed, in steps (s)."""
+
+    @property
+    def longest(self) -> float:
+        """Longest stable step (s)."""
+
+    def deviations(self, step: float) -> np.ndarray:
+        """Standard deviations (q,) of what a run in steps (s) samples."""
+
+
+def longest_step(marches: Sequence[Run], exact: list[np.ndarray], tolerance: float) -> float:
     """Longest step (s) up to which runs at every speed keep quantities within a tolerance of ``exact`` deviations.
 
     exact : of the whole scene, (q,) for each march. 0 where the shortest step that is looked at breaks it.

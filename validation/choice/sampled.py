@@ -1,0 +1,151 @@
+"""What a run in time samples of a linear scene, by a covariance of its steps: no sum over frequencies and no chance.
+
+Axle i meets the road D_i seconds late and moves the vehicle by x_i, so that x = sum x_i. A step of the classical
+Runge-Kutta method reads the filters f of the road at its begin, middle and end:
+
+    x_i(t + h) = R x_i(t) + sum_c B_ic f(t - D_i + c h),  c = 0, 1/2, 1
+
+The covariance S(a - b) of f(a) and f(b) is exact, so that of x_i with f and of x_i with x_j follow from the recursion.
+In the motions of the vehicle R is diagonal.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import expm, solve_continuous_lyapunov
+
+from models.ride.choice.march import March
+
+SHARES = (0.0, 0.5, 1.0)
+"""Of a step, where it reads the road."""
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """Runs of ``march``, whose quantities have no weightings."""
+
+    march: March
+
+    @property
+    def longest(self) -> float:
+        """Longest stable step (s)."""
+        return self.march.longest
+
+    def deviations(self, step: float) -> np.ndarray:
+        """Standard deviations (q,) of the quantities at the steps (s) of a run."""
+        assert not self.march.weightings
+        return _Steps(self.march, step).deviations()
+
+
+@dataclass(frozen=True)
+class _Steps:
+    """A run of ``march`` in steps (s)."""
+
+    march: March
+    step: float
+
+    def deviations(self) -> np.ndarray:
+        """Standard deviations (q,) of the quantities."""
+        axles = range(len(self._delays))
+        total = np.zeros(len(self.march.rows))
+        for i in axles:
+            for j in [i] if self.march.reduced.excitation.independent else axles:
+                total += self._shared(i, j)
+        return np.asarray(np.sqrt(total))
+
+    def _shared(self, i: int, j: int) -> np.ndarray:
+        """Covariances (q,) of what axle i moves with what axle j moves."""
+        seen, (by_i, by_j), late = self.march.motions[1], (self._by_road(i), self._by_road(j)), self._late(i, j)
+        motions = np.einsum("ql,lm,qm->q", seen, self._motions(i, j), seen.conj())
+        with_road = np.einsum("ql,lm,qm->q", seen, self._with_road(i, late), by_j)
+        back = np.einsum("ql,lm,qm->q", seen, self._with_road(j, -late), by_i)
+        road = np.einsum("ql,lm,qm->q", by_i, self._road(-late), by_j)
+        return np.asarray((motions + with_road + back + road).real)
+
+    def _late(self, i: int, j: int) -> float:
+        """Time (s) by which the road of axle j is ahead of that of axle i."""
+        return self._delays[i] - self._delays[j]
+
+    @cached_property
+    def _delays(self) -> np.ndarray:
+        return np.array(self.march.reduced.excitation.lengths) / self.march.speed
+
+    @cached_property
+    def _rate(self) -> np.ndarray:
+        """Of the filters in time (m, m), 1/s."""
+        return self.march.speed * self.march.reduced.excitation.F
+
+    @cached_property
+    def _variance(self) -> np.ndarray:
+        """Of the filters (m, m)."""
+        G = self.march.reduced.excitation.G
+        return np.asarray(solve_continuous_lyapunov(self._rate, -self.march.speed * G @ G.T))
+
+    def _road(self, later: float) -> np.ndarray:
+        """S (m, m): the filters by themselves ``later`` seconds before."""
+        if later < 0:
+            return self._road(-later).T
+        return np.asarray(expm(self._rate * later) @ self._variance)
+
+    def _by_road(self, axle: int) -> np.ndarray:
+        """Quantities by an axle's filters (q, m)."""
+        m = len(self._rate)
+        at = self.march.vehicle + axle * m
+        return self.march.heard(np.eye(self.march.reduced.states))[:, at : at + m]
+
+    @cached_property
+    def _grown(self) -> np.ndarray:
+        """R (n,) of the motions."""
+        z = self.step * self.march.motions[0]
+        return np.asarray(1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24)
+
+    def _moved(self, axle: int) -> list[np.ndarray]:
+        """B (n, m) by share of the step."""
+        rates, _, forced = self.march.motions
+        h, z, m, road = self.step, (self.step * rates)[:, None], len(self._rate), self.march.reduced.excitation
+        axles = len(road.heights)
+        force = forced[:, axle * m : (axle + 1) * m]
+        white = forced[:, axles * m :].reshape(len(rates), axles, -1)[:, axle]
+        noise = white @ np.linalg.pinv(self.march.speed**0.5 * road.G)
+        begin, middle = 1 + z + z**2 / 2 + z**3 / 4, 4 + 2 * z + z**2 / 2
+        mean = begin + middle + 1
+        ends, between = np.eye(m) / h, self._rate / 6
+        return [h / 6 * (begin * force - mean * (noise @ (ends + between))),
+                h / 6 * (middle * force - mean * (noise @ (4 * between))),
+                h / 6 * (force + mean * (noise @ (ends - between)))]  # fmt: skip
+
+    def _driven(self, axle: int, late: float) -> np.ndarray:
+        """A step's forces (n, m) by the filters ``late`` seconds after the step begins, in the axle's own time."""
+        parts = zip(self._moved(axle), SHARES, strict=True)
+        return np.asarray(sum(B @ self._road(share * self.step - late) for B, share in parts))
+
+    def _with_road(self, axle: int, after: float) -> np.ndarray:
+        """x of an axle by the filters that it meets ``after`` seconds later (n, m); before, where that is negative."""
+        steps = max(int(np.ceil(-after / self.step)), 0)
+        begin = after + steps * self.step
+        value, given = self._now(axle) @ expm(self._rate.T * begin), np.zeros(())
+        sooner = np.linalg.solve(self._variance, self._road(self.step))
+        for i in range(steps):
+            given = given @ sooner if i > 1 else self._driven(axle, begin - i * self.step)
+            value = self._grown[:, None] * value + given
+        return np.asarray(value)
+
+    def _now(self, axle: int) -> np.ndarray:
+        """x of an axle by the filters that it meets at that time (n, m)."""
+        kept, given = expm(self._rate.T * self.step), self._driven(axle, self.step)
+        return np.array([np.linalg.solve((np.eye(len(kept)) - grown * kept).T, row)
+                         for grown, row in zip(self._grown, given, strict=True)])  # fmt: skip
+
+    def _motions(self, i: int, j: int) -> np.ndarray:
+        """x of axle i by x of axle j (n, n)."""
+        given = self._grown[:, None] * self._before(i, j)
+        given += (self._grown[:, None] * self._before(j, i)).conj().T
+        given += sum(B @ self._driven(j, share * self.step + self._late(j, i)).conj().T
+                     for B, share in zip(self._moved(i), SHARES, strict=True))  # fmt: skip
+        return np.asarray(given / (1 - self._grown[:, None] * self._grown.conj()))
+
+    def _before(self, i: int, j: int) -> np.ndarray:
+        """x of axle i at a step's begin by the forces of axle j in that step (n, n)."""
+        return np.asarray(sum(self._with_road(i, self._late(i, j) + share * self.step) @ B.conj().T
+                              for B, share in zip(self._moved(j), SHARES, strict=True)))  # fmt: skip
