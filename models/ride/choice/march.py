@@ -123,7 +123,7 @@ class March:
         return met.transpose(1, 0, 2), noise.transpose(1, 0, 2)
 
 
-class Run(Protocol):
+class RunInSteps(Protocol):
     """Runs in time of a scene at a speed, in steps (s)."""
 
     @property
@@ -134,7 +134,7 @@ class Run(Protocol):
         """Standard deviations (q,) of what a run in steps (s) samples."""
 
 
-def longest_step(marches: Sequence[Run], exact: list[np.ndarray], tolerance: float) -> float:
+def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], tolerance: float) -> float:
     """Longest step (s) up to which runs at every speed keep quantities within a tolerance of ``exact`` deviations.
 
     exact : of the whole scene, (q,) for each march. 0 where the shortest step that is looked at breaks it.
