@@ -38,6 +38,25 @@ def write_whole(path: Path, content: bytes | memoryview | str) -> None:
         part.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
+def drop_parts(folder: Path) -> None:
+    """Remove from a folder, and from those within it, what killed processes left of files that they wrote."""
+    for part in folder.rglob(PART.format("*", "*", "*")):
+        number = part.name.rpartition(".part")[0].rpartition(".")[2]
+        if number.isdigit() and not _at_work(int(number)):
+            part.unlink(missing_ok=True)
+
+
+def _at_work(process: int) -> bool:
+    """Whether another process of this number lives, where a system can be asked without harm."""
+    if os.name != "posix":
+        return True
+    try:
+        os.kill(process, 0)
+    except OSError as error:
+        return error.errno == errno.EPERM
+    return process != os.getpid()
+
+
 def reason_of(error: OSError) -> str:
     """What the system says of a file that could not be written, as a phrase with the file."""
     reason = "the disk is full" if error.errno in FULL else error.strerror or str(error)

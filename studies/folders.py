@@ -7,7 +7,7 @@ from itertools import count
 from pathlib import Path
 
 from models.errors import InputError
-from models.whole_files import FULL
+from models.whole_files import FULL, drop_parts
 
 COMMAND = "command.txt"
 """First file of a folder that the user named: what made the others."""
@@ -36,11 +36,15 @@ def new_folder(wanted: Path | None, name: str) -> Path:
 
 
 def resumed_folder(wanted: Path, blocks: str) -> Path:
-    """The folder of an earlier run, with finished work in its folder ``blocks`` or nothing yet; else InputError."""
+    """The folder of an earlier run, with finished work in its folder ``blocks`` or nothing yet; else InputError.
+
+    What the run left of files when it was killed is removed.
+    """
     begun = wanted.is_dir() and {path.name for path in wanted.iterdir()} <= {COMMAND}
     if not begun and not (wanted / blocks).is_dir():
         allowed = f"holds no unfinished run: name a folder with {blocks!r} in it, or leave out --resume"
         raise InputError("--resume", "", str(wanted), allowed)
+    drop_parts(wanted)
     return wanted
 
 

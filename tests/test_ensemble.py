@@ -233,9 +233,16 @@ def _full_after(writes):
 def test_two_processes_never_work_in_one_folder(folder, tmp_path):
     with store.locked(tmp_path), pytest.raises(InputError, match="another process is at work"):
         run_paths(job(folder), 2, tmp_path)
-    (tmp_path / whole_files.PART.format("block 000000.npz", 1, ".npz")).touch()  # of a process that was killed
+    (tmp_path / whole_files.PART.format("block 000000.npz", ended(), ".npz")).touch()  # of a process that was killed
     run_paths(job(folder), 2, tmp_path)
-    assert not list(tmp_path.glob("*.part")) and not list(tmp_path.glob(".*.part"))
+    assert not list(tmp_path.glob("*.part*")) and not list(tmp_path.glob(".*.part*"))
+
+
+def ended():
+    """Number of a process that is no more."""
+    with subprocess.Popen([sys.executable, "-c", ""]) as child:
+        child.wait()
+    return child.pid
 
 
 @pytest.mark.parametrize(("change", "place"), [

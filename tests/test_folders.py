@@ -1,5 +1,7 @@
 """Result folders: no two runs ever share one, and none of an earlier run is touched."""
 
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -8,7 +10,8 @@ import numpy as np
 from models.errors import InputError
 from models.scene import build
 from models.simulate import simulate
-from studies.folders import COMMAND, drop_if_empty, new_folder
+from models.whole_files import PART
+from studies.folders import COMMAND, drop_if_empty, new_folder, resumed_folder
 from studies.single_run import difference
 
 
@@ -31,6 +34,19 @@ def test_one_named_folder_goes_to_one_run_alone(tmp_path):
         for i in range(20):
             taken = list(pool.map(take, [tmp_path / f"same{i}"] * 8))
             assert sum(folder is not None for folder in taken) == 1
+
+
+def test_a_resumed_folder_keeps_no_part_of_a_killed_process_and_those_of_living_ones(tmp_path):
+    (tmp_path / "points").mkdir()
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as child:
+        files = [folder / PART.format("sweep.png", child.pid, ".png") for folder in (tmp_path, tmp_path / "points")]
+        files.append(tmp_path / "notes.part.png")
+        for file in files:
+            file.touch()
+        assert resumed_folder(tmp_path, "points") == tmp_path and all(file.exists() for file in files)
+        child.communicate(b"\n")
+    resumed_folder(tmp_path, "points")
+    assert [file.exists() for file in files] == [False, False, True]
 
 
 def test_a_run_that_saved_nothing_leaves_nothing(tmp_path):

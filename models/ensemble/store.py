@@ -16,7 +16,7 @@ import numpy as np
 
 from models.errors import InputError
 from models.result import PACKAGES
-from models.whole_files import PART, write_whole
+from models.whole_files import drop_parts, write_whole
 
 Arrays = dict[str, np.ndarray]
 JOB = "job.json"
@@ -39,8 +39,7 @@ class Store:
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         with locked(self.folder):
-            for part in self.folder.glob(PART.format("*", "*", "*")):
-                part.unlink(missing_ok=True)  # of a process that was killed while it wrote
+            drop_parts(self.folder)
             self._claim(fingerprint(facts))
             yield
 
