@@ -381,7 +381,7 @@ def _told(found: Found) -> list[str]:
     """Lines for the terminal: findings that matter, and how the runs ended."""
     lines = [f"  {finding.weight}: {finding.text}" for finding in found.findings if finding.weight != "note"]
     notes = sum(finding.weight == "note" for finding in found.findings)
-    lines.append(f"  {notes} things were looked at and found good: see the page")
+    lines.append(f"  {notes} notes say what was looked at and found good, or could not be looked at: see the page")
     lines += [f"  {what} of the free run: {own}" for what, own in found.trust]
     for name, outcome in found.runs.items():
         end = found.failed.get(name, "to the end")
