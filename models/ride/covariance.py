@@ -64,12 +64,13 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
     if split.marginal:
         P, correction, V = _with_marginal(split, B, delays, system.independent, P, correction)
     C = system.C @ V
-    variance, change = _seen(C, P).clip(0.0), _seen(C, correction)
-    floor = silence(C, P)
+    floor, change = silence(C, P), _seen(C, correction)
+    variance = _seen(C, P)
+    variance = np.where(variance > floor, variance, 0.0)
     grown = growth(split, B, delays, system.C, system.independent, variance + floor, accuracy)
     status, reason = verdicts(D, variance, floor, grown, float(np.linalg.norm(split.S)), accuracy, split)
     finite = np.array([found == FINITE for found in status])
-    error = np.divide(abs(change), variance, out=np.zeros(len(variance)), where=finite & (variance > floor))
+    error = np.divide(abs(change), variance, out=np.zeros(len(variance)), where=finite & (variance > 0))
     error += split.neglected
     if (error[finite] > UNCERTAIN).any():
         _refuse(system.names[int(np.where(finite, error, 0.0).argmax())], float(error[finite].max()))
@@ -80,7 +81,9 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
 
 def silence(C: np.ndarray, P: np.ndarray) -> np.ndarray:
     """Variances (p,) of y = C x up to which an output counts as silent, its variance as rounding."""
-    return np.asarray(SILENT * (abs(C) ** 2).max(axis=1) * abs(P).max(initial=0.0))
+    terms = abs(C) @ np.sqrt(abs(np.diagonal(P)))
+    most = abs(C).max(axis=1) * np.sqrt(abs(P).max(initial=0.0))
+    return np.asarray(np.maximum(CANCELLED * terms, SILENT * most) ** 2, float)
 
 
 def hits(system: DelayedSystem) -> tuple[list[np.ndarray], list[np.ndarray], list[float]]:
@@ -117,9 +120,12 @@ def noise_of(system: DelayedSystem) -> np.ndarray:
 
 
 def intensity(A: np.ndarray, B: Sequence[np.ndarray], delays: Sequence[float], independent: bool) -> np.ndarray:
-    """Q (n, n) of A P + P A' + Q = 0: what the noise of all hits adds to the covariance per second, delays exact."""
-    before = _responses(A, B, delays, independent)
-    return np.asarray(sum(b @ b.T + f @ b.T + b @ f.T for f, b in zip(before, B, strict=True)))
+    """Q (n, n) of A P + P A' + Q = 0: what the noise of all hits adds to the covariance per second, delays exact.
+
+    Squares in extended precision: where two axles' noises cancel in an output, so do the squares of their rounding.
+    """
+    before, at = ([each.astype(np.longdouble) for each in own] for own in (_responses(A, B, delays, independent), B))
+    return np.asarray(sum(b @ b.T + f @ b.T + b @ f.T for f, b in zip(before, at, strict=True)))
 
 
 def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
@@ -209,8 +215,9 @@ def _seen(C: np.ndarray, P: np.ndarray) -> np.ndarray:
     return np.einsum("pi,ij,pj->p", C.astype(np.longdouble), P, C.astype(np.longdouble)).astype(float)
 
 
-SILENT = 1e-24
-"""A variance this much smaller than its largest term could make it is zero by symmetry, and all of it rounding."""
+CANCELLED, SILENT = 1e-9, 1e-12
+"""Deviations this much smaller than their terms together, or than the largest state could make them, are zero by
+symmetry, and all of them rounding: motions are told to about ten digits, and states at rest to those of P."""
 
 
 def verdicts(D: Sequence[np.ndarray], variance: np.ndarray, floor: np.ndarray, grown: Growth, fastest: float,

@@ -93,8 +93,8 @@ def quadrature(vehicle: LinearVehicle, excitation: Excitation, speed: float,
     """Variances as integrals over all frequencies, weighted outputs in place of their own; inf where one diverges.
 
     The error holds what halving the panels changes, the tail beyond the last one, and what a last digit of the
-    stiffness changes: that is much for places of a vehicle that is free to drive away. Raises Unstable: an integral
-    over frequencies is finite then, and means nothing.
+    largest stiffness of each motion changes: that is much for places of a vehicle that is free to drive away. Raises
+    Unstable: an integral over frequencies is finite then, and means nothing.
     """
     _check_stable(vehicle)
 
@@ -108,8 +108,10 @@ def quadrature(vehicle: LinearVehicle, excitation: Excitation, speed: float,
     frequencies = _breaks(vehicle, excitation, speed)
     edges = np.column_stack([frequencies[:-1], frequencies[1:]])
     first = over(edges)
-    digit = EPS * np.cos(np.arange(vehicle.stiffness.size)).reshape(vehicle.stiffness.shape)
-    nudged = over(edges, replace(vehicle, stiffness=vehicle.stiffness * (1 + digit)))
+    stiffness = vehicle.stiffness
+    largest = np.sqrt(abs(stiffness).max(axis=1, initial=0.0))
+    digit = EPS * np.outer(largest, largest) * np.cos(np.arange(stiffness.size)).reshape(stiffness.shape)
+    nudged = over(edges, replace(vehicle, stiffness=stiffness + digit))
     rounding = 10 * abs((nudged - first).sum(axis=0))  # one draw of many
     seen = abs(_weighted(vehicle, frequencies[1:], weights or {})) @ abs(road(excitation, speed, frequencies[1:]))
     terms = np.einsum("ambk,ambk,m->b", seen, seen, frequencies[1:])
