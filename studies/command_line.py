@@ -1,5 +1,6 @@
 """The command ``twinrig``: list, show, run, price, validate."""
 
+import io
 import json
 import signal
 import sys
@@ -42,6 +43,8 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON 
 def main() -> None:
     """Run the command; a user's mistake is one message and exit code 2, a failed run exit code 1."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # how schedulers end a job: as Ctrl-C does
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # names of files may hold bytes that are no text
     try:
         sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0)
     except TyperException as error:  # what was typed does not fit the command's options

@@ -51,7 +51,7 @@ def resumed_folder(wanted: Path, blocks: str) -> Path:
 def _marked(folder: Path) -> bool:
     """Put the command into the folder as its first file; False if another run was faster."""
     try:
-        with (folder / COMMAND).open("x") as file:
+        with (folder / COMMAND).open("x", encoding="utf-8", errors="backslashreplace") as file:
             file.write(" ".join(sys.argv) + "\n")
     except FileExistsError:
         return False

@@ -297,6 +297,25 @@ HOSTILE = {
 }
 
 
+def test_prints_of_a_controller_leave_standard_output_to_the_results(tmp_path, capfd):
+    """JSON of a run could not be read behind them."""
+    (tmp_path / "talks.py").write_text(
+        "import numpy as np\nfrom models.braking.controller import Command\nclass Talks:\n"
+        "    def __init__(self, wheels): pass\n    def sample(self, given):\n        print('noise', flush=True)\n"
+        "        return Command(valves=np.ones(4))\n")  # fmt: skip
+    run = Run(RADIUS, SAMPLE, folder=tmp_path)
+    with opened(PortTable(callable="talks.py:Talks", start=PATIENT), run, Example(4)) as (other, _):
+        ask(other, of())
+    said = capfd.readouterr()
+    assert said.out == "" and "noise" in said.err
+
+
+def test_what_a_controller_says_of_its_failure_is_a_line_that_can_be_printed():
+    error = ControllerFailed(of(), "crash", "ValueError: \ud800 \n\n\t boom" + 10_000 * "x")
+    assert str(error).splitlines() == [str(error)] and r"\ud800 boom" in str(error) and len(str(error)) < 1000
+    str(error).encode()
+
+
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_a_hostile_callable_ends_by_name_and_in_time(kind, tmp_path):
     name, does = HOSTILE[kind]

@@ -24,7 +24,7 @@ WITH_SLOW = STATES | {SLOW}
 ROUNDING = 1e-9
 """Share by which a pressure may exceed that of the supply."""
 HERE = Path(__file__).parent
-LONGEST = 2000
+LONGEST = 500
 """Characters that are kept of an error's text."""
 
 
@@ -33,6 +33,7 @@ class ControllerFailed(RunFailed):
     why : the fault, as a phrase."""
 
     def __init__(self, given: Sample, name: str, reason: str) -> None:
+        reason = " ".join(reason.encode(errors="backslashreplace").decode().split())[:LONGEST]
         self.name, self.number, self.why = name, given.number, reason
         super().__init__("controller", f"sample {given.number}: {name}: {reason}", 1e-9 * given.time)
 
@@ -57,7 +58,7 @@ def raised(error: BaseException) -> str:
     lines = [frame for frame in extract_tb(error.__traceback__)
              if "site-packages" not in frame.filename and Path(frame.filename).parent != HERE]  # fmt: skip
     where = f" ({Path(lines[-1].filename).name}, line {lines[-1].lineno})" if lines else ""
-    return f"{type(error).__name__}: {error}"[:LONGEST] + where
+    return f"{type(error).__name__}: {error}"[: LONGEST - len(where)] + where
 
 
 @dataclass

@@ -17,6 +17,8 @@ from models.errors import InputError, RunFailed
 
 LOOPBACK = "127.0.0.1"
 """The only address that this port ever listens on."""
+STDERR = 2
+"""Where a controller's own prints go: standard output is for the results alone."""
 GRACE = 0.5
 """Seconds for a process to end by itself once its connection is closed at the end of a run."""
 
@@ -139,7 +141,8 @@ def _started(words: Sequence[str] | None, port: int, folder: Path) -> Iterator[s
         return
     said = [word.replace("{port}", str(port)) for word in words]
     try:
-        process = subprocess.Popen(said, cwd=folder, stdin=subprocess.DEVNULL, start_new_session=True)
+        process = subprocess.Popen(said, cwd=folder, stdin=subprocess.DEVNULL, stdout=STDERR,
+                                   start_new_session=True)
     except OSError as error:
         raise InputError("", "command", list(words), f"cannot be started: {error.strerror}") from None
     grace = 0.0
