@@ -114,9 +114,9 @@ def _stable(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float],
 
 
 def noise_of(system: DelayedSystem) -> np.ndarray:
-    """``intensity`` of a system's own noise."""
+    """``intensity`` of a system's own noise, in double precision."""
     B, _, delays = hits(system)
-    return intensity(system.A, B, delays, system.independent)
+    return intensity(system.A, B, delays, system.independent).astype(float)
 
 
 def intensity(A: np.ndarray, B: Sequence[np.ndarray], delays: Sequence[float], independent: bool) -> np.ndarray:

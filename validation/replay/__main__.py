@@ -1,0 +1,84 @@
+"""``python -m validation.replay``: record what the command line answers, or check a later version against that."""
+
+import argparse
+import fnmatch
+import shutil
+import sys
+import tempfile
+import tomllib
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from validation.replay import jobs as asked
+from validation.replay.answers import Answer, answer
+from validation.replay.differences import difference
+from validation.replay.kept import load, read_jobs, save, thinned, write_jobs
+
+
+def main(words: list[str]) -> int:
+    """Exit code 1 where a value, an exit code or a channel differs."""
+    parser = argparse.ArgumentParser(prog="python -m validation.replay", description=__doc__)
+    parser.add_argument("what", choices=("record", "check"))
+    parser.add_argument("folder", type=Path, help="of the recording; one that was begun is gone on with")
+    parser.add_argument("--command", default=str(Path(sys.executable).with_name("twinrig")), help="the twinrig to ask")
+    parser.add_argument("--only", default="*", help="names of jobs, as in `wheelset*`")
+    parser.add_argument("--every", type=int, default=1, help="only each so manieth job")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--bound", type=float, default=0.0, help="change that is allowed, by a channel's largest number")
+    parser.add_argument("--renamed", type=Path, help="TOML of earlier names of channels and later ones")
+    given = parser.parse_args(words)
+    if given.what == "record":
+        return _record(given)
+    return _check(given)
+
+
+def _record(given: argparse.Namespace) -> int:
+    given.folder.mkdir(parents=True, exist_ok=True)
+    if not (given.folder / "jobs.json").exists():
+        write_jobs(given.folder, asked.jobs(given.command))
+    left = [job for job in _chosen(given) if load(given.folder, job.name) is None]
+    for job, now in _answers(left, given):
+        save(given.folder, job.name, now)
+        print(f"{now.seconds:7.1f} s  code {now.code}  {len(now.arrays):4} arrays  {job.name}", flush=True)
+    return 0
+
+
+def _check(given: argparse.Namespace) -> int:
+    renamed = tomllib.loads(given.renamed.read_text()) if given.renamed else {}
+    counts = {"same": 0, "differ": 0, "other words": 0}
+    for job, now in _answers(_chosen(given), given):
+        before = load(given.folder, job.name)
+        if before is None:
+            print(f"{job.name}: was not recorded")
+            continue
+        told = difference(before, now, given.bound, renamed)
+        counts["differ" if told.wrong else "other words" if told.other else "same"] += 1
+        for text in (told.wrong or told.other)[:5]:
+            print(f"{job.name}: {'DIFFERS: ' if told.wrong else ''}{text}", flush=True)
+    print(", ".join(f"{count} {what}" for what, count in counts.items()))
+    return 1 if counts["differ"] else 0
+
+
+def _chosen(given: argparse.Namespace) -> list[asked.Job]:
+    return [job for job in read_jobs(given.folder)[:: given.every] if fnmatch.fnmatch(job.name, given.only)]
+
+
+def _answers(jobs: list[asked.Job], given: argparse.Namespace,
+             ask: Callable[[asked.Job, str, Path], Answer] = answer) -> Iterator[tuple[asked.Job, Answer]]:  # fmt: skip
+    """Answers as they come in the jobs' order, several commands at a time."""
+    folder = Path(tempfile.mkdtemp(prefix="replay-"))
+
+    def one(job: asked.Job) -> Answer:
+        now = ask(job, given.command, folder / job.name)
+        return Answer(now.code, now.message, now.seconds, thinned(now.arrays))
+
+    try:
+        with ThreadPoolExecutor(given.workers) as pool:
+            yield from zip(jobs, pool.map(one, jobs), strict=True)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

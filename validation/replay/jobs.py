@@ -1,0 +1,131 @@
+"""The commands that are recorded: all shipped scenes as they are, and varied ones drawn from base scenes by a seed."""
+
+import copy
+import subprocess
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+SCENES = Path(__file__).with_name("scenes")
+"""Base scenes: each names as many tables as go together, short to run, and the files that they read."""
+VARIED, SEED = 300, 20
+DROPPED, CHANGED, MISTAKEN = 0.25, 0.6, 0.2
+"""Chances that a table goes, that numbers change, that the scene has a mistake."""
+FACTORS = (0.7, 1.4)
+"""By which a number that changes is multiplied, at random between them."""
+ENGINES = ("reference", "exudyn", "mujoco", "all")
+KEPT = ("title", "system", "study", "vehicle", "run", "options", "quantities", "tolerance")
+"""Keys that never go by chance."""
+
+Table = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One command: ``words`` after ``twinrig``, and the scene (TOML) that it reads as ``scene.toml``, if it has one."""
+
+    name: str
+    words: tuple[str, ...]
+    scene: str = ""
+
+
+def jobs(command: str) -> list[Job]:
+    """All of them; ``command``: the twinrig that lists the shipped scenes."""
+    return [Job("list", ("list",)), *_shipped(command), *_bases(), *_varied()]
+
+
+def _shipped(command: str) -> Iterator[Job]:
+    """Every scene that is listed: shown, and run as it is."""
+    said = subprocess.run([command, "list"], capture_output=True, text=True, check=True).stdout
+    for line in said.splitlines()[1:]:
+        if not line.startswith("  "):
+            return
+        name = line.split()[0]
+        yield Job(f"show-{name}", ("show", name))
+        yield Job(f"run-{name}", ("run", name, "--json", "--out", "out"))
+
+
+def _bases() -> Iterator[Job]:
+    """Every base scene as it is: shown, and run in every engine that it is for."""
+    from tomli_w import dumps
+
+    for base in sorted(SCENES.glob("*.toml")):
+        scene = tomllib.loads(base.read_text())
+        engines = scene.pop("engines_asked", ENGINES)
+        yield Job(f"{base.stem}-show", ("show", "scene.toml"), dumps(scene))
+        for engine in engines or ("",):
+            yield Job(f"{base.stem}-{engine or 'plain'}", _run(engine), dumps(scene))
+
+
+def _run(engine: str) -> tuple[str, ...]:
+    return ("run", "scene.toml", *(("--engine", engine) if engine else ()), "--json", "--out", "out")
+
+
+def _varied() -> Iterator[Job]:
+    bases = sorted(SCENES.glob("*.toml"))
+    for i in range(VARIED):
+        base = bases[i % len(bases)]
+        random = np.random.default_rng([SEED, i])
+        yield _drawn(f"{base.stem}-{i:03d}", tomllib.loads(base.read_text()), random)
+
+
+def _drawn(name: str, scene: Table, random: np.random.Generator) -> Job:
+    """A base scene less some tables, with other numbers, another engine, perhaps a mistake."""
+    from tomli_w import dumps
+
+    engines = scene.pop("engines_asked", ENGINES)
+    engine = str(random.choice(engines)) if engines else ""
+    _drop(scene, random)
+    if random.random() < CHANGED:
+        for place in random.permutation(list(_numbers(scene)))[:3]:
+            _change(scene, str(place), float(random.uniform(*FACTORS)))
+    if random.random() < MISTAKEN:
+        engine = _mistake(scene, engine, random)
+    return Job(name, _run(engine), dumps(scene))
+
+
+def _drop(scene: Table, random: np.random.Generator) -> None:
+    for table in (scene, scene.get("effects", {})):
+        for key in list(table):
+            if isinstance(table[key], dict) and key not in (*KEPT, "effects") and random.random() < DROPPED:
+                del table[key]
+
+
+def _numbers(table: Table, above: str = "") -> Iterator[str]:
+    """Places (keys joined by /) of all numbers that are not whole."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _numbers(value, f"{above}{key}/")
+        elif isinstance(value, float):
+            yield f"{above}{key}"
+
+
+def _at(scene: Table, place: str) -> tuple[Table, str]:
+    *above, key = place.split("/")
+    for part in above:
+        scene = scene[part]
+    return scene, key
+
+
+def _change(scene: Table, place: str, factor: float) -> None:
+    table, key = _at(scene, place)
+    table[key] = float(f"{factor * table[key]:.4g}")
+
+
+def _mistake(scene: Table, engine: str, random: np.random.Generator) -> str:
+    """Spoil a scene as users do; the engine that is asked for then."""
+    before = copy.deepcopy(scene)
+    places = sorted(_numbers(before))
+    kind = int(random.integers(5))
+    if kind == 0 or not places:
+        scene["vehicel"] = {}
+    elif kind == 4:
+        return "exodyn"
+    else:
+        table, key = _at(scene, str(random.choice(places)))
+        table[key] = {1: "a text", 2: -abs(table[key]) - 1.0, 3: float("nan")}[kind]
+    return engine

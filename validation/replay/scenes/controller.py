@@ -1,0 +1,14 @@
+"""A controller that releases a wheel that slips."""
+
+import numpy as np
+
+from models.braking.controller import Command
+
+
+class Releases:
+    def __init__(self, wheels, below=0.8):
+        self.below = below
+
+    def sample(self, given):
+        slow = np.asarray(given.wheels) < self.below * np.max(given.wheels)
+        return Command(valves=np.where(slow, -1, 1))
