@@ -89,7 +89,8 @@ def _drawn(name: str, scene: Table, random: np.random.Generator) -> Job:
 
 
 def _drop(scene: Table, random: np.random.Generator) -> None:
-    for table in (scene, scene.get("effects", {})):
+    effects = scene.get("effects")
+    for table in (scene, effects if isinstance(effects, dict) else {}):
         for key in list(table):
             if isinstance(table[key], dict) and key not in (*KEPT, "effects") and random.random() < DROPPED:
                 del table[key]
