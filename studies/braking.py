@@ -54,6 +54,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
                 paths[engine] = path
                 save(scene, name, path, folder / (f"{name}.nc" if len(engines) == 1 else f"{name}_{engine}.nc"))
         if not paths:
+            if not any(place.startswith(f"{name}, ") for place in failed):
+                table.append(f"  {name}: stands within two samples of {scene.run.sample:g} s: it has no figures")
             continue
         stop = Stop(next(iter(paths.values())))
         radius = plane_of(scene).radius

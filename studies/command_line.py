@@ -5,7 +5,7 @@ import json
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -151,10 +151,21 @@ def run(
         return _sweep(sweep, scene, engine, changes, out, resume, as_json)
     loaded = load_scene(scene, changes)
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
-    module = ready(loaded, engines)
+    module = _ready(loaded, engines)
     folder = _folder(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
     doubts = findings_of(loaded)
     _finish(lambda progress: module.run(loaded, engines, folder, progress), folder, as_json, doubts)
+
+
+def _ready(scene: Any, engines: tuple[str, ...]) -> Any:
+    """The study's module; where a scene is refused, doubts about its input are told, too, for they may be the cause."""
+    try:
+        return ready(scene, engines)
+    except InputError:
+        with suppress(InputError):
+            for line in lines(findings_of(scene)):
+                print(line, file=sys.stderr)
+        raise
 
 
 def _conformity(engine: str, more: bool, out: Path | None) -> None:
@@ -254,7 +265,7 @@ def _finish(work: Callable[[Any], dict[str, Any]], folder: Path, as_json: bool,
 
     doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results.
     """
-    from studies.folders import drop_if_empty
+    from studies.folders import COMMAND, drop_if_empty
 
     try:
         with _progress(as_json) as progress:
@@ -263,7 +274,8 @@ def _finish(work: Callable[[Any], dict[str, Any]], folder: Path, as_json: bool,
             summary["queries"] = queries(doubts)
             write_whole(folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
     except KeyboardInterrupt:
-        _end(f"interrupted; finished results are kept in {folder}", 130)
+        kept = {path.name for path in folder.iterdir()} > {COMMAND}
+        _end(f"interrupted; {f'finished results are kept in {folder}' if kept else 'nothing was finished'}", 130)
     finally:
         drop_if_empty(folder)
     if as_json:

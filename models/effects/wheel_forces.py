@@ -26,7 +26,7 @@ class Parameters(Strict):
     file: str = Field(description="CSV with the columns time [s], front [N], rear [N]; forces up on the wheels")
     interpolation: Interpolation = Field(description="held, linear or smooth between the samples")
     frame: Literal["inertial", "body"] = Field("inertial", description="axis of the forces: vertical, or the chassis'")
-    accept: list[Literal["weight", "balance", "sign", "unit", "swapped", "start"]] = Field(
+    accept: list[Literal["weight", "balance", "sign", "unit", "swapped", "start", "times"]] = Field(
         [], description="findings of the checks against the vehicle's weight that are meant as they are")
 
 

@@ -22,7 +22,7 @@ from models.measured.recording import Recording
 from models.measured.signal import Signal
 from models.vehicles.pitch_plane import Parameters
 
-CHECKS = ("weight", "balance", "sign", "unit", "swapped", "start")
+CHECKS = ("weight", "balance", "sign", "unit", "swapped", "start", "times")
 """Names of all findings."""
 AXLES = {"front": ("front", "front left", "front right"), "rear": ("rear", "rear left", "rear right")}
 """Where vertical forces may be measured: at an axle, or at its wheels, whose forces are added."""
@@ -58,6 +58,8 @@ OFF = 0.05
 """Share of its static load by which an axle may begin off it."""
 BAND = 1.0, 25.0
 """Hz, between which both axles feel the same road one after the other."""
+MANY, UNUSED = 1000, 100.0
+"""Samples of a record, and its length by that of the run, from which on its times are of another unit: milliseconds."""
 LAG = 0.02, 2.0
 """s, between the axles of a vehicle."""
 ALIKE = 0.3
@@ -252,11 +254,21 @@ def check(own: AxleForces) -> list[Finding]:
     if largest > IMPOSSIBLE * own.loads.sum():
         return [_error(own, "weight", f"A wheel force of {largest:.4g} N is none of a vehicle that weighs "
                        f"{own.loads.sum():.4g} N.", largest, "N")]  # fmt: skip
-    for look in (_explained, _coarse, _balance, _start):
+    for look in (_sparse, _explained, _coarse, _balance, _start):
         found = look(own)
         if found:
             return found + _dead(own)
     return _dead(own) + _order(own) or [_good(own)]
+
+
+def _sparse(own: AxleForces) -> list[Finding]:
+    """A long record of which a run takes next to nothing, too sparse for a wheel."""
+    if len(own.forces) < MANY or own.lasted < UNUSED * own.duration or own.period < 0.5 / BAND[1]:
+        return []
+    text = (f"The samples lie {own.period:.4g} s apart and last for {own.lasted:.4g} s, of which the run takes "
+            f"{own.duration:.4g} s; forces of a wheel move with up to {BAND[1]:g} Hz. If their times are in "
+            "milliseconds, head the column time [ms].")  # fmt: skip
+    return [Finding("times", "doubt", "wheel forces", text, own.period, "s", own.names)]
 
 
 def _explained(own: AxleForces) -> list[Finding]:

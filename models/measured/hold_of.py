@@ -16,9 +16,10 @@ def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
     """Noise (SI, by key) as stated; or else estimated, and not below what transducers have: filters hide noise."""
     usual, out = Hold(), dict[str, float]()
     for key, quantity in NOISE.items():
-        sizes = [noise(recording, s) for s in recording.find(quantity) if not s.check]
+        sizes = np.array([noise(recording, s) for s in recording.find(quantity) if not s.check])
+        known = sizes[np.isfinite(sizes)]  # none of a channel with too many gaps
         least = float(getattr(usual, key))
-        out[key] = getattr(stated, key) or float(np.nanmax([least, np.nanmedian(sizes)] if sizes else [least]))
+        out[key] = getattr(stated, key) or max(least, float(np.median(known)) if len(known) else least)
     return out
 
 

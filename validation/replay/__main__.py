@@ -25,7 +25,7 @@ def main(words: list[str]) -> int:
     parser.add_argument("--only", default="*", help="names of jobs, as in `wheelset*`")
     parser.add_argument("--every", type=int, default=1, help="only each so manieth job")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--bound", type=float, default=0.0, help="change that is allowed, by a channel's largest number")
+    parser.add_argument("--bound", type=float, default=0.0, help="allowed change, by a channel's largest number")
     parser.add_argument("--renamed", type=Path, help="TOML of earlier names of channels and later ones")
     given = parser.parse_args(words)
     if given.what == "record":

@@ -41,7 +41,8 @@ def thinned(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def save(folder: Path, name: str, answer: Answer) -> None:
     """Keep an answer; its note is written last."""
-    np.savez_compressed(folder / f"{name}.npz", **{str(i): array for i, array in enumerate(answer.arrays.values())})
+    arrays = {str(i): array for i, array in enumerate(answer.arrays.values())}
+    np.savez_compressed(folder / f"{name}.npz", allow_pickle=False, **arrays)
     note = {"code": answer.code, "message": answer.message, "seconds": answer.seconds, "arrays": list(answer.arrays)}
     (folder / f"{name}.json").write_text(json.dumps(note, indent=1))
 

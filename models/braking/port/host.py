@@ -10,7 +10,7 @@ import socket
 import struct
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -77,13 +77,16 @@ def main(port: int) -> None:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         try:
             serve(link)
+            return
         except ControllerFailed as error:
-            link.sendall(told(name=error.name, reason=error.why))
+            what = told(name=error.name, reason=error.why)
         except InputError as error:
-            link.sendall(told(file=error.file, place=error.place, value=error.value, allowed=error.allowed,
-                              choices=error.choices))  # fmt: skip
+            what = told(file=error.file, place=error.place, value=error.value, allowed=error.allowed,
+                        choices=error.choices)  # fmt: skip
         except BaseException as error:
-            link.sendall(told(name="crash", reason=raised(error)))
+            what = told(name="crash", reason=raised(error))
+        with suppress(OSError):  # nobody is left to hear it
+            link.sendall(what)
 
 
 if __name__ == "__main__":
