@@ -274,7 +274,7 @@ def _finish(work: Callable[[Any], dict[str, Any]], folder: Path, as_json: bool,
             summary["queries"] = queries(doubts)
             write_whole(folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
     except KeyboardInterrupt:
-        kept = {path.name for path in folder.iterdir()} > {COMMAND}
+        kept = {path.name for path in folder.iterdir()} - {COMMAND}
         _end(f"interrupted; {f'finished results are kept in {folder}' if kept else 'nothing was finished'}", 130)
     finally:
         drop_if_empty(folder)

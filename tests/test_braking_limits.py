@@ -102,3 +102,9 @@ def test_a_train_that_folds_ends_with_its_angle_and_keeps_its_path():
                     brakes={"supply": 2.0},
                     procedures={"stop": {"kind": "j_turn", "speed": 8.0, "steer": 0.1}}), "stop")  # fmt: skip
     assert len(told.value.partial.times) > 3
+
+
+def test_a_stop_within_one_sample_says_why_it_has_no_figures(twinrig, capsys, tmp_path):
+    (tmp_path / "still.toml").write_text('title = "t"\nsystem = "braking"\n[procedures.p]\nspeed = 1e-6\n')
+    assert twinrig("run", str(tmp_path / "still.toml"), "--out", str(tmp_path / "out")) == 0
+    assert "p: stands within two samples of 0.0055 s" in capsys.readouterr().out

@@ -138,6 +138,13 @@ def test_runs_that_all_fail_leave_no_folder(twinrig, capfd):
     assert not Path("results").exists()
 
 
+def test_an_interrupted_run_that_finished_nothing_says_so(twinrig, monkeypatch, capsys):
+    monkeypatch.setattr(single_run, "simulate", _failing("reference", KeyboardInterrupt()))
+    assert twinrig("run", "release", *SHORT, "--out", "mine") == 130
+    assert capsys.readouterr().err.strip() == "twinrig: interrupted; nothing was finished"
+    assert not Path("mine").exists()
+
+
 def test_an_interrupted_run_keeps_what_was_finished(twinrig, monkeypatch, capsys):
     assert twinrig("run", "release", *SHORT) == 0
     before = contents("results")

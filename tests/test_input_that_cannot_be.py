@@ -73,6 +73,23 @@ def test_wheel_forces_that_cannot_be_are_named(name):
     assert found and (found[0].weight, found[0].check) == (weight, kind), found
 
 
+def test_times_in_milliseconds_under_seconds_are_doubted():
+    """A run would take ten of ten thousand samples, each a second long."""
+    forces, lasted = true()[0], 20.0
+    for period, said in ((1e3 * PERIOD, ["times"]), (PERIOD, [])):
+        own = AxleForces(forces, period, TWIN, SIGNALS, lasted, IN_FILE)
+        assert [finding.check for finding in check(own) if finding.weight == "doubt"] == said
+    few = AxleForces(np.tile(LOADS, (5, 1)), 1000.0, TWIN, SIGNALS, lasted, IN_FILE)  # a constant load, as meant
+    assert not [finding for finding in check(few) if finding.check == "times"]
+
+
+def test_doubts_about_a_vehicle_stand_beside_its_refusal(twinrig, capsys):
+    """Only they tell why the step is too long: the chassis weighs a kilogram."""
+    assert twinrig("run", "release", "--set", "vehicle.override={m3=1.35}", "--set", "run.step=2e-3") == 2
+    *doubts, refused = capsys.readouterr().err.splitlines()
+    assert "in kg, not in tonnes" in doubts[0] and "stability limit" in refused
+
+
 def test_the_fall_that_is_told_is_that_of_the_run():
     found = judged(0.95 * true()[0])[0]
     fall = 0.05 * 9.81 * DURATION**2 / 2
