@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, NoReturn, get_args
 
 import typer
 from typer.exceptions import TyperException
@@ -17,6 +17,7 @@ from typer.exceptions import TyperException
 from models.errors import InputError, RunFailed
 from models.measured.file_kinds import is_measurement
 from models.measured.finding import Finding, lines, queries
+from models.strict import Query
 from models.whole_files import reason_of, write_whole
 from studies.asked import SCENES, engines_of, findings_of, load_scene, plan_of, ready
 
@@ -158,12 +159,12 @@ def run(
 
 
 def _ready(scene: Any, engines: tuple[str, ...]) -> Any:
-    """The study's module; where a scene is refused, doubts about its input are told, too, for they may be the cause."""
+    """The study's module; where a scene is refused, queries about its vehicle are told, too: they may be the cause."""
     try:
         return ready(scene, engines)
     except InputError:
         with suppress(InputError):
-            for line in lines(findings_of(scene)):
+            for line in lines(finding for finding in findings_of(scene) if finding.check in get_args(Query)):
                 print(line, file=sys.stderr)
         raise
 
