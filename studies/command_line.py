@@ -17,7 +17,6 @@ from typer.exceptions import TyperException
 from models.errors import InputError, RunFailed
 from models.measured.file_kinds import is_measurement
 from models.measured.finding import Finding, lines, queries
-from models.strict import Query
 from models.whole_files import reason_of, write_whole
 from studies.asked import SCENES, engines_of, findings_of, load_scene, plan_of, ready
 
@@ -160,6 +159,8 @@ def run(
 
 def _ready(scene: Any, engines: tuple[str, ...]) -> Any:
     """The study's module; where a scene is refused, queries about its vehicle are told, too: they may be the cause."""
+    from models.strict import Query
+
     try:
         return ready(scene, engines)
     except InputError:
