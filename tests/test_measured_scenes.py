@@ -216,6 +216,14 @@ def test_mistakes_in_the_map_are_told_in_one_sentence(tmp_path, change, said):
     assert "\n" not in str(error.value) and "Traceback" not in str(error.value)
 
 
+def test_a_name_that_a_file_has_twice_is_told_with_the_names_that_tell_them_apart(tmp_path):
+    rows = "\n".join(f"{0.01 * i:.2f},1.5,2.5" for i in range(200))
+    (tmp_path / "a.csv").write_text(f"time [s],fl [N],fl [N]\n{rows}\n")
+    own = scene(tmp_path, {"file": "a.csv", "channels": [force("fl", "fl")]})
+    with pytest.raises(InputError, match=r"is there 2 times in a.csv: name one of 'fl \(1\)', 'fl \(2\)'"):
+        signals(own, [open_source(tmp_path / "a.csv")], PLACES)
+
+
 def test_a_missing_wheel_or_angle_is_refused_before_anything_runs(tmp_path):
     t = np.arange(200) * 1e-2
     name = write_csv(tmp_path / "a.csv", t, fl__N=t)

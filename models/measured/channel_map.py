@@ -1,5 +1,6 @@
 """The channel map of a scene: each channel named in it, found in its file, with its factor to SI and its place."""
 
+import re
 from collections.abc import Sequence
 from difflib import get_close_matches
 
@@ -63,6 +64,11 @@ def find(source: Source, name: str, file: str, place: str) -> Channel:
         return found[0]
     if found:
         raise InputError(file, place, name, f"is there {len(found)} times in {source.path.name}: rename all but one")
+    same = re.compile(re.escape(name) + r" \(\d+\)")
+    numbered = [channel.name for channel in source.channels if same.fullmatch(channel.name)]
+    if numbered:
+        raise InputError(file, place, name, f"is there {len(numbered)} times in {source.path.name}: name one of "
+                         f"{', '.join(map(repr, numbered))}")  # fmt: skip
     raise InputError(file, place, name, f"no such channel in {source.path.name}{_near(name, source)}")
 
 
