@@ -151,18 +151,20 @@ def run(
         return _sweep(sweep, scene, engine, changes, out, resume, as_json)
     loaded = load_scene(scene, changes)
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
-    module = _ready(loaded, engines)
-    folder = _folder(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
-    doubts = findings_of(loaded)
-    _finish(lambda progress: module.run(loaded, engines, folder, progress), folder, as_json, doubts)
+    with _queried(loaded):
+        module = ready(loaded, engines)
+        folder = _folder(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
+        doubts = findings_of(loaded)
+        _finish(lambda progress: module.run(loaded, engines, folder, progress), folder, as_json, doubts)
 
 
-def _ready(scene: Any, engines: tuple[str, ...]) -> Any:
-    """The study's module; where a scene is refused, queries about its vehicle are told, too: they may be the cause."""
+@contextmanager
+def _queried(scene: Any) -> Iterator[None]:
+    """Where a scene is refused, tell queries about its vehicle, too: they may be the cause."""
     from models.strict import Query
 
     try:
-        return ready(scene, engines)
+        yield
     except InputError:
         with suppress(InputError):
             for line in lines(finding for finding in findings_of(scene) if finding.check in get_args(Query)):

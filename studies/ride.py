@@ -263,8 +263,8 @@ def _loads(vehicle: SpatialVehicle, found: Sweep) -> list[str]:
     """Dynamic wheel load factors in a line."""
     static = _static(vehicle)
     own = {name: float(found.of(found.cases[0], name)[-1]) for name in static}
-    parts = [f"{name} {dynamic_load_factor(own[name], load):.3f}" for name, load in static.items()
-             if np.isfinite(own[name])]  # fmt: skip
+    parts = [f"{name} {dynamic_load_factor(own[name], load):.3f}" if load > 0 else f"{name} has no load to carry"
+             for name, load in static.items() if np.isfinite(own[name])]  # fmt: skip
     return [f"  dynamic wheel load factor: {', '.join(parts)}"] if parts else []
 
 

@@ -17,7 +17,7 @@ from models.tables import ended
 from models.time_series import read_time_series, write_time_series
 from models.vehicles.plausible import plausible
 from models.vehicles.plausible_plane import plausible_plane
-from models.vehicles.vehicle_file import load_vehicle, shipped
+from models.vehicles.vehicle_file import SHIPPED, load_vehicle, shipped
 from studies.asked import findings_of, load_scene
 from validation.scenes import road_scene
 
@@ -88,6 +88,19 @@ def test_doubts_about_a_vehicle_stand_beside_its_refusal(twinrig, capsys):
     assert twinrig("run", "release", "--set", "vehicle.override={m3=1.35}", "--set", "run.step=2e-3") == 2
     *doubts, refused = capsys.readouterr().err.splitlines()
     assert "in kg, not in tonnes" in doubts[0] and "stability limit" in refused
+
+
+def test_a_wheel_that_carries_nothing_is_told_and_ends_no_run(twinrig, capsys, tmp_path):
+    """The centre of mass lies ahead of both axles: the rear wheel pulls on the road."""
+    vehicle = (SHIPPED / "half_car.toml").read_text()
+    ahead = vehicle.replace("position = [-0.011052666963241803,", "position = [5.0,")
+    assert ahead != vehicle
+    (tmp_path / "car.toml").write_text(ahead)
+    (tmp_path / "s.toml").write_text(
+        'title = "t"\nsystem = "ride"\n[vehicle]\nfile = "car.toml"\n[speeds]\nvalues = [20.0]\n')
+    assert twinrig("run", str(tmp_path / "s.toml"), "--engine", "reference", "--out", str(tmp_path / "out")) == 0
+    said = capsys.readouterr().out
+    assert "the wheel pulls on the road" in said and "tyre force rear left has no load to carry" in said
 
 
 def test_the_fall_that_is_told_is_that_of_the_run():
