@@ -6,14 +6,14 @@ import shutil
 import sys
 import tempfile
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from validation.replay import jobs as asked
 from validation.replay.answers import Answer, answer
 from validation.replay.differences import difference
-from validation.replay.kept import load, read_jobs, save, thinned, write_jobs
+from validation.replay.kept import load, read_jobs, save, write_jobs
 
 
 def main(words: list[str]) -> int:
@@ -40,7 +40,8 @@ def _record(given: argparse.Namespace) -> int:
     left = [job for job in _chosen(given) if load(given.folder, job.name) is None]
     for job, now in _answers(left, given):
         save(given.folder, job.name, now)
-        print(f"{now.seconds:7.1f} s  code {now.code}  {len(now.arrays):4} arrays  {job.name}", flush=True)
+        codes = ", ".join(map(str, now.codes))
+        print(f"{now.seconds:7.1f} s  {len(now.arrays):4} arrays  {job.name}: {codes}", flush=True)
     return 0
 
 
@@ -64,18 +65,13 @@ def _chosen(given: argparse.Namespace) -> list[asked.Job]:
     return [job for job in read_jobs(given.folder)[:: given.every] if fnmatch.fnmatch(job.name, given.only)]
 
 
-def _answers(jobs: list[asked.Job], given: argparse.Namespace,
-             ask: Callable[[asked.Job, str, Path], Answer] = answer) -> Iterator[tuple[asked.Job, Answer]]:  # fmt: skip
+def _answers(jobs: list[asked.Job], given: argparse.Namespace) -> Iterator[tuple[asked.Job, Answer]]:
     """Answers as they come in the jobs' order, several commands at a time."""
     folder = Path(tempfile.mkdtemp(prefix="replay-"))
 
-    def one(job: asked.Job) -> Answer:
-        now = ask(job, given.command, folder / job.name)
-        return Answer(now.code, now.message, now.seconds, thinned(now.arrays))
-
     try:
         with ThreadPoolExecutor(given.workers) as pool:
-            yield from zip(jobs, pool.map(one, jobs), strict=True)
+            yield from zip(jobs, pool.map(lambda job: answer(job, given.command, folder / job.name), jobs), strict=True)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

@@ -1,4 +1,4 @@
-"""What one command answers: exit code, message, and every array that it saves or prints."""
+"""What the commands of a job answer: exit codes, messages, and every array that they save or print."""
 
 import csv
 import json
@@ -30,32 +30,41 @@ UNWATCHED = ("seconds", "folder", "command", "price")
 
 @dataclass
 class Answer:
-    """Exit code, message, seconds, arrays by "file: channel"; channels of printed tables belong to no file."""
+    """Exit codes, message, seconds, arrays by "file: channel"; channels of printed tables belong to no file."""
 
-    code: int
+    codes: list[int]
     message: str
     seconds: float
     arrays: dict[str, np.ndarray] = field(default_factory=dict)
 
 
 def answer(job: Job, command: str, folder: Path) -> Answer:
-    """Run a command in a new folder, which is gone afterwards."""
+    """Run the commands of a job in a new folder, which is gone afterwards."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    if job.scene:
-        for file in SCENES.glob("*.[!t]*"):
-            shutil.copy(file, folder)
-        (folder / "scene.toml").write_text(job.scene)
+    for file in SCENES.glob("*.[!t]*"):
+        shutil.copy(file, folder)
+    (folder / "scene.toml").write_text(job.scene)
+    given = {path.name for path in folder.iterdir()}
+    now = Answer([], "", 0.0)
+    for words in job.commands:
+        _ask([command, *words], folder, now)
+    now.arrays |= dict(_saved(folder, given))
+    shutil.rmtree(folder)
+    return now
+
+
+def _ask(words: list[str], folder: Path, now: Answer) -> None:
+    """Run one command, and add what it says."""
     begun = time.monotonic()
-    code, said, wrong = _run([command, *job.words], folder)
-    seconds = time.monotonic() - begun
-    arrays = dict(_saved(folder / "out"))
+    code, said, wrong = _run(words, folder)
+    now.seconds += time.monotonic() - begun
     printed = _json(said)
     if printed is not None:
-        arrays |= {f": {place}": np.array(value) for place, value in _leaves(printed)}
+        now.arrays |= {f": {len(now.codes)}{place}": np.array(value) for place, value in _leaves(printed)}
         said = ""
-    shutil.rmtree(folder)
-    return Answer(code, _masked(said + wrong), seconds, arrays)
+    now.codes.append(code)
+    now.message += _masked(said + wrong)
 
 
 def _run(words: list[str], folder: Path) -> tuple[int, str, str]:
@@ -93,10 +102,11 @@ def _masked(text: str) -> str:
     return text
 
 
-def _saved(folder: Path) -> Iterator[tuple[str, np.ndarray]]:
+def _saved(folder: Path, given: set[str]) -> Iterator[tuple[str, np.ndarray]]:
+    """Of all files but those that were given."""
     for path in sorted(folder.rglob("*")):
         read = {".nc": _netcdf, ".csv": _csv}.get(path.suffix)
-        if read is not None:
+        if read is not None and path.name not in given:
             yield from ((f"{path.relative_to(folder)}: {name}", array) for name, array in read(path))
 
 

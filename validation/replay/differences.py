@@ -23,8 +23,8 @@ def difference(before: Answer, now: Answer, bound: float, renamed: Mapping[str, 
     names of channels to later ones; a channel that is in another file now is looked for by its name.
     """
     told = Difference()
-    if before.code != now.code:
-        told.wrong.append(f"exit code {before.code} is {now.code}: {now.message.strip()[-200:]}")
+    if before.codes != now.codes:
+        told.wrong.append(f"exit codes {before.codes} are {now.codes}: {now.message.strip()[-200:]}")
     if before.message != now.message:
         told.other.append(f"message {before.message.strip()[:200]!r} is {now.message.strip()[:200]!r}")
     matched = set()
@@ -33,11 +33,8 @@ def difference(before: Answer, now: Answer, bound: float, renamed: Mapping[str, 
             told.wrong.append(f"{name} is gone")
             continue
         matched.add(later)
-        if name.endswith(" (all)") and bound:
-            continue
         if text := _changed(array, now.arrays[later], bound):
-            (told.other if array.dtype.kind == "U" and not name.endswith(" (all)") else told.wrong).append(
-                f"{name}: {text}")  # fmt: skip
+            (told.other if array.dtype.kind == "U" else told.wrong).append(f"{name}: {text}")
     told.other += [f"{name} is new" for name in now.arrays if name not in matched]
     return told
 
@@ -53,15 +50,16 @@ def _later(name: str, arrays: Mapping[str, np.ndarray], renamed: Mapping[str, st
 
 def _changed(before: np.ndarray, now: np.ndarray, bound: float) -> str:
     """What changed of an array, "" if nothing beyond the bound."""
-    if before.shape != now.shape or before.dtype.kind != now.dtype.kind:
+    if before.dtype.kind == now.dtype.kind == "U" and before.size == now.size == 1:
+        return "" if before == now else f"{before} is {now}"
+    if before.shape != now.shape or before.dtype != now.dtype:
         return f"{before.dtype} {before.shape} is {now.dtype} {now.shape}"
-    if before.dtype.kind != "f":
-        same = np.array_equal(before, now)
-        return "" if same else f"{before.ravel()[:1]} is {now.ravel()[:1]}" if before.size == 1 else "other values"
-    if np.array_equal(before, now, equal_nan=True):
+    if before.tobytes() == now.tobytes():
         return ""
+    if before.dtype.kind != "f" or not bound:
+        return "other values" if before.size > 1 else f"{before} is {now}"
     known = np.isfinite(before)
-    if (known != np.isfinite(now)).any():
+    if not np.array_equal(before[~known], now[~known], equal_nan=True) or not np.isfinite(now[known]).all():
         return "numbers are finite elsewhere"
     share = abs(before - now)[known].max(initial=0.0) / max(abs(before)[known].max(initial=0.0), 1e-300)
     return "" if share <= bound else f"a number changed by {share:.2g} of the largest"

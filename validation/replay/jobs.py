@@ -1,4 +1,4 @@
-"""The commands that are recorded: all shipped scenes as they are, and varied ones drawn from base scenes by a seed."""
+"""The commands that are recorded: shipped scenes, jobs written out, base scenes, and others drawn from these by a seed."""
 
 import copy
 import subprocess
@@ -12,6 +12,10 @@ import numpy as np
 
 SCENES = Path(__file__).with_name("scenes")
 """Base scenes: each names as many tables as go together, short to run, and the files that they read."""
+SHORTER = Path(__file__).with_name("shipped.toml")
+"""By shipped scene what makes it short to run, as arguments of --set."""
+COMMANDS = Path(__file__).with_name("commands.toml")
+"""Jobs of several commands each."""
 VARIED, SEED = 300, 20
 DROPPED, CHANGED, MISTAKEN = 0.25, 0.6, 0.2
 """Chances that a table goes, that numbers change, that the scene has a mistake."""
@@ -26,27 +30,34 @@ Table = dict[str, Any]
 
 @dataclass(frozen=True)
 class Job:
-    """One command: ``words`` after ``twinrig``, and the scene (TOML) that it reads as ``scene.toml``, if it has one."""
+    """Commands in one folder: the words of each after ``twinrig``; the scene (TOML) that they read as ``scene.toml``,
+    if there is one."""
 
     name: str
-    words: tuple[str, ...]
+    commands: tuple[tuple[str, ...], ...]
     scene: str = ""
 
 
 def jobs(command: str) -> list[Job]:
     """All of them; ``command``: the twinrig that lists the shipped scenes."""
-    return [Job("list", ("list",)), *_shipped(command), *_bases(), *_varied()]
+    return [Job("list", (("list",),)), *_shipped(command), *_written(), *_bases(), *_varied()]
 
 
 def _shipped(command: str) -> Iterator[Job]:
-    """Every scene that is listed: shown, and run as it is."""
+    """Every scene that is listed: shown, and run."""
+    shorter = tomllib.loads(SHORTER.read_text())
     said = subprocess.run([command, "list"], capture_output=True, text=True, check=True).stdout
     for line in said.splitlines()[1:]:
         if not line.startswith("  "):
             return
         name = line.split()[0]
-        yield Job(f"show-{name}", ("show", name))
-        yield Job(f"run-{name}", ("run", name, "--json", "--out", "out"))
+        less = [word for change in shorter.get(name, ()) for word in ("--set", change)]
+        yield Job(f"shipped-{name}", (("show", name), ("run", name, *less, "--json", "--out", "out")))
+
+
+def _written() -> Iterator[Job]:
+    for job in tomllib.loads(COMMANDS.read_text())["jobs"]:
+        yield Job(f"commands-{job['name']}", tuple(tuple(words) for words in job["commands"]))
 
 
 def _bases() -> Iterator[Job]:
@@ -56,9 +67,8 @@ def _bases() -> Iterator[Job]:
     for base in sorted(SCENES.glob("*.toml")):
         scene = tomllib.loads(base.read_text())
         engines = scene.pop("engines_asked", ENGINES)
-        yield Job(f"{base.stem}-show", ("show", "scene.toml"), dumps(scene))
         for engine in engines or ("",):
-            yield Job(f"{base.stem}-{engine or 'plain'}", _run(engine), dumps(scene))
+            yield Job(f"{base.stem}-{engine or 'plain'}", (("show", "scene.toml"), _run(engine)), dumps(scene))
 
 
 def _run(engine: str) -> tuple[str, ...]:
@@ -85,7 +95,7 @@ def _drawn(name: str, scene: Table, random: np.random.Generator) -> Job:
             _change(scene, str(place), float(random.uniform(*FACTORS)))
     if random.random() < MISTAKEN:
         engine = _mistake(scene, engine, random)
-    return Job(name, _run(engine), dumps(scene))
+    return Job(name, (_run(engine),), dumps(scene))
 
 
 def _drop(scene: Table, random: np.random.Generator) -> None:

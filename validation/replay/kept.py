@@ -1,6 +1,5 @@
 """Recorded answers in a folder: ``NAME.json`` and ``NAME.npz`` of each job, and the jobs themselves."""
 
-import hashlib
 import json
 import zipfile
 from dataclasses import asdict
@@ -11,8 +10,6 @@ import numpy as np
 from validation.replay.answers import Answer
 from validation.replay.jobs import Job
 
-MOST = 20_000
-"""Numbers of an array that are kept; of a larger one so many, evenly spaced, and the digest of all."""
 JOBS = "jobs.json"
 
 
@@ -23,27 +20,15 @@ def write_jobs(folder: Path, jobs: list[Job]) -> None:
 
 def read_jobs(folder: Path) -> list[Job]:
     """The jobs of a recording."""
-    return [Job(each["name"], tuple(each["words"]), each["scene"]) for each in json.loads((folder / JOBS).read_text())]
-
-
-def thinned(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Large arrays by some of their numbers, with shape, kind and digest of all under "name (all)"."""
-    kept = {}
-    for name, array in arrays.items():
-        kept[name] = array
-        if array.size > MOST:
-            whole = np.ascontiguousarray(array)
-            digest = hashlib.sha256(whole.tobytes()).hexdigest()
-            kept[name] = whole.ravel()[:: -(-array.size // MOST)]
-            kept[f"{name} (all)"] = np.array(f"{array.dtype} {array.shape} {digest}")
-    return kept
+    return [Job(each["name"], tuple(map(tuple, each["commands"])), each["scene"])
+            for each in json.loads((folder / JOBS).read_text())]  # fmt: skip
 
 
 def save(folder: Path, name: str, answer: Answer) -> None:
     """Keep an answer; its note is written last."""
     arrays = {str(i): array for i, array in enumerate(answer.arrays.values())}
     np.savez_compressed(folder / f"{name}.npz", allow_pickle=False, **arrays)
-    note = {"code": answer.code, "message": answer.message, "seconds": answer.seconds, "arrays": list(answer.arrays)}
+    note = {"codes": answer.codes, "message": answer.message, "seconds": answer.seconds, "arrays": list(answer.arrays)}
     (folder / f"{name}.json").write_text(json.dumps(note, indent=1))
 
 
@@ -55,4 +40,4 @@ def load(folder: Path, name: str) -> Answer | None:
             arrays = {key: file[str(i)] for i, key in enumerate(note["arrays"])}
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         return None
-    return Answer(note["code"], note["message"], note["seconds"], arrays)
+    return Answer(note["codes"], note["message"], note["seconds"], arrays)
