@@ -1,4 +1,4 @@
-"""The commands that are recorded: shipped scenes, jobs written out, base scenes, and others drawn from these by a seed."""
+"""What is recorded: shipped scenes, jobs written out, base scenes, and scenes drawn from these by a seed."""
 
 import copy
 import subprocess
