@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -39,11 +40,11 @@ def write_whole(path: Path, content: bytes | memoryview | str) -> None:
 
 
 def drop_parts(folder: Path) -> None:
-    """Remove from a folder, and from those within it, what killed processes left of files that they wrote."""
-    for part in folder.rglob(PART.format("*", "*", "*")):
+    """Remove from a folder, and from those within it, what killed processes left of files and folders they wrote."""
+    for part in list(folder.rglob(PART.format("*", "*", "*"))):
         number = part.name.rpartition(".part")[0].rpartition(".")[2]
         if number.isdigit() and not _at_work(int(number)):
-            part.unlink(missing_ok=True)
+            shutil.rmtree(part) if part.is_dir() else part.unlink(missing_ok=True)
 
 
 def _at_work(process: int) -> bool:

@@ -43,10 +43,12 @@ def test_a_resumed_folder_keeps_no_part_of_a_killed_process_and_those_of_living_
         files.append(tmp_path / "notes.part.png")
         for file in files:
             file.touch()
+        files.append(tmp_path / PART.format("0003", child.pid, ""))
+        (files[-1] / "within").mkdir(parents=True)
         assert resumed_folder(tmp_path, "points") == tmp_path and all(file.exists() for file in files)
         child.communicate(b"\n")
     resumed_folder(tmp_path, "points")
-    assert [file.exists() for file in files] == [False, False, True]
+    assert [file.exists() for file in files] == [False, False, True, False]
 
 
 def test_a_run_that_saved_nothing_leaves_nothing(tmp_path):
