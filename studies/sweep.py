@@ -174,6 +174,8 @@ def run(job: Points, progress: Callable[[str, float], None]) -> dict[str, Any]:
     from studies.sweep_figure import draw
 
     with locked(job.folder):
+        for part in (job.folder / RUNS).glob(".*.part"):
+            shutil.rmtree(part, ignore_errors=True)  # of a process that was killed while it wrote
         found = _records(job, progress)
         quantities = list(dict.fromkeys(name for record in found for name in record["numbers"]))
         columns = {name: [record["numbers"].get(name) for record in found] for name in quantities}
