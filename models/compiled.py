@@ -99,7 +99,10 @@ def _kernels(file: Path) -> frozenset[Path]:
     """Files with kernels that a file names in its imports, be it they or what is in them; read and not imported."""
     if not file.is_file():
         return frozenset()
-    places = [ROOT.joinpath(*module.split("."), *name) for module, *names in IMPORT.findall(file.read_text())
-              for name in ((), *((one.split()[0],) for one in "".join(names).split(",") if one.strip()))]
+    places = [
+        ROOT.joinpath(*module.split("."), *name)
+        for module, *names in IMPORT.findall(file.read_text())
+        for name in ((), *((one.split()[0],) for one in "".join(names).split(",") if one.strip()))
+    ]
     files = {place.with_suffix(".py") for place in places}
     return frozenset(path for path in files if path.is_file() and "from models.compiled import" in path.read_text())

@@ -17,11 +17,17 @@ SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 BETWEEN = 3
 """Most rows between the headings and the numbers."""
 NUMBER = re.compile(r"\s*[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?\s*", re.IGNORECASE)
-MARKS = re.compile(r"\s*([+-]?nan(\(ind\))?|#?n/?a|n\.a\.|null|none|-+|inv(alid)?|missing|\*+|\?+|no ?data|void|"
-                   r"#value!|#div/0!|[+-]?1[.,]#(qnan|ind)0*)?\s*", re.IGNORECASE)  # fmt: skip
+MARKS = re.compile(
+    r"\s*([+-]?nan(\(ind\))?|#?n/?a|n\.a\.|null|none|-+|inv(alid)?|missing|\*+|\?+|no ?data|void|"
+    r"#value!|#div/0!|[+-]?1[.,]#(qnan|ind)0*)?\s*",
+    re.IGNORECASE,
+)
 """Cells that say that nothing was measured."""
-TIMED = re.compile(r"\s*(\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T]+)?\d{1,3}:\d{2}(:\d{2})?([.,:]\d+)?\s*(z|[+-]\d{2}:?\d{2}|"
-                   r"am|pm)?\s*", re.IGNORECASE)  # fmt: skip
+TIMED = re.compile(
+    r"\s*(\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T]+)?\d{1,3}:\d{2}(:\d{2})?([.,:]\d+)?\s*(z|[+-]\d{2}:?\d{2}|"
+    r"am|pm)?\s*",
+    re.IGNORECASE,
+)
 """Cells that are a time of the clock, in whatever notation."""
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _HEADING = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?", re.DOTALL)
@@ -102,11 +108,20 @@ def decimal_sign(path: str | Path, line: int, separator: str, cells: Sequence[st
     """Decimal sign of cells, the first of which are in ``line``; InputError where commas have two meanings."""
     commas = [cell for cell in cells if "," in cell]
     if commas and any("." in cell for cell in cells if is_number(cell.replace(",", ""))):
-        raise InputError(path, f"line {line} and after", commas[0], "the numbers hold points and commas: write them "
-                         "with one decimal sign and nothing else, without separators of thousands")  # fmt: skip
+        raise InputError(
+            path,
+            f"line {line} and after",
+            commas[0],
+            "the numbers hold points and commas: write them "
+            "with one decimal sign and nothing else, without separators of thousands",
+        )
     if commas and separator == "," and all(_THOUSANDS.fullmatch(cell) for cell in commas):
-        raise InputError(path, f"line {line} and after", commas[0], "the comma can be a decimal sign or one of "
-                         "thousands: write numbers with a decimal point and nothing else")  # fmt: skip
+        raise InputError(
+            path,
+            f"line {line} and after",
+            commas[0],
+            "the comma can be a decimal sign or one of thousands: write numbers with a decimal point and nothing else",
+        )
     return "," if commas else "."
 
 
@@ -130,8 +145,11 @@ def find_headings(lines: Sequence[Line], known: Callable[[str], bool], separator
     told by whoever reads the rows."""
     for i, line in enumerate(lines):
         parted = {sign: trimmed(split(line.text, sign)) for sign in separators}
-        heads = [Head(line, sign, tuple(names), len(names), tuple(lines[:i]), (), line.end, line.number)
-                 for sign, names in parted.items() if len(names) > 1 and any(map(known, names))]  # fmt: skip
+        heads = [
+            Head(line, sign, tuple(names), len(names), tuple(lines[:i]), (), line.end, line.number)
+            for sign, names in parted.items()
+            if len(names) > 1 and any(map(known, names))
+        ]
         if heads:
             return heads
     return []
@@ -148,8 +166,16 @@ def _head(lines: Sequence[Line], i: int, known: Callable[[str], bool], separator
         if not (len(cells) >= len(names) >= len(trimmed(cells))):
             return None
         if is_number(cells[place]) or TIMED.fullmatch(cells[place]):
-            return Head(lines[i], separator, tuple(names), len(cells), tuple(lines[:i]), tuple(lines[i + 1 : j]),
-                        lines[j].begin, lines[j].number - 1)  # fmt: skip
+            return Head(
+                lines[i],
+                separator,
+                tuple(names),
+                len(cells),
+                tuple(lines[:i]),
+                tuple(lines[i + 1 : j]),
+                lines[j].begin,
+                lines[j].number - 1,
+            )
         if any(is_number(cell) or known(cell) for cell in cells):
             return None
     return None

@@ -32,8 +32,12 @@ def turning_points(load: np.ndarray) -> np.ndarray:
 def checked(load: np.ndarray) -> np.ndarray:
     """The load (n,) as doubles; InputError for none, for one that is masked or not finite, for no row of them."""
     if np.ma.is_masked(load):
-        raise InputError("", "load", None, f"{np.ma.count_masked(load)} of {np.size(load)} samples are masked: leave "
-                         "them out or fill them")  # fmt: skip
+        raise InputError(
+            "",
+            "load",
+            None,
+            f"{np.ma.count_masked(load)} of {np.size(load)} samples are masked: leave them out or fill them",
+        )
     given = np.asarray(load)
     if given.ndim != 1 or given.dtype.kind not in "biuf":
         raise InputError("", "load", f"{given.ndim}-dimensional, {given.dtype}", "must be one row of real numbers")
@@ -51,8 +55,9 @@ def summed(spans: np.ndarray, counts: np.ndarray, slope: float) -> float:
     with np.errstate(over="ignore"):
         found = float(np.sum(counts * spans**slope))
     if not math.isfinite(found):
-        raise InputError("", "load", float(spans.max()), f"has a range whose power {slope:g} is beyond all numbers: "
-                         "use another unit")  # fmt: skip
+        raise InputError(
+            "", "load", float(spans.max()), f"has a range whose power {slope:g} is beyond all numbers: use another unit"
+        )
     return found
 
 

@@ -13,13 +13,25 @@ BLOCK = 4096
 """Samples per block; part of what names a sample, so it never changes."""
 
 
-(FORCES, GYRO, GYRO_BIAS, PITCH_SENSOR, ACCELEROMETERS, ROAD, BRAKE_SIGNALS, BRAKE_PRESSURES, SPEED, TRANSDUCERS,
- DROPOUTS) = range(11)  # fmt: skip
+(
+    FORCES,
+    GYRO,
+    GYRO_BIAS,
+    PITCH_SENSOR,
+    ACCELEROMETERS,
+    ROAD,
+    BRAKE_SIGNALS,
+    BRAKE_PRESSURES,
+    SPEED,
+    TRANSDUCERS,
+    DROPOUTS,
+) = range(11)
 """Sources of noise; a new one takes the next number."""
 
 
-def normal_block(seed: int, path: int, block: int, channels: int, source: int = FORCES,
-                 rows: int = BLOCK) -> np.ndarray:  # fmt: skip
+def normal_block(
+    seed: int, path: int, block: int, channels: int, source: int = FORCES, rows: int = BLOCK
+) -> np.ndarray:
     """Standard normal samples (rows, channels) of one block, its first: samples BLOCK block and following of a stream.
 
     seed : 0 to 2**64 - 1; path : 0 to 2**64 - 1; block : 0 to 2**64 - 1; InputError for others, which would name the
@@ -43,6 +55,8 @@ def normal(seed: int, path: int, count: int, channels: int, first: int = 0, sour
     if min(count, first) < 0:
         raise InputError("", "count, first", (count, first), "must be 0 or more")
     start, end = first // BLOCK, -(-(first + count) // BLOCK)
-    blocks = [normal_block(seed, path, block, channels, source, rows=min(BLOCK, first + count - block * BLOCK))
-              for block in range(start, end)]  # what lies behind the last sample is never drawn
+    blocks = [
+        normal_block(seed, path, block, channels, source, rows=min(BLOCK, first + count - block * BLOCK))
+        for block in range(start, end)
+    ]  # what lies behind the last sample is never drawn
     return np.concatenate(blocks)[first - start * BLOCK :] if blocks else np.empty((0, channels))

@@ -126,5 +126,11 @@ def _engine(scene: Scene, assembly: Assembly, engine: str) -> tuple[str, ...]:
     except Refused as error:
         return engine, f"refused: {error.why}"
     order = CATALOGUE[engine][settings.integrator].order
-    return (engine, settings.integrator, str(order), f"{settings.step:g} s", str(settings.steps),
-            *(str(plan[key]) for key in ("degrees of freedom", "native items", "callbacks")))
+    return (
+        engine,
+        settings.integrator,
+        str(order),
+        f"{settings.step:g} s",
+        str(settings.steps),
+        *(str(plan[key]) for key in ("degrees of freedom", "native items", "callbacks")),
+    )

@@ -16,8 +16,9 @@ PERIODS = 1.0
 """Of the cut-off that a record must hold: a straight line then passes to 1 %; with a fiftieth it turned round."""
 
 
-def prescribe(assembly: Assembly, effect: str, p: Any, mode: Mode,
-              columns: Mapping[str, Mapping[str, float]]) -> Assembly:  # fmt: skip
+def prescribe(
+    assembly: Assembly, effect: str, p: Any, mode: Mode, columns: Mapping[str, Mapping[str, float]]
+) -> Assembly:
     """The force-excited vehicle with the coordinates of ``mode`` as inputs, by a quintic spline through the samples.
 
     ``p`` holds the effect's ``file`` and ``bandwidth`` (Hz or None); ``columns`` names the file's columns, with the
@@ -32,8 +33,12 @@ def prescribe(assembly: Assembly, effect: str, p: Any, mode: Mode,
         values = smoothed(values, period, p.bandwidth, scene.file, f"effects.{effect}.bandwidth")
     motion = Smooth(values, period, derivatives=2, degree=5)
     if motion.end < scene.run.duration * (1 - 1e-9):
-        raise InputError(scene.file, f"effects.{effect}.file", p.file,
-                         f"ends at {motion.end:g} s, but the run lasts {scene.run.duration:g} s: shorten run.duration")
+        raise InputError(
+            scene.file,
+            f"effects.{effect}.file",
+            p.file,
+            f"ends at {motion.end:g} s, but the run lasts {scene.run.duration:g} s: shorten run.duration",
+        )
     assert assembly.input is not None
     guided = assembly.with_input(mode, Stacked((assembly.input, motion)))
     guided.initial[[*GUIDED[mode], *(4 + i for i in GUIDED[mode])]] = motion.at(0.0)[: 2 * len(columns)]
@@ -42,11 +47,19 @@ def prescribe(assembly: Assembly, effect: str, p: Any, mode: Mode,
 
 def _check_scene(scene: Any, columns: Mapping[str, Any]) -> None:
     if scene.effects["wheel_forces"].frame == "body":
-        raise InputError(scene.file, "effects.wheel_forces.frame", "body",
-                         "a prescribed pitch makes the frame a matter of the file: use 'inertial'")
+        raise InputError(
+            scene.file,
+            "effects.wheel_forces.frame",
+            "body",
+            "a prescribed pitch makes the frame a matter of the file: use 'inertial'",
+        )
     for name in (full for column in columns for full in (column, f"{column}_rate") if full in scene.start):
-        raise InputError(scene.file, f"start.{name}", scene.start[name], f"the {name.removesuffix('_rate')} is "
-                         "prescribed, and its file says where it starts: drop this key")
+        raise InputError(
+            scene.file,
+            f"start.{name}",
+            scene.start[name],
+            f"the {name.removesuffix('_rate')} is prescribed, and its file says where it starts: drop this key",
+        )
 
 
 def smoothed(values: np.ndarray, period: float, bandwidth: float, file: str, place: str) -> np.ndarray:
@@ -60,10 +73,19 @@ def smoothed(values: np.ndarray, period: float, bandwidth: float, file: str, pla
 
     fastest, length = 0.5 / period, (len(values) - 1) * period
     if not bandwidth < fastest:
-        raise InputError(file, place, bandwidth, f"must be below {fastest:g} Hz, half the sampling rate of the file: "
-                                                 "faster motion is not in it")
+        raise InputError(
+            file,
+            place,
+            bandwidth,
+            f"must be below {fastest:g} Hz, half the sampling rate of the file: faster motion is not in it",
+        )
     if not bandwidth * length >= PERIODS * (1 - 1e-9):
-        raise InputError(file, place, bandwidth, f"must be at least {PERIODS / length:.3g} Hz: of slower motion the "
-                         f"{length:g} s hold no {PERIODS:g} periods, and what is beyond their ends would be guessed")
+        raise InputError(
+            file,
+            place,
+            bandwidth,
+            f"must be at least {PERIODS / length:.3g} Hz: of slower motion the "
+            f"{length:g} s hold no {PERIODS:g} periods, and what is beyond their ends would be guessed",
+        )
     padding = min(len(values) - 1, math.ceil(3 / (bandwidth * period)))
     return sosfiltfilt(butter(ORDER, bandwidth / fastest, output="sos"), values, axis=0, padlen=padding)

@@ -35,13 +35,16 @@ def missing(positions: np.ndarray, rates: np.ndarray, step: float, mass: np.ndar
     return float(within.max() / whole), int(within.argmax())
 
 
-def check_resolved(engine: str, times: np.ndarray, positions: np.ndarray, rates: np.ndarray,
-                   mass: np.ndarray) -> None:  # fmt: skip
+def check_resolved(engine: str, times: np.ndarray, positions: np.ndarray, rates: np.ndarray, mass: np.ndarray) -> None:
     """Raise RunFailed for a run whose steps were too long for its motion; arguments as ``missing``, times (m,) in s."""
     if len(times) < 3:
         return
     step = float(times[1] - times[0])
     share, row = missing(positions, rates, step, mass)
     if not share <= ALLOWED:
-        raise RunFailed(engine, f"steps of {step:g} s are too long for this motion: {share:.2g} of its velocity goes "
-                        "unseen between them within a second; use a smaller step", float(times[row]))  # fmt: skip
+        raise RunFailed(
+            engine,
+            f"steps of {step:g} s are too long for this motion: {share:.2g} of its velocity goes "
+            "unseen between them within a second; use a smaller step",
+            float(times[row]),
+        )

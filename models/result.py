@@ -66,8 +66,11 @@ class Result:
 
 def write(data: "xr.Dataset", path: Path) -> None:
     """Write netCDF whole or not at all; numbers with checksums, so that whoever reads a damaged file is told."""
-    checked = {name: {"fletcher32": True} for name, own in data.variables.items() if own.size and own.ndim
-               and own.dtype.kind in "fiu"}  # fmt: skip
+    checked = {
+        name: {"fletcher32": True}
+        for name, own in data.variables.items()
+        if own.size and own.ndim and own.dtype.kind in "fiu"
+    }
     write_whole(path, data.to_netcdf(engine="h5netcdf", encoding=checked))  # HDF5 itself crashes on a full disk
 
 

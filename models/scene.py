@@ -114,8 +114,12 @@ def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
     except (ValueError, ArithmeticError):  # the sine of the pitch beyond 1
         rest = np.full(8, np.nan)
     if not np.isfinite(rest).all():
-        raise InputError(scene.file, "vehicle", None, "no static equilibrium with these parameters: "
-                         "the springs k1 to k4 are too soft for the weight")
+        raise InputError(
+            scene.file,
+            "vehicle",
+            None,
+            "no static equilibrium with these parameters: the springs k1 to k4 are too soft for the weight",
+        )
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Scene:
@@ -141,8 +145,10 @@ def _check_engine(name: str, scene: Scene) -> None:
         allowed = f"has no meaning for {integrator}: it belongs to exudyn's GeneralizedAlpha"
         raise InputError(scene.file, f"{place}.spectral_radius", given.spectral_radius, allowed)
     if "tolerance" in given.model_fields_set and not CATALOGUE[name][integrator].adaptive:
-        adaptive = " or ".join(key for key, value in CATALOGUE[name].items()
-                               if value.adaptive and (name, key) not in MISSING) or "other engines"
+        adaptive = (
+            " or ".join(key for key, value in CATALOGUE[name].items() if value.adaptive and (name, key) not in MISSING)
+            or "other engines"
+        )
         allowed = f"has no meaning for {integrator}, which takes steps of fixed length: it belongs to {adaptive}"
         raise InputError(scene.file, f"{place}.tolerance", given.tolerance, allowed)
 

@@ -90,15 +90,22 @@ def module_of(system: str, name: str) -> Any:
     own = ("PLACE", "leave_out") if hasattr(file, "named") else ("Parameters", "extend")
     missing = [key for key in ("COST", *own) if not hasattr(file, key)]
     if missing:
-        raise InputError(f"{name}.py", "", None, f"has no {' and no '.join(missing)}: models/scene_effects.py says "
-                         "what the file of an effect holds")  # fmt: skip
+        raise InputError(
+            f"{name}.py",
+            "",
+            None,
+            f"has no {' and no '.join(missing)}: models/scene_effects.py says what the file of an effect holds",
+        )
     return Effect(file)
 
 
 def named(scene: Any) -> tuple[str, ...]:
     """Effects that a scene names; none that it could name by a table alone is imported to know it."""
-    return tuple(name for name, file in sorted(_files(scene.system).items())
-                 if name in tables_of(scene) or (_placed(file) and module_of(scene.system, name).named(scene)))
+    return tuple(
+        name
+        for name, file in sorted(_files(scene.system).items())
+        if name in tables_of(scene) or (_placed(file) and module_of(scene.system, name).named(scene))
+    )
 
 
 def absent(scene: Any) -> tuple[str, ...]:
@@ -175,12 +182,20 @@ def legal(there: Iterable[str], scene: Any) -> None:
         why = f", {module.WHY}" if module.WHY else ""
         for other in module.NEEDS:
             if other not in there:
-                raise InputError(scene.file, _place(module, name), None, f"needs the effect {other!r}{why}: name it "
-                                 f"too{_instead(scene, other, there)}{_at(scene, other)}")  # fmt: skip
+                raise InputError(
+                    scene.file,
+                    _place(module, name),
+                    None,
+                    f"needs the effect {other!r}{why}: name it too{_instead(scene, other, there)}{_at(scene, other)}",
+                )
         for other in module.EXCLUDES:
             if other in there:
-                raise InputError(scene.file, _place(module, name), None, f"cannot stand beside {other!r}{why}: drop "
-                                 f"one of them{_at(scene, other)}")  # fmt: skip
+                raise InputError(
+                    scene.file,
+                    _place(module, name),
+                    None,
+                    f"cannot stand beside {other!r}{why}: drop one of them{_at(scene, other)}",
+                )
 
 
 def _instead(scene: Any, name: str, there: tuple[str, ...]) -> str:
@@ -219,8 +234,12 @@ def without(scene: Any, *left_out: str) -> Any:
     gone = [name for name in needy if name not in (*left_out, *named(found))]
     if gone:
         need = "it needs" if len(gone) == 1 else "they need"
-        raise InputError(scene.file, "", None, f"{' and '.join(left_out)} cannot be left out alone: leave out "
-                         f"{' and '.join(gone)}, too, for {need} it")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "",
+            None,
+            f"{' and '.join(left_out)} cannot be left out alone: leave out {' and '.join(gone)}, too, for {need} it",
+        )
     return found
 
 
@@ -230,8 +249,7 @@ def _depth(name: str, system: str) -> int:
 
 
 def beside(scene: Any, *more: str) -> Any:
-    """The scene with these effects at their usual values; raises InputError where one cannot be, or not beside others.
-    """
+    """The scene with these effects at their usual values; raises InputError where one cannot be, or not so."""
     table = own_table(scene)
     for name in more:
         _put_in(table, name, scene)

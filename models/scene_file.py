@@ -61,8 +61,10 @@ Model = TypeVar("Model", bound=SceneFile)
 def checked(model: type[Model], table: Mapping[str, Any], file: str, folder: Path) -> Model:
     """The scene of one system from nested tables; raises InputError for anything that is not understood."""
     if "effects" in table and "effects" not in model.model_fields:
-        allowed = ("has no place in a scene of this system, which only shows or compares what others compute: put it "
-                   "into a scene of theirs, such as contact, wheelset or ride")  # fmt: skip
+        allowed = (
+            "has no place in a scene of this system, which only shows or compares what others compute: put it "
+            "into a scene of theirs, such as contact, wheelset or ride"
+        )
         raise InputError(file, "effects", None, allowed)
     for key in ("file", "folder"):
         if key in table:

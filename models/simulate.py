@@ -48,8 +48,9 @@ def _keep_every(scene: Scene, settings: Settings) -> int:
     return round(ratio)
 
 
-def _label(assembly: Assembly, engine: str, settings: Settings, run: Trajectory, channels: Channels, keep: int,
-           seconds: float) -> Result:  # fmt: skip
+def _label(
+    assembly: Assembly, engine: str, settings: Settings, run: Trajectory, channels: Channels, keep: int, seconds: float
+) -> Result:
     import xarray as xr
 
     rows = slice(None, None, keep)
@@ -61,12 +62,20 @@ def _label(assembly: Assembly, engine: str, settings: Settings, run: Trajectory,
         coords={"time": ("time", run.times[rows], {"units": "s", "long_name": "time"})},
     )
     data.attrs = {
-        "title": assembly.scene.title, "scene": assembly.scene.file, "system": assembly.scene.system,
-        "mode": assembly.mode, "engine": engine, "integrator": settings.integrator, "step": settings.step,
-        "status": "complete, in doubt" if assembly.doubts else "complete", "doubts": json.dumps(assembly.doubts),
-        "counts": json.dumps(run.counts), "seconds": seconds,
-        "scene_table": json.dumps(assembly.scene.table()), "provenance": json.dumps(provenance()),
-    }  # fmt: skip
+        "title": assembly.scene.title,
+        "scene": assembly.scene.file,
+        "system": assembly.scene.system,
+        "mode": assembly.mode,
+        "engine": engine,
+        "integrator": settings.integrator,
+        "step": settings.step,
+        "status": "complete, in doubt" if assembly.doubts else "complete",
+        "doubts": json.dumps(assembly.doubts),
+        "counts": json.dumps(run.counts),
+        "seconds": seconds,
+        "scene_table": json.dumps(assembly.scene.table()),
+        "provenance": json.dumps(provenance()),
+    }
     return Result(data)
 
 
@@ -116,10 +125,12 @@ def _forces(assembly: Assembly, run: Trajectory, inputs: np.ndarray | None) -> C
     f1, f2 = _wheel_forces(assembly, y, inputs)
     moment = cosine * (p.b * f3 - p.a * f4)
     channels: Channels = {
-        "f1": ("N", "front wheel force, up", f1), "f2": ("N", "rear wheel force, up", f2),
-        "f3": ("N", "front suspension force, compression", f3), "f4": ("N", "rear suspension force, compression", f4),
+        "f1": ("N", "front wheel force, up", f1),
+        "f2": ("N", "rear wheel force, up", f2),
+        "f3": ("N", "front suspension force, compression", f3),
+        "f4": ("N", "rear suspension force, compression", f4),
         "suspension_moment": ("N m", "pitch moment of the suspension on the chassis, nose up", moment),
-    }  # fmt: skip
+    }
     if assembly.mode == "road" and inputs is not None:
         channels["zeta1"] = ("m", "road under the front wheel, down", inputs[:, 0])
         channels["zeta2"] = ("m", "road under the rear wheel, down", inputs[:, 1])

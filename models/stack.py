@@ -53,8 +53,15 @@ def row(typing_context, pointer, size, i):
     def generate(context, builder, signature, arguments):
         first, size, i = arguments
         own = make_array(kind)(context, builder)
-        populate_array(own, builder.gep(first, [builder.mul(size, i)]), [size], [ir.Constant(size.type, 8)],
-                       ir.Constant(size.type, 8), None, None)  # fmt: skip
+        populate_array(
+            own,
+            builder.gep(first, [builder.mul(size, i)]),
+            [size],
+            [ir.Constant(size.type, 8)],
+            ir.Constant(size.type, 8),
+            None,
+            None,
+        )
         return own._getvalue()
 
     return kind(DOUBLES, types.intp, types.intp), generate

@@ -30,20 +30,28 @@ class System:
 SYSTEMS = {
     DEFAULT: System("models.scene", "models.plan", ("reference", "exudyn", "mujoco"), "models.effects"),
     "ride": System("models.ride.scene", "models.ride.plan", ("reference", "exudyn", "mujoco"), "models.ride.effects"),
-    "wheelset": System("models.rail.scene", "models.rail.plan", ("reference", "exudyn", "mujoco"),
-                       "models.rail.effects"),
+    "wheelset": System(
+        "models.rail.scene", "models.rail.plan", ("reference", "exudyn", "mujoco"), "models.rail.effects"
+    ),
     "contact": System("models.contact.scene", "models.contact.plan", effects="models.contact.effects"),
-    "handling": System("models.handling.scene", "models.handling.plan", ("exudyn", "mujoco"),
-                       "models.handling.effects"),
-    "hub-forces": System("models.hub_forces.scene", "models.hub_forces.plan", ("reference", "exudyn", "mujoco"),
-                         "models.hub_forces.effects"),
-    "braking": System("models.braking.scene", "models.braking.plan", ("reference", "exudyn", "mujoco"),
-                      "models.braking.effects"),
-    "measured": System("models.measured.scene", "models.measured.plan", ("reference", "exudyn", "mujoco"),
-                       "models.measured.effects"),
+    "handling": System(
+        "models.handling.scene", "models.handling.plan", ("exudyn", "mujoco"), "models.handling.effects"
+    ),
+    "hub-forces": System(
+        "models.hub_forces.scene",
+        "models.hub_forces.plan",
+        ("reference", "exudyn", "mujoco"),
+        "models.hub_forces.effects",
+    ),
+    "braking": System(
+        "models.braking.scene", "models.braking.plan", ("reference", "exudyn", "mujoco"), "models.braking.effects"
+    ),
+    "measured": System(
+        "models.measured.scene", "models.measured.plan", ("reference", "exudyn", "mujoco"), "models.measured.effects"
+    ),
     "pictures": System("studies.pictures.scene", "studies.pictures.plan", ("exudyn", "mujoco")),
     "wheel-rail": System("models.rail.benchmark_scene", "models.rail.benchmark_plan"),
-}  # fmt: skip
+}
 
 
 def load(path: Path, changes: Iterable[str] = ()) -> Any:

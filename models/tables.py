@@ -129,8 +129,9 @@ def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Line
         raise InputError(path, "", None, "the file is empty: a header line and rows of numbers are needed")
     if not text.endswith("\n") and _cut_off([line for _, line in used]):
         place = f"line {len(lines)}"
-        raise InputError(path, place, lines[-1][1], "the last line has no line end and was cut off: add one, or delete "
-                         "the line")  # fmt: skip
+        raise InputError(
+            path, place, lines[-1][1], "the last line has no line end and was cut off: add one, or delete the line"
+        )
     return used[0], used[1:]
 
 

@@ -12,8 +12,9 @@ MARK = 1e28
 """SI: what is beyond this nobody measured; exporters write 9.9E+34 and the like, in any unit."""
 
 
-def read_time_series(path: str | Path, columns: Mapping[str, Mapping[str, float]], *,
-                     gaps: bool = False) -> tuple[np.ndarray, float]:  # fmt: skip
+def read_time_series(
+    path: str | Path, columns: Mapping[str, Mapping[str, float]], *, gaps: bool = False
+) -> tuple[np.ndarray, float]:
     """Values (n, columns) in SI and the sampling period (s) of a CSV file with a column ``time``.
 
     The first sample must lie at t = 0 and the period must be constant to 1e-6 of itself: a clock that
@@ -34,9 +35,14 @@ def _check_marks(path: str | Path, name: str, values: np.ndarray, time: np.ndarr
     """Refuse what exporters write where they have no value."""
     marks = np.flatnonzero(np.abs(values) > MARK)
     if len(marks):
-        raise InputError(path, f"column {name!r} at {time[marks[0]]:g} s", float(values[marks[0]]), "is an exporter's "
-                         f"mark for no value ({len(marks)} of {len(values)} samples are): mend the file, or leave "
-                         "such times out")
+        raise InputError(
+            path,
+            f"column {name!r} at {time[marks[0]]:g} s",
+            float(values[marks[0]]),
+            "is an exporter's "
+            f"mark for no value ({len(marks)} of {len(values)} samples are): mend the file, or leave "
+            "such times out",
+        )
 
 
 def _check_even(path: str | Path, time: np.ndarray, period: float) -> None:
@@ -46,9 +52,13 @@ def _check_even(path: str | Path, time: np.ndarray, period: float) -> None:
         return
     usual = float(np.median(np.diff(time)))  # one gap moves the mean period, and with it every row
     row = 1 + int(np.argmax(np.abs(np.diff(time) - usual) > slack))
-    raise InputError(path, f"row {row + 1} of the numbers, column 'time' (s)", float(f"{time[row]:.12g}"),
-                     f"the samples must be equally spaced: {time[row - 1] + usual:.9g} is expected here, {usual:.9g} "
-                     "after the row before it")
+    raise InputError(
+        path,
+        f"row {row + 1} of the numbers, column 'time' (s)",
+        float(f"{time[row]:.12g}"),
+        f"the samples must be equally spaced: {time[row - 1] + usual:.9g} is expected here, {usual:.9g} "
+        "after the row before it",
+    )
 
 
 def write_time_series(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]], period: float) -> None:

@@ -38,8 +38,13 @@ def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: P
         frames = _told(page.frames(), film.frames, progress)
         written.append(write(folder / f"film.{film.format}", frames, film.frames_per_second))
     table = [difference(motions), ", ".join(path.name for path in written), said]
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "frames": film.frames,
-            "table": [f"  {line}" for line in table if line]}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "frames": film.frames,
+        "table": [f"  {line}" for line in table if line],
+    }
 
 
 def _told(frames: Iterator[np.ndarray], count: int, progress: Progress) -> Iterator[np.ndarray]:

@@ -14,11 +14,34 @@ SCENES = Path(__file__).parent / "scenes"
 
 ANY = "any"
 """System of a study that runs scenes of all systems."""
-NOT_STUDIES = ("__init__", "asked", "braking_figures", "choice_figure", "command_line", "comparison",
-               "contact_figures", "figures", "folders", "handling_figures", "hub_forces_figures",
-               "log_axis", "manchester_figure", "recording_figures", "recording_page", "recording_runs",
-               "ride_choice_figure", "ride_figures", "ride_nonlinear_figures", "stabiliser_figures", "summary_numbers",
-               "sweep", "sweep_figure", "tyre_figure", "virtual_measurement", "wheelset_figures")  # fmt: skip
+NOT_STUDIES = (
+    "__init__",
+    "asked",
+    "braking_figures",
+    "choice_figure",
+    "command_line",
+    "comparison",
+    "contact_figures",
+    "figures",
+    "folders",
+    "handling_figures",
+    "hub_forces_figures",
+    "log_axis",
+    "manchester_figure",
+    "recording_figures",
+    "recording_page",
+    "recording_runs",
+    "ride_choice_figure",
+    "ride_figures",
+    "ride_nonlinear_figures",
+    "stabiliser_figures",
+    "summary_numbers",
+    "sweep",
+    "sweep_figure",
+    "tyre_figure",
+    "virtual_measurement",
+    "wheelset_figures",
+)
 """Modules beside the studies that are none."""
 
 
@@ -37,8 +60,12 @@ def scene_path(name: str) -> Path:
     if not name.endswith(".toml") and not os.path.lexists(name):
         raise InputError("", "scene", name, "no such scene, and no such file", names)
     if is_measurement(Path(name)):
-        raise InputError(name, "", None, f"this is no scene: `twinrig show {name}` says what is in a measurement and "
-                         "prints a scene for it")  # fmt: skip
+        raise InputError(
+            name,
+            "",
+            None,
+            f"this is no scene: `twinrig show {name}` says what is in a measurement and prints a scene for it",
+        )
     return Path(name)
 
 
@@ -75,8 +102,12 @@ def _unended(scene: Any) -> Iterator[Finding]:
         except InputError:  # a file that is written, not read
             continue
         if not ended(path):
-            yield Finding("file", "note", name, f"{name}: the last line has no line end; if the file was cut off, its "
-                          "last number may lack digits.")  # fmt: skip
+            yield Finding(
+                "file",
+                "note",
+                name,
+                f"{name}: the last line has no line end; if the file was cut off, its last number may lack digits.",
+            )
 
 
 def _files(table: Any) -> Iterator[str]:

@@ -91,8 +91,11 @@ def ended(measured: MeasuredPressures | None, stop: Stop) -> list[str]:
     return [f"    measured pressures end at {measured.times[-1]:.3f} s: from then on the last ones stay"]
 
 
-STEP_STEER = ("without brakes: response time [s]", "without brakes: overshoot [%]",
-              "without brakes: steady yaw rate [deg/s]")  # fmt: skip
+STEP_STEER = (
+    "without brakes: response time [s]",
+    "without brakes: overshoot [%]",
+    "without brakes: steady yaw rate [deg/s]",
+)
 
 
 def engineers(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
@@ -117,9 +120,14 @@ def engineers(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
         both = split(scene, name)
         return {"z_MALS": both.z, "z_MALS asked for": both.asked, "k low": both.k_low, "k high": both.k_high}
     used = utilisation(scene, surface)
-    return {"z_AL": used.z, "k front": used.k.front, "k rear": used.k.rear, "k of all": used.k_vehicle,
-            "adhesion utilisation epsilon": used.epsilon,
-            **dict(zip(("k trailer front", "k trailer rear"), used.k.trailer, strict=False))}  # fmt: skip
+    return {
+        "z_AL": used.z,
+        "k front": used.k.front,
+        "k rear": used.k.rear,
+        "k of all": used.k_vehicle,
+        "adhesion utilisation epsilon": used.epsilon,
+        **dict(zip(("k trailer front", "k trailer rear"), used.k.trailer, strict=False)),
+    }
 
 
 def compared(paths: dict[str, Path], seconds: dict[str, float]) -> list[str]:
@@ -128,8 +136,10 @@ def compared(paths: dict[str, Path], seconds: dict[str, float]) -> list[str]:
     for engine, path in paths.items():
         x, y, yaw = path.states[-1, 0, :3]
         clock = f"; {path.clock}" if path.clock else ""
-        rows.append(f"    {engine:<12}x {x:8.3f} m, y {y:8.3f} m, yaw {np.degrees(yaw):8.3f} deg after "
-                    f"{path.times[-1]:.3f} s; {len(path.times) - 1} samples in {seconds[engine]:.2f} s, once{clock}")
+        rows.append(
+            f"    {engine:<12}x {x:8.3f} m, y {y:8.3f} m, yaw {np.degrees(yaw):8.3f} deg after "
+            f"{path.times[-1]:.3f} s; {len(path.times) - 1} samples in {seconds[engine]:.2f} s, once{clock}"
+        )
     return rows
 
 
@@ -143,8 +153,7 @@ def lines(name: str, stop: Stop, told: dict[str, float], wheels: dict[str, np.nd
     rows += ["    (without steering correction, and of the vehicle without trailer)"] if "z_MALS" in told else []
     names = WHEELS[: stop.path.turning.shape[1]]
     rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel.replace('trailer ', 'tr. '):>17}" for wheel in names)]
-    return rows + [f"    {key:<40}" + "".join(f"{value:>17.2f}" for value in values)
-                   for key, values in wheels.items()]  # fmt: skip
+    return rows + [f"    {key:<40}" + "".join(f"{value:>17.2f}" for value in values) for key, values in wheels.items()]
 
 
 def _figure_of_merit(value: float) -> str:
@@ -157,8 +166,13 @@ def _unfinished(stop: Stop) -> str:
     return f": not stopped by {stop.times[-1]:g} s, still {stop.speed[-1]:.2f} m/s; all figures are those until then"
 
 
-REPORTS = {"force_x": (FORCE_X, "N"), "force_y": (FORCE_Y, "N"), "load": (LOAD, "N"), "slip": (SLIP, "1"),
-           "slip_angle": (SLIP_ANGLE, "rad")}  # fmt: skip
+REPORTS = {
+    "force_x": (FORCE_X, "N"),
+    "force_y": (FORCE_Y, "N"),
+    "load": (LOAD, "N"),
+    "slip": (SLIP, "1"),
+    "slip_angle": (SLIP_ANGLE, "rad"),
+}
 
 
 def save(scene: BrakingScene, name: str, path: Path, file: File) -> None:
@@ -173,17 +187,33 @@ def save(scene: BrakingScene, name: str, path: Path, file: File) -> None:
     rates = ", ".join(f"{unit}/s" for unit in units.split(", "))
     wheel, moving = ("time", "wheel"), ("time", "coordinate")
     data = xr.Dataset(
-        {"positions": (moving, path.states[:, 0], {"units": units}),
-         "rates": (moving, path.states[:, 1], {"units": rates}),
-         "turning": (wheel, path.turning, {"units": "rad/s"}), "pressure": (wheel, path.pressures, {"units": "bar"}),
-         "torque": (wheel, path.torques, {"units": "N m"})}
-        | {key: (wheel, np.concatenate((np.full((1, path.turning.shape[1]), np.nan), path.reports[:, :, column])),
-                 {"units": unit}) for key, (column, unit) in REPORTS.items()},
-        {"time": ("time", path.times, {"units": "s"}), "coordinate": list(path.coordinates),
-         "wheel": list(WHEELS[: path.turning.shape[1]])},
-    )  # fmt: skip
-    data.attrs = {"title": f"{scene.title}: {name}", "stands": int(path.stands),
-                  "scene_table": json.dumps(scene.table()), "provenance": json.dumps(provenance())}  # fmt: skip
+        {
+            "positions": (moving, path.states[:, 0], {"units": units}),
+            "rates": (moving, path.states[:, 1], {"units": rates}),
+            "turning": (wheel, path.turning, {"units": "rad/s"}),
+            "pressure": (wheel, path.pressures, {"units": "bar"}),
+            "torque": (wheel, path.torques, {"units": "N m"}),
+        }
+        | {
+            key: (
+                wheel,
+                np.concatenate((np.full((1, path.turning.shape[1]), np.nan), path.reports[:, :, column])),
+                {"units": unit},
+            )
+            for key, (column, unit) in REPORTS.items()
+        },
+        {
+            "time": ("time", path.times, {"units": "s"}),
+            "coordinate": list(path.coordinates),
+            "wheel": list(WHEELS[: path.turning.shape[1]]),
+        },
+    )
+    data.attrs = {
+        "title": f"{scene.title}: {name}",
+        "stands": int(path.stands),
+        "scene_table": json.dumps(scene.table()),
+        "provenance": json.dumps(provenance()),
+    }
     Result(data).save(file)
 
 

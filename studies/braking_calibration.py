@@ -28,7 +28,7 @@ PAPER = {
     "distance": ("stopping distance [m]", "44.4 +- 1.2", "44.4 +- 0.5", "compared"),
     "time": ("stopping time [s]", "8.15 in one run", "", "compared"),
     "yaw": ("final yaw [deg]", "21.3 in one run, a guessed reading", "", "compared"),
-}  # fmt: skip
+}
 """What the paper prints of its simulation and its measurements. "0.4" stands in print, where 0.04 would fit."""
 WANTED = {"deceleration": 1.36, "aside": 7.5}
 
@@ -89,8 +89,13 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     stop = Stop(drive(last, options.procedure))
     save(last, options.procedure, stop.path, folder / "calibration.nc")
     stop_figure(last, options.procedure, stop, folder / "calibration.png")
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "table": table(options, scale, steer, found),
-            "answer": {"scale": scale, "steer": steer, **{key: one.mean for key, one in found.items()}}}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "table": table(options, scale, steer, found),
+        "answer": {"scale": scale, "steer": steer, **{key: one.mean for key, one in found.items()}},
+    }
 
 
 def fitted(scene: BrakingScene, options: Options, scale: float, steer: float) -> BrakingScene:
@@ -103,17 +108,25 @@ def fitted(scene: BrakingScene, options: Options, scale: float, steer: float) ->
 
 
 def _means(scene: BrakingScene, options: Options, runs: int, pool: Any, seed: int | None = None) -> dict[str, Scatter]:
-    job = Stops(scene.table(), scene.file, scene.folder, options.procedure, options.speed_spread,
-                options.seed if seed is None else seed)  # fmt: skip
+    job = Stops(
+        scene.table(),
+        scene.file,
+        scene.folder,
+        options.procedure,
+        options.speed_spread,
+        options.seed if seed is None else seed,
+    )
     found = run_paths(job, runs, executor=pool, block=max(1, runs // (2 * options.workers)))
     return {key: scatter(found[key]) for key in PAPER}
 
 
 def table(options: Options, scale: float, steer: float, found: dict[str, Scatter]) -> list[str]:
     """What was fitted, and each figure beside the paper's."""
-    lines = [f"  calibration: friction of {options.surface} times {scale:.4f}, steer angle {steer:.5f} rad",
-             f"  means of {options.last} stops, +- the scatter of one",
-             f"    {'':<34}{'here':>18}   {'paper, simulated':<36}{'paper, measured':<18}"]  # fmt: skip
+    lines = [
+        f"  calibration: friction of {options.surface} times {scale:.4f}, steer angle {steer:.5f} rad",
+        f"  means of {options.last} stops, +- the scatter of one",
+        f"    {'':<34}{'here':>18}   {'paper, simulated':<36}{'paper, measured':<18}",
+    ]
     for key, (label, simulated, measured, how) in PAPER.items():
         here = f"{found[key].mean:.3f} +- {found[key].deviation:.3f}"
         lines.append(f"    {label:<34}{here:>18}   {simulated:<36}{measured:<18}{how}")

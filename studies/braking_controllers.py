@@ -19,23 +19,34 @@ from models.whole_files import write_whole
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
-SHOWN = {"distance [m]": "stopping distance [m]", "v0^2/2d [m/s^2]": "v0^2/2d [m/s^2]", "y [m]": "y [m]",
-         "yaw [deg]": "final yaw [deg]", "side slip [deg]": "largest side slip [deg]"}  # fmt: skip
+SHOWN = {
+    "distance [m]": "stopping distance [m]",
+    "v0^2/2d [m/s^2]": "v0^2/2d [m/s^2]",
+    "y [m]": "y [m]",
+    "yaw [deg]": "final yaw [deg]",
+    "side slip [deg]": "largest side slip [deg]",
+}
 
 
-ESTIMATED = ("  true_speed = false: the speed is estimated from the wheels, which tell the vehicle's only when they "
-             "come back to it; slip_pi holds them at a slip, and may lock them for seconds on ice")  # fmt: skip
+ESTIMATED = (
+    "  true_speed = false: the speed is estimated from the wheels, which tell the vehicle's only when they "
+    "come back to it; slip_pi holds them at a slip, and may lock them for seconds on ice"
+)
 
 
 class Options(Strict):
     """[options] of this study."""
 
-    surfaces: dict[str, str] = Field({"ice": "snow", "snow": "dry", "dry": "snow"}, min_length=1,
-                                     description="and what lies right of each in split procedures")  # fmt: skip
+    surfaces: dict[str, str] = Field(
+        {"ice": "snow", "snow": "dry", "dry": "snow"},
+        min_length=1,
+        description="and what lies right of each in split procedures",
+    )
     controllers: dict[str, ControllerTable] = Field(
         {kind: ControllerTable(kind=kind) for kind in ("slip_bang_bang", "acceleration_phases", "slip_pi")},
-        min_length=1, description="tables as [controller], by their names",
-    )  # fmt: skip
+        min_length=1,
+        description="tables as [controller], by their names",
+    )
 
 
 @dataclass(frozen=True)
@@ -52,10 +63,18 @@ def cases(scene: BrakingScene) -> list[Case]:
     """All runs, surface by surface."""
     options = read(Options, scene.options, scene.file, "options")
     trains = [scene] if scene.trailer is None else [scene.model_copy(update={"trailer": None}), scene]
-    return [Case(surface, name, controller + " + trailer" * (own.trailer is not None),
-                 _alone(own, surface, right, name, table))
-            for surface, right in options.surfaces.items() for name in scene.procedures
-            for own in trains for controller, table in options.controllers.items()]  # fmt: skip
+    return [
+        Case(
+            surface,
+            name,
+            controller + " + trailer" * (own.trailer is not None),
+            _alone(own, surface, right, name, table),
+        )
+        for surface, right in options.surfaces.items()
+        for name in scene.procedures
+        for own in trains
+        for controller, table in options.controllers.items()
+    ]
 
 
 def _alone(scene: BrakingScene, surface: str, right: str, name: str, controller: ControllerTable) -> BrakingScene:
@@ -63,8 +82,13 @@ def _alone(scene: BrakingScene, surface: str, right: str, name: str, controller:
     own = scene.procedures[name]
     if own.kind == "split":
         own = own.model_copy(update={"right": right})
-    return scene.model_copy(update={"road": RoadTable(stretches=[Stretch(left=surface)]), "controller": controller,
-                                    "procedures": {name: own}})  # fmt: skip
+    return scene.model_copy(
+        update={
+            "road": RoadTable(stretches=[Stretch(left=surface)]),
+            "controller": controller,
+            "procedures": {name: own},
+        }
+    )
 
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
@@ -89,12 +113,15 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
             continue
         stop = Stop(path)
         values = stop.of_vehicle()
-        found.append((case, {key: values[name] for key, name in SHOWN.items()}
-                      | {"locked [s]": float(stop.locks().time.max())}))  # fmt: skip
+        found.append(
+            (case, {key: values[name] for key, name in SHOWN.items()} | {"locked [s]": float(stop.locks().time.max())})
+        )
     _save(found, folder / "controllers.csv")
     _figure(scene, found, folder / "controllers.png")
-    answer = [{"surface": case.surface, "procedure": case.procedure, "controller": case.controller, **values}
-              for case, values in found]  # fmt: skip
+    answer = [
+        {"surface": case.surface, "procedure": case.procedure, "controller": case.controller, **values}
+        for case, values in found
+    ]
     return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": table(found)}
 
 
@@ -104,8 +131,9 @@ def table(found: list[tuple[Case, dict[str, float]]]) -> list[str]:
     lines = [f"  {'surface':<10}{'procedure':<12}{'controller':<32}" + "".join(f"{head:>17}" for head in heads)]
     for case, values in found:
         name = case.procedure.replace("_", " ")
-        lines.append(f"  {case.surface:<10}{name:<12}{case.controller:<32}"
-                     + "".join(f"{values[head]:>17.2f}" for head in heads))  # fmt: skip
+        lines.append(
+            f"  {case.surface:<10}{name:<12}{case.controller:<32}" + "".join(f"{values[head]:>17.2f}" for head in heads)
+        )
     lines += ["  locked: longest of the wheels, above 15 km/h"]
     return lines + [ESTIMATED] * any(not case.scene.controller.true_speed for case, _ in found)
 
@@ -113,8 +141,10 @@ def table(found: list[tuple[Case, dict[str, float]]]) -> list[str]:
 def _save(found: list[tuple[Case, dict[str, float]]], file: Path) -> None:
     heads = list(found[0][1]) if found else []
     rows = [",".join(["surface", "procedure", "controller", *heads])]
-    rows += [",".join([case.surface, case.procedure, case.controller, *(f"{values[head]:.17g}" for head in heads)])
-             for case, values in found]  # fmt: skip
+    rows += [
+        ",".join([case.surface, case.procedure, case.controller, *(f"{values[head]:.17g}" for head in heads)])
+        for case, values in found
+    ]
     write_whole(file, "\n".join(rows) + "\n")
 
 
@@ -129,22 +159,33 @@ def _figure(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], fil
     rights = read(Options, scene.options, scene.file, "options").surfaces
     each = len(read(Options, scene.options, scene.file, "options").controllers)
     names, kinds = list(scene.procedures), list(dict.fromkeys(case.controller for case, _ in found))
-    figure, axes = plt.subplots(len(PANELS), max(len(surfaces), 1), figsize=(4.4 * max(len(surfaces), 1), 6.4),
-                                squeeze=False, sharey="row")  # fmt: skip
+    figure, axes = plt.subplots(
+        len(PANELS), max(len(surfaces), 1), figsize=(4.4 * max(len(surfaces), 1), 6.4), squeeze=False, sharey="row"
+    )
     width = 0.8 / max(len(kinds), 1)
     for column, surface in enumerate(surfaces):
         for row, (key, heading) in enumerate(PANELS.items()):
             axis = axes[row, column]
             for k, kind in enumerate(kinds):
-                own = {case.procedure: values[key] for case, values in found
-                       if case.surface == surface and case.controller == kind}  # fmt: skip
+                own = {
+                    case.procedure: values[key]
+                    for case, values in found
+                    if case.surface == surface and case.controller == kind
+                }
                 heights = [own.get(name, np.nan) for name in names]
-                axis.bar(np.arange(len(names)) + (k - (len(kinds) - 1) / 2) * width, heights, width * 0.95,
-                         label=kind.replace("_", " "), color=f"C{k % each}",
-                         alpha=1.0 if k < each else 0.5)  # fmt: skip
+                axis.bar(
+                    np.arange(len(names)) + (k - (len(kinds) - 1) / 2) * width,
+                    heights,
+                    width * 0.95,
+                    label=kind.replace("_", " "),
+                    color=f"C{k % each}",
+                    alpha=1.0 if k < each else 0.5,
+                )
             axis.set_xticks(range(len(names)), [name.replace("_", " ") for name in names])
-            axis.set(title=f"{heading} on {surface}; split: {rights[surface]} on the right",
-                     ylabel=key.replace("^2", "²") if column == 0 else "")  # fmt: skip
+            axis.set(
+                title=f"{heading} on {surface}; split: {rights[surface]} on the right",
+                ylabel=key.replace("^2", "²") if column == 0 else "",
+            )
     if found:
         axes[0, 0].legend(fontsize=8)
     figure.suptitle(f"{scene.title}, each procedure from its speed to a stop", x=0.01, ha="left", fontweight="bold")

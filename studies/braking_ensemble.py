@@ -25,8 +25,13 @@ BLOCKS = "blocks"
 """Folder of the finished blocks, within that of the results: a killed run can be resumed."""
 BLOCK = 5
 """Runs per block."""
-SHOWN = {"distance": "stopping distance [m]", "time": "stopping time [s]", "deceleration": "v0/T [m/s^2]",
-         "aside": "y [m]", "yaw": "final yaw [deg]"}  # fmt: skip
+SHOWN = {
+    "distance": "stopping distance [m]",
+    "time": "stopping time [s]",
+    "deceleration": "v0/T [m/s^2]",
+    "aside": "y [m]",
+    "yaw": "final yaw [deg]",
+}
 
 
 class Options(Strict):
@@ -46,8 +51,9 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     check_reference(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     if options.procedure not in scene.procedures:
-        raise InputError(scene.file, "options.procedure", options.procedure, "no such procedure",
-                         tuple(scene.procedures))  # fmt: skip
+        raise InputError(
+            scene.file, "options.procedure", options.procedure, "no such procedure", tuple(scene.procedures)
+        )
     build(merged(scene.table(), options.other), f"{scene.file} with options.other", Path(scene.folder))
 
 
@@ -71,8 +77,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     drive(scene, options.procedure)  # compiles what is not compiled yet, once and not in every worker
     with processes(options.workers) if options.workers > 1 else nullcontext() as pool:
         for i, table in enumerate(tables):
-            job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread,
-                        options.seed + i)  # fmt: skip
+            job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread, options.seed + i)
 
             def tell(done: Done, i: int = i) -> None:
                 progress(f"{options.names[i]}: {done}", (i + done.done / done.paths) / len(tables))
@@ -85,31 +90,50 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     scatters = [{key: scatter(arrays[key]) for key in SHOWN} for arrays in found]
     tests = {key: welch(scatters[0][key], scatters[1][key]) for key in SHOWN} if len(found) > 1 else {}
     _figure(scene, options, found, scatters, tests, folder)
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "table": table_of(options, scatters, tests),
-            "answer": {"means": [{key: one[key].mean for key in SHOWN} for one in scatters],
-                       "p": {key: test.p for key, test in tests.items()}}}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "table": table_of(options, scatters, tests),
+        "answer": {
+            "means": [{key: one[key].mean for key in SHOWN} for one in scatters],
+            "p": {key: test.p for key, test in tests.items()},
+        },
+    }
 
 
 def table_of(options: Options, scatters: list[dict[str, Scatter]], tests: dict[str, Welch]) -> list[str]:
     """Means with their standard errors, scatter, and Welch's test."""
-    lines = [f"  {options.runs} stops in each ensemble, initial speed scatters by {100 * options.speed_spread:g} %",
-             "    " + " " * 26 + "".join(f"{name + ': mean':>24}{'scatter':>10}" for name, _ in
-                                          zip(options.names, scatters, strict=False))]  # fmt: skip
+    lines = [
+        f"  {options.runs} stops in each ensemble, initial speed scatters by {100 * options.speed_spread:g} %",
+        "    "
+        + " " * 26
+        + "".join(f"{name + ': mean':>24}{'scatter':>10}" for name, _ in zip(options.names, scatters, strict=False)),
+    ]
     for key, label in SHOWN.items():
-        parts = "".join(f"{one[key].mean:>14.3f} +- {one[key].error:<6.3f}{one[key].deviation:>10.3f}"
-                        for one in scatters)  # fmt: skip
+        parts = "".join(
+            f"{one[key].mean:>14.3f} +- {one[key].error:<6.3f}{one[key].deviation:>10.3f}" for one in scatters
+        )
         lines.append(f"    {label:<26}{parts}")
     for key in tests:
         test = tests[key]
         if np.isfinite(test.t) and test.half_width > 0.0:
-            lines.append(f"  difference of {SHOWN[key]}: {test.difference:+.3f}, 95 % interval "
-                         f"+-{test.half_width:.3f}; Welch's t = {test.t:.2f}, {test.freedoms:.0f} degrees of freedom, "
-                         f"p = {test.p:.2g}")  # fmt: skip
+            lines.append(
+                f"  difference of {SHOWN[key]}: {test.difference:+.3f}, 95 % interval "
+                f"+-{test.half_width:.3f}; Welch's t = {test.t:.2f}, {test.freedoms:.0f} degrees of freedom, "
+                f"p = {test.p:.2g}"
+            )
     return lines
 
 
-def _figure(scene: BrakingScene, options: Options, found: list[dict[str, np.ndarray]],
-            scatters: list[dict[str, Scatter]], tests: dict[str, Welch], folder: Path) -> None:  # fmt: skip
+def _figure(
+    scene: BrakingScene,
+    options: Options,
+    found: list[dict[str, np.ndarray]],
+    scatters: list[dict[str, Scatter]],
+    tests: dict[str, Welch],
+    folder: Path,
+) -> None:
     from studies.figures import plt, save
 
     figure, (histogram, cloud) = plt.subplots(1, 2, figsize=(11, 4.2))
@@ -121,8 +145,13 @@ def _figure(scene: BrakingScene, options: Options, found: list[dict[str, np.ndar
         histogram.axvline(own.mean, color=f"C{i}")
         cloud.plot(arrays["speed"], arrays["distance"], "o", ms=3, color=f"C{i}", alpha=0.6, label=options.names[i])
     speeds = np.sort(found[0]["speed"])
-    cloud.plot(speeds, scatters[0]["distance"].mean * (speeds / speeds.mean()) ** 2, color="#222222", lw=0.9,
-               label="by the square of the speed alone")  # fmt: skip
+    cloud.plot(
+        speeds,
+        scatters[0]["distance"].mean * (speeds / speeds.mean()) ** 2,
+        color="#222222",
+        lw=0.9,
+        label="by the square of the speed alone",
+    )
     said = f"; Welch's test of the means: p = {tests['distance'].p:.2g}" if tests else ""
     histogram.set(xlabel="stopping distance [m]", ylabel="stops", title="Stopping distances and their means")
     cloud.set(xlabel="initial speed [m/s]", ylabel="stopping distance [m]", title="They scatter by more than the speed")

@@ -20,8 +20,9 @@ OTHER = "#e8dcc8"
 """Colours of the road; of a surface of the user's own."""
 
 
-def stop_figure(scene: BrakingScene, name: str, stop: Stop, file: File,
-                measured: MeasuredPressures | None = None) -> File:  # fmt: skip
+def stop_figure(
+    scene: BrakingScene, name: str, stop: Stop, file: File, measured: MeasuredPressures | None = None
+) -> File:
     """Six panels: speeds, slips, pressures, motion, torques, path; of a vehicle on its suspension also its body's
     lean, and loads."""
     own = scene.procedures[name]
@@ -30,9 +31,13 @@ def stop_figure(scene: BrakingScene, name: str, stop: Stop, file: File,
     figure, axes = plt.subplots(2, columns, figsize=(14 * columns / 3, 7.2))
     distance, time = stop.of_vehicle()["stopping distance [m]"], stop.times[-1]
     ended = f"stands after {distance:.2f} m and {time:.2f} s" if stop.path.stands else f"still moves at {time:.1f} s"
-    figure.suptitle(f"{scene.title}: {name.replace('_', ' ')} from {own.speed:g} m/s, "
-                    f"{behind(scene).replace('{procedure}', name)}; {ended}",
-                    x=0.01, ha="left", fontweight="bold")  # fmt: skip
+    figure.suptitle(
+        f"{scene.title}: {name.replace('_', ' ')} from {own.speed:g} m/s, "
+        f"{behind(scene).replace('{procedure}', name)}; {ended}",
+        x=0.01,
+        ha="left",
+        fontweight="bold",
+    )
     _speeds(axes[0, 0], stop, stop.path.turning * plane_of(scene).radius, measured)
     slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports[:, :, SLIP], np.nan)
     _wheels(axes[0, 1], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
@@ -66,8 +71,9 @@ def _wheels(axis: plt.Axes, times: np.ndarray, values: np.ndarray, title: str, l
 
 def _lean(axis: plt.Axes, times: np.ndarray, lean: np.ndarray) -> None:
     """Roll and pitch (n, 2) in rad of the body."""
-    for values, colour, label in zip(np.degrees(lean).T, COLOURS[::2], ("roll, to the right", "pitch, nose down"),
-                                     strict=False):  # fmt: skip
+    for values, colour, label in zip(
+        np.degrees(lean).T, COLOURS[::2], ("roll, to the right", "pitch, nose down"), strict=False
+    ):
         axis.plot(times, values, color=colour, label=label)
     axis.set(xlabel="time [s]", ylabel="angle [deg]", title="Roll and pitch of the body")
     axis.legend(fontsize=8)
@@ -100,15 +106,27 @@ def road(axis: plt.Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
     for stretch, begin, end in zip(scene.road.stretches, starts[:-1], starts[1:], strict=True):
         left, right = sides(scene.procedures[name], stretch)
         for surface, bottom, top in ((left, scene.road.line, high), (right, low, scene.road.line)):
-            axis.fill_between([max(begin, first), min(end, last)], bottom, top, color=GROUND.get(surface, OTHER), lw=0,
-                              label=None if surface in told else surface)  # fmt: skip
+            axis.fill_between(
+                [max(begin, first), min(end, last)],
+                bottom,
+                top,
+                color=GROUND.get(surface, OTHER),
+                lw=0,
+                label=None if surface in told else surface,
+            )
             told.add(surface)
     axis.plot(x, y, color="#222222", label="centre of mass")
     plane, drawn = plane_of(scene), outlines(scene)
     for i in np.searchsorted(stop.way, np.linspace(0.0, stop.way[-1], 6 - len(drawn) // 2)).clip(0, len(x) - 1):
         for unit, corners in drawn:
             axis.plot(*on_ground(unit, corners, stop.path.states[i, 0], plane).T, color="#222222", lw=0.7)
-    axis.set(xlabel="x [m]", ylabel="y [m]", title="Path on the road, from above", xlim=(first, last), ylim=(low, high),
-             aspect="equal")  # fmt: skip
+    axis.set(
+        xlabel="x [m]",
+        ylabel="y [m]",
+        title="Path on the road, from above",
+        xlim=(first, last),
+        ylim=(low, high),
+        aspect="equal",
+    )
     axis.grid(False)
     axis.legend(fontsize=8, loc="upper left", frameon=True, facecolor="white", framealpha=1.0)

@@ -79,8 +79,13 @@ def told(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Pr
         _save(found[-1], folder / f"{i + 1}_{own.system.replace('-', '_')}.csv")
     progress("figure", 1.0)
     choice_figure(found, folder / "choice.png")
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": [_answer(one) for one in found],
-            "table": [line for one in found for line in lines(one, len(found) > 1)]}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "answer": [_answer(one) for one in found],
+        "table": [line for one in found for line in lines(one, len(found) > 1)],
+    }
 
 
 def _spent(progress: Progress, title: str, done: int, of: int, share: float) -> None:
@@ -108,8 +113,10 @@ def search(scene: Any) -> str:
     if has_closed_form(scene):
         return "  choice     by a closed form, without runs in time"
     runs = Variants(scene, engine_of(scene, ()))
-    return (f"  choice     among {len(runs.effects)} effects; the search ends at the calls of {RUNS} runs of the "
-            f"scene, of {runs.system.steps(runs.scene):,} steps each, and confirms {ROUNDS} sets at most")  # fmt: skip
+    return (
+        f"  choice     among {len(runs.effects)} effects; the search ends at the calls of {RUNS} runs of the "
+        f"scene, of {runs.system.steps(runs.scene):,} steps each, and confirms {ROUNDS} sets at most"
+    )
 
 
 def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None) -> Found:
@@ -117,8 +124,10 @@ def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], Non
     engine = engine_of(scene, engines)
     chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress)
     choice, none = chooser.choose(), chooser.work(frozenset())
-    alone = [Alone(one, chooser.teller.predicted(frozenset([one])), none / chooser.work(frozenset([one])))
-             for one in chooser.effects]  # fmt: skip
+    alone = [
+        Alone(one, chooser.teller.predicted(frozenset([one])), none / chooser.work(frozenset([one])))
+        for one in chooser.effects
+    ]
     return Found(scene, engine, choice, alone, chooser.further(frozenset(choice.left_out)), {})
 
 
@@ -134,31 +143,55 @@ def _linear(scene: Any) -> Found:
         found = chooser.choose()
         singles = {effect: frozenset([effect]) for effect in chooser.effects}
         calls = chooser.cost(frozenset()).calls
-        alone = [Alone(effect.name, abs(chooser.predicted(one)), calls / chooser.cost(one).calls)
-                 for effect, one in singles.items()]  # fmt: skip
+        alone = [
+            Alone(effect.name, abs(chooser.predicted(one)), calls / chooser.cost(one).calls)
+            for effect, one in singles.items()
+        ]
         further = {effect.name: change for effect, change in chooser.further(frozenset(found.left_out)).items()}
         watts = activity(chooser.wholes[len(chooser.wholes) // 2])
     before, after = round(found.before.calls), round(found.after.calls)
     work = tuple(cost.work for cost in (found.before, found.before, found.after))
-    choice = Choice(tuple(one.name for one in found.candidates), tuple(one.name for one in found.left_out),
-                    1, abs(found.predicted), 0.0 * found.predicted, abs(found.confirmed), 0.0 * found.predicted,
-                    found.kept, (before, before, after), work, found.rounds, 0, 0.0)  # fmt: skip
+    choice = Choice(
+        tuple(one.name for one in found.candidates),
+        tuple(one.name for one in found.left_out),
+        1,
+        abs(found.predicted),
+        0.0 * found.predicted,
+        abs(found.confirmed),
+        0.0 * found.predicted,
+        found.kept,
+        (before, before, after),
+        work,
+        found.rounds,
+        0,
+        0.0,
+    )
     return Found(scene, "closed form", choice, alone, further, watts)
 
 
 def _answer(one: Found) -> dict[str, Any]:
     """What was chosen, and how right and how cheap that is."""
     choice = one.choice
-    errors = zip(one.scene.quantities, *(part.tolist() for part in (choice.predicted, choice.confirmed, choice.chance)),
-                 strict=True)  # fmt: skip
+    errors = zip(
+        one.scene.quantities,
+        *(part.tolist() for part in (choice.predicted, choice.confirmed, choice.chance)),
+        strict=True,
+    )
     return {
-        "system": one.scene.system, "implementation": one.engine, "left out": list(choice.left_out),
-        "stay": [name for name in choice.candidates if name not in choice.left_out], "step times": choice.times,
-        "errors": {name: {"predicted": predicted, "confirmed": found, "chance": chance}
-                   for name, predicted, found, chance in errors},
-        "kept": choice.kept, "calls": list(choice.calls), "confirmations": choice.rounds,
+        "system": one.scene.system,
+        "implementation": one.engine,
+        "left out": list(choice.left_out),
+        "stay": [name for name in choice.candidates if name not in choice.left_out],
+        "step times": choice.times,
+        "errors": {
+            name: {"predicted": predicted, "confirmed": found, "chance": chance}
+            for name, predicted, found, chance in errors
+        },
+        "kept": choice.kept,
+        "calls": list(choice.calls),
+        "confirmations": choice.rounds,
         "would matter no more above": one.further,
-    }  # fmt: skip
+    }
 
 
 def _save(one: Found, path: Path) -> None:
@@ -198,19 +231,24 @@ def lines(one: Found, named: bool) -> list[str]:
     rows.append(f"    stay: {', '.join(stay) or 'nothing'}")
     for i, name in enumerate(scene.quantities):
         kept = "kept" if choice.confirmed[i] + choice.chance[i] <= scene.tolerance else "NOT KEPT"
-        rows.append(f"    {name}: {_between(choice.predicted[i], choice.remainder[i])} predicted, "
-                    f"{_between(choice.confirmed[i], choice.chance[i])} confirmed, tolerance "
-                    f"{100 * scene.tolerance:g} %: {kept}")  # fmt: skip
+        rows.append(
+            f"    {name}: {_between(choice.predicted[i], choice.remainder[i])} predicted, "
+            f"{_between(choice.confirmed[i], choice.chance[i])} confirmed, tolerance "
+            f"{100 * scene.tolerance:g} %: {kept}"
+        )
     before, step, after = choice.calls
     saved = f"{before:,} -> {after:,}, {before / after:.3g} times fewer"
     if one.watts:
         rows.append(f"    calls per second of motion {saved}")
     else:
         faster = choice.seconds[0] / choice.seconds[2]
-        rows.append(f"    calls {saved}, by steps {choice.times} times as long; {before / step:.3g} times by longer "
-                    f"steps with all effects; CPU seconds {faster:.3g} times fewer, once")  # fmt: skip
-    rows += [f"    {name} {_stays(change, one)}"
-             for name, change in sorted(one.further.items(), key=lambda item: item[1])]  # fmt: skip
+        rows.append(
+            f"    calls {saved}, by steps {choice.times} times as long; {before / step:.3g} times by longer "
+            f"steps with all effects; CPU seconds {faster:.3g} times fewer, once"
+        )
+    rows += [
+        f"    {name} {_stays(change, one)}" for name, change in sorted(one.further.items(), key=lambda item: item[1])
+    ]
     if choice.ended:
         rows.append(f"    the search ended at the calls of {RUNS} runs of the scene: larger sets were not tried")
     if choice.more:
@@ -231,8 +269,10 @@ def misled(one: Found) -> list[str]:
         share = one.watts.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
         for name, change in zip(one.scene.quantities, effect.changes, strict=True):
             if np.isfinite(share) and share > ACTIVE and change < IDLE:
-                rows.append(f"    energy activity misleads: {effect.effect} holds {percent(share)} of it, and without "
-                            f"it {name} changes by {percent(change)}")  # fmt: skip
+                rows.append(
+                    f"    energy activity misleads: {effect.effect} holds {percent(share)} of it, and without "
+                    f"it {name} changes by {percent(change)}"
+                )
     return rows
 
 

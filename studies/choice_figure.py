@@ -26,8 +26,12 @@ def choice_figure(found: list[Any], path: Path) -> None:
     for axis in axes.flat[len(panels) :]:
         axis.set_visible(False)
     gap = " " if columns > 1 else "\n"
-    figure.suptitle(f"Which effects matter for which question:{gap}change by leaving out one effect, against the "
-                    "tolerance", x=0.01, ha="left", fontweight="bold")  # fmt: skip
+    figure.suptitle(
+        f"Which effects matter for which question:{gap}change by leaving out one effect, against the tolerance",
+        x=0.01,
+        ha="left",
+        fontweight="bold",
+    )
     save(figure, path)
 
 
@@ -37,17 +41,30 @@ def _changes(axis: Any, one: Any) -> None:
     y = np.arange(len(shown))
     for i, name in enumerate(one.scene.quantities):
         values = np.array([effect.changes[i] for effect in shown])
-        axis.plot(np.clip(np.nan_to_num(100 * values, posinf=HIGHEST), LOWEST, HIGHEST), y, "os^Dv"[i % 5],
-                  color=f"C{i}", ms=5, label=name.partition(" [")[0])  # fmt: skip
+        axis.plot(
+            np.clip(np.nan_to_num(100 * values, posinf=HIGHEST), LOWEST, HIGHEST),
+            y,
+            "os^Dv"[i % 5],
+            color=f"C{i}",
+            ms=5,
+            label=name.partition(" [")[0],
+        )
     axis.axvline(100 * one.scene.tolerance, color="#222222", ls="--", lw=1, label="tolerance")
-    axis.set(xscale="log", xlim=(LOWEST / 1.5, HIGHEST * 1.5), yticks=y,
-             yticklabels=[effect.effect.replace("_", " ") for effect in shown],
-             xlabel="change [%] (at the ends: beyond)")  # fmt: skip
+    axis.set(
+        xscale="log",
+        xlim=(LOWEST / 1.5, HIGHEST * 1.5),
+        yticks=y,
+        yticklabels=[effect.effect.replace("_", " ") for effect in shown],
+        xlabel="change [%] (at the ends: beyond)",
+    )
     for label, effect in zip(axis.get_yticklabels(), shown, strict=True):
         label.set_color(LEFT if effect.effect in one.choice.left_out else STAYS)
     before, _, after = one.choice.calls
-    axis.set_title(f"{one.scene.system}: {before / after:.3g} times fewer calls at {100 * one.scene.tolerance:g} %\n"
-                   "green: left out; orange: stays, as it matters or costs nothing", fontsize=9.5)  # fmt: skip
+    axis.set_title(
+        f"{one.scene.system}: {before / after:.3g} times fewer calls at {100 * one.scene.tolerance:g} %\n"
+        "green: left out; orange: stays, as it matters or costs nothing",
+        fontsize=9.5,
+    )
     axis.legend(fontsize=7.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
@@ -56,5 +73,7 @@ def _activity(axis: Any, one: Any) -> None:
     total = sum(finite.values())
     shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS][::-1]
     axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color="#0072b2", alpha=0.7)
-    axis.set(title=f"{one.scene.system}: energy activity,\nwhich knows neither the question nor pairs",
-             xlabel="share of the mean power [%]")  # fmt: skip
+    axis.set(
+        title=f"{one.scene.system}: energy activity,\nwhich knows neither the question nor pairs",
+        xlabel="share of the mean power [%]",
+    )

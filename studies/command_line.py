@@ -21,9 +21,10 @@ from models.whole_files import reason_of, write_whole
 from studies.asked import SCENES, engines_of, findings_of, load_scene, plan_of, ready
 
 app = typer.Typer(
-    add_completion=False, pretty_exceptions_enable=False,
+    add_completion=False,
+    pretty_exceptions_enable=False,
     help="Ground vehicles built in Exudyn, in MuJoCo and by hand, held to closed forms and to one another.",
-)  # fmt: skip
+)
 
 SceneName = Annotated[str, typer.Argument(help="A scene file, or the name of one from `twinrig list`.")]
 Changes = Annotated[
@@ -81,8 +82,10 @@ def list_scenes() -> None:
         named = "[effects.NAME] in a scene" if system == DEFAULT else "by the tables of its scenes"
         _print_list(f"effects of {system} ({named}; one that is not named is not computed)", listing(system))
     _print_list("parameter sets (vehicle.parameters = NAME, or a TOML file of your own)", sets)
-    _print_list("engines and their integrators (--engine NAME; [engines.NAME] integrator = ...)",
-                {name: ", ".join(integrators) for name, integrators in CATALOGUE.items()})
+    _print_list(
+        "engines and their integrators (--engine NAME; [engines.NAME] integrator = ...)",
+        {name: ", ".join(integrators) for name, integrators in CATALOGUE.items()},
+    )
 
 
 def _print_list(title: str, entries: dict[str, str]) -> None:
@@ -185,8 +188,15 @@ def _conformity(engine: str, more: bool, out: Path | None) -> None:
     sys.exit(1 if conformity(engine, folder, " ".join(["twinrig", *sys.argv[1:]])) else 0)
 
 
-def _sweep(text: str, scene: str, engine: str | None, changes: list[str] | None, out: Path | None, resume: Path | None,
-           as_json: bool) -> None:  # fmt: skip
+def _sweep(
+    text: str,
+    scene: str,
+    engine: str | None,
+    changes: list[str] | None,
+    out: Path | None,
+    resume: Path | None,
+    as_json: bool,
+) -> None:
     """Run a scene at every value of a key."""
     from studies import sweep
 
@@ -263,8 +273,9 @@ def validate(
     sys.exit(1 if failed else 0)
 
 
-def _finish(work: Callable[[Any], dict[str, Any]], folder: Path, as_json: bool,
-            doubts: tuple[Finding, ...] = ()) -> None:  # fmt: skip
+def _finish(
+    work: Callable[[Any], dict[str, Any]], folder: Path, as_json: bool, doubts: tuple[Finding, ...] = ()
+) -> None:
     """Do the work, whose results go into ``folder``, with a progress bar, and print its summary.
 
     doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results.
@@ -327,8 +338,10 @@ def _print(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None:
     print(summary["scene"])
     for engine, line in summary.get("runs", {}).items():
         steps, calls = line["counts"].get("steps", 0), line["counts"].get("force calls", 0)
-        print(f"  {engine:<10} {line['integrator']:<17} step {line['step']:g} s  {steps} steps, "
-              f"{calls} force calls, {line['seconds']:.3f} s once")
+        print(
+            f"  {engine:<10} {line['integrator']:<17} step {line['step']:g} s  {steps} steps, "
+            f"{calls} force calls, {line['seconds']:.3f} s once"
+        )
     for engine, reason in summary.get("failed", {}).items():
         print(f"  {engine:<10} FAILED: {reason}")
     for pair, gap in summary.get("largest difference of states", {}).items():

@@ -96,9 +96,11 @@ def compare(one: Path, two: Path) -> tuple[list[Difference], list[str]]:
     for name, first, second in pairs:
         a, b = _read(first), _read(second)
         prefix = f"{name}: " if len(pairs) > 1 else ""
-        notes += [f"{prefix}only in {path}: {', '.join(own)}" for path, own in
-                  ((first, [key for key in a if key not in b]), (second, [key for key in b if key not in a]))
-                  if own]  # fmt: skip
+        notes += [
+            f"{prefix}only in {path}: {', '.join(own)}"
+            for path, own in ((first, [key for key in a if key not in b]), (second, [key for key in b if key not in a]))
+            if own
+        ]
         found += [_difference(prefix + key, a[key], b[key], second) for key in a if key in b]
     if not found:
         raise InputError(two, "", None, f"has no quantity in common with {one}: compare two results of one study")
@@ -122,9 +124,14 @@ def _pairs(one: Path, two: Path, notes: list[str]) -> list[tuple[str, Path, Path
         return [("", next(iter(first.values())), next(iter(second.values())))]
     if not common:
         raise InputError(two, "", None, f"has no results of the same names as {one}: compare two results of one study")
-    notes += [f"only in {path}: {', '.join(own)}" for path, own in
-              ((one, [name for name in first if name not in second]),
-               (two, [name for name in second if name not in first])) if own]  # fmt: skip
+    notes += [
+        f"only in {path}: {', '.join(own)}"
+        for path, own in (
+            (one, [name for name in first if name not in second]),
+            (two, [name for name in second if name not in first]),
+        )
+        if own
+    ]
     return [(name, first[name], second[name]) for name in common]
 
 
@@ -134,8 +141,11 @@ def _kind(path: Path) -> str:
 
 def _files(folder: Path) -> dict[str, Path]:
     """Results of a folder by their names within it; netCDF files alone where there are any."""
-    found = {path.relative_to(folder).as_posix(): path for path in sorted(folder.rglob("*"))
-             if path.suffix in SUFFIXES and not any(part.startswith(".") for part in path.parts[len(folder.parts) :])}
+    found = {
+        path.relative_to(folder).as_posix(): path
+        for path in sorted(folder.rglob("*"))
+        if path.suffix in SUFFIXES and not any(part.startswith(".") for part in path.parts[len(folder.parts) :])
+    }
     netcdf = {name: path for name, path in found.items() if path.suffix == ".nc"}
     return netcdf or found
 
@@ -253,20 +263,29 @@ def report(one: Path, two: Path, folder: Path) -> dict[str, Any]:
     """Compare, save ``compare.csv`` and ``compare.png``, and say it in lines."""
     found, notes = compare(one, two)
     names = [each.name for each in found]
-    table = {"largest": [each.largest for each in found], "rms": [each.rms for each in found],
-             "at": [each.at for each in found], "share": [each.share for each in found]}  # fmt: skip
+    table = {
+        "largest": [each.largest for each in found],
+        "rms": [each.rms for each in found],
+        "at": [each.at for each in found],
+        "share": [each.share for each in found],
+    }
     _save(folder / "compare.csv", found)
     _figure(one, two, found, folder / "compare.png")
-    return {"scene": f"{two} less {one}", "folder": str(folder), "failed": {}, "names": names, "differences": table,
-            "table": [*_lines(found), *(f"  {note}" for note in notes)]}  # fmt: skip
+    return {
+        "scene": f"{two} less {one}",
+        "folder": str(folder),
+        "failed": {},
+        "names": names,
+        "differences": table,
+        "table": [*_lines(found), *(f"  {note}" for note in notes)],
+    }
 
 
 def _save(path: Path, found: list[Difference]) -> None:
     with whole_file(path) as part, part.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("quantity", "unit", "largest difference", "at", "rms difference", "share of largest value"))
-        writer.writerows((d.name, d.unit, d.largest, d.where, d.rms, d.share)
-                         for d in found)  # fmt: skip
+        writer.writerows((d.name, d.unit, d.largest, d.where, d.rms, d.share) for d in found)
 
 
 def _lines(found: list[Difference]) -> list[str]:
@@ -274,8 +293,11 @@ def _lines(found: list[Difference]) -> list[str]:
     if len(same) == len(found):
         return [f"  all {len(found)} quantities are the same to the last bit"]
     lines = [f"  {'quantity':<44} {'largest':>11} {'rms':>11} {'unit':<9} {'share':>8}  where it is largest"]
-    lines += [f"  {d.name:<44} {d.largest:>11.4g} {d.rms:>11.4g} {d.unit:<9} {d.share:>8.1e}  "
-              f"{d.where}" for d in found[:SHOWN] if d.largest > 0.0]  # fmt: skip
+    lines += [
+        f"  {d.name:<44} {d.largest:>11.4g} {d.rms:>11.4g} {d.unit:<9} {d.share:>8.1e}  {d.where}"
+        for d in found[:SHOWN]
+        if d.largest > 0.0
+    ]
     more = sum(each.largest > 0.0 for each in found[SHOWN:])
     lines += [f"  {more} more that differ less: compare.csv"] if more else []
     lines += [f"  the same to the last bit: {len(same)} of {len(found)}"] if same else []

@@ -22,9 +22,12 @@ SYSTEM = "contact"
 Progress = Callable[[str, float], None]
 UNITS = {"fx": "N", "fy": "N", "mz": "N m", "stick": "-", "dissipation": "N"}
 """Of the forces; the power lost is the dissipation times the rolling speed."""
-ERRORS = {"error_of_cells": ("N", "cells"), "error_of_theory": ("N", "theory"),
-          "moment_error_of_cells": ("N m", "moment_cells"),
-          "moment_error_of_theory": ("N m", "moment_theory")}  # fmt: skip
+ERRORS = {
+    "error_of_cells": ("N", "cells"),
+    "error_of_theory": ("N", "theory"),
+    "moment_error_of_cells": ("N m", "moment_cells"),
+    "moment_error_of_theory": ("N m", "moment_theory"),
+}
 """Columns of the errors with their units and names in ``Error``: of the force, and of the moment."""
 ROWS = 12
 """Rows of a sweep that are printed, about; the file has all."""
@@ -62,8 +65,13 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     _save(motions, found, folder)
     progress("figures", 0.9)
     _figures(scene, body, motions, found, folder)
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(body, motions, found),
-            "table": _table(scene, body, motions, found, times)}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "answer": _answer(body, motions, found),
+        "table": _table(scene, body, motions, found, times),
+    }
 
 
 def _save(motions: list[Motion], found: list[tuple[Rolled, Error]], folder: Path) -> None:
@@ -78,15 +86,25 @@ def _save(motions: list[Motion], found: list[tuple[Rolled, Error]], folder: Path
     fields = found[-1][0].fields
     if fields:
         units = {"x": "m", "y": "m", "dx": "m", "dy": "m", "pressure": "Pa", "px": "Pa", "py": "Pa", "slips": "-"}
-        write_table(folder / "fields.csv", {name: (unit, np.concatenate([getattr(f, name)[f.inside] for f in fields]))
-                                            for name, unit in units.items()})  # fmt: skip
+        write_table(
+            folder / "fields.csv",
+            {
+                name: (unit, np.concatenate([getattr(f, name)[f.inside] for f in fields]))
+                for name, unit in units.items()
+            },
+        )
 
 
 def _answer(body: Contact, motions: list[Motion], found: list[tuple[Rolled, Error]]) -> dict[str, Any]:
     """Everything that was computed, as plain numbers in SI."""
-    rows = [{**dict(zip(("xi_x", "xi_y", "spin"), motion, strict=True)), **{name: getattr(one, name) for name in UNITS},
-             **{name: getattr(error, key) for name, (_, key) in ERRORS.items()}}
-            for motion, (one, error) in zip(motions, found, strict=True)]  # fmt: skip
+    rows = [
+        {
+            **dict(zip(("xi_x", "xi_y", "spin"), motion, strict=True)),
+            **{name: getattr(one, name) for name in UNITS},
+            **{name: getattr(error, key) for name, (_, key) in ERRORS.items()},
+        }
+        for motion, (one, error) in zip(motions, found, strict=True)
+    ]
     return {**asdict(body.pressing), "friction": body.friction, "forces": rows, "doubt": _doubt(body, found)}
 
 
@@ -95,8 +113,7 @@ def _doubt(body: Contact, found: list[tuple[Rolled, Error]]) -> str:
     if not isinstance(body, Linear):
         return ""
     with np.errstate(divide="ignore", invalid="ignore"):  # no friction carries nothing
-        return doubted(np.array([np.linalg.norm(one.force) for one, _ in found])
-                       / (body.friction * body.pressing.load))  # fmt: skip
+        return doubted(np.array([np.linalg.norm(one.force) for one, _ in found]) / (body.friction * body.pressing.load))
 
 
 def doubted(used: np.ndarray) -> str:
@@ -104,37 +121,53 @@ def doubted(used: np.ndarray) -> str:
     beyond = used[used > 1.0]
     if not beyond.size:
         return ""
-    return (f"the linear theory's force is more than friction can carry at {beyond.size} of {used.size} creepages, up "
-            f"to {beyond.max():.3g} mu N: it knows no slip")  # fmt: skip
+    return (
+        f"the linear theory's force is more than friction can carry at {beyond.size} of {used.size} creepages, up "
+        f"to {beyond.max():.3g} mu N: it knows no slip"
+    )
 
 
-def _table(scene: ContactScene, body: Contact, motions: list[Motion], found: list[tuple[Rolled, Error]],
-           times: tuple[float, np.ndarray]) -> list[str]:  # fmt: skip
+def _table(
+    scene: ContactScene,
+    body: Contact,
+    motions: list[Motion],
+    found: list[tuple[Rolled, Error]],
+    times: tuple[float, np.ndarray],
+) -> list[str]:
     """Normal contact, then forces with their errors: all of one creepage, or some rows of a sweep.
 
     times : of pressing, and of rolling at each creepage with its errors (s)
     """
     p, limit = body.pressing, body.friction * body.pressing.load
     size = f"a = {1e3 * body.a:.3f} mm, b = {1e3 * body.b:.3f} mm, " if isinstance(body, OnEllipse) else ""
-    lines = [f"  normal load {p.load:,.0f} N, approach {1e6 * p.approach:.2f} um, {size}area {1e6 * p.area:.2f} mm^2, "
-             f"largest pressure {1e-6 * p.peak:,.0f} MPa", *_places(scene),
-             f"  pressed in {duration(times[0])} once, rolled in {cost(times[1])} at each creepage, errors included",
-             f"  forces on the wheel by {theory(scene.method)}; mu N = {limit:,.0f} N",
-             f"    {'xi_x [-]':>10}{'xi_y [-]':>10}{'spin [1/m]':>11}{'Fx [N]':>10}{'Fy [N]':>10}{'Mz [N m]':>10}"
-             f"{'stick':>7}{'loss [N]':>10}   errors: of cells, of theory [% of mu N], of Mz [N m]"]  # fmt: skip
+    lines = [
+        f"  normal load {p.load:,.0f} N, approach {1e6 * p.approach:.2f} um, {size}area {1e6 * p.area:.2f} mm^2, "
+        f"largest pressure {1e-6 * p.peak:,.0f} MPa",
+        *_places(scene),
+        f"  pressed in {duration(times[0])} once, rolled in {cost(times[1])} at each creepage, errors included",
+        f"  forces on the wheel by {theory(scene.method)}; mu N = {limit:,.0f} N",
+        f"    {'xi_x [-]':>10}{'xi_y [-]':>10}{'spin [1/m]':>11}{'Fx [N]':>10}{'Fy [N]':>10}{'Mz [N m]':>10}"
+        f"{'stick':>7}{'loss [N]':>10}   errors: of cells, of theory [% of mu N], of Mz [N m]",
+    ]
     step = max(1, (len(motions) - 1) // ROWS)
     for motion, (one, error) in list(zip(motions, found, strict=True))[::step]:
-        lines.append(f"    {motion[0]:>10.3g}{motion[1]:>10.3g}{motion[2]:>11.3g}{round(one.fx):>10,}"
-                     f"{round(one.fy):>10,}{one.mz:>10.3f}{one.stick:>7.0%}{one.dissipation:>10.3g}"
-                     f"   {_percent(error.cells, limit):>6}{_percent(error.theory, limit):>8}"
-                     f"{error.moment:>9.2g}")  # fmt: skip
+        lines.append(
+            f"    {motion[0]:>10.3g}{motion[1]:>10.3g}{motion[2]:>11.3g}{round(one.fx):>10,}"
+            f"{round(one.fy):>10,}{one.mz:>10.3f}{one.stick:>7.0%}{one.dissipation:>10.3g}"
+            f"   {_percent(error.cells, limit):>6}{_percent(error.theory, limit):>8}"
+            f"{error.moment:>9.2g}"
+        )
     lines.append("  loss: power by the rolling speed; errors are of the force, that of Mz has both together")
     doubt = _doubt(body, found)
     return [*lines, f"  warning: {doubt}"] if doubt else lines
 
 
-NAMES = {"fastsim": "FASTSIM", "linear": "the linear theory", "simplified": "the theory of 1983",
-         "exact": "the exact theory"}  # fmt: skip
+NAMES = {
+    "fastsim": "FASTSIM",
+    "linear": "the linear theory",
+    "simplified": "the theory of 1983",
+    "exact": "the exact theory",
+}
 
 
 def theory(method: Method) -> str:
@@ -150,19 +183,23 @@ def _places(scene: ContactScene) -> list[str]:
     """Where profiles touch, a line each."""
     if scene.profiles is None:
         return []
-    return [f"  touches at {1e3 * touch.rail_y:.2f} mm from the rail's top and {1e3 * touch.wheel_y:.2f} mm from the "
-            f"taping line, {touch.angle:.4f} rad steep, gap {round(1e6 * touch.gap, 1) + 0.0:.1f} um"
-            for touch in touches(scene, built_of(scene))]  # fmt: skip
+    return [
+        f"  touches at {1e3 * touch.rail_y:.2f} mm from the rail's top and {1e3 * touch.wheel_y:.2f} mm from the "
+        f"taping line, {touch.angle:.4f} rad steep, gap {round(1e6 * touch.gap, 1) + 0.0:.1f} um"
+        for touch in touches(scene, built_of(scene))
+    ]
 
 
-def _figures(scene: ContactScene, body: Contact, motions: list[Motion], found: list[tuple[Rolled, Error]],
-             folder: Path) -> None:  # fmt: skip
+def _figures(
+    scene: ContactScene, body: Contact, motions: list[Motion], found: list[tuple[Rolled, Error]], folder: Path
+) -> None:
     from studies.contact_figures import contact_figure, sweep_figure
 
     one, fields = found[-1][0], list(found[-1][0].fields)
     if fields:
-        contact_figure(fields, body.friction, _caption(scene, motions[-1], one),
-                       _pressure(body), folder / "contact.png")
+        contact_figure(
+            fields, body.friction, _caption(scene, motions[-1], one), _pressure(body), folder / "contact.png"
+        )
     if scene.sweep is not None:
         title = f"{scene.title}\nForces by {theory(scene.method)}{_kept(scene)}"
         sweep_figure(scene.sweep, body, found, _checks(scene, body), title, folder / "forces.png")
@@ -174,8 +211,11 @@ SYMBOLS = {"xi_x": (r"$\xi_x$", ""), "xi_y": (r"$\xi_y$", ""), "spin": ("spin", 
 def _kept(scene: ContactScene) -> str:
     """The creepages that are not swept, where they are not zero."""
     assert scene.sweep is not None
-    kept = [f"{symbol} = {value:.3g}{unit}" for (symbol, unit), (name, value) in
-            zip(SYMBOLS.values(), scene.creepage, strict=True) if value and name != scene.sweep.of]  # fmt: skip
+    kept = [
+        f"{symbol} = {value:.3g}{unit}"
+        for (symbol, unit), (name, value) in zip(SYMBOLS.values(), scene.creepage, strict=True)
+        if value and name != scene.sweep.of
+    ]
     return "".join(f"; {text}" for text in kept)
 
 
@@ -187,9 +227,12 @@ def _pressure(body: Contact) -> str:
 
 
 def _caption(scene: ContactScene, motion: Motion, one: Rolled) -> str:
-    return (f"{scene.title}\n" rf"$\xi_x$ = {motion[0]:.3g}, $\xi_y$ = {motion[1]:.3g}, spin = {motion[2]:.3g} 1/m: "
-            f"$F_x$ = {1e-3 * one.fx:.2f} kN, $F_y$ = {1e-3 * one.fy:.2f} kN, $M_z$ = {one.mz:.1f} N m "
-            f"by {NAMES[scene.method.name]}")  # fmt: skip
+    return (
+        f"{scene.title}\n"
+        rf"$\xi_x$ = {motion[0]:.3g}, $\xi_y$ = {motion[1]:.3g}, spin = {motion[2]:.3g} 1/m: "
+        f"$F_x$ = {1e-3 * one.fx:.2f} kN, $F_y$ = {1e-3 * one.fy:.2f} kN, $M_z$ = {one.mz:.1f} N m "
+        f"by {NAMES[scene.method.name]}"
+    )
 
 
 CHECKED = 40

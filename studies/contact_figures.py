@@ -37,8 +37,10 @@ def contact_figure(patches: list[Fields], friction: float, title: str, pressure:
 
 def _extent(patches: list[Fields]) -> tuple[float, float]:
     """Length along x and width along y of all patches together (mm)."""
-    return tuple(float(np.ptp(np.concatenate([getattr(f, name)[f.inside] for f in patches]))) * MILLI  # type: ignore
-                 for name in ("x", "y"))  # fmt: skip
+    return tuple(
+        float(np.ptp(np.concatenate([getattr(f, name)[f.inside] for f in patches]))) * MILLI  # type: ignore
+        for name in ("x", "y")
+    )
 
 
 def _size(patches: list[Fields]) -> tuple[float, float]:
@@ -56,8 +58,9 @@ def _rectangles(f: Fields) -> list[np.ndarray]:
 def _pressure(axis: Any, patches: list[Fields], what: str) -> None:
     greatest = MEGA * max(float(f.pressure.max()) for f in patches)
     for f in patches:
-        cells = PolyCollection(_rectangles(f), array=MEGA * f.pressure[f.inside], cmap="viridis", edgecolor="face",
-                               linewidth=0.2)  # fmt: skip
+        cells = PolyCollection(
+            _rectangles(f), array=MEGA * f.pressure[f.inside], cmap="viridis", edgecolor="face", linewidth=0.2
+        )
         cells.set_clim(0.0, greatest)
         axis.add_collection(cells)
     axis.autoscale_view()
@@ -74,8 +77,17 @@ def _tractions(axis: Any, patches: list[Fields], friction: float) -> None:
         colours = np.where(slips, SLIP, STICK)
         axis.add_collection(PolyCollection(_rectangles(f), facecolor=colours, edgecolor="face", linewidth=0.2))
         x, y, px, py = _arrows(f, spacing / MILLI)
-        arrows = axis.quiver(MILLI * x, MILLI * y, px, py, angles="xy", scale_units="xy",
-                             scale=largest / (1.35 * spacing), width=0.003, color="#222222")  # fmt: skip
+        arrows = axis.quiver(
+            MILLI * x,
+            MILLI * y,
+            px,
+            py,
+            angles="xy",
+            scale_units="xy",
+            scale=largest / (1.35 * spacing),
+            width=0.003,
+            color="#222222",
+        )
     axis.quiverkey(arrows, 0.88, 0.035, largest, f"{MEGA * largest:,.0f} MPa", labelpos="W")
     marks = [plt.Rectangle((0, 0), 1, 1, facecolor=colour) for colour in (STICK, SLIP)]
     share = np.concatenate([f.slips[f.inside] for f in patches])
@@ -106,8 +118,14 @@ LABELS = {"xi_x": "longitudinal creepage [%]", "xi_y": "lateral creepage [%]", "
 COLOURS = {"fx": "#0072b2", "fy": "#d55e00", "mz": "#009e73"}
 
 
-def sweep_figure(sweep: Sweep, body: Contact, found: list[tuple[Rolled, Error]], checks: list[tuple[float, Rolled]],
-                 title: str, path: Path) -> None:  # fmt: skip
+def sweep_figure(
+    sweep: Sweep,
+    body: Contact,
+    found: list[tuple[Rolled, Error]],
+    checks: list[tuple[float, Rolled]],
+    title: str,
+    path: Path,
+) -> None:
     """Forces and moment against a creepage, with the band of their error, and points of the exact theory."""
     figure, axes = plt.subplots(1, 2, figsize=(11.0, 4.8))
     scale = 1.0 if sweep.of == "spin" else 100.0
@@ -119,13 +137,18 @@ def sweep_figure(sweep: Sweep, body: Contact, found: list[tuple[Rolled, Error]],
         low, high = np.clip(force - error, -limit, limit), np.clip(force + error, -limit, limit)
         axes[0].fill_between(values, 1e-3 * low, 1e-3 * high, color=COLOURS[name], alpha=0.18, linewidth=0)
         axes[0].plot(values, 1e-3 * force, color=COLOURS[name], linewidth=1.6, label=text)
-        axes[0].plot(at, [1e-3 * getattr(one, name) for _, one in checks], "o",
-                     color=COLOURS[name], markerfacecolor="white", markersize=5)  # fmt: skip
+        axes[0].plot(
+            at,
+            [1e-3 * getattr(one, name) for _, one in checks],
+            "o",
+            color=COLOURS[name],
+            markerfacecolor="white",
+            markersize=5,
+        )
     moment, off = np.array([[one.mz, error.moment] for one, error in found]).T
     axes[1].fill_between(values, moment - off, moment + off, color=COLOURS["mz"], alpha=0.18, linewidth=0)
     axes[1].plot(values, moment, color=COLOURS["mz"], linewidth=1.6)
-    axes[1].plot(at, [one.mz for _, one in checks], "o", color=COLOURS["mz"],
-                 markerfacecolor="white", markersize=5)  # fmt: skip
+    axes[1].plot(at, [one.mz for _, one in checks], "o", color=COLOURS["mz"], markerfacecolor="white", markersize=5)
     for sign in (-1, 1):
         axes[0].axhline(sign * 1e-3 * limit, color="black", linewidth=0.7, linestyle=":")
     axes[0].set_title(r"tangential force on the wheel; dotted: $\pm\mu N$")
@@ -147,10 +170,16 @@ def _legend(axis: Any, checked: bool) -> None:
     axis.figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=4)
 
 
-STYLES = {"linear theory": ("#888888", "x"), "FASTSIM 1982": ("#d55e00", "s"), "FASTSIM, plain march": ("#e69f00", "v"),
-          "FASTSIM": ("#0072b2", "o"), "FASTSIM, three flexibilities": ("#56b4e9", "^"),
-          "FASTSIM, parabolic": ("#009e73", "D"), "theory of 1983": ("#cc79a7", "P"),
-          "exact theory": ("#222222", "*")}  # fmt: skip
+STYLES = {
+    "linear theory": ("#888888", "x"),
+    "FASTSIM 1982": ("#d55e00", "s"),
+    "FASTSIM, plain march": ("#e69f00", "v"),
+    "FASTSIM": ("#0072b2", "o"),
+    "FASTSIM, three flexibilities": ("#56b4e9", "^"),
+    "FASTSIM, parabolic": ("#009e73", "D"),
+    "theory of 1983": ("#cc79a7", "P"),
+    "exact theory": ("#222222", "*"),
+}
 
 
 TOP = 60.0
@@ -162,8 +191,9 @@ def price_figure(points: list[Point], title: str) -> Figure:
     figure, axes = plt.subplots(1, 2, figsize=(11.5, 5.2), sharey=True)
     for name, (colour, marker) in STYLES.items():
         own = [one for one in points if one.name == name]
-        error, most = ([100 * value for value in values]
-                       for values in ([one.mean for one in own], [one.most for one in own]))  # fmt: skip
+        error, most = (
+            [100 * value for value in values] for values in ([one.mean for one in own], [one.most for one in own])
+        )
         for axis, along in zip(axes, ([one.seconds for one in own], [one.cells**2 for one in own]), strict=True):
             label = name if error[0] < TOP else f"{name}: {error[0]:.0f} %"
             axis.plot(along, error, color=colour, marker=marker, linewidth=1.4, markersize=5.5, label=label)

@@ -22,8 +22,9 @@ Progress = Callable[[str, float], None]
 class Options(Strict):
     """[options] of this study."""
 
-    levels: list[float] = Field([0.5, 1.5], min_length=1, description="sizes of the creepage; at 1 the linear theory "
-                                "reaches mu N")  # fmt: skip
+    levels: list[float] = Field(
+        [0.5, 1.5], min_length=1, description="sizes of the creepage; at 1 the linear theory reaches mu N"
+    )
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
@@ -45,8 +46,9 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     check(scene, engines)
     options, hertz = read(Options, scene.options, scene.file, "options"), hertz_of(scene)
     built = built_of(scene)
-    cases = ellipse_cases(float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair,
-                          tuple(options.levels))  # fmt: skip
+    cases = ellipse_cases(
+        float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair, tuple(options.levels)
+    )
     known = []
     for i, case in enumerate(cases):
         progress("exact theory", 0.5 * i / len(cases))
@@ -62,17 +64,27 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
 
     title = f"What accuracy costs: a = {1e3 * hertz.a:.2f} mm, b = {1e3 * hertz.b:.2f} mm, {len(known)} contacts"
     save(price_figure(points, title), folder / "price.png")
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "points": [asdict(one) for one in points],
-            "table": table}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "points": [asdict(one) for one in points],
+        "table": table,
+    }
 
 
 def _table(points: list[Any], count: int, uncertain: float) -> list[str]:
     """All points, then the cheapest for each target."""
-    lines = [f"  error of the tangential force in % of mu N over {count} contacts (exact ones known to "
-             f"{100 * uncertain:.2g} %)",
-             f"    {'':<28}{'cells':>6}{'mean':>8}{'95 of 100':>11}{'largest':>9}   time of contacts"]  # fmt: skip
-    lines += [f"    {one.name:<28}{one.cells:>6}{100 * one.mean:>8.2f}{100 * one.most:>11.2f}"
-              f"{100 * max(one.errors):>9.2f}   {cost((one.seconds, *one.range))}" for one in points]  # fmt: skip
+    lines = [
+        f"  error of the tangential force in % of mu N over {count} contacts (exact ones known to "
+        f"{100 * uncertain:.2g} %)",
+        f"    {'':<28}{'cells':>6}{'mean':>8}{'95 of 100':>11}{'largest':>9}   time of contacts",
+    ]
+    lines += [
+        f"    {one.name:<28}{one.cells:>6}{100 * one.mean:>8.2f}{100 * one.most:>11.2f}"
+        f"{100 * max(one.errors):>9.2f}   {cost((one.seconds, *one.range))}"
+        for one in points
+    ]
     lines.append("  cheapest that meets      in the mean; in 95 of 100 contacts")
     return lines + [f"    {target:>6}  {mean};  {most}" for target, mean, most in cheapest_lines(points)]
 

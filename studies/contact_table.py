@@ -41,8 +41,15 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     rows = answer(path, folder / ANSWER, scene.pair, scene.method, lambda done: progress(f"{done:,} rows", 0.0), extend)
     seconds = time.perf_counter() - start
     table = told(rows["rows"], rows["wrong"], path.name, seconds)
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "rows": rows, "answer": sizes(folder / ANSWER),
-            "seconds": seconds, "table": table}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "rows": rows,
+        "answer": sizes(folder / ANSWER),
+        "seconds": seconds,
+        "table": table,
+    }
 
 
 def sizes(path: Path) -> dict[str, dict[str, Any]]:
@@ -55,8 +62,11 @@ def sizes(path: Path) -> dict[str, dict[str, Any]]:
             sound = np.array([row[1:-1] for row in block if row[-1] == "ok"], float).reshape(-1, len(heads))
             largest = np.maximum(largest, np.abs(sound).max(axis=0, initial=0.0))
             squares, count = squares + (sound**2).sum(axis=0), count + len(sound)
-    return {name: {"unit": unit, "largest": float(most), "rms": float(np.sqrt(square / count))}
-            for (name, unit), most, square in zip(heads, largest, squares, strict=True) if count}  # fmt: skip
+    return {
+        name: {"unit": unit, "largest": float(most), "rms": float(np.sqrt(square / count))}
+        for (name, unit), most, square in zip(heads, largest, squares, strict=True)
+        if count
+    }
 
 
 def told(rows: int, wrong: int, name: str, seconds: float) -> list[str]:
@@ -66,8 +76,10 @@ def told(rows: int, wrong: int, name: str, seconds: float) -> list[str]:
     sound = ", all of them sound" if rows > 1 else ", sound"
     state = f"; {wrong:,} of them wrong, see their status" if wrong else sound
     each = f", {duration(seconds / rows)} a row" if rows > 1 else ""
-    return [f"  {rows:,} row{'s' * (rows > 1)} of {name}{state}",
-            f"  {duration(seconds)}{each}, once: reading, forces twice for the error of cells, writing"]  # fmt: skip
+    return [
+        f"  {rows:,} row{'s' * (rows > 1)} of {name}{state}",
+        f"  {duration(seconds)}{each}, once: reading, forces twice for the error of cells, writing",
+    ]
 
 
 if __name__ == "__main__":

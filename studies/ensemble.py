@@ -64,8 +64,13 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
     for engine in {"reference", *engines}:
         settings = scene.settings(engine)
         if CATALOGUE[engine][str(settings.integrator)].adaptive or settings.step != scene.run.step:
-            raise InputError(scene.file, f"engines.{engine}", None, "an ensemble compares states at the fixed steps of "
-                             "run.step: name no adaptive integrator and no other step")
+            raise InputError(
+                scene.file,
+                f"engines.{engine}",
+                None,
+                "an ensemble compares states at the fixed steps of "
+                "run.step: name no adaptive integrator and no other step",
+            )
     if not (divides(scene.run.step, options.rows) and divides(options.rows, scene.run.duration)):
         allowed = f"must be a multiple of run.step = {scene.run.step:g} s and divide run.duration"
         raise InputError(scene.file, "options.rows", options.rows, allowed)
@@ -103,8 +108,15 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     _figure(times, found["states"][:, :, 3] - true[:, 3], found["drift_off"], options, folder)
     told = {engine: None if math.isnan(worst) else worst for engine, worst in gaps.items()}
-    return {"scene": scene.title, "folder": str(folder), "paths": options.paths, "rows": rows, "gaps": told,
-            "failed": {}, "table": table}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "paths": options.paths,
+        "rows": rows,
+        "gaps": told,
+        "failed": {},
+        "table": table,
+    }
 
 
 def _workers(options: Options) -> AbstractContextManager[Executor | None]:
@@ -126,8 +138,9 @@ def _in_engine(engine: str, noisy: Scene, times: np.ndarray, truth: np.ndarray, 
     if engine == "mujoco":
         threads = mujoco_threads(noisy, times, truth, options.threshold, options.workers)
         return run_paths(threads, options.engine_paths)
-    return run_paths(noise_paths(noisy, times, truth, options.threshold, engine), options.engine_paths, executor=pool,
-                     block=1)  # fmt: skip
+    return run_paths(
+        noise_paths(noisy, times, truth, options.threshold, engine), options.engine_paths, executor=pool, block=1
+    )
 
 
 def _save(folder: Path, scene: Scene, job: NoisePaths, times: np.ndarray, found: Arrays) -> None:
@@ -137,13 +150,19 @@ def _save(folder: Path, scene: Scene, job: NoisePaths, times: np.ndarray, found:
     import xarray as xr
 
     data = xr.Dataset(
-        {"states": (("path", "time", "state"), found["states"], {"units": "m, rad, m/s, rad/s"}),
-         "drift_off": ("path", found["drift_off"], {"units": "s", "long_name": "drift-off, infinite if never"}),
-         "failed": ("path", found["failed"], {"units": "s", "long_name": "last good time of a path that failed"})},
+        {
+            "states": (("path", "time", "state"), found["states"], {"units": "m, rad, m/s, rad/s"}),
+            "drift_off": ("path", found["drift_off"], {"units": "s", "long_name": "drift-off, infinite if never"}),
+            "failed": ("path", found["failed"], {"units": "s", "long_name": "last good time of a path that failed"}),
+        },
         coords={"time": ("time", times, {"units": "s"}), "state": list(state_names())},
-    )  # fmt: skip
-    data.attrs = {"title": scene.title, "threshold": job.threshold, "scene_table": json.dumps(job.base.scene.table()),
-                  "provenance": json.dumps(provenance())}  # fmt: skip
+    )
+    data.attrs = {
+        "title": scene.title,
+        "threshold": job.threshold,
+        "scene_table": json.dumps(job.base.scene.table()),
+        "provenance": json.dumps(provenance()),
+    }
     Result(data).save(folder / "ensemble.nc")
 
 
@@ -153,19 +172,32 @@ def _rows(options: Options, times: np.ndarray, errors: np.ndarray) -> list[dict[
     for time in options.times:
         row = round(time / options.rows)
         (pitch, pitch_error), (heave, heave_error) = deviation(errors[:, row, 3]), deviation(errors[:, row, 2])
-        rows.append({"time": float(times[row]), "pitch": pitch, "pitch error": pitch_error, "heave": heave,
-                     "heave error": heave_error})  # fmt: skip
+        rows.append(
+            {
+                "time": float(times[row]),
+                "pitch": pitch,
+                "pitch error": pitch_error,
+                "heave": heave,
+                "heave error": heave_error,
+            }
+        )
     return rows
 
 
-def text(options: Options, scene: Scene, rows: list[dict[str, float]], found: Arrays,
-         gaps: dict[str, float]) -> list[str]:  # fmt: skip
+def text(
+    options: Options, scene: Scene, rows: list[dict[str, float]], found: Arrays, gaps: dict[str, float]
+) -> list[str]:
     """The table as lines of text."""
-    lines = [f"  {options.paths} paths of {scene.run.duration:g} s, forces at {options.sampling_rate:g} Hz, noise "
-             f"{100 * options.noise_fraction:g} % of the largest force",
-             "  time [s]   sd of pitch [rad]         sd of heave [m]"]  # fmt: skip
-    lines += [f"  {row['time']:8g}   {row['pitch']:.3e} +- {row['pitch error']:.0e}   "
-              f"{row['heave']:.3e} +- {row['heave error']:.0e}" for row in rows]  # fmt: skip
+    lines = [
+        f"  {options.paths} paths of {scene.run.duration:g} s, forces at {options.sampling_rate:g} Hz, noise "
+        f"{100 * options.noise_fraction:g} % of the largest force",
+        "  time [s]   sd of pitch [rad]         sd of heave [m]",
+    ]
+    lines += [
+        f"  {row['time']:8g}   {row['pitch']:.3e} +- {row['pitch error']:.0e}   "
+        f"{row['heave']:.3e} +- {row['heave error']:.0e}"
+        for row in rows
+    ]
     lines.append(f"  Drift-off ({options.threshold:g} rad), quantiles with their 95 % intervals [s]")
     for level in QUANTILES:
         value, low, high = quantile(found["drift_off"], level)
@@ -193,8 +225,9 @@ def _figure(times: np.ndarray, errors: np.ndarray, drift_off: np.ndarray, option
 
     figure, (fan, histogram) = plt.subplots(1, 2, figsize=(10, 3.8), width_ratios=(3, 2))
     draw_fan(fan, times[1:], percentiles(errors[:, 1:]))
-    fan.axhline(options.threshold, color="black", linestyle="--", linewidth=0.8,
-                label=f"drift-off, {options.threshold:g} rad")
+    fan.axhline(
+        options.threshold, color="black", linestyle="--", linewidth=0.8, label=f"drift-off, {options.threshold:g} rad"
+    )
     fan.legend(loc="lower right")
     drifted = drift_off[np.isfinite(drift_off)]
     histogram.hist(drifted, bins=40, color="C0", alpha=0.6)

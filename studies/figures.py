@@ -28,11 +28,23 @@ COLOURS = _Colours({"reference": "#222222", "exudyn": "#0072b2", "mujoco": "#d55
 LABELS = _Labels({"reference": "reference", "exudyn": "Exudyn", "mujoco": "MuJoCo"})
 """As figures call them; one from outside the tree by its own name and in a colour of its own."""
 
-plt.rcParams.update({
-    "figure.dpi": 110, "savefig.dpi": 130, "font.size": 9.5, "axes.titlesize": 10.5, "axes.titlelocation": "left",
-    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.alpha": 0.25,
-    "legend.frameon": False, "lines.linewidth": 1.1, "svg.hashsalt": "twinrig", "figure.constrained_layout.use": True,
-})  # fmt: skip
+plt.rcParams.update(
+    {
+        "figure.dpi": 110,
+        "savefig.dpi": 130,
+        "font.size": 9.5,
+        "axes.titlesize": 10.5,
+        "axes.titlelocation": "left",
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.grid": True,
+        "grid.alpha": 0.25,
+        "legend.frameon": False,
+        "lines.linewidth": 1.1,
+        "svg.hashsalt": "twinrig",
+        "figure.constrained_layout.use": True,
+    }
+)
 
 
 def save(figure: Figure, path: Path) -> Path:

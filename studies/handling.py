@@ -36,8 +36,10 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
         manoeuvre_figure(drive, name.replace("_", " "), folder / f"{name}.png")
         answer[name] = _answer(drives)
         lines.append(_line(name, answer[name]))
-    head = f"    {'':<16}{'largest':>26}{'least':>12}{'friction':>10}{'engines':>10}\n" \
-           f"    {'':<16}{'yaw rate':>12}{'lateral acc.':>14}{'load':>12}{'used':>10}{'differ':>10}"  # fmt: skip
+    head = (
+        f"    {'':<16}{'largest':>26}{'least':>12}{'friction':>10}{'engines':>10}\n"
+        f"    {'':<16}{'yaw rate':>12}{'lateral acc.':>14}{'load':>12}{'used':>10}{'differ':>10}"
+    )
     return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": [head, *lines]}
 
 
@@ -56,8 +58,11 @@ def friction_used(drive: Drive) -> np.ndarray:
 
 def _answer(drives: dict[str, Drive]) -> dict[str, float]:
     one, *others = drives.values()
-    pairs = [(a, b) for other in others for a, b in ((one.run.positions, other.run.positions),
-                                                     (one.run.rates, other.run.rates))]  # fmt: skip
+    pairs = [
+        (a, b)
+        for other in others
+        for a, b in ((one.run.positions, other.run.positions), (one.run.rates, other.run.rates))
+    ]
     found = {
         "largest yaw rate [rad/s]": np.abs(one.velocity()[:, 2]).max(),
         "largest lateral acceleration [m/s^2]": np.abs(one.lateral_acceleration()).max(),
@@ -74,13 +79,22 @@ def _answer(drives: dict[str, Drive]) -> dict[str, float]:
 def _line(name: str, answer: dict[str, float]) -> str:
     yaw, lateral, load, used = list(answer.values())[:4]
     gap = answer.get("largest difference of the engines")
-    return (f"    {name:<16}{yaw:>6.3f} rad/s{lateral:>8.2f} m/s^2{load:>10.0f} N{100 * used:>8.0f} %"
-            + (f"{gap:>10.1e}" if gap is not None else ""))  # fmt: skip
+    return f"    {name:<16}{yaw:>6.3f} rad/s{lateral:>8.2f} m/s^2{load:>10.0f} N{100 * used:>8.0f} %" + (
+        f"{gap:>10.1e}" if gap is not None else ""
+    )
 
 
-REPORTS = {"load": (at.PRESS, "N"), "fx": (at.FX, "N"), "fy": (at.FY, "N"), "mz": (at.MZ, "N m"),
-           "slip_x": (at.SLIP_X, "m/s"), "slip_y": (at.SLIP_Y, "m/s"), "tread": (at.TREAD, "m/s"),
-           "steer": (at.ANGLE, "rad"), "power": (at.POWER, "W")}  # fmt: skip
+REPORTS = {
+    "load": (at.PRESS, "N"),
+    "fx": (at.FX, "N"),
+    "fy": (at.FY, "N"),
+    "mz": (at.MZ, "N m"),
+    "slip_x": (at.SLIP_X, "m/s"),
+    "slip_y": (at.SLIP_Y, "m/s"),
+    "tread": (at.TREAD, "m/s"),
+    "steer": (at.ANGLE, "rad"),
+    "power": (at.POWER, "W"),
+}
 
 
 def _save(scene: HandlingScene, drives: dict[str, Drive], path: Path) -> None:
@@ -91,14 +105,21 @@ def _save(scene: HandlingScene, drives: dict[str, Drive], path: Path) -> None:
     first = next(iter(drives.values()))
     axes = ("engine", "time")
     data = xr.Dataset(
-        {"positions": ((*axes, "coordinate"), np.array([d.run.positions for d in drives.values()])),
-         "rates": ((*axes, "coordinate"), np.array([d.run.rates for d in drives.values()]))}
-        | {name: ((*axes, "tyre"), np.array([d.tyres[:, :, column] for d in drives.values()]), {"units": unit})
-           for name, (column, unit) in REPORTS.items()},
-        {"engine": list(drives), "time": ("time", first.run.times, {"units": "s"}),
-         "coordinate": [".".join(place) for place in first.handling.vehicle.coordinates()],
-         "tyre": [tyre.name for tyre in first.handling.vehicle.tyres]},
-    )  # fmt: skip
+        {
+            "positions": ((*axes, "coordinate"), np.array([d.run.positions for d in drives.values()])),
+            "rates": ((*axes, "coordinate"), np.array([d.run.rates for d in drives.values()])),
+        }
+        | {
+            name: ((*axes, "tyre"), np.array([d.tyres[:, :, column] for d in drives.values()]), {"units": unit})
+            for name, (column, unit) in REPORTS.items()
+        },
+        {
+            "engine": list(drives),
+            "time": ("time", first.run.times, {"units": "s"}),
+            "coordinate": [".".join(place) for place in first.handling.vehicle.coordinates()],
+            "tyre": [tyre.name for tyre in first.handling.vehicle.tyres],
+        },
+    )
     data.attrs = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
     write(data, path)
 

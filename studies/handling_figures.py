@@ -39,8 +39,17 @@ def _path(axis: plt.Axes, drive: Drive) -> None:
     x, y, yaw = drive.path.T
     axis.plot(x, y, color="#222222")
     every = slice(0, None, max(1, len(x) // 8))
-    axis.quiver(x[every], y[every], np.cos(yaw[every]), np.sin(yaw[every]), angles="xy", scale=14, width=5e-3,
-                color="#009e73", zorder=3)  # fmt: skip
+    axis.quiver(
+        x[every],
+        y[every],
+        np.cos(yaw[every]),
+        np.sin(yaw[every]),
+        angles="xy",
+        scale=14,
+        width=5e-3,
+        color="#009e73",
+        zorder=3,
+    )
     axis.set(xlabel="x [m]", ylabel="y [m]", title="Path on the road, and where the car points")
     low, high = y.min(), y.max()
     axis.set_ylim(low - 0.25 * (high - low) - 0.5, high + 0.25 * (high - low) + 0.5)
@@ -63,5 +72,9 @@ def _circle(axis: plt.Axes, drive: Drive) -> None:
     bound = np.where(own[:, :, at.PRESS] > 0.0, mu * own[:, :, at.PRESS], 1.0)
     for i in range(own.shape[1]):
         axis.plot(own[:, i, at.FY] / bound[:, i], own[:, i, at.FX] / bound[:, i], color=TYRES[i % 4], lw=0.9)
-    axis.set(xlabel="side force / mu N", ylabel="force ahead / mu N", aspect="equal",
-             title="Tyre forces in the friction circle")  # fmt: skip
+    axis.set(
+        xlabel="side force / mu N",
+        ylabel="force ahead / mu N",
+        aspect="equal",
+        title="Tyre forces in the friction circle",
+    )

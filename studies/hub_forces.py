@@ -61,9 +61,14 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
     _save(found, folder)
     drift_figure(found, scene.title, folder / "drift.png")
     damage_figure(found, scene.title, folder / "damage.png")
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": answer(found),
-            "doubts": list(found.tilt.doubts),
-            "table": _table(scene, found)}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "answer": answer(found),
+        "doubts": list(found.tilt.doubts),
+        "table": _table(scene, found),
+    }
 
 
 def compute(scene: HubScene, engines: tuple[str, ...], progress: Progress = lambda text, part: None) -> Found:
@@ -85,17 +90,27 @@ def compute(scene: HubScene, engines: tuple[str, ...], progress: Progress = lamb
             if name == FILTER:  # what the others are compared with
                 raise
             failed[name] = str(error)
-    check_halved(last, runs[FILTER], [element.name for element in vehicle.elements], lambda step, steps: build(
-        last, vehicle, stabilised.drive("kalman", step, steps), step, step * steps).run())  # fmt: skip
+    check_halved(
+        last,
+        runs[FILTER],
+        [element.name for element in vehicle.elements],
+        lambda step, steps: build(last, vehicle, stabilised.drive("kalman", step, steps), step, step * steps).run(),
+    )
     return Found(vehicle, forces, angles, tilt, true, runs, failed)
 
 
 def _planned(scene: HubScene, engines: tuple[str, ...]) -> dict[str, tuple[Method, str]]:
     """Method and engine of every run by its name; those of a stabiliser in the last engine need none beside theirs."""
-    pairs = [(name, method, engine) for name, method in METHODS.items() for engine in engines
-             if method == scene.stabilise.method or engine == engines[-1]]  # fmt: skip
-    return {name if name != FREE and engine == engines[-1] else f"{name}, {engine}": (method, engine)
-            for name, method, engine in pairs}  # fmt: skip
+    pairs = [
+        (name, method, engine)
+        for name, method in METHODS.items()
+        for engine in engines
+        if method == scene.stabilise.method or engine == engines[-1]
+    ]
+    return {
+        name if name != FREE and engine == engines[-1] else f"{name}, {engine}": (method, engine)
+        for name, method, engine in pairs
+    }
 
 
 def errors(found: Found, run: HubRun) -> np.ndarray:
@@ -113,8 +128,10 @@ def errors(found: Found, run: HubRun) -> np.ndarray:
 def damages(found: Found, run: HubRun) -> dict[str, float]:
     """Pseudo-damage of every element's section force by the true one, or by that of the run with the filter."""
     true = found.truth or found.runs[FILTER]
-    return {element.name: damage_ratio(run.elements[:, i], true.elements[:, i])
-            for i, element in enumerate(found.vehicle.elements)}  # fmt: skip
+    return {
+        element.name: damage_ratio(run.elements[:, i], true.elements[:, i])
+        for i, element in enumerate(found.vehicle.elements)
+    }
 
 
 def beside(found: Found) -> str:
@@ -136,8 +153,9 @@ def answer(found: Found) -> dict[str, Any]:
         off = np.abs(errors(found, run)).max(axis=0)
         out[name] = {
             **dict(zip((*ANGLES, "x", "y", "z"), map(float, off), strict=True)),
-            "moments": np.sqrt(np.mean(run.moments**2, axis=0)).tolist(), "damage": damages(found, run),
-        }  # fmt: skip
+            "moments": np.sqrt(np.mean(run.moments**2, axis=0)).tolist(),
+            "damage": damages(found, run),
+        }
     return out
 
 
@@ -150,20 +168,28 @@ def engines_apart(found: Found) -> float:
 
 
 def _table(scene: HubScene, found: Found) -> list[str]:
-    off, damage = (("largest error", "damage / true damage") if found.truth is not None else
-                   ("largest difference", "damage / that with the filter"))  # fmt: skip
-    lines = [f"  forces in the frame {scene.forces.frame!r}; innovations squared {found.tilt.surprise:.2f} times",
-             f"  {'':<18}{'roll':>9}{'pitch':>9}{'heading':>9}{'x':>8}{'y':>8}{'z':>8}{'drift-off':>11}"
-             f"{'moments rms':>16}   {damage}",
-             f"  {off:<18}{'[mrad]':>9}{'[mrad]':>9}{'[mrad]':>9}{'[m]':>8}{'[m]':>8}{'[m]':>8}{'[s]':>11}"
-             f"{'[N m]':>16}   least, most"]  # fmt: skip
+    off, damage = (
+        ("largest error", "damage / true damage")
+        if found.truth is not None
+        else ("largest difference", "damage / that with the filter")
+    )
+    lines = [
+        f"  forces in the frame {scene.forces.frame!r}; innovations squared {found.tilt.surprise:.2f} times",
+        f"  {'':<18}{'roll':>9}{'pitch':>9}{'heading':>9}{'x':>8}{'y':>8}{'z':>8}{'drift-off':>11}"
+        f"{'moments rms':>16}   {damage}",
+        f"  {off:<18}{'[mrad]':>9}{'[mrad]':>9}{'[mrad]':>9}{'[m]':>8}{'[m]':>8}{'[m]':>8}{'[s]':>11}"
+        f"{'[N m]':>16}   least, most",
+    ]
     for name, run in found.runs.items():
         largest, (roll, pitch) = np.abs(errors(found, run)).max(axis=0), np.sqrt(np.mean(run.moments**2, axis=0))
         ratios = damages(found, run).values()
-        lines.append(f"  {name:<18}" + "".join(f"{1e3 * v:>9.3g}" for v in largest[:3])
-                     + "".join(f"{v:>8.2g}" for v in largest[3:])
-                     + f"{_told(drift_off(found, run)):>11}{roll:>8.3g}{pitch:>8.3g}   "
-                     + f"{min(ratios):.3g}, {max(ratios):.3g}")  # fmt: skip
+        lines.append(
+            f"  {name:<18}"
+            + "".join(f"{1e3 * v:>9.3g}" for v in largest[:3])
+            + "".join(f"{v:>8.2g}" for v in largest[3:])
+            + f"{_told(drift_off(found, run)):>11}{roll:>8.3g}{pitch:>8.3g}   "
+            + f"{min(ratios):.3g}, {max(ratios):.3g}"
+        )
     if found.truth is None:
         lines.append("  the true run is not known: angles are beside the filter's estimate, damage beside that run's")
     lines += [f"  doubt: {text}" for text in found.tilt.doubts]
@@ -182,14 +208,22 @@ def _save(found: Found, folder: Path) -> None:
     names = [(f"{hub}_{name}", next(iter(units))) for hub in found.vehicle.hubs for name, units in COMPONENTS.items()]
     columns = {name: (unit, found.forces.samples[:, i]) for i, (name, unit) in enumerate(names)}
     write_time_series(folder / "hub_forces.csv", columns, found.forces.period)
-    angles = zip(("roll", "pitch", "roll_rate", "pitch_rate"), ("rad", "rad", "rad/s", "rad/s"),
-                 found.angles.samples.T, strict=True)  # fmt: skip
-    write_time_series(folder / "angles.csv", {name: (unit, values) for name, unit, values in angles},
-                      found.angles.period)  # fmt: skip
+    angles = zip(
+        ("roll", "pitch", "roll_rate", "pitch_rate"),
+        ("rad", "rad", "rad/s", "rad/s"),
+        found.angles.samples.T,
+        strict=True,
+    )
+    write_time_series(
+        folder / "angles.csv", {name: (unit, values) for name, unit, values in angles}, found.angles.period
+    )
     runs = {**({"true": found.truth} if found.truth else {}), **found.runs}
     every = {f"{name}: {what}": ("rad", run.states[:, i]) for name, run in runs.items() for what, i in ANGLES.items()}
-    every |= {f"{name}: {what}": ("m", run.states[:, i]) for name, run in runs.items()
-              for what, i in (("x", X), ("y", Y), ("z", Z))}  # fmt: skip
+    every |= {
+        f"{name}: {what}": ("m", run.states[:, i])
+        for name, run in runs.items()
+        for what, i in (("x", X), ("y", Y), ("z", Z))
+    }
     write_time_series(folder / "runs.csv", every, float(next(iter(found.runs.values())).times[1]))
 
 

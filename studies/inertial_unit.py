@@ -44,12 +44,17 @@ KEPT = 0.01
 class Options(Strict):
     """[options] of this study."""
 
-    grades: list[Positive] = Field([0.001, 0.01, 0.1, 1.0, 10.0], min_length=1,
-                                   description="standard deviation of the wandering bias, deg/h, rising")  # fmt: skip
-    random_walks: list[Positive] = Field([0.0005, 0.002, 0.02, 0.1, 0.5], min_length=1,
-                                         description="random walk of each grade, deg/sqrt(h)")  # fmt: skip
-    durations: list[Minutes] = Field([1.0, 5.0, 10.0, 60.0], min_length=1,
-                                     description="lengths of a drive, min, rising, to a second")  # fmt: skip
+    grades: list[Positive] = Field(
+        [0.001, 0.01, 0.1, 1.0, 10.0],
+        min_length=1,
+        description="standard deviation of the wandering bias, deg/h, rising",
+    )
+    random_walks: list[Positive] = Field(
+        [0.0005, 0.002, 0.02, 0.1, 0.5], min_length=1, description="random walk of each grade, deg/sqrt(h)"
+    )
+    durations: list[Minutes] = Field(
+        [1.0, 5.0, 10.0, 60.0], min_length=1, description="lengths of a drive, min, rising, to a second"
+    )
     correlation_time: float = quantity("s", "time in which the bias forgets itself", default=3600.0)
     allowed_damage_error: float = quantity("", "largest error of the damage that is good enough", default=0.05)
     sampling_rate: int = Field(100, ge=1, le=1000, description="samples of the gyro in a second")
@@ -63,8 +68,12 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
     if "road" not in scene.effects:
         raise InputError(scene.file, "effects.road", None, "is missing: this study needs a run on a road")
     if len(options.grades) != len(options.random_walks):
-        raise InputError(scene.file, "options.random_walks", options.random_walks,
-                         f"must have one value for each of the {len(options.grades)} grades")
+        raise InputError(
+            scene.file,
+            "options.random_walks",
+            options.random_walks,
+            f"must have one value for each of the {len(options.grades)} grades",
+        )
     for name in ("grades", "durations"):
         values = getattr(options, name)
         if (np.diff(values) <= 0).any():
@@ -94,8 +103,14 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     if curves:
         _figures(rows, options, next(iter(curves.values())), folder)
-    return {"scene": scene.title, "folder": str(folder), "rows": rows, "cheapest": cheapest(rows, options),
-            "failed": failed, "table": table}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "rows": rows,
+        "cheapest": cheapest(rows, options),
+        "failed": failed,
+        "table": table,
+    }
 
 
 def unit_paths(options: Options) -> tuple[np.ndarray, np.ndarray]:
@@ -136,8 +151,12 @@ def damage_curve(result: Result, scene: Scene, reach: float) -> CubicSpline:
     damage = np.array([_damage(result, angle) for angle in angles])
     true = damage[NODES // 2]
     if not (true > 0).all():
-        raise InputError(scene.file, "effects.road", None, "leaves no damage in the section forces to compare with: "
-                         "use a road that moves the vehicle")
+        raise InputError(
+            scene.file,
+            "effects.road",
+            None,
+            "leaves no damage in the section forces to compare with: use a road that moves the vehicle",
+        )
     return CubicSpline(angles, np.log(damage / true))
 
 
@@ -161,27 +180,41 @@ def damage_errors(curve: CubicSpline, angles: np.ndarray) -> np.ndarray:
     return np.expm1(curve(np.clip(angles, -reach, reach))).mean(axis=1)
 
 
-def _row(options: Options, grade: int, minutes: float, paths: tuple[np.ndarray, np.ndarray],
-         curves: dict[str, CubicSpline]) -> dict[str, Any]:  # fmt: skip
+def _row(
+    options: Options, grade: int, minutes: float, paths: tuple[np.ndarray, np.ndarray], curves: dict[str, CubicSpline]
+) -> dict[str, Any]:
     """One grade over one duration: angle error by law and measured, damage error per engine."""
     end = round(60 * minutes)
     angles = angle_errors(paths, options, grade)[:, : end + 1]
-    law = angle_variance(np.array(float(end)), options.random_walks[grade] * DEGREES_PER_ROOT_HOUR, 0.0,
-                         options.grades[grade] * DEGREES_PER_HOUR, options.correlation_time)  # fmt: skip
+    law = angle_variance(
+        np.array(float(end)),
+        options.random_walks[grade] * DEGREES_PER_ROOT_HOUR,
+        0.0,
+        options.grades[grade] * DEGREES_PER_HOUR,
+        options.correlation_time,
+    )
     worst = {engine: np.abs(damage_errors(curve, angles)).max(axis=1) for engine, curve in curves.items()}
-    return {"grade": options.grades[grade], "random walk": options.random_walks[grade], "minutes": minutes,
-            "angle by law": float(np.degrees(law**0.5)),
-            "angle measured": float(np.degrees(np.mean(angles[:, -1] ** 2) ** 0.5)),
-            "damage error": {name: [float(np.quantile(one, part)) for part in (0.5, SURE)]
-                             for name, one in worst.items()}}  # fmt: skip
+    return {
+        "grade": options.grades[grade],
+        "random walk": options.random_walks[grade],
+        "minutes": minutes,
+        "angle by law": float(np.degrees(law**0.5)),
+        "angle measured": float(np.degrees(np.mean(angles[:, -1] ** 2) ** 0.5)),
+        "damage error": {name: [float(np.quantile(one, part)) for part in (0.5, SURE)] for name, one in worst.items()},
+    }
 
 
 def cheapest(rows: list[dict[str, Any]], options: Options) -> dict[str, float | None]:
     """Duration in minutes -> coarsest grade (deg/h) of which SURE of all units keep the allowed damage error."""
     found: dict[str, float | None] = {}
     for minutes in options.durations:
-        good = [row["grade"] for row in rows if row["minutes"] == minutes and row["damage error"]
-                and max(sure for _, sure in row["damage error"].values()) <= options.allowed_damage_error]  # fmt: skip
+        good = [
+            row["grade"]
+            for row in rows
+            if row["minutes"] == minutes
+            and row["damage error"]
+            and max(sure for _, sure in row["damage error"].values()) <= options.allowed_damage_error
+        ]
         found[f"{minutes:g}"] = max(good, default=None)
     return found
 
@@ -200,10 +233,11 @@ def text(rows: list[dict[str, Any]], options: Options, engines: tuple[str, ...])
         f"  Damage: rainflow after ASTM E1049-85, the run repeated; slope {SLOPE:g}; worst of {', '.join(CHANNELS)}.",
         f"  Angle: rms of {options.samples} units at the end. Damage error [%]: median / {SURE:.0%} of all units.",
         f"    grade      walk     time     angle error [deg]   {names}",
-        "    deg/h  deg/rt(h)     min          law  measured", *lines,
+        "    deg/h  deg/rt(h)     min          law  measured",
+        *lines,
         f"  Coarsest grade of which {SURE:.0%} of all units keep the damage within {options.allowed_damage_error:.2g}:",
         *best,
-    ]  # fmt: skip
+    ]
 
 
 def _percent(part: float) -> str:
@@ -229,8 +263,13 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options) -> Any:
     times = np.geomspace(options.durations[0], options.durations[-1], 60)
     for i, grade in enumerate(options.grades):
         own = [row for row in rows if row["grade"] == grade]
-        law = angle_variance(60 * times, options.random_walks[i] * DEGREES_PER_ROOT_HOUR, 0.0, grade * DEGREES_PER_HOUR,
-                             options.correlation_time)  # fmt: skip
+        law = angle_variance(
+            60 * times,
+            options.random_walks[i] * DEGREES_PER_ROOT_HOUR,
+            0.0,
+            grade * DEGREES_PER_HOUR,
+            options.correlation_time,
+        )
         minutes = [row["minutes"] for row in own]
         axes[0].loglog(times, np.degrees(law**0.5), color=f"C{i}")
         axes[0].loglog(minutes, [row["angle measured"] for row in own], "o", color=f"C{i}", markersize=4)

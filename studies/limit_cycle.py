@@ -23,8 +23,9 @@ Progress = Callable[[str, float], None]
 class Options(Strict):
     """[options] of this study."""
 
-    speed: float | None = quantity("m/s", "of the cycle in all implementations; 1.1 of where the branch begins if not "
-                                   "given", default=None)  # fmt: skip
+    speed: float | None = quantity(
+        "m/s", "of the cycle in all implementations; 1.1 of where the branch begins if not given", default=None
+    )
 
 
 def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
@@ -53,8 +54,13 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     else:
         notes.append(f"at {speed:g} m/s a motion from {1e3 * scene.run.displacement:g} mm dies out: no cycle")
     table = [*_branch_lines(orbits), *_cycle_lines(cycles), *(f"  {note}" for note in notes)]
-    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": _answer(orbits, cycles),
-            "table": table}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": failed,
+        "answer": _answer(orbits, cycles),
+        "table": table,
+    }
 
 
 def _branch(scene: WheelsetScene, progress: Progress) -> tuple[list[Orbit], list[str]]:
@@ -74,8 +80,10 @@ def _branch(scene: WheelsetScene, progress: Progress) -> tuple[list[Orbit], list
 
 def _at_speeds(scene: WheelsetScene) -> list[Orbit]:
     """Cycles that motions reach at the scene's speeds, where no branch begins because nothing is stable."""
-    found = (attained(equations_of(scene, "reference", float(speed)), start=scene.run.displacement,
-                      step=scene.run.step) for speed in scene.speeds.all())  # fmt: skip
+    found = (
+        attained(equations_of(scene, "reference", float(speed)), start=scene.run.displacement, step=scene.run.step)
+        for speed in scene.speeds.all()
+    )
     return [refined(orbit, "amplitude") for orbit in found if orbit is not None]
 
 
@@ -107,10 +115,18 @@ def _save(scene: WheelsetScene, orbits: list[Orbit], cycles: dict[str, Orbit], f
     from studies.wheelset import dataset
 
     if orbits:
-        columns = {"speed": "m/s", "amplitude": "m", "frequency": "Hz", "multiplier": "-", "error": "m/s or m",
-                   "frequency_error": "Hz"}  # fmt: skip
-        write_table(folder / "branch.csv", {name: (unit, np.array([getattr(orbit, name) for orbit in orbits]))
-                                            for name, unit in columns.items()})  # fmt: skip
+        columns = {
+            "speed": "m/s",
+            "amplitude": "m",
+            "frequency": "Hz",
+            "multiplier": "-",
+            "error": "m/s or m",
+            "frequency_error": "Hz",
+        }
+        write_table(
+            folder / "branch.csv",
+            {name: (unit, np.array([getattr(orbit, name) for orbit in orbits])) for name, unit in columns.items()},
+        )
     origin = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
     for engine, orbit in cycles.items():
         data = dataset({engine: {orbit.speed: orbit.path()}}).assign_attrs(origin)
@@ -120,8 +136,10 @@ def _save(scene: WheelsetScene, orbits: list[Orbit], cycles: dict[str, Orbit], f
 def _answer(orbits: list[Orbit], cycles: dict[str, Orbit]) -> dict[str, Any]:
     """What was found, as plain numbers in SI."""
     names = ("speed", "amplitude", "frequency", "multiplier", "error", "frequency_error")
-    numbers = {engine: {name: float(getattr(orbit, name)) for name in names if name != "multiplier"}
-               for engine, orbit in cycles.items()}  # fmt: skip
+    numbers = {
+        engine: {name: float(getattr(orbit, name)) for name in names if name != "multiplier"}
+        for engine, orbit in cycles.items()
+    }
     return {"branch": [{name: float(getattr(orbit, name)) for name in names} for orbit in orbits], "cycles": numbers}
 
 
@@ -129,12 +147,16 @@ def _branch_lines(orbits: list[Orbit]) -> list[str]:
     """Every cycle of the branch."""
     if not orbits:
         return []
-    lines = ["  cycles, by rising amplitude; the error is what halving the step changes",
-             "    amplitude       speed    error   frequency    error  multiplier"]
+    lines = [
+        "  cycles, by rising amplitude; the error is what halving the step changes",
+        "    amplitude       speed    error   frequency    error  multiplier",
+    ]
     for o in orbits:
         kind = "attracts" if o.stable else "repels"
-        lines.append(f"    {1e3 * o.amplitude:>6.3f} mm{o.speed:>8.3f} m/s{o.error:>9.0e}{o.frequency:>9.4f} Hz"
-                     f"{o.frequency_error:>9.0e}{o.multiplier:>12.4f} {kind}")  # fmt: skip
+        lines.append(
+            f"    {1e3 * o.amplitude:>6.3f} mm{o.speed:>8.3f} m/s{o.error:>9.0e}{o.frequency:>9.4f} Hz"
+            f"{o.frequency_error:>9.0e}{o.multiplier:>12.4f} {kind}"
+        )
     return lines
 
 
@@ -146,12 +168,16 @@ def _cycle_lines(cycles: dict[str, Orbit]) -> list[str]:
     path = first.path()
     power, creep = path.contacts[:, :, wf.POWER], np.hypot(path.contacts[:, :, wf.FX], path.contacts[:, :, wf.FY])
     yaw = 1e3 * path.states[:, YAW].max()
-    lines = [f"  cycle at {first.speed:g} m/s: yaw up to {yaw:.4g} mrad, creep forces up to "
-             f"{creep.max():,.0f} N, their power from {power.min():,.4g} to {power.max():.3g} W at a patch, "
-             f"{-np.trapezoid(power.sum(axis=1), path.times):.4g} J in a period"]  # fmt: skip
+    lines = [
+        f"  cycle at {first.speed:g} m/s: yaw up to {yaw:.4g} mrad, creep forces up to "
+        f"{creep.max():,.0f} N, their power from {power.min():,.4g} to {power.max():.3g} W at a patch, "
+        f"{-np.trapezoid(power.sum(axis=1), path.times):.4g} J in a period"
+    ]
     for engine, o in cycles.items():
-        lines.append(f"    {engine:<10}{1e3 * o.amplitude:>12.8f} mm, error {1e3 * o.error:.0e}"
-                     f"{o.frequency:>14.9f} Hz, error {o.frequency_error:.0e}")  # fmt: skip
+        lines.append(
+            f"    {engine:<10}{1e3 * o.amplitude:>12.8f} mm, error {1e3 * o.error:.0e}"
+            f"{o.frequency:>14.9f} Hz, error {o.frequency_error:.0e}"
+        )
     return lines
 
 

@@ -23,19 +23,30 @@ FLANGE = 0.8
 TOO_DEEP = ("distance", "load")
 """What the theories complain of where the contact grows out of its surroundings."""
 COLUMNS: dict[str, tuple[str, Callable[[Place], float]]] = {
-    "on_rail": ("mm", lambda p: 1e3 * (p.y - p.top)), "in_track": ("mm", lambda p: 1e3 * p.y),
-    "on_wheel": ("mm", lambda p: 1e3 * p.wheel_centre), "ahead": ("mm", lambda p: 1e3 * p.x),
-    "angle": ("deg", lambda p: float(np.degrees(-p.centre_angle))), "normal": ("kN", lambda p: 1e-3 * p.normal),
-    "peak": ("MPa", lambda p: 1e-6 * p.peak), "area": ("mm^2", lambda p: 1e6 * p.area),
-    "half_length": ("mm", lambda p: 5e2 * p.length), "half_width": ("mm", lambda p: 5e2 * p.width),
+    "on_rail": ("mm", lambda p: 1e3 * (p.y - p.top)),
+    "in_track": ("mm", lambda p: 1e3 * p.y),
+    "on_wheel": ("mm", lambda p: 1e3 * p.wheel_centre),
+    "ahead": ("mm", lambda p: 1e3 * p.x),
+    "angle": ("deg", lambda p: float(np.degrees(-p.centre_angle))),
+    "normal": ("kN", lambda p: 1e-3 * p.normal),
+    "peak": ("MPa", lambda p: 1e-6 * p.peak),
+    "area": ("mm^2", lambda p: 1e6 * p.area),
+    "half_length": ("mm", lambda p: 5e2 * p.length),
+    "half_width": ("mm", lambda p: 5e2 * p.width),
     "rolling_radius": ("mm", lambda p: 1e3 * p.rolling_radius),
     "touch_on_rail": ("mm", lambda p: 1e3 * (p.touch_y - p.top)),
-    "touch_on_wheel": ("mm", lambda p: 1e3 * p.wheel_y), "touch_angle": ("deg", lambda p: float(np.degrees(-p.angle))),
-    "fx": ("kN", lambda p: 1e-3 * p.fx), "fy": ("kN", lambda p: 1e-3 * p.fy), "mz": ("N m", lambda p: p.mz),
-    "mz_on_rail": ("mm", lambda p: 1e3 * (p.touch_y - p.top)), "mz_ahead": ("mm", lambda p: 1e3 * p.touch_x),
-    "xi_x": ("-", lambda p: p.xi_x), "xi_y": ("-", lambda p: p.xi_y), "spin": ("1/m", lambda p: p.spin),
+    "touch_on_wheel": ("mm", lambda p: 1e3 * p.wheel_y),
+    "touch_angle": ("deg", lambda p: float(np.degrees(-p.angle))),
+    "fx": ("kN", lambda p: 1e-3 * p.fx),
+    "fy": ("kN", lambda p: 1e-3 * p.fy),
+    "mz": ("N m", lambda p: p.mz),
+    "mz_on_rail": ("mm", lambda p: 1e3 * (p.touch_y - p.top)),
+    "mz_ahead": ("mm", lambda p: 1e3 * p.touch_x),
+    "xi_x": ("-", lambda p: p.xi_x),
+    "xi_y": ("-", lambda p: p.xi_y),
+    "spin": ("1/m", lambda p: p.spin),
     "approach": ("um", lambda p: 1e6 * p.approach),
-}  # fmt: skip
+}
 """Unit and value of every column of a patch."""
 
 
@@ -53,15 +64,19 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
             progress(f"{name} at {1e3 * shift:g} mm", (k + i / shifts.size) / len(scene.cases))
             _try(contact, float(shift), case.yaw, name, found[name], failed)
             marks.append(time.perf_counter())
-        table += [f"  {name}: {case_text(case.yaw, case.friction)}; {cost(np.diff(marks))} a position",
-                  *_table(found[name])]  # fmt: skip
+        table += [
+            f"  {name}: {case_text(case.yaw, case.friction)}; {cost(np.diff(marks))} a position",
+            *_table(found[name]),
+        ]
         _save(name, found[name], folder)
     if any(found.values()):
-        figure(scene.title, {name: (scene.cases[name], placed) for name, placed in found.items()},
-               folder / "manchester.png")  # fmt: skip
+        figure(
+            scene.title,
+            {name: (scene.cases[name], placed) for name, placed in found.items()},
+            folder / "manchester.png",
+        )
     answer = {name: [_answer(one) for one in placed] for name, placed in found.items()}
-    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer,
-            "table": [*table, *NOTES]}  # fmt: skip
+    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": [*table, *NOTES]}
 
 
 def _try(contact: Contact, shift: float, yaw: float, name: str, found: list[Placed], failed: dict[str, str]) -> None:
@@ -71,9 +86,10 @@ def _try(contact: Contact, shift: float, yaw: float, name: str, found: list[Plac
     except (InputError, RunFailed) as error:
         deep = isinstance(error, InputError) and error.place in TOO_DEEP
         failed[f"{name}, {1e3 * shift:g} mm"] = (
-            f"a load of {contact.load:g} N presses wheel and rail more than {1e3 * DEEP:g} mm into each other" if deep
+            f"a load of {contact.load:g} N presses wheel and rail more than {1e3 * DEEP:g} mm into each other"
+            if deep
             else str(error)
-        )  # fmt: skip
+        )
 
 
 def patches(placed: Placed, wheel: str) -> tuple[Place, ...]:
@@ -87,9 +103,14 @@ def rows(placed: Placed, wheel: str) -> list[dict[str, float]]:
 
 
 def _answer(placed: Placed) -> dict[str, Any]:
-    return {"shift": 1e3 * placed.shift, "yaw": 1e3 * placed.yaw, "roll": 1e3 * placed.roll,
-            "spin_speed": placed.spin_speed, "radius_difference": 1e3 * rolling_radius_difference(placed),
-            **{wheel: rows(placed, wheel) for wheel in WHEELS}}  # fmt: skip
+    return {
+        "shift": 1e3 * placed.shift,
+        "yaw": 1e3 * placed.yaw,
+        "roll": 1e3 * placed.roll,
+        "spin_speed": placed.spin_speed,
+        "radius_difference": 1e3 * rolling_radius_difference(placed),
+        **{wheel: rows(placed, wheel) for wheel in WHEELS},
+    }
 
 
 POSITION = {"shift": "mm", "yaw": "mrad", "roll": "mrad", "spin_speed": "rad/s", "radius_difference": "mm"}
@@ -101,18 +122,32 @@ def _save(name: str, found: list[Placed], folder: Path) -> None:
     if not found:
         return
     answers = [_answer(one) for one in found]
-    write_table(folder / f"{name}.csv", {key: (unit, np.array([one[key] for one in answers]))
-                                         for key, unit in POSITION.items()})  # fmt: skip
+    write_table(
+        folder / f"{name}.csv", {key: (unit, np.array([one[key] for one in answers])) for key, unit in POSITION.items()}
+    )
     for wheel in WHEELS:
-        lines = [{"shift": one["shift"], "patch": k, **patch}
-                 for one in answers for k, patch in enumerate(one[wheel], 1)]  # fmt: skip
+        lines = [
+            {"shift": one["shift"], "patch": k, **patch} for one in answers for k, patch in enumerate(one[wheel], 1)
+        ]
         units = {"shift": "mm", "patch": "-", **{key: unit for key, (unit, _) in COLUMNS.items()}}
-        write_table(folder / f"{name}_{wheel}.csv", {key: (unit, np.array([line[key] for line in lines]))
-                                                     for key, unit in units.items()})  # fmt: skip
+        write_table(
+            folder / f"{name}_{wheel}.csv",
+            {key: (unit, np.array([line[key] for line in lines])) for key, unit in units.items()},
+        )
 
 
-HEADS = {"on_rail": "8.2f", "on_wheel": "8.2f", "angle": "7.2f", "normal": "8.3f", "peak": "7.0f", "area": "7.1f",
-         "half_length": "6.2f", "half_width": "6.2f", "fx": "7.3f", "fy": "7.3f"}  # fmt: skip
+HEADS = {
+    "on_rail": "8.2f",
+    "on_wheel": "8.2f",
+    "angle": "7.2f",
+    "normal": "8.3f",
+    "peak": "7.0f",
+    "area": "7.1f",
+    "half_length": "6.2f",
+    "half_width": "6.2f",
+    "fx": "7.3f",
+    "fy": "7.3f",
+}
 """Columns that are printed, and how."""
 NOTES = [
     "  centre of pressure: on the rail from its highest point, on the wheel from the taping line, outwards (mm);",
@@ -123,8 +158,10 @@ NOTES = [
 
 def _table(found: list[Placed]) -> list[str]:
     """A line for each patch, and what stands out."""
-    heads = (f"    {'shift':>6} {'wheel':<5}{'rail':>8}{'wheel':>8}{'angle':>7}{'N':>8}{'peak':>7}{'area':>7}{'a':>6}"
-             f"{'b':>6}{'Fx':>7}{'Fy':>7}{'dr':>8}")  # fmt: skip
+    heads = (
+        f"    {'shift':>6} {'wheel':<5}{'rail':>8}{'wheel':>8}{'angle':>7}{'N':>8}{'peak':>7}{'area':>7}{'a':>6}"
+        f"{'b':>6}{'Fx':>7}{'Fy':>7}{'dr':>8}"
+    )
     lines = [heads]
     for placed in found:
         for wheel in WHEELS:
@@ -138,8 +175,9 @@ def _table(found: list[Placed]) -> list[str]:
 
 def _remarks(found: list[Placed]) -> list[str]:
     """Positions with several patches on a wheel, and the first on a flange."""
-    several = [f"{1e3 * placed.shift:g} ({wheel})" for placed in found for wheel in WHEELS
-               if len(getattr(placed, wheel)) > 1]  # fmt: skip
+    several = [
+        f"{1e3 * placed.shift:g} ({wheel})" for placed in found for wheel in WHEELS if len(getattr(placed, wheel)) > 1
+    ]
     flange = [placed for placed in found for wheel in WHEELS if patches(placed, wheel)[0].angle < -FLANGE]
     lines = [f"    several patches on one wheel at, in mm: {', '.join(several)}"] if several else []
     if flange:

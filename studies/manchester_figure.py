@@ -38,14 +38,27 @@ def figure(title: str, found: dict[str, tuple[Case, list[Placed]]], path: Path) 
     save(drawn, path)
 
 
-def _points(axis: plt.Axes, placed: list[Placed], wheel: str, value: Callable[[Place], float], k: int, label: str, *,
-            wide: bool) -> None:  # fmt: skip
+def _points(
+    axis: plt.Axes, placed: list[Placed], wheel: str, value: Callable[[Place], float], k: int, label: str, *, wide: bool
+) -> None:
     """One case; later ones hollow and beside, so that equal ones show."""
-    points = [(1e3 * one.shift + 0.08 * k, value(place), 5e2 * place.width * np.cos(place.angle))
-              for one in placed for place in getattr(one, wheel)]  # fmt: skip
+    points = [
+        (1e3 * one.shift + 0.08 * k, value(place), 5e2 * place.width * np.cos(place.angle))
+        for one in placed
+        for place in getattr(one, wheel)
+    ]
     if not points:
         return
     shift, values, half = np.array(points).T
     colour = COLOURS[k % len(COLOURS)]
-    axis.errorbar(shift, values, yerr=half if wide else None, fmt="os"[k % 2], markersize=4, color=colour,
-                  linewidth=1.6, markerfacecolor=colour if k == 0 else "white", label=label)  # fmt: skip
+    axis.errorbar(
+        shift,
+        values,
+        yerr=half if wide else None,
+        fmt="os"[k % 2],
+        markersize=4,
+        color=colour,
+        linewidth=1.6,
+        markerfacecolor=colour if k == 0 else "white",
+        label=label,
+    )

@@ -87,8 +87,13 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     progress("figure", 1.0)
     if sources:
         _figure(sources[0], folder / "motion.png")
-    return {"scene": scene.title, "folder": str(folder), "failed": failed, "table": table,
-            "rows": [_numbers(source) for source in sources]}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": failed,
+        "table": table,
+        "rows": [_numbers(source) for source in sources],
+    }
 
 
 def check(scene: Scene, engines: tuple[str, ...]) -> tuple[Options, Parameters]:
@@ -99,15 +104,24 @@ def check(scene: Scene, engines: tuple[str, ...]) -> tuple[Options, Parameters]:
     p = scene.effects["accelerometers"]
     _array(scene, p.positions())
     if scene.run.output_step is not None:
-        raise InputError(scene.file, "run.output_step", scene.run.output_step, "this study reads its sensors at every "
-                         "step, and saves their samples alone: drop this key")
+        raise InputError(
+            scene.file,
+            "run.output_step",
+            scene.run.output_step,
+            "this study reads its sensors at every step, and saves their samples alone: drop this key",
+        )
     if options.file is not None:
         source = _measured(scene, options, p)
         count, period = len(source.readings), source.period
     else:
         if options.zeroed:
-            raise InputError(scene.file, "options.zeroed", True, "virtual sensors read specific force, gravity "
-                             "included: this key belongs to readings of your own (options.file)")
+            raise InputError(
+                scene.file,
+                "options.zeroed",
+                True,
+                "virtual sensors read specific force, gravity "
+                "included: this key belongs to readings of your own (options.file)",
+            )
         count, period = round(scene.run.duration * p.sampling_rate) + 1, 1 / p.sampling_rate
     for name in ("turning_cut_off", "position_cut_off"):
         check_cut_off(count, period, getattr(options, name), scene.file, f"options.{name}")
@@ -164,8 +178,14 @@ def _recover(source: Source, array: SensorArray, options: Options, p: Parameters
     if source.gyro is not None:
         turning = source.gyro[:, None] * [0.0, 1.0, 0.0]  # it reads the pitch rate; the vehicle does nothing else
         source.ways["rates from the gyro"] = _moved(source, array, readings, options, rates=turning)
-    source.ways["high-passed"] = _moved(source, array, readings, options, turning_cut_off=options.turning_cut_off,
-                                        position_cut_off=options.position_cut_off)  # fmt: skip
+    source.ways["high-passed"] = _moved(
+        source,
+        array,
+        readings,
+        options,
+        turning_cut_off=options.turning_cut_off,
+        position_cut_off=options.position_cut_off,
+    )
 
 
 def _moved(source: Source, array: SensorArray, readings: np.ndarray, options: Options, **other: Any) -> Motion:
@@ -187,12 +207,18 @@ def _save(source: Source, folder: Path) -> None:
 def _numbers(source: Source) -> dict[str, Any]:
     """Share, suspect, and the largest and rms error of each way; without a truth the sizes of what was found."""
     assert source.quality is not None
-    found: dict[str, Any] = {"source": source.name, "share": source.quality.share, "rigid": source.quality.rigid,
-                             "suspect": source.quality.suspect, "ways": {}}  # fmt: skip
+    found: dict[str, Any] = {
+        "source": source.name,
+        "share": source.quality.share,
+        "rigid": source.quality.rigid,
+        "suspect": source.quality.suspect,
+        "ways": {},
+    }
     for way, moved in source.ways.items():
         errors = {name: values - source.truth.get(name, 0.0) for name, values in _values(moved).items()}
-        found["ways"][way] = {name: [float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))]
-                              for name, error in errors.items()}  # fmt: skip
+        found["ways"][way] = {
+            name: [float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))] for name, error in errors.items()
+        }
     return found
 
 
@@ -205,11 +231,16 @@ def _lines(source: Source, p: Parameters) -> list[str]:
     assert source.quality is not None
     numbers, kind = _numbers(source), "error" if source.truth else "size"
     head = f"largest {kind} (rms)"
-    lines = [f"  {source.name}", f"    {_verdict(source.quality)}",
-             f"    {head:<28}{'pitch [mrad]':>20}{'rate [rad/s]':>20}{'heave [m]':>20}"]  # fmt: skip
+    lines = [
+        f"  {source.name}",
+        f"    {_verdict(source.quality)}",
+        f"    {head:<28}{'pitch [mrad]':>20}{'rate [rad/s]':>20}{'heave [m]':>20}",
+    ]
     for way, errors in numbers["ways"].items():
-        cells = [f"{scale * errors[name][0]:.3g} ({scale * errors[name][1]:.2g})"
-                 for name, scale in (("pitch", 1e3), ("rate", 1.0), ("heave", 1.0))]  # fmt: skip
+        cells = [
+            f"{scale * errors[name][0]:.3g} ({scale * errors[name][1]:.2g})"
+            for name, scale in (("pitch", 1e3), ("rate", 1.0), ("heave", 1.0))
+        ]
         lines.append(f"    {way:<28}{cells[0]:>20}{cells[1]:>20}{cells[2]:>20}")
     if p.deviation == 0:
         lines.append("    rates held by w w^T: not made, as the scene states no noise (deviation) to weigh it with")
@@ -225,18 +256,22 @@ def _verdict(found: Quality) -> str:
         return f"{share} (allowed: {100 * LIMIT:g} %, or what the noise leaves): the mounts pass for rigid"
     if found.suspect:
         return f"{share} (allowed: {100 * LIMIT:g} %): {found.suspect!r} does not move with the body and is left out"
-    return (f"{share} (allowed: {100 * LIMIT:g} %): the body or a mount gives way and no single sensor explains it, "
-            "or the noise is larger than the scene states (deviation)")
+    return (
+        f"{share} (allowed: {100 * LIMIT:g} %): the body or a mount gives way and no single sensor explains it, "
+        "or the noise is larger than the scene states (deviation)"
+    )
 
 
 def _closing(options: Options) -> list[str]:
     """What the filters take, and what a tilt costs."""
     far = float(tilt_displacement(TILT, np.array([10.0]))[0])
-    return [f"  High-pass: rates and angles {options.turning_cut_off:g} Hz, velocity and position "
-            f"{options.position_cut_off:g} Hz, Butterworth of order 2 forwards and backwards;",
-            "  it takes slow errors and true grades alike, and is least sure within one period of the ends.",
-            f"  A tilt error of {1e3 * TILT:g} mrad turns gravity into a false displacement of {far:.2g} m after 10 s, "
-            "four times that after 20 s."]  # fmt: skip
+    return [
+        f"  High-pass: rates and angles {options.turning_cut_off:g} Hz, velocity and position "
+        f"{options.position_cut_off:g} Hz, Butterworth of order 2 forwards and backwards;",
+        "  it takes slow errors and true grades alike, and is least sure within one period of the ends.",
+        f"  A tilt error of {1e3 * TILT:g} mrad turns gravity into a false displacement of {far:.2g} m after 10 s, "
+        "four times that after 20 s.",
+    ]
 
 
 def _figure(source: Source, path: Path) -> None:

@@ -114,11 +114,17 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
 
     found = compute(scene, engines[-1], folder, progress)
     page = write(found, folder / "recording.html")
-    return {"scene": found.scene.title, "folder": str(folder), "failed": _failed(found), "page": str(page),
-            "verdicts": {name: [own.word, own.reason] for name, own in found.verdicts.items()},
-            "effects": [str(one) for one in found.consequences],
-            "doubts": sum(finding.weight == "doubt" for finding in found.findings), "channels": _sizes(found),
-            "table": [*_told(found), f"  the page: {page}"]}  # fmt: skip
+    return {
+        "scene": found.scene.title,
+        "folder": str(folder),
+        "failed": _failed(found),
+        "page": str(page),
+        "verdicts": {name: [own.word, own.reason] for name, own in found.verdicts.items()},
+        "effects": [str(one) for one in found.consequences],
+        "doubts": sum(finding.weight == "doubt" for finding in found.findings),
+        "channels": _sizes(found),
+        "table": [*_told(found), f"  the page: {page}"],
+    }
 
 
 def compute(scene: MeasuredScene, engine: str, folder: Path, progress: Progress = lambda text, part: None) -> Found:
@@ -183,8 +189,14 @@ def _plane_job(found: Found, name: str) -> "PlaneJob":
     from models.measured.pitch_plane import PlaneJob
 
     assert found.scene.vehicle.parameters is not None
-    return PlaneJob(found.recording, found.scene.vehicle.parameters, found.engine, _holds(found)[name],
-                    found.scene.run.step, found.scene.file)  # fmt: skip
+    return PlaneJob(
+        found.recording,
+        found.scene.vehicle.parameters,
+        found.engine,
+        _holds(found)[name],
+        found.scene.run.step,
+        found.scene.file,
+    )
 
 
 def _fresh(folder: Path) -> Path:
@@ -223,8 +235,9 @@ def _predicted(found: Found) -> Drift:
     """Drift of the free run, which begins level and at rest, from the noise and from how the vehicle really began."""
     own, chassis, vehicle = found.recording, found.rig.chassis, _vehicle(found)
     noise = noise_of(found.scene.noise, own)
-    tilt, rate = ((_began(own, what, "roll", chassis), _began(own, what, "pitch", chassis))
-                  for what in ("angle", "angular rate"))  # fmt: skip
+    tilt, rate = (
+        (_began(own, what, "roll", chassis), _began(own, what, "pitch", chassis)) for what in ("angle", "angular rate")
+    )
     frame = next(s.frame for s in own.signals if s.at in vehicle.hubs)
     level = Level(noise["force"], noise["moment"], _bias(found), tilt, rate)
     return drift(vehicle, level, own.period, own.duration, frame)
@@ -279,8 +292,7 @@ def _job(found: Found, name: str) -> SectionRun:
     """A run to be made; answers at the sections of the scene, in the chassis' axes, and at accelerometers."""
     own, vehicle = found.recording, _vehicle(found)
     sections = Sections(vehicle, points=points(vehicle, own.signals, _places(found.scene)))
-    return SectionRun(vehicle, own, sections, found.engine, _holds(found)[name], found.scene.run.step,
-                      found.scene.file)  # fmt: skip
+    return SectionRun(vehicle, own, sections, found.engine, _holds(found)[name], found.scene.run.step, found.scene.file)
 
 
 def _judged(found: Found) -> None:
@@ -289,10 +301,16 @@ def _judged(found: Found) -> None:
     slopes, own = tuple(found.scene.hand_on.slopes), found.recording
     for name, run in found.runs.items():
         beside = tuple(compare(own, run, *pair, slopes) for pair in checks(_job(found, name)))
-        found.verdicts[name] = judge(run, _vehicle(found), _holds(found)[name], own.period, found.scene.limits,
-                                     found.drift.passes(found.drift.angle) or own.duration,
-                                     [one for one in beside if one.signal.check],
-                                     {s.name: noise(own, s) for s in own.signals if s.check})  # fmt: skip
+        found.verdicts[name] = judge(
+            run,
+            _vehicle(found),
+            _holds(found)[name],
+            own.period,
+            found.scene.limits,
+            found.drift.passes(found.drift.angle) or own.duration,
+            [one for one in beside if one.signal.check],
+            {s.name: noise(own, s) for s in own.signals if s.check},
+        )
         if name == found.chosen:
             found.compared = beside
 
@@ -304,8 +322,13 @@ def _weighed(found: Found, work: Path) -> None:
     if name not in found.runs:
         return
     make = _make_in_space if found.rig.vehicle else _make_in_plane
-    found.consequences = consequences(found.findings, found.recording, partial(make, found, name),
-                                      handed_on(found, found.runs[name]), work / "findings")  # fmt: skip
+    found.consequences = consequences(
+        found.findings,
+        found.recording,
+        partial(make, found, name),
+        handed_on(found, found.runs[name]),
+        work / "findings",
+    )
     found.verdicts = {name: judged(verdict, found.consequences) for name, verdict in found.verdicts.items()}
 
 
@@ -340,8 +363,10 @@ def _sizes(found: Found) -> dict[str, Any]:
     if found.held is None:
         return {}
     answers = handed_on(found, found.held)  # of an hour only one at a time is in memory
-    return {answer.name: {"unit": answer.unit, "max": float(np.abs(values).max()), "rms": rms(values)}
-            for answer, values in zip(answers, map(found.held.samples, answers), strict=True)}  # fmt: skip
+    return {
+        answer.name: {"unit": answer.unit, "max": float(np.abs(values).max()), "rms": rms(values)}
+        for answer, values in zip(answers, map(found.held.samples, answers), strict=True)
+    }
 
 
 def _left(name: str, progress: Progress, begin: float, share: float) -> Callable[[float, float], None]:

@@ -23,8 +23,14 @@ LOUD, QUIET, MARK = "#d55e00", "#222222", "#f0e442"
 
 def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
     """Draw what a finding says into ``path``; None where there is nothing to draw."""
-    fault = next((f for f in evidence.faults if {s.name for s in f.signals} == set(finding.signals)
-                  and finding.check in KINDS.get(f.kind, ())), None)  # fmt: skip
+    fault = next(
+        (
+            f
+            for f in evidence.faults
+            if {s.name for s in f.signals} == set(finding.signals) and finding.check in KINDS.get(f.kind, ())
+        ),
+        None,
+    )
     signals = tuple(s for s in evidence.recording.signals if s.name in finding.signals)
     if not signals:
         return None
@@ -53,8 +59,9 @@ def _times(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], pa
     first, last = round(begin / own.period), round(end / own.period) + 1
     every = max((last - first) // MOST, 1)
     times = own.period * np.arange(first, last)[::every]
-    drawn, axes = plt.subplots(len(signals[:SHOWN]), 1, figsize=(8, 1.2 + 1.5 * len(signals[:SHOWN])), sharex=True,
-                               squeeze=False)  # fmt: skip
+    drawn, axes = plt.subplots(
+        len(signals[:SHOWN]), 1, figsize=(8, 1.2 + 1.5 * len(signals[:SHOWN])), sharex=True, squeeze=False
+    )
     for axis, signal in zip(axes[:, 0], signals[:SHOWN], strict=False):
         values = own.columns.read(signal.name, first, last - first)[::every]
         axis.plot(times[: len(values)], values, color=QUIET, lw=0.8)
@@ -101,8 +108,10 @@ def _ratio(evidence: Evidence, fault: Fault, path: Path) -> Path:
     expected = factor * np.exp(-2j * np.pi * f * late)
     turned = -360 * f * late + (180.0 if factor < 0 else 0.0)
     drawn, axes = plt.subplots(2, 1, figsize=(8, 4.4), sharex=True)
-    for axis, measured, said, level in ((axes[0], np.abs(ratio), np.abs(expected), 1.0),
-                                        (axes[1], _degrees(ratio / expected) + turned, turned, 0.0)):  # fmt: skip
+    for axis, measured, said, level in (
+        (axes[0], np.abs(ratio), np.abs(expected), 1.0),
+        (axes[1], _degrees(ratio / expected) + turned, turned, 0.0),
+    ):
         axis.scatter(f, measured, s=4 + 40 * sure, color=QUIET, label="measured; larger: surer")
         axis.plot(f, said, color=LOUD, label=_said(fault))
         axis.axhline(level, color="#999999", ls=":", label="as it should be")

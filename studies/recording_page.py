@@ -72,45 +72,65 @@ def page(found: Found, folder: Path) -> str:
     """The page as text; figures pass through ``folder``."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    environment = Environment(loader=FileSystemLoader(Path(__file__).parent), autoescape=True,
-                              undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)  # fmt: skip
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     notes = [finding.text for finding in found.findings if finding.weight == "note"]
     return environment.get_template(TEMPLATE).render(
-        title=found.scene.title, subtitle=_subtitle(found), verdict=_verdict(found), tiles=_tiles(found),
+        title=found.scene.title,
+        subtitle=_subtitle(found),
+        verdict=_verdict(found),
+        tiles=_tiles(found),
         findings=[_finding(found, one, folder, i) for i, one in enumerate(found.findings) if one.weight != "note"],
-        notes=notes, parts=_parts(found, folder), files=_files(found), provenance=_provenance(found),
+        notes=notes,
+        parts=_parts(found, folder),
+        files=_files(found),
+        provenance=_provenance(found),
         scene=(Path(found.scene.folder) / found.scene.file).read_text(encoding="utf-8-sig"),
-    )  # fmt: skip
+    )
 
 
 def _subtitle(found: Found) -> str:
     own = found.recording
     began = f"recorded {own.start:%Y-%m-%d %H:%M:%S %Z}, " if own.start else ""
     kind = "a virtual measurement, with the truth beside it; " if found.virtual is not None else ""
-    return f"{kind}{began}{own.duration:.6g} s at {1 / own.period:.6g} Hz, {len(own.signals)} channels, vehicle " \
-           f"{found.rig.name}"  # fmt: skip
+    return (
+        f"{kind}{began}{own.duration:.6g} s at {1 / own.period:.6g} Hz, {len(own.signals)} channels, vehicle "
+        f"{found.rig.name}"
+    )
 
 
 def _verdict(found: Found) -> dict[str, str]:
     """Kind, word, threshold and reason."""
     if found.stopped:
         errors = sum(finding.weight == "error" for finding in found.findings)
-        return {"kind": "bad", "threshold": "Threshold: no error in the recording.", "word": "Stopped: nothing was run",
-                "why": f"{errors} error(s) were found in the recording. Correct them in the file or in the channel "
-                       "map, and run again."}  # fmt: skip
+        return {
+            "kind": "bad",
+            "threshold": "Threshold: no error in the recording.",
+            "word": "Stopped: nothing was run",
+            "why": f"{errors} error(s) were found in the recording. Correct them in the file or in the channel "
+            "map, and run again.",
+        }
     if found.held is None:
         return {"kind": "bad", "threshold": "Threshold: a run.", "word": "Failed", "why": _ended(found, found.chosen)}
     own, limits = found.verdicts[found.chosen], found.scene.limits
     other = found.verdicts.get(FREE) if found.chosen != FREE else None
     free = f" The free run: {other.word} ({other.reason})." if other else ""
-    return {"kind": {"accepted": "good", "rejected": "bad"}.get(own.word, "idle"), "word": own.word.capitalize(),
-            "why": f"{NAMES[found.chosen]}: {own.reason}.{free}",
-            "threshold": f"Threshold: held to measured angles with an artificial moment of at most "
-                         f"{limits.artificial_share:.0%} of what turns the {found.rig.chassis} (up to 15 Hz), "
-                         f"angles known to {limits.pitch_error:g} rad, and no check channel off by more than "
-                         f"{DISAGREES:.0%}; or free, and shorter than it can be trusted. A doubt that changes a "
-                         f"section force by {FORCE[0]:.0%} to {FORCE[1]:.0%} of its rms or {DAMAGE[0]:.0%} to "
-                         f"{DAMAGE[1]:.0%} of its damage is said, one that changes more rejects."}  # fmt: skip
+    return {
+        "kind": {"accepted": "good", "rejected": "bad"}.get(own.word, "idle"),
+        "word": own.word.capitalize(),
+        "why": f"{NAMES[found.chosen]}: {own.reason}.{free}",
+        "threshold": f"Threshold: held to measured angles with an artificial moment of at most "
+        f"{limits.artificial_share:.0%} of what turns the {found.rig.chassis} (up to 15 Hz), "
+        f"angles known to {limits.pitch_error:g} rad, and no check channel off by more than "
+        f"{DISAGREES:.0%}; or free, and shorter than it can be trusted. A doubt that changes a "
+        f"section force by {FORCE[0]:.0%} to {FORCE[1]:.0%} of its rms or {DAMAGE[0]:.0%} to "
+        f"{DAMAGE[1]:.0%} of its damage is said, one that changes more rejects.",
+    }
 
 
 def _ended(found: Found, name: str) -> str:
@@ -121,11 +141,13 @@ def _ended(found: Found, name: str) -> str:
 def _tiles(found: Found) -> list[dict[str, str]]:
     weights = [finding.weight for finding in found.findings]
     own = found.recording
-    return [{"value": f"{own.duration:.4g} s", "name": "of recording"},
-            {"value": str(sum(found.put_in(s) for s in own.signals)), "name": "channels put in"},
-            {"value": str(sum(not found.put_in(s) for s in own.signals)), "name": "compared with"},
-            {"value": str(weights.count("error")), "name": "errors"},
-            {"value": str(weights.count("doubt")), "name": "doubts"}]  # fmt: skip
+    return [
+        {"value": f"{own.duration:.4g} s", "name": "of recording"},
+        {"value": str(sum(found.put_in(s) for s in own.signals)), "name": "channels put in"},
+        {"value": str(sum(not found.put_in(s) for s in own.signals)), "name": "compared with"},
+        {"value": str(weights.count("error")), "name": "errors"},
+        {"value": str(weights.count("doubt")), "name": "doubts"},
+    ]
 
 
 def _finding(found: Found, one: Finding, folder: Path, i: int) -> dict[str, Any]:
@@ -166,19 +188,27 @@ def _forces(found: Found, run: Outcome, folder: Path) -> Part:
     counted = {answer: found.counted(run, answer) for answer in handed_on(found, run)}
     moving = {answer: own for answer, own in counted.items() if own.greatest - own.least > STILL}
     first = list(moving)[:DRAWN]
-    figures = (_figure(draw.forces_figure(run, first, folder / "forces.png", found.chosen),
-                       f"The first {len(first)} of {len(moving)} section forces and moments that change."),
-               _figure(draw.counting_figure({a: moving[a] for a in first}, folder / "counting.png"),
-                       "Level crossings (how often the load rises through a level) and range pairs (rainflow cycles "
-                       "of at least a range) of the same."))  # fmt: skip
+    figures = (
+        _figure(
+            draw.forces_figure(run, first, folder / "forces.png", found.chosen),
+            f"The first {len(first)} of {len(moving)} section forces and moments that change.",
+        ),
+        _figure(
+            draw.counting_figure({a: moving[a] for a in first}, folder / "counting.png"),
+            "Level crossings (how often the load rises through a level) and range pairs (rainflow cycles "
+            "of at least a range) of the same.",
+        ),
+    )
     files = f"Handed on as {', '.join(path.name for path in found.handed)}."
     still = len(counted) - len(moving)
     none = f" {still} more are handed on that stay the same throughout." if still else ""
     return Part("Section forces and moments", (files + none, DAMAGE_NOTE), _damages(found, run, moving), figures)
 
 
-DAMAGE_NOTE = ("Pseudo-damage is the sum over rainflow cycles (ASTM E1049-85, the residue as half cycles) of the range "
-               "to the slope; compare it only with figures counted alike.")  # fmt: skip
+DAMAGE_NOTE = (
+    "Pseudo-damage is the sum over rainflow cycles (ASTM E1049-85, the residue as half cycles) of the range "
+    "to the slope; compare it only with figures counted alike."
+)
 
 
 def _damages(found: Found, run: Outcome, counted: dict[Answer, Counted]) -> tuple[Table, ...]:
@@ -186,12 +216,25 @@ def _damages(found: Found, run: Outcome, counted: dict[Answer, Counted]) -> tupl
     slopes = tuple(found.scene.hand_on.slopes)
     names = set(found.rig.places.connectors)
     true = errors(run, found.virtual, SLOPE).damage if found.virtual is not None else {}
-    heads = ("section", "unit", "least", "greatest", "mean", *(f"damage, slope {slope:g}" for slope in slopes),
-             *((f"damage by true one, slope {SLOPE:g}",) if true else ()))  # fmt: skip
-    rows = {answer: (answer.name, answer.unit, *(f"{v:.4g}" for v in (own.least, own.greatest, own.mean)),
-                     *(f"{own.damage[slope]:.3e}" for slope in slopes),
-                     *((f"{true[answer.section]:.3f}" if answer.section in true else "–",) if true else ()))
-            for answer, own in counted.items()}  # fmt: skip
+    heads = (
+        "section",
+        "unit",
+        "least",
+        "greatest",
+        "mean",
+        *(f"damage, slope {slope:g}" for slope in slopes),
+        *((f"damage by true one, slope {SLOPE:g}",) if true else ()),
+    )
+    rows = {
+        answer: (
+            answer.name,
+            answer.unit,
+            *(f"{v:.4g}" for v in (own.least, own.greatest, own.mean)),
+            *(f"{own.damage[slope]:.3e}" for slope in slopes),
+            *((f"{true[answer.section]:.3f}" if answer.section in true else "–",) if true else ()),
+        )
+        for answer, own in counted.items()
+    }
     inside = tuple(row for answer, row in rows.items() if answer.section in names)
     outside = tuple(row for answer, row in rows.items() if answer.section not in names)
     both = Table(heads, inside), Table(heads, outside, folded=f"{len(outside)} forces and moments of guides and hubs")
@@ -201,22 +244,42 @@ def _damages(found: Found, run: Outcome, counted: dict[Answer, Counted]) -> tupl
 def _checks(found: Found, folder: Path) -> Part:
     """Channels that were not put in, beside the run."""
     bands = next((one.bands for one in found.compared if one.bands), ())
-    heads = ("channel", "unit", "explained", "offset", *(f"error {_band(band)}" for band in bands),
-             *(f"damage ratio, slope {slope:g}" for slope in found.scene.hand_on.slopes), "trusted for")  # fmt: skip
+    heads = (
+        "channel",
+        "unit",
+        "explained",
+        "offset",
+        *(f"error {_band(band)}" for band in bands),
+        *(f"damage ratio, slope {slope:g}" for slope in found.scene.hand_on.slopes),
+        "trusted for",
+    )
     sizes = [math.sqrt(sum(band.measured**2 for band in one.bands)) or math.inf for one in found.compared]
-    rows = [(one.signal.name, one.answer.unit, f"{one.explained:.2%}", f"{one.offset:.3g}",
-             *(f"{band.error / size:.2%}" for band in one.bands),
-             *(f"{ratio:.3g}" for ratio in one.damage.values()),
-             "all of it" if one.trusted == math.inf else f"{one.trusted:g} s")
-            for one, size in zip(found.compared, sizes, strict=True)]  # fmt: skip
+    rows = [
+        (
+            one.signal.name,
+            one.answer.unit,
+            f"{one.explained:.2%}",
+            f"{one.offset:.3g}",
+            *(f"{band.error / size:.2%}" for band in one.bands),
+            *(f"{ratio:.3g}" for ratio in one.damage.values()),
+            "all of it" if one.trusted == math.inf else f"{one.trusted:g} s",
+        )
+        for one, size in zip(found.compared, sizes, strict=True)
+    ]
     named = [one for one in found.compared if one.signal.check] or list(found.compared)
     drawn = draw.overlay_figure(found, named[:DRAWN], folder / "checks.png")
-    return Part("Channels that were not put in, beside the run", (CHECKS_NOTE,), (Table(heads, tuple(rows)),),
-                (_figure(drawn, "Measured and computed."),))  # fmt: skip
+    return Part(
+        "Channels that were not put in, beside the run",
+        (CHECKS_NOTE,),
+        (Table(heads, tuple(rows)),),
+        (_figure(drawn, "Measured and computed."),),
+    )
 
 
-CHECKS_NOTE = ("Explained is the part of the measured variance that the run gives; errors by band are by the rms of "
-               "the channel; a channel is trusted until the error of one second exceeds half of that.")  # fmt: skip
+CHECKS_NOTE = (
+    "Explained is the part of the measured variance that the run gives; errors by band are by the rms of "
+    "the channel; a channel is trusted until the error of one second exceeds half of that."
+)
 
 
 def _band(band: Band) -> str:
@@ -225,9 +288,20 @@ def _band(band: Band) -> str:
 
 def _map(found: Found) -> Part:
     heads = ("channel", "file", "quantity", "at", "component", "axes", "unit in the file", "to SI", "use")
-    rows = [(s.channel, s.file, s.quantity, s.at, s.component or "–", s.frame, s.unit or "–",
-             f"{s.sign * s.factor:g}", "put in" if found.put_in(s) else "compared with")
-            for s in found.recording.signals]  # fmt: skip
+    rows = [
+        (
+            s.channel,
+            s.file,
+            s.quantity,
+            s.at,
+            s.component or "–",
+            s.frame,
+            s.unit or "–",
+            f"{s.sign * s.factor:g}",
+            "put in" if found.put_in(s) else "compared with",
+        )
+        for s in found.recording.signals
+    ]
     return Part("Channel map", tables=(Table(heads, tuple(rows), numbers=False),))
 
 
@@ -243,9 +317,13 @@ def _provenance(found: Found) -> list[str]:
     names = ("twinrig", found.engine if found.engine != "reference" else "numpy", "numpy", "scipy")
     versions = ", ".join(f"{name} {version(name)}" for name in dict.fromkeys(names))
     times = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in found.seconds.items())
-    return [f"Command: {' '.join(sys.argv)}", f"Versions: {versions}, Python {platform.python_version()}",
-            f"Engine: {found.engine}, Runge-Kutta 4", f"Time taken, once: {times}",
-            *([f"Comment of the files: {found.recording.comment}"] if found.recording.comment else [])]  # fmt: skip
+    return [
+        f"Command: {' '.join(sys.argv)}",
+        f"Versions: {versions}, Python {platform.python_version()}",
+        f"Engine: {found.engine}, Runge-Kutta 4",
+        f"Time taken, once: {times}",
+        *([f"Comment of the files: {found.recording.comment}"] if found.recording.comment else []),
+    ]
 
 
 def _figure(path: Path, caption: str) -> Figure:

@@ -15,8 +15,13 @@ from studies.recording import FREE, Found
 POINTS = 1200
 """Columns of a curve: of each the least and the greatest value are drawn, so that no peak is lost."""
 LINES = {"measured": "#b5b5b5", "truth": "#222222", FREE: "#d55e00", "kalman": "#0072b2", "prescribed": "#0072b2"}
-NAMES = {"measured": "measured", "truth": "truth", FREE: "free run", "kalman": "held by the Kalman filter",
-         "prescribed": "held to the measured angles"}  # fmt: skip
+NAMES = {
+    "measured": "measured",
+    "truth": "truth",
+    FREE: "free run",
+    "kalman": "held by the Kalman filter",
+    "prescribed": "held to the measured angles",
+}
 WHEELS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 
 
@@ -77,8 +82,15 @@ def _expected(found: Found, panel: Any, angle: str) -> None:
     slow = np.interp(found.drift.times, times, values)
     spread = found.drift.deviations[:, ("roll", "pitch").index(angle)]
     low, high = np.degrees(slow - spread), np.degrees(slow + spread)
-    panel.fill_between(found.drift.times, low, high, color=LINES[FREE], alpha=0.15, lw=0,
-                       label="free run as predicted, 1 standard deviation")  # fmt: skip
+    panel.fill_between(
+        found.drift.times,
+        low,
+        high,
+        color=LINES[FREE],
+        alpha=0.15,
+        lw=0,
+        label="free run as predicted, 1 standard deviation",
+    )
 
 
 def _angles(found: Found, angle: str) -> list[tuple[str, np.ndarray, np.ndarray]]:
@@ -107,8 +119,9 @@ def forces_figure(run: Outcome, answers: Sequence[Answer], path: Path, name: str
     from studies.figures import plt, save
 
     times = run.period * np.arange(run.done)
-    figure, panels = plt.subplots(len(answers), 2, figsize=(9.5, 1.5 * len(answers) + 0.5), squeeze=False,
-                                  width_ratios=(2.4, 1))  # fmt: skip
+    figure, panels = plt.subplots(
+        len(answers), 2, figsize=(9.5, 1.5 * len(answers) + 0.5), squeeze=False, width_ratios=(2.4, 1)
+    )
     for (left, right), answer in zip(panels, answers, strict=True):
         values, unit, scale = run.samples(answer), f"k{answer.unit}", 1e-3
         if np.abs(values).max() < 1e3:
@@ -149,8 +162,9 @@ def overlay_figure(found: Found, compared: Sequence[Compared], path: Path) -> Pa
     from studies.figures import plt, save
 
     assert found.held is not None
-    figure, panels = plt.subplots(len(compared), 2, figsize=(9.5, 1.5 * len(compared) + 0.7), squeeze=False,
-                                  width_ratios=(2.4, 1))  # fmt: skip
+    figure, panels = plt.subplots(
+        len(compared), 2, figsize=(9.5, 1.5 * len(compared) + 0.7), squeeze=False, width_ratios=(2.4, 1)
+    )
     for (left, right), one in zip(panels, compared, strict=True):
         times, measured, computed = overlay(found.recording, found.held, one.signal, one.answer)
         peak = times[int(np.nanargmax(np.abs(computed - measured)))]

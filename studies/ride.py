@@ -107,8 +107,13 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     road_figure(road, y, fitted, scene.title, folder / "road.png")
     texts = (road.label(y), *met(scene, wheels(vehicle)), *(fitted.notes if fitted else ()))
     notes = [*(f"  question: {text}" for text in doubts(vehicle)), *(f"  road: {text}" for text in texts)]
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(found),
-            "table": [*_table(scene, vehicle, found, speed, options), *notes]}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "answer": _answer(found),
+        "table": [*_table(scene, vehicle, found, speed, options), *notes],
+    }
 
 
 def _simpler(scene: RideScene, case: tuple[str, str]) -> tuple[str, str]:
@@ -130,12 +135,16 @@ def _along(vehicle: SpatialVehicle) -> SpatialVehicle | None:
 def _static(vehicle: SpatialVehicle) -> dict[str, float]:
     """Static load (N) of the tyre behind each output that is a tyre force."""
     loads = preloads(replace(vehicle, gravity=GRAVITY)).tyres
-    return {output.name: loads[output.tyre] for output in vehicle.outputs
-            if isinstance(output, TyreOutput) and output.kind == "tyre force"}  # fmt: skip
+    return {
+        output.name: loads[output.tyre]
+        for output in vehicle.outputs
+        if isinstance(output, TyreOutput) and output.kind == "tyre force"
+    }
 
 
-def _save(scene: RideScene, vehicle: SpatialVehicle, linear: Linear, found: dict[str, Sweep], speed: float,
-          folder: Path) -> None:  # fmt: skip
+def _save(
+    scene: RideScene, vehicle: SpatialVehicle, linear: Linear, found: dict[str, Sweep], speed: float, folder: Path
+) -> None:
     """Deviations of every engine over case, speed and output; the system at one speed for other programs."""
     import xarray as xr
 
@@ -174,13 +183,16 @@ def _answer(found: dict[str, Sweep]) -> dict[str, Any]:
     """Standard deviations at all speeds in the scene's own case, SI; None where an output has none."""
     one = next(iter(found.values()))
     finite = np.where(np.isfinite(one.deviation[0, :-1]), one.deviation[0, :-1], np.nan)
-    values = {name: [None if np.isnan(value) else float(value) for value in finite[:, i]]
-              for i, name in enumerate(one.outputs)}  # fmt: skip
+    values = {
+        name: [None if np.isnan(value) else float(value) for value in finite[:, i]]
+        for i, name in enumerate(one.outputs)
+    }
     return {"speed": one.speeds[:-1].tolist(), "deviation": values}
 
 
-def _table(scene: RideScene, vehicle: SpatialVehicle, found: dict[str, Sweep], speed: float,
-           options: Options) -> list[str]:  # fmt: skip
+def _table(
+    scene: RideScene, vehicle: SpatialVehicle, found: dict[str, Sweep], speed: float, options: Options
+) -> list[str]:
     """What each output does at one speed, and how wrong simpler roads are."""
     first = next(iter(found.values()))
     linear = linear_vehicle(vehicle)(speed)
@@ -210,8 +222,10 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
         return {}
     linear = linear_vehicle(vehicle)(speed)
     low = LONGEST * min(f.corner for f in (road.mean, road.roll) if f.corner) if road.mean.corner else 0.01
-    found = [variances(linear, partial(spectral_matrix, one, placed), speed, low, SHORTEST)
-             for one in (road, isotropic_like(road, y))]  # fmt: skip
+    found = [
+        variances(linear, partial(spectral_matrix, one, placed), speed, low, SHORTEST)
+        for one in (road, isotropic_like(road, y))
+    ]
     names = [output.name for output in vehicle.outputs]
     return {name: float(np.sqrt(iso / own) - 1.0) for name, own, iso in zip(names, *found, strict=True) if own > 0}
 
@@ -243,8 +257,11 @@ def _travels(vehicle: SpatialVehicle, found: Sweep, options: Options) -> list[st
     """How often each travel passes the free travel; how fast it moves where the vehicle file asks for its rate."""
     if options.free_travel is None:
         return []
-    rates = {output.part: output.name for output in vehicle.outputs
-             if isinstance(output, PartOutput) and output.kind == "travel rate"}  # fmt: skip
+    rates = {
+        output.part: output.name
+        for output in vehicle.outputs
+        if isinstance(output, PartOutput) and output.kind == "travel rate"
+    }
     lines = []
     for output in vehicle.outputs:
         if not isinstance(output, PartOutput) or output.kind != "travel":
@@ -263,8 +280,11 @@ def _loads(vehicle: SpatialVehicle, found: Sweep) -> list[str]:
     """Dynamic wheel load factors in a line."""
     static = _static(vehicle)
     own = {name: float(found.of(found.cases[0], name)[-1]) for name in static}
-    parts = [f"{name} {dynamic_load_factor(own[name], load):.3f}" if load > 0 else f"{name} has no load to carry"
-             for name, load in static.items() if np.isfinite(own[name])]  # fmt: skip
+    parts = [
+        f"{name} {dynamic_load_factor(own[name], load):.3f}" if load > 0 else f"{name} has no load to carry"
+        for name, load in static.items()
+        if np.isfinite(own[name])
+    ]
     return [f"  dynamic wheel load factor: {', '.join(parts)}"] if parts else []
 
 
@@ -278,8 +298,9 @@ def _agreement(found: dict[str, Sweep]) -> list[str]:
         gaps = np.abs(np.where(finite, other.deviation, 0.0) - np.where(finite, first.deviation, 0.0))
         gap = np.max(gaps / np.where(largest > 0, largest, 1.0))
         same = "" if (other.status == first.status).all() else "; but what is finite differs"
-        lines.append(f"  {engine}'s own linear vehicle: standard deviations within {gap:.1e} (of the largest) of "
-                     f"{name}'s{same}")  # fmt: skip
+        lines.append(
+            f"  {engine}'s own linear vehicle: standard deviations within {gap:.1e} (of the largest) of {name}'s{same}"
+        )
     return lines
 
 

@@ -45,8 +45,12 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
         opened(scene)
     elif scene.options:
         place, value = next(iter(scene.options.items()))
-        raise InputError(scene.file, f"options.{place}", value, "is read where springs are bent, and effects chosen "
-                         "by runs; for this vehicle there is a closed form")  # fmt: skip
+        raise InputError(
+            scene.file,
+            f"options.{place}",
+            value,
+            "is read where springs are bent, and effects chosen by runs; for this vehicle there is a closed form",
+        )
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -70,8 +74,13 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     _save(scene, alone, choice, folder / "effects.csv")
     _save_activity(watts, folder / "activity.csv")
     choice_figure(scene, alone, choice, watts, folder / "choice.png")
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(scene, choice, further),
-            "table": _table(scene, choice, alone, further)}
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "answer": _answer(scene, choice, further),
+        "table": _table(scene, choice, alone, further),
+    }
 
 
 def _alone(chooser: Chooser, effect: Effect) -> Alone:
@@ -81,19 +90,28 @@ def _alone(chooser: Chooser, effect: Effect) -> Alone:
 
 def _answer(scene: RideScene, choice: Choice, further: dict[Effect, float]) -> dict[str, Any]:
     """What was chosen, and how right and how cheap that is."""
-    columns = {"predicted": choice.predicted, "confirmed": choice.confirmed, "between speeds": choice.between,
-               "parameters off": choice.off}  # fmt: skip
-    errors = {name: {key: float(values[i]) for key, values in columns.items()}
-              for i, name in enumerate(scene.quantities)}  # fmt: skip
+    columns = {
+        "predicted": choice.predicted,
+        "confirmed": choice.confirmed,
+        "between speeds": choice.between,
+        "parameters off": choice.off,
+    }
+    errors = {
+        name: {key: float(values[i]) for key, values in columns.items()} for i, name in enumerate(scene.quantities)
+    }
     return {
         "left out": [effect.name for effect in choice.left_out],
         "stay": [effect.name for effect in choice.candidates if effect not in choice.left_out],
-        "errors": errors, "kept": choice.kept, "states": [choice.before.states, choice.after.states],
-        "step": [choice.before.step, choice.after.step], "step limit": list(choice.stable),
-        "calls": [choice.before.calls, choice.after.calls], "said": list(choice.said),
-        "confirmations": choice.rounds, "would matter no more above": {
-            effect.name: change for effect, change in further.items()},
-    }  # fmt: skip
+        "errors": errors,
+        "kept": choice.kept,
+        "states": [choice.before.states, choice.after.states],
+        "step": [choice.before.step, choice.after.step],
+        "step limit": list(choice.stable),
+        "calls": [choice.before.calls, choice.after.calls],
+        "said": list(choice.said),
+        "confirmations": choice.rounds,
+        "would matter no more above": {effect.name: change for effect, change in further.items()},
+    }
 
 
 def _save(scene: RideScene, alone: list[Alone], choice: Choice, path: Path) -> None:
@@ -129,12 +147,17 @@ def _table(scene: RideScene, choice: Choice, alone: list[Alone], further: dict[E
     lines += [f"  stays: {', '.join(stay) or 'nothing'}", *(f"    {why}" for why in choice.said)]
     for i, name in enumerate(scene.quantities if choice.left_out else ()):
         told = map(percent, (choice.predicted[i], choice.confirmed[i], choice.between[i], choice.off[i]))
-        lines.append("  {}: {} predicted, {} confirmed; {} at the worst speed of the range, {} there with parameters "
-                     "5 % off; tolerance {}".format(name, *told, tolerance))  # fmt: skip
+        lines.append(
+            "  {}: {} predicted, {} confirmed; {} at the worst speed of the range, {} there with parameters "
+            "5 % off; tolerance {}".format(name, *told, tolerance)
+        )
     lines += saving(choice, tolerance)
     lines += ["  alone, what leaving it out changes (confirmed):"]
-    lines += [f"    {one.effect.name}: {', '.join(map(percent, one.confirmed))}"
-              + (f" ({one.illegal})" if one.illegal else "") for one in alone]  # fmt: skip
+    lines += [
+        f"    {one.effect.name}: {', '.join(map(percent, one.confirmed))}"
+        + (f" ({one.illegal})" if one.illegal else "")
+        for one in alone
+    ]
     for effect, change in sorted(further.items(), key=lambda item: item[1]):
         idle = "  {} could go, too ({:.3g} %), but saves no calls, or does not hold nearby"
         matters = "  {} would matter no more at a tolerance above {:.3g} %"
@@ -146,15 +169,20 @@ def _table(scene: RideScene, choice: Choice, alone: list[Alone], further: dict[E
 def saving(choice: Choice, tolerance: str) -> list[str]:
     """Steps and calls at equal accuracy, in words."""
     before, after = choice.before, choice.after
-    lines = [f"  a run confirms {1e3 * before.step:.3g} ms as the longest step of the classical Runge-Kutta method "
-             f"that keeps standard deviations within {tolerance} of the exact ones: {before.calls:.4g} calls per "
-             f"second of motion (stable up to {1e3 * choice.stable[0]:.3g} ms)"]  # fmt: skip
+    lines = [
+        f"  a run confirms {1e3 * before.step:.3g} ms as the longest step of the classical Runge-Kutta method "
+        f"that keeps standard deviations within {tolerance} of the exact ones: {before.calls:.4g} calls per "
+        f"second of motion (stable up to {1e3 * choice.stable[0]:.3g} ms)"
+    ]
     if not choice.left_out:
         return [*lines, "  nothing that may be left out saves calls"]
-    return [*lines, "  without what is left out, changes and steps together keep the same in steps of "
-            f"{1e3 * after.step:.3g} ms: {after.calls:.4g} calls, {before.calls / after.calls:.3g} times fewer at "
-            f"equal accuracy (stable up to {1e3 * choice.stable[1]:.3g} ms); states {before.states} -> {after.states}",
-            f"  {SCENE} beside the results runs what is left"]  # fmt: skip
+    return [
+        *lines,
+        "  without what is left out, changes and steps together keep the same in steps of "
+        f"{1e3 * after.step:.3g} ms: {after.calls:.4g} calls, {before.calls / after.calls:.3g} times fewer at "
+        f"equal accuracy (stable up to {1e3 * choice.stable[1]:.3g} ms); states {before.states} -> {after.states}",
+        f"  {SCENE} beside the results runs what is left",
+    ]
 
 
 if __name__ == "__main__":

@@ -17,8 +17,10 @@ ELEMENTS = 12
 
 def choice_figure(scene: RideScene, alone: list[Any], choice: Choice, watts: dict[str, float], path: Path) -> None:
     """Changes by effect, left out alone and all together; activity by element."""
-    rows = [(one.effect.name + ("  [left out]" if one.effect in choice.left_out else ""), one.predicted, one.confirmed)
-            for one in alone] + [("all that is left out", choice.predicted, choice.confirmed)]  # fmt: skip
+    rows = [
+        (one.effect.name + ("  [left out]" if one.effect in choice.left_out else ""), one.predicted, one.confirmed)
+        for one in alone
+    ] + [("all that is left out", choice.predicted, choice.confirmed)]
     height = 1.6 + 0.3 * max(len(rows), ELEMENTS)
     figure, (left, right) = plt.subplots(1, 2, figsize=(12, height), width_ratios=(1.6, 1))
     y = np.arange(len(rows))[::-1]
@@ -28,9 +30,14 @@ def choice_figure(scene: RideScene, alone: list[Any], choice: Choice, watts: dic
         left.plot(found, y + shift, "o", color=f"C{i}", label=f"{name}, confirmed", ms=5)
         left.plot(said, y + shift, "x", color=f"C{i}", label=f"{name}, predicted", ms=6)
     left.axvline(100 * (scene.tolerance or 0), color="#222222", ls="--", label="tolerance")
-    left.set(xscale="log", xlim=(LOWEST / 1.5, HIGHEST * 1.5), yticks=y, yticklabels=[row[0] for row in rows],
-             xlabel="change of the standard deviation [%], worst speed (at the ends: beyond)",
-             title="What leaving out an effect changes")  # fmt: skip
+    left.set(
+        xscale="log",
+        xlim=(LOWEST / 1.5, HIGHEST * 1.5),
+        yticks=y,
+        yticklabels=[row[0] for row in rows],
+        xlabel="change of the standard deviation [%], worst speed (at the ends: beyond)",
+        title="What leaving out an effect changes",
+    )
     left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize=8)
     _activity(right, watts)
     figure.suptitle(scene.title)

@@ -36,8 +36,10 @@ REPEATS = 5
 class Options(Strict):
     """[options] of this study."""
 
-    simpler: list[str] = Field(["quarter_car", "half_car", "seven_freedoms"],
-                                     description="vehicles to compare with the scene's, simplest first")  # fmt: skip
+    simpler: list[str] = Field(
+        ["quarter_car", "half_car", "seven_freedoms"],
+        description="vehicles to compare with the scene's, simplest first",
+    )
 
 
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:
@@ -67,14 +69,22 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         found[name] = _swept(scene, vehicle, scene.speeds.all())
     names = [output.name for output in full.outputs]
     truth = list(found.values())[-1].deviation[-1]
-    errors = {(model, road): _errors(swept, j, truth, names)
-              for model, swept in found.items() for j, road in enumerate(_roads(models[model]))}  # fmt: skip
+    errors = {
+        (model, road): _errors(swept, j, truth, names)
+        for model, swept in found.items()
+        for j, road in enumerate(_roads(models[model]))
+    }
     costs = _costs(scene, models)
     _save(errors, names, folder / "errors.csv")
     middle = {name: float(np.median(own)) for name, own in costs.items()}
     detail_figure(errors, names, middle, scene.title, folder / "detail.png")
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(errors, names),
-            "table": _table(errors, names, costs, full)}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "answer": _answer(errors, names),
+        "table": _table(errors, names, costs, full),
+    }
 
 
 def _options(scene: RideScene) -> Options:
@@ -89,8 +99,10 @@ def _simpler(scene: RideScene) -> list[SpatialVehicle]:
 def _named(vehicles: list[SpatialVehicle]) -> dict[str, SpatialVehicle]:
     """Models by their number of freedoms, and by their file where two have the same."""
     counts = [len(vehicle.coordinates()) for vehicle in vehicles]
-    return {f"{n} freedoms" + (f" of {vehicle.name}" if counts.count(n) > 1 else ""): vehicle
-            for n, vehicle in zip(counts, vehicles, strict=True)}  # fmt: skip
+    return {
+        f"{n} freedoms" + (f" of {vehicle.name}" if counts.count(n) > 1 else ""): vehicle
+        for n, vehicle in zip(counts, vehicles, strict=True)
+    }
 
 
 def _roads(vehicle: SpatialVehicle) -> list[str]:
@@ -121,8 +133,10 @@ def _costs(scene: RideScene, models: dict[str, SpatialVehicle]) -> dict[str, lis
     """Seconds of one covariance at one speed, of interleaved runs."""
     assert scene.speeds is not None
     speed = float(scene.speeds.all()[0])
-    systems = {name: excited(linear_vehicle(vehicle)(speed), excitation_of(scene, wheels(vehicle)), speed)
-               for name, vehicle in models.items()}  # fmt: skip
+    systems = {
+        name: excited(linear_vehicle(vehicle)(speed), excitation_of(scene, wheels(vehicle)), speed)
+        for name, vehicle in models.items()
+    }
     seconds: dict[str, list[float]] = {name: [] for name in systems}
     for _ in range(REPEATS):
         for name, system in systems.items():
@@ -145,9 +159,12 @@ def _save(errors: Errors, names: list[str], path: Path) -> None:
 
 
 def _answer(errors: Errors, names: list[str]) -> dict[str, Any]:
-    return {f"{model}, {road}": {name: None if np.isnan(value) else float(value)
-                                 for name, value in zip(names, values, strict=True)}
-            for (model, road), values in errors.items()}  # fmt: skip
+    return {
+        f"{model}, {road}": {
+            name: None if np.isnan(value) else float(value) for name, value in zip(names, values, strict=True)
+        }
+        for (model, road), values in errors.items()
+    }
 
 
 def _table(errors: Errors, names: list[str], costs: dict[str, list[float]], full: SpatialVehicle) -> list[str]:
@@ -155,9 +172,10 @@ def _table(errors: Errors, names: list[str], costs: dict[str, list[float]], full
     kinds = {output.name: output.kind for output in full.outputs}
     shown = list(dict.fromkeys(kinds.values()))
     width = max(len(f"{model}, {road}") for model, road in errors) + 2
-    lines = ["  largest error of a standard deviation over all speeds, against the full vehicle on two tracks with "
-             "delay",
-             f"    {'':<{width}}{'cost, median and range':>30}" + "".join(f"{kind:>22}" for kind in shown)]  # fmt: skip
+    lines = [
+        "  largest error of a standard deviation over all speeds, against the full vehicle on two tracks with delay",
+        f"    {'':<{width}}{'cost, median and range':>30}" + "".join(f"{kind:>22}" for kind in shown),
+    ]
     for (model, road), values in errors.items():
         worst = []
         for kind in shown:

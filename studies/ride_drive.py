@@ -64,10 +64,14 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     names = [output.name for output in vehicle.outputs]
     shown = [o.name for o in vehicle.outputs if o.kind in ("acceleration", "tyre force")]
     shown = _options(scene).outputs or shown or names
-    drive_figure(first, alone, shown, {o.name: (o.kind, u) for o, u in own}, scene.title,
-                 folder / "drive.png")  # fmt: skip
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(first, alone),
-            "table": [f"  linear vehicle of {engine}", *_table(first, alone, units)]}  # fmt: skip
+    drive_figure(first, alone, shown, {o.name: (o.kind, u) for o, u in own}, scene.title, folder / "drive.png")
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "answer": _answer(first, alone),
+        "table": [f"  linear vehicle of {engine}", *_table(first, alone, units)],
+    }
 
 
 def _options(scene: RideScene) -> Options:
@@ -87,10 +91,14 @@ def _save(scene: RideScene, found: VaryingSpeed, alone: np.ndarray, units: list[
 
     axes = ("time", "output")
     data = xr.Dataset(
-        {"deviation": (axes, found.deviation), "quasi_stationary": (axes, alone),
-         "speed": ("time", found.speed, {"units": "m/s"}), "path": ("time", found.path, {"units": "m"})},
+        {
+            "deviation": (axes, found.deviation),
+            "quasi_stationary": (axes, alone),
+            "speed": ("time", found.speed, {"units": "m/s"}),
+            "path": ("time", found.path, {"units": "m"}),
+        },
         {"time": ("time", found.time, {"units": "s"}), "output": list(found.names)},
-    )  # fmt: skip
+    )
     data["unit"] = ("output", units)
     data.attrs = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
     write(data, path)
@@ -108,8 +116,10 @@ def _answer(found: VaryingSpeed, alone: np.ndarray) -> dict[str, Any]:
     gaps = _gaps(found, alone)
     finite = np.isfinite(found.deviation).all(axis=0)
     worst = [float(gaps[np.abs(gaps[:, i]).argmax(), i]) if finite[i] else None for i in range(len(finite))]
-    return {name: {"largest error of the quasi-stationary answer": value}
-            for name, value in zip(found.names, worst, strict=True)}  # fmt: skip
+    return {
+        name: {"largest error of the quasi-stationary answer": value}
+        for name, value in zip(found.names, worst, strict=True)
+    }
 
 
 def _table(found: VaryingSpeed, alone: np.ndarray, units: list[str]) -> list[str]:
@@ -124,8 +134,10 @@ def _table(found: VaryingSpeed, alone: np.ndarray, units: list[str]) -> list[str
             lines.append(f"    {name:<{width}}{found.status[i]:>12}")
             continue
         top, worst = int(own.argmax()), int(np.abs(gaps[:, i]).argmax())
-        lines.append(f"    {name:<{width}}{own[top]:>12.4g}{found.time[top]:>8.2f}   by {100 * gaps[worst, i]:+.1f} % "
-                     f"at {found.time[worst]:.2f} s, {found.speed[worst]:.1f} m/s")  # fmt: skip
+        lines.append(
+            f"    {name:<{width}}{own[top]:>12.4g}{found.time[top]:>8.2f}   by {100 * gaps[worst, i]:+.1f} % "
+            f"at {found.time[worst]:.2f} s, {found.speed[worst]:.1f} m/s"
+        )
     return lines
 
 

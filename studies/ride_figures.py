@@ -20,8 +20,9 @@ COLOURS = ("#222222", "#0072b2", "#56b4e9", "#d55e00", "#cc79a7")
 STYLES = ("-", "--", ":", "--", ":")
 
 
-def along_figure(places: Sequence[float], at: Sweep, over: Sweep, vehicle: SpatialVehicle, speed: float, title: str,
-                 path: Path) -> None:  # fmt: skip
+def along_figure(
+    places: Sequence[float], at: Sweep, over: Sweep, vehicle: SpatialVehicle, speed: float, title: str, path: Path
+) -> None:
     """Vertical acceleration of the body, along it at one speed and at its middle output over speed, by correlation."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
     name = _middle(vehicle)
@@ -31,10 +32,18 @@ def along_figure(places: Sequence[float], at: Sweep, over: Sweep, vehicle: Spati
             right.plot(over.speeds[:-1], over.of(case, name)[:-1], STYLES[i], color=COLOURS[i])
     for x in vehicle.axles:
         left.axvline(x, color="0.8", zorder=0)
-    left.set(xlabel="x forward [m]  (grey: axles)", ylabel="standard deviation [m/s²]", ylim=(0, None),
-             title=f"Vertical acceleration along the body at {speed:g} m/s")
-    right.set(xlabel="speed [m/s]", ylabel="standard deviation [m/s²]", ylim=(0, None),
-              title=f"At {name!r} over speed" if name else "")
+    left.set(
+        xlabel="x forward [m]  (grey: axles)",
+        ylabel="standard deviation [m/s²]",
+        ylim=(0, None),
+        title=f"Vertical acceleration along the body at {speed:g} m/s",
+    )
+    right.set(
+        xlabel="speed [m/s]",
+        ylabel="standard deviation [m/s²]",
+        ylim=(0, None),
+        title=f"At {name!r} over speed" if name else "",
+    )
     left.legend(title="the axles' and tracks' roads")
     figure.suptitle(f"{title}: which correlations of the road matter where", fontsize=11)
     save(figure, path)
@@ -54,8 +63,9 @@ PANELS = 2
 """Side by side."""
 
 
-def outputs_figure(found: Sweep, kinds: Sequence[tuple[str, str]], static: Mapping[str, float], title: str,
-                   path: Path) -> None:  # fmt: skip
+def outputs_figure(
+    found: Sweep, kinds: Sequence[tuple[str, str]], static: Mapping[str, float], title: str, path: Path
+) -> None:
     """Standard deviations of the outputs over speed in the scene's own case, a panel per kind and unit (``kinds``)."""
     panels = list(dict.fromkeys(kinds))
     rows = -(-len(panels) // PANELS)
@@ -95,8 +105,7 @@ def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {"\n= ".join(names): values for names, values in groups}
 
 
-def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, title: str,
-                   path: Path) -> None:  # fmt: skip
+def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, title: str, path: Path) -> None:
     """One-sided spectra of the accelerations and tyre forces over frequency at one speed; no figure where all is 0."""
     from models.ride.frequency import spectra
 
@@ -141,8 +150,13 @@ def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, title: 
     save(figure, path)
 
 
-def detail_figure(errors: Mapping[tuple[str, str], np.ndarray], names: Sequence[str], cost: Mapping[str, float],
-                  title: str, path: Path) -> None:  # fmt: skip
+def detail_figure(
+    errors: Mapping[tuple[str, str], np.ndarray],
+    names: Sequence[str],
+    cost: Mapping[str, float],
+    title: str,
+    path: Path,
+) -> None:
     """Errors of all outputs by model and road as a table of colours, with what a covariance costs."""
     heads = [f"{model}\n{1e3 * cost[model]:.2g} ms\n" + road.replace(", ", ",\n") for model, road in errors]
     values = 100 * np.array(list(errors.values())).T
@@ -161,13 +175,20 @@ def detail_figure(errors: Mapping[tuple[str, str], np.ndarray], names: Sequence[
     save(figure, path)
 
 
-def drive_figure(found: VaryingSpeed, alone: np.ndarray, shown: Sequence[str], kinds: Mapping[str, tuple[str, str]],
-                 title: str, path: Path) -> None:  # fmt: skip
+def drive_figure(
+    found: VaryingSpeed,
+    alone: np.ndarray,
+    shown: Sequence[str],
+    kinds: Mapping[str, tuple[str, str]],
+    title: str,
+    path: Path,
+) -> None:
     """Standard deviations along a drive, dashed if every speed is taken by itself, above the speed."""
     groups = list(dict.fromkeys(kinds[name] for name in shown))
     heights = [3.0] * len(groups) + [1.3]
-    figure, axes = plt.subplots(len(heights), 1, figsize=(9, sum(heights) + 0.8), sharex=True, height_ratios=heights,
-                                squeeze=False)  # fmt: skip
+    figure, axes = plt.subplots(
+        len(heights), 1, figsize=(9, sum(heights) + 0.8), sharex=True, height_ratios=heights, squeeze=False
+    )
     for axis, (kind, unit) in zip(axes[:, 0], groups, strict=False):
         own = {name: found.names.index(name) for name in shown if kinds[name] == (kind, unit)}
         pairs = {name: np.concatenate([found.deviation[:, i], alone[:, i]]) for name, i in own.items()}

@@ -103,17 +103,27 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     deviations_figure(answer, own.vehicle.outputs, scene.title, folder / "deviations.png")
     if runs:
         spectra_figure(runs, own.vehicle, road, speed, scene.title, folder / "spectra.png")
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": _answer(answer),
-            "table": _table(answer, own, speed) + _lifted(vehicle, answer, runs)
-            + _time_table(runs, own, road, speed)}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "answer": _answer(answer),
+        "table": _table(answer, own, speed) + _lifted(vehicle, answer, runs) + _time_table(runs, own, road, speed),
+    }
 
 
 def _options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _swept(vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, options: Options, beside: list[float],
-           progress: Progress) -> Answer:  # fmt: skip
+def _swept(
+    vehicle: SpatialVehicle,
+    road: Excitation,
+    speeds: np.ndarray,
+    options: Options,
+    beside: list[float],
+    progress: Progress,
+) -> Answer:
     """Small motion and statistical linearisation at all speeds, Monte Carlo at some."""
     linear, on_road = linear_vehicle(vehicle), vehicle.with_tyres(pushes_only=False)
     small, found, copies = [], [], {}
@@ -127,14 +137,27 @@ def _swept(vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, option
     return Answer(speeds, np.array(small), found, copies, vehicle.lifts)
 
 
-def _in_engines(vehicle: SpatialVehicle, road: Excitation, speed: float, engines: tuple[str, ...], options: Options,
-                progress: Progress) -> dict[str, Ride]:  # fmt: skip
+def _in_engines(
+    vehicle: SpatialVehicle,
+    road: Excitation,
+    speed: float,
+    engines: tuple[str, ...],
+    options: Options,
+    progress: Progress,
+) -> dict[str, Ride]:
     """One path of the road through each engine that runs in time."""
     path, runs = road_path(road, speed, min(STEP, followed(vehicle, speed))), {}
     for engine in (engine for engine in engines if engine in INTEGRATORS):
         progress(f"{engine} in time", 0.8)
-        runs[engine] = ridden(engine, vehicle, path, options.driven, seed=options.seed, skipped=options.skipped,
-                              every=max(1, round(2.0 * STEP / path.step)))  # fmt: skip
+        runs[engine] = ridden(
+            engine,
+            vehicle,
+            path,
+            options.driven,
+            seed=options.seed,
+            skipped=options.skipped,
+            every=max(1, round(2.0 * STEP / path.step)),
+        )
     return runs
 
 
@@ -146,14 +169,22 @@ def _save(scene: RideScene, answer: Answer, path: Path) -> None:
     axes, few = ("speed", "output"), ("speed_of_copies", "output")
     copies = list(answer.copies.values())
     data = xr.Dataset(
-        {"deviation": (axes, answer.deviation), "small_motion": (axes, answer.small),
-         "mean": (axes, answer.of("mean")), "left_out": (axes, answer.of("left_out")),
-         "copies_deviation": (few, [c.deviation for c in copies]), "copies_mean": (few, [c.mean for c in copies]),
-         "copies_variance_error": (few, [c.error for c in copies]),
-         "copies_kurtosis": (few, [c.kurtosis for c in copies])},
-        {"speed": ("speed", answer.speeds, {"units": "m/s"}), "output": list(answer.found[0].covariance.names),
-         "speed_of_copies": ("speed_of_copies", list(answer.copies), {"units": "m/s"})},
-    )  # fmt: skip
+        {
+            "deviation": (axes, answer.deviation),
+            "small_motion": (axes, answer.small),
+            "mean": (axes, answer.of("mean")),
+            "left_out": (axes, answer.of("left_out")),
+            "copies_deviation": (few, [c.deviation for c in copies]),
+            "copies_mean": (few, [c.mean for c in copies]),
+            "copies_variance_error": (few, [c.error for c in copies]),
+            "copies_kurtosis": (few, [c.kurtosis for c in copies]),
+        },
+        {
+            "speed": ("speed", answer.speeds, {"units": "m/s"}),
+            "output": list(answer.found[0].covariance.names),
+            "speed_of_copies": ("speed_of_copies", list(answer.copies), {"units": "m/s"}),
+        },
+    )
     data["unit"] = ("output", [output.unit for output in answer.found[0].vehicle.outputs])
     tyres = {"tyres": "lift in copies alone"} if answer.lifts else {}
     data.attrs = {"title": scene.title, **tyres, **{key: str(value) for key, value in provenance().items()}}
@@ -161,14 +192,15 @@ def _save(scene: RideScene, answer: Answer, path: Path) -> None:
 
 
 def _answer(answer: Answer) -> dict[str, Any]:
-    """Deviations and means at all speeds, SI; None where an output has none. Of tyres that lift, at the copies' speeds.
-    """
+    """Deviations and means at all speeds, SI; None where there is none. Of tyres that lift, at the copies' speeds."""
     copies = list(answer.copies.values())
     out: dict[str, Any] = {"speed": list(answer.copies) if answer.lifts else answer.speeds.tolist()}
     for key, found in (("deviation", answer.deviation), ("mean", answer.of("mean"))):
         values = np.array([getattr(each, key) for each in copies]) if answer.lifts else found
-        out[key] = {name: [float(value) if np.isfinite(value) else None for value in values[:, i]]
-                    for i, name in enumerate(answer.found[0].covariance.names)}  # fmt: skip
+        out[key] = {
+            name: [float(value) if np.isfinite(value) else None for value in values[:, i]]
+            for i, name in enumerate(answer.found[0].covariance.names)
+        }
     return out
 
 
@@ -177,14 +209,18 @@ def _table(answer: Answer, own: StatisticallyLinear, speed: float) -> list[str]:
     lines = [f"  at {speed:g} m/s"]
     for name, spring in own.springs.items():
         k, c = spring.gains
-        lines.append(f"    {name}: {k:.5g} N/m and {c:.5g} N s/m stand for it; its travel has the mean "
-                     f"{1e3 * spring.travel:+.2f} mm and the deviation {1e3 * spring.deviation:.3g} mm")  # fmt: skip
+        lines.append(
+            f"    {name}: {k:.5g} N/m and {c:.5g} N s/m stand for it; its travel has the mean "
+            f"{1e3 * spring.travel:+.2f} mm and the deviation {1e3 * spring.deviation:.3g} mm"
+        )
     if not answer.lifts:
         lines += [f"    {sentence}" for sentence in own.sentences]
     lines.append(f"    gains found in {len(own.changes)} iterations, to {own.distance:.0e}")
     for beside, copies in answer.copies.items():
-        lines.append(f"  at {beside:g} m/s beside {len(copies.moments[0])} copies of {copies.duration:.0f} s: "
-                     "deviations and means, kurtosis (3 if Gaussian)")  # fmt: skip
+        lines.append(
+            f"  at {beside:g} m/s beside {len(copies.moments[0])} copies of {copies.duration:.0f} s: "
+            "deviations and means, kurtosis (3 if Gaussian)"
+        )
         width = max(map(len, copies.names))
         for i, name in enumerate(copies.names):
             deviation = f"{copies.deviation[i]:>10.4g} ± {50 * copies.error[i] / copies.variance[i]:.1f} %"
@@ -212,17 +248,23 @@ def _lifted(vehicle: SpatialVehicle, answer: Answer, runs: dict[str, Ride]) -> l
     if not vehicle.lifts:
         return []
     loads = preloads(vehicle).tyres
-    lines = ["  tyres lift in copies and engines; small motion and statistical linearisation keep them on the road and "
-             "are no answer where a tyre would pull"]  # fmt: skip
+    lines = [
+        "  tyres lift in copies and engines; small motion and statistical linearisation keep them on the road and "
+        "are no answer where a tyre would pull"
+    ]
     for spec in (spec for spec in vehicle.outputs if isinstance(spec, TyreOutput) and spec.kind == "tyre force"):
-        shares = [f"{engine} {100 * np.mean(run.of(spec.name) <= -loads[spec.tyre]):.2g} %"
-                  for engine, run in runs.items()]  # fmt: skip
-        worst = max(float(deviation[answer.found[0].covariance.names.index(spec.name)])
-                    for deviation in answer.deviation)  # fmt: skip
+        shares = [
+            f"{engine} {100 * np.mean(run.of(spec.name) <= -loads[spec.tyre]):.2g} %" for engine, run in runs.items()
+        ]
+        worst = max(
+            float(deviation[answer.found[0].covariance.names.index(spec.name)]) for deviation in answer.deviation
+        )
         pulls = float(ndtr(-loads[spec.tyre] / worst))
         told = f"; in the air {', '.join(shares)}" if shares else ""
-        lines.append(f"    {spec.name}: {loads[spec.tyre]:.4g} N at rest; on the road it would pull for up to "
-                     f"{100 * pulls:.2g} % of the time{told}")  # fmt: skip
+        lines.append(
+            f"    {spec.name}: {loads[spec.tyre]:.4g} N at rest; on the road it would pull for up to "
+            f"{100 * pulls:.2g} % of the time{told}"
+        )
     return lines
 
 
@@ -239,8 +281,9 @@ def _time_table(runs: dict[str, Ride], own: StatisticallyLinear, road: Excitatio
             value = run.outputs[:, i].std()
             if np.isfinite(value):
                 off = 100 * (value / own.covariance.deviation[i] - 1)
-                lines.append(f"    {engine:<8} {name}: {value:.4g}, {off:+.1f} % (one path scatters by "
-                             f"{100 * errors[i]:.1f} %)")  # fmt: skip
+                lines.append(
+                    f"    {engine:<8} {name}: {value:.4g}, {off:+.1f} % (one path scatters by {100 * errors[i]:.1f} %)"
+                )
     for engine, run in list(runs.items())[1:]:
         gap = np.abs(run.run.positions - first.run.positions).max()
         lines.append(f"    {engine} and {next(iter(runs))}: positions within {gap:.1e} m or rad on the same road")

@@ -141,9 +141,12 @@ def row(engine: str, name: str, measured: Result, run: Result) -> dict[str, Any]
 
 
 PUBLISHED = {
-    "undisturbed": "about 30 s", "noisy 1": "about 10 s", "perturbed": "about 10 s",
-    "guided, undisturbed": "about 70 N m", "guided, both": "+-800 N m; inertia term about 15 kN m",
-}  # fmt: skip
+    "undisturbed": "about 30 s",
+    "noisy 1": "about 10 s",
+    "perturbed": "about 10 s",
+    "guided, undisturbed": "about 70 N m",
+    "guided, both": "+-800 N m; inertia term about 15 kN m",
+}
 """What the paper prints. Its "85 kN m" cannot be: |I beta''| <= b|f3| + a|f4|, and 5 % of it is the moment."""
 
 
@@ -158,18 +161,23 @@ def text(found: list[dict[str, Any]], engines: tuple[str, ...], options: Options
         for name, lines in by_run.items()
         if "moment max" not in lines[0]
     ]
-    guided = [f"  {name:<20} {_cells(lines, _moment)}   {lines[0]['moment rms']:>9.1f}   "
-              f"{lines[0]['inertia max'] / 1e3:>9.1f}   {PUBLISHED.get(name, '')}".rstrip()
-              for name, lines in by_run.items() if "moment max" in lines[0]]  # fmt: skip
+    guided = [
+        f"  {name:<20} {_cells(lines, _moment)}   {lines[0]['moment rms']:>9.1f}   "
+        f"{lines[0]['inertia max'] / 1e3:>9.1f}   {PUBLISHED.get(name, '')}".rstrip()
+        for name, lines in by_run.items()
+        if "moment max" in lines[0]
+    ]
     return [
         f"  Sampled at {options.sampling_rate:g} Hz, linear in between; noise {deviation:.1f} N.",
         f"  Time [s] until the pitch is {DRIFT} rad wrong",
-        f"  {'force-excited':<20} {names}   heave [m]   paper", *free,
+        f"  {'force-excited':<20} {names}   heave [m]   paper",
+        *free,
         "  Largest enforced moment [N m]",
-        f"  {'pitch prescribed':<20} {names}   rms [N m]   I b'' [kN m]   paper", *guided,
+        f"  {'pitch prescribed':<20} {names}   rms [N m]   I b'' [kN m]   paper",
+        *guided,
         "  rms and I b'' (largest) are those of the first column; generalised-alpha's moment errs by some "
         "1e-3 of I b'' at 1 ms on this road",
-    ]  # fmt: skip
+    ]
 
 
 def _cells(lines: list[dict[str, Any]], form: Callable[[dict[str, Any]], str]) -> str:
@@ -200,10 +208,7 @@ def _figures(measured: Result, runs: dict[str, Result], folder: Path) -> None:
         "perturbed model": runs["perturbed"],
         "both": runs["both"],
     }
-    save(
-        _figure_drift(main, "Force-excited runs beside the measurement"),
-        folder / "fig5_drift.png",
-    )
+    save(_figure_drift(main, "Force-excited runs beside the measurement"), folder / "fig5_drift.png")
     for prefix, title, name in (
         ("noisy", "noise samples", "fig6_noise_samples"),
         ("model", "perturbed models", "fig7_perturbed_models"),

@@ -33,8 +33,10 @@ def decision(rows: list[Row], limits: Limits, grade: float | None) -> Any:
     _panel(axes[0], DAMAGE, "pseudo-damage of the section forces,\nin the chassis' frame, by the true one", right)
     _panel(axes[1], PITCH, "largest pitch error [rad]\n(dotted: tumbled)", (PITCH[0], limits.pitch_error))
     _panel(axes[2], SHARE, f"artificial moment by I pitch'',\nrms to {BAND:g} Hz", (SHARE[0], limits.artificial_share))
-    axes[0].set_xscale("function", functions=(lambda x: np.arcsinh(np.log(np.maximum(x, 1e-12)) / SHARP),
-                                              lambda u: np.exp(SHARP * np.sinh(u))))  # fmt: skip
+    axes[0].set_xscale(
+        "function",
+        functions=(lambda x: np.arcsinh(np.log(np.maximum(x, 1e-12)) / SHARP), lambda u: np.exp(SHARP * np.sinh(u))),
+    )
     axes[0].set_xlim(*DAMAGE)
     axes[0].set_xticks(TICKS, [f"{tick:g}" for tick in TICKS], fontsize=8)
     axes[0].minorticks_off()
@@ -43,8 +45,12 @@ def decision(rows: list[Row], limits: Limits, grade: float | None) -> Any:
     axes[0].set_ylim(len(methods) - 0.5, -0.5)
     _verdicts(axes[3], rows, methods)
     _legend(figure, grade)
-    figure.suptitle("Which stabiliser leaves the section forces right: perturbed model, noisy wheel forces "
-                    f"({rows[0]['engine']})", x=0.01, ha="left", fontweight="bold")  # fmt: skip
+    figure.suptitle(
+        f"Which stabiliser leaves the section forces right: perturbed model, noisy wheel forces ({rows[0]['engine']})",
+        x=0.01,
+        ha="left",
+        fontweight="bold",
+    )
     return figure
 
 
@@ -57,8 +63,15 @@ def _marks(axes: Any, row: Row, line: int) -> None:
             place = np.clip(row[f"damage {channel}"], *DAMAGE)
             axes[0].plot(place, y, mark, color=colour, markersize=4.5, clip_on=False, alpha=0.8)
     if row["damage f3x"] is None:
-        axes[0].text(1.0, y, f"tumbled; its vertical f3 says {row['vertical damage f3']:.2f}", color=colour,
-                     fontsize=7.5, ha="center", va="center")  # fmt: skip
+        axes[0].text(
+            1.0,
+            y,
+            f"tumbled; its vertical f3 says {row['vertical damage f3']:.2f}",
+            color=colour,
+            fontsize=7.5,
+            ha="center",
+            va="center",
+        )
     axes[1].plot(np.clip(row["pitch error max [rad]"], *PITCH), y, "o", color=colour, markersize=5, clip_on=False)
     axes[2].plot(np.clip(row["moment share to 15 Hz"], *SHARE), y, "o", color=colour, markersize=5, clip_on=False)
 
@@ -83,8 +96,15 @@ def _verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
     for row in rows:
         for key in ("verdict", "without truth"):
             word = row[key]
-            axis.text(places[row["road"], key], methods.index(row["method"]), word, color=WORDS[word], va="center",
-                      fontsize=8.5, fontweight="bold" if word == "accepted" else "normal")  # fmt: skip
+            axis.text(
+                places[row["road"], key],
+                methods.index(row["method"]),
+                word,
+                color=WORDS[word],
+                va="center",
+                fontsize=8.5,
+                fontweight="bold" if word == "accepted" else "normal",
+            )
     free = next(row["seconds"] for row in rows if row["method"] == "free")
     axis.text(9.5, -0.75, "cost,\nx free", fontsize=8, va="bottom")
     for row in rows:
@@ -94,11 +114,16 @@ def _verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
 
 def _legend(figure: Any, grade: float | None) -> None:
     """Marks and roads, below."""
-    marks = [plt.Line2D([], [], marker=mark, linestyle="", color="#555555", markersize=5, label=NAMES[channel])
-             for channel, mark in MARKS.items()]  # fmt: skip
+    marks = [
+        plt.Line2D([], [], marker=mark, linestyle="", color="#555555", markersize=5, label=NAMES[channel])
+        for channel, mark in MARKS.items()
+    ]
     words = {"road": "on the road as it is", "grade": f"on the same road with a grade of {grade or 0:g} rad"}
-    roads = [plt.Line2D([], [], marker="o", linestyle="", color=ROADS[road][1], label=word)
-             for road, word in words.items() if road == "road" or grade is not None]  # fmt: skip
+    roads = [
+        plt.Line2D([], [], marker="o", linestyle="", color=ROADS[road][1], label=word)
+        for road, word in words.items()
+        if road == "road" or grade is not None
+    ]
     good = plt.Rectangle((0, 0), 1, 1, color="#00795a", alpha=0.16, label="within the limits")
     figure.legend(handles=[*marks, *roads, good], loc="outside lower center", ncols=7, fontsize=8.5)
 
@@ -120,20 +145,28 @@ def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: f
     low = limits.pitch_error / 2
     axes[0].set_ylim(low, 3.0)
     axes[0].axhspan(low, limits.pitch_error, color="#00795a", alpha=0.16, linewidth=0, label="allowed")
-    axes[1].axhspan(1 - limits.damage_error, 1 + limits.damage_error, color="#00795a", alpha=0.3, linewidth=0,
-                    label="allowed")  # fmt: skip
+    axes[1].axhspan(
+        1 - limits.damage_error, 1 + limits.damage_error, color="#00795a", alpha=0.3, linewidth=0, label="allowed"
+    )
     axes[1].set_ylim(top=1.5 * DAMAGE[1])
     axes[0].set_title("largest pitch error [rad]")
     axes[1].set_title("damage ratio of the worst section force")
     for axis in axes:
         axis.axvline(level.holding, color="#555555", linewidth=0.8, linestyle="--", label="predicted to hold from here")
         axis.set_xlabel("stiffness of the spring to the ground [N m/rad]")
-        turning = (lambda k: np.sqrt(np.maximum(k, 0.0) / level.resisting) / (2 * math.pi),
-                   lambda f: level.resisting * (2 * math.pi * f) ** 2)  # fmt: skip
+        turning = (
+            lambda k: np.sqrt(np.maximum(k, 0.0) / level.resisting) / (2 * math.pi),
+            lambda f: level.resisting * (2 * math.pi * f) ** 2,
+        )
         above = axis.secondary_xaxis("top", functions=turning)
         above.set_xlabel("cut-off of the high-pass that is the same thing [Hz]", fontsize=8.5)
         axis.legend(fontsize=8)
-    figure.suptitle(f"Keeping the pitch near zero: no stiffness is right, least of all on a grade of {grade or 0:g} rad"
-                    if grade is not None else "Keeping the pitch near zero: what the stiffness does",
-                    x=0.01, ha="left", fontweight="bold")  # fmt: skip
+    figure.suptitle(
+        f"Keeping the pitch near zero: no stiffness is right, least of all on a grade of {grade or 0:g} rad"
+        if grade is not None
+        else "Keeping the pitch near zero: what the stiffness does",
+        x=0.01,
+        ha="left",
+        fontweight="bold",
+    )
     return figure

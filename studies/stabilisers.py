@@ -43,15 +43,7 @@ from models.strict import Strict, quantity, read
 from models.time_series import write_time_series
 from models.vehicles.pitch_plane import Parameters
 from models.whole_files import whole_file, write_whole
-from studies.virtual_measurement import (
-    PAPER,
-    check_road,
-    check_steps,
-    follower,
-    measure,
-    stride,
-    write_measurement,
-)
+from studies.virtual_measurement import PAPER, check_road, check_steps, follower, measure, stride, write_measurement
 
 Progress = Callable[[str, float], None]
 Row = dict[str, Any]
@@ -73,10 +65,12 @@ class Options(Strict):
     stiffnesses: list[float] = Field([50.0, 100.0, 300.0, 1e4], min_length=1, description="springs, N m/rad")
     dead_band: float = quantity("rad", "half width of the dead band of the stiffest spring", default=0.05)
     cut_offs: list[float] = Field([0.1, 0.5], description="high-pass filters, Hz")
-    sweep: list[float] = Field(np.geomspace(30.0, 3e5, 9).tolist(), min_length=1,
-                               description="springs of the second figure, N m/rad")  # fmt: skip
-    grade: float | None = Field(None, gt=-0.5, lt=0.5, description="slope angle of the second road",
-                                json_schema_extra={"unit": "rad"})  # fmt: skip
+    sweep: list[float] = Field(
+        np.geomspace(30.0, 3e5, 9).tolist(), min_length=1, description="springs of the second figure, N m/rad"
+    )
+    grade: float | None = Field(
+        None, gt=-0.5, lt=0.5, description="slope angle of the second road", json_schema_extra={"unit": "rad"}
+    )
     slope: float = quantity("", "Woehler exponent", default=SLOPE)
     limits: Limits = Limits()
 
@@ -103,8 +97,14 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     own = [row for row in rows if row["engine"] == engines[0]]
     save(decision(own, options.limits, options.grade), folder / "decide.png")
     save(stiffness(sweep, benches[0], options.limits, options.grade), folder / "stiffness.png")
-    return {"scene": scene.title, "folder": str(folder), "rows": rows, "failed": failed, "table": table,
-            "sweep": {road: found.tolist() for road, found in sweep.items()}}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "rows": rows,
+        "failed": failed,
+        "table": table,
+        "sweep": {road: found.tolist() for road, found in sweep.items()},
+    }
 
 
 def check(scene: Scene, engines: tuple[str, ...]) -> None:
@@ -113,8 +113,12 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
     check_road(scene, engines, options.sampling_rate)
     check_steps(scene, engines)
     if scene.run.step > COARSEST or scene.run.duration < LEAST * scene.run.step:
-        raise InputError(scene.file, "run", f"{scene.run.duration:g} s by {scene.run.step:g} s",
-                         f"the score takes {LEAST} steps or more, of {COARSEST:g} s or less")
+        raise InputError(
+            scene.file,
+            "run",
+            f"{scene.run.duration:g} s by {scene.run.step:g} s",
+            f"the score takes {LEAST} steps or more, of {COARSEST:g} s or less",
+        )
     for name, factor in options.factors.items():
         if name not in Parameters.model_fields:
             allowed = "not a parameter of the vehicle"
@@ -247,22 +251,31 @@ class Bench:
         limits = self.options.limits
         own, wrong = own_figures(run, self.parameters), errors(run, self.truth, self.options.slope)
         with_truth = verdict(own, wrong, effects, limits)
-        alone = blind_verdict(own, effects, float(run.times[-1]), limits, self.trusted,
-                              consistent(run), uncertainty(run))
+        alone = blind_verdict(
+            own, effects, float(run.times[-1]), limits, self.trusted, consistent(run), uncertainty(run)
+        )
         loads = {f"damage {channel}": wrong.damage[channel] for channel in CHANNELS}
         loads |= {f"error {channel} [N]": wrong.force_rms[channel] for channel in CHANNELS}
         return {
             "method": name,
             **(dict.fromkeys(loads) if own.pitch_max > TUMBLED else loads),
-            "vertical damage f3": wrong.vertical_damage["f3"], "vertical damage f4": wrong.vertical_damage["f4"],
-            "pitch error max [rad]": wrong.pitch_max, "pitch error rms [rad]": wrong.pitch_rms,
-            "heave error max [m]": wrong.heave_max, "moment rms [N m]": own.moment_rms,
-            "moment max [N m]": own.moment_max, "moment share": own.moment_share,
-            "moment share to 15 Hz": own.moment_share_band, "force share to 15 Hz": own.force_share_band,
-            "force calls": own.force_calls, "steps": own.steps,
-            "verdict": with_truth.word, "reason": with_truth.reason,
-            "without truth": alone.word, "reason without truth": alone.reason,
-        }  # fmt: skip
+            "vertical damage f3": wrong.vertical_damage["f3"],
+            "vertical damage f4": wrong.vertical_damage["f4"],
+            "pitch error max [rad]": wrong.pitch_max,
+            "pitch error rms [rad]": wrong.pitch_rms,
+            "heave error max [m]": wrong.heave_max,
+            "moment rms [N m]": own.moment_rms,
+            "moment max [N m]": own.moment_max,
+            "moment share": own.moment_share,
+            "moment share to 15 Hz": own.moment_share_band,
+            "force share to 15 Hz": own.force_share_band,
+            "force calls": own.force_calls,
+            "steps": own.steps,
+            "verdict": with_truth.word,
+            "reason": with_truth.reason,
+            "without truth": alone.word,
+            "reason without truth": alone.reason,
+        }
 
     def sweep(self) -> np.ndarray:
         """(n, 4): stiffness, largest pitch error of the spring, of the high-pass, worst damage ratio of the spring."""
@@ -291,17 +304,24 @@ def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
         bench = next(bench for bench in benches if bench.road == road)
         where = "the road" if road == "road" else f"a grade of {options.grade:g} rad"
         free = next(row["seconds"] for row in own if row["method"] == "free")
-        lines += ["", f"  {engine} on {where}: force noise {bench.deviation:.1f} N; predicted beforehand: a free run "
-                  f"can be trusted for {bench.trusted:.1f} s, springs hold from {bench.holding:.0f} N m/rad on"]
+        lines += [
+            "",
+            f"  {engine} on {where}: force noise {bench.deviation:.1f} N; predicted beforehand: a free run "
+            f"can be trusted for {bench.trusted:.1f} s, springs hold from {bench.holding:.0f} N m/rad on",
+        ]
         lines += [HEADS, UNITS]
         lines += [_line(row, free) for row in own]
     return lines
 
 
-HEADS = (f"  {'':<25}{'damage ratio':^28}{'vertical':>9}{'pitch error':>16}{'artificial moment':>21}{'cost':>8}"
-         f"{'verdict':>11}{'without':>11}")  # fmt: skip
-UNITS = (f"  {'method':<25}{'f3x':>7}{'f3z':>7}{'f4x':>7}{'f4z':>7}{'f3':>9}{'max':>9}{'rms':>7}"
-         f"{'rms':>7}{'max N m':>8}{'share':>6}{'x free*':>8}{'':>11}{'truth':>11}")  # fmt: skip
+HEADS = (
+    f"  {'':<25}{'damage ratio':^28}{'vertical':>9}{'pitch error':>16}{'artificial moment':>21}{'cost':>8}"
+    f"{'verdict':>11}{'without':>11}"
+)
+UNITS = (
+    f"  {'method':<25}{'f3x':>7}{'f3z':>7}{'f4x':>7}{'f4z':>7}{'f3':>9}{'max':>9}{'rms':>7}"
+    f"{'rms':>7}{'max N m':>8}{'share':>6}{'x free*':>8}{'':>11}{'truth':>11}"
+)
 
 
 def _line(row: Row, free: float) -> str:

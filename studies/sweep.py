@@ -88,9 +88,14 @@ class Points:
         """Everything that the points depend on: the scene as written, the files that it names, the code."""
         path = scene_path(self.scene)
         table = changed(path, self.changes)
-        return {"sweep": self.key, "values": list(self.values), "engine": self.engine, "scene": table,
-                "files": named_files([table, self.values, self.engine], path.parent),
-                "code of studies": code(Path(__file__).parent)}  # fmt: skip
+        return {
+            "sweep": self.key,
+            "values": list(self.values),
+            "engine": self.engine,
+            "scene": table,
+            "files": named_files([table, self.values, self.engine], path.parent),
+            "code of studies": code(Path(__file__).parent),
+        }
 
 
 def _array(records: list[Record]) -> Arrays:
@@ -182,12 +187,19 @@ def run(job: Points, progress: Callable[[str, float], None]) -> dict[str, Any]:
         failures = [record["failed"] for record in found]
         _save(job, columns, failures)
         pages = draw(job, columns, failures)
-    reasons = {f"{job.key}={value}{f', {who}' if who else ''}": reason
-               for value, failed in zip(job.values, failures, strict=True)
-               for who, reason in failed.items()}  # fmt: skip
-    return {"scene": f"{scene_path(job.scene).stem} over {job.key}, {len(job.values)} points", "failed": reasons,
-            "folder": str(job.folder), "values": list(job.values), "numbers": columns,
-            "table": _table(columns, pages)}  # fmt: skip
+    reasons = {
+        f"{job.key}={value}{f', {who}' if who else ''}": reason
+        for value, failed in zip(job.values, failures, strict=True)
+        for who, reason in failed.items()
+    }
+    return {
+        "scene": f"{scene_path(job.scene).stem} over {job.key}, {len(job.values)} points",
+        "failed": reasons,
+        "folder": str(job.folder),
+        "values": list(job.values),
+        "numbers": columns,
+        "table": _table(columns, pages),
+    }
 
 
 def _records(job: Points, progress: Callable[[str, float], None]) -> list[Record]:
@@ -222,9 +234,12 @@ def _save(job: Points, columns: dict[str, list[Any]], failures: list[dict[str, s
 
 def _table(columns: dict[str, list[Any]], pages: list[str]) -> list[str]:
     """The first quantities that change, from their least to their largest value."""
-    moving = {name: own for name, column in columns.items()
-              if len(set(own := [v for v in column if v is not None])) > 1}  # fmt: skip
-    lines = [f"    {name:<58} {own[0]:>12.5g} at first {own[-1]:>12.5g} at last {min(own):>12.5g} to {max(own):.5g}"
-             for name, own in list(moving.items())[:12]]  # fmt: skip
+    moving = {
+        name: own for name, column in columns.items() if len(set(own := [v for v in column if v is not None])) > 1
+    }
+    lines = [
+        f"    {name:<58} {own[0]:>12.5g} at first {own[-1]:>12.5g} at last {min(own):>12.5g} to {max(own):.5g}"
+        for name, own in list(moving.items())[:12]
+    ]
     rest = f", {len(moving) - 12} more of them" if len(moving) > 12 else ""
     return [*lines, f"  {len(moving)} of {len(columns)} numbers change{rest}: sweep.csv, {', '.join(pages)}"]

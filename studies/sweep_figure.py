@@ -44,8 +44,9 @@ def _moves(column: list[Any]) -> bool:
     return len({value for value in column if value is not None}) > 1
 
 
-def _page(job: "Points", panels: list[tuple[str, dict[str, list[Any]]]], failures: list[dict[str, str]], name: str,
-          note: str) -> None:  # fmt: skip
+def _page(
+    job: "Points", panels: list[tuple[str, dict[str, list[Any]]]], failures: list[dict[str, str]], name: str, note: str
+) -> None:
     down = -(-len(panels) // ACROSS)
     figure, axes = plt.subplots(down, min(ACROSS, len(panels)), figsize=(12, 2.6 * down + 0.9), squeeze=False)
     at, ticks = _places(job.values)
@@ -58,8 +59,9 @@ def _page(job: "Points", panels: list[tuple[str, dict[str, list[Any]]]], failure
         axis.set_xlabel(job.key)
     for axis in axes.flat[len(panels) :]:
         axis.set_visible(False)
-    handles = {label: handle for axis in axes.flat
-               for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}  # fmt: skip
+    handles = {
+        label: handle for axis in axes.flat for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
+    }
     figure.legend(handles.values(), handles.keys(), loc="outside upper right", ncols=max(1, len(handles)))
     figure.suptitle(f"{job.scene.rpartition('/')[2]} over {job.key}: {note}", x=0.01, ha="left", fontweight="bold")
     save(figure, job.folder / name)
@@ -72,21 +74,38 @@ def _places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
     return np.arange(float(len(values))), [str(value)[:18] for value in values]
 
 
-def _panel(axis: Any, at: np.ndarray, what: str, curves: dict[str, list[Any]], failures: list[dict[str, str]],
-           style: str) -> None:  # fmt: skip
+def _panel(
+    axis: Any, at: np.ndarray, what: str, curves: dict[str, list[Any]], failures: list[dict[str, str]], style: str
+) -> None:
     order = np.argsort(at)
     for i, (engine, column) in enumerate(curves.items()):
         values = np.array([np.nan if value is None else float(value) for value in column])
-        axis.plot(at[order], values[order], style, color=COLOURS.get(engine, "#0072b2"), markersize=3.5,
-                  linewidth=2.2 - 0.6 * min(i, 2), label=LABELS.get(engine, engine) or None)  # fmt: skip
+        axis.plot(
+            at[order],
+            values[order],
+            style,
+            color=COLOURS.get(engine, "#0072b2"),
+            markersize=3.5,
+            linewidth=2.2 - 0.6 * min(i, 2),
+            label=LABELS.get(engine, engine) or None,
+        )
     if all(_spread(np.array([v for v in column if v is not None], float)) for column in curves.values()):
         axis.set_yscale("log")
     else:
         axis.ticklabel_format(axis="y", useOffset=False)
     lost = [i for i, failed in enumerate(failures) if failed and any(column[i] is None for column in curves.values())]
     if lost:
-        axis.plot(at[lost], np.full(len(lost), 0.04), "x", transform=axis.get_xaxis_transform(), color="#cc0000",
-                  markersize=8, markeredgewidth=2, clip_on=False, label="failed")  # fmt: skip
+        axis.plot(
+            at[lost],
+            np.full(len(lost), 0.04),
+            "x",
+            transform=axis.get_xaxis_transform(),
+            color="#cc0000",
+            markersize=8,
+            markeredgewidth=2,
+            clip_on=False,
+            label="failed",
+        )
     axis.set_title(_title(what), fontsize=9)
 
 

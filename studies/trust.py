@@ -57,8 +57,12 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     assembly = assemble(base)
     other = assembly.parameters.model_copy(update={"I": assembly.parameters.I * (1 - options.inertia_error)})
     progress("predictions", 0.1)
-    curves = {"noise": noise(assembly, deviation), "interpolation": interpolation(assembly),
-              "inertia": model(assembly, other), "rounding": rounding(assembly)}  # fmt: skip
+    curves = {
+        "noise": noise(assembly, deviation),
+        "interpolation": interpolation(assembly),
+        "inertia": model(assembly, other),
+        "rounding": rounding(assembly),
+    }
     runs = {}
     if truth is not None:
         progress("runs", 0.2)
@@ -85,11 +89,19 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
         check_road(scene, engines, options.sampling_rate)
         return
     if set(scene.effects) != {"wheel_forces"}:
-        raise InputError(scene.file, "effects", sorted(scene.effects), "this study takes a road or wheel forces alone, "
-                         "and names noise itself")
+        raise InputError(
+            scene.file,
+            "effects",
+            sorted(scene.effects),
+            "this study takes a road or wheel forces alone, and names noise itself",
+        )
     if options.sampling_rate is not None:
-        raise InputError(scene.file, "options.sampling_rate", options.sampling_rate, "the file of wheel forces has its "
-                         "own: drop this key")
+        raise InputError(
+            scene.file,
+            "options.sampling_rate",
+            options.sampling_rate,
+            "the file of wheel forces has its own: drop this key",
+        )
 
 
 def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, np.ndarray | None, float]:
@@ -126,16 +138,24 @@ def _ensemble(base: Scene, deviation: float, options: Options, engine: str) -> d
     true = quiet["pitch"]
     rows = np.arange(0, len(true), every)
     found = run_paths(noise_paths(scene, quiet.times[rows], true, options.angle, engine), options.paths)
-    return {"times": quiet.times[rows], "drift_off": found["drift_off"],
-            "errors": np.abs(found["states"][:, :, 3] - true[rows])}  # fmt: skip
+    return {
+        "times": quiet.times[rows],
+        "drift_off": found["drift_off"],
+        "errors": np.abs(found["states"][:, :, 3] - true[rows]),
+    }
 
 
-NAMES = {"noise": "noise on the samples", "interpolation": "interpolation between them", "inertia": "a wrong inertia",
-         "rounding": "rounding"}  # fmt: skip
+NAMES = {
+    "noise": "noise on the samples",
+    "interpolation": "interpolation between them",
+    "inertia": "a wrong inertia",
+    "rounding": "rounding",
+}
 
 
-def _rows(curves: dict[str, Curve], runs: dict[str, Curve], spread: dict[str, np.ndarray],
-          options: Options) -> list[Row]:  # fmt: skip
+def _rows(
+    curves: dict[str, Curve], runs: dict[str, Curve], spread: dict[str, np.ndarray], options: Options
+) -> list[Row]:
     """Predicted and measured drift-off (s) by source; None where it lies beyond the run."""
     rows = []
     for name, curve in curves.items():
@@ -154,15 +174,21 @@ def _finite(time: float) -> float | None:
     return time if math.isfinite(time) else None
 
 
-def _text(rows: list[Row], options: Options, deviation: float, rate: float, base: Scene,
-          curves: dict[str, Curve]) -> list[str]:  # fmt: skip
+def _text(
+    rows: list[Row], options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, Curve]
+) -> list[str]:
     """The table as lines of text, and what a longer run would take."""
-    lines = [f"  pitch {options.angle:g} rad off after [s]     predicted   measured",
-             *(f"  {NAMES[row['source']]:<28} {_when(row['predicted']):>14} {_measured(row):>10}" for row in rows)]
+    lines = [
+        f"  pitch {options.angle:g} rad off after [s]     predicted   measured",
+        *(f"  {NAMES[row['source']]:<28} {_when(row['predicted']):>14} {_measured(row):>10}" for row in rows),
+    ]
     limits = [row["predicted"] for row in rows if row["predicted"] is not None]
     until = f"until about {min(limits):.3g} s" if limits else "to its end"
-    lines.append(f"  trusted {until}; a tilt error grows by e in {1 / rate:.2g} s (growth rate {rate:.3g} 1/s)" if rate
-                 else f"  trusted {until}; a tilt error does not grow exponentially")  # fmt: skip
+    lines.append(
+        f"  trusted {until}; a tilt error grows by e in {1 / rate:.2g} s (growth rate {rate:.3g} 1/s)"
+        if rate
+        else f"  trusted {until}; a tilt error does not grow exponentially"
+    )
     return lines + _remedies(options, deviation, rate, base, curves)
 
 
@@ -187,11 +213,13 @@ def _remedies(options: Options, deviation: float, rate: float, base: Scene, curv
     for name in ("noise", "interpolation", "inertia"):
         excess = _excess(curves[name], options, rate)
         order = ORDERS[base.effects["wheel_forces"].interpolation]
-        takes = {"noise": f"noise of {deviation / excess:.2g} N instead of {deviation:.3g} N on each sample",
-                 "interpolation": f"samples at {excess ** (1 / order) / forces.period:.3g} Hz instead of "
-                                  f"{1 / forces.period:g} Hz",
-                 "inertia": f"an inertia known to {100 * options.inertia_error / excess:.2g} % instead of "
-                            f"{100 * options.inertia_error:g} %"}  # fmt: skip
+        takes = {
+            "noise": f"noise of {deviation / excess:.2g} N instead of {deviation:.3g} N on each sample",
+            "interpolation": f"samples at {excess ** (1 / order) / forces.period:.3g} Hz instead of "
+            f"{1 / forces.period:g} Hz",
+            "inertia": f"an inertia known to {100 * options.inertia_error / excess:.2g} % instead of "
+            f"{100 * options.inertia_error:g} %",
+        }
         lines.append(f"    {takes[name]}" if excess > 1 else f"    nothing against {NAMES[name]}")
     return [*lines, "  or a stabiliser: see the effects prescribed_pitch, pitch_spring, kalman_filter"]
 
@@ -209,25 +237,36 @@ def _excess(curve: Curve, options: Options, rate: float) -> float:
     return size / options.angle * math.sqrt(float(longer))
 
 
-def _figure(curves: dict[str, Curve], runs: dict[str, Curve], spread: dict[str, np.ndarray], options: Options,
-            path: Path) -> None:  # fmt: skip
+def _figure(
+    curves: dict[str, Curve], runs: dict[str, Curve], spread: dict[str, np.ndarray], options: Options, path: Path
+) -> None:
     """Error growth on a logarithmic scale: laws dashed, runs drawn through."""
     from studies.figures import plt, save
 
     colours = {"noise": "#0072b2", "interpolation": "#d55e00", "inertia": "#009e73", "rounding": "#888888"}
     figure, axis = plt.subplots(figsize=(8.0, 4.6))
     axis.semilogy(spread["times"], spread["errors"][:20].T, color="#0072b2", alpha=0.15, linewidth=0.6)
-    axis.semilogy(spread["times"], np.median(spread["errors"], axis=0), color="#0072b2",
-                  label="noise: median of the paths (20 of them thin)")  # fmt: skip
+    axis.semilogy(
+        spread["times"],
+        np.median(spread["errors"], axis=0),
+        color="#0072b2",
+        label="noise: median of the paths (20 of them thin)",
+    )
     for name, curve in runs.items():
         axis.semilogy(curve.times[::50], curve.size[::50], color=colours[name], linewidth=0.9, label=f"{name}: run")
     for name, curve in curves.items():
         small = np.where(np.maximum.accumulate(curve.size) < 1.0, curve.size, np.nan)  # no law holds for a tumbling run
-        axis.semilogy(curve.times[::50], small[::50], "--", color=colours[name], linewidth=1.5,
-                      label=f"{name}: predicted")  # fmt: skip
+        axis.semilogy(
+            curve.times[::50], small[::50], "--", color=colours[name], linewidth=1.5, label=f"{name}: predicted"
+        )
     axis.axhline(options.angle, color="black", linewidth=0.8, label=f"not trusted above {options.angle:g} rad")
-    axis.set(xlabel="time [s]", ylabel="pitch error [rad]", ylim=(1e-12, 10), xlim=(0, curves["noise"].times[-1]),
-             title="Growth of the pitch error of a force-excited run by source, predicted and run")  # fmt: skip
+    axis.set(
+        xlabel="time [s]",
+        ylabel="pitch error [rad]",
+        ylim=(1e-12, 10),
+        xlim=(0, curves["noise"].times[-1]),
+        title="Growth of the pitch error of a force-excited run by source, predicted and run",
+    )
     figure.legend(loc="outside lower center", ncols=3, fontsize=8.5)
     save(figure, path)
 

@@ -45,15 +45,19 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     answer = {name: figures(table, options.load) for name, table in tables.items()}
     for name, table in tables.items():
         save_csv(table, options, folder / f"{name.replace('/', '_').replace(' ', '_')}.csv")
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": answer,
-            "table": lines(answer, options.load)}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "answer": answer,
+        "table": lines(answer, options.load),
+    }
 
 
 def tables_of(scene: BrakingScene) -> dict[str, TyreTable]:
     """Tables by name of all surfaces under all procedures, a rear tyre of its own beside the front one."""
     names = dict.fromkeys(name for procedure in scene.procedures.values() for name in surfaces_of(scene, procedure))
-    return {f"{name}/rear" if rear else name: table_of(scene, name, rear)
-            for name in names for rear in kinds_of(scene)}  # fmt: skip
+    return {f"{name}/rear" if rear else name: table_of(scene, name, rear) for name in names for rear in kinds_of(scene)}
 
 
 def figures(table: TyreTable, load: float) -> dict[str, float]:
@@ -61,11 +65,14 @@ def figures(table: TyreTable, load: float) -> dict[str, float]:
     x, y = table.friction(table.angles, table.slips, load)
     little_slip, little_angle = table.slips[1], table.angles[min(1, table.angles.size - 1)]
     return {
-        "peak along": float(x[0].max()), "at slip [%]": 100.0 * float(table.slips[x[0].argmax()]),
-        "locked": float(x[0, -1]), "slope [1/%]": 0.01 * float(x[0, 1] / little_slip),
-        "peak across": float(y[:, 0].max()), "at slip angle [deg]": float(np.rad2deg(table.angles[y[:, 0].argmax()])),
+        "peak along": float(x[0].max()),
+        "at slip [%]": 100.0 * float(table.slips[x[0].argmax()]),
+        "locked": float(x[0, -1]),
+        "slope [1/%]": 0.01 * float(x[0, 1] / little_slip),
+        "peak across": float(y[:, 0].max()),
+        "at slip angle [deg]": float(np.rad2deg(table.angles[y[:, 0].argmax()])),
         "slope [1/deg]": float(y[:, 0][min(1, len(y) - 1)] / np.rad2deg(little_angle)) if little_angle else 0.0,
-    }  # fmt: skip
+    }
 
 
 def lines(answer: dict[str, dict[str, float]], load: float) -> list[str]:
@@ -81,8 +88,9 @@ def save_csv(table: TyreTable, options: Options, path: Path) -> None:
     angles = np.unique([0.0, *options.slip_angles])
     x, y = table.friction(np.deg2rad(angles), table.slips, options.load)
     angle, slip = (axis.ravel() for axis in np.meshgrid(angles, table.slips, indexing="ij"))
-    write_table(path, {"slip angle": ("deg", angle), "slip": ("-", slip), "mu_x": ("-", x.ravel()),
-                       "mu_y": ("-", y.ravel())})  # fmt: skip
+    write_table(
+        path, {"slip angle": ("deg", angle), "slip": ("-", slip), "mu_x": ("-", x.ravel()), "mu_y": ("-", y.ravel())}
+    )
 
 
 if __name__ == "__main__":

@@ -12,8 +12,7 @@ SLIPS = np.linspace(0.0, 1.0, 1001)
 COLOURS = plt.get_cmap("viridis")
 
 
-def tyre_figure(tables: Mapping[str, TyreTable], angles: Sequence[float], load: float, title: str,
-                path: Path) -> None:  # fmt: skip
+def tyre_figure(tables: Mapping[str, TyreTable], angles: Sequence[float], load: float, title: str, path: Path) -> None:
     """A row per table: mu_x and mu_y over slip at slip angles (deg), and both of them beside each other; load in N."""
     figure, axes = plt.subplots(len(tables), 3, figsize=(12, 3.4 * len(tables)), squeeze=False)
     for row, (name, table) in zip(axes, tables.items(), strict=True):
@@ -26,9 +25,20 @@ def tyre_figure(tables: Mapping[str, TyreTable], angles: Sequence[float], load: 
             row[2].plot(x[i], y[i], color=colour)
         row[0].set(xlabel="slip", ylabel="$\\mu_x$", ylim=(0, top), title=f"{name}: along the wheel")
         row[1].set(xlabel="slip", ylabel="$\\mu_y$", ylim=(0, top), title="across the wheel")
-        row[2].set(xlabel="$\\mu_x$", ylabel="$\\mu_y$", xlim=(0, top), ylim=(0, top), aspect="equal",
-                   title="both, from slip 0 to 1")  # fmt: skip
-        row[2].legend(*row[0].get_legend_handles_labels(), title="slip angle [deg]", fontsize=7.5, loc="center left",
-                      bbox_to_anchor=(1.0, 0.5))  # fmt: skip
+        row[2].set(
+            xlabel="$\\mu_x$",
+            ylabel="$\\mu_y$",
+            xlim=(0, top),
+            ylim=(0, top),
+            aspect="equal",
+            title="both, from slip 0 to 1",
+        )
+        row[2].legend(
+            *row[0].get_legend_handles_labels(),
+            title="slip angle [deg]",
+            fontsize=7.5,
+            loc="center left",
+            bbox_to_anchor=(1.0, 0.5),
+        )
     figure.suptitle(f"{title}: friction under {load / 1e3:.4g} kN", fontsize=11)
     save(figure, path)

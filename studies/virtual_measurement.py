@@ -36,13 +36,21 @@ def check_road(scene: Scene, engines: tuple[str, ...], sampling_rate: float) -> 
     """Refuse a scene that is no virtual measurement, or that cannot be followed through all runs on its files."""
     for name in scene.effects:
         if name not in MEASURING:
-            raise InputError(scene.file, f"effects.{name}", None, "this study measures on a road and names the effects "
-                             "of the other runs itself: drop it")
+            raise InputError(
+                scene.file,
+                f"effects.{name}",
+                None,
+                "this study measures on a road and names the effects of the other runs itself: drop it",
+            )
     if "road" not in scene.effects:
         raise InputError(scene.file, "effects.road", None, "is missing: this study measures on a road")
     if scene.run.output_step is not None:
-        raise InputError(scene.file, "run.output_step", scene.run.output_step, "this study makes its table from every "
-                         "step, and chooses the rows that it saves: drop this key")
+        raise InputError(
+            scene.file,
+            "run.output_step",
+            scene.run.output_step,
+            "this study makes its table from every step, and chooses the rows that it saves: drop this key",
+        )
     stride(scene, sampling_rate)
     if scene.run.duration * sampling_rate < LEAST:
         allowed = f"must last at least {LEAST} samples, {LEAST / sampling_rate:g} s"
@@ -64,8 +72,13 @@ def check_steps(scene: Scene, engines: tuple[str, ...]) -> None:
     for engine in engines:
         step = scene.settings(engine).step
         if step != scene.run.step:
-            raise InputError(scene.file, f"engines.{engine}.step", step, "this study compares runs row by row with the "
-                             f"measurement, whose step is run.step = {scene.run.step:g} s: drop this key")
+            raise InputError(
+                scene.file,
+                f"engines.{engine}.step",
+                step,
+                "this study compares runs row by row with the "
+                f"measurement, whose step is run.step = {scene.run.step:g} s: drop this key",
+            )
 
 
 def stride(scene: Scene, sampling_rate: float) -> int:

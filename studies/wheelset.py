@@ -23,8 +23,13 @@ from models.rail.wheelset import Wheelset
 SYSTEM = "wheelset"
 Progress = Callable[[str, float], None]
 STATES = {"y": (Y, "m"), "z": (Z, "m"), "roll": (ROLL, "rad"), "yaw": (YAW, "rad"), "spin": (SPIN, "rad/s")}
-CONTACTS = {"normal": (wf.LOAD, "N"), "fx": (wf.FX, "N"), "fy": (wf.FY, "N"), "mz": (wf.MZ, "N m"),
-            "power": (wf.POWER, "W")}  # fmt: skip
+CONTACTS = {
+    "normal": (wf.LOAD, "N"),
+    "fx": (wf.FX, "N"),
+    "fy": (wf.FY, "N"),
+    "mz": (wf.MZ, "N m"),
+    "power": (wf.POWER, "W"),
+}
 """What is saved of every path, with its place and unit."""
 
 
@@ -48,8 +53,13 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     if paths:
         paths_figure(paths, scene.title, folder / "paths.png")
         creep_figure(next(iter(paths.values())), scene.title, folder / "creep.png")
-    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": _answer(wheelset, linear, paths),
-            "table": [*_waves(wheelset, linear), *_stability(wheelset, linear), *_motions(scene, paths)]}  # fmt: skip
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": failed,
+        "answer": _answer(wheelset, linear, paths),
+        "table": [*_waves(wheelset, linear), *_stability(wheelset, linear), *_motions(scene, paths)],
+    }
 
 
 class Linear:
@@ -82,8 +92,7 @@ def path(scene: WheelsetScene, engine: str, speed: float) -> Motion:
     return equations.run(start, scene.run.duration, scene.run.step)
 
 
-def _save(scene: WheelsetScene, linear: dict[str, Linear], paths: dict[str, dict[float, Motion]],
-          folder: Path) -> None:  # fmt: skip
+def _save(scene: WheelsetScene, linear: dict[str, Linear], paths: dict[str, dict[float, Motion]], folder: Path) -> None:
     """Eigenvalues over the speeds and every step of the paths as netCDF; damping and frequency as a table."""
     import xarray as xr
 
@@ -93,8 +102,14 @@ def _save(scene: WheelsetScene, linear: dict[str, Linear], paths: dict[str, dict
     if linear:
         axes = {"engine": list(linear), "speed": next(iter(linear.values())).speeds}
         values = np.array([one.values for one in linear.values()])
-        data = xr.Dataset({name: (("engine", "speed", "eigenvalue"), part, {"units": "1/s"})
-                           for name, part in (("real", values.real), ("imag", values.imag))}, axes, origin)  # fmt: skip
+        data = xr.Dataset(
+            {
+                name: (("engine", "speed", "eigenvalue"), part, {"units": "1/s"})
+                for name, part in (("real", values.real), ("imag", values.imag))
+            },
+            axes,
+            origin,
+        )
         data["speed"].attrs["units"] = "m/s"
         write(data, folder / "eigenvalues.nc")
         _save_table(linear, folder)
@@ -109,10 +124,14 @@ def dataset(paths: dict[str, dict[float, Motion]]) -> Any:
     one = next(iter(paths.values()))
     axes = {"engine": list(paths), "speed": list(one), "time": next(iter(one.values())).times}
     every = [[own[speed] for speed in one] for own in paths.values()]
-    states = {name: (tuple(axes), np.array([[p.states[:, k] for p in row] for row in every]), {"units": unit})
-              for name, (k, unit) in STATES.items()}  # fmt: skip
-    contacts = {name: ((*axes, "patch"), np.array([[p.contacts[:, :, k] for p in row] for row in every]),
-                       {"units": unit}) for name, (k, unit) in CONTACTS.items()}  # fmt: skip
+    states = {
+        name: (tuple(axes), np.array([[p.states[:, k] for p in row] for row in every]), {"units": unit})
+        for name, (k, unit) in STATES.items()
+    }
+    contacts = {
+        name: ((*axes, "patch"), np.array([[p.contacts[:, :, k] for p in row] for row in every]), {"units": unit})
+        for name, (k, unit) in CONTACTS.items()
+    }
     data = xr.Dataset({**states, **contacts}, axes)
     data["speed"].attrs["units"], data["time"].attrs["units"] = "m/s", "s"
     return data
@@ -131,22 +150,31 @@ def _save_table(linear: dict[str, Linear], folder: Path) -> None:
 
 def _answer(wheelset: Wheelset, linear: dict[str, Linear], paths: dict[str, dict[float, Motion]]) -> dict[str, Any]:
     """What was found, as plain numbers in SI; None where there is no critical speed."""
-    return {"klingel": klingel(wheelset), "wavelength": {engine: one.wavelength for engine, one in linear.items()},
-            "critical_speed": {engine: one.critical for engine, one in linear.items()},
-            "largest_power": {engine: max(float(p.contacts[:, :, wf.POWER].max()) for p in own.values())
-                              for engine, own in paths.items()}}  # fmt: skip
+    return {
+        "klingel": klingel(wheelset),
+        "wavelength": {engine: one.wavelength for engine, one in linear.items()},
+        "critical_speed": {engine: one.critical for engine, one in linear.items()},
+        "largest_power": {
+            engine: max(float(p.contacts[:, :, wf.POWER].max()) for p in own.values()) for engine, own in paths.items()
+        },
+    }
 
 
 def _waves(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
     """Klingel's wavelength by its closed form, and how far each implementation's lies from it."""
     closed_form = "closed form of the cones, no slip" if wheelset.profiles else "closed form, no slip"
     closed, first = klingel(wheelset), next((one.wavelength for one in linear.values()), 0.0)
-    lines = ["  wavelength of the free wheelset", f"    {closed_form:<34}{closed:>14.9g} m",
-             f"    {'creep forces alone':<34}{kinematic_wavelength(wheelset):>14.9g} m"]  # fmt: skip
+    lines = [
+        "  wavelength of the free wheelset",
+        f"    {closed_form:<34}{closed:>14.9g} m",
+        f"    {'creep forces alone':<34}{kinematic_wavelength(wheelset):>14.9g} m",
+    ]
     for engine, one in linear.items():
-        lines.append(f"    {f'eigenvalues of {engine}':<34}{one.wavelength:>14.9g} m   "
-                     f"{one.wavelength / closed - 1:+.1e} from the closed form, "
-                     f"{one.wavelength / first - 1:+.0e} from the first")  # fmt: skip
+        lines.append(
+            f"    {f'eigenvalues of {engine}':<34}{one.wavelength:>14.9g} m   "
+            f"{one.wavelength / closed - 1:+.1e} from the closed form, "
+            f"{one.wavelength / first - 1:+.0e} from the first"
+        )
     return lines
 
 
@@ -157,8 +185,10 @@ def _stability(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
     if wheelset.friction == 0.0:
         lines.append("    DOUBT: without friction nothing creeps: what follows from creep forces is no wheelset's")
     first = next((one.critical for one in linear.values()), None)
-    return lines + [f"    {f'eigenvalues of {engine}':<34}" + _speed(one.critical, one.why, first if k else None)
-                    for k, (engine, one) in enumerate(linear.items())]  # fmt: skip
+    return lines + [
+        f"    {f'eigenvalues of {engine}':<34}" + _speed(one.critical, one.why, first if k else None)
+        for k, (engine, one) in enumerate(linear.items())
+    ]
 
 
 def _two_motions(wheelset: Wheelset, speed: float) -> float:
@@ -181,15 +211,22 @@ def _motions(scene: WheelsetScene, paths: dict[str, dict[float, Motion]]) -> lis
     lines = [f"  paths, by {name}, with {scene.contact.law}"]
     for speed, own in first.items():
         lines.append(f"    {speed:g} m/s: {_ending(own)}")
-        lines += [f"      {engine}: within {np.abs(other[speed].states - own.states).max():.1e} of {name} (m, rad, s)"
-                  for engine, other in paths.items() if engine != name]  # fmt: skip
+        lines += [
+            f"      {engine}: within {np.abs(other[speed].states - own.states).max():.1e} of {name} (m, rad, s)"
+            for engine, other in paths.items()
+            if engine != name
+        ]
         lines += _climbs(wheelset_of(scene), own) + _slides(scene, own)
         power = own.contacts[:, :, wf.POWER]
         book = ledger(equations_of(scene, "reference", speed), own)
-        lines.append(f"      power of the creep forces: from {power.min():,.3g} to {power.max():.3g} W at a patch; "
-                     f"together they take {book.creep[-1]:,.4g} J")  # fmt: skip
-        lines.append(f"      energy: the drive gives {book.drive[-1]:,.4g} J, dampers take {book.dampers[-1]:,.4g} J; "
-                     f"{np.abs(book.residual).max():.1e} J are not accounted for")  # fmt: skip
+        lines.append(
+            f"      power of the creep forces: from {power.min():,.3g} to {power.max():.3g} W at a patch; "
+            f"together they take {book.creep[-1]:,.4g} J"
+        )
+        lines.append(
+            f"      energy: the drive gives {book.drive[-1]:,.4g} J, dampers take {book.dampers[-1]:,.4g} J; "
+            f"{np.abs(book.residual).max():.1e} J are not accounted for"
+        )
     return lines
 
 
@@ -198,8 +235,10 @@ def _climbs(wheelset: Wheelset, motion: Motion) -> list[str]:
     share, limit = flange_share(motion.contacts), nadal(wheelset.friction)
     if wheelset.profiles is not None or share <= max(limit, 0.0):
         return []
-    return [f"      DOUBT: a flange is pushed with {share:.2g} times its wheel's load; beyond {limit:.2g} (Nadal, 70 "
-            "degrees) it may climb, which cones cannot show: use [profiles]"]  # fmt: skip
+    return [
+        f"      DOUBT: a flange is pushed with {share:.2g} times its wheel's load; beyond {limit:.2g} (Nadal, 70 "
+        "degrees) it may climb, which cones cannot show: use [profiles]"
+    ]
 
 
 def _slides(scene: WheelsetScene, motion: Motion) -> list[str]:
@@ -210,8 +249,10 @@ def _slides(scene: WheelsetScene, motion: Motion) -> list[str]:
         return []
     with np.errstate(divide="ignore", invalid="ignore"):
         most = np.nanmax(force / bound)
-    return [f"      DOUBT: the linear law's creep forces are up to {most:.3g} times what friction carries: it knows no "
-            "slip; use fastsim"]  # fmt: skip
+    return [
+        f"      DOUBT: the linear law's creep forces are up to {most:.3g} times what friction carries: it knows no "
+        "slip; use fastsim"
+    ]
 
 
 def _ending(motion: Motion) -> str:

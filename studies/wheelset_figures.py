@@ -32,17 +32,30 @@ def stability_figure(linear: Mapping[str, Any], wheelset: Wheelset, title: str, 
     left.axhline(0.0, color="0.6", linewidth=0.8)
     if first.critical is not None:
         left.axvline(first.critical, color="0.6", linestyle=":")
-        left.annotate(f"{first.critical:.4g} m/s", (first.critical, 0.0), (-4, 8), textcoords="offset points",
-                      ha="right")  # fmt: skip
+        left.annotate(
+            f"{first.critical:.4g} m/s", (first.critical, 0.0), (-4, 8), textcoords="offset points", ha="right"
+        )
     middle.axhline(klingel(wheelset), color="0.6", linestyle=":")
-    middle.annotate("Klingel's, without suspension", (first.speeds[-1], klingel(wheelset)), (0, -12),
-                    textcoords="offset points", ha="right")  # fmt: skip
+    middle.annotate(
+        "Klingel's, without suspension",
+        (first.speeds[-1], klingel(wheelset)),
+        (0, -12),
+        textcoords="offset points",
+        ha="right",
+    )
     right.axvline(0.0, color="0.6", linewidth=0.8)
     for i in np.unique(np.linspace(0, len(first.speeds) - 1, 6).astype(int)):
         at = first.hunting[i]
         if np.isfinite(at):
-            right.annotate(f"{first.speeds[i]:g} m/s", (at.real, at.imag / (2.0 * np.pi)), (-6, 0),
-                           textcoords="offset points", ha="right", va="center", fontsize=8)  # fmt: skip
+            right.annotate(
+                f"{first.speeds[i]:g} m/s",
+                (at.real, at.imag / (2.0 * np.pi)),
+                (-6, 0),
+                textcoords="offset points",
+                ha="right",
+                va="center",
+                fontsize=8,
+            )
     left.set(xlabel="speed [m/s]", ylabel="largest real part [1/s]", title="Growth of the least stable motion")
     middle.set(xlabel="speed [m/s]", ylabel="wavelength [m]", title="Wavelength of hunting")
     right.set(xlabel="real part [1/s]", ylabel="frequency [Hz]", title="Root locus of hunting over the speed")
@@ -56,19 +69,26 @@ def stability_figure(linear: Mapping[str, Any], wheelset: Wheelset, title: str, 
 def paths_figure(paths: Mapping[str, Mapping[float, Motion]], title: str, path: Path) -> None:
     """Lateral displacement over time, a panel per speed; below, how far the engines are from the first one."""
     name, first = next(iter(paths.items()))
-    figure, axes = plt.subplots(2, len(first), figsize=(6.2 * len(first), 5.6), squeeze=False, sharex="col",
-                                height_ratios=(2, 1))  # fmt: skip
+    figure, axes = plt.subplots(
+        2, len(first), figsize=(6.2 * len(first), 5.6), squeeze=False, sharex="col", height_ratios=(2, 1)
+    )
     for k, (speed, own) in enumerate(first.items()):
         top, below = axes[:, k]
         for engine, other in paths.items():
             every = slice(None) if engine == name else slice(40 * (1 + list(paths).index(engine)), None, 150)
             mark = "-" if engine == name else MARKS[engine]
-            top.plot(own.times[every], 1e3 * other[speed].states[every, Y], mark, color=COLOURS[engine],
-                     label=LABELS[engine])  # fmt: skip
+            top.plot(
+                own.times[every], 1e3 * other[speed].states[every, Y], mark, color=COLOURS[engine], label=LABELS[engine]
+            )
             if engine != name:
                 gap = np.abs(other[speed].states - own.states).max(axis=1)
-                below.semilogy(own.times, np.maximum(gap, 1e-17), color=COLOURS[engine], linewidth=0.7,
-                               label=f"{LABELS[engine]} from {LABELS[name]}")  # fmt: skip
+                below.semilogy(
+                    own.times,
+                    np.maximum(gap, 1e-17),
+                    color=COLOURS[engine],
+                    linewidth=0.7,
+                    label=f"{LABELS[engine]} from {LABELS[name]}",
+                )
         top.set(ylabel="lateral displacement [mm]", title=f"{speed:g} m/s")
         below.set(xlabel="time [s]", ylabel="largest difference\nof a state [SI]")
     axes[0, 0].legend(loc="upper right", ncols=3)
@@ -95,8 +115,9 @@ def creep_figure(paths: Mapping[float, Motion], title: str, path: Path) -> None:
         axes[2, k].axhline(0.0, color="0.6", linewidth=0.8)
     axes[0, 0].legend(loc="upper right", ncols=2)
     largest = max(float(own.contacts[:, :, wf.POWER].max()) for own in paths.values())
-    figure.suptitle(f"{title}\ncreep forces on the wheels and their power, at any time {largest:.3g} W or less",
-                    fontsize=11)  # fmt: skip
+    figure.suptitle(
+        f"{title}\ncreep forces on the wheels and their power, at any time {largest:.3g} W or less", fontsize=11
+    )
     save(figure, path)
 
 
@@ -109,8 +130,15 @@ def branch_figure(orbits: Sequence[Orbit], wheelset: Wheelset, title: str, path:
         axis.plot(speeds, values, color="0.7", zorder=1)
         for stable, face, label in ((True, "#0072b2", "attracts"), (False, "white", "repels")):
             chosen = [i for i, orbit in enumerate(orbits) if orbit.stable == stable]
-            axis.scatter(speeds[chosen], values[chosen], s=22, facecolor=face, edgecolor="#0072b2", zorder=2,
-                         label=f"cycle that {label}" if chosen else None)  # fmt: skip
+            axis.scatter(
+                speeds[chosen],
+                values[chosen],
+                s=22,
+                facecolor=face,
+                edgecolor="#0072b2",
+                zorder=2,
+                label=f"cycle that {label}" if chosen else None,
+            )
         axis.set_xlabel("speed [m/s]")
     for axis in (left, middle):
         axis.axhline(clearance, color="0.6", linestyle=":")
@@ -118,8 +146,9 @@ def branch_figure(orbits: Sequence[Orbit], wheelset: Wheelset, title: str, path:
     begins = speeds[amplitudes <= 1.02e-3 * clearance] if (amplitudes <= 1e-3 * clearance).any() else speeds[:1]
     margin = 0.2 * np.ptp(begins) + 0.05
     middle.set(xlim=(begins.min() - margin, begins.max() + margin), ylim=(0, 1.1 * clearance), title="Where it begins")
-    left.annotate("flanges touch", (speeds.max(), clearance), (0, -11), textcoords="offset points", ha="right",
-                  fontsize=8)  # fmt: skip
+    left.annotate(
+        "flanges touch", (speeds.max(), clearance), (0, -11), textcoords="offset points", ha="right", fontsize=8
+    )
     ends = np.array([speeds.min(), speeds.max()])
     right.plot(ends, ends / klingel(wheelset), color="0.6", linestyle=":", label="speed by Klingel's wavelength")
     left.set_title("Amplitude")
@@ -143,8 +172,11 @@ def cycle_figure(cycles: Mapping[str, Orbit], title: str, path: Path) -> None:
         for wheel, side, colour in ((0, "right", "#0072b2"), (1, "left", "#d55e00")):
             values = own.contacts[:, wheel * each : (wheel + 1) * each, column].sum(axis=1)
             right.plot(own.times, 1e-3 * values, style, color=colour, label=f"{side} wheel, {name}")
-    left.set(xlabel="lateral displacement [mm]", ylabel="yaw [mrad]", title=f"Cycle at {first.speed:g} m/s, "
-             f"{first.frequency:.4g} Hz")  # fmt: skip
+    left.set(
+        xlabel="lateral displacement [mm]",
+        ylabel="yaw [mrad]",
+        title=f"Cycle at {first.speed:g} m/s, {first.frequency:.4g} Hz",
+    )
     right.set(xlabel="time [s]", ylabel="creep force [kN]", title="Creep forces in one period")
     left.legend()
     right.legend(fontsize=8, loc="center", bbox_to_anchor=(0.5, -0.24), ncols=2)

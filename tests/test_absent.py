@@ -14,15 +14,7 @@ from models.scene_effects import module_of, names_of
 from models.systems import DEFAULT
 from validation.absence import ride
 from validation.absence.hand_built import mujoco_model
-from validation.absence.probes import (
-    belongs_to_effects,
-    installed,
-    march,
-    probe,
-    quietest,
-    registered,
-    user_functions,
-)
+from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, registered, user_functions
 from validation.cases import absent, effect_prices
 from validation.cases.absent import EFFECTS, ENGINES, FORCES, added_to, change, declared, model, scene
 from validation.cases.effect_prices import hand_built
@@ -183,8 +175,14 @@ def test_mujoco_compiles_the_same_model_from_the_description_and_by_hand(folder)
 
 def test_the_price_list_reads_as_a_table():
     spread = {"median": 1.25, "mad": 0.1, "min": 1.0}
-    entry = {"effect": "road", "engine": "exudyn", "adds": "+4 callbacks", "step": 2.5, "us": spread,
-             "ratio": (1.5, 1.4, 1.6)}
+    entry = {
+        "effect": "road",
+        "engine": "exudyn",
+        "adds": "+4 callbacks",
+        "step": 2.5,
+        "us": spread,
+        "ratio": (1.5, 1.4, 1.6),
+    }
     (table,) = effect_prices.tables({"price": [entry]})
     assert table.rows == (("road", "exudyn", "+4 callbacks", "2.50", "+1.25 +/- 0.10", "1.50 (1.40 to 1.60)"),)
     assert len(table.headings) == len(table.rows[0])

@@ -65,8 +65,11 @@ def test_what_needs_another_leaves_before_it():
 
 def test_effects_that_cannot_be_together_are_told_with_the_remedy():
     on_springs = {**file_of("braking").BARE, "vehicle": {"file": "r19_free", "spin_inertia": 1.7}, "load_transfer": {}}
-    with pytest.raises(InputError, match=r"load_transfer: cannot stand beside 'suspension', whose springs carry the "
-                       r"loads: drop one of them; 'suspension' is named by vehicle.file"):  # fmt: skip
+    with pytest.raises(
+        InputError,
+        match=r"load_transfer: cannot stand beside 'suspension', whose springs carry the "
+        r"loads: drop one of them; 'suspension' is named by vehicle.file",
+    ):
         build(on_springs, "s.toml")
     with pytest.raises(InputError, match="falling_friction: needs the effect 'saturation': name it too"):
         without(beside(bare("contact"), "saturation", "falling_friction"), "saturation")
@@ -77,8 +80,11 @@ def test_effects_that_cannot_be_together_are_told_with_the_remedy():
 def test_a_remedy_that_would_break_another_law_says_so():
     effects = {"road": {"source": "study", "speed": 20.0}, "force_noise": {"deviation": 8.0}}
     scene = build_half_car({"title": "t", "run": {"duration": 1.0, "step": 1e-3}, "effects": effects}, "s")
-    with pytest.raises(InputError, match=r"force_noise: needs the effect 'wheel_forces': name it too in place of "
-                       "'road', beside which it cannot stand"):  # fmt: skip
+    with pytest.raises(
+        InputError,
+        match=r"force_noise: needs the effect 'wheel_forces': name it too in place of "
+        "'road', beside which it cannot stand",
+    ):
         check(scene)
 
 

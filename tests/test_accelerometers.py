@@ -15,10 +15,17 @@ from validation.hard_cases.case import judge
 ENGINES = ("reference", "exudyn", "mujoco")
 SENSORS = {"front": {"x": 1.1, "y": 0.6, "z": 0.2}, "rear": {"x": -0.9, "z": -0.3}}
 
-BARE = {"title": "test", "vehicle": {"parameters": "asymmetric_twin"}, "start": {"pitch": 0.1, "z3": -0.1},
-        "run": {"duration": 0.2, "step": 5e-4}}  # fmt: skip
-EXCITED = {"free": {}, "road": {"road": {"source": "study", "speed": 20.0}},
-           "spring": {"pitch_spring": {"stiffness": 2e4, "damping": 1e3}}}  # fmt: skip
+BARE = {
+    "title": "test",
+    "vehicle": {"parameters": "asymmetric_twin"},
+    "start": {"pitch": 0.1, "z3": -0.1},
+    "run": {"duration": 0.2, "step": 5e-4},
+}
+EXCITED = {
+    "free": {},
+    "road": {"road": {"source": "study", "speed": 20.0}},
+    "spring": {"pitch_spring": {"stiffness": 2e4, "damping": 1e3}},
+}
 
 
 def scene(sensors=SENSORS, effects=None, rate=1000.0, **other):
@@ -56,8 +63,9 @@ def test_readings_are_the_second_derivative_of_a_point_of_the_run(engine, effect
     second = (-place[:-4] + 16 * place[1:-3] - 30 * place[2:-2] + 16 * place[3:-1] - place[4:]) / (12 * period**2)
     force = second - [0.0, 9.81]
     rows = slice(4, -4, 2)
-    local = np.column_stack([cosine[rows] * force[:, 0] - sine[rows] * force[:, 1],
-                             sine[rows] * force[:, 0] + cosine[rows] * force[:, 1]])  # fmt: skip
+    local = np.column_stack(
+        [cosine[rows] * force[:, 0] - sine[rows] * force[:, 1], sine[rows] * force[:, 0] + cosine[rows] * force[:, 1]]
+    )
     felt = np.column_stack([run["ax1"], run["az1"]])[rows]
     # fourth-order differences across the fastest poles, 1/ms and faster, once the start has rung off
     assert np.abs(local - felt)[60:].max() < 2e-3 * np.abs(felt).max()
@@ -69,14 +77,22 @@ def test_readings_are_the_second_derivative_of_a_point_of_the_run(engine, effect
 def test_readings_follow_the_run_whatever_drives_it(engine, guide, tmp_path):
     """Two sensors ahead of one another give heave and pitch acceleration, whatever else acts: against differences."""
     t = 1e-3 * np.arange(301)
-    write_time_series(tmp_path / "f.csv", {"front": ("N", 4200 + 800 * np.sin(9 * t)),
-                                           "rear": ("N", 3300 + 500 * np.cos(7 * t))}, 1e-3)  # fmt: skip
-    write_time_series(tmp_path / "m.csv", {"z3": ("m", 0.06 + 0.01 * np.sin(np.pi * t) ** 2),
-                                           "pitch": ("rad", 0.05 * (1 - np.cos(8 * t)))}, 1e-3)  # fmt: skip
+    write_time_series(
+        tmp_path / "f.csv",
+        {"front": ("N", 4200 + 800 * np.sin(9 * t)), "rear": ("N", 3300 + 500 * np.cos(7 * t))},
+        1e-3,
+    )
+    write_time_series(
+        tmp_path / "m.csv",
+        {"z3": ("m", 0.06 + 0.01 * np.sin(np.pi * t) ** 2), "pitch": ("rad", 0.05 * (1 - np.cos(8 * t)))},
+        1e-3,
+    )
     forces = {"file": "f.csv", "interpolation": "linear", "frame": "inertial" if guide else "body"}
     two = {"sampling_rate": 1000.0, "sensors": {"middle": {"x": 0.0, "z": 0.0}, "ahead": {"x": 1.0, "z": 0.0}}}
-    run = simulate(build(BARE | {"start": {}, "effects": {"wheel_forces": forces, "accelerometers": two, **guide}}, "",
-                         tmp_path), engine)  # fmt: skip
+    run = simulate(
+        build(BARE | {"start": {}, "effects": {"wheel_forces": forces, "accelerometers": two, **guide}}, "", tmp_path),
+        engine,
+    )
     heave = 9.81 + np.cos(run["pitch"]) * run["az1"] - np.sin(run["pitch"]) * run["ax1"]
     for found, rate in ((heave, run["z3_rate"]), (run["az1"] - run["az2"], run["pitch_rate"])):
         slope = np.gradient(rate, run.times)
@@ -122,14 +138,17 @@ def test_a_stiff_bracket_is_a_rigid_mount_and_gravity_passes():
     assert np.abs(on_bracket(moved, 1e-3, 3000.0, 0.7) - moved).max() < 1e-3
 
 
-@pytest.mark.parametrize(("own", "words"), [
-    ({"sensors": {}}, "sensors"),
-    ({"sensors": {"a": {"x": 1.0}}}, "sensors.a.z"),
-    ({"sensors": {"a": {"x": 1.0, "z": 0.0, "height": 2.0}}}, "unknown key"),
-    ({"sensors": {"a": {"x": 1.0, "z": float("nan")}}}, "sensors.a.z"),
-    ({"sensors": {"a": {"x": 1.0, "z": 0.0, "bracket": {"frequency": -3.0, "damping": 0.1}}}}, "bracket.frequency"),
-    ({"rate": 700.0}, "sampling_rate"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("own", "words"),
+    [
+        ({"sensors": {}}, "sensors"),
+        ({"sensors": {"a": {"x": 1.0}}}, "sensors.a.z"),
+        ({"sensors": {"a": {"x": 1.0, "z": 0.0, "height": 2.0}}}, "unknown key"),
+        ({"sensors": {"a": {"x": 1.0, "z": float("nan")}}}, "sensors.a.z"),
+        ({"sensors": {"a": {"x": 1.0, "z": 0.0, "bracket": {"frequency": -3.0, "damping": 0.1}}}}, "bracket.frequency"),
+        ({"rate": 700.0}, "sampling_rate"),
+    ],
+)
 def test_bad_scenes_are_one_clear_message(own, words):
     with pytest.raises(InputError, match=words):
         simulate(scene(**own), "reference")

@@ -127,8 +127,32 @@ def test_the_installed_command_says_the_same(case, folder, capsys):
     assert done.stdout == "" and tree(folder) == before
 
 
-NASTY = ["nan", "inf", "-1", "0", "1e308", "1e-308", "-0.0", "true", '""', "[]", "{}", '"x"', "[[", "=", "\n", "\r",
-         "#", "\x00", "\ufeff", "999999999999999999999", "1979-05-27", ".", ",", "'"]
+NASTY = [
+    "nan",
+    "inf",
+    "-1",
+    "0",
+    "1e308",
+    "1e-308",
+    "-0.0",
+    "true",
+    '""',
+    "[]",
+    "{}",
+    '"x"',
+    "[[",
+    "=",
+    "\n",
+    "\r",
+    "#",
+    "\x00",
+    "\ufeff",
+    "999999999999999999999",
+    "1979-05-27",
+    ".",
+    ",",
+    "'",
+]
 """Pieces that readers stumble over."""
 
 
@@ -142,14 +166,20 @@ def mutations(draw, text):
         piece = draw(st.sampled_from(NASTY) | st.text(max_size=3))
         lines = text.splitlines(keepends=True) or [""]
         row = draw(st.integers(0, len(lines) - 1))
-        text = {"token": text[:start] + piece + text[end:], "insert": text[:start] + piece + text[start:],
-                "lose": "".join(lines[:row] + lines[row + 1 :]), "double": "".join(lines[: row + 1] + lines[row:]),
-                "cut": text[:end]}[kind]
+        text = {
+            "token": text[:start] + piece + text[end:],
+            "insert": text[:start] + piece + text[start:],
+            "lose": "".join(lines[:row] + lines[row + 1 :]),
+            "double": "".join(lines[: row + 1] + lines[row:]),
+            "cut": text[:end],
+        }[kind]
     return text
 
 
 FUZZ = settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
-FULL = FREE.replace("[run]", "override = { m3 = 700.0, k3 = 1e5, d4 = 1e4, a = 1.0 }\n[run]\noutput_step = 0.002") + """
+FULL = (
+    FREE.replace("[run]", "override = { m3 = 700.0, k3 = 1e5, d4 = 1e4, a = 1.0 }\n[run]\noutput_step = 0.002")
+    + """
 [start]
 pitch = 0.1
 [engines.exudyn]
@@ -157,6 +187,7 @@ integrator = "GeneralizedAlpha"
 spectral_radius = 0.8
 step = 0.0005
 """
+)
 
 
 def accepted_or_refused(path, *changes):
@@ -184,8 +215,17 @@ def test_no_number_ends_in_a_traceback(scene, folder):
     """Every number of a scene made huge or tiny: accepted or refused, without an overflow on the way."""
     (folder / "ride.toml").write_text(scene)
     parameters = [f"vehicle.override.{name}" for name in Parameters.model_fields]
-    others = ["run.step", "run.duration", "run.output_step", "engines.exudyn.step", "effects.road.speed",
-              "effects.road.run_in", "start.z3", "start.pitch_rate", "effects.pitch_spring.stiffness"]
+    others = [
+        "run.step",
+        "run.duration",
+        "run.output_step",
+        "engines.exudyn.step",
+        "effects.road.speed",
+        "effects.road.run_in",
+        "start.z3",
+        "start.pitch_rate",
+        "effects.pitch_spring.stiffness",
+    ]
     for key, value in itertools.product([*parameters, *others], EXTREME):
         accepted_or_refused(folder / "ride.toml", f"{key}={value!r}")
 

@@ -46,8 +46,10 @@ def test_bodies_that_are_one_in_mujoco_move_as_they_do_apart(monkeypatch: pytest
 
 def test_a_wheel_with_inertia_of_its_own_does_not_spin_with_its_rotor() -> None:
     own, _, _ = bare_cars.start()
-    heavy = tuple(replace(body, inertia=((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 1.0))) if body.name == "fl"
-                  else body for body in own.vehicle.bodies)  # fmt: skip
+    heavy = tuple(
+        replace(body, inertia=((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 1.0))) if body.name == "fl" else body
+        for body in own.vehicle.bodies
+    )
     assert "fl" not in free_vehicle_mujoco.carriers(replace(own.vehicle, bodies=heavy))
 
 

@@ -91,25 +91,45 @@ def test_estimate_is_the_fastest_rolling_wheel_and_learns_the_slope():
     assert worst < 0.02
 
 
-@pytest.mark.parametrize(("name", "parameters", "word"), [
-    ("slip_bang_bang", {"release": 0.0}, "release"), ("slip_bang_bang", {"apply": 0.5}, "apply"),
-    ("slip_bang_bang", {"select_low": (2,)}, "axles"), ("five_phase", {"e2": 1.0}, "above e1"),
-    ("slip_pi", {"reset": -1.0}, "reset"), ("acceleration_phases", {"falls": 1.0}, "falls"),
-    ("slip_pi", {"gain": 1e9}, "gain = 1000000000.0: must be above 0, at most 10000"),
-    ("slip_pi", {"target": 0.1 + 0.2j}, "target = .*must be a number"), ("five_phase", {"e5": np.nan}, "e5"),
-    ("slip_pi", {"mix": -1.0}, "mix = -1.0: must be 0 or more"), ("five_phase", {"deep": 1.5}, "at most 1"),
-    ("acceleration_phases", {"rises": -2.0}, "rises"), ("acceleration_phases", {"pulse": 2.5}, "whole number"),
-    ("slip_bang_bang", {"apply": "0.05"}, "must be a number"), ("five_phase", {"fast": True}, "must be a number"),
-    ("five_phase", {"falling": np.inf}, "falling"), ("slip_pi", {"cut_off": 1e6}, "at most 100"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "parameters", "word"),
+    [
+        ("slip_bang_bang", {"release": 0.0}, "release"),
+        ("slip_bang_bang", {"apply": 0.5}, "apply"),
+        ("slip_bang_bang", {"select_low": (2,)}, "axles"),
+        ("five_phase", {"e2": 1.0}, "above e1"),
+        ("slip_pi", {"reset": -1.0}, "reset"),
+        ("acceleration_phases", {"falls": 1.0}, "falls"),
+        ("slip_pi", {"gain": 1e9}, "gain = 1000000000.0: must be above 0, at most 10000"),
+        ("slip_pi", {"target": 0.1 + 0.2j}, "target = .*must be a number"),
+        ("five_phase", {"e5": np.nan}, "e5"),
+        ("slip_pi", {"mix": -1.0}, "mix = -1.0: must be 0 or more"),
+        ("five_phase", {"deep": 1.5}, "at most 1"),
+        ("acceleration_phases", {"rises": -2.0}, "rises"),
+        ("acceleration_phases", {"pulse": 2.5}, "whole number"),
+        ("slip_bang_bang", {"apply": "0.05"}, "must be a number"),
+        ("five_phase", {"fast": True}, "must be a number"),
+        ("five_phase", {"falling": np.inf}, "falling"),
+        ("slip_pi", {"cut_off": 1e6}, "at most 100"),
+    ],
+)
 def test_parameters_that_cannot_be_used(name, parameters, word):
     with pytest.raises(InputError, match=word):
         CONTROLLERS[name](4, **parameters)
 
 
 def frozen(**changes):
-    return Frozen(**{"speed": 11.11, "load": 16.8e3, "radius": 0.5, "inertia": 13.35, "brake": LINE,
-                     "tyre": surface("dry"), **changes})  # fmt: skip
+    return Frozen(
+        **{
+            "speed": 11.11,
+            "load": 16.8e3,
+            "radius": 0.5,
+            "inertia": 13.35,
+            "brake": LINE,
+            "tyre": surface("dry"),
+            **changes,
+        }
+    )
 
 
 def exact(wheel, controller=PHASES):

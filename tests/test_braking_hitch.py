@@ -11,17 +11,26 @@ from models.braking.of_scene import plane_of
 from models.braking.scene import build
 from models.braking.trailer import CHOSEN
 
-TABLE = {"title": "t", "system": "braking", "controller": {"kind": "slip_bang_bang"}, "trailer": CHOSEN.model_dump(),
-         "procedures": {"stop": {"speed": 10.0}}}  # fmt: skip
+TABLE = {
+    "title": "t",
+    "system": "braking",
+    "controller": {"kind": "slip_bang_bang"},
+    "trailer": CHOSEN.model_dump(),
+    "procedures": {"stop": {"speed": 10.0}},
+}
 
 
 def test_hitch_angles_are_of_the_drawbar_against_the_truck():
     states = np.zeros((3, 2, 5))
     states[:, 0, 2:4] = [[0.0, 0.0], [0.1, -0.2], [0.3, 0.2]]
     stop = SimpleNamespace(path=SimpleNamespace(states=states), times=np.array([0.0, 1.0, 2.0]))
-    assert of_hitch(stop) == pytest.approx({"largest hitch angle [deg]": np.degrees(-0.3),
-                                            "largest hitch angle at [s]": 1.0,
-                                            "final hitch angle [deg]": np.degrees(-0.1)})  # fmt: skip
+    assert of_hitch(stop) == pytest.approx(
+        {
+            "largest hitch angle [deg]": np.degrees(-0.3),
+            "largest hitch angle at [s]": 1.0,
+            "final hitch angle [deg]": np.degrees(-0.1),
+        }
+    )
 
 
 def test_the_train_is_drawn_where_its_hinges_are():

@@ -42,8 +42,15 @@ def test_beyond_balance_two_wheels_bear_nothing(loads, side):
 
 def test_a_stop_at_the_edge_of_locking_finishes():
     steered = {"stop": {"kind": "j_turn", "speed": 15.0, "steer": 0.02}}
-    path = drive(scene(load_transfer={"front": 0.3}, brakes={"supply": 5.0}, road={"stretches": [{"left": "dry"}]},
-                       procedures=steered), "stop")  # fmt: skip
+    path = drive(
+        scene(
+            load_transfer={"front": 0.3},
+            brakes={"supply": 5.0},
+            road={"stretches": [{"left": "dry"}]},
+            procedures=steered,
+        ),
+        "stop",
+    )
     assert path.stands and path.times[-1] == pytest.approx(2.301, abs=0.01)
 
 
@@ -73,9 +80,18 @@ def test_valves_apply_slowly_only_where_the_scene_has_them():
         drive(scene(controller=phases), "stop")
     with pytest.raises(InputError, match=r"pressure.slow = 0.01: must be at least fill, 0.15 s"):
         scene(pressure={"slow": 0.01})
-    fast, slow = (drive(scene(controller=phases | {"parameters": {"slow": value, "cut_off": 0.0}},
-                              pressure={"slow": 2.0}, procedures={"stop": {"speed": 11.0}}, run={"duration": 2.0}),
-                        "stop") for value in (False, True))  # fmt: skip
+    fast, slow = (
+        drive(
+            scene(
+                controller=phases | {"parameters": {"slow": value, "cut_off": 0.0}},
+                pressure={"slow": 2.0},
+                procedures={"stop": {"speed": 11.0}},
+                run={"duration": 2.0},
+            ),
+            "stop",
+        )
+        for value in (False, True)
+    )
     assert not np.array_equal(fast.pressures, slow.pressures)
 
 
@@ -98,9 +114,15 @@ def test_what_cannot_be_is_refused_with_its_value():
 
 def test_a_train_that_folds_ends_with_its_angle_and_keeps_its_path():
     with pytest.raises(RunFailed, match=r"jackknifes: the drawbar against the truck at -?\d+\.\d deg, limit") as told:
-        drive(scene(trailer=CHOSEN.model_copy(update={"fold": 0.02}).model_dump(), run={"duration": 6.0},
-                    brakes={"supply": 2.0},
-                    procedures={"stop": {"kind": "j_turn", "speed": 8.0, "steer": 0.1}}), "stop")  # fmt: skip
+        drive(
+            scene(
+                trailer=CHOSEN.model_copy(update={"fold": 0.02}).model_dump(),
+                run={"duration": 6.0},
+                brakes={"supply": 2.0},
+                procedures={"stop": {"kind": "j_turn", "speed": 8.0, "steer": 0.1}},
+            ),
+            "stop",
+        )
     assert len(told.value.partial.times) > 3
 
 

@@ -17,8 +17,14 @@ from studies.braking import ended, run
 
 HEAD = "time [s], pressure_fl [bar], pressure_fr [kPa], pressure_rl [bar], pressure_rr [bar]"
 SPEEDS = ", speed_fl [km/h], speed_fr [m/s], speed_rl [m/s], speed_rr [m/s]"
-DRY = {"title": "t", "system": "braking", "road": {"stretches": [{"left": "dry"}]}, "load_transfer": {},
-       "options": {"adhesion": False}, "procedures": {"stop": {"speed": 8.0}}}  # fmt: skip
+DRY = {
+    "title": "t",
+    "system": "braking",
+    "road": {"stretches": [{"left": "dry"}]},
+    "load_transfer": {},
+    "options": {"adhesion": False},
+    "procedures": {"stop": {"speed": 8.0}},
+}
 MEASURED = {"measured": {"file": "{procedure}_pressures.csv"}}
 
 
@@ -48,12 +54,15 @@ def test_pressures_of_a_file_are_held_after_its_end_and_it_is_said(tmp_path):
     assert "measured pressures {procedure}" in describe(own)
 
 
-@pytest.mark.parametrize(("tables", "place", "said"), [
-    ({"controller": {"kind": "slip_pi"}}, "controller", "measured"),
-    ({"port": {"callable": "a:B"}}, "port", "measured"),
-    ({"pressure": {}}, "pressure", "measured"),
-    ({"measured": {"file": "no.csv"}}, "measured.file", "no such file"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("tables", "place", "said"),
+    [
+        ({"controller": {"kind": "slip_pi"}}, "controller", "measured"),
+        ({"port": {"callable": "a:B"}}, "port", "measured"),
+        ({"pressure": {}}, "pressure", "measured"),
+        ({"measured": {"file": "no.csv"}}, "measured.file", "no such file"),
+    ],
+)
 def test_measured_pressures_leave_nothing_else_to_do(tmp_path, tables, place, said):
     (tmp_path / "stop_pressures.csv").write_text(HEAD + "\n0, 1, 100, 1, 1\n1, 1, 100, 1, 1\n")
     with pytest.raises(InputError, match=said) as error:
@@ -78,17 +87,20 @@ def test_measured_speeds_differ_from_rims_by_their_rms(tmp_path):
     assert found.rms(np.array([0.0, 0.5, 2.0]), rims) == pytest.approx([0.0, 0.5**0.5, 0.0, 2.0**0.5], abs=1e-12)
 
 
-@pytest.mark.parametrize(("text", "word"), [
-    (HEAD + "\n0.5, 0, 0, 1, 1\n1, 2, 2, 1, 1\n", "time.*begin at 0"),
-    (HEAD + "\n0, 0, 0, 1, 1\n1, -2, 2, 1, 1\n", "pressure_fl at 1 s.*above the air"),
-    (HEAD + "\n0, 0, 0, 1, 1\n0, 2, 2, 1, 1\n", "line 3, column 'time'"),
-    (HEAD + "\n0, 0, 0, 1, 1\n1, 2, x, 1, 1\n", r"line 3, column 'pressure_fr \[kPa\]'"),
-    (HEAD + "\n0, 0, 0, 1, 1\n", "2 rows"),
-    (HEAD.replace("fr", "xx") + "\n0, 0, 0, 1, 1\n1, 2, 2, 1, 1\n", "pressure_fr"),
-    (HEAD.replace("kPa", "psi") + "\n0, 0, 0, 1, 1\n1, 2, 2, 1, 1\n", "pressure_fr', unit = 'psi'"),
-    (HEAD + ", speed_fl [m/s]\n0, 0, 0, 1, 1, 9\n1, 2, 2, 1, 1, 9\n", "'speed_fr' is missing"),
-    (HEAD + SPEEDS + "\n0, 0, 0, 1, 1, 1, 1, 1, 1\n1, 2, 2, 1, 1, 1, 1, 1, 400\n", "speed_rr at 1 s.*150 m/s"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        (HEAD + "\n0.5, 0, 0, 1, 1\n1, 2, 2, 1, 1\n", "time.*begin at 0"),
+        (HEAD + "\n0, 0, 0, 1, 1\n1, -2, 2, 1, 1\n", "pressure_fl at 1 s.*above the air"),
+        (HEAD + "\n0, 0, 0, 1, 1\n0, 2, 2, 1, 1\n", "line 3, column 'time'"),
+        (HEAD + "\n0, 0, 0, 1, 1\n1, 2, x, 1, 1\n", r"line 3, column 'pressure_fr \[kPa\]'"),
+        (HEAD + "\n0, 0, 0, 1, 1\n", "2 rows"),
+        (HEAD.replace("fr", "xx") + "\n0, 0, 0, 1, 1\n1, 2, 2, 1, 1\n", "pressure_fr"),
+        (HEAD.replace("kPa", "psi") + "\n0, 0, 0, 1, 1\n1, 2, 2, 1, 1\n", "pressure_fr', unit = 'psi'"),
+        (HEAD + ", speed_fl [m/s]\n0, 0, 0, 1, 1, 9\n1, 2, 2, 1, 1, 9\n", "'speed_fr' is missing"),
+        (HEAD + SPEEDS + "\n0, 0, 0, 1, 1, 1, 1, 1, 1\n1, 2, 2, 1, 1, 1, 1, 1, 400\n", "speed_rr at 1 s.*150 m/s"),
+    ],
+)
 def test_measured_pressures_that_cannot_be_used(tmp_path, text, word):
     file = tmp_path / "run.csv"
     file.write_text(text)

@@ -52,15 +52,27 @@ def test_every_end_is_at_rest_and_stays(step):
     for torque in (0.0, 30.0, 700.0, 1e5):
         for yaw, side in ((0.0, 0.0), (2.0, -3.0), (0.0, 0.6)):
             torques = np.array([torque, torque, 0.5 * torque, 0.0])
-            state, _, _, turning = braked(torques, steer=0.03, speed=0.5, yaw=yaw, side=side, step=step,
-                                          duration=min(2.0, 5e3 * step))  # fmt: skip
+            state, _, _, turning = braked(
+                torques, steer=0.03, speed=0.5, yaw=yaw, side=side, step=step, duration=min(2.0, 5e3 * step)
+            )
             assert np.isfinite(state).all() and np.isfinite(turning).all()
     state, _, report, turning = braked(np.full(4, 5e3), steer=0.03, speed=1.0, yaw=2.0, side=1.0, step=step)
     assert not state[1].any() and not turning.any()
     again = state.copy()
-    status, _ = advance(again, turning, np.full((3, 4), 5e3), step, np.zeros(4), ICE.cornering, truck(PAPER),
-                        np.zeros(4, dtype=int), road([Stretch(0.0, 0, 0)]), stacked([ICE]).packed, np.zeros(3),
-                        report)  # fmt: skip
+    status, _ = advance(
+        again,
+        turning,
+        np.full((3, 4), 5e3),
+        step,
+        np.zeros(4),
+        ICE.cornering,
+        truck(PAPER),
+        np.zeros(4, dtype=int),
+        road([Stretch(0.0, 0, 0)]),
+        stacked([ICE]).packed,
+        np.zeros(3),
+        report,
+    )
     assert status == AT_REST and np.array_equal(again, state)
 
 

@@ -67,8 +67,16 @@ def vehicle():
     chambers = Chambers(np.full(4, 0.05), np.full(4, 0.05), 6.0)
     ice = surface("ice")
     brakes = of_wheels(PAPER_FRONT, PAPER_FRONT, PAPER_REAR, PAPER_REAR)
-    return Braked(plane=truck(PAPER), kind=np.zeros(4, dtype=np.int64), tables=stacked([ice]), slope=ice.cornering,
-                  road=road([Stretch(0.0, 0, 0)]), brakes=brakes, chambers=chambers, steer=np.zeros(4))  # fmt: skip
+    return Braked(
+        plane=truck(PAPER),
+        kind=np.zeros(4, dtype=np.int64),
+        tables=stacked([ice]),
+        slope=ice.cornering,
+        road=road([Stretch(0.0, 0, 0)]),
+        brakes=brakes,
+        chambers=chambers,
+        steer=np.zeros(4),
+    )
 
 
 def of(number=0, wheels=(11.0, 10.0, 9.0, 8.0), speed=11.0):
@@ -156,10 +164,16 @@ def test_an_fmu_gives_the_same_bits(vehicle, tmp_path):
     assert same(path, vehicle.run(Example(4), 11.0, SHORT))
 
 
-@pytest.mark.parametrize(("does", "name"), [
-    ("raise ValueError", "crash"), ("while True: pass", "silence"), ("os._exit(5)", "crash: .* status 5"),
-    ("ctypes.string_at(0)", "crash: .* SIGSEGV"), ("return False", "crash"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("does", "name"),
+    [
+        ("raise ValueError", "crash"),
+        ("while True: pass", "silence"),
+        ("os._exit(5)", "crash: .* status 5"),
+        ("ctypes.string_at(0)", "crash: .* SIGSEGV"),
+        ("return False", "crash"),
+    ],
+)
 def test_a_hostile_fmu_ends_by_name_and_in_time(does, name, tmp_path):
     builder = pytest.importorskip("pythonfmu").FmuBuilder
     source = (HERE / "example_slave.py").read_text()
@@ -256,44 +270,58 @@ def _exits(given):
     raise SystemExit(0)
 
 
-@pytest.mark.parametrize(("answer", "name"), [
-    (_raises, "crash: ValueError: no idea"),
-    (_exits, "crash: SystemExit: 0"),
-    (lambda given: None, "wrong frame"),
-    (lambda given: Command(), "wrong frame"),
-    (lambda given: Command(valves=np.ones(3)), "wrong length: 3 values for 4 wheels"),
-    (lambda given: Command(valves=np.ones((2, 2))), "wrong length: 2 x 2 values for 4 wheels"),
-    (lambda given: Command(valves=np.array([1, 1, 1, 2])), "no state of a valve: 2 is none"),
-    (lambda given: Command(pressures=np.array([1, 1, np.inf, 1])), "not a number: inf"),
-    (lambda given: Command(pressures=np.array([1, -1e-9, 1, 1])), "below zero"),
-    (lambda given: Command(pressures=["a"] * 4), "wrong frame"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("answer", "name"),
+    [
+        (_raises, "crash: ValueError: no idea"),
+        (_exits, "crash: SystemExit: 0"),
+        (lambda given: None, "wrong frame"),
+        (lambda given: Command(), "wrong frame"),
+        (lambda given: Command(valves=np.ones(3)), "wrong length: 3 values for 4 wheels"),
+        (lambda given: Command(valves=np.ones((2, 2))), "wrong length: 2 x 2 values for 4 wheels"),
+        (lambda given: Command(valves=np.array([1, 1, 1, 2])), "no state of a valve: 2 is none"),
+        (lambda given: Command(pressures=np.array([1, 1, np.inf, 1])), "not a number: inf"),
+        (lambda given: Command(pressures=np.array([1, -1e-9, 1, 1])), "below zero"),
+        (lambda given: Command(pressures=["a"] * 4), "wrong frame"),
+    ],
+)
 def test_nonsense_of_a_callable_is_named(answer, name):
     with pytest.raises(ControllerFailed, match=name):
         ask(Says(answer), of(), most=6.0)
 
 
 HOSTILE = {
-    "sleeps, whatever is raised": ("silence: no answer within 0.3 s", "while True:\n            try: time.sleep(0.05)\n"
-                                   "            except BaseException: pass"),
+    "sleeps, whatever is raised": (
+        "silence: no answer within 0.3 s",
+        "while True:\n            try: time.sleep(0.05)\n            except BaseException: pass",
+    ),
     "sleeps in C": ("silence", "ctypes.CDLL(None).sleep(1000)"),
     "works in C": ("silence", "sum(iter(int, 1))"),
-    "hears no signal": ("silence", "[signal.signal(s, signal.SIG_IGN) for s in range(1, 32) if s not in (9, 19)]\n"
-                        "        while True: pass"),
+    "hears no signal": (
+        "silence",
+        "[signal.signal(s, signal.SIG_IGN) for s in range(1, 32) if s not in (9, 19)]\n        while True: pass",
+    ),
     "stops itself": ("silence", "os.kill(os.getpid(), signal.SIGSTOP)"),
-    "leaves a thread": (r"crash: ValueError: boom \(hostile.py, line 7\)", "threading.Thread(target=time.sleep, "
-                        "args=(1000,)).start(); raise ValueError('boom')"),
+    "leaves a thread": (
+        r"crash: ValueError: boom \(hostile.py, line 7\)",
+        "threading.Thread(target=time.sleep, args=(1000,)).start(); raise ValueError('boom')",
+    ),
     "ends its process": ("crash: .* ended with status 3", "os._exit(3)"),
     "leaves by sys.exit": ("crash: SystemExit: 0", "sys.exit(0)"),
     "crashes": ("crash: .* SIGSEGV", "ctypes.string_at(0)"),
     "is killed": ("crash: .* SIGKILL", "os.kill(os.getpid(), signal.SIGKILL)"),
     "closes everything": ("crash", "os.closerange(3, 256); time.sleep(1000)"),
     "is late": ("silence", "time.sleep(0.4); return Command(valves=np.ones(4))"),
-    "is no array": ("silence", "class A:\n            def __array__(self, *a, **k):\n                while True: pass\n"
-                    "        return Command(pressures=A())"),
+    "is no array": (
+        "silence",
+        "class A:\n            def __array__(self, *a, **k):\n                while True: pass\n"
+        "        return Command(pressures=A())",
+    ),
     "answers complex numbers": ("wrong frame: complex", "return Command(pressures=np.full(4, 1j))"),
-    "presses more than there is": ("too high: a pressure of 299 bar, above the 6 bar",
-                                   "return Command(pressures=np.full(4, 299.0))"),
+    "presses more than there is": (
+        "too high: a pressure of 299 bar, above the 6 bar",
+        "return Command(pressures=np.full(4, 299.0))",
+    ),
 }
 
 
@@ -302,7 +330,8 @@ def test_prints_of_a_controller_leave_standard_output_to_the_results(tmp_path, c
     (tmp_path / "talks.py").write_text(
         "import numpy as np\nfrom models.braking.controller import Command\nclass Talks:\n"
         "    def __init__(self, wheels): pass\n    def sample(self, given):\n        print('noise', flush=True)\n"
-        "        return Command(valves=np.ones(4))\n")  # fmt: skip
+        "        return Command(valves=np.ones(4))\n"
+    )
     run = Run(RADIUS, SAMPLE, folder=tmp_path)
     with opened(PortTable(callable="talks.py:Talks", start=PATIENT), run, Example(4)) as (other, _):
         ask(other, of())
@@ -322,7 +351,8 @@ def test_a_hostile_callable_ends_by_name_and_in_time(kind, tmp_path):
     (tmp_path / "hostile.py").write_text(
         "import ctypes, os, signal, sys, threading, time\nimport numpy as np\n"
         "from models.braking.controller import Command\nclass Hostile:\n    def __init__(self, wheels): pass\n"
-        f"    def sample(self, given):\n        {does}\n")  # fmt: skip
+        f"    def sample(self, given):\n        {does}\n"
+    )
     table = PortTable(callable="hostile.py:Hostile", timeout=time_out(name, 0.3), start=PATIENT)
     run = Run(RADIUS, SAMPLE, folder=tmp_path)
     with pytest.raises(ControllerFailed, match=name), opened(table, run, Example(4)) as (other, _):
@@ -332,19 +362,23 @@ def test_a_hostile_callable_ends_by_name_and_in_time(kind, tmp_path):
 
 
 def test_a_callable_that_is_not_made_in_time_or_crashes_as_it_is_made(tmp_path):
-    for does, start, told in (("while True: pass", 3.0, "silence: (it was not made|nobody connected)"),
-                              ("import os; os._exit(4)", PATIENT, "status 4")):  # fmt: skip
-        (tmp_path / "made.py").write_text(f"class Made:\n    def __init__(self, wheels):\n        {does}\n"
-                                          "    def sample(self, given): pass\n")  # fmt: skip
+    for does, start, told in (
+        ("while True: pass", 3.0, "silence: (it was not made|nobody connected)"),
+        ("import os; os._exit(4)", PATIENT, "status 4"),
+    ):
+        (tmp_path / "made.py").write_text(
+            f"class Made:\n    def __init__(self, wheels):\n        {does}\n    def sample(self, given): pass\n"
+        )
         table = PortTable(callable="made.py:Made", start=start)
         with pytest.raises(RunFailed, match=told), opened(table, Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)):
             pass
 
 
 @pytest.mark.parametrize("table", [{"signals": {"gain": 0.9}}, {"faults": [{"kind": "stuck"}]}, {"log": "a.log"}, {}])
-@pytest.mark.parametrize(("answer", "name"), [
-    (lambda given: None, "wrong frame"), (lambda given: Command(pressures=np.full(4, -1.0)), "below zero"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("answer", "name"),
+    [(lambda given: None, "wrong frame"), (lambda given: Command(pressures=np.full(4, -1.0)), "below zero")],
+)
 def test_nonsense_is_named_before_sensors_faults_and_log_can_hide_it(table, answer, name, tmp_path):
     run = Run(RADIUS, SAMPLE, folder=tmp_path)
     failing = Says(answer)
@@ -376,10 +410,12 @@ def test_a_command_that_ends_at_once_and_one_that_never_connects(monkeypatch):
 
 def test_no_process_stays(monkeypatch, tmp_path):
     monkeypatch.setattr(socket_port, "GRACE", 0.01)
-    code = ("import os, socket, subprocess, sys\n"
-            "open('parent', 'w').write(str(os.getpid()))\n"
-            "open('child', 'w').write(str(subprocess.Popen(['sleep', '600']).pid))\n"
-            "link = socket.create_connection(('127.0.0.1', int(sys.argv[1])))\nos.wait()\n")  # fmt: skip
+    code = (
+        "import os, socket, subprocess, sys\n"
+        "open('parent', 'w').write(str(os.getpid()))\n"
+        "open('child', 'w').write(str(subprocess.Popen(['sleep', '600']).pid))\n"
+        "link = socket.create_connection(('127.0.0.1', int(sys.argv[1])))\nos.wait()\n"
+    )
     with connected([sys.executable, "-S", "-c", code, "{port}"], 0, PATIENT, PATIENT, tmp_path):
         pass
     for name in ("parent", "child"):
@@ -403,14 +439,20 @@ def test_a_log_replays_bit_for_bit_and_knows_its_scene(vehicle, tmp_path):
         path = vehicle.run(own, 11.0, SHORT)
     with opened(PortTable(replay="a.log"), run, Says(_raises)) as (replayed, _):
         assert same(path, vehicle.run(replayed, 11.0, SHORT))
-    with opened(PortTable(replay="a.log"), run, Example(4)) as (replayed, _), \
-            pytest.raises(RunFailed, match="was asked something else"):  # fmt: skip
+    with (
+        opened(PortTable(replay="a.log"), run, Example(4)) as (replayed, _),
+        pytest.raises(RunFailed, match="was asked something else"),
+    ):
         vehicle.run(replayed, np.nextafter(11.0, 12.0), SHORT)
-    with opened(PortTable(replay="a.log"), run, Example(4)) as (replayed, _), \
-            pytest.raises(RunFailed, match=f"sample {len(path.times) - 1}: a.log has ended"):  # fmt: skip
+    with (
+        opened(PortTable(replay="a.log"), run, Example(4)) as (replayed, _),
+        pytest.raises(RunFailed, match=f"sample {len(path.times) - 1}: a.log has ended"),
+    ):
         vehicle.run(replayed, 11.0, SHORT + 0.1)
-    with pytest.raises(InputError, match="another scene"), \
-            opened(PortTable(replay="a.log"), Run(RADIUS, SAMPLE, "another", tmp_path), Example(4)):  # fmt: skip
+    with (
+        pytest.raises(InputError, match="another scene"),
+        opened(PortTable(replay="a.log"), Run(RADIUS, SAMPLE, "another", tmp_path), Example(4)),
+    ):
         pass
     (tmp_path / "no.log").write_bytes(b"no")
     with pytest.raises(InputError, match="no log"), opened(PortTable(replay="no.log"), run, Example(4)):
@@ -503,10 +545,12 @@ def test_a_missing_tooth_makes_one_dip_per_turn():
 
 def test_lost_and_delayed_samples_and_stuck_valves():
     says = Says(lambda given: Command(valves=np.full(4, 1 if given.number < 5 else -1)))
-    faults = [Fault(kind="lost", start=2 * SAMPLE, end=4 * SAMPLE, wheels=[0]),
-              Fault(kind="delayed", start=3 * SAMPLE, samples=2, wheels=[1]),
-              Fault(kind="stuck", start=5 * SAMPLE, wheels=[2]),
-              Fault(kind="stuck", start=2 * SAMPLE, end=3 * SAMPLE, wheels=[3], state=0)]  # fmt: skip
+    faults = [
+        Fault(kind="lost", start=2 * SAMPLE, end=4 * SAMPLE, wheels=[0]),
+        Fault(kind="delayed", start=3 * SAMPLE, samples=2, wheels=[1]),
+        Fault(kind="stuck", start=5 * SAMPLE, wheels=[2]),
+        Fault(kind="stuck", start=2 * SAMPLE, end=3 * SAMPLE, wheels=[3], state=0),
+    ]
     faulty = Faulty(says, faults)
     valves = np.array([faulty.sample(of(i, (float(i),) * 4)).valves for i in range(8)])
     seen = np.array([given.wheels for given in says.seen])
@@ -517,15 +561,18 @@ def test_lost_and_delayed_samples_and_stuck_valves():
     assert valves[:, 3].tolist() == [1, 1, 0, 1, 1, -1, -1, -1]
 
 
-@pytest.mark.parametrize(("table", "told"), [
-    ({"callable": "a:B", "fmu": "c.fmu"}, "at most one of"),
-    ({"callabel": "a:B"}, "callable"),
-    ({"faults": [{"kind": "delayed"}]}, "needs samples"),
-    ({"faults": [{"kind": "lost", "state": 1}]}, "no meaning"),
-    ({"faults": [{"kind": "tooth", "tooth": 1}]}, "counted from teeth"),
-    ({"signals": {"bits": 12}}, "together"),
-    ({"timeout": 0.0}, "above 0"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        ({"callable": "a:B", "fmu": "c.fmu"}, "at most one of"),
+        ({"callabel": "a:B"}, "callable"),
+        ({"faults": [{"kind": "delayed"}]}, "needs samples"),
+        ({"faults": [{"kind": "lost", "state": 1}]}, "no meaning"),
+        ({"faults": [{"kind": "tooth", "tooth": 1}]}, "counted from teeth"),
+        ({"signals": {"bits": 12}}, "together"),
+        ({"timeout": 0.0}, "above 0"),
+    ],
+)
 def test_a_table_that_cannot_be(table, told):
     with pytest.raises(InputError, match=told):
         read(PortTable, table, "scene.toml", "port")
@@ -538,11 +585,18 @@ def test_a_fault_of_a_wheel_that_is_not_there():
 
 
 def test_a_callable_by_its_name(tmp_path):
-    (tmp_path / "mine.py").write_text("class Mine:\n    def __init__(self, wheels, x=1):\n        self.x = x\n"
-                                      "    def sample(self, given):\n        return None\nNOT = 1\n")  # fmt: skip
+    (tmp_path / "mine.py").write_text(
+        "class Mine:\n    def __init__(self, wheels, x=1):\n        self.x = x\n"
+        "    def sample(self, given):\n        return None\nNOT = 1\n"
+    )
     assert named_controller("mine.py:Mine", tmp_path, 4, {"x": 3}).x == 3
-    for name, told in (("mine.py:Min", "did you mean 'Mine'"), ("mine.py", "must be"), ("no.py:A", "not loaded"),
-                       ("mine.py:NOT", "not made"), ("types:SimpleNamespace", "not made|no method")):  # fmt: skip
+    for name, told in (
+        ("mine.py:Min", "did you mean 'Mine'"),
+        ("mine.py", "must be"),
+        ("no.py:A", "not loaded"),
+        ("mine.py:NOT", "not made"),
+        ("types:SimpleNamespace", "not made|no method"),
+    ):
         with pytest.raises(InputError, match=told):
             named_controller(name, tmp_path, 4, {})
 

@@ -8,17 +8,7 @@ from models.braking.tyre_table import stacked
 from models.engines.braking import Carried
 from validation.price import runner as cost
 from validation.price.problems import braking_stop
-from validation.price.problems.braking_stop import (
-    EULER,
-    FULL,
-    LITERAL,
-    OURS,
-    QUICK,
-    RK4,
-    VEHICLE,
-    BrakingStop,
-    Played,
-)
+from validation.price.problems.braking_stop import EULER, FULL, LITERAL, OURS, QUICK, RK4, VEHICLE, BrakingStop, Played
 
 
 @pytest.fixture(scope="module")
@@ -48,8 +38,18 @@ def test_the_reference_knows_itself_and_where_friction_changes(short, monkeypatc
 @pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
 def test_an_engine_that_carries_the_chassis_gives_the_digits_of_the_exact_wheel(short, engine):
     """What the problem's note says: rounding of some hundred steps of 10 mm, 1e-14 m each."""
-    stop = Braked(VEHICLE.plane, np.zeros(1, dtype=np.int64), stacked(short._tables), 1.0, short._road, short._brakes,
-                  short._chambers, np.zeros(1), substeps=2, engine=Carried(engine, VEHICLE.plane))  # fmt: skip
+    stop = Braked(
+        VEHICLE.plane,
+        np.zeros(1, dtype=np.int64),
+        stacked(short._tables),
+        1.0,
+        short._road,
+        short._brakes,
+        short._chambers,
+        np.zeros(1),
+        substeps=2,
+        engine=Carried(engine, VEHICLE.plane),
+    )
     path = stop.run(Played(short.valves), 2.0)
     assert path.stands and path.states[-1, 0, 0] == pytest.approx(short._ours(2).distance, abs=1e-12)
 

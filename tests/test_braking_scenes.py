@@ -28,35 +28,41 @@ def scene(**tables):
     return build({**PLAIN, **tables}, "s.toml")
 
 
-@pytest.mark.parametrize(("tables", "place", "said"), [
-    ({"procedures": {}}, "procedures", "at least 1"),
-    ({"procedures": {"a": {"kind": "jturn"}}}, "procedures.a.kind", "j_turn"),
-    ({"procedures": {"a": {"kind": "j_turn"}}}, "procedures.a.steer", "missing"),
-    ({"procedures": {"a": {"steer": 0.1}}}, "procedures.a.steer", "no meaning for straight"),
-    ({"procedures": {"a": {"kind": "turn", "radius": 1.0}}}, "procedures.a.radius", "at least 10 m"),
-    ({"procedures": {"a": {"speed": 200.0}}}, "procedures.a.speed", "100 m/s"),
-    ({"brakes": {"front": {"gradient": 9.0, "push_outt": 1.0}}}, "brakes.front.push_outt", "push_out"),
-    ({"run": {"sample": 5.5}}, "run.sample", "0.1 s"),
-    ({"loadtransfer": {}}, "loadtransfer", "load_transfer"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("tables", "place", "said"),
+    [
+        ({"procedures": {}}, "procedures", "at least 1"),
+        ({"procedures": {"a": {"kind": "jturn"}}}, "procedures.a.kind", "j_turn"),
+        ({"procedures": {"a": {"kind": "j_turn"}}}, "procedures.a.steer", "missing"),
+        ({"procedures": {"a": {"steer": 0.1}}}, "procedures.a.steer", "no meaning for straight"),
+        ({"procedures": {"a": {"kind": "turn", "radius": 1.0}}}, "procedures.a.radius", "at least 10 m"),
+        ({"procedures": {"a": {"speed": 200.0}}}, "procedures.a.speed", "100 m/s"),
+        ({"brakes": {"front": {"gradient": 9.0, "push_outt": 1.0}}}, "brakes.front.push_outt", "push_out"),
+        ({"run": {"sample": 5.5}}, "run.sample", "0.1 s"),
+        ({"loadtransfer": {}}, "loadtransfer", "load_transfer"),
+    ],
+)
 def test_what_a_scene_cannot_be_is_told_by_its_key(tables, place, said):
     with pytest.raises(InputError) as error:
         scene(**tables)
     assert error.value.file == "s.toml" and error.value.place == place and said in str(error.value)
 
 
-@pytest.mark.parametrize(("tables", "place", "said"), [
-    ({"controller": {"kind": "slip_bangbang"}}, "controller.kind", "slip_bang_bang"),
-    ({"controller": {"kind": "slip_pi", "parameters": {"gian": 1.0}}}, "controller.parameters.gian", "gain"),
-    ({"controller": {"kind": "slip_pi", "parameters": {"gain": -1.0}}}, "controller.parameters.gain", "above 0"),
-    ({"road": {"stretches": [{"left": "icy"}]}}, "road.stretches", "ice"),
-    ({"road": {"stretches": [{"x": 5.0, "left": "ice"}, {"x": 5.0, "left": "dry"}]}}, "road.stretches", "rise"),
-    ({"vehicle": {"parameters": "papr"}}, "vehicle.parameters", "paper"),
-    ({"vehicle": {"override": {"mas": 1.0}}}, "vehicle.override.mas", "mass"),
-    ({"brakes": {"front": {"gradient": 1.0, "release": 1.0}}}, "brakes.front", "push_out"),
-    ({"tyres": {"scale": {"ice": 3.0}}}, "tyres.scale.ice", "at most 2"),
-    ({"tyres": {"scale": {"icee": 1.1}}}, "tyres.scale.icee", "no such surface"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("tables", "place", "said"),
+    [
+        ({"controller": {"kind": "slip_bangbang"}}, "controller.kind", "slip_bang_bang"),
+        ({"controller": {"kind": "slip_pi", "parameters": {"gian": 1.0}}}, "controller.parameters.gian", "gain"),
+        ({"controller": {"kind": "slip_pi", "parameters": {"gain": -1.0}}}, "controller.parameters.gain", "above 0"),
+        ({"road": {"stretches": [{"left": "icy"}]}}, "road.stretches", "ice"),
+        ({"road": {"stretches": [{"x": 5.0, "left": "ice"}, {"x": 5.0, "left": "dry"}]}}, "road.stretches", "rise"),
+        ({"vehicle": {"parameters": "papr"}}, "vehicle.parameters", "paper"),
+        ({"vehicle": {"override": {"mas": 1.0}}}, "vehicle.override.mas", "mass"),
+        ({"brakes": {"front": {"gradient": 1.0, "release": 1.0}}}, "brakes.front", "push_out"),
+        ({"tyres": {"scale": {"ice": 3.0}}}, "tyres.scale.ice", "at most 2"),
+        ({"tyres": {"scale": {"icee": 1.1}}}, "tyres.scale.icee", "no such surface"),
+    ],
+)
 def test_what_reading_does_not_find_is_refused_before_a_run(tables, place, said):
     with pytest.raises(InputError) as error:
         check(scene(**tables), ())
@@ -125,11 +131,14 @@ def test_the_system_whose_adhesion_is_measured_is_the_one_behind_the_port(tmp_pa
     (tmp_path / "mine.py").write_text(
         "import numpy as np\nfrom models.braking.controller import Command\nclass Released:\n"
         "    def __init__(self, wheels): pass\n"
-        "    def sample(self, given): return Command(pressures=np.full(4, 0.5))\n")  # fmt: skip
+        "    def sample(self, given): return Command(pressures=np.full(4, 0.5))\n"
+    )
     tables = {**PLAIN, "run": {"duration": 60.0}, "controller": {"kind": "slip_bang_bang"}}
     port = {"callable": "mine.py:Released", "timeout": 60.0, "start": 60.0}
-    own, others = (utilisation(build({**tables, **more}, "s.toml", tmp_path), "ice", Adhesion(0.17, 0.17)).z
-                   for more in ({}, {"port": port}))  # fmt: skip
+    own, others = (
+        utilisation(build({**tables, **more}, "s.toml", tmp_path), "ice", Adhesion(0.17, 0.17)).z
+        for more in ({}, {"port": port})
+    )
     expected = 0.5 * 2 * (1500.0 + 1200.0) / 0.5 / (5640.0 * 9.81 + 2 * (13.35 + 27.0) / 0.25 * 9.81)
     assert others == pytest.approx(expected, rel=0.02) and own > 1.3 * others
 
@@ -168,12 +177,19 @@ def test_the_braking_scene_of_the_readme_is_valid():
     check(build(tomllib.loads(block), "README.md"), ())
 
 
-@pytest.mark.parametrize(("tables", "place", "said"), [
-    ({"controller": {"kind": "slip_pi", "parameters": {"gian": 1.0}}}, "controller.parameters.gian", "gain"),
-    ({"tyres": {"files": {"ice": "tyre.csv"}}}, "line 1 (header), column 'slip', unit", "not known"),
-    ({"port": {"fmu": "no.fmu"}}, "port.fmu", "no such file"),
-    ({"port": {"replay": "tyre.csv", "faults": [{"kind": "lost", "wheels": [4]}]}}, "port.faults.0.wheels", "0 to 3"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("tables", "place", "said"),
+    [
+        ({"controller": {"kind": "slip_pi", "parameters": {"gian": 1.0}}}, "controller.parameters.gian", "gain"),
+        ({"tyres": {"files": {"ice": "tyre.csv"}}}, "line 1 (header), column 'slip', unit", "not known"),
+        ({"port": {"fmu": "no.fmu"}}, "port.fmu", "no such file"),
+        (
+            {"port": {"replay": "tyre.csv", "faults": [{"kind": "lost", "wheels": [4]}]}},
+            "port.faults.0.wheels",
+            "0 to 3",
+        ),
+    ],
+)
 def test_what_a_scene_names_is_read_before_its_plan_is_shown(tmp_path, tables, place, said):
     (tmp_path / "tyre.csv").write_text("slip [furlong]\n1\n")
     with pytest.raises(InputError, match=said) as error:
@@ -181,12 +197,15 @@ def test_what_a_scene_names_is_read_before_its_plan_is_shown(tmp_path, tables, p
     assert error.value.place == place
 
 
-@pytest.mark.parametrize(("port", "place", "said"), [
-    ({"callable": "models.braking.port.example:Exampel"}, "port.callable", "Example"),
-    ({"command": ["/no/such/program"]}, "port.command", "cannot be started"),
-    ({"replay": "s.log"}, "port.replay", "is no log"),
-    ({"fmu": "s.log"}, "port.fmu", "is no FMU"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("port", "place", "said"),
+    [
+        ({"callable": "models.braking.port.example:Exampel"}, "port.callable", "Example"),
+        ({"command": ["/no/such/program"]}, "port.command", "cannot be started"),
+        ({"replay": "s.log"}, "port.replay", "is no log"),
+        ({"fmu": "s.log"}, "port.fmu", "is no FMU"),
+    ],
+)
 def test_what_is_wrong_behind_the_port_is_told_by_the_scene_s_key(tmp_path, port, place, said):
     (tmp_path / "s.log").write_text("x")
     with pytest.raises(InputError, match=said) as error:
@@ -194,13 +213,16 @@ def test_what_is_wrong_behind_the_port_is_told_by_the_scene_s_key(tmp_path, port
     assert error.value.file == "s.toml" and error.value.place == place
 
 
-@pytest.mark.parametrize(("port", "engines", "said"), [
-    ({"log": "{engine}.log"}, ("reference",), r"{procedure} in it: 2"),
-    ({"log": "{procedure}.log"}, ("reference", "mujoco"), r"{engine} in it: 2"),
-    ({"log": "none/{procedure}.log"}, ("reference",), "no such folder"),
-    ({"log": "{procedure}.csv"}, ("reference",), "is no log"),
-    ({"log": ".{procedure}"}, ("reference",), "is a folder"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("port", "engines", "said"),
+    [
+        ({"log": "{engine}.log"}, ("reference",), r"{procedure} in it: 2"),
+        ({"log": "{procedure}.log"}, ("reference", "mujoco"), r"{engine} in it: 2"),
+        ({"log": "none/{procedure}.log"}, ("reference",), "no such folder"),
+        ({"log": "{procedure}.csv"}, ("reference",), "is no log"),
+        ({"log": ".{procedure}"}, ("reference",), "is a folder"),
+    ],
+)
 def test_a_log_that_another_drive_or_file_would_lose_is_refused(tmp_path, port, engines, said):
     (tmp_path / "b.csv").write_text("mine")
     (tmp_path / ".b").mkdir()

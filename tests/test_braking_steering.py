@@ -16,8 +16,16 @@ STEPS = np.linspace(0.0, 8.0, 80_001)
 
 def scene(**procedure):
     own = {"kind": "j_turn", "speed": 10.0, **procedure}
-    return build({"title": "t", "system": "braking", "road": {"stretches": [{"left": "dry"}]}, "procedures": {"j": own},
-                  "run": {"duration": 0.3}}, "s.toml")  # fmt: skip
+    return build(
+        {
+            "title": "t",
+            "system": "braking",
+            "road": {"stretches": [{"left": "dry"}]},
+            "procedures": {"j": own},
+            "run": {"duration": 0.3},
+        },
+        "s.toml",
+    )
 
 
 def test_response_of_first_and_second_order():
@@ -48,8 +56,12 @@ def test_the_response_of_a_vehicle_is_that_of_the_linear_one():
     each = surface("dry").cornering * mass * GRAVITY
     front, rear = each * b / (a + b), each * a / (a + b)
     turned, damped = a * front - b * rear, a * a * front + b * b * rear
-    system = np.array([[-(front + rear) / (mass * speed), -speed - turned / (mass * speed)],
-                       [-turned / (inertia * speed), -damped / (inertia * speed)]])  # fmt: skip
+    system = np.array(
+        [
+            [-(front + rear) / (mass * speed), -speed - turned / (mass * speed)],
+            [-turned / (inertia * speed), -damped / (inertia * speed)],
+        ]
+    )
     given = lti(system, np.array([[front / mass], [a * front / inertia]]), np.array([[0.0, 1.0]]), 0.0)
     _, rates, _ = given.output(np.interp(STEPS, [0.0, ramp], [0.0, angle]), STEPS)
     wanted = response(STEPS, rates, ramp / 2.0)
@@ -67,15 +79,18 @@ def test_a_ramp_begins_with_straight_wheels():
     assert not ready(scene(steering=[[0.0, 0.0], [0.2, 0.03]]), "j")[0].steer.any()
 
 
-@pytest.mark.parametrize(("own", "place", "said"), [
-    ({}, "steer", "steer or steering"),
-    ({"steer": 0.1, "steering": [[0.0, 0.1]]}, "steering", "beside steer"),
-    ({"steering": [[0.0, 0.0], [0.0, 0.1]]}, "steering", "rise from knot to knot"),
-    ({"steering": [[-1.0, 0.0], [0.0, 0.1]]}, "steering", "from 0 on"),
-    ({"steering": [[0.0, 3.0]]}, "steering", "1 rad"),
-    ({"steering": [[0.0, 0.0, 1.0]]}, "steering.0", "at most 2"),
-    ({"kind": "straight", "steering": [[0.0, 0.1]]}, "steering", "no meaning for straight"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("own", "place", "said"),
+    [
+        ({}, "steer", "steer or steering"),
+        ({"steer": 0.1, "steering": [[0.0, 0.1]]}, "steering", "beside steer"),
+        ({"steering": [[0.0, 0.0], [0.0, 0.1]]}, "steering", "rise from knot to knot"),
+        ({"steering": [[-1.0, 0.0], [0.0, 0.1]]}, "steering", "from 0 on"),
+        ({"steering": [[0.0, 3.0]]}, "steering", "1 rad"),
+        ({"steering": [[0.0, 0.0, 1.0]]}, "steering.0", "at most 2"),
+        ({"kind": "straight", "steering": [[0.0, 0.1]]}, "steering", "no meaning for straight"),
+    ],
+)
 def test_steering_that_a_procedure_cannot_have(own, place, said):
     with pytest.raises(InputError, match=said) as error:
         scene(**own)

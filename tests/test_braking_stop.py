@@ -31,13 +31,20 @@ def test_the_exact_way_of_a_wheel_that_locks_at_once_is_that_of_sliding():
     assert exact(case.FRONT, tyre, 1e7, 11.11) == pytest.approx(slide, rel=1e-4)  # it locks within a millisecond
 
 
-@pytest.mark.parametrize(("row", "column", "value", "said"), [
-    (2, 3, -1e-9, "turns backwards"), (1, 3, 20.1, "turns faster than it rolls"), (3, 2, 1e-4, "creeps"),
-    (3, 1, 5.001, "creeps"), (1, 2, np.nan, "no number"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("row", "column", "value", "said"),
+    [
+        (2, 3, -1e-9, "turns backwards"),
+        (1, 3, 20.1, "turns faster than it rolls"),
+        (3, 2, 1e-4, "creeps"),
+        (3, 1, 5.001, "creeps"),
+        (1, 2, np.nan, "no number"),
+    ],
+)
 def test_each_rule_of_a_stop_is_seen_to_break(row, column, value, said):
-    path = np.array([[0.0, 0.0, 10.0, 20.0, 0.0], [0.5, 4.0, 5.0, 9.0, 0.0], [1.0, 5.0, 0.0, 0.0, 0.0],
-                     [1.5, 5.0, 0.0, 0.0, 0.0]])  # fmt: skip
+    path = np.array(
+        [[0.0, 0.0, 10.0, 20.0, 0.0], [0.5, 4.0, 5.0, 9.0, 0.0], [1.0, 5.0, 0.0, 0.0, 0.0], [1.5, 5.0, 0.0, 0.0, 0.0]]
+    )
     assert case.faults_of(Stop(path, 2), 0.5, True) == []
     path[row, column] = value
     assert said in case.faults_of(Stop(path, 2), 0.5, True)

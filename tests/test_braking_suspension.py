@@ -20,12 +20,18 @@ TORQUES = Torques(600.0, 600.0, 200.0, 200.0)
 
 def scene(**tables):
     """The car on wet road, with what ``tables`` change."""
-    return build({
-        "title": "car", "system": "braking", "vehicle": {"file": "r19_free", "spin_inertia": 1.7},
-        "road": {"stretches": [{"left": "wet"}]},
-        "brakes": {"front": {"gradient": 300.0}, "rear": {"gradient": 100.0}, "supply": 2.0},
-        "procedures": {"straight": {"speed": 3.0}, "turn": {"kind": "turn", "speed": 6.0, "radius": 40.0}}, **tables,
-    }, "scene.toml")  # fmt: skip
+    return build(
+        {
+            "title": "car",
+            "system": "braking",
+            "vehicle": {"file": "r19_free", "spin_inertia": 1.7},
+            "road": {"stretches": [{"left": "wet"}]},
+            "brakes": {"front": {"gradient": 300.0}, "rear": {"gradient": 100.0}, "supply": 2.0},
+            "procedures": {"straight": {"speed": 3.0}, "turn": {"kind": "turn", "speed": 6.0, "radius": 40.0}},
+            **tables,
+        },
+        "scene.toml",
+    )
 
 
 def test_locked_wheels_pitch_and_load_the_box_as_springs_in_series_do():
@@ -56,8 +62,10 @@ def test_mirrored_steering_gives_a_mirrored_stop_and_none_gives_no_yaw():
 
 
 def test_engines_agree():
-    ends = [braked(car(), surface("wet"), engine, 0.05, 1e-3).run(TORQUES, 4.0, 0.2).states[-1]
-            for engine in ("mujoco", "exudyn")]  # fmt: skip
+    ends = [
+        braked(car(), surface("wet"), engine, 0.05, 1e-3).run(TORQUES, 4.0, 0.2).states[-1]
+        for engine in ("mujoco", "exudyn")
+    ]
     assert ends[0] == pytest.approx(ends[1], abs=1e-9)  # the same forces and Runge-Kutta method
 
 
@@ -94,12 +102,13 @@ def test_a_scene_is_marched_by_an_engine_with_its_steady_turn_and_reports_the_bo
 
 
 def test_what_a_vehicle_file_has_no_place_for_is_refused():
-    for place, tables in (("load_transfer", {"load_transfer": {}}),
-                          ("relaxation", {"relaxation": {"front": 1.0, "rear": 1.0}}),
-                          ("vehicle.spin_inertia", {"vehicle": {"file": "r19_free"}}),
-                          ("vehicle.override", {"vehicle": {"file": "r19_free", "spin_inertia": 1.0,
-                                                            "override": {"mass": 1.0}}}),
-                          ("vehicle.spin_inertia", {"vehicle": {"spin_inertia": 1.0}})):  # fmt: skip
+    for place, tables in (
+        ("load_transfer", {"load_transfer": {}}),
+        ("relaxation", {"relaxation": {"front": 1.0, "rear": 1.0}}),
+        ("vehicle.spin_inertia", {"vehicle": {"file": "r19_free"}}),
+        ("vehicle.override", {"vehicle": {"file": "r19_free", "spin_inertia": 1.0, "override": {"mass": 1.0}}}),
+        ("vehicle.spin_inertia", {"vehicle": {"spin_inertia": 1.0}}),
+    ):
         with pytest.raises(InputError) as told:
             scene(**tables)
         assert told.value.place == place

@@ -10,8 +10,21 @@ import slow_machine
 
 from validation.run import CASES, seeds
 
-QUICK = ("audit", "twin", "order", "tight", "enforced_moment", "roads", "motion", "score", "ensemble",
-         "growth", "drift_off", "drift_solvers", "holding_spring")  # fmt: skip
+QUICK = (
+    "audit",
+    "twin",
+    "order",
+    "tight",
+    "enforced_moment",
+    "roads",
+    "motion",
+    "score",
+    "ensemble",
+    "growth",
+    "drift_off",
+    "drift_solvers",
+    "holding_spring",
+)
 """Cases whose rows no other test file runs as a whole."""
 
 

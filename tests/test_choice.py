@@ -26,9 +26,14 @@ ROAD = {"source": "study", "speed": 20.0}
 def half_car(**more):
     from models.scene import build
 
-    table = {"title": "t", "study": "choice", "quantities": ["pitch", "rms f1"], "tolerance": 0.02,
-             "run": {"duration": 0.96, "step": 1e-3},
-             "effects": {"road": ROAD, "pitch_spring": {"stiffness": 100.0}}}  # fmt: skip
+    table = {
+        "title": "t",
+        "study": "choice",
+        "quantities": ["pitch", "rms f1"],
+        "tolerance": 0.02,
+        "run": {"duration": 0.96, "step": 1e-3},
+        "effects": {"road": ROAD, "pitch_spring": {"stiffness": 100.0}},
+    }
     return build(table | more, "t")
 
 
@@ -52,8 +57,11 @@ class Made(Variants):
     def __init__(self, function, effects):
         self.function, self.names, self.calls, self._kept, self._costs = function, effects, 0, {}, {}
         self.scene, self.engine = type("Made", (), {"file": "t", "system": "made"}), ""
-        self.system = type("System", (), {"WINDOWED": False, "parts": staticmethod(lambda scene: 4),
-                                          "steps": staticmethod(lambda scene: 4)})  # fmt: skip
+        self.system = type(
+            "System",
+            (),
+            {"WINDOWED": False, "parts": staticmethod(lambda scene: 4), "steps": staticmethod(lambda scene: 4)},
+        )
 
     @property
     def effects(self):
@@ -146,8 +154,15 @@ def test_steps_of_the_screen_are_shorter_where_a_run_fails_late(monkeypatch):
 def hub_forces(**more):
     from models.hub_forces.scene import build
 
-    table = {"title": "t", "system": "hub-forces", "effects": "auto", "quantities": ["rms z"], "tolerance": 0.05,
-             "vehicle": {"file": "r19_free", "chassis": "body"}, "road": {"iso8608": "B", "speed": 20.0}}  # fmt: skip
+    table = {
+        "title": "t",
+        "system": "hub-forces",
+        "effects": "auto",
+        "quantities": ["rms z"],
+        "tolerance": 0.05,
+        "vehicle": {"file": "r19_free", "chassis": "body"},
+        "road": {"iso8608": "B", "speed": 20.0},
+    }
     return build(table | {"run": {"duration": 0.5, "step": 1e-3}, "forces": {"sampling_rate": 500.0}} | more, "t")
 
 
@@ -188,10 +203,17 @@ def test_a_spring_that_hardly_pulls_goes_and_the_road_stays():
     assert "road" not in own.choose().left_out
 
 
-@pytest.mark.parametrize(("change", "place"), [
-    ({"quantities": []}, "quantities"), ({"tolerance": 2.0}, "tolerance"), ({"study": "single_run"}, "quantities"),
-    ({"effects": "auto", "study": "single_run"}, "study"), ({"effects": "all"}, "effects"),
-    ({"quantities": ["pitch", "f1", "pitch"]}, "quantities")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        ({"quantities": []}, "quantities"),
+        ({"tolerance": 2.0}, "tolerance"),
+        ({"study": "single_run"}, "quantities"),
+        ({"effects": "auto", "study": "single_run"}, "study"),
+        ({"effects": "all"}, "effects"),
+        ({"quantities": ["pitch", "f1", "pitch"]}, "quantities"),
+    ],
+)
 def test_half_a_question_is_refused_with_its_place(change, place):
     with pytest.raises(InputError) as error:
         half_car(**change)
@@ -201,8 +223,17 @@ def test_half_a_question_is_refused_with_its_place(change, place):
 def test_auto_alone_names_the_study():
     from models.rail.scene import build
 
-    scene = build({"title": "t", "system": "wheelset", "effects": "auto", "quantities": ["y"], "tolerance": 0.01,
-                   "speeds": {"values": [10.0]}}, "t")  # fmt: skip
+    scene = build(
+        {
+            "title": "t",
+            "system": "wheelset",
+            "effects": "auto",
+            "quantities": ["y"],
+            "tolerance": 0.01,
+            "speeds": {"values": [10.0]},
+        },
+        "t",
+    )
     assert scene.study == "choice" and scene.tolerance == 0.01
 
 

@@ -21,9 +21,11 @@ pytestmark = pytest.mark.usefixtures("empty_folder")
 
 def imported(*args):
     """Heavy packages that a fresh process has imported once the command has ended."""
-    code = ("import sys; from studies.command_line import main; sys.argv = ['twinrig', *sys.argv[1:]]\n"
-            "try: main()\nexcept SystemExit as e: assert not e.code\n"
-            f"print('\\n' + ' '.join(m for m in {HEAVY} if m in sys.modules))")
+    code = (
+        "import sys; from studies.command_line import main; sys.argv = ['twinrig', *sys.argv[1:]]\n"
+        "try: main()\nexcept SystemExit as e: assert not e.code\n"
+        f"print('\\n' + ' '.join(m for m in {HEAVY} if m in sys.modules))"
+    )
     done = subprocess.run([sys.executable, "-c", code, *args], capture_output=True, text=True, check=True)
     return set(done.stdout.splitlines()[-1].split())
 
@@ -52,9 +54,19 @@ def test_list_imports_no_engine_and_names_everything(twinrig, capsys):
 def test_show_says_what_each_engine_will_compute(twinrig, capsys):
     assert twinrig("show", "study_road", *SHORT, "--set", "effects.pitch_spring.stiffness=5") == 0
     said = capsys.readouterr().out
-    for words in ("Pitch-plane vehicle", "eq. 38", "chassis", "750 kg, 500 kg m^2", "5 N m/rad", "z1 0.0191",
-                  "pitch_rate", "road: height", "absent     accelerometers, contact_points",
-                  "f1, f2, f3, f4", "native items"):
+    for words in (
+        "Pitch-plane vehicle",
+        "eq. 38",
+        "chassis",
+        "750 kg, 500 kg m^2",
+        "5 N m/rad",
+        "z1 0.0191",
+        "pitch_rate",
+        "road: height",
+        "absent     accelerometers, contact_points",
+        "f1, f2, f3, f4",
+        "native items",
+    ):
         assert words in said
     rows = {line.split()[0]: line.split() for line in said.splitlines()[-3:]}
     assert rows["reference"][1:6] == ["RK4", "4", "0.001", "s", "50"]
@@ -176,8 +188,9 @@ def test_the_console_command_is_this_one():
 
 
 def test_a_price_says_before_it_runs_code_of_the_user(twinrig, empty_folder, capsys, monkeypatch):
-    (empty_folder / "scene.toml").write_text('title = "t"\nsystem = "braking"\n[procedures.p]\nspeed = 11.1\n'
-                                             '[port]\ncallable = "mine.py:Mine"\n')
+    (empty_folder / "scene.toml").write_text(
+        'title = "t"\nsystem = "braking"\n[procedures.p]\nspeed = 11.1\n[port]\ncallable = "mine.py:Mine"\n'
+    )
     (empty_folder / "mine.py").write_text("class Mine: pass\n")
     said = []
 

@@ -48,19 +48,24 @@ def test_another_step_is_read_by_a_spline_and_said(run, tmp_path):
     assert states["pitch"].note and states["pitch"].largest < 1e-7  # order 4 and a cubic spline on 0.25 ms
 
 
-@pytest.mark.parametrize(("first", "second", "said"), [
-    ("t [s],x [m]\n0,1\n1,2\n", "t [s],x [mm]\n0,1\n1,2\n", "the other one is in m"),
-    ("v,x\n0,1\n1,2\n", "v,x\n0,1\n3,2\n", "at other places .v. than the first$"),
-    ("v,x\n0,1\n1e-10,2\n", "v,x\n0,1\n2e-10,2\n", "at other places"),
-    ("v,x\n0,1\n1,2\n", "v,x\n0,1\n", "at other places .v. than the first, 1 instead of 2"),
-    ("name,x\na,1\nb,2\n", "name,x\nb,1\na,2\n", "other rows than the first, which has 'a' there"),
-    ("v,x\n0,1\n", "v,x\n", "has no rows"),
-    ("v,x\n0,1\n", "v,x,x\n0,1,2\n", "two columns are called 'x'"),
-    ("time [s],x\n0,1\n1,2\n", "time [s],x\n0,1\n2,3\n1,7\n4,6\n", "do not increase"),
-    ("time [s],x\n0,1\n1,2\n", "time [s],x\n0,1\n0.5,\n1,2\n2,6\n", "holds what is no number"),
-    ("v,x\n0,1\n1,2\n", "v,y\n0,1\n1,2\n", "no quantity in common"),
-    ("v,x\n0,1\n1,2\n", "", "not a table of results"),
-    ("v,x\n0,1\n1,2\n", "v,x\n0\n", "not a table of results")], ids=str)  # fmt: skip
+@pytest.mark.parametrize(
+    ("first", "second", "said"),
+    [
+        ("t [s],x [m]\n0,1\n1,2\n", "t [s],x [mm]\n0,1\n1,2\n", "the other one is in m"),
+        ("v,x\n0,1\n1,2\n", "v,x\n0,1\n3,2\n", "at other places .v. than the first$"),
+        ("v,x\n0,1\n1e-10,2\n", "v,x\n0,1\n2e-10,2\n", "at other places"),
+        ("v,x\n0,1\n1,2\n", "v,x\n0,1\n", "at other places .v. than the first, 1 instead of 2"),
+        ("name,x\na,1\nb,2\n", "name,x\nb,1\na,2\n", "other rows than the first, which has 'a' there"),
+        ("v,x\n0,1\n", "v,x\n", "has no rows"),
+        ("v,x\n0,1\n", "v,x,x\n0,1,2\n", "two columns are called 'x'"),
+        ("time [s],x\n0,1\n1,2\n", "time [s],x\n0,1\n2,3\n1,7\n4,6\n", "do not increase"),
+        ("time [s],x\n0,1\n1,2\n", "time [s],x\n0,1\n0.5,\n1,2\n2,6\n", "holds what is no number"),
+        ("v,x\n0,1\n1,2\n", "v,y\n0,1\n1,2\n", "no quantity in common"),
+        ("v,x\n0,1\n1,2\n", "", "not a table of results"),
+        ("v,x\n0,1\n1,2\n", "v,x\n0\n", "not a table of results"),
+    ],
+    ids=str,
+)
 def test_tables_that_do_not_fit_are_refused(tmp_path, first, second, said):
     for name, text in (("a.csv", first), ("b.csv", second)):
         (tmp_path / name).write_text(text)
@@ -72,16 +77,24 @@ def test_channels_over_more_than_time_are_compared_by_what_their_places_are_call
     """Swapped engines, or other speeds, are no equal entries."""
     import xarray as xr
 
-    data = xr.Dataset({"load": (("engine", "speed"), np.arange(6.0).reshape(2, 3), {"units": "N"})},
-                      {"engine": ["exudyn", "mujoco"], "speed": [5.0, 10.0, 15.0]})  # fmt: skip
-    for name, each in {"a": data, "swapped": data.isel(engine=[1, 0]), "one": data.isel(engine=[0]),
-                       "kicked": data + 0.5 * ((data.speed == 10.0) & (data.engine == "mujoco")),
-                       "faster": data.assign_coords(speed=data.speed * 1.5)}.items():  # fmt: skip
+    data = xr.Dataset(
+        {"load": (("engine", "speed"), np.arange(6.0).reshape(2, 3), {"units": "N"})},
+        {"engine": ["exudyn", "mujoco"], "speed": [5.0, 10.0, 15.0]},
+    )
+    for name, each in {
+        "a": data,
+        "swapped": data.isel(engine=[1, 0]),
+        "one": data.isel(engine=[0]),
+        "kicked": data + 0.5 * ((data.speed == 10.0) & (data.engine == "mujoco")),
+        "faster": data.assign_coords(speed=data.speed * 1.5),
+    }.items():
         each["load"].attrs["units"] = "N"
         each.to_netcdf(tmp_path / f"{name}.nc", engine="h5netcdf")
     found, notes = compare(tmp_path / "a.nc", tmp_path / "kicked.nc")
     assert [(one.name, one.largest, one.where) for one in found] == [
-        ("load, mujoco", 0.5, "speed = 10"), ("load, exudyn", 0.0, "speed = 5")] and not notes  # fmt: skip
+        ("load, mujoco", 0.5, "speed = 10"),
+        ("load, exudyn", 0.0, "speed = 5"),
+    ] and not notes
     assert not any(one.largest for one in compare(tmp_path / "a.nc", tmp_path / "swapped.nc")[0])
     found, notes = compare(tmp_path / "a.nc", tmp_path / "one.nc")
     assert len(found) == 1 and "load, mujoco" in notes[0]

@@ -13,8 +13,13 @@ import models
 from models import compiled
 from models.engines.reference import derivative_of, march_of
 
-MODES = (("road", "exact"), ("road", "linear"), ("force", "exact"), ("force-body", "exact"),
-         ("force", "exact", "springs"))
+MODES = (
+    ("road", "exact"),
+    ("road", "linear"),
+    ("force", "exact"),
+    ("force-body", "exact"),
+    ("force", "exact", "springs"),
+)
 
 
 def test_no_two_kernels_share_a_cache_file():
@@ -65,8 +70,9 @@ def answers(folder, name, *factors):
     (folder / "factory.py").write_text(FACTORY.replace("NAMED", name))
     command = [sys.executable, "-c", f"from factory import kernel; print([kernel(f)(1.0) for f in {list(factors)}])"]
     path = os.pathsep.join([str(folder), str(Path(models.__file__).parents[1])])
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True,
-                          env={**os.environ, "PYTHONPATH": path})  # fmt: skip
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": path}
+    )
     return json.loads(done.stdout)
 
 
@@ -81,6 +87,7 @@ def test_closures_of_one_factory_never_stand_in_for_one_another(tmp_path):
 def test_a_change_of_the_equations_is_seen(tmp_path):
     """Copy the package, run, change a sign in the equations, run again: the answer must change."""
     import shutil
+
     copy = tmp_path / "models"
     shutil.copytree(Path(models.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
     script = (
@@ -100,8 +107,12 @@ def test_a_change_of_the_equations_is_seen(tmp_path):
 
 
 def test_machine_code_is_as_old_as_the_kernels_that_its_file_imports_from_other_folders(tmp_path, monkeypatch):
-    for name, text in (("a/mine.py", "from models.b.theirs import (  # both\n    f,\n    g,\n)"),
-                       ("b/theirs.py", "from models.c import deep as d"), ("c/deep.py", ""), ("c/other.py", "")):
+    for name, text in (
+        ("a/mine.py", "from models.b.theirs import (  # both\n    f,\n    g,\n)"),
+        ("b/theirs.py", "from models.c import deep as d"),
+        ("c/deep.py", ""),
+        ("c/other.py", ""),
+    ):
         path = tmp_path / "models" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f"from models.compiled import lean\n{text}\n")

@@ -41,8 +41,9 @@ def test_forces_are_those_of_the_package():
         np.testing.assert_allclose(f[k : k + 4], expected, rtol=1e-11, atol=1e-7)
 
 
-@pytest.mark.parametrize(("count", "theory", "cells"), [(1, "fastsim", 7), (4, "fastsim", 21), (8, "linear", 21),
-                                                        (1, "simplified", 7)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("count", "theory", "cells"), [(1, "fastsim", 7), (4, "fastsim", 21), (8, "linear", 21), (1, "simplified", 7)]
+)
 def test_both_engines_give_one_path(count, theory, cells):
     wheels = Wheels(count, theory, cells)
     path = native(wheels, np.concatenate(wheels.state())[None])[0, -1]
@@ -97,8 +98,18 @@ def test_what_no_kernel_can_answer_is_no_path():
         Rolling(wheels, Forces(wheels).of).run(q, v, 5)
 
 
-@pytest.mark.parametrize("wrong", [{"count": 0}, {"count": 1.5}, {"speed": float("inf")}, {"load": float("nan")},
-                                   {"cells": 2}, {"theory": "hertz"}, {"theory": "simplified", "cells": 2}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"count": 0},
+        {"count": 1.5},
+        {"speed": float("inf")},
+        {"load": float("nan")},
+        {"cells": 2},
+        {"theory": "hertz"},
+        {"theory": "simplified", "cells": 2},
+    ],
+)
 def test_wheels_that_are_none(wrong):
     with pytest.raises(InputError):
         _ = Wheels(**wrong).numbers

@@ -23,32 +23,40 @@ friction = 0.3
 [creepage]
 xi_x = 1e-3
 """
-TABLE = {"title": "a contact", "system": "contact", "ellipse": {"a": 5e-3, "b": 4e-3},
-         "contact": {"load": 8e4, "friction": 0.3}}  # fmt: skip
+TABLE = {
+    "title": "a contact",
+    "system": "contact",
+    "ellipse": {"a": 5e-3, "b": 4e-3},
+    "contact": {"load": 8e4, "friction": 0.3},
+}
 pytestmark = pytest.mark.usefixtures("empty_folder")
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    ("ellipse.a=-1e-3", ("ellipse.a = -0.001", "above 0", "semi-axis along x", "in m")),
-    ("ellipse.c=1e-3", ("ellipse.c", "unknown key", "a, b")),
-    ("curvatures.A=1.0", ("curvatures.B", "is missing")),
-    ("contact.load=-1", ("contact.load = -1", "above 0", "in N")),
-    ("contact.load=1e12", ("c.toml", "contact.load = 1000000000000.0", "at most 1e+10 N")),
-    ("contact.friction=30", ("contact.friction = 30", "at most 10")),
-    ("creepage.spin=-1e12", ("creepage.spin", "1e+09 1/m")),
-    ("contact.approach=1e-4", ("contact.load = 80000.0", "either the load in N or contact.approach in m")),
-    ("contact.frction=0.3", ("unknown key", "did you mean 'friction'?")),
-    ("bodies.wheel.E=2.1e5", ("bodies.wheel", "E = 210000.0", "Young's modulus", "Pa")),
-    ("creepage.xi_x=fast", ("creepage.xi_x = 'fast'", "must be a number", "longitudinal creepage")),
-    ("sweep.of=xi", ("sweep.of", "xi_x or xi_y or spin", "also wrong: sweep.start, sweep.stop")),
-    ("method.name=fastsm", ("method.name", "did you mean 'fastsim'?")),
-    ("method.cells=4", ("method.cells = 4", "5 or more")),
-    ("cases.file=x.csv", ("ellipse, cases",)),
-    ("study=six_runs", ("study = 'six_runs'", "system 'pitch-plane'", "'contact'")),
-    ("study=contact_table", ("needs the table [cases]",)),
-    ("options.points=3", ("options.points = 3", "unknown key")),
-    ("system=contcat", ("no such system", "did you mean 'contact'?")),
-], ids=lambda value: value if isinstance(value, str) else "")  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("ellipse.a=-1e-3", ("ellipse.a = -0.001", "above 0", "semi-axis along x", "in m")),
+        ("ellipse.c=1e-3", ("ellipse.c", "unknown key", "a, b")),
+        ("curvatures.A=1.0", ("curvatures.B", "is missing")),
+        ("contact.load=-1", ("contact.load = -1", "above 0", "in N")),
+        ("contact.load=1e12", ("c.toml", "contact.load = 1000000000000.0", "at most 1e+10 N")),
+        ("contact.friction=30", ("contact.friction = 30", "at most 10")),
+        ("creepage.spin=-1e12", ("creepage.spin", "1e+09 1/m")),
+        ("contact.approach=1e-4", ("contact.load = 80000.0", "either the load in N or contact.approach in m")),
+        ("contact.frction=0.3", ("unknown key", "did you mean 'friction'?")),
+        ("bodies.wheel.E=2.1e5", ("bodies.wheel", "E = 210000.0", "Young's modulus", "Pa")),
+        ("creepage.xi_x=fast", ("creepage.xi_x = 'fast'", "must be a number", "longitudinal creepage")),
+        ("sweep.of=xi", ("sweep.of", "xi_x or xi_y or spin", "also wrong: sweep.start, sweep.stop")),
+        ("method.name=fastsm", ("method.name", "did you mean 'fastsim'?")),
+        ("method.cells=4", ("method.cells = 4", "5 or more")),
+        ("cases.file=x.csv", ("ellipse, cases",)),
+        ("study=six_runs", ("study = 'six_runs'", "system 'pitch-plane'", "'contact'")),
+        ("study=contact_table", ("needs the table [cases]",)),
+        ("options.points=3", ("options.points = 3", "unknown key")),
+        ("system=contcat", ("no such system", "did you mean 'contact'?")),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
 def test_a_mistake_is_one_message_and_touches_nothing(twinrig, change, words, capsys):
     Path("c.toml").write_text(ELLIPSE)
     assert twinrig("run", "c.toml", "--set", change) == 2
@@ -102,10 +110,19 @@ def test_radii_curvatures_ellipse_and_approach_name_the_same_contact():
     """To rounding of some roots: 1e-12."""
     own = {key: value for key, value in TABLE.items() if key != "ellipse"}
     one = hertz_of(build({**own, "radii": {"wheel_x": 0.46, "rail_y": 0.3}}))
-    same = [hertz_of(build({**own, "curvatures": {"A": 1 / 0.92, "B": 1 / 0.6}})),
-            hertz_of(build({**own, "ellipse": {"a": float(one.a), "b": float(one.b)}})),
-            hertz_of(build({**own, "ellipse": {"a": float(one.a), "b": float(one.b)},
-                            "contact": {"approach": float(one.approach), "friction": 0.3}}))]  # fmt: skip
+    same = [
+        hertz_of(build({**own, "curvatures": {"A": 1 / 0.92, "B": 1 / 0.6}})),
+        hertz_of(build({**own, "ellipse": {"a": float(one.a), "b": float(one.b)}})),
+        hertz_of(
+            build(
+                {
+                    **own,
+                    "ellipse": {"a": float(one.a), "b": float(one.b)},
+                    "contact": {"approach": float(one.approach), "friction": 0.3},
+                }
+            )
+        ),
+    ]
     for other in same:
         for name in ("a", "b", "p0", "approach", "load", "A", "B"):
             assert getattr(other, name) == pytest.approx(getattr(one, name), rel=1e-12), name

@@ -27,8 +27,12 @@ from validation.price.problems import contact_alone
 
 CASES = "a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [-],spin [1/mm]\n"
 ROW = "5,4,80,0.3,0.1,-2e-4,4e-4\n"
-TABLE = {"title": "a contact", "system": "contact", "ellipse": {"a": 5e-3, "b": 4e-3},
-         "contact": {"load": 8e4, "friction": 0.3}}  # fmt: skip
+TABLE = {
+    "title": "a contact",
+    "system": "contact",
+    "ellipse": {"a": 5e-3, "b": 4e-3},
+    "contact": {"load": 8e4, "friction": 0.3},
+}
 pytestmark = pytest.mark.usefixtures("empty_folder")
 
 
@@ -55,12 +59,25 @@ def test_one_contact_saves_forces_fields_and_a_picture(twinrig, capsys):
 
 
 def test_a_sweep_saves_a_row_for_every_creepage(twinrig, capsys):
-    args = ("--set", "sweep={of='xi_y', start=-1e-2, stop=1e-2, count=5}", "--set", "creepage={xi_x=0.0}",
-            "--set", "options.exact=0", "--out", "out")  # fmt: skip
+    args = (
+        "--set",
+        "sweep={of='xi_y', start=-1e-2, stop=1e-2, count=5}",
+        "--set",
+        "creepage={xi_x=0.0}",
+        "--set",
+        "options.exact=0",
+        "--out",
+        "out",
+    )
     assert twinrig("run", "contact_ellipse", *args) == 0
-    units = {"xi_x": SHARES, "xi_y": SHARES, "spin": {"1/m": 1.0}, "stick": SHARES,
-             **dict.fromkeys(("fx", "fy", "dissipation", "error_of_cells", "error_of_theory"), NEWTONS),
-             **{name: {"N m": 1.0} for name in ("mz", "moment_error_of_cells", "moment_error_of_theory")}}  # fmt: skip
+    units = {
+        "xi_x": SHARES,
+        "xi_y": SHARES,
+        "spin": {"1/m": 1.0},
+        "stick": SHARES,
+        **dict.fromkeys(("fx", "fy", "dissipation", "error_of_cells", "error_of_theory"), NEWTONS),
+        **{name: {"N m": 1.0} for name in ("mz", "moment_error_of_cells", "moment_error_of_theory")},
+    }
     found = read_table("out/forces.csv", units)
     assert found["xi_y"].tolist() == pytest.approx([-1e-2, -5e-3, 0.0, 5e-3, 1e-2])
     assert found["fy"] == pytest.approx(-found["fy"][::-1]) and found["fy"][2] == 0 == found["error_of_theory"][2]
@@ -115,8 +132,24 @@ def test_forces_that_friction_cannot_carry_are_told(twinrig, capsys):
     sweep = "sweep={of='xi_x', start=0.0, stop=1e-2, count=5}"
     told = {}
     for name in ("linear", "fastsim"):
-        assert twinrig("run", "contact_ellipse", "--set", f"method.name={name}", "--set", sweep, "--set",
-                       "creepage={xi_y=0.0}", "--set", "options.exact=0", "--out", name, "--json") == 0  # fmt: skip
+        assert (
+            twinrig(
+                "run",
+                "contact_ellipse",
+                "--set",
+                f"method.name={name}",
+                "--set",
+                sweep,
+                "--set",
+                "creepage={xi_y=0.0}",
+                "--set",
+                "options.exact=0",
+                "--out",
+                name,
+                "--json",
+            )
+            == 0
+        )
         told[name] = json.loads(capsys.readouterr().out)["answer"]
     beyond = [one for one in told["linear"]["forces"] if np.hypot(one["fx"], one["fy"]) > 0.3 * told["linear"]["load"]]
     assert 0 < len(beyond) < 5 and f"at {len(beyond)} of 5 creepages" in told["linear"]["doubt"]
@@ -161,10 +194,16 @@ def test_a_row_of_a_table_is_the_contact_with_its_units():
     assert float(rows[0]["moment_error_of_theory [N m]"]) == pytest.approx(error.moment_theory, rel=1e-3)
 
 
-WRONG = {"x,4,80,0.3,0,0,0\n": "column 'a [mm]' = 'x'", "1,2\n": "7 values are needed, found 2",
-         "5,4,80,-0.3,0,0,0\n": "coefficient of friction", "-5,4,80,0.3,0,0,0\n": "semi-axis", "5,4,80,0.3,nan,0,0\n":
-         "finite number", "5,4,80,0.3,\udcff,0,0\n": "finite number", "5e9,4,80,0.3,0,0,0\n": "in m",
-         "5,4,80,0.3,1_0,0,0\n": "finite number"}  # fmt: skip
+WRONG = {
+    "x,4,80,0.3,0,0,0\n": "column 'a [mm]' = 'x'",
+    "1,2\n": "7 values are needed, found 2",
+    "5,4,80,-0.3,0,0,0\n": "coefficient of friction",
+    "-5,4,80,0.3,0,0,0\n": "semi-axis",
+    "5,4,80,0.3,nan,0,0\n": "finite number",
+    "5,4,80,0.3,\udcff,0,0\n": "finite number",
+    "5e9,4,80,0.3,0,0,0\n": "in m",
+    "5,4,80,0.3,1_0,0,0\n": "finite number",
+}
 
 
 def test_wrong_rows_get_a_status_and_stop_no_other():
@@ -184,8 +223,9 @@ def test_sizes_of_an_answer_are_those_of_its_sound_rows(monkeypatch):
     rows = ["3,3,1,ok", "4,,,wrong", "5,,,wrong", "6,,,wrong", "7,-4,1,ok"]
     Path("forces.csv").write_text("\n".join(["line [-],fx [N],stick [-],status", *rows]) + "\n")
     assert contact_table.sizes(Path("forces.csv")) == {
-        "fx": {"unit": "N", "largest": 4.0, "rms": pytest.approx(12.5**0.5)}, "stick": {"unit": "-", "largest": 1.0,
-                                                                                       "rms": 1.0}}  # fmt: skip
+        "fx": {"unit": "N", "largest": 4.0, "rms": pytest.approx(12.5**0.5)},
+        "stick": {"unit": "-", "largest": 1.0, "rms": 1.0},
+    }
     Path("none.csv").write_text("line [-],fx [N],status\n3,,wrong\n")
     assert contact_table.sizes(Path("none.csv")) == {}
 
@@ -197,13 +237,16 @@ def test_a_table_that_was_cut_off_says_so():
     assert counts["wrong"] == 0
 
 
-@pytest.mark.parametrize(("header", "words"), [
-    (CASES.replace("a [mm]", "a"), "the unit is missing: write a [m]"),
-    (CASES.replace("kN", "kg"), "this unit is not known here"),
-    (CASES.replace(",spin [1/mm]", ""), "column 'spin' is missing"),
-    (CASES.replace("a [mm],b [mm]", "A [1/m],b [mm]"), "wanted"),
-    ("", "the file is empty"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        (CASES.replace("a [mm]", "a"), "the unit is missing: write a [m]"),
+        (CASES.replace("kN", "kg"), "this unit is not known here"),
+        (CASES.replace(",spin [1/mm]", ""), "column 'spin' is missing"),
+        (CASES.replace("a [mm],b [mm]", "A [1/m],b [mm]"), "wanted"),
+        ("", "the file is empty"),
+    ],
+)
 def test_a_header_that_cannot_be_used_is_refused_before_anything_is_written(header, words):
     Path("cases.csv").write_text(header + ROW if header else "")
     with pytest.raises(InputError) as found:
@@ -246,10 +289,14 @@ def test_rows_are_counted_in_words_that_fit():
 
 
 def test_the_cheapest_is_the_fastest_that_meets_the_target():
-    points = [Point("slow", 9, (0.001,), 1.0, (0.9, 1.2)), Point("fast", 9, (0.01,), 0.1, (0.1, 0.1)),
-              Point("rough", 9, (0.2,), 0.01, (0.01, 0.02))]  # fmt: skip
-    assert [getattr(cheapest(points, target, lambda one: one.mean), "name", None)
-            for target in (0.5, 0.05, 0.005, 0.0001)] == ["rough", "fast", "slow", None]  # fmt: skip
+    points = [
+        Point("slow", 9, (0.001,), 1.0, (0.9, 1.2)),
+        Point("fast", 9, (0.01,), 0.1, (0.1, 0.1)),
+        Point("rough", 9, (0.2,), 0.01, (0.01, 0.02)),
+    ]
+    assert [
+        getattr(cheapest(points, target, lambda one: one.mean), "name", None) for target in (0.5, 0.05, 0.005, 0.0001)
+    ] == ["rough", "fast", "slow", None]
 
 
 def test_kept_forces_are_what_the_exact_theory_gives_and_the_set_is_complete():

@@ -100,8 +100,15 @@ def test_contact_point_follows_polynomials_exactly():
     for piece in range(6):
         own = times[(times > piece * period + 1e-9) & (times < (piece + 1) * period - 1e-9)]
         span = (piece * period, (piece + 1) * period - 1e-13)
-        solution = solve_ivp(lambda t, e: (force(t) - stiffness * e) / damping, span, [start], "DOP853",
-                             rtol=1e-12, atol=1e-16, dense_output=True)  # fmt: skip
+        solution = solve_ivp(
+            lambda t, e: (force(t) - stiffness * e) / damping,
+            span,
+            [start],
+            "DOP853",
+            rtol=1e-12,
+            atol=1e-16,
+            dense_output=True,
+        )
         start = solution.y[0, -1]
         truth += [*solution.sol(own)[0], start]
     assert np.abs(compression(pieces, period, stiffness, damping, times) - truth[:-1]).max() < 1e-11

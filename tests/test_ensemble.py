@@ -73,8 +73,11 @@ class Reversed(Executor):
         return future
 
 
-@pytest.mark.parametrize("changes", [{}, {"interpolation": "held"}, {"interpolation": "smooth"},
-                                     {"effects": {"pitch_spring": {"stiffness": 300.0}}}], ids=str)  # fmt: skip
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"interpolation": "held"}, {"interpolation": "smooth"}, {"effects": {"pitch_spring": {"stiffness": 300.0}}}],
+    ids=str,
+)
 def test_a_path_is_the_scene_with_that_number_to_the_last_bit(folder, changes):
     found = run_paths(job(folder, **changes), 3)
     alone = simulate(scene(folder, path=2, **changes), "reference")
@@ -83,8 +86,10 @@ def test_a_path_is_the_scene_with_that_number_to_the_last_bit(folder, changes):
 
 
 def test_drift_off_is_the_first_time_beyond_the_threshold(folder, expected):
-    noisy, quiet = (simulate(scene(folder, path=4, effects=noise), "reference")
-                    for noise in ({}, {"force_noise": {"deviation": 0.0}}))  # fmt: skip
+    noisy, quiet = (
+        simulate(scene(folder, path=4, effects=noise), "reference")
+        for noise in ({}, {"force_noise": {"deviation": 0.0}})
+    )
     far = np.abs(noisy["pitch"] - quiet["pitch"]) > 2e-4
     assert far.any() and expected["drift_off"][4] == noisy.times[far.argmax()]
     never = run_paths(replace(job(folder), threshold=1.0), 2)
@@ -245,9 +250,15 @@ def ended():
     return child.pid
 
 
-@pytest.mark.parametrize(("change", "place"), [
-    ({"seed": 4}, "scene.effects.force_noise.seed"), ({"override": {"k3": 1.1e5}}, "scene.vehicle.override.k3"),
-    ({"interpolation": "held"}, "interpolation")], ids=str)  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        ({"seed": 4}, "scene.effects.force_noise.seed"),
+        ({"override": {"k3": 1.1e5}}, "scene.vehicle.override.k3"),
+        ({"interpolation": "held"}, "interpolation"),
+    ],
+    ids=str,
+)
 def test_the_folder_of_another_job_is_refused_by_name(folder, tmp_path, change, place):
     run_paths(job(folder), 2, tmp_path)
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
@@ -366,8 +377,18 @@ def test_the_interval_of_a_quantile_covers_it():
     assert quantile(np.array([1.0, 2.0, np.inf, np.inf]), 0.5)[0] == 2.0
 
 
-SHORT = ("--set", "run.duration=1", "--set", "options.times=[0.5, 1.0]", "--set", "options.paths=60",
-         "--set", "options.workers=1", "--engine", "reference")  # fmt: skip
+SHORT = (
+    "--set",
+    "run.duration=1",
+    "--set",
+    "options.times=[0.5, 1.0]",
+    "--set",
+    "options.paths=60",
+    "--set",
+    "options.workers=1",
+    "--engine",
+    "reference",
+)
 
 
 def test_the_study_resumes_in_its_own_folder(twinrig, tmp_path, capsys):
@@ -387,18 +408,28 @@ def test_the_study_resumes_in_its_own_folder(twinrig, tmp_path, capsys):
     assert "force_noise.seed" in capsys.readouterr().err and (first / "wheel_forces.csv").stat().st_mtime_ns == forces
 
 
-@pytest.mark.parametrize(("args", "said"), [
-    (("ensemble", "--resume", "nowhere"), "holds no unfinished run"),
-    (("ensemble", "--resume", "nowhere", "--out", "new"), "leave out --out"),
-    (("six_runs", "--resume", "nowhere"), "keeps nothing that can be resumed")], ids=str)  # fmt: skip
+@pytest.mark.parametrize(
+    ("args", "said"),
+    [
+        (("ensemble", "--resume", "nowhere"), "holds no unfinished run"),
+        (("ensemble", "--resume", "nowhere", "--out", "new"), "leave out --out"),
+        (("six_runs", "--resume", "nowhere"), "keeps nothing that can be resumed"),
+    ],
+    ids=str,
+)
 def test_what_cannot_be_resumed_is_refused(twinrig, args, said, tmp_path, capsys):
     assert twinrig("run", *args) == 2
     assert said in capsys.readouterr().err and not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(("seconds", "busy", "said"), [
-    (70.0, 135.0, ("reported", "reported")), (130.0, 250.0, ("missed", "missed")),
-    (400.0, 170.0, ("missed", "reported"))])  # fmt: skip
+@pytest.mark.parametrize(
+    ("seconds", "busy", "said"),
+    [
+        (70.0, 135.0, ("reported", "reported")),
+        (130.0, 250.0, ("missed", "missed")),
+        (400.0, 170.0, ("missed", "reported")),
+    ],
+)
 def test_a_slow_machine_misses_aims_and_fails_no_row(seconds, busy, said):
     from validation.cases.ensemble import _scale_rows
 

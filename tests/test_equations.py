@@ -22,14 +22,22 @@ def paper_matrix(p, beta):
     s, c = (np.sin(beta) / beta if beta else 1.0), np.cos(beta)
     k1, k3, k4, d1, d3, d4, a, b = p.k1, p.k3, p.k4, p.d1, p.d3, p.d4, p.a, p.b
     del k1, d1
-    stiff = np.array([
-        [-k3, 0, k3, -b * k3 * s], [0, -k4, k4, a * k4 * s], [k3, k4, -k3 - k4, (b * k3 - a * k4) * s],
-        [-b * k3 * c, a * k4 * c, (b * k3 - a * k4) * c, (-b * b * k3 - a * a * k4) * s * c],
-    ])  # fmt: skip
-    damp = np.array([
-        [-d3, 0, d3, -b * d3 * c], [0, -d4, d4, a * d4 * c], [d3, d4, -d3 - d4, (b * d3 - a * d4) * c],
-        [-b * d3 * c, a * d4 * c, (b * d3 - a * d4) * c, (-b * b * d3 - a * a * d4) * c * c],
-    ])  # fmt: skip
+    stiff = np.array(
+        [
+            [-k3, 0, k3, -b * k3 * s],
+            [0, -k4, k4, a * k4 * s],
+            [k3, k4, -k3 - k4, (b * k3 - a * k4) * s],
+            [-b * k3 * c, a * k4 * c, (b * k3 - a * k4) * c, (-b * b * k3 - a * a * k4) * s * c],
+        ]
+    )
+    damp = np.array(
+        [
+            [-d3, 0, d3, -b * d3 * c],
+            [0, -d4, d4, a * d4 * c],
+            [d3, d4, -d3 - d4, (b * d3 - a * d4) * c],
+            [-b * d3 * c, a * d4 * c, (b * d3 - a * d4) * c, (-b * b * d3 - a * a * d4) * c * c],
+        ]
+    )
     return np.array([p.m1, p.m2, p.m3, p.I]), stiff, damp
 
 
@@ -67,14 +75,17 @@ def test_prescribed_pitch_is_equation_39_with_its_third_row_repaired(p):
         beta, rate, second = RANDOM.uniform(-0.7, 0.7, 3)
         s, c = np.sin(beta), np.cos(beta)
         z, w = y[:3], y[4:7]
-        rows = np.array([
-            [-p.k3, 0, p.k3], [0, -p.k4, p.k4], [p.k3, p.k4, -p.k3 - p.k4]]) @ z + np.array([
-            [-p.d3, 0, p.d3], [0, -p.d4, p.d4], [p.d3, p.d4, -p.d3 - p.d4]]) @ w  # fmt: skip
-        load = np.array([
-            p.m1 * p.g - f[0] - p.k3 * p.b * s - p.d3 * p.b * rate * c,
-            p.m2 * p.g - f[1] + p.k4 * p.a * s + p.d4 * p.a * rate * c,
-            p.m3 * p.g + (p.k3 * p.b - p.k4 * p.a) * s + (p.d3 * p.b - p.d4 * p.a) * rate * c,
-        ])  # fmt: skip
+        rows = (
+            np.array([[-p.k3, 0, p.k3], [0, -p.k4, p.k4], [p.k3, p.k4, -p.k3 - p.k4]]) @ z
+            + np.array([[-p.d3, 0, p.d3], [0, -p.d4, p.d4], [p.d3, p.d4, -p.d3 - p.d4]]) @ w
+        )
+        load = np.array(
+            [
+                p.m1 * p.g - f[0] - p.k3 * p.b * s - p.d3 * p.b * rate * c,
+                p.m2 * p.g - f[1] + p.k4 * p.a * s + p.d4 * p.a * rate * c,
+                p.m3 * p.g + (p.k3 * p.b - p.k4 * p.a) * s + (p.d3 * p.b - p.d4 * p.a) * rate * c,
+            ]
+        )
         expected = (rows + load) / np.array([p.m1, p.m2, p.m3])
         u = np.array([*f, beta, rate, second])
         found = derivative_of("pitch", "exact")(y, u, p.array())

@@ -29,10 +29,16 @@ def plain_python(a, b, load, mu, xi_x, xi_y, spin, cells, power, half):
     l1, l2, l3 = flexibilities(a, b, PAIR)
     strips = int(strips_of(np.array(a / b), cells))
     ys = b * ((strips - 1 - 2 * np.arange(strips)) / strips)
-    p0 = mu * load / sum(
-        (1 - (x / a) ** 2 - (y / b) ** 2) ** power * (2 * s / cells) * (2 * b / strips)
-        for y in ys for s in [a * math.sqrt(1 - (y / b) ** 2)] for x in s * (1 - (2 * np.arange(cells) + 1) / cells)
-    )  # fmt: skip
+    p0 = (
+        mu
+        * load
+        / sum(
+            (1 - (x / a) ** 2 - (y / b) ** 2) ** power * (2 * s / cells) * (2 * b / strips)
+            for y in ys
+            for s in [a * math.sqrt(1 - (y / b) ** 2)]
+            for x in s * (1 - (2 * np.arange(cells) + 1) / cells)
+        )
+    )
     total = np.zeros(3)
     for y in ys:
         s = a * math.sqrt(1 - (y / b) ** 2)
@@ -196,20 +202,37 @@ def test_a_call_takes_whole_numbers_and_names_what_it_does_not_take():
 def test_next_to_nothing_is_nothing(name, value):
     """A slip by so small a bound, squared, would be beyond all numbers."""
     assert (fastsim(**{**AT, name: value}, pair=PAIR).fx, Ellipse(1.5, PAIR)(6e-3, 1e-310, 0.3, 0.1, 0.1, 1.0)[0]) == (
-        0.0, 0.0)  # fmt: skip
+        0.0,
+        0.0,
+    )
     assert fastsim(**{**AT, "xi_x": 1.0}, pair=PAIR).stick == 0.0
 
 
-@pytest.mark.parametrize(("name", "value"), [
-    ("a", -1e-3), ("a", 600.0), ("b", math.nan), ("load", math.inf), ("mu", -0.1), ("mu", 30.0), ("xi_x", math.nan),
-    ("xi_x", 50.0), ("spin", math.inf), ("a", 0.0), ("xi_y", [1e-3, 2e-3]), ("xi_x", "much")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("a", -1e-3),
+        ("a", 600.0),
+        ("b", math.nan),
+        ("load", math.inf),
+        ("mu", -0.1),
+        ("mu", 30.0),
+        ("xi_x", math.nan),
+        ("xi_x", 50.0),
+        ("spin", math.inf),
+        ("a", 0.0),
+        ("xi_y", [1e-3, 2e-3]),
+        ("xi_x", "much"),
+    ],
+)
 def test_bad_input_is_named(name, value):
     with pytest.raises(InputError, match=name):
         fastsim(**{**AT, "xi_x": [0.0, 1e-3, 2e-3], name: value}, pair=PAIR)
 
 
-@pytest.mark.parametrize("options", [{"cells": 2}, {"cells": 21.0}, {"bound": "round"}, {"march": "third"},
-                                     {"flexibilities": "two"}])  # fmt: skip
+@pytest.mark.parametrize(
+    "options", [{"cells": 2}, {"cells": 21.0}, {"bound": "round"}, {"march": "third"}, {"flexibilities": "two"}]
+)
 def test_an_unknown_option_is_named(options):
     with pytest.raises(InputError, match=next(iter(options))):
         fastsim(**AT, pair=PAIR, **options)

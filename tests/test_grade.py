@@ -55,8 +55,9 @@ def test_its_extent_and_finest_detail_are_the_profiles():
 
 
 @pytest.mark.parametrize("engine", ["reference", "exudyn", "mujoco"])
-@pytest.mark.parametrize(("parameters", "geometry"), [("itwm_drift", "exact"), ("asymmetric_twin", "exact"),
-                                                       ("itwm_drift", "linear")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("parameters", "geometry"), [("itwm_drift", "exact"), ("asymmetric_twin", "exact"), ("itwm_drift", "linear")]
+)
 def test_steady_climb_has_the_pitch_of_the_grade(engine, parameters, geometry):
     """All moves at one rate, so no damper acts and every spring is as at rest: sin(pitch) grows by tan(grade).
 
@@ -64,8 +65,9 @@ def test_steady_climb_has_the_pitch_of_the_grade(engine, parameters, geometry):
     sine on one side and the tangent on the other, which differ by half a per cent at 0.1 rad.
     """
     grade, duration = 0.1, 8.0
-    own = build_scene({"title": "climb", "vehicle": {"parameters": parameters, "geometry": geometry},
-                       "run": {"duration": duration}})  # fmt: skip
+    own = build_scene(
+        {"title": "climb", "vehicle": {"parameters": parameters, "geometry": geometry}, "run": {"duration": duration}}
+    )
     assembly = assemble(own)
     rest, wheelbase = assembly.initial[3], assembly.parameters.a + assembly.parameters.b
     road = RoadUnderWheels(Graded(FLAT, grade, 0.0), 20.0, wheelbase)
@@ -79,8 +81,9 @@ def test_steady_climb_has_the_pitch_of_the_grade(engine, parameters, geometry):
 
 
 def scene(source, **keys):
-    return build_scene({"title": "grade", "run": {"duration": 5.0},
-                        "effects": {"road": {"source": source, "speed": 20.0, **keys}}})  # fmt: skip
+    return build_scene(
+        {"title": "grade", "run": {"duration": 5.0}, "effects": {"road": {"source": source, "speed": 20.0, **keys}}}
+    )
 
 
 @pytest.mark.parametrize(("source", "keys"), [("study", {}), ("hills", {}), ("iso8608", {"road_class": "C"})])
@@ -105,5 +108,3 @@ def test_impossible_grades_are_refused(grade):
 def test_a_measured_road_takes_no_grade(tmp_path):
     with pytest.raises(InputError, match="has no meaning for source = 'csv'"):
         assemble(scene("csv", file="road.csv", beyond_end="refused", grade=0.1))
-
-

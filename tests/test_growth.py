@@ -151,8 +151,10 @@ def test_noise_curve_scales_and_a_wrong_model_comes_from_its_inertia(folder):
     once, twice = noise(assembly, 10.0), noise(assembly, 20.0)
     assert twice.size[-1] == pytest.approx(2 * once.size[-1], rel=1e-12)
     p = assembly.parameters
-    wrong = {name: model(assembly, p.model_copy(update={name: getattr(p, name) * 1.01})).size.max()
-             for name in ("I", "k3", "k1")}  # fmt: skip
+    wrong = {
+        name: model(assembly, p.model_copy(update={name: getattr(p, name) * 1.01})).size.max()
+        for name in ("I", "k3", "k1")
+    }
     assert wrong["I"] > 5 * wrong["k3"] and wrong["k1"] == 0.0  # the tyres are cut off
 
 
@@ -166,8 +168,10 @@ def test_monte_carlo_agrees_with_the_covariance(folder):
     """60 paths: standard deviation known to 1 / sqrt(120) = 9 %, three times that allowed."""
     assembly = assemble(force_scene(folder, duration=4.0, step=1e-3))
     quiet, values = states(assembly)[-1], assembly.input.values
-    off = [states(replace(assembly, input=replace(assembly.input, values=values + 30.0 * normal(5, i, len(values), 2))))
-           for i in range(60)]  # fmt: skip
+    off = [
+        states(replace(assembly, input=replace(assembly.input, values=values + 30.0 * normal(5, i, len(values), 2))))
+        for i in range(60)
+    ]
     found = np.sqrt(np.mean([(path[-1] - quiet) ** 2 for path in off], axis=0))
     expected = np.sqrt(np.diag(covariance(assembly, 30.0).matrices[-1]))
     assert found[3] / expected[3] == pytest.approx(1.0, abs=0.27)
@@ -185,9 +189,13 @@ def test_study_predicts_what_it_measures(tmp_path):
 
 
 def test_study_on_a_file_of_ones_own(folder):
-    table = {"title": "own", "study": "trust", "run": {"duration": 6.0, "step": 1e-3},
-             "effects": {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}},
-             "options": {"paths": 20, "noise_fraction": 0.02}}  # fmt: skip
+    table = {
+        "title": "own",
+        "study": "trust",
+        "run": {"duration": 6.0, "step": 1e-3},
+        "effects": {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}},
+        "options": {"paths": 20, "noise_fraction": 0.02},
+    }
     from models.scene import build as build_scene
 
     (folder / "out").mkdir()

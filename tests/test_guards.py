@@ -19,8 +19,12 @@ from models.time_series import write_time_series
 from validation.cases import guards
 from validation.hard_cases import setups
 
-LIMITED = [(engine, name) for engine, names in CATALOGUE.items() for name in names
-           if stability.step_matrix(name, 1e-3, stability.linearised(setups.vehicle().vehicle)) is not None]
+LIMITED = [
+    (engine, name)
+    for engine, names in CATALOGUE.items()
+    for name in names
+    if stability.step_matrix(name, 1e-3, stability.linearised(setups.vehicle().vehicle)) is not None
+]
 
 
 def measured(engine: str, integrator: str, geometry: str, steps: int, guided: bool) -> np.ndarray:
@@ -57,10 +61,15 @@ def test_step_matrix_of_the_guided_vehicle(engine, integrator):
     assert np.abs(np.linalg.matrix_power(matrix, 5) - found).max() < 1e-10
 
 
-@pytest.mark.parametrize(("integrator", "limit"), [
-    ("RK44", 2.785293563405282 / 690.8),  # real root of |R(z)| = 1 over the fastest pole
-    ("ExplicitEuler", 2 / 690.8), ("ExplicitMidpoint", 2 / 690.8), ("RK33", 2.512745326618 / 690.8),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("integrator", "limit"),
+    [
+        ("RK44", 2.785293563405282 / 690.8),  # real root of |R(z)| = 1 over the fastest pole
+        ("ExplicitEuler", 2 / 690.8),
+        ("ExplicitMidpoint", 2 / 690.8),
+        ("RK33", 2.512745326618 / 690.8),
+    ],
+)
 def test_limits_are_the_textbook_ones(integrator, limit):
     linear = stability.linearised(setups.vehicle().vehicle)
     assert stability.limit(integrator, 0.1, 1000.0, linear) == pytest.approx(limit, rel=2e-4)
@@ -129,13 +138,16 @@ def test_a_missing_balance_fails_the_row(monkeypatch):
     assert set(guards.constrained_unchecked().values()) == {"answered"}
 
 
-@pytest.mark.parametrize(("times", "states", "reason"), [
-    ([], np.empty((0, 8)), "0 states"),
-    ([0.0, 1.0], np.full((2, 8), 2e4), "beyond"),
-    ([0.0, 1.0], np.full((2, 8), np.nan), "not a number"),
-    ([0.0, 0.5, 0.25], np.zeros((3, 8)), "backwards"),
-    ([0.0, 0.5], np.zeros((2, 8)), "stopped at 0.5"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("times", "states", "reason"),
+    [
+        ([], np.empty((0, 8)), "0 states"),
+        ([0.0, 1.0], np.full((2, 8), 2e4), "beyond"),
+        ([0.0, 1.0], np.full((2, 8), np.nan), "not a number"),
+        ([0.0, 0.5, 0.25], np.zeros((3, 8)), "backwards"),
+        ([0.0, 0.5], np.zeros((2, 8)), "stopped at 0.5"),
+    ],
+)
 def test_the_guard_names_what_it_found(times, states, reason):
     with pytest.raises(RunFailed, match=reason):
         guard("engine", np.array(times), states, 1.0)

@@ -14,17 +14,20 @@ DX, DY = 0.5e-3, 0.3e-3
 def kernel(x, y):
     """Boussinesq's and Cerruti's displacements by a point force, (3, 3), as Johnson (1985) has them."""
     r, nu, k = np.hypot(x, y), PAIR.nu, PAIR.mismatch
-    return np.array([
-        [(1 - nu) / r + nu * x * x / r**3, nu * x * y / r**3, -k * x / r**2],
-        [nu * x * y / r**3, (1 - nu) / r + nu * y * y / r**3, -k * y / r**2],
-        [k * x / r**2, k * y / r**2, (1 - nu) / r],
-    ]) / (np.pi * PAIR.G)  # fmt: skip
+    return np.array(
+        [
+            [(1 - nu) / r + nu * x * x / r**3, nu * x * y / r**3, -k * x / r**2],
+            [nu * x * y / r**3, (1 - nu) / r + nu * y * y / r**3, -k * y / r**2],
+            [k * x / r**2, k * y / r**2, (1 - nu) / r],
+        ]
+    ) / (np.pi * PAIR.G)
 
 
 @pytest.mark.parametrize(("x", "y"), [(0.7e-3, 0.4e-3), (-0.6e-3, 0.0), (0.25e-3, -0.9e-3)])
 def test_numbers_are_the_integrals(x, y):
     for i in range(3):
         for j in range(3):
+
             def at(v, u, i=i, j=j):
                 return kernel(x - u, y - v)[i, j]
 

@@ -128,13 +128,16 @@ def test_road_has_the_variance_of_its_level() -> None:
     assert ratio.mean() / np.log(60.0 / 0.5) * 4000 == pytest.approx(1.0, abs=0.065)
 
 
-@pytest.mark.parametrize(("change", "message"), [
-    ({"steer": [[0.0, 0.0], [0.0, 0.1]]}, "manoeuvres.go.steer.*rise from knot to knot"),
-    ({"steer": [[0.0, 2.0]]}, "manoeuvres.go.steer.*from -1.2 to 1.2 rad"),
-    ({"brake": [[0.0, -5.0]]}, "manoeuvres.go.brake.*from 0 to 100000 N m"),
-    ({"duration": 0.0015}, "run.step.*must divide"),
-    ({"speeds": 1.0}, "manoeuvres.go.speeds.*unknown key"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"steer": [[0.0, 0.0], [0.0, 0.1]]}, "manoeuvres.go.steer.*rise from knot to knot"),
+        ({"steer": [[0.0, 2.0]]}, "manoeuvres.go.steer.*from -1.2 to 1.2 rad"),
+        ({"brake": [[0.0, -5.0]]}, "manoeuvres.go.brake.*from 0 to 100000 N m"),
+        ({"duration": 0.0015}, "run.step.*must divide"),
+        ({"speeds": 1.0}, "manoeuvres.go.speeds.*unknown key"),
+    ],
+)
 def test_bad_manoeuvres_are_told(change: dict, message: str) -> None:
     table = {"title": "t", "manoeuvres": {"go": {"speed": 20.0, **change}}}
     with pytest.raises(InputError, match=message):
@@ -173,8 +176,9 @@ def test_lateral_acceleration_is_that_of_the_place_below_the_chassis(braked_turn
     """Twice the difference of its path in the axes of the road, turned to the left: 1 ms of a manoeuvre of 0.1 s."""
     x, y, yaw = braked_turn.path.T
     place = next(body for body in R19.bodies if body.name == "body").position
-    path = np.stack([x + np.cos(yaw) * place[0] - np.sin(yaw) * place[1],
-                     y + np.sin(yaw) * place[0] + np.cos(yaw) * place[1]])  # fmt: skip
+    path = np.stack(
+        [x + np.cos(yaw) * place[0] - np.sin(yaw) * place[1], y + np.sin(yaw) * place[0] + np.cos(yaw) * place[1]]
+    )
     times = braked_turn.run.times
     along, across = np.gradient(np.gradient(path, times, axis=1), times, axis=1)
     found, expected = braked_turn.lateral_acceleration(), np.cos(yaw) * across - np.sin(yaw) * along

@@ -88,28 +88,31 @@ def test_aspect_solves_its_equation(curvatures):
     assert g * g * sine / cosine == pytest.approx(curvatures, rel=1e-12)  # ln g is known to 1e-16, g to 460 times that
 
 
-@pytest.mark.parametrize(("call", "words"), [
-    (lambda: by_load(-1.0, 1.0, 1.0, PAIR), r"A = -1.0: must be above 0: .*conform"),
-    (lambda: by_load(1.0, 0.0, 1.0, PAIR), r"B = 0.0: must be above 0"),
-    (lambda: by_load(1.0, [1.0, np.nan], 1.0, PAIR), r"B\[1\] = nan: must be a curvature in 1/m"),
-    (lambda: by_load(1e-3, 2e-3, 1.0, PAIR), r"0.002: the larger of both must be 0.01 1/m or more; radii are in m"),
-    (lambda: by_load(1.0, 1.0, np.inf, PAIR), r"load = inf: must be a load in N"),
-    (lambda: by_load(1.0, 1.0, "much", PAIR), r"load = 'much': must be a number"),
-    (lambda: by_load([1.0, 1.0], 1.0, [1.0, 2.0, 3.0], PAIR), r"no common shape: .*load \(3,\)"),
-    (lambda: by_approach(1.0, 1.0, 0.1, PAIR), r"approach = 0.1: must be an approach in m, at most 0.05"),
-    (lambda: by_axes(-5e-3, 4e-3, PAIR, load=1e4), r"a = -0.005: must be a semi-axis in m, above 0"),
-    (lambda: by_axes(5e-3, 4e-3, PAIR), r"either the load \(N\) or the approach"),
-    (lambda: by_axes(5e-3, 4e-3, PAIR, load=1e4, approach=1e-5), r"either the load \(N\) or the approach"),
-    (lambda: by_load(1.0, 1.0, "1e4", PAIR), r"load = '1e4': must be a number"),
-    (lambda: by_load(1.0, 1.0, np.ma.masked_less([1.0, -1.0], 0.0), PAIR), r"load.*must be a number"),
-    (lambda: by_load(1.0, 1.0, np.array([1.0 + 1.0j]), PAIR), r"load.*must be a number"),
-    (lambda: Pair(STEEL, 0.28), r"pair.two = 0.28: must be a Material"),
-    (lambda: Material(E=2.1e5, nu=0.28), r"E = 210000.0: must be 1e\+06 or more \(Young's modulus, not in MPa"),
-    (lambda: Material(E=2.1e11, nu=0.6), r"nu = 0.6: must be at most 0.5"),
-    (lambda: Material(E=float("nan"), nu=0.3), r"E = nan"),
-    (lambda: Material(E=2.1e11), r"nu: is missing"),
-    (lambda: Material(E=2.1e11, nu=0.3, rho=1.0), r"rho = 1.0: unknown key \(allowed: E, nu\)"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: by_load(-1.0, 1.0, 1.0, PAIR), r"A = -1.0: must be above 0: .*conform"),
+        (lambda: by_load(1.0, 0.0, 1.0, PAIR), r"B = 0.0: must be above 0"),
+        (lambda: by_load(1.0, [1.0, np.nan], 1.0, PAIR), r"B\[1\] = nan: must be a curvature in 1/m"),
+        (lambda: by_load(1e-3, 2e-3, 1.0, PAIR), r"0.002: the larger of both must be 0.01 1/m or more; radii are in m"),
+        (lambda: by_load(1.0, 1.0, np.inf, PAIR), r"load = inf: must be a load in N"),
+        (lambda: by_load(1.0, 1.0, "much", PAIR), r"load = 'much': must be a number"),
+        (lambda: by_load([1.0, 1.0], 1.0, [1.0, 2.0, 3.0], PAIR), r"no common shape: .*load \(3,\)"),
+        (lambda: by_approach(1.0, 1.0, 0.1, PAIR), r"approach = 0.1: must be an approach in m, at most 0.05"),
+        (lambda: by_axes(-5e-3, 4e-3, PAIR, load=1e4), r"a = -0.005: must be a semi-axis in m, above 0"),
+        (lambda: by_axes(5e-3, 4e-3, PAIR), r"either the load \(N\) or the approach"),
+        (lambda: by_axes(5e-3, 4e-3, PAIR, load=1e4, approach=1e-5), r"either the load \(N\) or the approach"),
+        (lambda: by_load(1.0, 1.0, "1e4", PAIR), r"load = '1e4': must be a number"),
+        (lambda: by_load(1.0, 1.0, np.ma.masked_less([1.0, -1.0], 0.0), PAIR), r"load.*must be a number"),
+        (lambda: by_load(1.0, 1.0, np.array([1.0 + 1.0j]), PAIR), r"load.*must be a number"),
+        (lambda: Pair(STEEL, 0.28), r"pair.two = 0.28: must be a Material"),
+        (lambda: Material(E=2.1e5, nu=0.28), r"E = 210000.0: must be 1e\+06 or more \(Young's modulus, not in MPa"),
+        (lambda: Material(E=2.1e11, nu=0.6), r"nu = 0.6: must be at most 0.5"),
+        (lambda: Material(E=float("nan"), nu=0.3), r"E = nan"),
+        (lambda: Material(E=2.1e11), r"nu: is missing"),
+        (lambda: Material(E=2.1e11, nu=0.3, rho=1.0), r"rho = 1.0: unknown key \(allowed: E, nu\)"),
+    ],
+)
 def test_what_cannot_be_used_says_what_is_expected(call, words):
     with pytest.raises(InputError, match=words):
         call()

@@ -38,8 +38,12 @@ def test_small_motion_on_tyres_is_that_of_the_linear_vehicle():
     places = {place: i for i, place in enumerate(car.whole.coordinates())}
     order = [places["body", f] for f in ("x", "y", "z", "rz", "ry", "rx")]
     order += [places[place] for place in car.tree.coordinates()[6:]]
-    bare = replace(car, tree=replace(car.tree, gravity=0.0), loads=0 * car.loads,
-                   elements=tuple(replace(element, held=0.0) for element in car.elements))  # fmt: skip
+    bare = replace(
+        car,
+        tree=replace(car.tree, gravity=0.0),
+        loads=0 * car.loads,
+        elements=tuple(replace(element, held=0.0) for element in car.elements),
+    )
     model = build("reference", bare, Drive(np.zeros((3, 8)), speed=20.0), 1e-3, 1e-3)
     small = 1e-6 * np.random.default_rng(1).uniform(-1, 1, (2, n))
     found = model.accelerations(0.0, *small)
@@ -74,8 +78,10 @@ def test_the_filter_holds_both_angles_and_refuses_what_contradicts(measured):
     tilt = estimate(car, forces, angles.noisy((1.75e-3, 5e-3), 3), deviation, (1.75e-3, 5e-3), 1.0)
     assert np.abs(tilt.states[50:, :2] - angles.samples[50:, :2]).max() < 3e-3
     shifted = replace(forces, samples=forces.samples + np.eye(24)[3] * 400.0)  # 1.4 rad/s^2 of roll that was not
-    free, drawn = (build("mujoco", car, d, 2e-3, 1.0).run() for d in (
-        shifted.drive(2e-3, 500), pulled(shifted.drive(2e-3, 500), car, tilt, 2e-3, 2.0)))  # fmt: skip
+    free, drawn = (
+        build("mujoco", car, d, 2e-3, 1.0).run()
+        for d in (shifted.drive(2e-3, 500), pulled(shifted.drive(2e-3, 500), car, tilt, 2e-3, 2.0))
+    )
     off = [np.abs(run.states[-1, ROLL] - true.states[-1, ROLL]) for run in (free, drawn)]
     assert off[0] > 0.3 and off[1] < 0.02
     with pytest.raises(InputError, match="contradicts the hub forces"):
@@ -99,20 +105,24 @@ def test_noise_is_the_same_in_any_frame_and_differs_from_path_to_path():
     assert one.std() == pytest.approx(3.0, rel=0.01)  # 120,000 samples: 0.2 %
     assert abs(np.mean(one * two)) < 0.1
     assert Angles(np.zeros((5000, 4)), 1e-3).noisy((1.0, 10.0), 7).samples.std(axis=0) == pytest.approx(
-        [1, 1, 10, 10], rel=0.05)  # fmt: skip
+        [1, 1, 10, 10], rel=0.05
+    )
 
 
-@pytest.mark.parametrize(("change", "told"), [
-    ({"vehicle": {"file": "r19_free", "chassis": "fl"}}, "fl"),
-    ({"vehicle": {"file": "r19_free", "chassis": "bodi"}}, "no such body"),
-    ({"vehicle": {"file": "quarter_car", "chassis": "body"}}, "what is left of a vehicle without tyres"),
-    ({"forces": {"file": "f.csv"}}, "give either the table road"),
-    ({"forces": {"frame": "wheel"}}, "frame"),
-    ({"forces": {"sampling_rate": 300.0}}, "multiple of run.step"),
-    ({"run": {"step": 7e-3}}, "must divide run.duration"),
-    ({"run": {"step": 0.05, "duration": 1.0}, "forces": {"sampling_rate": 20.0}}, "step of 0.05 s"),
-    ({"forces": {"frame": "inertial"}, "stabilise": {"bandwidth": 0.3}}, "topple the vehicle"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"vehicle": {"file": "r19_free", "chassis": "fl"}}, "fl"),
+        ({"vehicle": {"file": "r19_free", "chassis": "bodi"}}, "no such body"),
+        ({"vehicle": {"file": "quarter_car", "chassis": "body"}}, "what is left of a vehicle without tyres"),
+        ({"forces": {"file": "f.csv"}}, "give either the table road"),
+        ({"forces": {"frame": "wheel"}}, "frame"),
+        ({"forces": {"sampling_rate": 300.0}}, "multiple of run.step"),
+        ({"run": {"step": 7e-3}}, "must divide run.duration"),
+        ({"run": {"step": 0.05, "duration": 1.0}, "forces": {"sampling_rate": 20.0}}, "step of 0.05 s"),
+        ({"forces": {"frame": "inertial"}, "stabilise": {"bandwidth": 0.3}}, "topple the vehicle"),
+    ],
+)
 def test_one_clear_message(change, told):
     from models.hub_forces.plan import check
 
@@ -135,8 +145,9 @@ def test_steps_that_the_road_is_too_fast_for_are_told():
     from models.hub_forces.of_scene import measured
 
     for road, held_true in (({}, True), ({"speed": 60.0, "iso8608": "F"}, False)):
-        own = scene_of({**ALL, "road": road, "run": {"duration": 1.0, "step": 4e-3},
-                        "forces": {"sampling_rate": 250.0}}, "s.toml")  # fmt: skip
+        own = scene_of(
+            {**ALL, "road": road, "run": {"duration": 1.0, "step": 4e-3}, "forces": {"sampling_rate": 250.0}}, "s.toml"
+        )
         with nullcontext() if held_true else pytest.raises(RunFailed, match=r"bush' by 0\.1 of its largest"):
             measured(own, case.r19(), "mujoco")
 

@@ -17,8 +17,14 @@ from studies.asked import plan_of
 from studies.hub_forces import _planned
 
 NOISES = ("angle_noise", "force_noise")
-ON_ROAD = {"title": "t", "system": "hub-forces", "study": "hub_forces", "vehicle": {"file": "r19_free"}, "road": {},
-           "run": {"duration": 0.1}}  # fmt: skip
+ON_ROAD = {
+    "title": "t",
+    "system": "hub-forces",
+    "study": "hub_forces",
+    "vehicle": {"file": "r19_free"},
+    "road": {},
+    "run": {"duration": 0.1},
+}
 
 
 def scene(**more):
@@ -50,11 +56,21 @@ def test_a_stabiliser_leaves_for_none_and_gives_way_to_the_other():
     assert without(beside(held, "prescribed_angles"), "prescribed_angles").stabilise.method == "none"
 
 
-@pytest.mark.parametrize(("there", "told"), [
-    (("force_noise",), "forces.noise: needs the effect 'virtual_measurement', for files have the noise that they have"),
-    (("angle_noise",), "angles.noise: needs the effect 'virtual_measurement'"),
-    (("kalman_filter", "prescribed_angles"), "stabilise.method: cannot stand beside 'prescribed_angles', as one moment "
-                                             "holds roll and pitch: drop one of them")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("there", "told"),
+    [
+        (
+            ("force_noise",),
+            "forces.noise: needs the effect 'virtual_measurement', for files have the noise that they have",
+        ),
+        (("angle_noise",), "angles.noise: needs the effect 'virtual_measurement'"),
+        (
+            ("kalman_filter", "prescribed_angles"),
+            "stabilise.method: cannot stand beside 'prescribed_angles', as one moment "
+            "holds roll and pitch: drop one of them",
+        ),
+    ],
+)
 def test_what_cannot_be_together_is_told_with_the_remedy(there, told):
     with pytest.raises(InputError, match=told):
         legal(there, scene())
@@ -71,14 +87,17 @@ def test_files_have_the_noise_that_they_have(table):
 def test_quantities_are_those_of_the_run_that_the_scene_holds():
     """A price and a choice see a stabiliser by what it changes; angles that nothing reads change nothing."""
     free, held = scene(), scene(stabilise={"method": "kalman"})
-    paths = [answer(own, "mujoco").quantities["roll"].cases[0]
-             for own in (free, without(free, "angle_noise"), held, without(held, "angle_noise"))]  # fmt: skip
+    paths = [
+        answer(own, "mujoco").quantities["roll"].cases[0]
+        for own in (free, without(free, "angle_noise"), held, without(held, "angle_noise"))
+    ]
     assert np.array_equal(paths[0], paths[1])
     assert not np.array_equal(paths[0], paths[2]) and not np.array_equal(paths[2], paths[3])
 
 
 def test_a_scene_that_names_no_stabiliser_makes_no_estimate(monkeypatch):
     """Positive control beside it: a filter that cannot be made is missed where it is named, and there only."""
+
     def missing(*given):
         raise AssertionError("was made")
 
@@ -99,4 +118,9 @@ def test_a_study_runs_the_scene_as_it_is_in_every_engine_and_the_others_in_one()
     assert names["none"] == ["free, exudyn", "free, mujoco", "filter", "prescribed"]
     assert names["kalman"] == ["free, mujoco", "filter, exudyn", "filter", "prescribed"]
     assert named(scene(stabilise={"method": "kalman"})) == (
-        "angle_noise", "force_noise", "kalman_filter", "turning_forces", "virtual_measurement")  # fmt: skip
+        "angle_noise",
+        "force_noise",
+        "kalman_filter",
+        "turning_forces",
+        "virtual_measurement",
+    )

@@ -106,15 +106,18 @@ def test_the_study_adds_what_the_effects_add():
     assert ours == pytest.approx(error, rel=1e-9)
 
 
-@pytest.mark.parametrize(("changes", "words"), [
-    (["options.random_walks=[0.1]"], "one value for each"),
-    (["options.grades=[1.0, 0.1, 2.0, 3.0, 4.0]"], "must rise"),
-    (["options.durations=[5.0, 1.0]"], "must rise"),
-    (["options.durations=[-5.0]"], "must be 0.1 or more"),
-    (["options.samples=2"], "samples"),
-    (["options.sampling_rate=33.3"], "whole number"),
-    (["options.grades=[]"], "at least 1 value"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (["options.random_walks=[0.1]"], "one value for each"),
+        (["options.grades=[1.0, 0.1, 2.0, 3.0, 4.0]"], "must rise"),
+        (["options.durations=[5.0, 1.0]"], "must rise"),
+        (["options.durations=[-5.0]"], "must be 0.1 or more"),
+        (["options.samples=2"], "samples"),
+        (["options.sampling_rate=33.3"], "whole number"),
+        (["options.grades=[]"], "at least 1 value"),
+    ],
+)
 def test_lists_that_make_no_table_are_refused(changes, words, tmp_path):
     with pytest.raises(InputError, match=words):
         study.run(scene(*changes), ("reference",), tmp_path, lambda text, part: None)

@@ -24,8 +24,9 @@ from validation.scenes import road_scene
 TWIN, DURATION, PERIOD = asymmetric_twin.PARAMETERS, 20.0, 1e-3
 WHEELS = np.array([TWIN.m1, TWIN.m2]) * TWIN.g
 LOADS = TWIN.m3 * TWIN.g * np.array([TWIN.a, TWIN.b]) / (TWIN.a + TWIN.b) + WHEELS
-SIGNALS = tuple((Signal(axle, "f.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0),)
-                for axle in ("front", "rear"))  # fmt: skip
+SIGNALS = tuple(
+    (Signal(axle, "f.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0),) for axle in ("front", "rear")
+)
 
 
 @cache
@@ -63,7 +64,7 @@ FAULTS = {
     "offset at the rear": (lambda f: f + np.array([0, 60.0]), "doubt", "balance"),
     "front constant": (lambda f: np.column_stack([np.full(len(f), LOADS[0]), f[:, 1]]), "doubt", "balance"),
     "no value": (lambda f: np.where(np.arange(len(f))[:, None] == 500, 9.9e34, f), "error", "weight"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -97,7 +98,8 @@ def test_a_wheel_that_carries_nothing_is_told_and_ends_no_run(twinrig, capsys, t
     assert ahead != vehicle
     (tmp_path / "car.toml").write_text(ahead)
     (tmp_path / "s.toml").write_text(
-        'title = "t"\nsystem = "ride"\n[vehicle]\nfile = "car.toml"\n[speeds]\nvalues = [20.0]\n')
+        'title = "t"\nsystem = "ride"\n[vehicle]\nfile = "car.toml"\n[speeds]\nvalues = [20.0]\n'
+    )
     assert twinrig("run", str(tmp_path / "s.toml"), "--engine", "reference", "--out", str(tmp_path / "out")) == 0
     said = capsys.readouterr().out
     assert "the wheel pulls on the road" in said and "tyre force rear left has no load to carry" in said
@@ -135,7 +137,8 @@ def scene(folder, forces, extra=""):
     write_time_series(folder / "f.csv", {"front": ("N", forces[:, 0]), "rear": ("N", forces[:, 1])}, PERIOD)
     (folder / "s.toml").write_text(
         f'title = "t"\n[vehicle]\nparameters = "asymmetric_twin"\n[run]\nduration = {PERIOD * (len(forces) - 1):g}\n'
-        f'step = 1e-3\n[effects.wheel_forces]\nfile = "f.csv"\ninterpolation = "linear"\n{extra}')
+        f'step = 1e-3\n[effects.wheel_forces]\nfile = "f.csv"\ninterpolation = "linear"\n{extra}'
+    )
     return load_scene(str(folder / "s.toml"), [])
 
 
@@ -165,11 +168,15 @@ def test_shipped_vehicles_raise_no_query():
 
 
 PLANE = {
-    "chassis in tonnes": ({"m3": 1.35}, "mass"), "all in tonnes": ({"m3": 1.35, "m1": 0.04, "m2": 0.05}, "mass"),
-    "wheelbase in mm": ({"a": 1300.0, "b": 800.0}, "size"), "inertia in t m^2": ({"I": 0.54}, "inertia"),
-    "springs in N/mm": ({"k3": 90.0, "k4": 120.0}, "frequency"), "tyres in N/mm": ({"k1": 190.0}, "frequency"),
-    "dampers in N s/mm": ({"d3": 9.0, "d4": 12.0}, "damping"), "a wheel in tonnes": ({"m1": 0.014}, "frequency"),
-}  # fmt: skip
+    "chassis in tonnes": ({"m3": 1.35}, "mass"),
+    "all in tonnes": ({"m3": 1.35, "m1": 0.04, "m2": 0.05}, "mass"),
+    "wheelbase in mm": ({"a": 1300.0, "b": 800.0}, "size"),
+    "inertia in t m^2": ({"I": 0.54}, "inertia"),
+    "springs in N/mm": ({"k3": 90.0, "k4": 120.0}, "frequency"),
+    "tyres in N/mm": ({"k1": 190.0}, "frequency"),
+    "dampers in N s/mm": ({"d3": 9.0, "d4": 12.0}, "damping"),
+    "a wheel in tonnes": ({"m1": 0.014}, "frequency"),
+}
 
 
 @pytest.mark.parametrize("name", PLANE)
@@ -197,19 +204,28 @@ SPACE = {
     "centre beyond the front axle": (lambda v: body(v, "body", position=(1.6, 0.0, 0.6)), "load"),
     "centre at the left wheels": (lambda v: body(v, "body", position=(0.0, 0.55, 0.6)), "load"),
     "a strut on the other side": (
-        lambda v: spring(v, "front left", point_one=(1.156, -0.69, 0.344), point_two=(1.156, -0.69, 0.344)), "strut"),
+        lambda v: spring(v, "front left", point_one=(1.156, -0.69, 0.344), point_two=(1.156, -0.69, 0.344)),
+        "strut",
+    ),
     "a strut in mm": (
-        lambda v: spring(v, "front left", point_one=(1156.0, 0.69, 0.344), point_two=(1156.0, 0.69, 0.344)), "strut"),
+        lambda v: spring(v, "front left", point_one=(1156.0, 0.69, 0.344), point_two=(1156.0, 0.69, 0.344)),
+        "strut",
+    ),
     "a corner without a strut": (
-        lambda v: replace(v, springs=tuple(s for s in v.springs if s.name != "front left")), "strut"),
+        lambda v: replace(v, springs=tuple(s for s in v.springs if s.name != "front left")),
+        "strut",
+    ),
     "a damper alone": (lambda v: spring(v, "front left", stiffness=0.0), "strut"),
     "a tyre in N/mm": (
         lambda v: replace(v, tyres=tuple(replace(t, stiffness=158.0) if t.name == "fl" else t for t in v.tyres)),
-        "stiffness"),
+        "stiffness",
+    ),
     "height in mm": (lambda v: body(v, "body", position=(-0.01, 0.0, 613.7)), "size"),
-    "inertia in kg mm^2": (lambda v: body(v, "body", inertia=((2.2e8, 0.0, 0.0), (0.0, 1.6e9, 0.0), (0.0,) * 3)),
-                           "inertia"),
-}  # fmt: skip
+    "inertia in kg mm^2": (
+        lambda v: body(v, "body", inertia=((2.2e8, 0.0, 0.0), (0.0, 1.6e9, 0.0), (0.0,) * 3)),
+        "inertia",
+    ),
+}
 
 
 @pytest.mark.parametrize("name", SPACE)

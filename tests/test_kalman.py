@@ -35,11 +35,16 @@ def folder(tmp_path):
     return tmp_path
 
 
-def scene(folder, effects=None, *, duration=DURATION, interpolation="linear", geometry="exact", frame="inertial",
-          **override):  # fmt: skip
+def scene(
+    folder, effects=None, *, duration=DURATION, interpolation="linear", geometry="exact", frame="inertial", **override
+):
     forces = {"wheel_forces": {"file": "f.csv", "interpolation": interpolation, "frame": frame}}
-    table = {"title": "test", "vehicle": {"geometry": geometry, "override": override},
-             "run": {"duration": duration, "step": 1e-3}, "effects": forces | (effects or {})}  # fmt: skip
+    table = {
+        "title": "test",
+        "vehicle": {"geometry": geometry, "override": override},
+        "run": {"duration": duration, "step": 1e-3},
+        "effects": forces | (effects or {}),
+    }
     return build_scene(table, "test.toml", folder)
 
 
@@ -297,10 +302,15 @@ def test_right_innovations_are_called_wrong_as_seldom_as_stated():
     assert consistency(gaps, ("pitch",)).consistent
 
 
-@pytest.mark.parametrize("plant, named", [
-    (lambda w: 1.2 * w, "mean square"), (lambda w: 0.8 * w, "mean square"), (lambda w: w + 0.2, "mean of pitch"),
-    (lambda w: (w[1:] + 0.3 * w[:-1]) / 1.044, "correlation of pitch"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "plant, named",
+    [
+        (lambda w: 1.2 * w, "mean square"),
+        (lambda w: 0.8 * w, "mean square"),
+        (lambda w: w + 0.2, "mean of pitch"),
+        (lambda w: (w[1:] + 0.3 * w[:-1]) / 1.044, "correlation of pitch"),
+    ],
+)
 def test_wrong_innovations_are_named(plant, named):
     found = consistency(plant(np.random.default_rng(8).standard_normal((2000, 1))), ("pitch",))
     assert not found.consistent and named in str(found)

@@ -37,8 +37,12 @@ def test_numbers_are_those_of_the_package(cells):
         mu, motion = rng.uniform(0.01, 0.6), (*rng.normal(0.0, 3e-3, 2), rng.normal(0.0, 0.5))
         hertz = by_load(A, B, load, PAIR)
         creep = fastsim(hertz.a, hertz.b, load, mu, *motion, PAIR, cells=cells)
-        inputs = {k.BY_LOAD: (A, B, load), k.BY_APPROACH: (A, B, hertz.approach),
-                  k.AXES_BY_LOAD: (hertz.a, hertz.b, load), k.AXES_BY_APPROACH: (hertz.a, hertz.b, hertz.approach)}
+        inputs = {
+            k.BY_LOAD: (A, B, load),
+            k.BY_APPROACH: (A, B, hertz.approach),
+            k.AXES_BY_LOAD: (hertz.a, hertz.b, load),
+            k.AXES_BY_APPROACH: (hertz.a, hertz.b, hertz.approach),
+        }
         for given, shape in inputs.items():
             status, out = call(how, given, (*shape, mu, *motion))
             assert status == k.FINE
@@ -84,11 +88,25 @@ def test_what_is_no_number_is_refused(place, bad):
             assert np.isnan(out).all()
 
 
-@pytest.mark.parametrize(("given", "place", "value"), [
-    (k.BY_LOAD, 0, 0.0), (k.BY_LOAD, 1, -1.0), (k.BY_LOAD, 2, 1e11), (k.BY_APPROACH, 2, 0.06), (k.BY_LOAD, 3, -0.1),
-    (k.BY_LOAD, 3, 11.0), (k.BY_LOAD, 4, 11.0), (k.BY_LOAD, 5, -11.0), (k.BY_LOAD, 6, 2e9), (k.BY_LOAD, 0, 1e-300),
-    (k.AXES_BY_LOAD, 0, 0.0), (k.AXES_BY_LOAD, 0, 2e3), (k.AXES_BY_APPROACH, 1, -1e-3), (k.BY_LOAD, 0, 1e13),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("given", "place", "value"),
+    [
+        (k.BY_LOAD, 0, 0.0),
+        (k.BY_LOAD, 1, -1.0),
+        (k.BY_LOAD, 2, 1e11),
+        (k.BY_APPROACH, 2, 0.06),
+        (k.BY_LOAD, 3, -0.1),
+        (k.BY_LOAD, 3, 11.0),
+        (k.BY_LOAD, 4, 11.0),
+        (k.BY_LOAD, 5, -11.0),
+        (k.BY_LOAD, 6, 2e9),
+        (k.BY_LOAD, 0, 1e-300),
+        (k.AXES_BY_LOAD, 0, 0.0),
+        (k.AXES_BY_LOAD, 0, 2e3),
+        (k.AXES_BY_APPROACH, 1, -1e-3),
+        (k.BY_LOAD, 0, 1e13),
+    ],
+)
 def test_what_is_out_of_range_is_refused(given, place, value):
     values = [*((5e-3, 4e-3) if given >= k.AXES_BY_LOAD else GOOD[:2]), 1e-5 if given % 2 else GOOD[2], *GOOD[3:]]
     values[place] = value
@@ -109,8 +127,9 @@ def test_nothing_is_allocated_and_threads_agree():
     motions = [(*GOOD[:4], 1e-3 * np.sin(i), 1e-3 * np.cos(i), 0.01 * i) for i in range(300)]
     nrt.memsys_enable_stats()
     before = rtsys.get_allocation_stats()
-    threads = [threading.Thread(target=lambda own=own: own.extend(call(how, k.BY_LOAD, m)[1] for m in motions))
-               for own in runs]  # fmt: skip
+    threads = [
+        threading.Thread(target=lambda own=own: own.extend(call(how, k.BY_LOAD, m)[1] for m in motions)) for own in runs
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -124,9 +143,16 @@ def test_nothing_is_allocated_and_threads_agree():
 
 def test_header_says_what_the_kernel_does():
     text = HEADER.read_text()
-    words = {"BY_LOAD": k.BY_LOAD, "BY_APPROACH": k.BY_APPROACH, "AXES_BY_LOAD": k.AXES_BY_LOAD, "FINE": k.FINE,
-             "AXES_BY_APPROACH": k.AXES_BY_APPROACH, "NOT_FINITE": k.NOT_FINITE, "NOT_PLAUSIBLE": k.NOT_PLAUSIBLE,
-             "NOT_KNOWN": k.NOT_KNOWN}  # fmt: skip
+    words = {
+        "BY_LOAD": k.BY_LOAD,
+        "BY_APPROACH": k.BY_APPROACH,
+        "AXES_BY_LOAD": k.AXES_BY_LOAD,
+        "FINE": k.FINE,
+        "AXES_BY_APPROACH": k.AXES_BY_APPROACH,
+        "NOT_FINITE": k.NOT_FINITE,
+        "NOT_PLAUSIBLE": k.NOT_PLAUSIBLE,
+        "NOT_KNOWN": k.NOT_KNOWN,
+    }
     assert all(f"TWINRIG_{word} = {number}" in text for word, number in words.items())
 
 
@@ -135,8 +161,11 @@ def test_c_program_calls_the_kernel(tmp_path):
     if compiler is None:
         pytest.skip("no C compiler here")
     library = tmp_path / "example.so"
-    subprocess.run([compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-o", library,
-                    EXAMPLE, "-lm"], check=True, timeout=60)  # fmt: skip
+    subprocess.run(
+        [compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-o", library, EXAMPLE, "-lm"],
+        check=True,
+        timeout=60,
+    )
     creepage_for = ctypes.CDLL(str(library)).creepage_for
     creepage_for.restype = ctypes.c_double
     creepage_for.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_double] * 3]

@@ -17,9 +17,11 @@ from models.errors import InputError
 
 PAIR, SIZE = Pair(), (-0.03, 0.03)
 ELLIPSE = quadratic(1.1, 1.7, 0.03, 0.03, 61)
-SHAPES = {"ellipse": ELLIPSE,
-          "flattened": from_function(lambda x, y: 0.6 * x**2 + 3e3 * y**4 + 0.2 * y**2, SIZE, SIZE, 61),
-          "leaning": from_function(lambda x, y: 1e-5 + (x**2 + y**2) * (1.3 + 25.0 * y), SIZE, SIZE, 61)}  # fmt: skip
+SHAPES = {
+    "ellipse": ELLIPSE,
+    "flattened": from_function(lambda x, y: 0.6 * x**2 + 3e3 * y**4 + 0.2 * y**2, SIZE, SIZE, 61),
+    "leaning": from_function(lambda x, y: 1e-5 + (x**2 + y**2) * (1.3 + 25.0 * y), SIZE, SIZE, 61),
+}
 
 
 def solved(bodies, approach, mu, motion, cells=9, given=k.BY_APPROACH):
@@ -65,9 +67,15 @@ def test_full_sliding_is_friction():
     assert out[k.STICK] == 0.0
 
 
-@pytest.mark.parametrize(("changed", "expected"), [
-    ({"given": k.BY_LOAD}, k.NOT_KNOWN), ({"approach": float("nan")}, k.NOT_FINITE),
-    ({"approach": 2e-3}, k.NOT_PLAUSIBLE), ({"mu": -1.0}, k.NOT_PLAUSIBLE)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ({"given": k.BY_LOAD}, k.NOT_KNOWN),
+        ({"approach": float("nan")}, k.NOT_FINITE),
+        ({"approach": 2e-3}, k.NOT_PLAUSIBLE),
+        ({"mu": -1.0}, k.NOT_PLAUSIBLE),
+    ],
+)
 def test_a_status_where_there_is_no_answer(changed, expected):
     # at 2 mm the contact reaches the edge of the distance
     status, out = solved(ELLIPSE, **{"approach": 5e-5, "mu": 0.3, "motion": (1e-3, 0.0, 0.0), **changed})

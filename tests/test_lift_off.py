@@ -43,11 +43,15 @@ DROP = {"z1": -0.3, "z2": -0.2, "z3": -0.4, "pitch": 0.05}
 
 
 def scene(effects=None, geometry="exact", duration=2.0, step=5e-4, start=None, **override):
-    return build_scene({
-        "title": "t", "vehicle": {"parameters": "asymmetric_twin", "geometry": geometry, "override": override},
-        "run": {"duration": duration, "step": step}, "start": start or {},
-        "effects": {"lift_off": {}, **(effects or {})},
-    })  # fmt: skip
+    return build_scene(
+        {
+            "title": "t",
+            "vehicle": {"parameters": "asymmetric_twin", "geometry": geometry, "override": override},
+            "run": {"duration": duration, "step": step},
+            "start": start or {},
+            "effects": {"lift_off": {}, **(effects or {})},
+        }
+    )
 
 
 def forces(run):
@@ -55,8 +59,9 @@ def forces(run):
 
 
 @pytest.mark.parametrize("geometry", ["exact", "linear"])
-@pytest.mark.parametrize("effects", [{}, {"road": ROAD}, {"road": ROAD, "pitch_spring": SLACK}],
-                         ids=["flat", "road", "dead band"])  # fmt: skip
+@pytest.mark.parametrize(
+    "effects", [{}, {"road": ROAD}, {"road": ROAD, "pitch_spring": SLACK}], ids=["flat", "road", "dead band"]
+)
 def test_three_implementations_agree_and_never_pull(effects, geometry):
     own = scene(effects, geometry=geometry, start=DROP)
     found = {engine: simulate(own, engine) for engine in ENGINES}
@@ -117,8 +122,9 @@ def test_a_wheel_alone_bounces_by_the_closed_form(engine):
     assert (since > 0.0).any() and np.abs(run.states[:, 0] - wanted).max() < 5e-6  # corners: the square of 0.1 ms
 
 
-@pytest.mark.parametrize("override", [{}, {"d1": 3000.0, "d2": 2000.0}, {"d1": 0.0, "d2": 0.0}],
-                         ids=["as it is", "damped", "undamped"])  # fmt: skip
+@pytest.mark.parametrize(
+    "override", [{}, {"d1": 3000.0, "d2": 2000.0}, {"d1": 0.0, "d2": 0.0}], ids=["as it is", "damped", "undamped"]
+)
 def test_the_exact_path_piece_by_piece(override):
     own = scene(geometry="linear", start=DROP, duration=1.0, step=1e-4, **override)
     assembly = assemble(own)
@@ -159,8 +165,10 @@ def test_a_tyre_that_pulls_in_one_implementation_is_seen(monkeypatch):
     """Planted: the cut at zero is forgotten; the damper is not limited."""
     own = scene({"road": ROAD}, duration=1.5)
     truth = simulate(own, "exudyn")
-    for law in (lambda y, u, p: pitch_plane_equations.tyres(y, u, p),
-                lambda y, u, p: tuple(max(f, 0.0) for f in pitch_plane_equations.tyres(y, u, p))):  # fmt: skip
+    for law in (
+        lambda y, u, p: pitch_plane_equations.tyres(y, u, p),
+        lambda y, u, p: tuple(max(f, 0.0) for f in pitch_plane_equations.tyres(y, u, p)),
+    ):
         assembly = assemble(own)
         model = build("reference", assembly, settings_of(own, "reference"))
         dy = np.empty(8)
@@ -184,8 +192,17 @@ def test_what_cannot_be_is_told_with_the_remedy(tmp_path):
 
     write_time_series(tmp_path / "f.csv", {"front": ("N", np.full(9, 4e3)), "rear": ("N", np.full(9, 4e3))}, 1e-3)
     with pytest.raises(InputError, match="lift_off: cannot stand beside 'wheel_forces', there is no tyre"):
-        assemble(build_scene({"title": "t", "run": {"duration": 5e-3}, "effects": {
-            "lift_off": {}, "wheel_forces": {"file": "f.csv", "interpolation": "linear"}}}, "", tmp_path))  # fmt: skip
+        assemble(
+            build_scene(
+                {
+                    "title": "t",
+                    "run": {"duration": 5e-3},
+                    "effects": {"lift_off": {}, "wheel_forces": {"file": "f.csv", "interpolation": "linear"}},
+                },
+                "",
+                tmp_path,
+            )
+        )
     with pytest.raises(InputError, match="depth"):
         build_scene({"title": "t", "run": {"duration": 5e-3}, "effects": {"lift_off": {"depth": 1e-3}}})
 
@@ -205,8 +222,14 @@ def test_absent_means_absent():
 
 
 def ride_scene(name="r19_ride", level=3e-4, **more):
-    own = {"title": "t", "system": "ride", "vehicle": {"file": name, "operating_point": "loaded"},
-           "road": {"level": level}, "speeds": {"values": [20.0]}, "effects": {"lift_off": {}}}  # fmt: skip
+    own = {
+        "title": "t",
+        "system": "ride",
+        "vehicle": {"file": name, "operating_point": "loaded"},
+        "road": {"level": level},
+        "speeds": {"values": [20.0]},
+        "effects": {"lift_off": {}},
+    }
     return build_ride({**own, **more}, "s.toml")
 
 
@@ -285,8 +308,17 @@ def test_a_choice_of_effects_runs_in_time_and_may_leave_it_out():
 
 
 def hubs(road_class="E", **effects):
-    return build_hubs({"title": "t", "system": "hub-forces", "vehicle": {"file": "r19_free"}, "road": {
-        "iso8608": road_class}, "run": {"duration": 2.0}, "effects": effects}, "s.toml").cut_vehicle()  # fmt: skip
+    return build_hubs(
+        {
+            "title": "t",
+            "system": "hub-forces",
+            "vehicle": {"file": "r19_free"},
+            "road": {"iso8608": road_class},
+            "run": {"duration": 2.0},
+            "effects": effects,
+        },
+        "s.toml",
+    ).cut_vehicle()
 
 
 def test_hub_forces_of_wheels_in_the_air_are_none_in_every_engine():
@@ -332,7 +364,13 @@ def test_hub_loads_are_the_law_of_where_the_engine_says_the_hubs_are():
 
 
 def test_measured_hub_forces_have_no_tyre_that_could_lift():
-    table = {"title": "t", "system": "hub-forces", "vehicle": {"file": "r19_free"}, "forces": {"file": "f.csv"},
-             "angles": {"file": "a.csv"}, "effects": {"lift_off": {}}}  # fmt: skip
+    table = {
+        "title": "t",
+        "system": "hub-forces",
+        "vehicle": {"file": "r19_free"},
+        "forces": {"file": "f.csv"},
+        "angles": {"file": "a.csv"},
+        "effects": {"lift_off": {}},
+    }
     with pytest.raises(InputError, match="lift_off: needs the effect 'virtual_measurement', for no tyre is below"):
         build_hubs(table, "s.toml")

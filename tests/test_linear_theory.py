@@ -121,18 +121,21 @@ def test_compiled_callers_get_the_same():
     assert flexibilities(np.zeros((2, 1)), [1.0, 0.0, 1e-3], PAIR)[2].tolist() == [[0.0] * 3] * 2
 
 
-@pytest.mark.parametrize(("call", "words"), [
-    (lambda: coefficients(0.0, 0.3), r"ratio = 0.0: must be a ratio a/b"),
-    (lambda: coefficients([1.0, -2.0], 0.3), r"ratio\[1\] = -2.0"),
-    (lambda: coefficients(1.0, 0.6), r"nu = 0.6: must be a Poisson's ratio from 0 to 0.5"),
-    (lambda: forces(5.0, 3.0, 0, 0, 0, PAIR), r"at most 0.5 m; axes are in m, not in mm"),
-    (lambda: forces(-1e-3, 3e-3, 0, 0, 0, PAIR), r"a = -0.001: must be a semi-axis in m"),
-    (lambda: forces(A, B, np.nan, 0, 0, PAIR), r"xi_x = nan: must be a creepage"),
-    (lambda: forces(A, B, 0, 0, np.inf, PAIR), r"spin = inf: must be a spin in 1/m"),
-    (lambda: forces([A, A], B, [1e-3] * 3, 0, 0, PAIR), r"no common shape: .*xi_x \(3,\)"),
-    (lambda: flexibilities(A, B, Pair(STEEL, Material(E=7e10, nu=0.33))), "too unlike"),
-    (lambda: forces(A, B, 0, 0, 0, Pair(STEEL, Material(E=7e10, nu=0.33))), "too unlike"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: coefficients(0.0, 0.3), r"ratio = 0.0: must be a ratio a/b"),
+        (lambda: coefficients([1.0, -2.0], 0.3), r"ratio\[1\] = -2.0"),
+        (lambda: coefficients(1.0, 0.6), r"nu = 0.6: must be a Poisson's ratio from 0 to 0.5"),
+        (lambda: forces(5.0, 3.0, 0, 0, 0, PAIR), r"at most 0.5 m; axes are in m, not in mm"),
+        (lambda: forces(-1e-3, 3e-3, 0, 0, 0, PAIR), r"a = -0.001: must be a semi-axis in m"),
+        (lambda: forces(A, B, np.nan, 0, 0, PAIR), r"xi_x = nan: must be a creepage"),
+        (lambda: forces(A, B, 0, 0, np.inf, PAIR), r"spin = inf: must be a spin in 1/m"),
+        (lambda: forces([A, A], B, [1e-3] * 3, 0, 0, PAIR), r"no common shape: .*xi_x \(3,\)"),
+        (lambda: flexibilities(A, B, Pair(STEEL, Material(E=7e10, nu=0.33))), "too unlike"),
+        (lambda: forces(A, B, 0, 0, 0, Pair(STEEL, Material(E=7e10, nu=0.33))), "too unlike"),
+    ],
+)
 def test_what_cannot_be_used_says_what_is_expected(call, words):
     with pytest.raises(InputError, match=words):
         call()

@@ -39,8 +39,10 @@ def ridden() -> VirtualMeasurement:
 def made(folder: Path, **columns: np.ndarray) -> Recording:
     """A recording of nothing but these columns, named quantity_component."""
     kinds: dict[str, Quantity] = {"acc": "acceleration", "angle": "angle", "rate": "angular rate", "force": "force"}
-    signals = tuple(Signal(name, "", name, kinds[name.split("_")[0]], "body", name.split("_")[1], "body", 1, "", 1.0)
-                    for name in columns)  # fmt: skip
+    signals = tuple(
+        Signal(name, "", name, kinds[name.split("_")[0]], "body", name.split("_")[1], "body", 1, "", 1.0)
+        for name in columns
+    )
     values = np.column_stack(list(columns.values()))
     own = Columns(folder / "made.columns", tuple(columns), len(values))
     own.write(0, values)
@@ -79,8 +81,10 @@ def test_a_clean_recording_of_five_seconds_raises_nothing(ridden, tmp_path):
     assert not case.findings(ridden, ridden.samples(Faults(noise=case.NOISE), 5), tmp_path)
 
 
-@pytest.mark.parametrize(("fault", "check_name", "size"), [({"gain": {"rr_fz": -0.02}}, "gain", -2.0),
-                                                           ({"gain": {"fl_fz": 0.02}}, "gain", 2.0)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("fault", "check_name", "size"),
+    [({"gain": {"rr_fz": -0.02}}, "gain", -2.0), ({"gain": {"fl_fz": 0.02}}, "gain", 2.0)],
+)
 def test_two_percent_are_seen_in_five_seconds(fault, check_name, size, ridden, tmp_path):
     # the mean moment of the hub forces is what the gyros say that it must be
     (found,) = case.findings(ridden, ridden.samples(Faults(noise=case.NOISE, **fault), 5), tmp_path)
@@ -104,8 +108,10 @@ def test_a_clock_that_is_fast_is_named_and_nothing_else(tmp_path):
 
 def test_moments_of_an_offset_are_known_before_a_run(ridden, tmp_path):
     values = [ridden.samples(Faults(noise=case.NOISE, bias=bias), 5) for bias in ({}, {"fl_fz": 30.0})]
-    clean, off = (weight.moments(Evidence(case.recording(ridden, own, tmp_path / f"{i}.columns"), ridden.vehicle))
-                  for i, own in enumerate(values))  # fmt: skip
+    clean, off = (
+        weight.moments(Evidence(case.recording(ridden, own, tmp_path / f"{i}.columns"), ridden.vehicle))
+        for i, own in enumerate(values)
+    )
     arm = rigid(ridden.vehicle).arms[0]
     assert not clean.any() and off == pytest.approx([30 * arm[1], -30 * arm[0]], rel=0.1)
 
@@ -186,11 +192,15 @@ def test_a_spike_does_not_hide_an_error_of_its_channel(ridden, tmp_path):
     samples[1000, case._columns(ridden, "rr_fz")] += 5e4
     samples[:, case._columns(ridden, "rr_fz")] *= 1e-3
     assert {(one.check, one.weight) for one in case.findings(ridden, samples, tmp_path)} >= {
-        ("spikes", "doubt"), ("unit", "error")}  # fmt: skip
+        ("spikes", "doubt"),
+        ("unit", "error"),
+    }
 
 
-@pytest.mark.parametrize(("level", "kind", "size"), [(0.0, "gravity", 9.81), (-9.81, "sign", -1.0),
-                         (1.0, "unit", 0.102), (8.9, "gravity", -0.91), (9.7, "", 0.0)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("level", "kind", "size"),
+    [(0.0, "gravity", 9.81), (-9.81, "sign", -1.0), (1.0, "unit", 0.102), (8.9, "gravity", -0.91), (9.7, "", 0.0)],
+)
 def test_a_vertical_accelerometer_feels_gravity(level, kind, size, tmp_path):
     found = said(gravity.check, made(tmp_path, acc_z=level + 0.3 * white()))
     assert [one.check for one in found] == ([kind] if kind else [])
@@ -202,8 +212,10 @@ def test_gravity_along_another_axis_means_that_axes_are_exchanged(tmp_path):
     assert (found.weight, found.place) == ("error", "acc_y")
 
 
-@pytest.mark.parametrize(("factor", "late", "kind", "size"), [(1.0, 0.0, "", 0.0), (-1.0, 0.0, "sign", -1.0),
-                         (57.3, 0.0, "unit", 57.3), (1.0, 4e-3, "shift", 4e-3)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("factor", "late", "kind", "size"),
+    [(1.0, 0.0, "", 0.0), (-1.0, 0.0, "sign", -1.0), (57.3, 0.0, "unit", 57.3), (1.0, 4e-3, "shift", 4e-3)],
+)
 def test_a_rate_is_the_derivative_of_its_angle(factor, late, kind, size, tmp_path):
     times, waves = PERIOD * np.arange(10_000), np.random.default_rng(1).uniform(0.5, 6.0, (40, 2))
     phase = np.pi * waves[:, 1]
@@ -247,8 +259,11 @@ def test_findings_of_means_of_times_and_of_motion_have_their_figures(ridden, tmp
     samples[:, case._columns(ridden, "rr_fz")] *= 1e-3
     samples[500:700, case._columns(ridden, "rl_mz")] = 0.0
     evidence = Evidence(case.recording(ridden, samples, tmp_path / "own.columns"), ridden.vehicle)
-    drawn = {one.check for i, one in enumerate(findings(evidence)) if one.weight != "note"
-             and figure(one, evidence, tmp_path / f"{i}.png")}  # fmt: skip
+    drawn = {
+        one.check
+        for i, one in enumerate(findings(evidence))
+        if one.weight != "note" and figure(one, evidence, tmp_path / f"{i}.png")
+    }
     assert drawn == {"unit", "clipped", "shift"}
     assert len(list(tmp_path.glob("*.png"))) == 3
 
@@ -286,8 +301,10 @@ def test_moments_about_the_contact_patch_are_recognised(hubs, lever, ridden, tmp
     assert f"levers = {{ {hubs[0]} = " in said[0].text and ("contact patch" in said[0].text)
 
 
-@pytest.mark.parametrize("bias, named", [({}, ""), ({"pitch_rate": 3e-3}, "innovations of pitch "),
-                                         ({"roll_rate": -5e-3}, "innovations of roll ")])  # fmt: skip
+@pytest.mark.parametrize(
+    "bias, named",
+    [({}, ""), ({"pitch_rate": 3e-3}, "innovations of pitch "), ({"roll_rate": -5e-3}, "innovations of roll ")],
+)
 def test_a_filter_names_a_biased_gyro_and_no_right_one(bias, named, ridden, tmp_path):
     samples = ridden.samples(Faults(noise=case.NOISE, bias=bias), case.SEED)
     own = recording(ridden, samples, tmp_path / "a.columns")

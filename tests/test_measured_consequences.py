@@ -38,8 +38,9 @@ def of(ridden: VirtualMeasurement, faults: dict, finding: Finding, folder: Path)
     own, right = (recording(ridden, values, folder / f"{i}.columns") for i, values in enumerate(samples))
     answers = [a for a in Sections(ridden.vehicle).answers if a.name == SECTION]
     (found,) = consequences([finding], own, partial(made, ridden), answers, folder / "work")
-    wrong, true = (made(ridden, each, folder / name).samples(answers[0])[500:]
-                   for each, name in ((own, "wrong"), (right, "true")))  # fmt: skip
+    wrong, true = (
+        made(ridden, each, folder / name).samples(answers[0])[500:] for each, name in ((own, "wrong"), (right, "true"))
+    )
     return found, rms(wrong - true) / rms(true - true.mean()), damage_ratio(wrong, true, SLOPE)
 
 
@@ -83,8 +84,13 @@ def test_lost_samples_are_judged_by_what_their_bridging_is_known_to(ridden, tmp_
 def test_words_follow_the_bounds():
     finding, good = Finding("shift", "doubt", "fl", ""), Verdict("accepted", "held")
     one = Consequence(finding, "a", FORCE[0], 1.0 + 0.9 * DAMAGE[0])
-    several = (one, replace(one, force=2 * FORCE[0]), replace(one, damage=0.7), replace(one, force=2 * FORCE[1]),
-               Consequence(finding))  # fmt: skip
+    several = (
+        one,
+        replace(one, force=2 * FORCE[0]),
+        replace(one, damage=0.7),
+        replace(one, force=2 * FORCE[1]),
+        Consequence(finding),
+    )
     words = [judged(good, [each]).word for each in several]
     assert words == ["accepted", "accepted with doubt", "rejected", "rejected", "accepted with doubt"]
     assert judged(good, []) is good and judged(Verdict("stabilise", ""), [one]).word == "stabilise"

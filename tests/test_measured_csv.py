@@ -32,18 +32,27 @@ from validation.measured.measured_files.odd import TIMES, Odd, difference, read,
 
 PLAIN = Form().times
 FORMS = st.builds(
-    Form, headings=st.just(HEADINGS), above=st.sampled_from([(), TITLES, KEYS, ("# by hand",)]),
-    separator=st.sampled_from(",;\t"), decimal=st.sampled_from(".,"), quoted=st.booleans(),
-    trailing=st.sampled_from(["", ","]), end=st.sampled_from(["\n", "\r\n"]),
-    encoding=st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "cp1252"]), below=st.sampled_from([(), ("",), (",,",)]),
+    Form,
+    headings=st.just(HEADINGS),
+    above=st.sampled_from([(), TITLES, KEYS, ("# by hand",)]),
+    separator=st.sampled_from(",;\t"),
+    decimal=st.sampled_from(".,"),
+    quoted=st.booleans(),
+    trailing=st.sampled_from(["", ","]),
+    end=st.sampled_from(["\n", "\r\n"]),
+    encoding=st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "cp1252"]),
+    below=st.sampled_from([(), ("",), (",,",)]),
     times=st.sampled_from([PLAIN, stamps(clock), stamps(iso), stamps(german)]),
-)  # fmt: skip
+)
 
 
 def possible(form: Form) -> Form:
     """The nearest form that somebody can have meant: separators that end rows part them, and quotes hold commas."""
-    form = replace(form, trailing=form.trailing and form.separator, below=tuple(
-        line.replace(",", form.separator) for line in form.below))  # fmt: skip
+    form = replace(
+        form,
+        trailing=form.trailing and form.separator,
+        below=tuple(line.replace(",", form.separator) for line in form.below),
+    )
     commas = form.decimal == "," or "," in form.times[0]
     return replace(form, quoted=True) if commas and form.separator == "," else form
 
@@ -70,9 +79,19 @@ def test_every_form_that_is_meant_is_read_as_the_plain_file(form):
 
 
 @settings(max_examples=150, deadline=None)
-@given(FORMS, st.sampled_from([form for _, _, form, truth in READ if set(truth) == set(usual()) and form.gap is None
-                               and not form.beside and "" not in form.headings]), st.booleans(), st.integers(0, 10**6),
-       st.sampled_from("xä;,\t\"'°"))  # fmt: skip
+@given(
+    FORMS,
+    st.sampled_from(
+        [
+            form
+            for _, _, form, truth in READ
+            if set(truth) == set(usual()) and form.gap is None and not form.beside and "" not in form.headings
+        ]
+    ),
+    st.booleans(),
+    st.integers(0, 10**6),
+    st.sampled_from("xä;,\t\"'°"),
+)
 def test_a_strange_letter_in_a_row_is_never_silent(one, other, which, place, letter):
     form = possible(one) if which else other
     text = form.text()
@@ -123,9 +142,17 @@ def test_stamps_keep_their_zone_and_their_day(tmp_path):
     assert np.abs(found["Fz"][0] - TIMES).max() <= 1e-16 and open_source(path).channels[0].unit == "N"
 
 
-@pytest.mark.parametrize("name, unit", [
-    ("time [s]", "s"), ("Time (s)", "s"), ("t / ms", "ms"), ("Zeit_s", "s"), ("TIME [hh:mm:ss]", "hh:mm:ss"), ("t", ""),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "name, unit",
+    [
+        ("time [s]", "s"),
+        ("Time (s)", "s"),
+        ("t / ms", "ms"),
+        ("Zeit_s", "s"),
+        ("TIME [hh:mm:ss]", "hh:mm:ss"),
+        ("t", ""),
+    ],
+)
 def test_headings_of_clocks(name, unit):
     assert is_clock(name) and clock_heading(name)[1] == unit
 

@@ -30,8 +30,13 @@ def test_files_have_the_faults_that_they_have(name):
 
 
 def short(**more):
-    table = {"title": "t", "system": "measured", "vehicle": {"file": "r19_free"}, "stabilise": {"method": "none"},
-             "virtual": {"duration": 0.18, "format": "csv", "faults": FAULTS["sensor_noise"]}}  # fmt: skip
+    table = {
+        "title": "t",
+        "system": "measured",
+        "vehicle": {"file": "r19_free"},
+        "stabilise": {"method": "none"},
+        "virtual": {"duration": 0.18, "format": "csv", "faults": FAULTS["sensor_noise"]},
+    }
     return build(table | more, "s.toml")
 
 
@@ -57,8 +62,15 @@ def test_a_recording_is_run_for_a_part_and_in_longer_steps(tmp_path, monkeypatch
 
 
 def test_the_pitch_plane_is_told_what_has_a_price():
-    scene = build({"title": "t", "system": "measured", "vehicle": {"parameters": "itwm_drift"},
-                   "files": bare("measured").table()["files"]}, "s.toml")  # fmt: skip
+    scene = build(
+        {
+            "title": "t",
+            "system": "measured",
+            "vehicle": {"parameters": "itwm_drift"},
+            "files": bare("measured").table()["files"],
+        },
+        "s.toml",
+    )
     with pytest.raises(InputError, match=r"vehicle.parameters.* for a vehicle in space: name vehicle.file"):
         measured.answer(scene, "mujoco")
 
@@ -67,8 +79,13 @@ def test_the_pitch_plane_is_told_what_has_a_price():
 def test_auto_leaves_out_what_the_question_does_not_see():
     """The noise of angles is read by nothing in a free run; steps stay whole samples of the recording."""
     faults = {"noise": {"angle": 1e-3}}
-    scene = short(stabilise={"method": "none"}, effects="auto", quantities=["rms front left F"], tolerance=0.02,
-                  virtual={"duration": 0.18, "format": "csv", "faults": faults})  # fmt: skip
+    scene = short(
+        stabilise={"method": "none"},
+        effects="auto",
+        quantities=["rms front left F"],
+        tolerance=0.02,
+        virtual={"duration": 0.18, "format": "csv", "faults": faults},
+    )
     choice = Chooser(scene, "mujoco", scene.quantities, scene.tolerance).choose()
     assert choice.left_out == ("sensor_noise",) and choice.kept
 

@@ -23,8 +23,14 @@ EXTENSIONS = (".csv", ".mf4", ".rsp", ".tdms")
 def group(count=50, **changed):
     """A group of two channels, in blocks of 20."""
     table = np.column_stack((np.arange(count) + 0.5, -2.0 * np.arange(count)))
-    own = {"names": ("Fz", "Fx"), "units": ("N", "kN"), "comments": ("", ""), "period": 0.01, "count": count,
-           "blocks": [table[i : i + 20] for i in range(0, count, 20)]}  # fmt: skip
+    own = {
+        "names": ("Fz", "Fx"),
+        "units": ("N", "kN"),
+        "comments": ("", ""),
+        "period": 0.01,
+        "count": count,
+        "blocks": [table[i : i + 20] for i in range(0, count, 20)],
+    }
     return Group(**own | changed)
 
 
@@ -118,11 +124,17 @@ def test_a_folder_that_does_not_exist_is_one_message(tmp_path):
             write(tmp_path / "no" / f"a{extension}", [group()])
 
 
-@pytest.mark.parametrize(("changed", "says"), [
-    ({"names": ("Fz", "Fz")}, "once in a file"), ({"names": ("Fz", "a\nb")}, "printable"),
-    ({"names": ("Fz", " Fx")}, "printable"), ({"names": ("Fz", "")}, "printable"), ({"count": 0}, "samples"),
-    ({"period": 0.0}, "period"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [
+        ({"names": ("Fz", "Fz")}, "once in a file"),
+        ({"names": ("Fz", "a\nb")}, "printable"),
+        ({"names": ("Fz", " Fx")}, "printable"),
+        ({"names": ("Fz", "")}, "printable"),
+        ({"count": 0}, "samples"),
+        ({"period": 0.0}, "period"),
+    ],
+)
 def test_channels_that_no_file_can_hold_are_refused_before_a_block_is_taken(tmp_path, changed, says):
     for extension in EXTENSIONS:
         with pytest.raises(InputError, match=says):
@@ -130,10 +142,15 @@ def test_channels_that_no_file_can_hold_are_refused_before_a_block_is_taken(tmp_
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("changed", "says"), [
-    ({"names": ("Fz", "M" * 96)}, "room for 95"), ({"names": ("Fz", "Ω")}, "'Ω'"), ({"units": ("N", "kΩ")}, "'Ω'"),
-    ({"comments": ("", "x" * 95 * 1100)}, "1024 parameters"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [
+        ({"names": ("Fz", "M" * 96)}, "room for 95"),
+        ({"names": ("Fz", "Ω")}, "'Ω'"),
+        ({"units": ("N", "kΩ")}, "'Ω'"),
+        ({"comments": ("", "x" * 95 * 1100)}, "1024 parameters"),
+    ],
+)
 def test_what_rpc_has_no_room_for_is_refused_and_never_cut(tmp_path, changed, says):
     with pytest.raises(InputError, match=says):
         write(tmp_path / "a.rsp", [group(**changed, blocks=iter(()))])
@@ -149,7 +166,7 @@ def test_a_long_comment_is_kept_to_the_letter(tmp_path):
 
 
 def test_names_that_look_like_csv_come_back(tmp_path):
-    names, units = ("a;b, \"c\"", "d [e]"), ("", "N;m")
+    names, units = ('a;b, "c"', "d [e]"), ("", "N;m")
     source = open_source(write(tmp_path / "a.csv", [group(names=names, units=units)]))
     assert [(one.name, one.unit) for one in source.channels] == list(zip(names, units, strict=True))
     for changed in ({"units": ("N", "[N]")}, {"units": ("N\n", "")}, {"names": ("Fz", "Time")}):
@@ -205,8 +222,11 @@ def test_steps_of_whole_numbers_are_told(tmp_path):
 
 
 def test_readers_say_nothing_on_the_terminal(tmp_path, capfd):
-    for module, name in ((mdf4_files, "MDF 3 cut"), (tdms_files, "TDMS cut in its samples"),
-                         (mdf4_files, "MDF 4 with invalid samples")):  # fmt: skip
+    for module, name in (
+        (mdf4_files, "MDF 3 cut"),
+        (tdms_files, "TDMS cut in its samples"),
+        (mdf4_files, "MDF 4 with invalid samples"),
+    ):
         try:
             odd(module, name).error(tmp_path / name)
         except InputError:
@@ -216,7 +236,7 @@ def test_readers_say_nothing_on_the_terminal(tmp_path, capfd):
 
 def test_numbers_in_other_hands(tmp_path):
     path = tmp_path / "a.csv"
-    path.write_text("Zeit [ms]\tKraft [kN]\t\"a, b\"\n0\t+1.5e3\t.5\n10\t-1E-3\tNaN\n", encoding="utf-8")
+    path.write_text('Zeit [ms]\tKraft [kN]\t"a, b"\n0\t+1.5e3\t.5\n10\t-1E-3\tNaN\n', encoding="utf-8")
     source = open_source(path)
     assert [(one.name, one.unit) for one in source.channels] == [("Kraft", "kN"), ("a, b", "")]
     found = read(source)

@@ -92,13 +92,16 @@ def test_killed_at_any_moment_it_goes_on_to_the_same_bits(whole, tmp_path, monke
     assert told[-1] == pytest.approx(SECONDS, abs=2e-3)
 
 
-@pytest.mark.parametrize(("change", "told"), [
-    (lambda own: replace(own, hold=Hold("none")), "another stabiliser"),
-    (lambda own: replace(own, engine="exudyn"), "another engine"),
-    (lambda own: replace(own, step=5e-4), "another step"),
-    (lambda own: replace(own, sections=Sections(own.vehicle)), "another list of sections"),
-    (lambda own: replace(own, vehicle=replace(own.vehicle, loads=own.vehicle.loads * 2)), "another vehicle"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda own: replace(own, hold=Hold("none")), "another stabiliser"),
+        (lambda own: replace(own, engine="exudyn"), "another engine"),
+        (lambda own: replace(own, step=5e-4), "another step"),
+        (lambda own: replace(own, sections=Sections(own.vehicle)), "another list of sections"),
+        (lambda own: replace(own, vehicle=replace(own.vehicle, loads=own.vehicle.loads * 2)), "another vehicle"),
+    ],
+)
 def test_results_of_other_inputs_are_not_mixed(whole, change, told):
     own, found, bits = whole
     with pytest.raises(InputError, match=told):

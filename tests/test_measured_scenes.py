@@ -28,24 +28,51 @@ HUBS = ("fl", "fr")
 PLACES = Places(HUBS, ("body",), ("front left",), ("dash",))
 
 
-@pytest.mark.parametrize("unit, quantity, factor", [
-    ("kN", "force", 1e3), ("lbf", "force", 4.4482216152605), ("kp", "force", 9.80665), ("[N]", "force", 1.0),
-    ("Nm", "moment", 1.0), ("kNm", "moment", 1e3), ("N-m", "moment", 1.0), ("lbf ft", "moment", 1.3558179483314),
-    ("g", "acceleration", 9.80665), ("m/s2", "acceleration", 1.0), ("m/s²", "acceleration", 1.0),
-    ("°/s", "angular rate", np.pi / 180), ("U/min", "angular rate", np.pi / 30), ("Grad", "angle", np.pi / 180),
-    ("mm", "travel", 1e-3), ("µm/m", "strain", 1e-6), ("%", "strain", 1e-2), ("mm/m", "strain", 1e-3),
-    ("", "strain", 1.0),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "unit, quantity, factor",
+    [
+        ("kN", "force", 1e3),
+        ("lbf", "force", 4.4482216152605),
+        ("kp", "force", 9.80665),
+        ("[N]", "force", 1.0),
+        ("Nm", "moment", 1.0),
+        ("kNm", "moment", 1e3),
+        ("N-m", "moment", 1.0),
+        ("lbf ft", "moment", 1.3558179483314),
+        ("g", "acceleration", 9.80665),
+        ("m/s2", "acceleration", 1.0),
+        ("m/s²", "acceleration", 1.0),
+        ("°/s", "angular rate", np.pi / 180),
+        ("U/min", "angular rate", np.pi / 30),
+        ("Grad", "angle", np.pi / 180),
+        ("mm", "travel", 1e-3),
+        ("µm/m", "strain", 1e-6),
+        ("%", "strain", 1e-2),
+        ("mm/m", "strain", 1e-3),
+        ("", "strain", 1.0),
+    ],
+)
 def test_units_as_they_are_spelt(unit, quantity, factor):
     assert conversion(unit, quantity, "", "") == pytest.approx(factor, rel=1e-12)
 
 
-@pytest.mark.parametrize("unit, quantity, said", [
-    ("kn", "force", "did you mean 'kN'"), ("Nm", "force", "unit of moment"), ("degC", "force", "degree_Celsius"),
-    ("mV/V", "force", "calibration"), ("wibbles", "travel", "no such unit"), ("1/s", "angular rate", "does not say"),
-    ("Hz", "angular rate", "does not say"), ("%", "angle", "does not say"), ("deg", "strain", "unit of angle"),
-    ("grad", "angle", "no such unit"), ("", "force", "pure number"), ("10 kN", "force", "no such unit"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "unit, quantity, said",
+    [
+        ("kn", "force", "did you mean 'kN'"),
+        ("Nm", "force", "unit of moment"),
+        ("degC", "force", "degree_Celsius"),
+        ("mV/V", "force", "calibration"),
+        ("wibbles", "travel", "no such unit"),
+        ("1/s", "angular rate", "does not say"),
+        ("Hz", "angular rate", "does not say"),
+        ("%", "angle", "does not say"),
+        ("deg", "strain", "unit of angle"),
+        ("grad", "angle", "no such unit"),
+        ("", "force", "pure number"),
+        ("10 kN", "force", "no such unit"),
+    ],
+)
 def test_units_that_mean_something_else_are_refused(unit, quantity, said):
     with pytest.raises(InputError, match=said.replace("'", ".")):
         conversion(unit, quantity, "scene.toml", "unit")
@@ -78,11 +105,16 @@ def test_all_channels_on_the_clock_of_the_wheel_forces(tmp_path):
     a = write_csv(tmp_path / "a.csv", t, fl__kN=np.sin(t), fr__N=np.cos(t))
     b = write_csv(tmp_path / "b.csv", fast, az__g=np.sin(2 * np.pi * 20 * fast) + np.sin(2 * np.pi * 700 * fast))
     c = write_csv(tmp_path / "c.csv", slow + 0.5, roll__deg=slow)
-    own = scene(tmp_path, {"file": a, "channels": [force("fl", "fl"), force("fr", "fr", sign=-1)]},
-                {"file": b, "channels": [
-                    {"channel": "az", "quantity": "acceleration", "at": "dash", "component": "z"}]},
-                {"file": c, "offset": -0.5, "channels": [
-                    {"channel": "roll", "quantity": "angle", "at": "body", "component": "roll"}]})  # fmt: skip
+    own = scene(
+        tmp_path,
+        {"file": a, "channels": [force("fl", "fl"), force("fr", "fr", sign=-1)]},
+        {"file": b, "channels": [{"channel": "az", "quantity": "acceleration", "at": "dash", "component": "z"}]},
+        {
+            "file": c,
+            "offset": -0.5,
+            "channels": [{"channel": "roll", "quantity": "angle", "at": "body", "component": "roll"}],
+        },
+    )
     found = recorded(own, tmp_path)
     fl, fr, az, roll = (found.samples(signal) for signal in found.signals)
     assert (found.period, found.count) == (pytest.approx(2e-3), 1001)
@@ -110,8 +142,11 @@ def test_a_clock_that_is_fast_is_slowed_down_and_a_zero_is_taken_off(tmp_path):
     t = np.arange(2000) * 1e-2
     a = write_csv(tmp_path / "a.csv", t, fl__kN=t + 0.25)
     b = write_csv(tmp_path / "b.csv", 1.002 * t, fr__N=t)
-    own = scene(tmp_path, {"file": a, "channels": [force("fl", "fl", sign=-1, zero=0.25)]},
-                {"file": b, "drift": 2e-3, "channels": [force("fr", "fr")]})  # fmt: skip
+    own = scene(
+        tmp_path,
+        {"file": a, "channels": [force("fl", "fl", sign=-1, zero=0.25)]},
+        {"file": b, "drift": 2e-3, "channels": [force("fr", "fr")]},
+    )
     found = recorded(own, tmp_path)
     assert found.samples(found.signals[0]) == pytest.approx(-1e3 * t, abs=1e-4)
     assert found.samples(found.signals[1]) == pytest.approx(t, abs=1e-6) and found.count == 2000
@@ -142,8 +177,10 @@ def test_times_that_are_late_repeated_or_go_back(tmp_path):
         timing(np.zeros(3), "a.csv")
 
 
-@pytest.mark.parametrize("rate, digits, way", [(1000, 2, np.round), (1024, 3, np.round), (400, 3, np.round),
-                                               (1000, 2, np.floor), (2000, 3, np.ceil)])  # fmt: skip
+@pytest.mark.parametrize(
+    "rate, digits, way",
+    [(1000, 2, np.round), (1024, 3, np.round), (400, 3, np.round), (1000, 2, np.floor), (2000, 3, np.ceil)],
+)
 def test_rounded_times_are_those_of_an_even_clock(rate, digits, way):
     t = np.arange(1500) / rate
     found = timing(way(np.round(t * 10**digits, 6)) / 10**digits, "a.csv")
@@ -200,12 +237,22 @@ def test_resampling_knows_nothing_outside():
     assert np.isnan(out[:10]).all() and np.isnan(out[60:]).all() and np.isfinite(out[10:60]).all()
 
 
-@pytest.mark.parametrize("change, said", [
-    ({"channel": "FL"}, "did you mean 'fl'"), ({"channel": "wheel"}, "which has 2: fl, fr"),
-    ({"at": "lf"}, "no such place"), ({"component": "w"}, "must be x, y or z"), ({"component": ""}, "x, y or z"),
-    ({"frame": "sensor"}, "no frame"), ({"unit": "mm"}, "unit of travel"), ({"quantity": "thrust"}, "must be force"),
-    ({"sign": 0}, "must be 1 or -1"), ({"at": "front left"}, "leave component out"), ({"channel": "fr"}, "twice"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        ({"channel": "FL"}, "did you mean 'fl'"),
+        ({"channel": "wheel"}, "which has 2: fl, fr"),
+        ({"at": "lf"}, "no such place"),
+        ({"component": "w"}, "must be x, y or z"),
+        ({"component": ""}, "x, y or z"),
+        ({"frame": "sensor"}, "no frame"),
+        ({"unit": "mm"}, "unit of travel"),
+        ({"quantity": "thrust"}, "must be force"),
+        ({"sign": 0}, "must be 1 or -1"),
+        ({"at": "front left"}, "leave component out"),
+        ({"channel": "fr"}, "twice"),
+    ],
+)
 def test_mistakes_in_the_map_are_told_in_one_sentence(tmp_path, change, said):
     t = np.arange(200) * 1e-2
     name = write_csv(tmp_path / "a.csv", t, fl__N=t, fr__N=t)
@@ -233,22 +280,38 @@ def test_a_missing_wheel_or_angle_is_refused_before_anything_runs(tmp_path):
         scene(tmp_path)
 
 
-@pytest.mark.parametrize("name, unit, found", [
-    ("FL_Fx", "kN", ("force", "fl", "x")), ("WFT_RR_MZ", "N m", ("moment", "rr", "z")),
-    ("Radkraft vorne links", "kN", ("force", "fl", "z")), ("Nickrate", "°/s", ("angular rate", "body", "pitch")),
-    ("FzFrontRight", "N", ("force", "fr", "z")), ("Federweg HL", "mm", ("travel", "rear left", "")),
-    ("Fx_rr", "", ("force", "rr", "x")), ("Vehicle speed", "km/h", None),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "name, unit, found",
+    [
+        ("FL_Fx", "kN", ("force", "fl", "x")),
+        ("WFT_RR_MZ", "N m", ("moment", "rr", "z")),
+        ("Radkraft vorne links", "kN", ("force", "fl", "z")),
+        ("Nickrate", "°/s", ("angular rate", "body", "pitch")),
+        ("FzFrontRight", "N", ("force", "fr", "z")),
+        ("Federweg HL", "mm", ("travel", "rear left", "")),
+        ("Fx_rr", "", ("force", "rr", "x")),
+        ("Vehicle speed", "km/h", None),
+    ],
+)
 def test_guesses(name, unit, found):
     own = guess(Channel(name, unit, "", 0, 10, None))
     assert (own and (own.quantity, own.at, own.component)) == found
 
 
-@pytest.mark.parametrize("name, unit, family, reason", [
-    ("Strut_FL_F", "N", "", "strut"), ("Damper force FL", "kN", "", "damper"), ("Federbein VL", "kN", "", "federbein"),
-    ("shock_rr", "N", "", "shock"), ("Stoßdämpferkraft HL", "N", "", "stoßdämpferkraft"), ("TieRodFL", "N", "", "tie"),
-    ("Fz", "N", "Damper FL", "damper"), ("Strut FL Mx", "N m", "", "strut"), ("Bellows FL", "N", "", "bellows"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "name, unit, family, reason",
+    [
+        ("Strut_FL_F", "N", "", "strut"),
+        ("Damper force FL", "kN", "", "damper"),
+        ("Federbein VL", "kN", "", "federbein"),
+        ("shock_rr", "N", "", "shock"),
+        ("Stoßdämpferkraft HL", "N", "", "stoßdämpferkraft"),
+        ("TieRodFL", "N", "", "tie"),
+        ("Fz", "N", "Damper FL", "damper"),
+        ("Strut FL Mx", "N m", "", "strut"),
+        ("Bellows FL", "N", "", "bellows"),
+    ],
+)
 def test_forces_of_struts_are_not_guessed_to_be_hub_forces(tmp_path, name, unit, family, reason):
     own = guess(Channel(name, unit, "", 0, 10, None, family=family))
     assert own.at == "" and f"({reason}" in own.left_out
@@ -261,10 +324,16 @@ def test_forces_of_struts_are_not_guessed_to_be_hub_forces(tmp_path, name, unit,
         assert [row["channel"] for row in rows] == ["FL_Fz"]
 
 
-@pytest.mark.parametrize("name, unit, family, at", [
-    ("Fz", "N", "WFT VL", "fl"), ("My", "N m", "Rear right wheel", "rr"), ("Instrument FR Fz", "N", "", "fr"),
-    ("spring travel FL", "mm", "", "front left"), ("Radkraft vorne links", "N", "", "fl"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "name, unit, family, at",
+    [
+        ("Fz", "N", "WFT VL", "fl"),
+        ("My", "N m", "Rear right wheel", "rr"),
+        ("Instrument FR Fz", "N", "", "fr"),
+        ("spring travel FL", "mm", "", "front left"),
+        ("Radkraft vorne links", "N", "", "fl"),
+    ],
+)
 def test_groups_and_words_that_only_sound_like_parts_are_guessed(name, unit, family, at):
     own = guess(Channel(name, unit, "", 0, 10, None, family=family))
     assert own.at == at and not own.left_out
@@ -280,10 +349,16 @@ def test_what_show_prints_is_a_scene(tmp_path):
 
 @pytest.mark.full
 def test_from_the_road_to_the_page(tmp_path):
-    own = build({"title": "short", "system": "measured", "vehicle": {"file": "r19_free"},
-                 "virtual": {"duration": 0.6, "format": "csv", "sampling_rate": 500.0, "sections": ["front left"]},
-                 "hand_on": {"sections": ["front left", "fl hub"], "formats": ["csv"], "slopes": [5.0]}},
-                "s.toml")  # fmt: skip
+    own = build(
+        {
+            "title": "short",
+            "system": "measured",
+            "vehicle": {"file": "r19_free"},
+            "virtual": {"duration": 0.6, "format": "csv", "sampling_rate": 500.0, "sections": ["front left"]},
+            "hand_on": {"sections": ["front left", "fl hub"], "formats": ["csv"], "slopes": [5.0]},
+        },
+        "s.toml",
+    )
     summary = run(own, ("mujoco",), tmp_path, lambda text, part: None)
     page = (tmp_path / "recording.html").read_text()
     assert summary["failed"] == {} and "<b>Accepted</b>" in page and page.count("<img") >= 5

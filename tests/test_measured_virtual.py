@@ -40,9 +40,13 @@ def car() -> CutVehicle:
 
 @pytest.fixture(scope="module")
 def driven(car: CutVehicle) -> VirtualMeasurement:
-    table = {"duration": 0.5, "sampling_rate": 500.0, "accelerometers": {"origin": [-0.17469426452848785, 0.0,
-             0.6254492741749169], "roof": [0.3, 0.2, 1.4]}, "travels": ["front left", "front bar"],
-             "sections": ["front left"]}  # fmt: skip
+    table = {
+        "duration": 0.5,
+        "sampling_rate": 500.0,
+        "accelerometers": {"origin": [-0.17469426452848785, 0.0, 0.6254492741749169], "roof": [0.3, 0.2, 1.4]},
+        "travels": ["front left", "front bar"],
+        "sections": ["front left"],
+    }
     return virtual_measurement(car, read(VirtualTable, table, ""), "mujoco")
 
 
@@ -58,10 +62,15 @@ WAVE = np.sin(2 * np.pi * 3.0 * 1e-3 * np.arange(8001))
 TWO = (_signal("a"), _signal("b", at="fr"))
 
 
-@pytest.mark.parametrize(("faults", "expected"), [
-    ({}, WAVE[::2]), ({"gain": {"fl": 0.02}}, 1.02 * WAVE[::2]), ({"bias": {"a": 3.0, "force": 9.0}}, WAVE[::2] + 3.0),
-    ({"delay": {"force": 0.0035}}, np.sin(2 * np.pi * 3.0 * np.maximum(2e-3 * np.arange(4001) - 0.0035, 0.0))),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("faults", "expected"),
+    [
+        ({}, WAVE[::2]),
+        ({"gain": {"fl": 0.02}}, 1.02 * WAVE[::2]),
+        ({"bias": {"a": 3.0, "force": 9.0}}, WAVE[::2] + 3.0),
+        ({"delay": {"force": 0.0035}}, np.sin(2 * np.pi * 3.0 * np.maximum(2e-3 * np.arange(4001) - 0.0035, 0.0))),
+    ],
+)
 def test_a_fault_does_what_it_says_and_nothing_else(faults: dict[str, object], expected: np.ndarray) -> None:
     found = _faulty(faults, TWO, np.column_stack([WAVE, WAVE]))
     assert np.abs(found[:, 0] - expected).max() < 1e-9  # the spline of a delay errs by (w h)^4 / 384
@@ -80,8 +89,9 @@ def test_noise_belongs_to_its_channel() -> None:
 def test_a_converter_rounds_and_a_silent_transducer_loses_all_its_channels() -> None:
     signals = (_signal("a"), _signal("b", component="x"), _signal("c", at="fr"))
     truth = np.column_stack([WAVE, 2 * WAVE, WAVE])
-    found = _faulty({"quantisation": {"bits": 8, "channels": ["a"]}, "dropouts": {"rate": 1.0, "length": 0.02}},
-                    signals, truth)  # fmt: skip
+    found = _faulty(
+        {"quantisation": {"bits": 8, "channels": ["a"]}, "dropouts": {"rate": 1.0, "length": 0.02}}, signals, truth
+    )
     lost = np.isnan(found)
     assert (lost[:, 0] == lost[:, 1]).all() and (lost[:, 0] != lost[:, 2]).any()
     assert 1 <= lost[:, 0].sum() / 10 <= 20  # of 8 expected gaps of 10 samples; 5 deviations of a Poisson number are 14
@@ -96,12 +106,18 @@ def test_names_that_no_signal_has_are_refused() -> None:
         check(read(Faults, {"delay": {"a": -1e-3}}, ""), TWO)
 
 
-@pytest.mark.parametrize(("table", "message"), [
-    ({"faults": {"gain": {"fl_fy2": 0.1}}}, "did you mean 'fl_fy'"), ({"travels": ["strut"]}, "travels = 'strut'"),
-    ({"sampling_rate": 700.0}, "virtual.sampling_rate"), ({"duration": 1.00007}, "virtual.step"),
-])  # fmt: skip
-def test_a_measurement_that_cannot_be_is_refused_before_its_run(car: CutVehicle, table: dict[str, object],
-                                                                message: str) -> None:  # fmt: skip
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"faults": {"gain": {"fl_fy2": 0.1}}}, "did you mean 'fl_fy'"),
+        ({"travels": ["strut"]}, "travels = 'strut'"),
+        ({"sampling_rate": 700.0}, "virtual.sampling_rate"),
+        ({"duration": 1.00007}, "virtual.step"),
+    ],
+)
+def test_a_measurement_that_cannot_be_is_refused_before_its_run(
+    car: CutVehicle, table: dict[str, object], message: str
+) -> None:
     with pytest.raises(InputError, match=message):
         check_virtual(car, read(VirtualTable, table, ""))
 
@@ -144,8 +160,11 @@ def test_transducers_agree_with_one_another(car: CutVehicle, driven: VirtualMeas
     roll = np.gradient(value["roll_rate"], driven.step)
     assert np.abs(lever + roll)[5:-5].max() < 0.1 * np.abs(roll).max()  # about x, upwards is leftwards turned round
     spring = car.elements[[element.name for element in car.elements].index("front left")]
-    law = spring.held + spring.stiffness * value["front left_travel"] \
-        + spring.damping * np.gradient(value["front left_travel"], driven.step)  # fmt: skip
+    law = (
+        spring.held
+        + spring.stiffness * value["front left_travel"]
+        + spring.damping * np.gradient(value["front left_travel"], driven.step)
+    )
     assert np.abs(law - value["front left_force"])[5:-5].max() < 0.02 * np.ptp(value["front left_force"])
 
 
@@ -192,10 +211,15 @@ def test_a_channel_that_disagrees_is_told_from_its_noise() -> None:
 @pytest.fixture(scope="module")
 def planar(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     true = simulate(road_scene(duration=1.5, step=1e-3), "reference")
-    pairs = [(_signal(f"{at}{side}", at=f"{at} {side}"), share * true[force]) for at, force in (("front", "f1"),
-             ("rear", "f2")) for side, share in (("left", 0.55), ("right", 0.45))]  # fmt: skip
-    pairs += [(_signal("pitch", "angle", "chassis", "pitch"), -true["pitch"]),
-              (_signal("rate", "angular rate", "chassis", "pitch"), -true["pitch_rate"])]  # fmt: skip
+    pairs = [
+        (_signal(f"{at}{side}", at=f"{at} {side}"), share * true[force])
+        for at, force in (("front", "f1"), ("rear", "f2"))
+        for side, share in (("left", 0.55), ("right", 0.45))
+    ]
+    pairs += [
+        (_signal("pitch", "angle", "chassis", "pitch"), -true["pitch"]),
+        (_signal("rate", "angular rate", "chassis", "pitch"), -true["pitch_rate"]),
+    ]
     columns = Columns(tmp_path_factory.mktemp("plane") / "c.bin", tuple(s.name for s, _ in pairs), len(true.times))
     columns.write(0, np.column_stack([values for _, values in pairs]))
     return Recording(tuple(s for s, _ in pairs), columns, 1e-3)

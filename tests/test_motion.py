@@ -8,8 +8,13 @@ from models.systems import load
 from studies.asked import SCENES
 from studies.motion import run
 
-SHORT = ["run.duration=2.5", "effects.accelerometers.sampling_rate=200.0", "effects.gyro.sampling_rate=200.0",
-         "options.turning_cut_off=0.5", "options.position_cut_off=0.5"]  # fmt: skip
+SHORT = [
+    "run.duration=2.5",
+    "effects.accelerometers.sampling_rate=200.0",
+    "effects.gyro.sampling_rate=200.0",
+    "options.turning_cut_off=0.5",
+    "options.position_cut_off=0.5",
+]
 CLEAN = [*SHORT, "effects.accelerometers.deviation=0.0"]
 
 
@@ -33,12 +38,16 @@ def test_the_loose_sensor_is_left_out_and_the_rest_recovers_the_motion(tmp_path)
         assert row["ways"]["high-passed"]["pitch"][0] > 0.01
     assert "'battery' does not move" in "\n".join(found["table"])
     assert {"motion.png", "table.txt", "reference readings.csv", "mujoco, integrated.csv"} <= {
-        path.name for path in tmp_path.iterdir()}  # fmt: skip
+        path.name for path in tmp_path.iterdir()
+    }
 
 
 def test_clean_rigid_sensors_recover_it_to_the_integration(tmp_path):
-    rigid = [*CLEAN, "effects.accelerometers.sensors.battery={x = 0.6, y = 0.3, z = 0.0}",
-             "effects.accelerometers.sampling_rate=1000.0"]  # fmt: skip
+    rigid = [
+        *CLEAN,
+        "effects.accelerometers.sensors.battery={x = 0.6, y = 0.3, z = 0.0}",
+        "effects.accelerometers.sampling_rate=1000.0",
+    ]
     (row,) = ran(rigid, tmp_path)["rows"]
     assert row["rigid"] and row["suspect"] == "" and row["share"] < 1e-14
     # kinks of the road's start and fast poles at 1 kHz; order 4 elsewhere
@@ -54,21 +63,26 @@ def test_a_users_file_takes_the_place_of_the_runs(tmp_path):
     (row,) = ran([*CLEAN, "options.file=mine.csv"], again, ("reference", "mujoco"), file=tmp_path)["rows"]
     assert row["source"] == "mine.csv" and row["suspect"] == "battery"
     # the file says nothing of the start: at rest and level, as this run begins but for the static pitch of 0
-    one, other = (np.loadtxt(folder / name, delimiter=",", skiprows=1)[:, 1:3] for folder, name in (
-        (tmp_path, "reference, integrated.csv"), (again, "mine, integrated.csv")))  # fmt: skip
+    one, other = (
+        np.loadtxt(folder / name, delimiter=",", skiprows=1)[:, 1:3]
+        for folder, name in ((tmp_path, "reference, integrated.csv"), (again, "mine, integrated.csv"))
+    )
     assert np.abs(one - other).max() < 1e-12
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    ("options.turning_cut_off=0.01", "options.turning_cut_off.*shorter than one period"),
-    ("options.position_cut_off=200.0", "options.position_cut_off.*between 0 and 100 Hz"),
-    ("effects.accelerometers.sensors={a = {x = 1.0, z = 0.0}, b = {x = 2.0, z = 0.0}}", "sensors.*at least three"),
-    ("effects.accelerometers.sensors={a={x=1.0,z=0.0},b={x=2.0,z=0.0},c={x=3.0,z=0.0}}", "sensors.*on a line"),
-    ("options.file=none.csv", "options.file.*no such file"),
-    ("options.zeroed=true", "options.zeroed.*of your own"),
-    ("run.output_step=5e-3", "run.output_step.*drop this key"),
-    ("options.speed=3.0", "unknown key"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("options.turning_cut_off=0.01", "options.turning_cut_off.*shorter than one period"),
+        ("options.position_cut_off=200.0", "options.position_cut_off.*between 0 and 100 Hz"),
+        ("effects.accelerometers.sensors={a = {x = 1.0, z = 0.0}, b = {x = 2.0, z = 0.0}}", "sensors.*at least three"),
+        ("effects.accelerometers.sensors={a={x=1.0,z=0.0},b={x=2.0,z=0.0},c={x=3.0,z=0.0}}", "sensors.*on a line"),
+        ("options.file=none.csv", "options.file.*no such file"),
+        ("options.zeroed=true", "options.zeroed.*of your own"),
+        ("run.output_step=5e-3", "run.output_step.*drop this key"),
+        ("options.speed=3.0", "unknown key"),
+    ],
+)
 def test_what_cannot_be_used_is_refused_before_anything_is_written(change, words, tmp_path):
     with pytest.raises(InputError, match=words):
         ran([*SHORT, change], tmp_path)

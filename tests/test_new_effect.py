@@ -86,14 +86,17 @@ def test_a_new_effect_of_another_system(new_file, capsys):
     assert "effect     slow_chambers" in import_module(SYSTEMS["braking"].plan).describe(scene)
 
 
-@pytest.mark.parametrize(("text", "told"), [
-    ("x = (", r"is no effect of braking that can be imported: .* was never closed"),
-    ("import nothing_there", "can be imported: No module named 'nothing_there'"),
-    ('"""Half a file."""', "has no COST and no Parameters and no extend"),
-    (SLOW.partition("    slow = ")[0] + "    pass", "extend: returns nothing"),
-    (SLOW.partition("    slow = ")[0] + "    return vehicle.none", "extend: line 18 stops with Attrib"),
-    (SLOW.replace("COST", "NEEDS = ('storm',)\nCOST"), "storm.py: is no effect of braking"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("x = (", r"is no effect of braking that can be imported: .* was never closed"),
+        ("import nothing_there", "can be imported: No module named 'nothing_there'"),
+        ('"""Half a file."""', "has no COST and no Parameters and no extend"),
+        (SLOW.partition("    slow = ")[0] + "    pass", "extend: returns nothing"),
+        (SLOW.partition("    slow = ")[0] + "    return vehicle.none", "extend: line 18 stops with Attrib"),
+        (SLOW.replace("COST", "NEEDS = ('storm',)\nCOST"), "storm.py: is no effect of braking"),
+    ],
+)
 def test_a_file_that_is_no_effect_is_told_by_name(text, told, new_file, capsys):
     new_file("braking", "slow_chambers", text)
     list_scenes()

@@ -72,7 +72,13 @@ def extend(built, p):
 
 
 NEW = {
-    "ride": New("tread", "second_corner", "length", 0.1, '{"all": {"states": 4}}', """
+    "ride": New(
+        "tread",
+        "second_corner",
+        "length",
+        0.1,
+        '{"all": {"states": 4}}',
+        """
     def lagged(road):
         m, lag = len(road.F), np.eye(len(road.F)) / p.length
         return replace(road, F=np.block([[road.F, np.zeros((m, m))], [lag, -lag]]),
@@ -80,29 +86,64 @@ NEW = {
                        heights=tuple(np.hstack([0.0 * H, H]) for H in road.heights))
 
     return replace(built, road=(*built.road, lagged))
-"""),
-    "contact": New("soft_bodies", "falling_friction", "share", 0.5, "{}", """
+""",
+    ),
+    "contact": New(
+        "soft_bodies",
+        "falling_friction",
+        "share",
+        0.5,
+        "{}",
+        """
     from models.contact.material import Material, Pair
 
     soft = (Material(E=p.share * body.E, nu=body.nu) for body in (built.pair.one, built.pair.two))
     return replace(built, pair=Pair(*soft))
-""", beside=("saturation",)),
-    "wheelset": New("rubber", "profiles", "stiffness", 1e7, '{"all": {"springs": 1}, "exudyn": {"spring-dampers": 2}, '
-                    '"mujoco": {"actuators": 2}}', """
+""",
+        beside=("saturation",),
+    ),
+    "wheelset": New(
+        "rubber",
+        "profiles",
+        "stiffness",
+        1e7,
+        '{"all": {"springs": 1}, "exudyn": {"spring-dampers": 2}, "mujoco": {"actuators": 2}}',
+        """
     return built.changed(stiffness_x=p.stiffness)
-"""),
-    "handling": New("side_wind", "rough_road", "force", 900.0, '{"all": {"pushes": 1}}', """
+""",
+    ),
+    "handling": New(
+        "side_wind",
+        "rough_road",
+        "force",
+        900.0,
+        '{"all": {"pushes": 1}}',
+        """
     from models.handling.numbers import Push
 
     wind = Push("body", (0.3, 0.0, 0.8), (0.0, 1.0, 0.0), ((0.0, 0.0), (5e-3, p.force)))
     return replace(built, pushes=(*built.pushes, wind))
-"""),
-    "hub-forces": New("light_wheels", "turning_forces", "share", 0.5, "{}", """
+""",
+    ),
+    "hub-forces": New(
+        "light_wheels",
+        "turning_forces",
+        "share",
+        0.5,
+        "{}",
+        """
     wheels = {tyre.body for tyre in built.tyres}
     bodies = (replace(b, mass=p.share * b.mass) if b.name in wheels else b for b in built.bodies)
     return replace(built, bodies=tuple(bodies))
-"""),
-    "measured": New("slow_transducers", "own_clocks", "time", 5e-3, "{}", """
+""",
+    ),
+    "measured": New(
+        "slow_transducers",
+        "own_clocks",
+        "time",
+        5e-3,
+        "{}",
+        """
     share = 1.0 - np.exp(-built.period / p.time)
 
     def lag(signal, samples):
@@ -112,8 +153,9 @@ NEW = {
         return out
 
     return built.changed(lag)
-"""),
-}  # fmt: skip
+""",
+    ),
+}
 """System -> a file for it. Where engines march by one tableau they part by rounding alone."""
 
 
@@ -147,8 +189,9 @@ def _judged(before, after, apart):
 def test_a_push_from_outside_does_the_work_that_the_vehicle_gains():
     """Energy of the rigid bodies, written without an engine, less the power of all forces by Simpson's rule: a push of
     900 N over some 16 mm puts in 15 J, and 9e-8 J are left."""
-    handling = Handling(load_vehicle("r19_free")).changed(pushes=(
-        Push("body", (0.3, 0.0, 0.8), (0.0, 1.0, 0.0), ((0.0, 0.0), (0.05, 900.0), (0.3, 900.0), (0.4, 0.0))),))
+    handling = Handling(load_vehicle("r19_free")).changed(
+        pushes=(Push("body", (0.3, 0.0, 0.8), (0.0, 1.0, 0.0), ((0.0, 0.0), (0.05, 900.0), (0.3, 900.0), (0.4, 0.0))),)
+    )
     drive = driven("mujoco", handling, 25.0, 0.5)
     assert np.abs(unaccounted(drive)).max() < 1e-6
     assert drive.path[-1, 1] > 0.04  # m, to the left
@@ -156,15 +199,27 @@ def test_a_push_from_outside_does_the_work_that_the_vehicle_gains():
         handling.changed(pushes=(Push("sail", (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), ((0.0, 1.0),)),))
 
 
-DAMPERS = New("dampers", "curves", "damping", 800.0, "{}", """
+DAMPERS = New(
+    "dampers",
+    "curves",
+    "damping",
+    800.0,
+    "{}",
+    """
     from models.vehicles.spatial import SpringDamper
 
     more = (SpringDamper(f"{t.name} damper", "body", t.body, t.point, t.point, (0.0, 0.0, 1.0), 0.0, p.damping)
             for t in built.vehicle.tyres)
     return replace(built, vehicle=replace(built.vehicle, springs=(*built.vehicle.springs, *more)))
-""")
-HALF_CAR = {"title": "t", "system": "ride", "vehicle": {"file": "half_car"}, "speeds": {"values": [20.0]},
-            "road": {"cutoff": 20.0}}  # fmt: skip
+""",
+)
+HALF_CAR = {
+    "title": "t",
+    "system": "ride",
+    "vehicle": {"file": "half_car"},
+    "speeds": {"values": [20.0]},
+    "road": {"cutoff": 20.0},
+}
 """Its road has rates, as runs in time need where tyres are damped."""
 
 
@@ -189,7 +244,7 @@ def test_a_new_effect_of_ride_is_in_every_linear_vehicle_and_in_both_engines(new
 def test_new_effects_of_ride_are_priced_and_chosen_among(new_file, monkeypatch):
     """Exactly: each is left out of the equations themselves. What needs another one goes with it."""
     new_file("ride", DAMPERS.name, DAMPERS.text)
-    new_file("ride", "tread", NEW["ride"].text.replace('COST', 'NEEDS = ("delay", "dampers")\nCOST', 1))
+    new_file("ride", "tread", NEW["ride"].text.replace("COST", 'NEEDS = ("delay", "dampers")\nCOST', 1))
     scene = load(SCENES / "ride_choice.toml")
     held = Held(own := beside(scene, "dampers", "tread"), vehicle_of(own))
     there = {effect.name: effect for effect in effects_of(held)}
@@ -210,17 +265,26 @@ def test_new_effects_of_ride_are_priced_and_chosen_among(new_file, monkeypatch):
     assert "name it in the scene" in prices["drag"].why and prices["weighting"].gone == ("body centre Wk",)
 
 
-RAIN = New("rain", "spin", "share", 0.5, "{}", """
+RAIN = New(
+    "rain",
+    "spin",
+    "share",
+    0.5,
+    "{}",
+    """
     return replace(built, friction=p.share * built.friction)
-""")
+""",
+)
 
 
 @pytest.mark.parametrize("theory", ["fastsim", "simplified", "exact"])
 def test_a_new_law_of_friction_is_in_every_theory(theory, new_file):
     new_file("contact", RAIN.name, RAIN.text)
     table = CONTACT | {"contact": {"load": 8e4, "friction": 0.2}, "method": {"name": theory}}
-    own, known = build_contact(table | {"effects": {"rain": {"share": 0.5}}}), build_contact(
-        table | {"contact": {"load": 8e4, "friction": 0.1}})  # fmt: skip
+    own, known = (
+        build_contact(table | {"effects": {"rain": {"share": 0.5}}}),
+        build_contact(table | {"contact": {"load": 8e4, "friction": 0.1}}),
+    )
     one, other = (contact(scene).roll((5e-3, 1e-3, 0.0), 9) for scene in (own, known))
     assert (one.fx, one.fy) == (other.fx, other.fy) != (0.0, 0.0)
 
@@ -231,8 +295,9 @@ def test_a_new_law_of_friction_holds_for_every_row_of_a_table(new_file, tmp_path
     for name, friction in (("wet", (0.2, 0.6)), ("dry", (0.1, 0.3))):
         rows = (f"5e-3,4e-3,8e4,{mu},5e-3,1e-3,0.1\n" for mu in friction)
         (tmp_path / f"{name}.csv").write_text(head + "".join(rows))
-    scene = build_contact({"title": "t", "system": "contact", "cases": {"file": "wet.csv"},
-                           "effects": {"rain": {"share": 0.5}}})  # fmt: skip
+    scene = build_contact(
+        {"title": "t", "system": "contact", "cases": {"file": "wet.csv"}, "effects": {"rain": {"share": 0.5}}}
+    )
     answer(tmp_path / "wet.csv", tmp_path / "a.csv", scene.pair, scene.method, extend=partial(extended, scene=scene))
     answer(tmp_path / "dry.csv", tmp_path / "b.csv", scene.pair, scene.method)
     assert (tmp_path / "a.csv").read_text() == (tmp_path / "b.csv").read_text()
@@ -240,18 +305,40 @@ def test_a_new_law_of_friction_holds_for_every_row_of_a_table(new_file, tmp_path
 
 def test_a_new_profile_and_a_law_that_no_theory_of_the_scene_knows(new_file):
     """A rail that is rounder by a parabola carries on a smaller area."""
-    new_file("contact", "ground", New("ground", "falling_friction", "depth", 1e-4, "{}", """
+    new_file(
+        "contact",
+        "ground",
+        New(
+            "ground",
+            "falling_friction",
+            "depth",
+            1e-4,
+            "{}",
+            """
     rail = built.profiles["rail"]
     own = replace(rail, z=rail.z + p.depth * (rail.y / 0.02) ** 2)
     return replace(built, profiles={**built.profiles, "rail": own})
-""").text)
+""",
+        ).text,
+    )
     scene = build_contact(CONTACT | {"ellipse": None, "profiles": {}, "method": {"name": "simplified"}})
     assert contact(beside(scene, "ground")).pressing.area < contact(scene).pressing.area
-    new_file("contact", "worn_in", New("worn_in", "falling_friction", "floor", 0.4, "{}", """
+    new_file(
+        "contact",
+        "worn_in",
+        New(
+            "worn_in",
+            "falling_friction",
+            "floor",
+            0.4,
+            "{}",
+            """
     from models.contact.falling_friction import Falling
 
     return replace(built, falling=Falling(floor=p.floor, decay=0.6, speed=20.0))
-""").text)
+""",
+        ).text,
+    )
     with pytest.raises(InputError, match=r"'simplified': has constant friction, .*: use fastsim"):
         contact(beside(scene, "worn_in"))
 

@@ -91,17 +91,20 @@ def test_bodies_apart(given):
     assert found.load == 0.0 and not found.contact.any() and found.area == 0.0
 
 
-@pytest.mark.parametrize(("distance", "step", "given", "place"), [
-    (np.zeros(5), STEP, {"load": 1.0}, "distance"),
-    (np.full((5, 5), np.nan), STEP, {"load": 1.0}, "distance"),
-    (bowl(), -STEP, {"load": 1.0}, "dx"),
-    (bowl(), 0.4, {"load": 1.0}, "dx"),
-    (bowl(), STEP, {}, "load"),
-    (bowl(), STEP, {"load": 1.0, "approach": 1e-5}, "load"),
-    (bowl(), STEP, {"load": np.inf}, "load"),
-    (bowl(), STEP, {"approach": 7.0}, "approach"),
-    (bowl(), STEP, {"load": 1e7}, "distance"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("distance", "step", "given", "place"),
+    [
+        (np.zeros(5), STEP, {"load": 1.0}, "distance"),
+        (np.full((5, 5), np.nan), STEP, {"load": 1.0}, "distance"),
+        (bowl(), -STEP, {"load": 1.0}, "dx"),
+        (bowl(), 0.4, {"load": 1.0}, "dx"),
+        (bowl(), STEP, {}, "load"),
+        (bowl(), STEP, {"load": 1.0, "approach": 1e-5}, "load"),
+        (bowl(), STEP, {"load": np.inf}, "load"),
+        (bowl(), STEP, {"approach": 7.0}, "approach"),
+        (bowl(), STEP, {"load": 1e7}, "distance"),
+    ],
+)
 def test_bad_input_is_refused(distance, step, given, place):
     with pytest.raises(InputError) as error:
         solve_normal(distance, step, STEP, PAIR, **given)

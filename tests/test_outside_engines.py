@@ -127,8 +127,11 @@ def test_a_scipy_solver_of_a_dozen_lines_agrees_with_the_reference(own, tmp_path
     """
     name = own(Scipy)
     write_forces(simulate(road_scene(duration=SHORT), "reference"), tmp_path, 5e-3)
-    scenes = [road_scene(duration=SHORT), force_scene(tmp_path, duration=SHORT),
-              force_scene(tmp_path, duration=SHORT, interpolation="held")]  # fmt: skip
+    scenes = [
+        road_scene(duration=SHORT),
+        force_scene(tmp_path, duration=SHORT),
+        force_scene(tmp_path, duration=SHORT, interpolation="held"),
+    ]
     for scene in scenes:
         assembly = assemble(scene)
         found = build(name, assembly, Settings(name, 1e-3, SHORT, 1e-11)).run()
@@ -136,31 +139,49 @@ def test_a_scipy_solver_of_a_dozen_lines_agrees_with_the_reference(own, tmp_path
         assert np.abs(found.states - tight.states).max() < 1e-7 and found.counts["force calls"] > 100
 
 
-@pytest.mark.parametrize(("answer", "said"), [
-    (lambda times, start: None, "gave NoneType instead of numbers"), (lambda times, start: "x", "instead of numbers"),
-    (lambda times, start: np.zeros((3, 8)), r"gave the shape \(3, 8\)"),
-    (lambda times, start: np.full((len(times), 8), np.nan), "infinite or not a number"),
-    (lambda times, start: np.full((len(times), 8), 1e9), "no vehicle any more"),
-    (lambda times, start: 1 / 0, "integrate raised ZeroDivisionError")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (lambda times, start: None, "gave NoneType instead of numbers"),
+        (lambda times, start: "x", "instead of numbers"),
+        (lambda times, start: np.zeros((3, 8)), r"gave the shape \(3, 8\)"),
+        (lambda times, start: np.full((len(times), 8), np.nan), "infinite or not a number"),
+        (lambda times, start: np.full((len(times), 8), 1e9), "no vehicle any more"),
+        (lambda times, start: 1 / 0, "integrate raised ZeroDivisionError"),
+    ],
+)
 def test_a_wrong_answer_is_a_failed_run_that_says_so(own, answer, said):
     name = own(answering(answer))
     with pytest.raises(RunFailed, match=said):
         simulate(road_scene(duration=0.01), name, Settings(name, 1e-3, 0.01))
 
 
-@pytest.mark.parametrize(("found", "said"), [
-    (Deaf, r"has no acceleration\(\)"), (type("Empty", (), {"order": 3}), r"no run and no acceleration\(\)"),
-    (type("Unordered", (Euler,), {"order": None}), "must say its order"),
-    (type("Zeroth", (Euler,), {"order": 0}), "must say its order"), (len, "is no class")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (Deaf, r"has no acceleration\(\)"),
+        (type("Empty", (), {"order": 3}), r"no run and no acceleration\(\)"),
+        (type("Unordered", (Euler,), {"order": None}), "must say its order"),
+        (type("Zeroth", (Euler,), {"order": 0}), "must say its order"),
+        (len, "is no class"),
+    ],
+)
 def test_what_is_no_engine_is_refused(own, found, said):
     with pytest.raises(InputError, match=said):
         own(found)
 
 
-@pytest.mark.parametrize(("name", "said"), [
-    ("nowhere_at_all:X", "no module 'nowhere_at_all'"), ("json:Nope", "has no Nope"), (":", "must read module:Class"),
-    ("a b:C", "must read module:Class"), ("broken:X", "cannot be imported: ZeroDivisionError"),
-    ("leaving:X", "cannot be imported: SystemExit")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("nowhere_at_all:X", "no module 'nowhere_at_all'"),
+        ("json:Nope", "has no Nope"),
+        (":", "must read module:Class"),
+        ("a b:C", "must read module:Class"),
+        ("broken:X", "cannot be imported: ZeroDivisionError"),
+        ("leaving:X", "cannot be imported: SystemExit"),
+    ],
+)
 def test_a_name_that_leads_nowhere_is_refused_by_the_command(name, said, twinrig, empty_folder, capsys):
     (empty_folder / "broken.py").write_text("1 / 0\n")
     (empty_folder / "leaving.py").write_text("import sys\nsys.exit(3)\n")
@@ -204,9 +225,17 @@ RUNS = {"path.study road", "path.wheel forces, linear", "path.wheel forces, held
 """Rows that a run decides, but for the equilibrium, in which nothing moves."""
 
 
-@pytest.mark.parametrize(("found", "failed"), [
-    (Sparse, RUNS | {"equilibrium"}), (Far, RUNS), (Scipy, set()), (Engine, set()), (Boast, {"order", "momentum"}),
-    (Tilted, {f"audit.{v}.{g}" for v in ("itwm_drift", "asymmetric_twin") for g in ("exact", "linear")})])  # fmt: skip
+@pytest.mark.parametrize(
+    ("found", "failed"),
+    [
+        (Sparse, RUNS | {"equilibrium"}),
+        (Far, RUNS),
+        (Scipy, set()),
+        (Engine, set()),
+        (Boast, {"order", "momentum"}),
+        (Tilted, {f"audit.{v}.{g}" for v in ("itwm_drift", "asymmetric_twin") for g in ("exact", "linear")}),
+    ],
+)
 def test_the_suite_passes_what_is_right_and_names_what_is_wrong(own, tmp_path, monkeypatch, found, failed):
     rows = judged(own(found), tmp_path, monkeypatch)
     assert {id for id, status in rows.items() if status != "passed"} == failed and len(rows) == 11
@@ -219,8 +248,12 @@ def test_a_class_that_answers_nothing_fails_row_by_row(own, tmp_path, monkeypatc
 
 @pytest.mark.full
 def test_a_method_that_keeps_a_tolerance_is_not_blamed_for_rounding_or_for_steps(own, tmp_path, monkeypatch):
-    kept = {"samples belong to the recorder": "not run", "measured road between its points": "not run",
-            "static equilibrium": "passed", "+z is down": "passed"}  # fmt: skip
+    kept = {
+        "samples belong to the recorder": "not run",
+        "measured road between its points": "not run",
+        "static equilibrium": "passed",
+        "+z is down": "passed",
+    }
     for family in conformity.FAMILIES:
         module = import_module(f"validation.hard_cases.{family}")
         monkeypatch.setattr(module, "CASES", tuple(case for case in module.CASES if case.name in kept))

@@ -69,8 +69,11 @@ def test_contact_forces_carry_the_wheelset_where_its_wheels_touch(hunting):
 def test_what_is_magnified_leans_more_and_spins_as_it_does(hunting):
     stage, (motion, _) = hunting
     lean, spin = Rotation.from_euler("x", 0.01), Rotation.from_euler("y", 2.0)
-    turned = replace(motion, turns={"wheelset": np.array([(lean * spin).as_matrix()])},
-                     places={"wheelset": np.array([[0.0, 2e-3, 0.0]])})  # fmt: skip
+    turned = replace(
+        motion,
+        turns={"wheelset": np.array([(lean * spin).as_matrix()])},
+        places={"wheelset": np.array([[0.0, 2e-3, 0.0]])},
+    )
     place, turn = pose(turned, replace(stage, magnified=5.0), "wheelset", 0)
     np.testing.assert_allclose(place, [0.0, 1e-2, 0.0], atol=1e-15)
     np.testing.assert_allclose(turn, (Rotation.from_euler("x", 0.05) * spin).as_matrix(), atol=1e-12)
@@ -118,14 +121,17 @@ def test_without_the_extra_the_stills_are_kept_and_one_sentence_names_it(hunting
     assert "twinrig[video]" in summary["table"][-1] and "twinrig[video]" not in "".join(summary["table"][:-1])
 
 
-@pytest.mark.parametrize(("change", "place", "said"), [
-    ("vehicle=tram", "vehicle", "wheelset"),
-    ("film.frames_per_second=-5", "film.frames_per_second", "1"),
-    ("film.duration=-1", "film.duration", "0"),
-    ("film.duration=100", "film.duration", "10000 frames"),  # 100 s x 4 x 25
-    ("film.duration=1000", "film.duration", "120"),
-    ("film.format=avi", "film.format", "gif"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "place", "said"),
+    [
+        ("vehicle=tram", "vehicle", "wheelset"),
+        ("film.frames_per_second=-5", "film.frames_per_second", "1"),
+        ("film.duration=-1", "film.duration", "0"),
+        ("film.duration=100", "film.duration", "10000 frames"),  # 100 s x 4 x 25
+        ("film.duration=1000", "film.duration", "120"),
+        ("film.format=avi", "film.format", "gif"),
+    ],
+)
 def test_bad_input_is_refused_with_its_place(change, place, said):
     with pytest.raises(InputError) as found:
         changed(change)

@@ -71,14 +71,17 @@ def test_the_symmetric_vehicle_hides_exactly_what_symmetry_says(found):
     assert {name for name, record in found.items() if not case.caught(record, case.SYMMETRIC)} == set(case.HIDDEN)
 
 
-@pytest.mark.parametrize(("name", "blind"), [
-    ("road held at the middle stages", "audit"),  # an acceleration knows no stage
-    ("start from zero heave", "audit"),  # states are given to it
-    ("held sample of the step's end", "linear twin"),
-    ("front suspension 1 % too stiff", "momentum"),  # inner forces cancel
-    ("pitch inertia about the front axle", "equilibrium"),  # nothing moves
-    ("wheel forces in kN", "road twin"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "blind"),
+    [
+        ("road held at the middle stages", "audit"),  # an acceleration knows no stage
+        ("start from zero heave", "audit"),  # states are given to it
+        ("held sample of the step's end", "linear twin"),
+        ("front suspension 1 % too stiff", "momentum"),  # inner forces cancel
+        ("pitch inertia about the front axle", "equilibrium"),  # nothing moves
+        ("wheel forces in kN", "road twin"),
+    ],
+)
 def test_no_check_is_enough_alone(found, name, blind):
     assert not case.seen(found[name], blind)
     assert case.caught(found[name])
@@ -92,10 +95,18 @@ def test_a_late_read_or_a_held_stage_loses_three_orders():
 
 
 def test_a_fault_lives_only_while_its_model_works():
-    watched = [(exudyn.Clock, "advance"), (exudyn.Clock, "reader"), (exudyn.ExudynModel, "_enforced"),
-               (mujoco, "_spec"), (mujoco, "_suspension"), (mujoco, "_guidance"), (equations, "suspension"),
-               (equations, "newton_euler"),
-               (reference, "njit"), (reference, "_FIXED")]  # fmt: skip
+    watched = [
+        (exudyn.Clock, "advance"),
+        (exudyn.Clock, "reader"),
+        (exudyn.ExudynModel, "_enforced"),
+        (mujoco, "_spec"),
+        (mujoco, "_suspension"),
+        (mujoco, "_guidance"),
+        (equations, "suspension"),
+        (equations, "newton_euler"),
+        (reference, "njit"),
+        (reference, "_FIXED"),
+    ]
     before = [getattr(owner, name) for owner, name in watched]
     bench = Bench("asymmetric_twin", 0.02)
     for own in FAULTS:

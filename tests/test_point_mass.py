@@ -26,8 +26,9 @@ def test_discrete_covariance_is_a_sum_of_squares(h):
     velocity = (1 - h) ** np.arange(n)
     position = step * np.concatenate([[0.0], np.cumsum(velocity)[:-1]])
     found = discrete(n, 2.0, step, 4.0, h / step)
-    truth = (2.0 * step / 4.0) ** 2 * np.array([[position @ position, position @ velocity],
-                                                [position @ velocity, velocity @ velocity]])  # fmt: skip
+    truth = (2.0 * step / 4.0) ** 2 * np.array(
+        [[position @ position, position @ velocity], [position @ velocity, velocity @ velocity]]
+    )
     assert found == pytest.approx(truth, rel=1e-11)  # the plain sum of 40 terms of alternating sign loses some digits
 
 

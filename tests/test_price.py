@@ -90,10 +90,14 @@ def test_hollow_points_do_not_enter_the_order():
 
 def test_coinciding_curves_are_named():
     base = {h: h**4 for h in STEPS}
-    found = curves.coinciding({
-        "a": base, "b": {h: 1.009 * e for h, e in base.items()}, "c": {h: 1.05 * e for h, e in base.items()},
-        "two points": {h: base[h] for h in STEPS[:2]},
-    })  # fmt: skip
+    found = curves.coinciding(
+        {
+            "a": base,
+            "b": {h: 1.009 * e for h, e in base.items()},
+            "c": {h: 1.05 * e for h, e in base.items()},
+            "two points": {h: base[h] for h in STEPS[:2]},
+        }
+    )
     assert found == [("a", "b")], "1 % is the same, 5 % is not, two common points prove nothing"
 
 
@@ -130,9 +134,17 @@ def test_pareto_front():
     assert curves.pareto([1, 2, 3, 4], [10, 20, 1, 0.999]) == [0, 2], "0.1 % better is not better"
 
 
-@pytest.mark.parametrize(("vice", "status"), [("huge", "SILENT"), ("nan", "SILENT"), ("raises", "raised"),
-                                              ("refuses", "refused"), ("doubts", "flagged"),
-                                              ("none", "ok")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("vice", "status"),
+    [
+        ("huge", "SILENT"),
+        ("nan", "SILENT"),
+        ("raises", "raised"),
+        ("refuses", "refused"),
+        ("doubts", "flagged"),
+        ("none", "ok"),
+    ],
+)
 def test_status(vice, status):
     problem = PlantedProblem(vice)
     point = cost.attempt(problem, problem.setting("exudyn", "fourth", 1e-3))
@@ -176,8 +188,11 @@ def test_parts_of_a_step_from_three_runs():
 
     noise, seconds = np.array([1.3, 1.0, 1.1]), 1e-6 * split.STEPS["road"]
     runs = zip(split.RUNS, (4, 5, 10), strict=True)
-    saved = {"problem": "road", "engine": "mujoco",
-             "seconds": {run: (total * seconds * noise).tolist() for run, total in runs}}  # fmt: skip
+    saved = {
+        "problem": "road",
+        "engine": "mujoco",
+        "seconds": {run: (total * seconds * noise).tolist() for run, total in runs},
+    }
     assert split.parts(saved) == pytest.approx([4.4, 1.1, 5.5])
     assert split.share(saved) == pytest.approx((10, 10, 10))
     assert split.table([saved], "road")[0].rows[0][2:5] == ("4.40", "1.10", "5.50")
@@ -186,9 +201,12 @@ def test_parts_of_a_step_from_three_runs():
 
 def test_a_wrong_order_fails_its_row():
     problem = PlantedProblem()
-    points = [p if p.setting.method == "first" else
-              cost.Point(p.setting, p.status, "", {"force": p.setting.value**3}, p.counts, p.seconds)
-              for p in points_of(problem)]  # fmt: skip
+    points = [
+        p
+        if p.setting.method == "first"
+        else cost.Point(p.setting, p.status, "", {"force": p.setting.value**3}, p.counts, p.seconds)
+        for p in points_of(problem)
+    ]
     rows = {one.id: one for one in rows_of(problem, points, quick=True)}
     assert rows["price.planted.order.force.exudyn-fourth"].status == "failed"
     assert rows["price.planted.order.force.exudyn-first"].status == "passed"
@@ -237,8 +255,10 @@ def test_rounds_are_for_settings_that_decide_something():
     problem, points = PlantedProblem(), timed()
     fourth = [p for p in points if p.setting.method == "fourth"]
     for longer, expected in ((10.0, False), (1.2, True)):
-        third = [replace(p, setting=replace(p.setting, method="third"), seconds=(longer * p.cost("seconds"),))
-                 for p in fourth]  # fmt: skip
+        third = [
+            replace(p, setting=replace(p.setting, method="third"), seconds=(longer * p.cost("seconds"),))
+            for p in fourth
+        ]
         chosen = {p.setting.curve for p in cost.racing(problem, points + third)}
         assert {"exudyn fourth", "exudyn first"} <= chosen
         assert ("exudyn third" in chosen) == expected
@@ -327,8 +347,13 @@ def test_force_calls_seen_from_outside():
     from validation.price.problems.road_excited import scene, setting, settings_of
 
     assembly = assemble(scene())
-    for engine, method, stages in (("mujoco", "RK4", 4), ("mujoco", "Euler", 1), ("exudyn", "RK44", 4),
-                                   ("exudyn", "RK67", 7), ("exudyn", "VelocityVerlet", 1)):  # fmt: skip
+    for engine, method, stages in (
+        ("mujoco", "RK4", 4),
+        ("mujoco", "Euler", 1),
+        ("exudyn", "RK44", 4),
+        ("exudyn", "RK67", 7),
+        ("exudyn", "VelocityVerlet", 1),
+    ):
         assert counted(engine, assembly, settings_of(setting(engine, method, 1e-3), 0.05)) == (50 * stages, 50 * stages)
     outside, said = counted("exudyn", assembly, settings_of(setting("exudyn", "GeneralizedAlpha 0.9", 1e-3), 0.05))
     assert outside == said > 50
@@ -340,7 +365,7 @@ def test_every_integrator_of_the_catalogue_is_tried():
 
     tried = {(engine, method.split()[0]) for engine, method in FULL}
     assert tried == {(engine, name) for engine, names in CATALOGUE.items() for name in names}
-    for (engine, method, value) in DEFAULTS:
+    for engine, method, value in DEFAULTS:
         assert value in FULL[engine, method], "a default is left out of the full sweep"
         assert value in QUICK[engine, method], "a default is left out of the quick one"
     assert all(set(values) <= set(FULL[curve]) for curve, values in QUICK.items())

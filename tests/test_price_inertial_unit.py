@@ -25,10 +25,18 @@ def test_the_closed_form_is_what_its_own_rates_turn(short):
 
 @pytest.mark.parametrize(
     ("engine", "method", "order"),
-    [("reference", "held rates", 1), ("reference", "mean rates", 2), ("reference", "cubic rates", 4),
-     ("exudyn", "RK44", 2), ("exudyn", "ExplicitEuler", 1), ("exudyn", "GeneralizedAlpha 0.9", 2),
-     ("exudyn", "VelocityVerlet", 2), ("mujoco", "Euler", 1), ("mujoco", "RK4", 2)],
-)  # fmt: skip
+    [
+        ("reference", "held rates", 1),
+        ("reference", "mean rates", 2),
+        ("reference", "cubic rates", 4),
+        ("exudyn", "RK44", 2),
+        ("exudyn", "ExplicitEuler", 1),
+        ("exudyn", "GeneralizedAlpha 0.9", 2),
+        ("exudyn", "VelocityVerlet", 2),
+        ("mujoco", "Euler", 1),
+        ("mujoco", "RK4", 2),
+    ],
+)
 def test_every_way_has_its_order(short, engine, method, order):
     coarse, fine = (cost.attempt(short, short.setting(engine, method, h)).errors["attitude"] for h in (0.02, 0.01))
     assert coarse / fine == pytest.approx(2**order, rel=0.08)

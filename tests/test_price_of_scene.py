@@ -31,8 +31,11 @@ class Planted:
     lies: float = 0.0
 
     def ladders(self):
-        return [Ladder("exudyn", "fourth", STEPS, 4), Ladder("exudyn", "first", STEPS, 1, default=0.05),
-                Ladder("exudyn", "liar", STEPS, 2)]  # fmt: skip
+        return [
+            Ladder("exudyn", "fourth", STEPS, 4),
+            Ladder("exudyn", "first", STEPS, 1, default=0.05),
+            Ladder("exudyn", "liar", STEPS, 2),
+        ]
 
     def reference(self):
         return Ladder("reference", "exact", tuple(5e-3 / 2**k for k in range(6)), 4)
@@ -67,7 +70,8 @@ def test_the_coarsest_setting_that_meets_the_tolerance_wins_and_liars_are_named(
     assert (best.method, best.value) == ("fourth", 0.05)
     assert found.winners["exudyn", "calls"].error == pytest.approx(1e3 * 0.05**4, rel=1e-3)
     assert {one.status for one in found.tried if one.setting.method == "liar" and one.setting.value == STEPS[0]} <= {
-        "SILENT"}  # fmt: skip
+        "SILENT"
+    }
     assert found.defaults["exudyn"].refined.tried.setting.value <= 1e-2
 
 

@@ -14,11 +14,22 @@ from validation.price.own_scene.recommendation import price, recommend
 from validation.price.own_scene.text import lines
 from validation.price.problems import Setting
 
-STOP = {"title": "a stop", "system": "braking", "pressure": {}, "load_transfer": {},
-        "controller": {"kind": "slip_bang_bang"}, "road": {"stretches": [{"left": "wet"}]},
-        "procedures": {"turned": {"kind": "j_turn", "speed": 4.0, "steer": 0.03}, "ahead": {"speed": 4.0}}}  # fmt: skip
-PATHS = {"title": "a path", "system": "wheelset", "speeds": {"values": [10.0]}, "contact": {"law": "linear"},
-         "run": {"duration": 0.05, "step": 5e-4, "speeds": [20.0]}}  # fmt: skip
+STOP = {
+    "title": "a stop",
+    "system": "braking",
+    "pressure": {},
+    "load_transfer": {},
+    "controller": {"kind": "slip_bang_bang"},
+    "road": {"stretches": [{"left": "wet"}]},
+    "procedures": {"turned": {"kind": "j_turn", "speed": 4.0, "steer": 0.03}, "ahead": {"speed": 4.0}},
+}
+PATHS = {
+    "title": "a path",
+    "system": "wheelset",
+    "speeds": {"values": [10.0]},
+    "contact": {"law": "linear"},
+    "run": {"duration": 0.05, "step": 5e-4, "speeds": [20.0]},
+}
 
 
 def scene_of(table):
@@ -52,8 +63,9 @@ def test_a_path_with_linear_creep_is_held_by_steps_alone():
 def test_more_cells_come_nearer_and_are_counted():
     scene = own({**PATHS, "contact": {"law": "fastsim"}}, "fy")
     ladder = next(one for one in scene.ladders() if one.default)
-    coarse, fine, exact = (scene.answer(scene.solve(ladder.setting(ladder.values.index(1.0 / n)), 0.05))
-                           for n in (5, 11, 45))  # fmt: skip
+    coarse, fine, exact = (
+        scene.answer(scene.solve(ladder.setting(ladder.values.index(1.0 / n)), 0.05)) for n in (5, 11, 45)
+    )
     gaps = [abs(one.values - exact.values).max() for one in (coarse, fine)]
     assert gaps[1] < 0.6 * gaps[0]  # of second order but for the kinks between slip and stick: 0.2 at best
     assert fine.counts["contact cells"] == 121 * fine.counts["force calls"]
@@ -91,9 +103,15 @@ def test_a_vehicle_that_does_not_stop_has_no_price():
         recommend(own({**STOP, "run": {"duration": 0.2}}), 1e-2)
 
 
-@pytest.mark.parametrize(("name", "why"), [
-    ("ride", "covariances, which have no step"), ("hub_forces", r"study = .choice."),
-    ("contact_ellipse", "contact_price"), ("recording", "samples of its files")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("ride", "covariances, which have no step"),
+        ("hub_forces", r"study = .choice."),
+        ("contact_ellipse", "contact_price"),
+        ("recording", "samples of its files"),
+    ],
+)
 def test_systems_without_a_price_of_steps_say_why(name, why):
     with pytest.raises(InputError, match=why):
         price(load(SCENES / f"{name}.toml"), 1.0, None, ("reference",))

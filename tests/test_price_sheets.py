@@ -31,8 +31,13 @@ def test_the_sheet_of_noisy_forces_is_solved_by_scipy_alone(tmp_path):
         f3 = k * (y[2] - y[0] - np.sin(y[3])) + d * (y[6] - y[4] - y[7] * np.cos(y[3]))
         f4 = k * (y[2] - y[1] + np.sin(y[3])) + d * (y[6] - y[5] + y[7] * np.cos(y[3]))
         f1, f2 = np.interp(now, t, front), np.interp(now, t, rear)
-        return [*y[4:], g + (f3 - f1) / m[0], g + (f4 - f2) / m[1], g - (f3 + f4) / m[2],
-                np.cos(y[3]) * (f3 - f4) / inertia]  # fmt: skip
+        return [
+            *y[4:],
+            g + (f3 - f1) / m[0],
+            g + (f4 - f2) / m[1],
+            g - (f3 + f4) / m[2],
+            np.cos(y[3]) * (f3 - f4) / inertia,
+        ]
 
     start = (tmp_path / "noise.md").read_text().partition("Start: ")[2].partition(".\n")[0]
     y = np.array([float(part.partition(" = ")[2]) for part in start.split(", ")])
@@ -56,8 +61,13 @@ def test_the_sheet_of_the_inertial_unit_is_solved_by_scipy_alone(tmp_path):
 
     def rates(t, q):
         (roll, pitch, _), (r, p, y) = angles(t), (angles(t + 1e-5) - angles(t - 1e-5)) / 2e-5
-        w = np.array([r - y * np.sin(pitch), p * np.cos(roll) + y * np.sin(roll) * np.cos(pitch),
-                      -p * np.sin(roll) + y * np.cos(roll) * np.cos(pitch)])  # fmt: skip
+        w = np.array(
+            [
+                r - y * np.sin(pitch),
+                p * np.cos(roll) + y * np.sin(roll) * np.cos(pitch),
+                -p * np.sin(roll) + y * np.cos(roll) * np.cos(pitch),
+            ]
+        )
         return 0.5 * np.concatenate([[-q[1:] @ w], q[0] * w + np.cross(q[1:], w)])
 
     def attitude(t):
@@ -76,8 +86,18 @@ def test_the_sheet_of_ride_is_solved_by_scipy_alone(tmp_path):
     text, v = (tmp_path / "ride.md").read_text(), 20.0
     table = csv.DictReader((tmp_path / "ride.csv").read_text().splitlines())
     n, w, outputs = 19, 4, len(rows)
-    shapes = {"M": (n, n), "D": (n, n), "K": (n, n), "R": (n, w), "S": (n, w), "A": (outputs, n), "V": (outputs, n),
-              "P": (outputs, n), "H": (outputs, w), "E": (outputs, w)}  # fmt: skip
+    shapes = {
+        "M": (n, n),
+        "D": (n, n),
+        "K": (n, n),
+        "R": (n, w),
+        "S": (n, w),
+        "A": (outputs, n),
+        "V": (outputs, n),
+        "P": (outputs, n),
+        "H": (outputs, w),
+        "E": (outputs, w),
+    }
     m = {name: np.zeros(shape) for name, shape in shapes.items()}
     for line in table:
         m[line["matrix"]][int(line["row"]) - 1, int(line["column"]) - 1] = float(line["value"])
@@ -95,6 +115,8 @@ def test_the_sheet_of_ride_is_solved_by_scipy_alone(tmp_path):
 
     assert np.isfinite(density(1.0, 0))
     for row in (0, 5):
-        variance = sum(quad(density, a, b, (row,), limit=400, epsrel=1e-11)[0]
-                       for a, b in pairwise((0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 20.0, 100.0, 2000.0, np.inf)))
+        variance = sum(
+            quad(density, a, b, (row,), limit=400, epsrel=1e-11)[0]
+            for a, b in pairwise((0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 20.0, 100.0, 2000.0, np.inf))
+        )
         assert variance**0.5 == pytest.approx(float(rows[row]["value"]), rel=1e-9)

@@ -32,9 +32,11 @@ def test_engines_come_to_the_equations_by_hand(monkeypatch):
     monkeypatch.setattr(free_vehicle, "REFERENCES", (("DOP853", 1e-8, "by hand"), ("LSODA", 1e-9, "engine")))
     problem = FreeVehicle(False)
     assert problem.uncertainty["wheel load"] < 1e-3
-    errors = [cost.attempt(problem, problem.setting("mujoco", "RK4", step)).errors["wheel load"]
-              for step in (5e-3, 2.5e-3)]  # fmt: skip
+    errors = [
+        cost.attempt(problem, problem.setting("mujoco", "RK4", step)).errors["wheel load"] for step in (5e-3, 2.5e-3)
+    ]
     assert errors[0] / errors[1] == pytest.approx(16, rel=0.1)
     assert cost.attempt(problem, problem.setting("exudyn", "RK44", 5e-3)).errors["wheel load"] == pytest.approx(
-        errors[0], rel=1e-6)  # fmt: skip
+        errors[0], rel=1e-6
+    )
     assert cost.attempt(problem, problem.setting("exudyn", "DOPRI5", 1e-6)).status == "refused"

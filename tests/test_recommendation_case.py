@@ -80,12 +80,17 @@ def test_one_that_is_refused_again_and_again_is_not_held(refusing, tmp_path, mon
 
 @pytest.mark.parametrize(
     ("row", "change"),
-    [("met", {"true": 1.1}), ("predicted", {"predicted": 0.05}), ("predicted", {"predicted": 2.0}),
-     ("slower", {"slower": True})],
-)  # fmt: skip
+    [
+        ("met", {"true": 1.1}),
+        ("predicted", {"predicted": 0.05}),
+        ("predicted", {"predicted": 2.0}),
+        ("slower", {"slower": True}),
+    ],
+)
 def test_every_promise_that_is_broken_fails_its_row(row, change):
-    good, bad = ({one.id: one.status for one in case._rows([[own]] * 10, [])}
-                 for own in (GOOD, replace(GOOD, **change)))  # fmt: skip
+    good, bad = (
+        {one.id: one.status for one in case._rows([[own]] * 10, [])} for own in (GOOD, replace(GOOD, **change))
+    )
     assert good[f"recommendation.{row}"] == "passed" and bad[f"recommendation.{row}"] == "failed"
 
 
@@ -97,11 +102,13 @@ def test_a_recommendation_that_is_slow_by_the_clock_misses_an_aim_and_fails_no_r
 def test_a_default_that_the_race_forgot_is_seen_by_the_verdict(monkeypatch):
     real = recommendation._timed
     whole = recommend(Whole(), LOOSE)
-    monkeypatch.setattr(recommendation, "_timed", lambda search: [
-        one for one in real(search) if not one.tried.setting.default])  # fmt: skip
+    monkeypatch.setattr(
+        recommendation, "_timed", lambda search: [one for one in real(search) if not one.tried.setting.default]
+    )
     forgot = recommend(Whole(), LOOSE)
-    said = [any(slower(own, key, one) for key, one in own.winners.items() if key[1] == "calls")
-            for own in (whole, forgot)]  # fmt: skip
+    said = [
+        any(slower(own, key, one) for key, one in own.winners.items() if key[1] == "calls") for own in (whole, forgot)
+    ]
     assert said == [False, True]
 
 

@@ -26,9 +26,17 @@ def test_the_law_is_exact_whatever_the_step():
 
 
 def stop(length=None, steer=0.03, substeps=4, duration=20.0):
-    scene = build({"title": "t", "system": "braking", "road": {"stretches": [{"left": "snow"}]},
-                   "brakes": {"supply": 0.8}, "pressure": {}, "run": {"substeps": substeps},
-                   "procedures": {"j": {"kind": "j_turn", "speed": 9.0, "steer": steer}}})  # fmt: skip
+    scene = build(
+        {
+            "title": "t",
+            "system": "braking",
+            "road": {"stretches": [{"left": "snow"}]},
+            "brakes": {"supply": 0.8},
+            "pressure": {},
+            "run": {"substeps": substeps},
+            "procedures": {"j": {"kind": "j_turn", "speed": 9.0, "steer": steer}},
+        }
+    )
     vehicle, start = ready(scene, "j")
     if length is not None:
         vehicle = replace(vehicle, relaxation=np.full(4, length))

@@ -35,9 +35,10 @@ def stub(folder, x="0.1", code=0):
     return path
 
 
-@pytest.mark.parametrize(("change", "said"), [
-    ({}, ""), ({"x": "0.10000000000000002"}, "x [m]: other values"), ({"code": 1}, "exit codes [0, 0] are [0, 1]"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [({}, ""), ({"x": "0.10000000000000002"}, "x [m]: other values"), ({"code": 1}, "exit codes [0, 0] are [0, 1]")],
+)
 def test_a_later_version_is_held_to_what_was_recorded(tmp_path, capsys, change, said):
     words = [str(tmp_path / "kept"), "--command", str(stub(tmp_path)), "--only", "*-alone"]
     assert replay.main(["record", *words]) == 0
@@ -66,11 +67,17 @@ def test_channels_that_vanish_move_or_are_renamed():
     assert not difference(before, named, 0.0, {"b.csv: y": "c.nc: z"}).wrong
 
 
-@pytest.mark.parametrize("now", [
-    np.array([-0.0, 1.0, np.inf, np.nan]), np.array([0.0, 1.0, np.inf, np.nan], dtype=np.float32),
-    np.array([0.0, 1.0, -np.inf, np.nan]), np.array([0.0, 1.0, np.inf, np.inf]), np.array([0.0, 1.0, np.inf]),
-    np.array([0.0, 1.0 + 2e-16, np.inf, np.nan]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "now",
+    [
+        np.array([-0.0, 1.0, np.inf, np.nan]),
+        np.array([0.0, 1.0, np.inf, np.nan], dtype=np.float32),
+        np.array([0.0, 1.0, -np.inf, np.nan]),
+        np.array([0.0, 1.0, np.inf, np.inf]),
+        np.array([0.0, 1.0, np.inf]),
+        np.array([0.0, 1.0 + 2e-16, np.inf, np.nan]),
+    ],
+)
 def test_every_bit_counts(tmp_path, now):
     """Signs of zeros, kinds of numbers, and what no number is, after a way through the files, too."""
     array = np.array([0.0, 1.0, np.inf, np.nan])
@@ -93,8 +100,7 @@ def test_a_bound_is_of_the_largest_number_and_of_every_number():
 def test_what_a_machine_decides_is_no_part_of_an_answer(tmp_path):
     now = answer(Job("both", (("show", "alone"), ("run",))), str(stub(tmp_path)), tmp_path / "work")
     assert now.message == "a plan, made in SECONDS\n" and now.codes == [0, 0]
-    assert set(now.arrays) == {"out/path.csv: time [s]", "out/path.csv: x [m]", ": 1/scene",
-                               ": 1/answer/largest x [m]"}  # fmt: skip
+    assert set(now.arrays) == {"out/path.csv: time [s]", "out/path.csv: x [m]", ": 1/scene", ": 1/answer/largest x [m]"}
 
 
 def test_the_same_seed_draws_the_same_scenes_of_every_system(tmp_path):

@@ -24,8 +24,16 @@ from validation.run import save as _save
 from validation.run import say
 
 ODD = '<script>alert("1")</script> & "quotes" µ'
-FAILED = at_most("audit.mujoco.broken", "pitch-plane", "acceleration of a broken model", 3e-3, "of the largest", 1e-12,
-                 "rounding", "native")  # fmt: skip
+FAILED = at_most(
+    "audit.mujoco.broken",
+    "pitch-plane",
+    "acceleration of a broken model",
+    3e-3,
+    "of the largest",
+    1e-12,
+    "rounding",
+    "native",
+)
 
 
 def rows() -> list[Row]:
@@ -42,8 +50,14 @@ def rows() -> list[Row]:
 
 def save(folder: Path, own: list[Row]) -> Path:
     (folder / "data").mkdir()
-    source = {"commit": "abc", "versions": {"exudyn": "1"}, "command": "twinrig validate --quick", "quick": True,
-              "seconds": {"audit": 200.0, "order": 200.0}, "wall": 301.0}  # fmt: skip
+    source = {
+        "commit": "abc",
+        "versions": {"exudyn": "1"},
+        "command": "twinrig validate --quick",
+        "quick": True,
+        "seconds": {"audit": 200.0, "order": 200.0},
+        "wall": 301.0,
+    }
     _save(folder, own, source)
     return folder
 
@@ -72,8 +86,11 @@ class Outside(HTMLParser):
         self.open: list[str] = []
 
     def handle_starttag(self, tag, attributes):
-        self.fetched += [value for name, value in attributes
-                         if name in ("src", "href", "xlink:href", "data") and not value.startswith(("#", "data:"))]
+        self.fetched += [
+            value
+            for name, value in attributes
+            if name in ("src", "href", "xlink:href", "data") and not value.startswith(("#", "data:"))
+        ]
         self.fetched += [tag] if tag in ("link", "iframe", "object") else []
         if tag not in self.void:
             self.open.append(tag)
@@ -140,8 +157,9 @@ def test_drawn_again_elsewhere_by_a_new_process_from_saved_files_it_is_the_same_
     other = tmp_path / "elsewhere"
     shutil.copytree(folder / "data", other / "data")
     shutil.copy(folder / "results.json", other)
-    done = subprocess.run([sys.executable, "-m", "validation.report", str(other)], capture_output=True, text=True,
-                          timeout=120, check=True)  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-m", "validation.report", str(other)], capture_output=True, text=True, timeout=120, check=True
+    )
     assert done.stdout.strip() == str(other / "report.html")
     assert (other / "report.html").read_bytes() == first
     assert not list(other.glob(".report*"))
@@ -210,13 +228,27 @@ def test_every_parameter_has_its_unit_and_source(page):
     assert "Fraunhofer ITWM" in section and "asymmetric_twin" in section
 
 
-@pytest.mark.parametrize(("value", "text"), [
-    (0.0, "0"), (41, "41"), (3.14159, "3.142"), (-2.5, "−2.5"), (0.001, "0.001"), (99999.0, "99999"),
-    (12345.6, "12346"), (2.5e-16, "250&thinsp;·&thinsp;10<sup>−18</sup>"),
-    (1e-12, "1&thinsp;·&thinsp;10<sup>−12</sup>"),
-    (9.99999e-7, "1&thinsp;·&thinsp;10<sup>−6</sup>"), (2e5, "200&thinsp;·&thinsp;10<sup>3</sup>"),
-    (100.0, "100"), (float("nan"), "not a number"), (None, "–"), ("<b>", "&lt;b&gt;"), (True, "True"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (41, "41"),
+        (3.14159, "3.142"),
+        (-2.5, "−2.5"),
+        (0.001, "0.001"),
+        (99999.0, "99999"),
+        (12345.6, "12346"),
+        (2.5e-16, "250&thinsp;·&thinsp;10<sup>−18</sup>"),
+        (1e-12, "1&thinsp;·&thinsp;10<sup>−12</sup>"),
+        (9.99999e-7, "1&thinsp;·&thinsp;10<sup>−6</sup>"),
+        (2e5, "200&thinsp;·&thinsp;10<sup>3</sup>"),
+        (100.0, "100"),
+        (float("nan"), "not a number"),
+        (None, "–"),
+        ("<b>", "&lt;b&gt;"),
+        (True, "True"),
+    ],
+)
 def test_numbers_read_as_an_engineer_writes_them(value, text):
     assert number(value) == text
 
@@ -269,13 +301,22 @@ def test_missed_aims_are_counted_and_told_in_the_verdict_and_fail_nothing(tmp_pa
 def test_the_first_screen_tells_version_commit_date_machine_and_data(tmp_path):
     save(tmp_path, rows())
     found = json.loads((tmp_path / "results.json").read_text())
-    found["provenance"] |= {"twinrig": "1.2", "date": "2026-01-02 03:04 UTC", "machine": "x86_64, 2 cores",
-                            "data": "3 files"}  # fmt: skip
+    found["provenance"] |= {
+        "twinrig": "1.2",
+        "date": "2026-01-02 03:04 UTC",
+        "machine": "x86_64, 2 cores",
+        "data": "3 files",
+    }
     (tmp_path / "results.json").write_text(json.dumps(found))
     top = report.write(tmp_path).read_text(encoding="utf-8").partition('<div class="tiles">')[0]
     told = dict(re.findall(r"<dt>(\w+)</dt><dd>([^<]*)</dd>", top))
-    assert told == {"version": "1.2", "commit": "abc", "date": "2026-01-02 03:04 UTC", "machine": "x86_64, 2 cores",
-                    "data": "3 files"}  # fmt: skip
+    assert told == {
+        "version": "1.2",
+        "commit": "abc",
+        "date": "2026-01-02 03:04 UTC",
+        "machine": "x86_64, 2 cores",
+        "data": "3 files",
+    }
 
 
 def test_rows_that_an_older_report_called_passed_without_judging_them_are_reported(folder):

@@ -32,8 +32,9 @@ SPEED = 20.0
 
 
 def held(name="half_car", tyre_damping=0.0, **road):
-    scene = build({"title": "t", "system": "ride", "vehicle": {"file": name}, "road": road,
-                   "speeds": {"values": [SPEED]}}, "t")  # fmt: skip
+    scene = build(
+        {"title": "t", "system": "ride", "vehicle": {"file": name}, "road": road, "speeds": {"values": [SPEED]}}, "t"
+    )
     vehicle = load_vehicle(name)
     tyres = tuple(replace(tyre, damping=tyre_damping) for tyre in vehicle.tyres)
     return Held(scene, replace(vehicle, tyres=tyres))
@@ -63,8 +64,10 @@ def test_nothing_left_out_is_the_system_itself():
 @pytest.mark.parametrize(("name", "small"), [("half_car", 1e-5), ("seven_freedoms", 1e-5)])
 def test_wheels_without_mass_are_the_limit_of_light_ones(name, small):
     scene = held(name)
-    bodies = tuple(replace(b, mass=small * b.mass) if b.name in {t.body for t in scene.vehicle.tyres} else b
-                   for b in scene.vehicle.bodies)  # fmt: skip
+    bodies = tuple(
+        replace(b, mass=small * b.mass) if b.name in {t.body for t in scene.vehicle.tyres} else b
+        for b in scene.vehicle.bodies
+    )
     light = of_vehicle(scene, replace(scene.vehicle, bodies=bodies))
     assert deviations(scene, "mass of all wheels") == pytest.approx(light, rel=1e-4, abs=1e-9)  # error of order small
 
@@ -75,15 +78,19 @@ def test_rigid_springs_and_locked_freedoms_are_limits():
     one = replace(drew, held=replace(drew.held, vehicle=replace(drew.held.vehicle, tyres=tyres)))
     own = named(one.held)
     bush = next(name for name in own if name.startswith("bushings"))
-    stiff = tuple(replace(s, stiffness=1e4 * s.stiffness, damping=1e2 * s.damping) if "bush" in s.name else s
-                  for s in one.held.vehicle.springs)  # fmt: skip
+    stiff = tuple(
+        replace(s, stiffness=1e4 * s.stiffness, damping=1e2 * s.damping) if "bush" in s.name else s
+        for s in one.held.vehicle.springs
+    )
     limit = of_vehicle(one.held, replace(one.held.vehicle, springs=stiff))
     found = deviations(one.held, bush)
     told = np.isfinite(limit) & (limit > 1e-6)
     assert found[told] == pytest.approx(limit[told], rel=2e-3)  # compliance 1e-4 of a few per cent's effect
     scene = held()
-    heavy = tuple(replace(b, inertia=((0.0,) * 3, (0.0, 1e12, 0.0), (0.0,) * 3)) if b.name == "body" else b
-                  for b in scene.vehicle.bodies)  # fmt: skip
+    heavy = tuple(
+        replace(b, inertia=((0.0,) * 3, (0.0, 1e12, 0.0), (0.0,) * 3)) if b.name == "body" else b
+        for b in scene.vehicle.bodies
+    )
     front = [output.name for output in scene.vehicle.outputs].index("body front")
     limit = of_vehicle(scene, replace(scene.vehicle, bodies=heavy))[front]
     assert deviations(scene, "body ry")[front] == pytest.approx(limit, rel=1e-6)
@@ -150,23 +157,45 @@ def test_a_tolerance_that_holds_because_errors_cancel_is_refused_with_its_reason
 
 def test_a_quantity_that_symmetry_silences_is_refused_not_held_to_its_rounding():
     """Both axles of a symmetric half car meet the same at once: it does not pitch."""
-    scene = build({"title": "t", "system": "ride", "vehicle": {"file": str(SCENES / "vehicles/pitch_plane.toml")},
-                   "road": {"front_rear": "equal"}, "speeds": {"values": [SPEED]}}, "t")  # fmt: skip
+    scene = build(
+        {
+            "title": "t",
+            "system": "ride",
+            "vehicle": {"file": str(SCENES / "vehicles/pitch_plane.toml")},
+            "road": {"front_rear": "equal"},
+            "speeds": {"values": [SPEED]},
+        },
+        "t",
+    )
     own = Held(scene, vehicle_of(scene))
     with pytest.raises(InputError, match="finite standard deviation above zero"):
         Chooser(own, [SPEED], ["pitch acceleration"], 0.02)
     assert Chooser(own, [SPEED], ["body centre"], 0.02).choose().kept
 
 
-ASKING = {"title": "t", "system": "ride", "study": "ride_choice", "vehicle": {"file": "half_car"}, "effects": "auto",
-          "quantities": ["body front"], "tolerance": 0.02, "speeds": {"values": [SPEED]}}  # fmt: skip
+ASKING = {
+    "title": "t",
+    "system": "ride",
+    "study": "ride_choice",
+    "vehicle": {"file": "half_car"},
+    "effects": "auto",
+    "quantities": ["body front"],
+    "tolerance": 0.02,
+    "speeds": {"values": [SPEED]},
+}
 
 
-@pytest.mark.parametrize(("change", "said"), [
-    ({"quantities": []}, "quantities"), ({"tolerance": None}, "tolerance"), ({"study": "ride"}, "ride_choice"),
-    ({"effects": None, "study": "ride"}, "quantities"), ({"tolerance": 1.5}, "below 1"),
-    ({"quantities": ["body front", "body front"]}, "names 'body front' twice"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"quantities": []}, "quantities"),
+        ({"tolerance": None}, "tolerance"),
+        ({"study": "ride"}, "ride_choice"),
+        ({"effects": None, "study": "ride"}, "quantities"),
+        ({"tolerance": 1.5}, "below 1"),
+        ({"quantities": ["body front", "body front"]}, "names 'body front' twice"),
+    ],
+)
 def test_scenes_that_ask_half_a_question(change, said):
     table = {key: value for key, value in {**ASKING, **change}.items() if value is not None}
     with pytest.raises(InputError, match=said):
@@ -258,8 +287,11 @@ def test_a_run_does_what_the_closed_form_of_runs_says():
     assert (abs(run.ratio - wrong) > 4 * run.error).any()
 
 
-@pytest.mark.parametrize("road", [{}, {"cutoff": 50.0}, {"front_rear": "uncorrelated"}, {"front_rear": "equal"}],
-                         ids=["first", "second", "apart", "together"])
+@pytest.mark.parametrize(
+    "road",
+    [{}, {"cutoff": 50.0}, {"front_rear": "uncorrelated"}, {"front_rear": "equal"}],
+    ids=["first", "second", "apart", "together"],
+)
 def test_two_closed_forms_of_runs_agree(road):
     """A sum over frequencies and a covariance of steps, under white noise from damped tyres, too."""
     scene = held("half_car", tyre_damping=300.0, **road)
@@ -296,10 +328,14 @@ values = [20.0]
     assert found[:2] == pytest.approx([error["confirmed"] for error in changes.values()], rel=1e-6)
 
 
-@pytest.mark.parametrize(("table", "said"), [
-    ('massless = ["wheel"]', "no such body"), ('rigid = ["none"]', "no such spring"),
-    ('locked = [["body", "rz"]]', "no such freedom of a body"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ('massless = ["wheel"]', "no such body"),
+        ('rigid = ["none"]', "no such spring"),
+        ('locked = [["body", "rz"]]', "no such freedom of a body"),
+    ],
+)
 def test_limits_of_parts_that_a_vehicle_has_not(table, said, empty_folder):
     text = (SCENES / "vehicles" / "pitch_plane.toml").read_text()
     (empty_folder / "mine.toml").write_text(f"{text}\n[reduced]\n{table}\n")

@@ -27,9 +27,17 @@ LAWS = ("curves over rate", "curves over travel", "friction")
 
 
 def quarter_car(**more):
-    table = {"title": "t", "system": "ride", "effects": "auto", "quantities": ["body front"], "tolerance": 0.05,
-             "vehicle": {"file": "quarter_car_nonlinear"}, "road": {"level": 6.4e-5}, "speeds": {"values": [20.0]},
-             "options": {"copies": 16, "lasting": 2.0}}  # fmt: skip
+    table = {
+        "title": "t",
+        "system": "ride",
+        "effects": "auto",
+        "quantities": ["body front"],
+        "tolerance": 0.05,
+        "vehicle": {"file": "quarter_car_nonlinear"},
+        "road": {"level": 6.4e-5},
+        "speeds": {"values": [20.0]},
+        "options": {"copies": 16, "lasting": 2.0},
+    }
     return build(table | more, "t")
 
 
@@ -99,8 +107,12 @@ def test_few_copies_find_what_all_of_them_tell():
 
 
 def test_what_a_search_may_take_is_shown_beforehand(twinrig, capsys):
-    assert twinrig("show", "ride_choice", "--set", "vehicle.file=quarter_car_nonlinear", "--set",
-                   "quantities=['body front']") == 0  # fmt: skip
+    assert (
+        twinrig(
+            "show", "ride_choice", "--set", "vehicle.file=quarter_car_nonlinear", "--set", "quantities=['body front']"
+        )
+        == 0
+    )
     assert "among 4 effects; the search ends at the calls of 100 runs" in capsys.readouterr().out
 
 
@@ -133,8 +145,18 @@ def test_prices_of_a_ride_on_bent_springs_say_what_chance_may_add(monkeypatch):
 
 
 def test_the_study_tells_the_choice(twinrig, capsys):
-    asked = ("--set", "vehicle.file=quarter_car_nonlinear", "--set", "quantities=['body front']", "--set",
-             "options.copies=16", "--set", "options.lasting=2.0", "--set", "tolerance=0.05")  # fmt: skip
+    asked = (
+        "--set",
+        "vehicle.file=quarter_car_nonlinear",
+        "--set",
+        "quantities=['body front']",
+        "--set",
+        "options.copies=16",
+        "--set",
+        "options.lasting=2.0",
+        "--set",
+        "tolerance=0.05",
+    )
     assert twinrig("run", "ride_choice", *asked, "--out", "out", "--json") == 0
     (found,) = json.loads(capsys.readouterr().out)["answer"]
     assert found["kept"] and found["errors"]["body front"]["chance"] > 0.0

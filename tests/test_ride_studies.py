@@ -19,8 +19,7 @@ from studies import ride_nonlinear
 from studies.asked import load_scene
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
-TABLE = {"title": "a ride", "system": "ride", "vehicle": {"file": "seven_freedoms"},
-         "speeds": {"values": [10.0, 20.0]}}  # fmt: skip
+TABLE = {"title": "a ride", "system": "ride", "vehicle": {"file": "seven_freedoms"}, "speeds": {"values": [10.0, 20.0]}}
 SMALL = ("--set", "vehicle.file=half_car", "--set", "speeds={values=[10.0, 20.0]}", "--set", "weighting={}")
 
 
@@ -29,8 +28,17 @@ def test_a_run_saves_deviations_figures_and_the_system(twinrig, capsys):
 
     assert twinrig("run", "ride", *SMALL, "--engine", "reference", "--out", "out", "--json") == 0
     found = json.loads(capsys.readouterr().out)["answer"]
-    names = {"command.txt", "deviations.nc", "deviations.csv", "system.npz", "system.mat", "body_acceleration.png",
-             "over_speed.png", "spectra.png", "road.png"}  # fmt: skip
+    names = {
+        "command.txt",
+        "deviations.nc",
+        "deviations.csv",
+        "system.npz",
+        "system.mat",
+        "body_acceleration.png",
+        "over_speed.png",
+        "spectra.png",
+        "road.png",
+    }
     assert {path.name for path in Path("out").iterdir()} == names
     with xr.open_dataset("out/deviations.nc", engine="h5netcdf") as data:
         saved = data["deviation"].sel(engine="reference", correlation="as in the scene", output="body centre").values
@@ -49,8 +57,15 @@ def test_engines_linear_vehicles_agree_in_what_is_printed(twinrig, capsys):
 
 
 def test_detail_compares_outputs_of_the_same_name(twinrig, capsys):
-    given = ("--set", "speeds={values=[15.0]}", "--set", "options.simpler=['quarter_car']",
-             "--set", "vehicle.file=half_car", "--json")  # fmt: skip
+    given = (
+        "--set",
+        "speeds={values=[15.0]}",
+        "--set",
+        "options.simpler=['quarter_car']",
+        "--set",
+        "vehicle.file=half_car",
+        "--json",
+    )
     assert twinrig("run", "ride_detail", *given, "--out", "out") == 0
     found = json.loads(capsys.readouterr().out)["answer"]
     assert found["4 freedoms, one track"]["body centre"] == 0.0  # the scene's vehicle against itself
@@ -152,8 +167,18 @@ def test_a_scene_that_cannot_be_is_told_why(change, said):
 
 def test_an_output_that_symmetry_silences_is_zero(twinrig, capsys):
     """Both tracks alike do not roll a car whose halves are equal."""
-    given = ("--set", "vehicle.file=seven_freedoms", "--set", "speeds={values=[15.0]}", "--set", "weighting={}",
-             "--set", "road={left_right='equal'}", "--engine", "reference")  # fmt: skip
+    given = (
+        "--set",
+        "vehicle.file=seven_freedoms",
+        "--set",
+        "speeds={values=[15.0]}",
+        "--set",
+        "weighting={}",
+        "--set",
+        "road={left_right='equal'}",
+        "--engine",
+        "reference",
+    )
     assert twinrig("run", "ride", *given, "--out", "out") == 0
     (line,) = [line for line in capsys.readouterr().out.splitlines() if line.strip().startswith("roll acceleration ")]
     assert line.split()[2:4] == ["0", "rad/s^2"] and line.count("%") == 0
@@ -206,8 +231,16 @@ freedoms = ["z"]
 def test_a_wheel_in_the_middle_is_on_neither_of_two_tracks(twinrig, capsys):
     """The study leaves out the road that it cannot run on, draws what there is, and finds the file of the command."""
     Path("tricycle.toml").write_text(TRICYCLE)
-    given = ("--set", "vehicle.file=tricycle.toml", "--set", "speeds={values=[10.0, 20.0]}", "--set", "weighting={}",
-             "--engine", "reference")  # fmt: skip
+    given = (
+        "--set",
+        "vehicle.file=tricycle.toml",
+        "--set",
+        "speeds={values=[10.0, 20.0]}",
+        "--set",
+        "weighting={}",
+        "--engine",
+        "reference",
+    )
     assert twinrig("run", "ride", *given, "--out", "out") == 0
     said = capsys.readouterr().out
     assert "tracks alike" in said and "tracks independent" not in said

@@ -43,8 +43,13 @@ def test_the_whole_motion_comes_back(case):
 
 def test_integration_falls_with_the_fourth_power_of_the_period(case):
     array, clean = case
-    errors = [np.abs(motion.integrate_rates(motion.spin(array, clean[::every]), every * PATH.period,
-                                            PATH.rates[0])[-1] - PATH.rates[::every][-1]).max() for every in (20, 10)]
+    errors = [
+        np.abs(
+            motion.integrate_rates(motion.spin(array, clean[::every]), every * PATH.period, PATH.rates[0])[-1]
+            - PATH.rates[::every][-1]
+        ).max()
+        for every in (20, 10)
+    ]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.3)
 
 
@@ -64,18 +69,23 @@ def test_in_a_plane_the_plain_formula_would_give_half_and_a_bias():
 def test_both_formulas_agree_where_both_hold():
     places = ARRAYS["5, one 1 m up"]
     clean = readings(np.array(list(places.values())))
-    alphas = [motion.angular_acceleration(motion.spin(sensor_array(places, formula), clean), PATH.rates)
-              for formula in ("spatial", "plane")]  # fmt: skip
+    alphas = [
+        motion.angular_acceleration(motion.spin(sensor_array(places, formula), clean), PATH.rates)
+        for formula in ("spatial", "plane")
+    ]
     assert np.abs(alphas[0] - alphas[1]).max() < 1e-13
 
 
-@pytest.mark.parametrize(("places", "words"), [
-    ({"a": (0, 0, 0), "b": (1, 0, 0)}, "at least three"),
-    ({"a": (0, 0, 0), "b": (1, 0, 0), "c": (2, 5e-4, 0)}, "on a line"),
-    ({"a": (0, 0, 0), "b": (0, 0, 0), "c": (0, 0, 0)}, "on a line"),
-    ({"a": (0, 0, 0), "b": (1, 0, 0), "c": (0, 1, np.nan)}, "finite numbers"),
-    ({"a": (0, 0), "b": (1, 0), "c": (0, 1)}, "three finite numbers"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("places", "words"),
+    [
+        ({"a": (0, 0, 0), "b": (1, 0, 0)}, "at least three"),
+        ({"a": (0, 0, 0), "b": (1, 0, 0), "c": (2, 5e-4, 0)}, "on a line"),
+        ({"a": (0, 0, 0), "b": (0, 0, 0), "c": (0, 0, 0)}, "on a line"),
+        ({"a": (0, 0, 0), "b": (1, 0, 0), "c": (0, 1, np.nan)}, "finite numbers"),
+        ({"a": (0, 0), "b": (1, 0), "c": (0, 1)}, "three finite numbers"),
+    ],
+)
 def test_arrays_that_cannot_see_a_turn_are_refused(places, words):
     with pytest.raises(InputError, match=words):
         sensor_array(places)

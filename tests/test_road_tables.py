@@ -25,7 +25,7 @@ def test_units_are_converted_once(tmp_path):
 
 
 def test_order_of_columns_line_ends_and_byte_order_mark_do_not_matter(tmp_path):
-    text = b"\xef\xbb\xbfrear [N],\"time [ms]\",front [kN]\r\n1,2,3\r\n"
+    text = b'\xef\xbb\xbfrear [N],"time [ms]",front [kN]\r\n1,2,3\r\n'
     table = read(tmp_path, text)
     assert (table["rear"][0], table["time"][0], table["front"][0]) == (1.0, 2e-3, 3000.0)
 

@@ -90,9 +90,20 @@ def sweep_command(folder, *arguments):
     study.write_text(QUICK_STUDY)
     script.write_text(SWEEP.format(study=str(study)))
     return subprocess.Popen(
-        [sys.executable, str(script), "run", "contact_ellipse", "--sweep", f"contact.load=1e4:1.1e5:{POINTS}",
-         *arguments],
-        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)  # fmt: skip
+        [
+            sys.executable,
+            str(script),
+            "run",
+            "contact_ellipse",
+            "--sweep",
+            f"contact.load=1e4:1.1e5:{POINTS}",
+            *arguments,
+        ],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
 
 
 def finished(folder):

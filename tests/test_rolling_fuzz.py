@@ -9,8 +9,22 @@ from models.rail.wheelset import CHOSEN
 from validation.hard_cases.rolling import KINDS
 
 SPREAD = np.array([2e-3, 1e-4, 2e-4, 5e-3, 1.0, 0.05, 0.01, 0.05, 0.05, 1.0])
-SPREADABLE = ("mass", "spin_inertia", "yaw_inertia", "radius", "conicity", "head_radius", "stiffness_x", "stiffness_y",
-              "stiffness_z", "damping_x", "damping_y", "damping_z", "friction", "flange_clearance")  # fmt: skip
+SPREADABLE = (
+    "mass",
+    "spin_inertia",
+    "yaw_inertia",
+    "radius",
+    "conicity",
+    "head_radius",
+    "stiffness_x",
+    "stiffness_y",
+    "stiffness_z",
+    "damping_x",
+    "damping_y",
+    "damping_z",
+    "friction",
+    "flange_clearance",
+)
 SAME, NUDGE, SENSITIVE = 1e-8, 1e-13, 100.0
 """Largest difference between the engines, SI, but where wheels that bounce make more of rounding: the written equations
 do so too with a start moved by NUDGE of itself, and engines may differ by so many times that. The written equations

@@ -30,8 +30,14 @@ def test_every_condition_holds_by_a_plain_sum():
     found = solve_rolling(PRESSED, MU, *motion, PAIR)
     y, x = np.meshgrid(PRESSED.y, PRESSED.x, indexing="ij")
     away = (x[..., None, None] - x, y[..., None, None] - y)
-    u = [np.einsum("abcdij,cdj->abi", influence(away[0] + i * PRESSED.dx, away[1], PRESSED.dx, PRESSED.dy, PAIR)
-                   [..., :2, :2], found.traction) for i in range(3)]  # fmt: skip
+    u = [
+        np.einsum(
+            "abcdij,cdj->abi",
+            influence(away[0] + i * PRESSED.dx, away[1], PRESSED.dx, PRESSED.dy, PAIR)[..., :2, :2],
+            found.traction,
+        )
+        for i in range(3)
+    ]
     slip = rigid_slip(PRESSED.x, PRESSED.y, *motion) + (3 * u[0] - 4 * u[1] + u[2]) / (2 * PRESSED.dx)
     size, bound = np.linalg.norm(found.traction, axis=-1), MU * PRESSED.pressure
     allowed = 10 * TOLERANCE
@@ -88,13 +94,16 @@ def test_next_to_no_friction_turns_with_the_slip(part):
     assert found.fy == pytest.approx(whole, rel=1e-6)
 
 
-@pytest.mark.parametrize(("wrong", "words"), [
-    (lambda: solve_rolling(PRESSED, MU, [1e-3, 2e-3], 0.0, 0.0, PAIR), r"xi_x = .*one number, not an array"),
-    (lambda: solve_rolling(PRESSED, MU, 0.0, 0.0, 1e12, PAIR), r"spin = 1000000000000.0: must be a spin in 1/m"),
-    (lambda: Pressed(np.zeros((5, 4)), centres(5, 1e-3), centres(4, 1e-3)), r"pressure = \[5, 4\]: .*\(4, 5\)"),
-    (lambda: Pressed(np.zeros((4, 5)), centres(5, 1e-3)[::-1], centres(4, 1e-3)), r"x: must ascend"),
-    (lambda: Pressed(np.full((4, 5), -1.0), centres(5, 1e-3), centres(4, 1e-3)), r"pressure\[0, 0\] = -1.0"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda: solve_rolling(PRESSED, MU, [1e-3, 2e-3], 0.0, 0.0, PAIR), r"xi_x = .*one number, not an array"),
+        (lambda: solve_rolling(PRESSED, MU, 0.0, 0.0, 1e12, PAIR), r"spin = 1000000000000.0: must be a spin in 1/m"),
+        (lambda: Pressed(np.zeros((5, 4)), centres(5, 1e-3), centres(4, 1e-3)), r"pressure = \[5, 4\]: .*\(4, 5\)"),
+        (lambda: Pressed(np.zeros((4, 5)), centres(5, 1e-3)[::-1], centres(4, 1e-3)), r"x: must ascend"),
+        (lambda: Pressed(np.full((4, 5), -1.0), centres(5, 1e-3), centres(4, 1e-3)), r"pressure\[0, 0\] = -1.0"),
+    ],
+)
 def test_wrong_input_is_named(wrong, words):
     with pytest.raises(InputError, match=words):
         wrong()
@@ -156,13 +165,16 @@ def test_carter_s_own_limits():
     assert carter(x, 1.0, 1 - 1e-9) == pytest.approx(np.sqrt(1 - x * x), abs=1e-8)
 
 
-@pytest.mark.parametrize(("arguments", "place"), [
-    ((-0.1, 0.0, 0.0, 0.0, PAIR), "mu"),
-    ((0.3, np.nan, 0.0, 0.0, PAIR), "xi_x"),
-    ((0.3, 0.0, np.inf, 0.0, PAIR), "xi_y"),
-    ((0.3, 0.0, 0.0, np.nan, PAIR), "spin"),
-    ((0.3, 0.0, 0.0, 0.0, Pair(STEEL, Material(E=3e9, nu=0.4))), "pair"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("arguments", "place"),
+    [
+        ((-0.1, 0.0, 0.0, 0.0, PAIR), "mu"),
+        ((0.3, np.nan, 0.0, 0.0, PAIR), "xi_x"),
+        ((0.3, 0.0, np.inf, 0.0, PAIR), "xi_y"),
+        ((0.3, 0.0, 0.0, np.nan, PAIR), "spin"),
+        ((0.3, 0.0, 0.0, 0.0, Pair(STEEL, Material(E=3e9, nu=0.4))), "pair"),
+    ],
+)
 def test_bad_input_is_refused(arguments, place):
     with pytest.raises(InputError) as error:
         solve_rolling(PRESSED, *arguments)

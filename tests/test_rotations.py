@@ -26,9 +26,11 @@ def tight(end):
 def test_matrix_is_the_papers_equation_21():
     for q in SOME[:20]:
         a, b, c, d = q
-        wanted = [[a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
-                  [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
-                  [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d]]  # fmt: skip
+        wanted = [
+            [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
+            [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
+            [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d],
+        ]
         assert np.abs(r.matrix(q) - wanted).max() < 1e-15
 
 

@@ -25,10 +25,25 @@ from models.simulate import simulate
 from validation.scenes import force_scene, road_scene, write_forces
 
 DURATION = 4.0
-OWN = Own(moment_rms=1.0, moment_max=3.0, moment_share=0.5, moment_share_band=0.1, force_share_band=0.0,
-          pitch_max=0.1, seconds=1.0, force_calls=4, steps=1)  # fmt: skip
-ERRORS = Errors(damage=dict.fromkeys(CHANNELS, 1.01), force_rms={}, vertical_damage={"f3": 1.0, "f4": 1.0},
-                pitch_max=0.01, pitch_rms=0.005, heave_max=0.0)  # fmt: skip
+OWN = Own(
+    moment_rms=1.0,
+    moment_max=3.0,
+    moment_share=0.5,
+    moment_share_band=0.1,
+    force_share_band=0.0,
+    pitch_max=0.1,
+    seconds=1.0,
+    force_calls=4,
+    steps=1,
+)
+ERRORS = Errors(
+    damage=dict.fromkeys(CHANNELS, 1.01),
+    force_rms={},
+    vertical_damage={"f3": 1.0, "f4": 1.0},
+    pitch_max=0.01,
+    pitch_rms=0.005,
+    heave_max=0.0,
+)
 GUIDED, SPRUNG, FREE = ("wheel_forces", "prescribed_pitch"), ("wheel_forces", "pitch_spring"), ("wheel_forces",)
 
 
@@ -121,36 +136,42 @@ def test_the_upright_component_is_scored_in_the_chassis_frame(place):
     assert 0.54**5 / 2 < errors(turned, truth).damage["f3z"] < 0.54**5 * 2
 
 
-@pytest.mark.parametrize(("own", "wrong", "effects", "word"), [
-    ({}, {}, GUIDED, "accepted"),
-    ({}, {}, SPRUNG, "accepted"),
-    ({}, {"damage": {**ERRORS.damage, "f4x": 1.06}}, GUIDED, "rejected"),
-    ({}, {"damage": {**ERRORS.damage, "f3z": float("nan")}}, GUIDED, "rejected"),
-    ({}, {"damage": {**ERRORS.damage, "f4x": 0.9}}, FREE, "stabilise"),
-    ({}, {"pitch_max": 0.03}, SPRUNG, "rejected"),
-    ({"moment_share_band": 0.2}, {}, GUIDED, "rejected"),
-    ({"force_share_band": 0.2}, {}, GUIDED, "rejected"),
-    ({"pitch_max": 5.9}, {}, FREE, "rejected"),
-    ({"pitch_max": 5.9}, {}, GUIDED, "rejected"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("own", "wrong", "effects", "word"),
+    [
+        ({}, {}, GUIDED, "accepted"),
+        ({}, {}, SPRUNG, "accepted"),
+        ({}, {"damage": {**ERRORS.damage, "f4x": 1.06}}, GUIDED, "rejected"),
+        ({}, {"damage": {**ERRORS.damage, "f3z": float("nan")}}, GUIDED, "rejected"),
+        ({}, {"damage": {**ERRORS.damage, "f4x": 0.9}}, FREE, "stabilise"),
+        ({}, {"pitch_max": 0.03}, SPRUNG, "rejected"),
+        ({"moment_share_band": 0.2}, {}, GUIDED, "rejected"),
+        ({"force_share_band": 0.2}, {}, GUIDED, "rejected"),
+        ({"pitch_max": 5.9}, {}, FREE, "rejected"),
+        ({"pitch_max": 5.9}, {}, GUIDED, "rejected"),
+    ],
+)
 def test_verdict_with_the_truth(own, wrong, effects, word):
     assert verdict(replace(OWN, **own), replace(ERRORS, **wrong), effects, Limits()).word == word
 
 
-@pytest.mark.parametrize(("own", "effects", "more", "word"), [
-    ({}, GUIDED, {}, "accepted"),
-    ({}, (*FREE, "kalman_filter"), {"consistent": True}, "accepted"),
-    ({}, (*FREE, "kalman_filter"), {"consistent": False}, "rejected"),
-    ({}, (*FREE, "kalman_filter"), {"consistent": True, "uncertainty": 0.03}, "rejected"),
-    ({"moment_share_band": 0.2}, GUIDED, {}, "rejected"),
-    ({"moment_share_band": 0.2}, SPRUNG, {}, "rejected"),
-    ({}, SPRUNG, {}, "stabilise"),
-    ({}, (*FREE, "high_pass"), {"trusted": 100.0}, "stabilise"),
-    ({}, FREE, {}, "stabilise"),
-    ({}, FREE, {"trusted": 5.0}, "stabilise"),
-    ({}, FREE, {"trusted": 10.0}, "accepted"),
-    ({"pitch_max": 5.9}, FREE, {"trusted": 100.0}, "rejected"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("own", "effects", "more", "word"),
+    [
+        ({}, GUIDED, {}, "accepted"),
+        ({}, (*FREE, "kalman_filter"), {"consistent": True}, "accepted"),
+        ({}, (*FREE, "kalman_filter"), {"consistent": False}, "rejected"),
+        ({}, (*FREE, "kalman_filter"), {"consistent": True, "uncertainty": 0.03}, "rejected"),
+        ({"moment_share_band": 0.2}, GUIDED, {}, "rejected"),
+        ({"moment_share_band": 0.2}, SPRUNG, {}, "rejected"),
+        ({}, SPRUNG, {}, "stabilise"),
+        ({}, (*FREE, "high_pass"), {"trusted": 100.0}, "stabilise"),
+        ({}, FREE, {}, "stabilise"),
+        ({}, FREE, {"trusted": 5.0}, "stabilise"),
+        ({}, FREE, {"trusted": 10.0}, "accepted"),
+        ({"pitch_max": 5.9}, FREE, {"trusted": 100.0}, "rejected"),
+    ],
+)
 def test_verdict_without_the_truth(own, effects, more, word):
     assert blind_verdict(replace(OWN, **own), effects, 10.0, Limits(), **more).word == word
 

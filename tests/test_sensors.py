@@ -17,8 +17,15 @@ ENGINES = ("reference", "exudyn", "mujoco")
 
 
 def scene(effects, step=5e-4, **engines):
-    return build({"title": "test", "run": {"duration": 0.4, "step": step}, "start": {"pitch": 0.05},
-                  "effects": effects, "engines": engines})  # fmt: skip
+    return build(
+        {
+            "title": "test",
+            "run": {"duration": 0.4, "step": step},
+            "start": {"pitch": 0.05},
+            "effects": effects,
+            "engines": engines,
+        }
+    )
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -27,8 +34,10 @@ def test_readings_are_the_truth_at_their_instants_plus_their_own_noise(engine):
     sensor = {"sampling_rate": 100.0, "deviation": 0.01, "seed": 4, "path": 2}
     run = simulate(scene({"gyro": gyro, "pitch_sensor": sensor}), engine)
     rows = np.arange(801)
-    for channel, true, every, deviation, source in (("gyro", "pitch_rate", 10, 0.02, GYRO),
-                                                    ("pitch_reading", "pitch", 20, 0.01, PITCH_SENSOR)):  # fmt: skip
+    for channel, true, every, deviation, source in (
+        ("gyro", "pitch_rate", 10, 0.02, GYRO),
+        ("pitch_reading", "pitch", 20, 0.01, PITCH_SENSOR),
+    ):
         noise = deviation * normal(4, 2, 800 // every + 1, 1, source=source)[:, 0]
         assert np.array_equal(run[channel], run[true][rows - rows % every] + noise[rows // every])
     assert np.array_equal(run.states, simulate(scene({}), engine).states)

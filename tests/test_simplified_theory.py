@@ -125,8 +125,13 @@ def test_displacement_is_that_of_the_half_space():
     pressure = np.random.default_rng(3).random((7, 7))
     x = np.arange(7) * 2e-4
     y = np.arange(7) * 3e-4
-    numbers = influence(x[None, None, None, :] - x[None, :, None, None], y[None, None, :, None] -
-                        y[:, None, None, None], 2e-4, 3e-4, PAIR)[..., Z, Z]  # fmt: skip
+    numbers = influence(
+        x[None, None, None, :] - x[None, :, None, None],
+        y[None, None, :, None] - y[:, None, None, None],
+        2e-4,
+        3e-4,
+        PAIR,
+    )[..., Z, Z]
     expected = np.einsum("jkmi,jk->mi", numbers, pressure)
     assert displacement(pressure, 2e-4, 3e-4, PAIR.modulus) == pytest.approx(expected, rel=1e-10)
 
@@ -186,6 +191,7 @@ def test_the_march_is_of_second_order_where_tractions_turn():
 
     With a traction that counts as slipping by its size it is 1.1 % and a fifth, without the turning 2.7 % and a fourth.
     """
+
     def force(cells):
         y = B * (2.0 * np.arange(200) + 1.0 - 200) / 200
         half = A0 * np.sqrt(1.0 - (y / B) ** 2)
@@ -212,8 +218,10 @@ def test_a_slipping_traction_turns_exactly():
 
 
 def test_flat_and_ring_like_bottoms_give_finite_positive_answers():
-    for height in (lambda x, y: 0.0 * x * y + np.maximum(np.hypot(x, y) - 4e-3, 0.0) ** 2 * 30,
-                   lambda x, y: 4e4 * (x**2 + y**2 - 1.6e-5) ** 2 * 1e1):  # fmt: skip
+    for height in (
+        lambda x, y: 0.0 * x * y + np.maximum(np.hypot(x, y) - 4e-3, 0.0) ** 2 * 30,
+        lambda x, y: 4e4 * (x**2 + y**2 - 1.6e-5) ** 2 * 1e1,
+    ):
         found = press(from_function(height, (-0.02, 0.02), (-0.02, 0.02)), PAIR, load=1e4)
         assert found.load == pytest.approx(1e4, rel=1e-9)
         assert 0.0 < found.approach < 1e-3

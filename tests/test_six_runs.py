@@ -45,8 +45,16 @@ def test_implementations_agree_before_the_drift(summary):
 def test_the_files_that_a_user_gets_are_there(summary):
     found, folder = summary
     names = {path.name for path in folder.iterdir()}
-    figures = {f"fig{i}_{name}.png" for i, name in ((4, "measurement"), (5, "drift"), (6, "noise_samples"),
-                                                    (7, "perturbed_models"), (8, "enforced_moment"))}  # fmt: skip
+    figures = {
+        f"fig{i}_{name}.png"
+        for i, name in (
+            (4, "measurement"),
+            (5, "drift"),
+            (6, "noise_samples"),
+            (7, "perturbed_models"),
+            (8, "enforced_moment"),
+        )
+    }
     assert figures | {"table.txt", "measurement.nc", "wheel_forces.csv", "pitch.csv", "mujoco guided, both.nc"} <= names
     assert found["failed"] == {}
 
@@ -64,13 +72,16 @@ def test_sampling_rate_must_fit_the_step(tmp_path):
         run(scene, ("reference",), tmp_path, lambda text, part: None)
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    ("effects.pitch_spring.stiffness=2e5", "drop it"),
-    ("run.output_step=0.01", "drop this key"),
-    ("engines.exudyn.integrator=RK67", "prescribe the pitch"),
-    ("run.duration=0.004", "at least 8 samples"),
-    ("options.seed=99999999999999999999999999", "seed"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("effects.pitch_spring.stiffness=2e5", "drop it"),
+        ("run.output_step=0.01", "drop this key"),
+        ("engines.exudyn.integrator=RK67", "prescribe the pitch"),
+        ("run.duration=0.004", "at least 8 samples"),
+        ("options.seed=99999999999999999999999999", "seed"),
+    ],
+)
 def test_what_the_study_cannot_follow_is_refused_before_it_writes(change, words, tmp_path):
     with pytest.raises(InputError, match=words):
         run(load(SCENES / "six_runs.toml", [change]), ("exudyn",), tmp_path, lambda text, part: None)
@@ -79,8 +90,14 @@ def test_what_the_study_cannot_follow_is_refused_before_it_writes(change, words,
 
 def test_runs_start_where_the_measurement_did_and_at_its_own_step(tmp_path):
     """A tilted start and a step of the engine's own leave an undisturbed run on the measurement."""
-    changes = ["start.pitch=0.05", "engines.reference.step=5e-4", "run.duration=3.0", "options.noise_samples=1",
-               "options.perturbed_models=0", "vehicle.parameters=asymmetric_twin"]  # fmt: skip
+    changes = [
+        "start.pitch=0.05",
+        "engines.reference.step=5e-4",
+        "run.duration=3.0",
+        "options.noise_samples=1",
+        "options.perturbed_models=0",
+        "vehicle.parameters=asymmetric_twin",
+    ]
     found = run(load(SCENES / "six_runs.toml", changes), ("reference",), tmp_path, lambda text, part: None)
     free, guided = of(found, "reference", "undisturbed"), of(found, "reference", "guided, undisturbed")
     assert free["drift-off"] is None and free["heave error"] < 1e-4

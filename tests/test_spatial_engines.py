@@ -53,8 +53,10 @@ def test_curves_are_linearised_by_their_mean_slope_at_rest():
 def test_accelerations_agree_with_the_equations_by_hand():
     """Large random motion of the vehicle that no symmetry helps, curves, gravity, road: rounding only."""
     vehicle = curved(of_name("spatial twin", GRAVITY))
-    exudyn, mujoco_, reference = (*(build(engine, vehicle, speed=SPEED) for engine in ENGINES),
-                                  SpatialReference(vehicle, SPEED))  # fmt: skip
+    exudyn, mujoco_, reference = (
+        *(build(engine, vehicle, speed=SPEED) for engine in ENGINES),
+        SpatialReference(vehicle, SPEED),
+    )
     for path in range(5):
         state = random_state(vehicle, path)
         expected = reference.acceleration(*state)
@@ -67,8 +69,10 @@ def test_a_wheel_that_only_slides_is_linearised_wherever_its_spring_and_its_tyre
     coordinate. Exudyn once asked for markers that it had not."""
     roller = Body("roller", 400.0, (0.0, 0.0, 0.6), ("rx",), ((30.0, 0.0, 0.0), (0.0, 30.0, 0.0), (0.0, 0.0, 30.0)))
     wheel = Body("wheel", 40.0, (0.0, 0.7, 0.3), ("z",))
-    springs = tuple(SpringDamper(f"{i}", "roller", "wheel", (0.0, 0.6, 0.6), (0.0, 0.6, 0.3), axis, 3e4, 1e3)
-                    for i, axis in enumerate([(0.0, 0.0, 1.0), (0.0, 0.6, 0.8)]))  # fmt: skip
+    springs = tuple(
+        SpringDamper(f"{i}", "roller", "wheel", (0.0, 0.6, 0.6), (0.0, 0.6, 0.3), axis, 3e4, 1e3)
+        for i, axis in enumerate([(0.0, 0.0, 1.0), (0.0, 0.6, 0.8)])
+    )
     bar = AntiRollBar("bar", "roller", "wheel", "roller", (0.0, 0.7, 0.3), (0.0, -0.7, 0.6), 1e4, 10.0)
     tyre = Tyre("tyre", "wheel", (0.0, 0.7, 0.3), 0, 2e5)
     turning = TurnOutput("turn", "angle", "wheel", (1.0, 0.0, 0.0))
@@ -85,9 +89,13 @@ def test_equations_by_hand_keep_energy():
     """
     plain = of_name("spatial twin", GRAVITY)
     vehicle = replace(
-        plain, side_forces=(), drags=(), tyres=tuple(replace(tyre, damping=0.0) for tyre in plain.tyres),
+        plain,
+        side_forces=(),
+        drags=(),
+        tyres=tuple(replace(tyre, damping=0.0) for tyre in plain.tyres),
         springs=tuple(replace(s, damping=0.0) for s in plain.springs),
-        bars=tuple(replace(bar, damping=0.0) for bar in plain.bars))  # fmt: skip
+        bars=tuple(replace(bar, damping=0.0) for bar in plain.bars),
+    )
     model = SpatialReference(vehicle)
     q, v, _ = random_state(vehicle, 0)
     a = model.acceleration(q, v)
@@ -95,8 +103,11 @@ def test_equations_by_hand_keep_energy():
     def energy(t):
         at, rate = q + t[0] * v + t[0] ** 2 / 2 * a, v + t[0] * a
         motions = model._motions(at, rate)
-        kinetic = sum(0.5 * body.mass * np.sum((m.shift @ rate) ** 2) + 0.5 * (w := m.rotation.T @ m.turn @ rate)
-                      @ np.array(body.inertia) @ w for body, m in motions_of(vehicle, motions))  # fmt: skip
+        kinetic = sum(
+            0.5 * body.mass * np.sum((m.shift @ rate) ** 2)
+            + 0.5 * (w := m.rotation.T @ m.turn @ rate) @ np.array(body.inertia) @ w
+            for body, m in motions_of(vehicle, motions)
+        )
         return np.array([kinetic])
 
     def motions_of(vehicle, motions):
@@ -113,8 +124,9 @@ def test_paths_agree():
     """R19-ride with curves under gravity on a random road from a random start: 20 steps of the same tableau."""
     vehicle = curved(of_name("r19_ride", GRAVITY))
     road = 1e-4 * np.cumsum(np.ones((41, 8)), axis=0)
-    exudyn, other = (build(engine, vehicle, settings(engine), None, road).run(*random_state(vehicle, 1)[:2])
-                     for engine in ENGINES)  # fmt: skip
+    exudyn, other = (
+        build(engine, vehicle, settings(engine), None, road).run(*random_state(vehicle, 1)[:2]) for engine in ENGINES
+    )
     assert len(exudyn.times) == 21
     assert exudyn.counts["force calls"] == 80
     assert np.abs(exudyn.positions - other.positions).max() < 1e-13
@@ -125,8 +137,9 @@ def test_paths_agree():
 def test_road_is_read_at_half_steps(engine):
     """One RK4 step of a mass on a spring over a road z = t^3, whose stages are written down here."""
     mass, k, h = 2.0, 50.0, 0.01
-    vehicle = SpatialVehicle("one mass", (Body("m", mass, (0, 0, 0.3), ("z",)),), (),
-                             (Tyre("t", "m", (0.0, 0.0, 0.3), 0, k),), (0.0,))  # fmt: skip
+    vehicle = SpatialVehicle(
+        "one mass", (Body("m", mass, (0, 0, 0.3), ("z",)),), (), (Tyre("t", "m", (0.0, 0.0, 0.3), 0, k),), (0.0,)
+    )
     times = h / 2 * np.arange(3)
     found = build(engine, vehicle, settings(engine, h, h), None, np.column_stack([times**3, 3 * times**2])).run(
         np.array([0.1]), np.array([0.0])
@@ -229,8 +242,12 @@ def test_answers_do_not_depend_on_what_was_asked_before(engine):
 
 def test_body_may_bear_any_name():
     """MuJoCo's own ground is called "world"."""
-    vehicle = SpatialVehicle("two", (Body("world", 2.0, (0, 0, 0.3), ("z",)), Body("0 z", 1.0, (0, 0, 0.6), ("z",))),
-                             (SpringDamper("s", "0 z", "world", (0, 0, 0.6), (0, 0, 0.3), (0, 0, 1), 30.0, 1.0),),
-                             (Tyre("t", "world", (0.0, 0.0, 0.3), 0, 50.0),), (0.0,))  # fmt: skip
+    vehicle = SpatialVehicle(
+        "two",
+        (Body("world", 2.0, (0, 0, 0.3), ("z",)), Body("0 z", 1.0, (0, 0, 0.6), ("z",))),
+        (SpringDamper("s", "0 z", "world", (0, 0, 0.6), (0, 0, 0.3), (0, 0, 1), 30.0, 1.0),),
+        (Tyre("t", "world", (0.0, 0.0, 0.3), 0, 50.0),),
+        (0.0,),
+    )
     for engine in ENGINES:
         assert difference(build(engine, vehicle).linearise(), linearise(vehicle)) < 1e-12

@@ -51,10 +51,13 @@ def twin():
         SpringDamper("belt", "alternator", None, (1.2, 0.3, 0.9), (1.3, 0.1, 0.1), (0.0, 0.0, 1.0), 5e3, 20.0),
     )
     for name, (one, two), at in (
-        ("mount", ("engine", "body"), (0.7, 0.3, 0.5)), ("stay", ("engine", "body"), (1.2, -0.2, 0.4)),
-        ("bracket", ("alternator", "engine"), (1.0, 0.2, 0.7)), ("foot", ("body", None), (-0.4, -0.3, 0.2)),
-        ("joint", ("arm", "body"), (-0.9, 0.7, 0.35)), ("knee", ("axle", "body"), (0.8, 0.1, 0.5)),
-    ):  # fmt: skip
+        ("mount", ("engine", "body"), (0.7, 0.3, 0.5)),
+        ("stay", ("engine", "body"), (1.2, -0.2, 0.4)),
+        ("bracket", ("alternator", "engine"), (1.0, 0.2, 0.7)),
+        ("foot", ("body", None), (-0.4, -0.3, 0.2)),
+        ("joint", ("arm", "body"), (-0.9, 0.7, 0.35)),
+        ("knee", ("axle", "body"), (0.8, 0.1, 0.5)),
+    ):
         for i, axis in enumerate(np.eye(3)):
             at_axis = SpringDamper(f"{name}.{i}", one, two, at, at, tuple(axis), 3e4 + 7e3 * i, 100.0 + 30 * i)
             springs += (at_axis,)
@@ -265,9 +268,26 @@ def eigenvalues(linear):
 
 
 FREQUENCIES = [
-    1.357622, 1.47076, 2.152076, 2.738235, 2.89083, 5.917883, 6.426765, 9.707712, 10.419969, 10.434258,
-    11.280234, 11.401383, 11.656264, 12.007752, 12.667486, 15.478222, 15.487798, 15.526984, 15.535278,
-]  # fmt: skip
+    1.357622,
+    1.47076,
+    2.152076,
+    2.738235,
+    2.89083,
+    5.917883,
+    6.426765,
+    9.707712,
+    10.419969,
+    10.434258,
+    11.280234,
+    11.401383,
+    11.656264,
+    12.007752,
+    12.667486,
+    15.478222,
+    15.487798,
+    15.526984,
+    15.535278,
+]
 """Hz, |lambda| / 2 pi of the damped pairs of R19-ride, as handed over with its parameters."""
 
 

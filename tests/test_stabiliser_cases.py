@@ -32,9 +32,10 @@ def test_all_rows_pass_and_their_ids_are_their_own(measured):
         assert len({row.id for row in rows}) == len(rows) and all(row.id.startswith(f"{name}.") for row in rows)
 
 
-@pytest.mark.parametrize(("module", "model", "engine"), [
-    (reference, "Reference", "reference"), (mujoco, "MujocoModel", "mujoco"), (exudyn, "ExudynModel", "exudyn"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("module", "model", "engine"),
+    [(reference, "Reference", "reference"), (mujoco, "MujocoModel", "mujoco"), (exudyn, "ExudynModel", "exudyn")],
+)
 def test_a_force_without_its_sign_fails_its_rows(monkeypatch, tmp_path, module, model, engine):
     """The enforced force upward instead of down: both vehicles' rows of that implementation, and no other row."""
     original = getattr(module, model)._enforced

@@ -38,11 +38,19 @@ def forces(tmp_path):
 def driven(folder, interpolation="linear", frame="inertial", geometry="exact", **effects) -> Assembly:
     """The asymmetric vehicle under the wheel forces, with further effects, released from a tilt."""
     table = {"file": "forces.csv", "interpolation": interpolation, "frame": frame}
-    return assemble(build_scene({
-        "title": "t", "vehicle": {"parameters": "asymmetric_twin", "geometry": geometry},
-        "run": {"duration": DURATION, "step": STEP}, "start": {"pitch": 0.2, "pitch_rate": 0.5},
-        "effects": {"wheel_forces": table, **effects},
-    }, "t", folder))  # fmt: skip
+    return assemble(
+        build_scene(
+            {
+                "title": "t",
+                "vehicle": {"parameters": "asymmetric_twin", "geometry": geometry},
+                "run": {"duration": DURATION, "step": STEP},
+                "start": {"pitch": 0.2, "pitch_rate": 0.5},
+                "effects": {"wheel_forces": table, **effects},
+            },
+            "t",
+            folder,
+        )
+    )
 
 
 def moment(interpolation="linear", period=SAMPLING):
@@ -97,15 +105,18 @@ def test_two_springs_are_both_there(forces):
     own = driven(forces)
     one, two, both = (PitchSpring("chassis", k, d) for k, d in ((2e3, 50.0), (1e3, 200.0), (3e3, 250.0)))
     for engine in ENGINES:
-        found = [model(engine, replace(own, vehicle=replace(own.vehicle, pitch_springs=springs))).acceleration(0, STATE)
-                 for springs in ((one, two), (both,))]
+        found = [
+            model(engine, replace(own, vehicle=replace(own.vehicle, pitch_springs=springs))).acceleration(0, STATE)
+            for springs in ((one, two), (both,))
+        ]
         np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
 
 
 def banded(folder, interpolation="linear", frame="inertial", geometry="exact") -> Assembly:
     """The driven vehicle on a spring with a dead band of 0.22 rad, which it leaves and comes back to."""
-    return driven(folder, interpolation, frame, geometry,
-                  pitch_spring={"stiffness": 5e4, "damping": 300.0, "dead_band": 0.22})
+    return driven(
+        folder, interpolation, frame, geometry, pitch_spring={"stiffness": 5e4, "damping": 300.0, "dead_band": 0.22}
+    )
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -122,10 +133,15 @@ def test_a_dead_band_is_slack_within_and_counts_from_its_edge(forces, engine):
 
 
 @pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
-@pytest.mark.parametrize(("frame", "interpolation", "geometry"), [
-    ("inertial", "held", "exact"), ("inertial", "linear", "exact"), ("body", "held", "exact"),
-    ("inertial", "smooth", "linear"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("frame", "interpolation", "geometry"),
+    [
+        ("inertial", "held", "exact"),
+        ("inertial", "linear", "exact"),
+        ("body", "held", "exact"),
+        ("inertial", "smooth", "linear"),
+    ],
+)
 def test_engines_agree_on_a_dead_band(forces, engine, frame, interpolation, geometry):
     """The same stages see the same side of the edge: rounding, although the moment jumps by 150 N m there."""
     own = banded(forces, interpolation, frame, geometry)
@@ -137,8 +153,11 @@ def test_engines_agree_on_a_dead_band(forces, engine, frame, interpolation, geom
 def test_a_dead_band_stands_in_a_vehicle_without_any_input(tmp_path):
     """On its tyres, over a flat road: the law is there although there is no table to read."""
     effects = {"pitch_spring": {"stiffness": 5e4, "damping": 300.0, "dead_band": 0.05}}
-    scene = build_scene({"title": "t", "run": {"duration": DURATION, "step": STEP}, "start": {"pitch": 0.1},
-                         "effects": effects}, "t", tmp_path)  # fmt: skip
+    scene = build_scene(
+        {"title": "t", "run": {"duration": DURATION, "step": STEP}, "start": {"pitch": 0.1}, "effects": effects},
+        "t",
+        tmp_path,
+    )
     paths = [model(engine, assemble(scene)).run().states for engine in ENGINES]
     assert np.abs(paths[1] - paths[0]).max() < 1e-12 > np.abs(paths[2] - paths[0]).max()
 
@@ -166,17 +185,25 @@ def test_a_high_pass_decays_as_declared(forces):
 def guided(forces):
     """The folder with a motion of heave and pitch beside the forces."""
     t = np.arange(0, DURATION + SAMPLING / 2, SAMPLING)
-    write_time_series(forces / "motion.csv", {"z3": ("m", 0.06 + 0.02 * np.sin(23.0 * t + 0.4)),
-                                              "pitch": ("rad", 0.1 * np.sin(17.0 * t + 1.0))}, SAMPLING)
+    write_time_series(
+        forces / "motion.csv",
+        {"z3": ("m", 0.06 + 0.02 * np.sin(23.0 * t + 0.4)), "pitch": ("rad", 0.1 * np.sin(17.0 * t + 1.0))},
+        SAMPLING,
+    )
     return forces
 
 
 def on_rails(folder, interpolation="smooth", geometry="exact", **values):
     """The asymmetric vehicle whose heave and pitch are prescribed."""
-    scene = {"vehicle": {"parameters": "asymmetric_twin", "geometry": geometry}, "title": "t",
-             "run": {"duration": DURATION, "step": STEP}, "effects": {
-                 "wheel_forces": {"file": "forces.csv", "interpolation": interpolation},
-                 "prescribed_heave_and_pitch": {"file": "motion.csv", **values}}}
+    scene = {
+        "vehicle": {"parameters": "asymmetric_twin", "geometry": geometry},
+        "title": "t",
+        "run": {"duration": DURATION, "step": STEP},
+        "effects": {
+            "wheel_forces": {"file": "forces.csv", "interpolation": interpolation},
+            "prescribed_heave_and_pitch": {"file": "motion.csv", **values},
+        },
+    }
     return assemble(build_scene(scene, "t", folder))
 
 
@@ -192,8 +219,10 @@ def test_mujoco_and_the_reference_agree_on_rails(guided, geometry, interpolation
 def test_exudyn_multipliers_on_rails(guided):
     """Second order: (2 pi f h)^2 / 12 of m3 z3'' and I beta'', 4e-5 at 23 rad/s and 1 ms; its start has died out."""
     own = on_rails(guided)
-    one, other = (model(engine, own, integrator=name).run()
-                  for engine, name in (("reference", "RK4"), ("exudyn", "GeneralizedAlpha")))
+    one, other = (
+        model(engine, own, integrator=name).run()
+        for engine, name in (("reference", "RK4"), ("exudyn", "GeneralizedAlpha"))
+    )
     assert np.abs(one.states - other.states)[:, [2, 3]].max() < 1e-12  # it stays where it is put
     off = np.abs(one.enforced - other.enforced)[50:].max(axis=0) / np.abs(one.enforced).max(axis=0)
     assert (off < 1e-3).all()
@@ -221,9 +250,14 @@ def noisy_pitch(folder, rng=0):
 
 
 def measured(folder, **values):
-    scene = {"title": "t", "run": {"duration": 2.0, "step": 1e-3}, "effects": {
-        "wheel_forces": {"file": "forces.csv", "interpolation": "linear"},
-        "prescribed_pitch": {"file": "pitch.csv", **values}}}
+    scene = {
+        "title": "t",
+        "run": {"duration": 2.0, "step": 1e-3},
+        "effects": {
+            "wheel_forces": {"file": "forces.csv", "interpolation": "linear"},
+            "prescribed_pitch": {"file": "pitch.csv", **values},
+        },
+    }
     return assemble(build_scene(scene, "scene.toml", folder))
 
 
@@ -232,8 +266,9 @@ def test_bandwidth_takes_the_noise_and_leaves_the_motion(tmp_path):
     true = noisy_pitch(tmp_path)
     left = measured(tmp_path, bandwidth=5.0).input.sample(0.0, 1e-3, len(true))[:, 2] - true
     assert 0.5 < np.std(left[200:-200]) / (np.deg2rad(0.1) * np.sqrt(2 * 5.0 * 1e-3 * 0.92)) < 1.7  # 18 free values
-    rough, smooth = (measured(tmp_path, **own).input.sample(0.0, 1e-3, len(true))[:, 4] * 500.0 for own in
-                     ({}, {"bandwidth": 5.0}))
+    rough, smooth = (
+        measured(tmp_path, **own).input.sample(0.0, 1e-3, len(true))[:, 4] * 500.0 for own in ({}, {"bandwidth": 5.0})
+    )
     assert np.std(rough) > 1e6 > 1e3 > np.std(smooth[200:-200])  # N m, with I = 500 kg m^2
 
 
@@ -266,9 +301,9 @@ def linear_map(engine, own, integrator, free):
     return np.array(columns).T[[*free, *(4 + j for j in free)]]
 
 
-@pytest.mark.parametrize(("engine", "integrator"), [
-    ("exudyn", "RK44"), ("mujoco", "Euler"), ("mujoco", "implicitfast"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("engine", "integrator"), [("exudyn", "RK44"), ("mujoco", "Euler"), ("mujoco", "implicitfast")]
+)
 def test_the_step_check_knows_a_taut_dead_band(forces, engine, integrator):
     """Beyond its band the spring stiffens the vehicle; its damper is in a callback, so implicit in no integrator."""
     own = driven(forces, geometry="linear", pitch_spring={"stiffness": 5e4, "damping": 3e3, "dead_band": 0.1})
@@ -284,13 +319,30 @@ def test_the_step_check_knows_a_vehicle_on_rails(guided, engine, integrator):
 
 
 def test_the_plan_names_what_is_there(guided):
-    scene = build_scene({"title": "t", "run": {"duration": DURATION, "step": STEP},
-                         "effects": {"pitch_spring": {"stiffness": 5e4, "dead_band": 0.22}}}, "t", guided)  # fmt: skip
+    scene = build_scene(
+        {
+            "title": "t",
+            "run": {"duration": DURATION, "step": STEP},
+            "effects": {"pitch_spring": {"stiffness": 5e4, "dead_band": 0.22}},
+        },
+        "t",
+        guided,
+    )
     assert "to the ground, beyond 0.22 rad" in describe(scene)
-    effects = {"wheel_forces": {"file": "forces.csv", "interpolation": "linear", "accept": ["weight", "balance"]},
-               "prescribed_heave_and_pitch": {"file": "motion.csv"}}
-    scene = build_scene({"title": "t", "run": {"duration": DURATION, "step": STEP}, "effects": effects,
-                         "engines": {"exudyn": {"integrator": "GeneralizedAlpha"}}}, "t", guided)  # fmt: skip
+    effects = {
+        "wheel_forces": {"file": "forces.csv", "interpolation": "linear", "accept": ["weight", "balance"]},
+        "prescribed_heave_and_pitch": {"file": "motion.csv"},
+    }
+    scene = build_scene(
+        {
+            "title": "t",
+            "run": {"duration": DURATION, "step": STEP},
+            "effects": effects,
+            "engines": {"exudyn": {"integrator": "GeneralizedAlpha"}},
+        },
+        "t",
+        guided,
+    )
     text = describe(scene)
     assert "heave and pitch of the chassis prescribed" in text and "enforced_force, inertia_term" in text
     names = set(simulate(scene, "exudyn").data.data_vars)

@@ -24,8 +24,9 @@ def summary(tmp_path_factory):
 
 
 def of(summary, method, road="road", engine="reference"):
-    return next(row for row in summary[0]["rows"]
-                if (row["method"], row["road"], row["engine"]) == (method, road, engine))  # fmt: skip
+    return next(
+        row for row in summary[0]["rows"] if (row["method"], row["road"], row["engine"]) == (method, road, engine)
+    )
 
 
 def test_what_knows_the_pitch_is_accepted_on_both_roads_in_both_engines(summary):
@@ -50,8 +51,11 @@ def test_springs_and_high_pass_are_wrong_on_the_grade(summary):
 
 def test_other_engines_run_what_is_accepted(summary):
     rows = summary[0]["rows"]
-    accepted = {row["method"] for row in rows if row["road"] == "road" and row["engine"] == "reference"
-                and row["verdict"] == "accepted"}  # fmt: skip
+    accepted = {
+        row["method"]
+        for row in rows
+        if row["road"] == "road" and row["engine"] == "reference" and row["verdict"] == "accepted"
+    }
     assert {row["method"] for row in rows if row["engine"] == "mujoco"} == {"free"} | accepted
     for method in accepted - {"free"}:
         one, other = of(summary, method), of(summary, method, engine="mujoco")
@@ -68,27 +72,37 @@ def test_spring_and_high_pass_of_the_sweep_are_the_same(summary):
 def test_the_files_that_a_user_gets_are_there(summary):
     found, folder = summary
     names = {str(path.relative_to(folder)) for path in folder.rglob("*.*")}
-    assert {"table.txt", "score.csv", "decide.png", "stiffness.png", "road/wheel_forces.csv", "road/measured_pitch.csv",
-            "grade/heave_and_pitch.csv"} <= names  # fmt: skip
+    assert {
+        "table.txt",
+        "score.csv",
+        "decide.png",
+        "stiffness.png",
+        "road/wheel_forces.csv",
+        "road/measured_pitch.csv",
+        "grade/heave_and_pitch.csv",
+    } <= names
     assert found["failed"] == {} and found["table"] == (folder / "table.txt").read_text().splitlines()
     with (folder / "score.csv").open() as file:
         assert len(list(csv.DictReader(file))) == len(found["rows"])
     assert max(len(line) for line in found["table"]) < 160
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    ("options.factors={J = 1.1}", "not a parameter"),
-    ("options.stiffnesses=[0.0]", "above 0"),
-    ("options.cut_offs=[-1.0]", "above 0"),
-    ("options.limits.damage=0.1", "damage_error"),
-    ("options.grade=0.7", "grade"),
-    ("effects.road.grade=0.1", "drop this key"),
-    ("effects.pitch_spring.stiffness=2e5", "drop it"),
-    ("run.output_step=0.01", "drop this key"),
-    ("options.sampling_rate=700.0", "sampling_rate"),
-    ("engines.exudyn.step=5e-4", r"engines\.exudyn\.step.*drop this key"),
-    ("run.duration=0.05", "100 steps or more"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("options.factors={J = 1.1}", "not a parameter"),
+        ("options.stiffnesses=[0.0]", "above 0"),
+        ("options.cut_offs=[-1.0]", "above 0"),
+        ("options.limits.damage=0.1", "damage_error"),
+        ("options.grade=0.7", "grade"),
+        ("effects.road.grade=0.1", "drop this key"),
+        ("effects.pitch_spring.stiffness=2e5", "drop it"),
+        ("run.output_step=0.01", "drop this key"),
+        ("options.sampling_rate=700.0", "sampling_rate"),
+        ("engines.exudyn.step=5e-4", r"engines\.exudyn\.step.*drop this key"),
+        ("run.duration=0.05", "100 steps or more"),
+    ],
+)
 def test_what_the_study_cannot_follow_is_refused_before_it_writes(change, words, tmp_path):
     with pytest.raises(InputError, match=words):
         run(load(SCENES / "stabilisers.toml", [change]), ("exudyn",), tmp_path, quiet)

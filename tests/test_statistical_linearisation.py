@@ -66,8 +66,10 @@ def test_laws_that_are_lines_give_the_linear_vehicle():
     """A spring and a damper written as curves: the covariance itself, nothing left out, no mean."""
     vehicle, road = ride("quarter_car")
     spring = vehicle.springs[0]
-    lines = {"travel_force": Curve((-1.0, 0.0, 1.0), (-spring.stiffness, 0.0, spring.stiffness)),
-             "rate_force": Curve((-1.0, 1.0), (-spring.damping, spring.damping))}  # fmt: skip
+    lines = {
+        "travel_force": Curve((-1.0, 0.0, 1.0), (-spring.stiffness, 0.0, spring.stiffness)),
+        "rate_force": Curve((-1.0, 1.0), (-spring.damping, spring.damping)),
+    }
     found = statistically_linear(sprung(vehicle, stiffness=0.0, damping=0.0, **lines), road, SPEED)
     exact = stationary(excited(linearise(vehicle), road, SPEED))
     assert found.covariance.deviation == pytest.approx(exact.deviation, rel=1e-12)
@@ -137,8 +139,10 @@ def test_rear_wheels_meet_the_road_later_and_rates_are_its_slopes():
 def test_damped_tyres_need_a_road_with_rates():
     vehicle, road = ride("quarter_car")
     damped = replace(vehicle, tyres=tuple(replace(tyre, damping=50.0) for tyre in vehicle.tyres))
-    for run in (lambda: copies_in_time(damped, road, SPEED, 1.0),
-                lambda: ridden("mujoco", damped, road_path(road, SPEED, 1e-3), 0.1)):  # fmt: skip
+    for run in (
+        lambda: copies_in_time(damped, road, SPEED, 1.0),
+        lambda: ridden("mujoco", damped, road_path(road, SPEED, 1e-3), 0.1),
+    ):
         with pytest.raises(InputError, match=r"road.cutoff: is missing"):
             run()
 
@@ -207,8 +211,9 @@ def test_standard_errors_of_a_run():
     """
     vehicle, _ = ride("quarter_car")
     linear = linearise(vehicle)
-    height = replace(linear.outputs[0], acceleration=np.zeros(2), rate=np.zeros(2), displacement=np.zeros(2),
-                     road=np.ones(1))  # fmt: skip
+    height = replace(
+        linear.outputs[0], acceleration=np.zeros(2), rate=np.zeros(2), displacement=np.zeros(2), road=np.ones(1)
+    )
     road = excitation(road_of_level(1.0, corners=(0.3, 0.3)), on_track(wheels(vehicle), 1.0))
     P, a, T = stationary(excited(replace(linear, outputs=(height,)), road, 10.0)).variance[0], 3.0, 200.0
     mean, square = standard_errors(replace(linear, outputs=(height,)), road, 10.0, T)

@@ -19,35 +19,74 @@ method = { name = "linear" }
 """
 
 
-@pytest.mark.parametrize(("text", "values"), [
-    ("k=1:3:3", (1, 2, 3)), ("k=1:2:3", (1.0, 1.5, 2.0)), ("k=2e-4:1e-4:2", (2e-4, 1e-4)),
-    ("k=1.0:3:3", (1.0, 2.0, 3.0)),
-    ("k=1,2.5", (1, 2.5)), ("a.b = exact, linear", ("exact", "linear")), ('k="x,y","z"', ("x,y", "z")),
-    ("k=[1,2],[3,4]", ([1, 2], [3, 4])), ("k=true,false", (True, False)),
-    ("k=Straße,\U0001f600", ("Straße", "\U0001f600"))], ids=str)  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("k=1:3:3", (1, 2, 3)),
+        ("k=1:2:3", (1.0, 1.5, 2.0)),
+        ("k=2e-4:1e-4:2", (2e-4, 1e-4)),
+        ("k=1.0:3:3", (1.0, 2.0, 3.0)),
+        ("k=1,2.5", (1, 2.5)),
+        ("a.b = exact, linear", ("exact", "linear")),
+        ('k="x,y","z"', ("x,y", "z")),
+        ("k=[1,2],[3,4]", ([1, 2], [3, 4])),
+        ("k=true,false", (True, False)),
+        ("k=Straße,\U0001f600", ("Straße", "\U0001f600")),
+    ],
+    ids=str,
+)
 def test_values_are_read_as_a_scene_would(text, values):
     key, found = asked(text)
     assert key == text.partition("=")[0].strip() and found == values
     assert [type(one) for one in found] == [type(one) for one in values]
 
 
-@pytest.mark.parametrize("text", ["k", "=1:2:3", "k=", "k=1:2:x", "k=a:2:3", "k=1:2:1", "k=1:inf:3", "k=1:2:99999",
-                                  "k=1", "k=1,1", "k=1:1:3", "k=nan,1", "k=inf,1", "k=2026-01-01,2",
-                                  "k={a=1},{a=2}"])  # fmt: skip
+@pytest.mark.parametrize(
+    "text",
+    [
+        "k",
+        "=1:2:3",
+        "k=",
+        "k=1:2:x",
+        "k=a:2:3",
+        "k=1:2:1",
+        "k=1:inf:3",
+        "k=1:2:99999",
+        "k=1",
+        "k=1,1",
+        "k=1:1:3",
+        "k=nan,1",
+        "k=inf,1",
+        "k=2026-01-01,2",
+        "k={a=1},{a=2}",
+    ],
+)
 def test_what_is_no_sweep_is_refused(text):
     with pytest.raises(InputError, match="--sweep"):
         asked(text)
 
 
 def test_numbers_of_a_summary_have_names_and_units():
-    summary = {"scene": "s", "seconds": 3.0, "answer": {"pitch": {"unit": "rad", "max": 0.5, "rms": float("nan")}},
-               "rows": [{"method": "free", "x": 1, "seconds": 2.0}, {"method": "held", "x": 2, "good": True}],
-               "pair": [3.0, 4.0], "curve": [3.0, -4.0] * 5, "branch": [{"v": float(i)} for i in range(10)],
-               }  # fmt: skip
+    summary = {
+        "scene": "s",
+        "seconds": 3.0,
+        "answer": {"pitch": {"unit": "rad", "max": 0.5, "rms": float("nan")}},
+        "rows": [{"method": "free", "x": 1, "seconds": 2.0}, {"method": "held", "x": 2, "good": True}],
+        "pair": [3.0, 4.0],
+        "curve": [3.0, -4.0] * 5,
+        "branch": [{"v": float(i)} for i in range(10)],
+    }
     assert numbers(summary) == {
-        "pitch, max [rad]": 0.5, "free, x": 1, "held, x": 2, "pair, 1": 3.0, "pair, 2": 4.0, "curve, largest": 4.0,
-        "curve, rms": pytest.approx(12.5**0.5), "branch, v, largest": 9.0, "branch, v, rms": pytest.approx(28.5**0.5),
-    }  # fmt: skip
+        "pitch, max [rad]": 0.5,
+        "free, x": 1,
+        "held, x": 2,
+        "pair, 1": 3.0,
+        "pair, 2": 4.0,
+        "curve, largest": 4.0,
+        "curve, rms": pytest.approx(12.5**0.5),
+        "branch, v, largest": 9.0,
+        "branch, v, rms": pytest.approx(28.5**0.5),
+    }
 
 
 def test_a_key_counts_the_entries_of_lists_from_nought(tmp_path):

@@ -10,18 +10,24 @@ from models.time_series import read_time_series
 COLUMNS = {"time": SECONDS, "left": METRES, "right": METRES}
 TIMES, LEFT, RIGHT = 0.125 * np.arange(12), 1.5 * np.arange(12.0), -0.25 * np.arange(12.0)
 PLAIN = "time [s],left [mm],right [mm]\n" + "".join(
-    f"{t},{a},{b}\n" for t, a, b in zip(TIMES.tolist(), LEFT.tolist(), RIGHT.tolist(), strict=True))  # fmt: skip
+    f"{t},{a},{b}\n" for t, a, b in zip(TIMES.tolist(), LEFT.tolist(), RIGHT.tolist(), strict=True)
+)
 GERMAN = PLAIN.replace(",", ";").replace(".", ",")
 ROWS = PLAIN.split("\n", 1)[1]
 QUOTED = "".join('"' + line.replace(",", '","') + '"\n' for line in PLAIN.splitlines())
 FORMS = {
-    "semicolons": GERMAN, "tabs": PLAIN.replace(",", "\t"), "sep": "sep=;\n" + GERMAN, "quotes": QUOTED,
+    "semicolons": GERMAN,
+    "tabs": PLAIN.replace(",", "\t"),
+    "sep": "sep=;\n" + GERMAN,
+    "quotes": QUOTED,
     "quotes and commas": "".join('"' + line.replace(";", '","') + '"\n' for line in GERMAN.splitlines()),
-    "titles": "Road survey\nOperator; Meier\n\n" + PLAIN, "units beneath": "time,left,right\ns,mm,mm\n" + ROWS,
+    "titles": "Road survey\nOperator; Meier\n\n" + PLAIN,
+    "units beneath": "time,left,right\ns,mm,mm\n" + ROWS,
     "units in brackets beneath": "time;left;right\n[s];[mm];[mm]\n" + GERMAN.split("\n", 1)[1],
-    "ends of Windows": GERMAN.replace("\n", "\r\n"), "separator at the end": PLAIN.replace("\n", ",\n"),
+    "ends of Windows": GERMAN.replace("\n", "\r\n"),
+    "separator at the end": PLAIN.replace("\n", ",\n"),
     "comment within": PLAIN.replace("\n0.25,", "\n# here\n0.25,").replace(",", ";"),
-}  # fmt: skip
+}
 
 
 def table(tmp_path, text, encoding="utf-8", **asked):
@@ -37,13 +43,22 @@ def test_a_form_has_the_bits_of_the_plain_table(tmp_path, text, encoding):
     assert all(np.array_equal(found[name], plain[name]) for name in COLUMNS)
 
 
-@pytest.mark.parametrize(("text", "says"), [
-    (GERMAN.replace("1,5;", "1.001,5;"), "thousands"), (GERMAN.replace("3,0;", "x;"), "line 4, column 'left [mm]'"),
-    (GERMAN.replace("3,0;", ""), "line 4"), (GERMAN.replace("3,0;", "NA;"), "line 4, column 'left [mm]'"),
-    (GERMAN[:-5], "no line end"), ("titles\nno table\n", "wanted"), (GERMAN.replace("[mm]", ""), "unit is missing"),
-    (QUOTED.replace('"1.5"', '"1,500"'), "thousands"), (GERMAN.replace("left", "lft"), "lft"),
-    ("sep=|\n" + PLAIN.replace(",", "|"), "sep=|"), (PLAIN.replace("left", '"left"', 1).replace("1.5", "1 .5"), "1 .5"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (GERMAN.replace("1,5;", "1.001,5;"), "thousands"),
+        (GERMAN.replace("3,0;", "x;"), "line 4, column 'left [mm]'"),
+        (GERMAN.replace("3,0;", ""), "line 4"),
+        (GERMAN.replace("3,0;", "NA;"), "line 4, column 'left [mm]'"),
+        (GERMAN[:-5], "no line end"),
+        ("titles\nno table\n", "wanted"),
+        (GERMAN.replace("[mm]", ""), "unit is missing"),
+        (QUOTED.replace('"1.5"', '"1,500"'), "thousands"),
+        (GERMAN.replace("left", "lft"), "lft"),
+        ("sep=|\n" + PLAIN.replace(",", "|"), "sep=|"),
+        (PLAIN.replace("left", '"left"', 1).replace("1.5", "1 .5"), "1 .5"),
+    ],
+)
 def test_what_has_two_meanings_is_refused_with_its_place(tmp_path, text, says):
     with pytest.raises(InputError) as error:
         table(tmp_path, text)

@@ -75,16 +75,19 @@ def test_a_point_of_the_curve_by_hand(tmp_path):
     assert table(tmp_path).friction([0.0], [0.1], 29912.0)[0][0, 0] == pytest.approx(want, abs=1e-4)
 
 
-@pytest.mark.parametrize(("old", "new", "said"), [
-    ("PKY2 = 2.4559\n", "", "truck.tir: PKY2: is missing"),
-    ("'newton'", "'pound_force'", r"line 6, FORCE = 'pound_force': must be 'newton'"),
-    ("ANGLE  = 'radians'\n", "", r"\[UNITS\] ANGLE: is missing"),
-    ("= 0.84003", "= 0,84003", r"line 17, PDX1 = '0,84003': must be a finite number"),
-    ("FITTYP = 5 ", "FITTYP = 61 ", "FITTYP = '61': is of other equations"),
-    ("FZMAX = 42193", "FZMAX = 42", "FZMAX = '42': must be above FZMIN"),
-    ("PDX1 = 0.84003", "PDX1 = 8.4", "give no friction"),
-    ("PCX1 = 1.4", "PCX1 = 1.4\nPCX1 = 1.5", "line 17, PCX1 = '1.5': stands in line 16 already"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("PKY2 = 2.4559\n", "", "truck.tir: PKY2: is missing"),
+        ("'newton'", "'pound_force'", r"line 6, FORCE = 'pound_force': must be 'newton'"),
+        ("ANGLE  = 'radians'\n", "", r"\[UNITS\] ANGLE: is missing"),
+        ("= 0.84003", "= 0,84003", r"line 17, PDX1 = '0,84003': must be a finite number"),
+        ("FITTYP = 5 ", "FITTYP = 61 ", "FITTYP = '61': is of other equations"),
+        ("FZMAX = 42193", "FZMAX = 42", "FZMAX = '42': must be above FZMIN"),
+        ("PDX1 = 0.84003", "PDX1 = 8.4", "give no friction"),
+        ("PCX1 = 1.4", "PCX1 = 1.4\nPCX1 = 1.5", "line 17, PCX1 = '1.5': stands in line 16 already"),
+    ],
+)
 def test_what_is_wrong_is_told_with_its_line(tmp_path, old, new, said):
     with pytest.raises(InputError, match=said):
         table(tmp_path, TRUCK.replace(old, new))

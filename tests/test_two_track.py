@@ -52,8 +52,13 @@ def test_equal_tracks_are_those_of_the_left():
 @pytest.mark.parametrize("case", list(itertools.product(LEFT_RIGHT, FRONT_REAR)))
 def test_delayed_noise_gives_the_delayed_output(case):
     """Also the pairs that are none of the paper's five."""
-    by_noise, by_output = (f(*x) for f, x in ((heights_covariance, (excitation(ROAD, WHEELS, *case),)),
-                                              (input_covariance, (ROAD, WHEELS, *case))))  # fmt: skip
+    by_noise, by_output = (
+        f(*x)
+        for f, x in (
+            (heights_covariance, (excitation(ROAD, WHEELS, *case),)),
+            (input_covariance, (ROAD, WHEELS, *case)),
+        )
+    )
     assert np.abs(by_noise - by_output).max() < 1e-13 * np.abs(by_output).max()  # rounding
 
 

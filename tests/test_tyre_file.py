@@ -13,8 +13,12 @@ X, SHARE = {0: 0.0, 20: 0.8, 100: 0.6}, {0: 1.0, 4: 0.8, 90: 0.1}
 
 def rows(mu_y=lambda angle, load, slip: {0: 0, 4: 0.35, 90: 0.7}[angle] * (1 - slip / 250) * (1.1 - load / 100)):
     """All combinations; friction of whatever shape."""
-    return [f"{a},{s},{f},{X[s] * SHARE[a] * (1.1 - f / 100):.12g},{mu_y(a, f, s):.12g}"
-            for s in SLIPS for f in LOADS for a in ANGLES]  # fmt: skip
+    return [
+        f"{a},{s},{f},{X[s] * SHARE[a] * (1.1 - f / 100):.12g},{mu_y(a, f, s):.12g}"
+        for s in SLIPS
+        for f in LOADS
+        for a in ANGLES
+    ]
 
 
 def table(tmp_path, lines, header=HEADER):
@@ -43,16 +47,19 @@ def test_a_file_without_loads_holds_for_all(tmp_path):
         assert (x[0, 0], y[0, 0]) == pytest.approx((0.2, 0.15), rel=1e-12)
 
 
-@pytest.mark.parametrize(("change", "said"), [
-    (lambda r: [*r[:4], "4,0,30,abc,0.4", *r[5:]], r"line 7: .*mu_x.* = 'abc'.*finite number"),
-    (lambda r: [*r[:4], "4,0,30,0", *r[5:]], "line 7: .*5 values are needed"),
-    (lambda r: r[:-1], "1 of 18 combinations are missing, the first: slip angle 90 deg, load 30 kN, slip 1"),
-    (lambda r: [*r, r[0]], "line 21: has the slip angle, load and slip of line 3"),
-    (lambda r: ["-1,0,10,0,0", *r[1:]], "line 3, column 'slip angle'"),
-    (lambda r: ["0,0,10,0.1,0", *r[1:]], "line 3, column 'mu_x' = 0.1: must be 0 where slip is 0"),
-    (lambda r: ["0,0,10,0,4", *r[1:]], "line 3, column 'mu_y' = 4.0: must be from 0 to 3"),
-    (lambda r: [line for line in r if ",100," not in line], "slips = 0.2: must begin at 0 and end at 1"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda r: [*r[:4], "4,0,30,abc,0.4", *r[5:]], r"line 7: .*mu_x.* = 'abc'.*finite number"),
+        (lambda r: [*r[:4], "4,0,30,0", *r[5:]], "line 7: .*5 values are needed"),
+        (lambda r: r[:-1], "1 of 18 combinations are missing, the first: slip angle 90 deg, load 30 kN, slip 1"),
+        (lambda r: [*r, r[0]], "line 21: has the slip angle, load and slip of line 3"),
+        (lambda r: ["-1,0,10,0,0", *r[1:]], "line 3, column 'slip angle'"),
+        (lambda r: ["0,0,10,0.1,0", *r[1:]], "line 3, column 'mu_x' = 0.1: must be 0 where slip is 0"),
+        (lambda r: ["0,0,10,0,4", *r[1:]], "line 3, column 'mu_y' = 4.0: must be from 0 to 3"),
+        (lambda r: [line for line in r if ",100," not in line], "slips = 0.2: must begin at 0 and end at 1"),
+    ],
+)
 def test_what_is_wrong_is_told_by_line(tmp_path, change, said):
     with pytest.raises(InputError, match=said):
         table(tmp_path, change(rows()))

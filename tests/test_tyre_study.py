@@ -24,8 +24,15 @@ def test_the_study_draws_a_tyre_and_writes_it_as_a_table_that_a_scene_takes(tmp_
     assert (tmp_path / "tyre.png").stat().st_size > 10_000
     again = tyre_table(tmp_path / "ice.csv").friction([0.0], [0.055], 2e4)[0][0, 0]
     assert again == table_of(scene, "ice").friction([0.0], [0.055], 1e4)[0][0, 0]
-    mine = build({**SCENE, "road": {"stretches": [{"left": "mine"}]},
-                  "tyres": {"files": {"mine": "ice.csv"}, "scale": {"mine": 0.5}}}, "s.toml", tmp_path)  # fmt: skip
+    mine = build(
+        {
+            **SCENE,
+            "road": {"stretches": [{"left": "mine"}]},
+            "tyres": {"files": {"mine": "ice.csv"}, "scale": {"mine": 0.5}},
+        },
+        "s.toml",
+        tmp_path,
+    )
     assert table_of(mine, "mine").mu_x.max() == pytest.approx(0.086, abs=1e-4)
 
 
@@ -36,11 +43,14 @@ def test_rear_wheels_have_tyres_of_their_own_where_asked(tmp_path):
     assert vehicle.tables.mu_x.max(axis=(1, 2, 3)) == pytest.approx([0.172, 0.173], abs=1e-4)
 
 
-@pytest.mark.parametrize(("tyres", "said"), [
-    ({"files": {"ice": "no.csv"}}, r"s.toml: tyres.files.ice = 'no.csv': no such file"),
-    ({"files": {"ice": "a.txt"}}, r"a.txt = '.txt': is no file of a tyre \(allowed: .csv, .tir\)"),
-    ({"scale": {"ice": 3.0}}, r"tyres.scale.ice = 3.0: must be above 0"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("tyres", "said"),
+    [
+        ({"files": {"ice": "no.csv"}}, r"s.toml: tyres.files.ice = 'no.csv': no such file"),
+        ({"files": {"ice": "a.txt"}}, r"a.txt = '.txt': is no file of a tyre \(allowed: .csv, .tir\)"),
+        ({"scale": {"ice": 3.0}}, r"tyres.scale.ice = 3.0: must be above 0"),
+    ],
+)
 def test_tyres_that_cannot_be_are_told(tmp_path, tyres, said):
     (tmp_path / "a.txt").write_text("x\n")
     with pytest.raises(InputError, match=said):

@@ -10,8 +10,17 @@ from models.errors import InputError
 
 def small(peak=0.8):
     """Two loads, three angles, three slips: every figure of its own."""
-    mu_x = np.array([[[0.0, 0.8, 0.6], [0.0, 0.7, 0.5]], [[0.0, 0.5, 0.45], [0.0, 0.4, 0.42]],
-                     [[0.0, 0.1, 0.2], [0.0, 0.12, 0.19]]]) * peak / 0.8  # fmt: skip
+    mu_x = (
+        np.array(
+            [
+                [[0.0, 0.8, 0.6], [0.0, 0.7, 0.5]],
+                [[0.0, 0.5, 0.45], [0.0, 0.4, 0.42]],
+                [[0.0, 0.1, 0.2], [0.0, 0.12, 0.19]],
+            ]
+        )
+        * peak
+        / 0.8
+    )
     g = np.array([[1.0, 0.6, 0.1], [1.0, 0.7, 0.2], [1.0, 0.9, 0.5]])
     h = np.array([[0.0, 0.0], [0.7, 0.6], [0.65, 0.62]]) * peak / 0.8
     return TyreTable(np.array([0.0, 0.1, 0.4]), np.array([0.0, 0.2, 1.0]), np.array([1e4, 3e4]), mu_x, g, h, "small")
@@ -48,8 +57,9 @@ def test_the_union_of_nodes_loses_nothing():
     for angle, load, slip in rng.uniform((0, 5e3, 0), (0.5, 4e4, 1), (60, 3)):
         for number, table in enumerate((one, other)):
             # g and h lie between nodes of the union as between their own: equal to rounding
-            assert at(both, number, angle, load, slip) == pytest.approx(at(stacked([table]), 0, angle, load, slip),
-                                                                        rel=1e-13, abs=1e-15)  # fmt: skip
+            assert at(both, number, angle, load, slip) == pytest.approx(
+                at(stacked([table]), 0, angle, load, slip), rel=1e-13, abs=1e-15
+            )
             x, y = table.friction([angle], [slip], load)
             assert (x[0, 0], y[0, 0]) == pytest.approx(at(both, number, angle, load, slip), rel=1e-13, abs=1e-15)
 
@@ -105,13 +115,19 @@ def test_front_and_rear_differ():
     assert surface("dry/rear").h.max() == pytest.approx(0.961, abs=1e-4)
 
 
-@pytest.mark.parametrize(("change", "said"), [
-    ({"slips": np.array([0.0, 0.2, 0.9])}, "slips = 0.9"), ({"angles": np.array([0.0, 0.4, 0.1])}, "rise strictly"),
-    ({"loads": np.array([0.0, 1.0])}, "loads"), ({"g": np.full((3, 3), np.nan)}, "g = nan"),
-    ({"mu_x": np.full((3, 2, 3), 0.1)}, "at slip 0"), ({"h": np.full((3, 2), 0.1)}, "at slip angle 0"),
-    ({"h": np.array([[0.0, 0.0], [0.7, 0.6], [0.65, 0.62]]) * 5}, "0 to 3"),
-    ({"g": np.array([[1.0, 1.0, 1.0]] * 3)}, "slip angle 5.73 deg, load 10000 N, slip 0.2 = 0.86"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"slips": np.array([0.0, 0.2, 0.9])}, "slips = 0.9"),
+        ({"angles": np.array([0.0, 0.4, 0.1])}, "rise strictly"),
+        ({"loads": np.array([0.0, 1.0])}, "loads"),
+        ({"g": np.full((3, 3), np.nan)}, "g = nan"),
+        ({"mu_x": np.full((3, 2, 3), 0.1)}, "at slip 0"),
+        ({"h": np.full((3, 2), 0.1)}, "at slip angle 0"),
+        ({"h": np.array([[0.0, 0.0], [0.7, 0.6], [0.65, 0.62]]) * 5}, "0 to 3"),
+        ({"g": np.array([[1.0, 1.0, 1.0]] * 3)}, "slip angle 5.73 deg, load 10000 N, slip 0.2 = 0.86"),
+    ],
+)
 def test_what_no_tyre_can_have_is_told(change, said):
     from dataclasses import replace
 

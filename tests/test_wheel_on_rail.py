@@ -220,9 +220,11 @@ BAD_PLACES = {
     "yaw": (lambda: wheel_on_rail(s1002(), uic60(), yaw=math.nan), "a yaw angle in rad"),
     "gauge": (lambda: wheel_on_rail(s1002(), uic60(), track=Track(gauge=1.0)), "lateral_shift"),
     "wheelset": (lambda: wheel_on_rail(s1002(), uic60(), wheelset=Wheelset(back_to_back=1.0)), "lateral_shift"),
-    "shallow rail": (lambda: laid(Profile(np.linspace(-0.02, 0.02, 50), np.linspace(-0.02, 0.02, 50) ** 2), Track()),
-                     "the gauge is measured at 0.014 m"),
-}  # fmt: skip
+    "shallow rail": (
+        lambda: laid(Profile(np.linspace(-0.02, 0.02, 50), np.linspace(-0.02, 0.02, 50) ** 2), Track()),
+        "the gauge is measured at 0.014 m",
+    ),
+}
 
 
 @pytest.mark.parametrize("case", BAD_PLACES)

@@ -51,8 +51,12 @@ def test_cone_touches_where_its_surface_is_nearest_to_the_axis_of_the_head(side)
         own = np.array([rolling * math.sin(round_about), side * along, rolling * math.cos(round_about)])
         return np.array([0.0, y, z]) + turn(roll, yaw) @ own
 
-    found = minimize(lambda u: np.hypot(*(surface(u)[1:] - axis)), [half_gauge, 0.0], method="Nelder-Mead",
-                     options={"xatol": 1e-12, "fatol": 1e-16, "maxiter": 2000})  # fmt: skip
+    found = minimize(
+        lambda u: np.hypot(*(surface(u)[1:] - axis)),
+        [half_gauge, 0.0],
+        method="Nelder-Mead",
+        options={"xatol": 1e-12, "fatol": 1e-16, "maxiter": 2000},
+    )
     depth, rolling, n_y, n_z, *place = cone_on_rail(side, y, z, roll, yaw, *CONE)
     assert depth == pytest.approx(head - found.fun, abs=1e-14)
     # The place is found to the root of the distance's rounding, 1e-8 and more along the axle.

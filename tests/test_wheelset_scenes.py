@@ -25,8 +25,13 @@ from models.scene_effects import named, without
 from studies import limit_cycle, wheelset
 from validation.absence import wheelset as absence
 
-SCENE = {"title": "t", "system": "wheelset", "contact": {"cells": 11},
-         "speeds": {"start": 50.0, "stop": 80.0, "count": 4}, "run": {"duration": 0.2, "speeds": [60.0]}}  # fmt: skip
+SCENE = {
+    "title": "t",
+    "system": "wheelset",
+    "contact": {"cells": 11},
+    "speeds": {"start": 50.0, "stop": 80.0, "count": 4},
+    "run": {"duration": 0.2, "speeds": [60.0]},
+}
 OWN = "".join(f"{key} = {value}\n" for key, value in CHOSEN.model_dump(exclude={"material", "profiles"}).items())
 
 
@@ -34,31 +39,37 @@ def scene(**tables):
     return build(SCENE | tables, "s.toml")
 
 
-@pytest.mark.parametrize(("tables", "place", "words"), [
-    ({"speeds": {"values": [0.0]}}, "speeds.values.0", "above 0"),
-    ({"speeds": {"start": 0.0, "stop": 9.0}}, "speeds.start", "above 0"),
-    ({"speeds": {"start": 60.0, "stop": 60.0}}, "speeds.stop", "for one speed write speeds.values = [60]"),
-    ({"speeds": {"start": 60.0, "stop": 300.0}}, "speeds.stop", "at most 200"),
-    ({"run": {"speeds": [-1.0]}}, "run.speeds.0", "above 0"),
-    ({"run": {"duration": 1.0, "step": 3e-4}}, "run.step", "divide"),
-    ({"run": {"displacement": 0.5}}, "run.displacement", "at most 0.02 m"),
-    ({"contact": {"law": "lineer"}}, "contact.law", "did you mean 'linear'"),
-    ({"contact": {"law": "linear", "cells": 9}}, "contact.cells", "no meaning"),
-    ({"wheelset": {"overide": {}}}, "wheelset.overide", "did you mean 'override'"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("tables", "place", "words"),
+    [
+        ({"speeds": {"values": [0.0]}}, "speeds.values.0", "above 0"),
+        ({"speeds": {"start": 0.0, "stop": 9.0}}, "speeds.start", "above 0"),
+        ({"speeds": {"start": 60.0, "stop": 60.0}}, "speeds.stop", "for one speed write speeds.values = [60]"),
+        ({"speeds": {"start": 60.0, "stop": 300.0}}, "speeds.stop", "at most 200"),
+        ({"run": {"speeds": [-1.0]}}, "run.speeds.0", "above 0"),
+        ({"run": {"duration": 1.0, "step": 3e-4}}, "run.step", "divide"),
+        ({"run": {"displacement": 0.5}}, "run.displacement", "at most 0.02 m"),
+        ({"contact": {"law": "lineer"}}, "contact.law", "did you mean 'linear'"),
+        ({"contact": {"law": "linear", "cells": 9}}, "contact.cells", "no meaning"),
+        ({"wheelset": {"overide": {}}}, "wheelset.overide", "did you mean 'override'"),
+    ],
+)
 def test_scenes_that_cannot_be(tables, place, words):
     with pytest.raises(InputError, match=r"s\.toml") as told:
         scene(**tables)
     assert told.value.place == place and words in str(told.value)
 
 
-@pytest.mark.parametrize(("table", "place", "words"), [
-    ({"override": {"mass": -1.0}}, "wheelset.override.mass", "above 0"),
-    ({"override": {"stifness_x": 1e5}}, "wheelset.override.stifness_x", "did you mean 'stiffness_x'"),
-    ({"override": {"load": 100.0}}, "wheelset.override", "own weight"),
-    ({"parameters": "chosn"}, "wheelset.parameters", "did you mean 'chosen'"),
-    ({"parameters": "mine.toml"}, "wheelset.parameters", "no such file"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("table", "place", "words"),
+    [
+        ({"override": {"mass": -1.0}}, "wheelset.override.mass", "above 0"),
+        ({"override": {"stifness_x": 1e5}}, "wheelset.override.stifness_x", "did you mean 'stiffness_x'"),
+        ({"override": {"load": 100.0}}, "wheelset.override", "own weight"),
+        ({"parameters": "chosn"}, "wheelset.parameters", "did you mean 'chosen'"),
+        ({"parameters": "mine.toml"}, "wheelset.parameters", "no such file"),
+    ],
+)
 def test_wheelsets_that_cannot_be(table, place, words):
     with pytest.raises(InputError, match=r"s\.toml") as told:
         wheelset_of(scene(wheelset=table))
@@ -155,8 +166,9 @@ def test_the_scene_of_the_readme_is_a_valid_scene():
     from pathlib import Path
 
     text = (Path(__file__).parents[1] / "README.md").read_text()
-    (block,) = (found for found in re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
-                if 'system = "wheelset"' in found)  # fmt: skip
+    (block,) = (
+        found for found in re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL) if 'system = "wheelset"' in found
+    )
     plan.check(build(tomllib.loads(block), "README.md"), ("reference",))
 
 
@@ -187,8 +199,9 @@ def test_profiles_of_a_parameter_file_are_an_effect_that_its_file_has_to_drop(tm
         without(own, "profiles")
 
 
-@pytest.mark.parametrize(("law", "friction", "doubt"), [("linear", 0.0, True), ("linear", 0.3, False),
-                                                        ("fastsim", 0.0, False)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("law", "friction", "doubt"), [("linear", 0.0, True), ("linear", 0.3, False), ("fastsim", 0.0, False)]
+)
 def test_creep_forces_beyond_friction_are_told(law, friction, doubt) -> None:
     short = {"duration": 0.02, "displacement": 1e-3}
     own = scene(contact={"law": law}, wheelset={"override": {"friction": friction}}, run=short)

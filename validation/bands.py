@@ -8,8 +8,9 @@ LEVEL = 0.999
 """Chance that a true law passes; the seeds are fixed, so a row either always passes or never does."""
 
 
-def mean_square(id: str, system: System, quantity: str, value: float, expected: float, freedom: int, unit: str,
-                why: str) -> Row:  # fmt: skip
+def mean_square(
+    id: str, system: System, quantity: str, value: float, expected: float, freedom: int, unit: str, why: str
+) -> Row:
     """Row for a mean square of ``freedom`` independent normal numbers whose variance should be ``expected``.
 
     freedom times value by expected is chi-square with that many degrees of freedom; the row passes inside the

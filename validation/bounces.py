@@ -29,8 +29,10 @@ class Bounces:
         bare = replace(vehicle, struts=tuple(strut for strut in vehicle.struts if strut.lower.body is not None))
         mass, damping, stiffness = matrices(bare)
         weight = np.array([*(body.mass * vehicle.gravity for body in vehicle.bodies), 0.0])
-        self.rates = {(i, j): _rates(mass, damping, stiffness, weight, _laws(self.p, (i, j)))
-                      for i, j in product(range(3), range(3))}  # fmt: skip
+        self.rates = {
+            (i, j): _rates(mass, damping, stiffness, weight, _laws(self.p, (i, j)))
+            for i, j in product(range(3), range(3))
+        }
         self.moves = {states: expm(rate * step) for states, rate in self.rates.items()}
 
     def path(self, start: np.ndarray, count: int) -> np.ndarray:
@@ -79,8 +81,9 @@ def _laws(p: Parameters, states: Pair) -> list[tuple[float, float]]:
     return [law[state] for law, state in zip(laws, states, strict=True)]
 
 
-def _rates(mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray, weight: np.ndarray,
-           laws: list[tuple[float, float]]) -> np.ndarray:  # fmt: skip
+def _rates(
+    mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray, weight: np.ndarray, laws: list[tuple[float, float]]
+) -> np.ndarray:
     """A (9, 9) of x' = A x, x the state with a last entry of 1."""
     a, inverse = np.zeros((9, 9)), 1.0 / mass.diagonal()
     extra_k, extra_d = (np.diag([*(law[i] for law in laws), 0.0, 0.0]) for i in range(2))

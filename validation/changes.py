@@ -56,24 +56,37 @@ def against(earlier: dict[str, Any], rows: list[dict[str, Any]], source: dict[st
     old, new = (("quick" if one.get("quick") else "full") for one in (was, source))
     notes = [] if old == new else [f"the earlier report is the {old} one and this the {new} one"]
     notes += [f"{name} {before} -> {now}" for name, before, now in _other(was, source)]
-    return {"file": earlier["file"], "commit": str(was.get("commit", "unknown")), "note": "; ".join(notes),
-            "changes": changes(earlier["rows"], {row["id"]: row for row in rows})}  # fmt: skip
+    return {
+        "file": earlier["file"],
+        "commit": str(was.get("commit", "unknown")),
+        "note": "; ".join(notes),
+        "changes": changes(earlier["rows"], {row["id"]: row for row in rows}),
+    }
 
 
 def _other(was: dict[str, Any], source: dict[str, Any]) -> Iterator[tuple[str, Any, Any]]:
     """Versions, seeds, Python, machine and system that are not the same, in the order of the earlier report."""
     for name in ("versions", "seeds"):
         old, new = was.get(name) or {}, source.get(name) or {}
-        yield from ((f"{name[:-1]} of {key}", old.get(key), new.get(key)) for key in {**old, **new}
-                    if old.get(key) != new.get(key))  # fmt: skip
-    yield from ((name, was.get(name), source.get(name)) for name in ("python", "machine", "system")
-                if was.get(name) != source.get(name))  # fmt: skip
+        yield from (
+            (f"{name[:-1]} of {key}", old.get(key), new.get(key))
+            for key in {**old, **new}
+            if old.get(key) != new.get(key)
+        )
+    yield from (
+        (name, was.get(name), source.get(name))
+        for name in ("python", "machine", "system")
+        if was.get(name) != source.get(name)
+    )
 
 
 def changes(before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any]]) -> list[Change]:
     """Changed rows by id, in the order of KINDS and, within values, the largest share of a tolerance first."""
-    found = [change for id in (*before, *(id for id in after if id not in before))
-             for change in _of(id, before.get(id), after.get(id))]  # fmt: skip
+    found = [
+        change
+        for id in (*before, *(id for id in after if id not in before))
+        for change in _of(id, before.get(id), after.get(id))
+    ]
     return sorted(found, key=lambda one: (KINDS.index(one["kind"]), _rank(one["after"]), -one["size"]))
 
 
@@ -86,8 +99,16 @@ def _of(id: str, old: dict[str, Any] | None, new: dict[str, Any] | None) -> Iter
     row = new or old or {}
 
     def change(kind: str, before: Any, after: Any, size: float = 0.0) -> Change:
-        return {"id": id, "kind": kind, "quantity": row["quantity"], "unit": row["unit"], "before": before,
-                "after": after, "size": size, "reason": row["reason"] if kind in ("status", "new") else ""}  # fmt: skip
+        return {
+            "id": id,
+            "kind": kind,
+            "quantity": row["quantity"],
+            "unit": row["unit"],
+            "before": before,
+            "after": after,
+            "size": size,
+            "reason": row["reason"] if kind in ("status", "new") else "",
+        }
 
     if old is None or new is None:
         yield change("new" if old is None else "gone", old and old["status"], new and new["status"])
@@ -132,9 +153,12 @@ def lines(found: dict[str, Any]) -> list[str]:
     names = zip(KINDS, ("of status", "gone", "new", "judged otherwise", "of value"), strict=True)
     counts = ", ".join(f"{sum(one['kind'] == kind for one in own)} {text}" for kind, text in names)
     head = f"against {found['file']} (commit {found['commit']}): {len(own)} changes: {counts}"
-    told = [f"  {one['kind']}: {one['id']}: {one['quantity']}: {_shown(one['before'])} -> {_shown(one['after'])}"
-            f"{' ' + one['unit'] if one['kind'] == 'value' and one['unit'] else ''}"
-            f"{': ' + one['reason'] if one['reason'] else ''}" for one in own]  # fmt: skip
+    told = [
+        f"  {one['kind']}: {one['id']}: {one['quantity']}: {_shown(one['before'])} -> {_shown(one['after'])}"
+        f"{' ' + one['unit'] if one['kind'] == 'value' and one['unit'] else ''}"
+        f"{': ' + one['reason'] if one['reason'] else ''}"
+        for one in own
+    ]
     return [head, *([f"  note: {found['note']}"] if found["note"] else []), *told]
 
 

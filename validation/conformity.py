@@ -58,8 +58,18 @@ def conformity(name: str, folder: Path, command: str) -> int:
     with TemporaryDirectory() as own:
         rows = list(_told(_rows(name, Path(own))))
     (folder / "data").mkdir(exist_ok=True)
-    save(folder, rows, {**provenance(command), "engine": name, "seeds": {"random states": checks.SEED}, "quick": False,
-                        "seconds": {}, "wall": None})  # fmt: skip
+    save(
+        folder,
+        rows,
+        {
+            **provenance(command),
+            "engine": name,
+            "seeds": {"random states": checks.SEED},
+            "quick": False,
+            "seconds": {},
+            "wall": None,
+        },
+    )
     from validation.report.page import write
 
     return say(rows, None, write(folder))
@@ -86,8 +96,9 @@ def _rows(name: str, folder: Path) -> Iterator[Row]:
     yield not_run("conformity.others", SYSTEM, "wheelset, contact, ride, handling, hub forces, braking", OTHERS)
 
 
-def _judged(id: str, quantity: str, unit: str, bound: float, why: str, error: Callable[[], float],
-            second: Independence) -> Row:  # fmt: skip
+def _judged(
+    id: str, quantity: str, unit: str, bound: float, why: str, error: Callable[[], float], second: Independence
+) -> Row:
     """Row of an error; a check that cannot be carried out is failed, with what was raised."""
     try:
         return at_most(id, SYSTEM, quantity, error(), unit, bound, why, second)
@@ -107,8 +118,9 @@ def _run(name: str, assembly: Assembly, settings: Settings) -> Any:
     found = checks.engine(name)(assembly, settings).run()
     if not np.array_equal(np.rint(found.times / settings.step), np.arange(settings.steps + 1)):
         allowed = f"instead of {settings.steps + 1} from 0 to {settings.duration:g} s, the ends of the steps"
-        raise RunFailed(name, f"gave {len(found.times)} times from {found.times[0]:.6g} to {found.times[-1]:.6g} s "
-                              f"{allowed}")
+        raise RunFailed(
+            name, f"gave {len(found.times)} times from {found.times[0]:.6g} to {found.times[-1]:.6g} s {allowed}"
+        )
     return found
 
 
@@ -116,20 +128,39 @@ def _checks(name: str, folder: Path) -> Iterator[Check]:
     make, settings = checks.engine(name), _settings(name)
     for vehicle in VEHICLES:
         for geometry in ("exact", "linear"):
-            yield (f"audit.{vehicle}.{geometry}",
-                   f"acceleration at 100 random states against the equations of the paper, {vehicle}, {geometry}",
-                   "of the largest", 1e-12, "both sides are a dozen products of doubles",
-                   partial(checks.acceleration_gap, make, _road(vehicle, geometry), settings))  # fmt: skip
-    yield ("equilibrium", "distance from the static equilibrium on a flat road", "m, rad, m/s, rad/s",
-           KEPT if _adaptive(name) else 1e-9, "nothing moves what is at rest, beyond a kept tolerance",
-           partial(_at_rest, name, settings))  # fmt: skip
+            yield (
+                f"audit.{vehicle}.{geometry}",
+                f"acceleration at 100 random states against the equations of the paper, {vehicle}, {geometry}",
+                "of the largest",
+                1e-12,
+                "both sides are a dozen products of doubles",
+                partial(checks.acceleration_gap, make, _road(vehicle, geometry), settings),
+            )
+    yield (
+        "equilibrium",
+        "distance from the static equilibrium on a flat road",
+        "m, rad, m/s, rad/s",
+        KEPT if _adaptive(name) else 1e-9,
+        "nothing moves what is at rest, beyond a kept tolerance",
+        partial(_at_rest, name, settings),
+    )
     for kind, scene in _paths(folder).items():
-        yield (f"path.{kind}", f"largest state error, {kind}, against the reference by DOP853 at 1e-13",
-               "m, rad, m/s, rad/s", _bound(name), f"{DURATION:g} s at {STEP:g} s, RK4 has 1e-6 at most",
-               partial(_off, name, assemble(scene), settings))  # fmt: skip
-    yield ("momentum", "vertical momentum against weight less wheel forces over time", "of weight times time",
-           _momentum_bound(name), "an invariant of any vehicle, exact from order 2 on for forces linear over each step",
-           partial(_momentum, name, assemble(_paths(folder)["wheel forces, linear"]), settings))  # fmt: skip
+        yield (
+            f"path.{kind}",
+            f"largest state error, {kind}, against the reference by DOP853 at 1e-13",
+            "m, rad, m/s, rad/s",
+            _bound(name),
+            f"{DURATION:g} s at {STEP:g} s, RK4 has 1e-6 at most",
+            partial(_off, name, assemble(scene), settings),
+        )
+    yield (
+        "momentum",
+        "vertical momentum against weight less wheel forces over time",
+        "of weight times time",
+        _momentum_bound(name),
+        "an invariant of any vehicle, exact from order 2 on for forces linear over each step",
+        partial(_momentum, name, assemble(_paths(folder)["wheel forces, linear"]), settings),
+    )
 
 
 def _road(vehicle: str, geometry: str) -> Assembly:
@@ -155,9 +186,11 @@ def _paths(folder: Path) -> dict[str, Any]:
     """Scenes whose paths are compared: a road, and wheel forces read in two ways."""
     if not (folder / "wheel_forces.csv").exists():
         write_forces(simulate(road_scene(duration=DURATION), "reference"), folder, STEP)
-    return {"study road": road_scene(duration=DURATION),
-            "wheel forces, linear": force_scene(folder, duration=DURATION),
-            "wheel forces, held": force_scene(folder, duration=DURATION, interpolation="held")}  # fmt: skip
+    return {
+        "study road": road_scene(duration=DURATION),
+        "wheel forces, linear": force_scene(folder, duration=DURATION),
+        "wheel forces, held": force_scene(folder, duration=DURATION, interpolation="held"),
+    }
 
 
 def _truth(assembly: Assembly, step: float = STEP) -> Any:
@@ -185,9 +218,15 @@ def _order(name: str, second: Independence) -> Row:
     """Observed order of a method of fixed steps, or that a tighter tolerance gives a smaller error."""
     road = assemble(road_scene(duration=DURATION))
     if _adaptive(name):
-        return _judged("conformity.tolerance", "error at a tolerance of 1e-9 by that at 1e-5", "ratio", 0.1,
-                       "a method that keeps a tolerance is the more exact the tighter it is",
-                       partial(_tightened, name, road), second)  # fmt: skip
+        return _judged(
+            "conformity.tolerance",
+            "error at a tolerance of 1e-9 by that at 1e-5",
+            "ratio",
+            0.1,
+            "a method that keeps a tolerance is the more exact the tighter it is",
+            partial(_tightened, name, road),
+            second,
+        )
     declared, why = CATALOGUE[name][name].order, "one halving; the band leaves room for the next term of the error"
 
     def gap() -> float:
@@ -221,8 +260,14 @@ def _guards(name: str, folder: Path) -> Row:
         found = "raised"
     except InputError:
         found = "refused"
-    return behaves("conformity.guard", SYSTEM, "a run that leaves all bounds", found, "raised",
-                   "what is no vehicle any more is no answer")  # fmt: skip
+    return behaves(
+        "conformity.guard",
+        SYSTEM,
+        "a run that leaves all bounds",
+        found,
+        "raised",
+        "what is no vehicle any more is no answer",
+    )
 
 
 def _hard_cases(name: str, folder: Path) -> Iterator[Row]:
@@ -245,6 +290,11 @@ def _hard_cases(name: str, folder: Path) -> Iterator[Row]:
                     continue
                 outcome = Outcome("SILENT", float("inf"), f"{type(error).__name__}: {error}")
             good = outcome.word != "SILENT"
-            yield behaves(id, SYSTEM, quantity, outcome.word if good else f"SILENT, off by {outcome.error:.3g}",
-                          outcome.word if good else "right, refused or raised",
-                          f"{case.hard}{f': {outcome.message}' if outcome.message else ''}")  # fmt: skip
+            yield behaves(
+                id,
+                SYSTEM,
+                quantity,
+                outcome.word if good else f"SILENT, off by {outcome.error:.3g}",
+                outcome.word if good else "right, refused or raised",
+                f"{case.hard}{f': {outcome.message}' if outcome.message else ''}",
+            )

@@ -53,10 +53,18 @@ class Cases:
     def facts(self) -> dict[str, Any]:
         """The share, the code, and which measured files there are, without which rows are not run."""
         root, own = data_folder(), Path(__file__).parent
-        sizes = {str(path.relative_to(root)): path.stat().st_size for path in sorted(root.rglob("*")) if path.is_file()
-                 } if root else {}  # fmt: skip
-        return {"cases": list(self.names), "quick": self.quick, "measured files": sizes,
-                "code of validation": code(own), "code of studies": code(own.parent / "studies")}  # fmt: skip
+        sizes = (
+            {str(path.relative_to(root)): path.stat().st_size for path in sorted(root.rglob("*")) if path.is_file()}
+            if root
+            else {}
+        )
+        return {
+            "cases": list(self.names),
+            "quick": self.quick,
+            "measured files": sizes,
+            "code of validation": code(own),
+            "code of studies": code(own.parent / "studies"),
+        }
 
 
 def _array(records: list[dict[str, Any]]) -> Arrays:
@@ -77,8 +85,10 @@ def measured(job: Cases, pool: Executor, progress: Callable[[int], None], alone:
     store, ahead = job.folder / KEPT / ("alone" if alone else "together"), 1 if alone else AHEAD
     found = run_paths(job, len(job.names), store, pool, 1, lambda done: progress(done.done), lost, ahead)["record"]
     records = (json.loads(str(one)) for one in found)
-    return {name: ([Row(**row) for row in record["rows"]], record["seconds"])
-            for name, record in zip(job.names, records, strict=True)}  # fmt: skip
+    return {
+        name: ([Row(**row) for row in record["rows"]], record["seconds"])
+        for name, record in zip(job.names, records, strict=True)
+    }
 
 
 def _broken(name: str, reason: str) -> Row:

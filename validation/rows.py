@@ -4,7 +4,15 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
 System = Literal[
-    "pitch-plane", "drift", "contact", "ride", "rolling-vehicle", "anti-lock", "measured", "hard-cases", "cost",
+    "pitch-plane",
+    "drift",
+    "contact",
+    "ride",
+    "rolling-vehicle",
+    "anti-lock",
+    "measured",
+    "hard-cases",
+    "cost",
     "effects",
 ]
 Independence = Literal["native", "handed over", "shared kernel", "closed form", "published", "none"]
@@ -49,8 +57,17 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
-def within(id: str, system: System, quantity: str, value: float, unit: str, expected: float, tolerance: float,
-           why: str, independence: Independence) -> Row:  # fmt: skip
+def within(
+    id: str,
+    system: System,
+    quantity: str,
+    value: float,
+    unit: str,
+    expected: float,
+    tolerance: float,
+    why: str,
+    independence: Independence,
+) -> Row:
     """Row that passes if |value - expected| <= tolerance; a value that is not a number fails."""
     passed = abs(value - expected) <= tolerance
     status: Status = "passed" if passed else "failed"
@@ -58,14 +75,16 @@ def within(id: str, system: System, quantity: str, value: float, unit: str, expe
     return Row(id, system, quantity, value, unit, expected, tolerance, why, independence, status, reason)
 
 
-def at_most(id: str, system: System, quantity: str, value: float, unit: str, bound: float, why: str,
-            independence: Independence) -> Row:  # fmt: skip
+def at_most(
+    id: str, system: System, quantity: str, value: float, unit: str, bound: float, why: str, independence: Independence
+) -> Row:
     """Row for an error or a ratio that must not exceed a bound: expected 0, tolerance the bound."""
     return within(id, system, quantity, value, unit, 0.0, bound, why, independence)
 
 
-def behaves(id: str, system: System, quantity: str, found: str, expected: str, why: str,
-            independence: Independence = "none") -> Row:  # fmt: skip
+def behaves(
+    id: str, system: System, quantity: str, found: str, expected: str, why: str, independence: Independence = "none"
+) -> Row:
     """Row for a behaviour, such as "refused": passes if found and expected are the same word."""
     passed = found == expected
     reason = "" if passed else f"found {found!r}"
@@ -74,14 +93,23 @@ def behaves(id: str, system: System, quantity: str, found: str, expected: str, w
     )
 
 
-def finding(id: str, system: System, quantity: str, value: float, unit: str, expected: float | str, why: str,
-            independence: Independence = "published") -> Row:  # fmt: skip
+def finding(
+    id: str,
+    system: System,
+    quantity: str,
+    value: float,
+    unit: str,
+    expected: float | str,
+    why: str,
+    independence: Independence = "published",
+) -> Row:
     """Row that reports a figure beside a published one without judging it."""
     return Row(id, system, quantity, value, unit, expected, None, why, independence, "reported")
 
 
-def aim(id: str, system: System, quantity: str, value: float, unit: str, bound: float, why: str,
-        side: Side = "at most") -> Row:  # fmt: skip
+def aim(
+    id: str, system: System, quantity: str, value: float, unit: str, bound: float, why: str, side: Side = "at most"
+) -> Row:
     """Row of a stated aim that decides no verdict: reported where it is reached, missed otherwise or for no number.
 
     So are figures that the machine decides, as seconds, their ratios and memory, and aims that the method is known not

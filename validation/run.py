@@ -22,16 +22,65 @@ from validation.report.shares import full
 from validation.rows import STATUSES, Row
 from validation.scenes import data_folder
 
-CASES = ("audit", "twin", "order", "tight", "enforced_moment", "guards", "roads", "drift_paper", "growth",
-         "drift_off", "drift_solvers", "holding_spring", "point_mass", "lift_off",
-         "inertial_unit", "motion", "stabilisers", "index_reduction", "kalman", "score", "hard_cases",
-         "planted_faults", "absent", "effect_prices", "price", "instruction_counts", "recommendation",
-         "ensemble", "contact_hertz", "contact_coefficients", "contact_exact",
-         "contact_simplified", "contact_profiles", "manchester", "ride_road", "ride_covariance", "ride_engines",
-         "ride_varying_speed", "ride_nonlinear", "choice_linear", "choice_nonlinear", "hub_forces",
-         "contact_price", "fastsim", "wheelset", "contact_bridges", "handling", "braking_stop", "braking_limits",
-         "braking_port", "braking_controllers", "braking_engines", "braking_suspension", "measured_formats",
-         "measured_virtual", "measured_long", "measured_checks")  # fmt: skip
+CASES = (
+    "audit",
+    "twin",
+    "order",
+    "tight",
+    "enforced_moment",
+    "guards",
+    "roads",
+    "drift_paper",
+    "growth",
+    "drift_off",
+    "drift_solvers",
+    "holding_spring",
+    "point_mass",
+    "lift_off",
+    "inertial_unit",
+    "motion",
+    "stabilisers",
+    "index_reduction",
+    "kalman",
+    "score",
+    "hard_cases",
+    "planted_faults",
+    "absent",
+    "effect_prices",
+    "price",
+    "instruction_counts",
+    "recommendation",
+    "ensemble",
+    "contact_hertz",
+    "contact_coefficients",
+    "contact_exact",
+    "contact_simplified",
+    "contact_profiles",
+    "manchester",
+    "ride_road",
+    "ride_covariance",
+    "ride_engines",
+    "ride_varying_speed",
+    "ride_nonlinear",
+    "choice_linear",
+    "choice_nonlinear",
+    "hub_forces",
+    "contact_price",
+    "fastsim",
+    "wheelset",
+    "contact_bridges",
+    "handling",
+    "braking_stop",
+    "braking_limits",
+    "braking_port",
+    "braking_controllers",
+    "braking_engines",
+    "braking_suspension",
+    "measured_formats",
+    "measured_virtual",
+    "measured_long",
+    "measured_checks",
+)
 """Case modules in the order of the report."""
 
 
@@ -43,8 +92,9 @@ WORKERS = 2
 """Processes that measure the other cases."""
 
 
-def validate(folder: Path, quick: bool, command: str, earlier: dict[str, Any] | None = None,
-             resumed: bool = False) -> int:  # fmt: skip
+def validate(
+    folder: Path, quick: bool, command: str, earlier: dict[str, Any] | None = None, resumed: bool = False
+) -> int:
     """Measure all cases into ``folder``; returns the number of failed rows. earlier : ``changes.read`` of a report.
 
     resumed : the folder may hold cases that have ended; the time of them all together is then not known.
@@ -57,8 +107,12 @@ def validate(folder: Path, quick: bool, command: str, earlier: dict[str, Any] | 
         seconds = {name: found[name][1] for name in CASES}
         wall = None if resumed else time.perf_counter() - start
         source = {**provenance(command), "date": f"{begun:%Y-%m-%d %H:%M} UTC", "data": _data()}
-        save(folder, rows, {**source, "seeds": _in(pool, seeds), "quick": quick, "seconds": seconds, "wall": wall},
-             earlier)  # fmt: skip
+        save(
+            folder,
+            rows,
+            {**source, "seeds": _in(pool, seeds), "quick": quick, "seconds": seconds, "wall": wall},
+            earlier,
+        )
         path = _written(pool, folder)
     return say(rows, time.perf_counter() - start, path)
 
@@ -82,8 +136,9 @@ def _outcomes(pool: Executor, quick: bool, folder: Path) -> Outcomes:
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("validate", total=len(CASES))
         first = measured(Cases(together, quick, folder), pool, lambda done: bar.update(task, completed=done))
-        return first | measured(Cases(alone, quick, folder), pool,
-                                lambda done: bar.update(task, completed=len(together) + done), alone=True)  # fmt: skip
+        return first | measured(
+            Cases(alone, quick, folder), pool, lambda done: bar.update(task, completed=len(together) + done), alone=True
+        )
 
 
 def _lasting(name: str) -> float:
@@ -147,22 +202,43 @@ def seeds() -> dict[str, int]:
     from validation.price.own_scene import unseen, unseen_systems
     from validation.ride import fitted_roads
 
-    return {"random states": checks.SEED, "class C road": roads.SEED, "six runs": Options.model_fields["seed"].default,
-            "order of timing": timing.SEED, "point mass": point_mass.SEED,
-            "inertial unit": inertial_unit.SEED, "noise paths": ensemble.SEED,
-            "accelerometers": motion.SEED, "Kalman filter": kalman.SEED,
-            "loads of the score": score.SEED, "stabilisers": stabilisers.SEED, "index reduction": index_reduction.SEED,
-            "growth of noise": growth.SEED, "drift-off": drift_off.SEED, "drift by solver": drift_solvers.SEED,
-            "holding spring": holding_spring.SEED, "hub forces": hub_forces.SEED,
-            "random contacts": fastsim.SEED, "drawn contacts": contact_set.SEED,
-            "table of contacts": contact_price.SEED, "made road": fitted_roads.SEED,
-            "states of ride": ride_engines.SEED, "twins of ride": ride_covariance.SEED,
-            "copies of ride": ride_varying_speed.SEED, "nonlinear ride": ride_nonlinear.SEED,
-            "drawn wheelsets": wheelset.SEED, "rough road of handling": handling.SEED,
-            "speeds on ice": braking_controllers.SEED, "measurement files": measured_formats.SEED,
-            "virtual measurements": measured_virtual.SEED, "checks of recordings": measured_checks.SEED,
-            "long recordings": long_recording.SEED, "scenes never seen": unseen.SEED,
-            "scenes of other systems": unseen_systems.SEED, "drawn questions": drawn_scenes.SEED}  # fmt: skip
+    return {
+        "random states": checks.SEED,
+        "class C road": roads.SEED,
+        "six runs": Options.model_fields["seed"].default,
+        "order of timing": timing.SEED,
+        "point mass": point_mass.SEED,
+        "inertial unit": inertial_unit.SEED,
+        "noise paths": ensemble.SEED,
+        "accelerometers": motion.SEED,
+        "Kalman filter": kalman.SEED,
+        "loads of the score": score.SEED,
+        "stabilisers": stabilisers.SEED,
+        "index reduction": index_reduction.SEED,
+        "growth of noise": growth.SEED,
+        "drift-off": drift_off.SEED,
+        "drift by solver": drift_solvers.SEED,
+        "holding spring": holding_spring.SEED,
+        "hub forces": hub_forces.SEED,
+        "random contacts": fastsim.SEED,
+        "drawn contacts": contact_set.SEED,
+        "table of contacts": contact_price.SEED,
+        "made road": fitted_roads.SEED,
+        "states of ride": ride_engines.SEED,
+        "twins of ride": ride_covariance.SEED,
+        "copies of ride": ride_varying_speed.SEED,
+        "nonlinear ride": ride_nonlinear.SEED,
+        "drawn wheelsets": wheelset.SEED,
+        "rough road of handling": handling.SEED,
+        "speeds on ice": braking_controllers.SEED,
+        "measurement files": measured_formats.SEED,
+        "virtual measurements": measured_virtual.SEED,
+        "checks of recordings": measured_checks.SEED,
+        "long recordings": long_recording.SEED,
+        "scenes never seen": unseen.SEED,
+        "scenes of other systems": unseen_systems.SEED,
+        "drawn questions": drawn_scenes.SEED,
+    }
 
 
 def save(folder: Path, rows: list[Row], source: dict[str, Any], earlier: dict[str, Any] | None = None) -> None:

@@ -16,8 +16,13 @@ COURSE = "detrended_rms_course_2in.crg"
 """The 504 m measured course; it is not part of the repository."""
 
 
-def road_scene(parameters: str = "itwm_drift", step: float = 1e-3, duration: float = 2.0,
-               road: dict[str, Any] | None = None, folder: Path = Path()) -> Scene:  # fmt: skip
+def road_scene(
+    parameters: str = "itwm_drift",
+    step: float = 1e-3,
+    duration: float = 2.0,
+    road: dict[str, Any] | None = None,
+    folder: Path = Path(),
+) -> Scene:
     """The vehicle on a road, the study road unless another is given."""
     return build(
         {
@@ -31,9 +36,15 @@ def road_scene(parameters: str = "itwm_drift", step: float = 1e-3, duration: flo
     )
 
 
-def force_scene(folder: Path, parameters: str = "itwm_drift", step: float = 1e-3, duration: float = 2.0,
-                interpolation: str = "linear", override: dict[str, float] | None = None,
-                effects: dict[str, Any] | None = None) -> Scene:  # fmt: skip
+def force_scene(
+    folder: Path,
+    parameters: str = "itwm_drift",
+    step: float = 1e-3,
+    duration: float = 2.0,
+    interpolation: str = "linear",
+    override: dict[str, float] | None = None,
+    effects: dict[str, Any] | None = None,
+) -> Scene:
     """The vehicle driven by the forces that ``write_forces`` left in the folder."""
     forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": interpolation}}
     return build(

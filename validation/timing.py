@@ -20,9 +20,15 @@ LONG = 2.0
 Clock = Callable[[], float]
 
 
-def interleave(jobs: Sequence[Callable[[], Any]], rounds: int, least: float = 0.02, seed: int = SEED,
-               lasted: Sequence[float] | np.ndarray | None = None, every: Sequence[int] | None = None,
-               clock: Clock = time.perf_counter) -> np.ndarray:  # fmt: skip
+def interleave(
+    jobs: Sequence[Callable[[], Any]],
+    rounds: int,
+    least: float = 0.02,
+    seed: int = SEED,
+    lasted: Sequence[float] | np.ndarray | None = None,
+    every: Sequence[int] | None = None,
+    clock: Clock = time.perf_counter,
+) -> np.ndarray:
     """Seconds of every job in every round, shape (jobs, rounds), NaN in those that it is not in; single thread, warmed
     up.
 
@@ -31,8 +37,7 @@ def interleave(jobs: Sequence[Callable[[], Any]], rounds: int, least: float = 0.
     rounds, a run that has been its first; clock : that of the processor leaves out what else the machine does.
     """
     known = [0.0] * len(jobs) if lasted is None else lasted
-    repeats = [1 if one > LONG * least else _repeats(job, least, clock)
-               for job, one in zip(jobs, known, strict=True)]  # fmt: skip
+    repeats = [1 if one > LONG * least else _repeats(job, least, clock) for job, one in zip(jobs, known, strict=True)]
     order = np.random.default_rng(seed)
     seconds = np.full((len(jobs), rounds), np.nan)
     for i in range(rounds):

@@ -112,8 +112,9 @@ def adhesion(scene: BrakingScene, surface: str) -> Adhesion:
         return found
     train = on_one(scene, surface)
     rates, weight = [_rate(scene, train, axle) for axle in (2, 3)], float(train.plane.static.sum())
-    return replace(found, trailer=tuple(
-        adhesion_trailer(z, weight, float(behind(train, z)[i])) for i, z in enumerate(rates)))  # fmt: skip
+    return replace(
+        found, trailer=tuple(adhesion_trailer(z, weight, float(behind(train, z)[i])) for i, z in enumerate(rates))
+    )
 
 
 def _held_by_system(scene: BrakingScene, name: str, vehicle: Braked, speed: float) -> Path:

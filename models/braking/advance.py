@@ -53,8 +53,9 @@ def in_parts(parts, state, turning, torque0, torque1, step, steer, surface, regu
         for i in range(wheels):
             for side in range(2):
                 ends[side, i] = torque0[i] + (torque1[i] - torque0[i]) * (k + side) / parts
-        used = step_on(state, turning, ends[0], ends[1], piece, steer, surface, regular / parts, plane, tables, found,
-                       report)  # fmt: skip
+        used = step_on(
+            state, turning, ends[0], ends[1], piece, steer, surface, regular / parts, plane, tables, found, report
+        )
         if used < 0.0:
             return used
         time += used
@@ -84,11 +85,25 @@ def advance(state, turning, torques, step, steer, slope, plane, kind, road, tabl
         regular = slope * 9.81 * step
         parts = parts_of(state, regular)
         if parts <= 1:
-            used = step_on(state, turning, torques[n], torques[n + 1], step, steer, surface, regular, plane, tables,
-                           found, report)  # fmt: skip
+            used = step_on(
+                state, turning, torques[n], torques[n + 1], step, steer, surface, regular, plane, tables, found, report
+            )
         else:
-            used = in_parts(parts, state, turning, torques[n], torques[n + 1], step, steer, surface, regular, plane,
-                            tables, found, report)  # fmt: skip
+            used = in_parts(
+                parts,
+                state,
+                turning,
+                torques[n],
+                torques[n + 1],
+                step,
+                steer,
+                surface,
+                regular,
+                plane,
+                tables,
+                found,
+                report,
+            )
         if used < 0.0:
             return NOT_FOUND, time
         time += used
@@ -98,5 +113,3 @@ def advance(state, turning, torques, step, steer, slope, plane, kind, road, tabl
         if status != FINE:
             return status, time
     return FINE, time
-
-

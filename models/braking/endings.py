@@ -53,8 +53,10 @@ def _tipped(status: int, plane: Plane, four: slice, rates: tuple[float, float], 
     if status == PITCHED:
         axle = 0 if loads[four][:2].max() <= 0.0 else 2
         limit = -static[axle : axle + 2].sum() / by_x[axle : axle + 2].sum()
-        return (f"the {body} pitches over: its {'rear' if axle else 'front'} wheels lift off at {ahead:.2f} m/s^2 "
-                f"along it, limit {limit:.2f}")  # fmt: skip
+        return (
+            f"the {body} pitches over: its {'rear' if axle else 'front'} wheels lift off at {ahead:.2f} m/s^2 "
+            f"along it, limit {limit:.2f}"
+        )
     pressed = static + by_x * ahead
     limit = float(np.abs(y) @ pressed / np.abs(by_y @ y))
     side = "left" if loads[four][0] <= 0.0 else "right"

@@ -85,8 +85,9 @@ def go_on(state, rate, time, wheel, after):
     speed, radius, inertia, brakes, grip, slips, mu_x = wheel
     after[PRESSURE] = max(state[PRESSURE] + rate * time, 0.0)
     after[TORQUE] = torque(0, after[PRESSURE], state[TORQUE], brakes)
-    after[TURNING], force, _, _ = wheel_step(speed, speed, state[TURNING], state[TORQUE], after[TORQUE], time, radius,
-                                             inertia, grip, slips, mu_x)  # fmt: skip
+    after[TURNING], force, _, _ = wheel_step(
+        speed, speed, state[TURNING], state[TORQUE], after[TORQUE], time, radius, inertia, grip, slips, mu_x
+    )
     after[TIME], after[IMPULSE] = state[TIME] + time, state[IMPULSE] + time * force
 
 
@@ -179,8 +180,12 @@ def limit_cycle(frozen: Frozen, controller: FivePhase, step: float = 2e-5, most:
 def _cycle(at: np.ndarray, frozen: Frozen) -> Cycle:
     """Of the states (6, 5) at the switches of one."""
     last, slips = at[-1], 1.0 - frozen.radius * at[:, TURNING] / frozen.speed
-    return Cycle(float(last[TIME]), tuple(np.diff(at[:, TIME]).tolist()),
-                 float(last[IMPULSE] / last[TIME] / frozen.peak), tuple(slips.tolist()))  # fmt: skip
+    return Cycle(
+        float(last[TIME]),
+        tuple(np.diff(at[:, TIME]).tolist()),
+        float(last[IMPULSE] / last[TIME] / frozen.peak),
+        tuple(slips.tolist()),
+    )
 
 
 def _to_end(state: np.ndarray, number: int, controller: FivePhase, step: float, frozen: Frozen) -> int:

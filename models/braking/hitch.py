@@ -22,9 +22,11 @@ def of_hitch(stop: Stop) -> dict[str, float]:
     """Of the hitch of a train, by name and unit."""
     angle = hitch(stop)
     largest = int(np.argmax(np.abs(angle)))
-    return {"largest hitch angle [deg]": float(np.degrees(angle[largest])),
-            "largest hitch angle at [s]": float(stop.times[largest]),
-            "final hitch angle [deg]": float(np.degrees(angle[-1]))}  # fmt: skip
+    return {
+        "largest hitch angle [deg]": float(np.degrees(angle[largest])),
+        "largest hitch angle at [s]": float(stop.times[largest]),
+        "final hitch angle [deg]": float(np.degrees(angle[-1])),
+    }
 
 
 def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
@@ -32,8 +34,10 @@ def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
     own = vehicle_of(scene)
     found = [(0, _box(own.front.x, own.rear.x))]
     if scene.trailer is not None:
-        found += [(1, np.array([[scene.trailer.drawbar, 0.0], [0.0, 0.0]])),
-                  (2, _box(scene.trailer.front.x, scene.trailer.rear.x))]  # fmt: skip
+        found += [
+            (1, np.array([[scene.trailer.drawbar, 0.0], [0.0, 0.0]])),
+            (2, _box(scene.trailer.front.x, scene.trailer.rear.x)),
+        ]
     return found
 
 

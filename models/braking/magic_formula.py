@@ -60,8 +60,17 @@ def surface(name: str, scale: float = 1.0, load: float = 1e4, fall: float = 0.0)
     return filled(*SURFACES[name], scale=scale, load=load, fall=fall, name=name)
 
 
-def filled(along: Pure, across: Pure, *, scale: float = 1.0, load: float = 1e4, fall: float = 0.0,
-           angles: np.ndarray = ANGLES, slips: np.ndarray = SLIPS, name: str = "") -> TyreTable:  # fmt: skip
+def filled(
+    along: Pure,
+    across: Pure,
+    *,
+    scale: float = 1.0,
+    load: float = 1e4,
+    fall: float = 0.0,
+    angles: np.ndarray = ANGLES,
+    slips: np.ndarray = SLIPS,
+    name: str = "",
+) -> TyreTable:
     """Table of two curves of pure slip at given nodes; see ``surface`` for its friction under other loads."""
     if not 0.0 <= fall < 1.0:
         raise InputError(name, "fall", fall, "must be from 0 to below 1")
@@ -70,5 +79,6 @@ def filled(along: Pure, across: Pure, *, scale: float = 1.0, load: float = 1e4, 
     def times(own: float) -> float:
         return scale * (1.0 - fall * (own / load - 1.0))
 
-    return by_similarity(lambda k, own: times(own) * along(k), lambda k, own: times(own) * across(k), loads, angles,
-                         slips, name)  # fmt: skip
+    return by_similarity(
+        lambda k, own: times(own) * along(k), lambda k, own: times(own) * across(k), loads, angles, slips, name
+    )

@@ -82,8 +82,9 @@ def write_pressures(path: str | Path, times: np.ndarray, pressures: np.ndarray, 
     write_table(path, columns)
 
 
-def _within(path: str | Path, table: dict[str, np.ndarray], head: str, names: tuple[str, ...], largest: float,
-            unit: str) -> np.ndarray:  # fmt: skip
+def _within(
+    path: str | Path, table: dict[str, np.ndarray], head: str, names: tuple[str, ...], largest: float, unit: str
+) -> np.ndarray:
     """Columns (n, W) of one quantity, from 0 to the largest value that it can have."""
     for name in names:
         column = table[f"{head}_{name}"]

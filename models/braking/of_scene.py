@@ -42,15 +42,25 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
     engine = None if own is None else on_springs(SPRUNG_ENGINE, own)
     if engine is not None:
         engine.check_step(scene.run.sample / scene.run.substeps)
-    return extended(Braked(
-        plane=plane, kind=np.where(np.arange(plane.wheels) < 2, 0, len(kinds_of(scene)) - 1), tables=stacked(tyres),
-        slope=max(table.cornering for table in tyres), road=road_of(scene, procedure, names),
-        brakes=of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
-        chambers=chambers_of(scene, plane.wheels),
-        steer=np.zeros(plane.wheels), substeps=scene.run.substeps, sample=scene.run.sample,
-        speed_given=scene.controller.true_speed, relaxation=lags_of(scene, plane.wheels), sprung=own,
-        engine=engine,
-    ), scene)  # fmt: skip
+    return extended(
+        Braked(
+            plane=plane,
+            kind=np.where(np.arange(plane.wheels) < 2, 0, len(kinds_of(scene)) - 1),
+            tables=stacked(tyres),
+            slope=max(table.cornering for table in tyres),
+            road=road_of(scene, procedure, names),
+            brakes=of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
+            chambers=chambers_of(scene, plane.wheels),
+            steer=np.zeros(plane.wheels),
+            substeps=scene.run.substeps,
+            sample=scene.run.sample,
+            speed_given=scene.controller.true_speed,
+            relaxation=lags_of(scene, plane.wheels),
+            sprung=own,
+            engine=engine,
+        ),
+        scene,
+    )
 
 
 def plane_of(scene: BrakingScene) -> Plane:
@@ -152,10 +162,17 @@ def table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
 def brake_of(scene: BrakingScene, axle: str) -> Brake:
     """Brake of one axle's wheels."""
     own: BrakeTable = getattr(scene.brakes, axle)
-    return read(Brake, {
-        "push_out": own.push_out, "release": own.push_out if own.release is None else own.release,
-        "rising": own.gradient, "falling": own.gradient if own.falling is None else own.falling,
-    }, scene.file, f"brakes.{axle}")  # fmt: skip
+    return read(
+        Brake,
+        {
+            "push_out": own.push_out,
+            "release": own.push_out if own.release is None else own.release,
+            "rising": own.gradient,
+            "falling": own.gradient if own.falling is None else own.falling,
+        },
+        scene.file,
+        f"brakes.{axle}",
+    )
 
 
 def lags_of(scene: BrakingScene, wheels: int) -> np.ndarray | None:

@@ -77,16 +77,25 @@ def describe(scene: BrakingScene) -> str:
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
     motion = "plane motion" if scene.vehicle.file is None else "suspension, roll and pitch"
     name = scene.vehicle.file or scene.vehicle.parameters
-    lines += [_line("vehicle", f"{name}: {vehicle.mass:g} kg, {vehicle.yaw_inertia:g} kg m^2, "
-                    f"axles at {axles[0]:g} and {axles[1]:g} m, wheels of {vehicle.front.radius:g} m; {motion}, "
-                    "wheels turn")]  # fmt: skip
+    lines += [
+        _line(
+            "vehicle",
+            f"{name}: {vehicle.mass:g} kg, {vehicle.yaw_inertia:g} kg m^2, "
+            f"axles at {axles[0]:g} and {axles[1]:g} m, wheels of {vehicle.front.radius:g} m; {motion}, "
+            "wheels turn",
+        )
+    ]
     lines += [_line("brakes", f"supply {scene.brakes.supply:g} bar")]
     lines += [_line("controller", f"{behind(scene)}, every {1e3 * run.sample:g} ms")]
     for name, own in scene.procedures.items():
         names = ", ".join(surfaces_of(scene, own))
         lines += [_line(name, f"{PROCEDURES[own.kind]}, from {own.speed:g} m/s on {names}")]
-    lines += [_line("step", f"{1e3 * run.sample / run.substeps:g} ms, {run.substeps} to a sample; order two, wheels "
-                    "exact within it")]  # fmt: skip
+    lines += [
+        _line(
+            "step",
+            f"{1e3 * run.sample / run.substeps:g} ms, {run.substeps} to a sample; order two, wheels exact within it",
+        )
+    ]
     return "\n".join([*lines, *effect_lines(scene)])
 
 

@@ -33,8 +33,27 @@ FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE, LOCKED, TURNING = range(7)
 time locked (s), speed of turning at the end (rad/s)."""
 REPORTED = 7
 KNOWN = 19
-(START, RATE, ALONG, ASIDE, ANGLE, CELL, PART, BASE, TURNED, RADIUS, SPIN, FIRST, SECOND, SHARE, LAGGED, COSINE,
- SINE, SIDE, BORNE) = range(KNOWN)
+(
+    START,
+    RATE,
+    ALONG,
+    ASIDE,
+    ANGLE,
+    CELL,
+    PART,
+    BASE,
+    TURNED,
+    RADIUS,
+    SPIN,
+    FIRST,
+    SECOND,
+    SHARE,
+    LAGGED,
+    COSINE,
+    SINE,
+    SIDE,
+    BORNE,
+) = range(KNOWN)
 """Columns of what is known of each wheel: speed of its centre along it at the start, what its rate has besides the
 accelerations, speeds along and across it where slip angles are taken, slip angle with its cell and part in the tables,
 load besides the accelerations, speed of turning at the start, radius, inertia, tables and the share of the second, tan
@@ -117,8 +136,9 @@ def settle(positions, rates, steer, regular, starts, plane, angles, frame, found
             v = known[LAGGED] * max(forwards, regular)
         known[ASIDE], known[ANGLE] = v, math.atan2(abs(v), max(forwards, regular))
         known[CELL], known[PART] = place(angles, known[ANGLE])
-    inertia(units, rates, plane.masses, plane.inertias, plane.reach, frame.mass, frame.right,
-            frame.tried[0], frame.tried[1])  # fmt: skip
+    inertia(
+        units, rates, plane.masses, plane.inertias, plane.reach, frame.mass, frame.right, frame.tried[0], frame.tried[1]
+    )
     for a in range(frame.free, frame.right.size):
         for b in range(frame.free):
             frame.right[a] -= frame.mass[a, b] * found[b]
@@ -134,8 +154,19 @@ def tyre(known, rate, load, torque0, torque1, step, tables, report):
     c, p = int(known[CELL]), known[PART]
     j, q = place(loads, load)
     grip = (first, second, share, c, p, j, q, load)
-    w, force, slip, locked = wheel_step(sign * start, sign * (start + step * rate), sign * known[TURNED], torque0,
-                                        torque1, step, known[RADIUS], known[SPIN], grip, slips, mu_x)  # fmt: skip
+    w, force, slip, locked = wheel_step(
+        sign * start,
+        sign * (start + step * rate),
+        sign * known[TURNED],
+        torque0,
+        torque1,
+        step,
+        known[RADIUS],
+        known[SPIN],
+        grip,
+        slips,
+        mu_x,
+    )
     k, part = place(slips, abs(slip))
     side = across(first, c, p, j, q, k, part, g, h)
     if share > 0.0:
@@ -301,8 +332,9 @@ def step_on(state, turning, torque0, torque1, step, steer, surface, regular, pla
     ways, known = array(doubles(3 * wheels * size), (3, wheels, size)), array(doubles(wheels * KNOWN), (wheels, KNOWN))
     units, mass = array(doubles(2 * (size - 2)), (size - 2, 2)), array(doubles(size * size), (size, size))
     some, middle = array(doubles(6 * size), (6, size)), array(doubles(wheels), (wheels,))
-    frame = Frame(ways[0], ways[1], ways[2], known, units, mass, some[0], some[1:4],
-                  0 if size == ALONE else 2 * plane.hooked)  # fmt: skip
+    frame = Frame(
+        ways[0], ways[1], ways[2], known, units, mass, some[0], some[1:4], 0 if size == ALONE else 2 * plane.hooked
+    )
     frame.press[:], frame.tried[:] = 0.0, 0.0
     place0, rate0 = some[4], some[5]
     for a in range(size):

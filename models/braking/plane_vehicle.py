@@ -77,8 +77,20 @@ def truck(vehicle: Truck, transfer: bool = True) -> Plane:
     check_wheels(vehicle, vehicle.mass)
     none = np.zeros(4, dtype=np.int64)
     place, radius, spin, static, by_x, by_y = wheels(vehicle, transfer)
-    return Plane(np.array([vehicle.mass]), np.array([vehicle.yaw_inertia]), np.zeros((1, 1)), none, none.copy(),
-                 place, radius, spin, static, by_x, by_y, 0)  # fmt: skip
+    return Plane(
+        np.array([vehicle.mass]),
+        np.array([vehicle.yaw_inertia]),
+        np.zeros((1, 1)),
+        none,
+        none.copy(),
+        place,
+        radius,
+        spin,
+        static,
+        by_x,
+        by_y,
+        0,
+    )
 
 
 def check_wheels(vehicle: Truck, mass: float) -> None:
@@ -103,17 +115,28 @@ def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:
         for side in (1.0, -1.0):
             pitch = lean * vehicle.mass * vehicle.height / (2.0 * vehicle.wheelbase)
             roll = -side * axle.roll_share * vehicle.mass * vehicle.height / axle.track
-            rows.append([axle.x, side * axle.track / 2.0, axle.radius, axle.spin_inertia, weight * share / 2.0,
-                         pitch * transfer, roll * transfer])  # fmt: skip
+            rows.append(
+                [
+                    axle.x,
+                    side * axle.track / 2.0,
+                    axle.radius,
+                    axle.spin_inertia,
+                    weight * share / 2.0,
+                    pitch * transfer,
+                    roll * transfer,
+                ]
+            )
     x, y, *others = np.ascontiguousarray(np.array(rows).T)
     return np.column_stack((x, y)), *others
 
 
 PAPER = Truck(
-    mass=5640.0, yaw_inertia=25000.0, height=1.2,
+    mass=5640.0,
+    yaw_inertia=25000.0,
+    height=1.2,
     front=Axle(x=1.42, track=1.9, radius=0.5, spin_inertia=13.35, roll_share=0.3),
     rear=Axle(x=-2.19, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.7),
-)  # fmt: skip
+)
 """The paper's unladen truck of two axles as far as its printed data can be read.
 
 Firm: radius, the shares 0.3 and 0.7, the total weight to 15 %. Guessed from a damaged print: yaw inertia, spin

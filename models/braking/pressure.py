@@ -56,8 +56,12 @@ def still(chambers: Chambers, sample: float) -> Air:
     if math.isfinite(chambers.reservoir) and chambers.volumes.size != wheels:
         raise InputError("", "volumes", chambers.volumes.tolist(), f"a reservoir asks for those of {wheels} chambers")
     rows = int(chambers.delay / sample) + 2
-    return Air(np.zeros(wheels), np.zeros(wheels), np.array([float(chambers.supply)]),
-               np.full((rows, wheels), RELEASE, dtype=np.int64))  # fmt: skip
+    return Air(
+        np.zeros(wheels),
+        np.zeros(wheels),
+        np.array([float(chambers.supply)]),
+        np.full((rows, wheels), RELEASE, dtype=np.int64),
+    )
 
 
 @lean

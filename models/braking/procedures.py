@@ -126,8 +126,16 @@ def port_of(scene: BrakingScene, name: str, vehicle: Braked, engine: str) -> Run
     """What the port needs to know; a log is that of a vehicle and its drive, whatever answered."""
     known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}
     text = json.dumps([name, known], sort_keys=True)
-    return Run(vehicle.plane.radius, scene.run.sample, text, Folder(scene.folder), scene.file, name, engine,
-               vehicle.chambers.slow.size > 0)  # fmt: skip
+    return Run(
+        vehicle.plane.radius,
+        scene.run.sample,
+        text,
+        Folder(scene.folder),
+        scene.file,
+        name,
+        engine,
+        vehicle.chambers.slow.size > 0,
+    )
 
 
 def steered(vehicle: Braked, angle: float) -> np.ndarray:
@@ -194,6 +202,18 @@ def _accelerations(vehicle: Braked, state: np.ndarray, steer: np.ndarray) -> np.
     surface, found = np.zeros((plane.wheels, 3)), np.zeros(state.shape[1])
     found[:2] = state[1, 2] * np.array([-state[1, 1], state[1, 0]])
     under_wheels(state, 0.0, plane, vehicle.kind, vehicle.road, surface)
-    step_on(state.copy(), turning, none, none, BLINK, steer, surface, vehicle.slope * 9.81 * BLINK, plane,
-            vehicle.tables.packed, found, np.zeros((plane.wheels, REPORTED)))  # fmt: skip
+    step_on(
+        state.copy(),
+        turning,
+        none,
+        none,
+        BLINK,
+        steer,
+        surface,
+        vehicle.slope * 9.81 * BLINK,
+        plane,
+        vehicle.tables.packed,
+        found,
+        np.zeros((plane.wheels, REPORTED)),
+    )
     return found

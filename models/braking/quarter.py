@@ -42,8 +42,20 @@ class Quarter(Strict):
     def plane(self) -> Plane:
         """As compiled functions take it: unit and group are the only ones, the wheel is at the centre."""
         none, one = np.zeros(1, dtype=np.int64), np.ones(1)
-        return Plane(self.mass * one, one, np.zeros((1, 1)), none, none.copy(), np.zeros((1, 2)), self.radius * one,
-                     self.spin_inertia * one, self.mass * GRAVITY * one, np.zeros(1), np.zeros(1), 0)  # fmt: skip
+        return Plane(
+            self.mass * one,
+            one,
+            np.zeros((1, 1)),
+            none,
+            none.copy(),
+            np.zeros((1, 2)),
+            self.radius * one,
+            self.spin_inertia * one,
+            self.mass * GRAVITY * one,
+            np.zeros(1),
+            np.zeros(1),
+            0,
+        )
 
     def steady_torque(self, slip: float, force: float) -> float:
         """Torque (N m) under which a slip stays as it is while the tyre gives a force (N)."""
@@ -82,8 +94,20 @@ def march(state, turning, torques, step, kind, road, plane, tables, path):
     surface = np.empty((turning.size, 3))
     for n in range(torques.shape[0] - 1):
         under_wheels(state, step, plane, kind, road, surface)
-        used = step_on(state, turning, torques[n], torques[n + 1], step, np.zeros(turning.size), surface, REGULAR,
-                       plane, tables, found, report)  # fmt: skip
+        used = step_on(
+            state,
+            turning,
+            torques[n],
+            torques[n + 1],
+            step,
+            np.zeros(turning.size),
+            surface,
+            REGULAR,
+            plane,
+            tables,
+            found,
+            report,
+        )
         if used < 0.0:
             return -2
         if used < step and rest < 0:
@@ -93,8 +117,15 @@ def march(state, turning, torques, step, kind, road, plane, tables, path):
     return rest
 
 
-def braked(quarter: Quarter, tyres: Tables, road: Road, torques: np.ndarray, step: float, speed: float,
-           turning: float | None = None) -> Stop:  # fmt: skip
+def braked(
+    quarter: Quarter,
+    tyres: Tables,
+    road: Road,
+    torques: np.ndarray,
+    step: float,
+    speed: float,
+    turning: float | None = None,
+) -> Stop:
     """Motion along x from a speed (m/s) under torques (n + 1,) in N m at the ends of steps (s), linear in between.
 
     turning : rad/s at the start, that of rolling if not given. Raises InputError for a torque below 0 or no number.
@@ -105,8 +136,17 @@ def braked(quarter: Quarter, tyres: Tables, road: Road, torques: np.ndarray, ste
     state[1, 0] = speed
     spin = np.array([speed / quarter.radius if turning is None else turning])
     path[0, SPEED], path[0, TURNING] = speed, spin[0]
-    rest = march(state, spin, np.ascontiguousarray(torques, dtype=float)[:, None], step, np.zeros(1, dtype=np.int64),
-                 road, quarter.plane, tyres.packed, path)  # fmt: skip
+    rest = march(
+        state,
+        spin,
+        np.ascontiguousarray(torques, dtype=float)[:, None],
+        step,
+        np.zeros(1, dtype=np.int64),
+        road,
+        quarter.plane,
+        tyres.packed,
+        path,
+    )
     if rest == -2 or not np.isfinite(path).all():
         raise RunFailed("braking", "no loads were found", float(path[np.argmax(path[:, TIME]), TIME]))
     return Stop(path, rest)

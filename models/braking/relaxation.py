@@ -60,8 +60,20 @@ def advance_lagging(state, turning, torques, step, steer, slope, plane, kind, ro
     for n in range(torques.shape[0] - 1):
         under_wheels(state, step, plane, kind, road, surface)
         lag_on(state, 0.5 * step, steer, plane, slope, length, lag, surface)
-        used = step_on(state, turning, torques[n], torques[n + 1], step, steer, surface, slope * 9.81 * step, plane,
-                       tables, found, report)  # fmt: skip
+        used = step_on(
+            state,
+            turning,
+            torques[n],
+            torques[n + 1],
+            step,
+            steer,
+            surface,
+            slope * 9.81 * step,
+            plane,
+            tables,
+            found,
+            report,
+        )
         if used < 0.0:
             return NOT_FOUND, time
         time += used

@@ -37,5 +37,6 @@ def parts(rows: list[np.ndarray], like: Row) -> list[np.ndarray]:
     """Of blocks of rows that are like one, each part with an axis for the rows before its own."""
     ends = np.cumsum([part.size for part in like[1:]])
     columns = np.split(np.concatenate(rows), ends[:-1], axis=1)
-    return [np.ascontiguousarray(column).reshape(-1, *part.shape)
-            for column, part in zip(columns, like[1:], strict=True)]  # fmt: skip
+    return [
+        np.ascontiguousarray(column).reshape(-1, *part.shape) for column, part in zip(columns, like[1:], strict=True)
+    ]

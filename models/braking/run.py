@@ -129,13 +129,25 @@ class Braked:
                     told.steer[:] = self.steering(time + 0.5 * self.sample)
         return _path(rows, now, status == AT_REST, self.coordinates)
 
-    def _moving(self, told: Told, kept: Kept, now: Row,
-                rates: np.ndarray) -> Iterator[tuple[int, float, float, float]]:  # fmt: skip
+    def _moving(self, told: Told, kept: Kept, now: Row, rates: np.ndarray) -> Iterator[tuple[int, float, float, float]]:
         """The vehicle as it is ``now`` with its accelerations (2 + U,), moved on sample by sample; see ``samples``."""
         air = still(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
         torques = np.zeros((self.substeps + 1, self.plane.wheels))
-        given = (told, kept, self.sample, Braking(air, self.chambers, self.brakes, torques), now.state, now.turning,
-                 self.slope, self.plane, self.kind, self.road, self.tables.packed, rates, now.report)  # fmt: skip
+        given = (
+            told,
+            kept,
+            self.sample,
+            Braking(air, self.chambers, self.brakes, torques),
+            now.state,
+            now.turning,
+            self.slope,
+            self.plane,
+            self.kind,
+            self.road,
+            self.tables.packed,
+            rates,
+            now.report,
+        )
         if self.engine is not None:
             moving: Iterator[tuple[int, float, float, float]] = self.engine.moving(*given)
             return moving

@@ -33,8 +33,11 @@ class VehicleTable(Strict):
 
     parameters: str = Field(default="paper", description="paper, or a TOML file with every parameter")
     override: dict[str, Any] = Field(default_factory=dict, description="parameters that are changed")
-    file: str | None = Field(default=None, description="in their place a vehicle on its suspension: one that comes "
-                             "with twinrig, as r19_free, or a TOML file of your own")  # fmt: skip
+    file: str | None = Field(
+        default=None,
+        description="in their place a vehicle on its suspension: one that comes "
+        "with twinrig, as r19_free, or a TOML file of your own",
+    )
     spin_inertia: float | None = quantity("kg m^2", "of a wheel about its axle, which that file lacks", default=None)
     accept: list[Query] = accepted()
 
@@ -73,8 +76,9 @@ class BrakeTable(Strict):
 
     gradient: float = quantity("N m/bar", "of the torque while pressure rises")
     push_out: float = quantity("bar", "pressure above which torque rises from none", default=0.0, zero=True)
-    release: float | None = quantity("bar", "pressure at which a falling torque ends; push_out if not said",
-                                     default=None, zero=True)  # fmt: skip
+    release: float | None = quantity(
+        "bar", "pressure at which a falling torque ends; push_out if not said", default=None, zero=True
+    )
     falling: float | None = quantity("N m/bar", "gradient while pressure falls; as rising if not said", default=None)
 
 
@@ -92,8 +96,11 @@ class PressureTable(Strict):
 
     fill: float = quantity("s", "time constant of filling", default=0.15)
     empty: float = quantity("s", "time constant of emptying", default=0.1)
-    slow: float | None = quantity("s", "time constant of filling by valves that can apply slowly, at least fill; not "
-                                  "said, no valve can", default=None)  # fmt: skip
+    slow: float | None = quantity(
+        "s",
+        "time constant of filling by valves that can apply slowly, at least fill; not said, no valve can",
+        default=None,
+    )
     delay: float = quantity("s", "of the valves", default=0.0, zero=True)
     reservoir: float | None = quantity("l", "of the supply; not said, its pressure stays", default=None)
     volume: float = quantity("l", "of one chamber, which the reservoir fills", default=1.5)
@@ -127,8 +134,11 @@ class Procedure(Strict):
     speed: float = quantity("m/s", "at which the brake is applied", default=11.11)
     right: str | None = Field(default=None, description="surface right of the line on every stretch (split)")
     steer: float | None = quantity("rad", "fixed angle of the front wheels (j_turn)", default=None, signed=True)
-    steering: list[Pair] | None = Field(default=None, min_length=1, description="angle of the front wheels by time in "
-                                        "place of steer, linear between: [[s, rad], ...] (j_turn)")  # fmt: skip
+    steering: list[Pair] | None = Field(
+        default=None,
+        min_length=1,
+        description="angle of the front wheels by time in place of steer, linear between: [[s, rad], ...] (j_turn)",
+    )
     radius: float | None = quantity("m", "of the steady circle before braking (turn)", default=None, signed=True)
 
 
@@ -217,8 +227,12 @@ def _check_brakes(scene: BrakingScene) -> None:
         for key, value in (("gradient", table.gradient), ("falling", table.falling or 0.0)):
             if value * own.supply > LARGEST_TORQUE:
                 most = LARGEST_TORQUE / own.supply
-                raise InputError(file, f"brakes.{axle}.{key}", value, f"must be at most {most:g} N m/bar: no brake "
-                                 f"gives more than {LARGEST_TORQUE:g} N m")  # fmt: skip
+                raise InputError(
+                    file,
+                    f"brakes.{axle}.{key}",
+                    value,
+                    f"must be at most {most:g} N m/bar: no brake gives more than {LARGEST_TORQUE:g} N m",
+                )
 
 
 def _check_vehicle(scene: BrakingScene) -> None:
@@ -230,8 +244,10 @@ def _check_vehicle(scene: BrakingScene) -> None:
         return
     if own.spin_inertia is None:
         raise InputError(file, "vehicle.spin_inertia", None, "is missing: a vehicle file does not say it")
-    for place, named in (("vehicle.parameters", "parameters" in own.model_fields_set),
-                         ("vehicle.override", bool(own.override))):  # fmt: skip
+    for place, named in (
+        ("vehicle.parameters", "parameters" in own.model_fields_set),
+        ("vehicle.override", bool(own.override)),
+    ):
         if named:
             raise InputError(file, place, None, "has no meaning beside vehicle.file, which says it all")
 
@@ -241,15 +257,27 @@ def _check_run(scene: BrakingScene) -> None:
         raise InputError(scene.file, "run.sample", scene.run.sample, "must be from 0.0001 to 0.1 s")
     if scene.run.sample / scene.run.substeps > LONGEST_STEP * (1.0 + 1e-9):
         least = math.ceil(scene.run.sample / LONGEST_STEP - 1e-9)
-        raise InputError(scene.file, "run.substeps", scene.run.substeps, f"must be at least {least}: steps of more "
-                         f"than {LONGEST_STEP:g} s mistake stopping distances by percents")
+        raise InputError(
+            scene.file,
+            "run.substeps",
+            scene.run.substeps,
+            f"must be at least {least}: steps of more than {LONGEST_STEP:g} s mistake stopping distances by percents",
+        )
     if scene.pressure is not None and scene.pressure.delay > 1.0:
         raise InputError(scene.file, "pressure.delay", scene.pressure.delay, "must be at most 1 s")
     if scene.pressure is not None and scene.pressure.slow is not None and scene.pressure.slow < scene.pressure.fill:
-        raise InputError(scene.file, "pressure.slow", scene.pressure.slow, f"must be at least fill, "
-                         f"{scene.pressure.fill:g} s: it is that of filling slowly")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "pressure.slow",
+            scene.pressure.slow,
+            f"must be at least fill, {scene.pressure.fill:g} s: it is that of filling slowly",
+        )
     if scene.run.duration < 2.0 * scene.run.sample:
-        raise InputError(scene.file, "run.duration", scene.run.duration, f"must be at least {2.0 * scene.run.sample:g} "
-                         "s, two samples")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "run.duration",
+            scene.run.duration,
+            f"must be at least {2.0 * scene.run.sample:g} s, two samples",
+        )
     if scene.run.duration > 1000.0:
         raise InputError(scene.file, "run.duration", scene.run.duration, "must be at most 1000 s")

@@ -25,8 +25,14 @@ ANGLES, SLIPS = graded(np.pi / 2.0, 0.03, 261), graded(1.0, 0.02, 201)
 """Nodes (rad; 1) between which the tables of the magic formula's surfaces are met to 1e-4 of mu."""
 
 
-def by_similarity(along: Curve, across: Curve, loads: np.ndarray, angles: np.ndarray = ANGLES,
-                  slips: np.ndarray = SLIPS, name: str = "") -> TyreTable:  # fmt: skip
+def by_similarity(
+    along: Curve,
+    across: Curve,
+    loads: np.ndarray,
+    angles: np.ndarray = ANGLES,
+    slips: np.ndarray = SLIPS,
+    name: str = "",
+) -> TyreTable:
     """Table of a curve along the wheel and one across it.
 
     g is the mean over the loads, weighted by h squared: exact if all loads share one shape of the curve across. Where

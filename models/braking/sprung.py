@@ -18,8 +18,13 @@ from models.vehicles.spatial import Freedom, SpatialVehicle, Vector
 ROLL, PITCH = 4, 5
 """Places of the chassis' roll and pitch among the coordinates."""
 LEADING: tuple[tuple[str, Freedom], ...] = (
-    (CARRIER, "x"), (CARRIER, "y"), (CARRIER, "rz"), (SWAY, "z"), (SWAY, "rx"), (SWAY, "ry"),
-)  # fmt: skip
+    (CARRIER, "x"),
+    (CARRIER, "y"),
+    (CARRIER, "rz"),
+    (SWAY, "z"),
+    (SWAY, "rx"),
+    (SWAY, "ry"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +53,8 @@ def sprung(vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5) -> 
     """
     tyres = sorted(vehicle.tyres, key=lambda tyre: (tyre.axle, -tyre.point[1]))
     if [tyre.axle for tyre in tyres] != [0, 0, 1, 1] or any(
-            left.point[1] <= right.point[1] for left, right in (tyres[:2], tyres[2:])):  # fmt: skip
+        left.point[1] <= right.point[1] for left, right in (tyres[:2], tyres[2:])
+    ):
         raise InputError(vehicle.name, "tyres", [tyre.name for tyre in tyres], "must be two of each of two axles")
     centred = _moved(replace(vehicle, tyres=tuple(tyres)), -centre(vehicle))
     handling = Handling(centred, Tyres(spin_inertia=0.0))
@@ -76,21 +82,33 @@ def _moved(vehicle: SpatialVehicle, way: np.ndarray) -> SpatialVehicle:
         bodies=tuple(replace(body, position=at(body.position)) for body in vehicle.bodies),
         springs=tuple(replace(s, point_one=at(s.point_one), point_two=at(s.point_two)) for s in vehicle.springs),
         tyres=tuple(replace(tyre, point=at(tyre.point)) for tyre in vehicle.tyres),
-        bars=tuple(replace(bar, point_left=at(bar.point_left), point_right=at(bar.point_right))
-                   for bar in vehicle.bars),
+        bars=tuple(
+            replace(bar, point_left=at(bar.point_left), point_right=at(bar.point_right)) for bar in vehicle.bars
+        ),
         side_forces=tuple(replace(force, point=at(force.point)) for force in vehicle.side_forces),
         axles=tuple(float(x + by[0]) for x in vehicle.axles),
-    )  # fmt: skip
+    )
 
 
 def _plane(vehicle: SpatialVehicle, spin_inertia: float, front: float) -> Truck:
     """The plane vehicle of a centred one."""
-    turn = sum(body.inertia[2][2] + body.mass * (body.position[0] ** 2 + body.position[1] ** 2)
-               for body in vehicle.bodies)  # fmt: skip
+    turn = sum(
+        body.inertia[2][2] + body.mass * (body.position[0] ** 2 + body.position[1] ** 2) for body in vehicle.bodies
+    )
     front_axle, rear_axle = (
-        Axle(x=left.point[0], track=left.point[1] - right.point[1], radius=left.point[2], spin_inertia=spin_inertia,
-             roll_share=share)
+        Axle(
+            x=left.point[0],
+            track=left.point[1] - right.point[1],
+            radius=left.point[2],
+            spin_inertia=spin_inertia,
+            roll_share=share,
+        )
         for left, right, share in zip(vehicle.tyres[::2], vehicle.tyres[1::2], (front, 1.0 - front), strict=True)
-    )  # fmt: skip
-    return Truck(mass=sum(body.mass for body in vehicle.bodies), yaw_inertia=turn,
-                 height=float(centre(vehicle)[2]), front=front_axle, rear=rear_axle)  # fmt: skip
+    )
+    return Truck(
+        mass=sum(body.mass for body in vehicle.bodies),
+        yaw_inertia=turn,
+        height=float(centre(vehicle)[2]),
+        front=front_axle,
+        rear=rear_axle,
+    )

@@ -57,16 +57,34 @@ def held_forces(numbers, q, v, f, motion):
     """Add all forces to ``f`` (n,), and fill ``motion`` (W, 3): speeds of the wheels' centres along them (m/s), of
     their contacts across (m/s), loads (N)."""
     chassis, table = int(numbers[CHASSIS]), start(numbers)
-    contact, slide, way, found = array(doubles(10), (10,)), array(doubles(4), (4,)), array(doubles(WAY), (WAY,)), array(
-        doubles(3), (3,))  # fmt: skip
+    contact, slide, way, found = (
+        array(doubles(10), (10,)),
+        array(doubles(4), (4,)),
+        array(doubles(WAY), (WAY,)),
+        array(doubles(3), (3,)),
+    )
     report, ledger = array(doubles(REPORTED), (REPORTED,)), array(doubles(LEDGER), (LEDGER,))
     frame, tree = enter(numbers, q, v, f, doubles(room(numbers)), ledger)
     waves, rows = numbers[int(numbers[OF_WAVES]) :], numbers[int(numbers[COUNT]) :]
     found[2], tyres, carrying = 0.0, beyond(table, int(numbers[OF_TYRES])), row(tree[0], PER_LINK, chassis)
     for i in range(int(numbers[TYRES])):
         own, held = row(tyres, PER_TYRE, i), rows[ROW * i :]
-        touch(own, waves, int(numbers[WAVES]), held[STEER], 0.0, v, chassis, frame, tree, contact, slide, way, ledger,
-              report)  # fmt: skip
+        touch(
+            own,
+            waves,
+            int(numbers[WAVES]),
+            held[STEER],
+            0.0,
+            v,
+            chassis,
+            frame,
+            tree,
+            contact,
+            slide,
+            way,
+            ledger,
+            report,
+        )
         motion[i, 0] = dot(three(way, PASSING), three(way, ROLLING))
         motion[i, 1], motion[i, 2] = report[SLIP_Y], report[PRESS]
         found[0], found[1] = held[HELD_X], held[HELD_Y]

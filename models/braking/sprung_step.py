@@ -74,8 +74,20 @@ def advance(state, turning, torques, step, steer, slope, plane, kind, road, tabl
             if rest < step:
                 return AT_REST, time + rest
         else:
-            hold(own.numbers, q + half * v + 0.5 * half**2 * rates, v + half * rates, before, after, step, own.rates,
-                 regular, False, tables, known, report)  # fmt: skip
+            hold(
+                own.numbers,
+                q + half * v + 0.5 * half**2 * rates,
+                v + half * rates,
+                before,
+                after,
+                step,
+                own.rates,
+                regular,
+                False,
+                tables,
+                known,
+                report,
+            )
             if not march(own.engine, q, v):
                 return GAVE_UP, time
             turning[:] = report[:, -1]

@@ -23,8 +23,13 @@ def sprung_turn(vehicle: Braked, speed: float, radius: float, plane: SteadyTurn)
 
     def moved(unknown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         found: tuple[np.ndarray, np.ndarray] = go.rolling(
-            state(unknown), steered(vehicle, unknown[0]), vehicle.plane, vehicle.kind, vehicle.road,
-            vehicle.tables.packed)  # fmt: skip
+            state(unknown),
+            steered(vehicle, unknown[0]),
+            vehicle.plane,
+            vehicle.kind,
+            vehicle.road,
+            vehicle.tables.packed,
+        )
         return found
 
     def left(unknown: np.ndarray) -> np.ndarray:

@@ -8,18 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.braking.figures_of_merit import (
-    Locks,
-    equivalent_deceleration,
-    lock_table,
-    mean_fully_developed,
-    yaw_ratio,
-)
+from models.braking.figures_of_merit import Locks, equivalent_deceleration, lock_table, mean_fully_developed, yaw_ratio
 from models.braking.plane_step import LOAD, LOCKED, SLIP
 from models.braking.run import Path
 
-WHEELS = ("front left", "front right", "rear left", "rear right", "trailer front left", "trailer front right",
-          "trailer rear left", "trailer rear right")  # fmt: skip
+WHEELS = (
+    "front left",
+    "front right",
+    "rear left",
+    "rear right",
+    "trailer front left",
+    "trailer front right",
+    "trailer rear left",
+    "trailer rear right",
+)
 SLOWEST = 1.0
 """m/s: slips and slip angles of a vehicle that hardly moves mean nothing, and are left out below this speed."""
 LIMITS = (0.2, 0.5)
@@ -77,7 +79,9 @@ class Stop:
         slip, lateral = int(np.argmax(np.abs(self.side_slip))), int(np.argmax(np.abs(self.across)))
         time, distance = float(path.times[-1]), float(way[-1])
         return {
-            "initial speed [m/s]": float(speed[0]), "stopping distance [m]": distance, "stopping time [s]": time,
+            "initial speed [m/s]": float(speed[0]),
+            "stopping distance [m]": distance,
+            "stopping time [s]": time,
             "x [m]": float(path.states[-1, 0, 0] - path.states[0, 0, 0]),
             "y [m]": float(path.states[-1, 0, 1] - path.states[0, 0, 1]),
             "final yaw [deg]": float(np.degrees(path.states[-1, 0, 2] - path.states[0, 0, 2])),
@@ -88,7 +92,7 @@ class Stop:
             "largest side slip at [s]": float(path.times[slip]),
             "largest lateral acceleration [m/s^2]": float(self.across[lateral]),
             "largest lateral acceleration at [s]": float(path.times[lateral]),
-        } | self.of_body()  # fmt: skip
+        } | self.of_body()
 
     @property
     def lean(self) -> np.ndarray | None:
@@ -101,9 +105,11 @@ class Stop:
         if self.lean is None:
             return {}
         roll, pitch = np.degrees(self.lean).T
-        return {"largest roll [deg]": float(roll[np.argmax(np.abs(roll))]),
-                "largest pitch [deg]": float(pitch[np.argmax(np.abs(pitch))]),
-                "least wheel load [N]": float(self.path.reports[:, :, LOAD].min())}  # fmt: skip
+        return {
+            "largest roll [deg]": float(roll[np.argmax(np.abs(roll))]),
+            "largest pitch [deg]": float(pitch[np.argmax(np.abs(pitch))]),
+            "least wheel load [N]": float(self.path.reports[:, :, LOAD].min()),
+        }
 
     def of_wheels(self) -> dict[str, np.ndarray]:
         """What each wheel (W,) did above SLOWEST, or above half of a lower initial speed, by name and unit."""
@@ -114,17 +120,21 @@ class Stop:
         found |= {f"slip above {limit:g} [% of time]": 100.0 * (lengths @ (slips > limit)) / whole for limit in LIMITS}
         locks = self.locks()
         return found | {
-            "locked above 15 km/h [s]": locks.time, "longest lock [s]": locks.longest,
-            "mean pressure [bar]": lengths @ pressures / whole, "final pressure [bar]": path.pressures[-1],
-        }  # fmt: skip
+            "locked above 15 km/h [s]": locks.time,
+            "longest lock [s]": locks.longest,
+            "mean pressure [bar]": lengths @ pressures / whole,
+            "final pressure [bar]": path.pressures[-1],
+        }
 
     def in_turn(self, radius: float, time: float = 1.0) -> dict[str, float]:
         """What it did ``time`` (s) after the brake was applied on a circle (m, positive to the left), by name and unit.
 
         Source: ISO 14794 (heavy vehicles), ISO 7975 (cars); not checked against the text of the standard.
         """
-        speed, yaw_rate, slip = (float(np.interp(time, self.times, values)) for values in
-                                 (self.speed, self.path.states[:, 1, 2], self.side_slip))  # fmt: skip
+        speed, yaw_rate, slip = (
+            float(np.interp(time, self.times, values))
+            for values in (self.speed, self.path.states[:, 1, 2], self.side_slip)
+        )
         place = [np.interp(time, self.times, self.path.states[:, 0, i]) for i in range(2)]
         vx, vy = self.path.states[0, 1, :2] / self.speed[0]
         centre = self.path.states[0, 0, :2] + radius * np.array([-vy, vx])

@@ -16,8 +16,13 @@ from models.ensemble.runner import PathFailed
 from models.errors import RunFailed
 from models.noise import SPEED, normal
 
-KEPT = {"stopping distance [m]": "distance", "stopping time [s]": "time", "v0/T [m/s^2]": "deceleration",
-        "y [m]": "aside", "final yaw [deg]": "yaw"}  # fmt: skip
+KEPT = {
+    "stopping distance [m]": "distance",
+    "stopping time [s]": "time",
+    "v0/T [m/s^2]": "deceleration",
+    "y [m]": "aside",
+    "final yaw [deg]": "yaw",
+}
 """Quantities of every stop, and their names in the arrays."""
 
 
@@ -38,12 +43,17 @@ class Stops:
         scene = build(self.table, self.file, Path(self.folder))
         rows = [self._one(scene, path) for path in paths]
         return {name: np.array([row[key] for row in rows]) for key, name in KEPT.items()} | {
-            "speed": np.array([row["initial speed [m/s]"] for row in rows])}  # fmt: skip
+            "speed": np.array([row["initial speed [m/s]"] for row in rows])
+        }
 
     def facts(self) -> dict[str, Any]:
         """Everything that the result depends on."""
-        return {"scene": str(sorted(self.table.items())), "procedure": self.procedure, "spread": self.spread,
-                "seed": self.seed}  # fmt: skip
+        return {
+            "scene": str(sorted(self.table.items())),
+            "procedure": self.procedure,
+            "spread": self.spread,
+            "seed": self.seed,
+        }
 
     def _one(self, scene: BrakingScene, path: int) -> dict[str, float]:
         own = scene.procedures[self.procedure]

@@ -52,8 +52,12 @@ def check_way(own: Road, way: float) -> None:
     """Refuse steps on which a wheel may go a way (m) longer than the shortest stretch between two others."""
     shortest = float(np.diff(own.starts[1:]).min()) if own.starts.size > 2 else np.inf
     if way > shortest:
-        raise InputError("", "stretches", shortest, f"must be at least as long as the way in a step, {way:.3g} m: take "
-                         "longer stretches or more substeps")  # fmt: skip
+        raise InputError(
+            "",
+            "stretches",
+            shortest,
+            f"must be at least as long as the way in a step, {way:.3g} m: take longer stretches or more substeps",
+        )
 
 
 @inlined

@@ -53,8 +53,9 @@ def tir_table(path: str | Path) -> TyreTable:
     loads = np.unique(np.concatenate((np.linspace(least, most, LOADS), np.clip([nominal], least, most))))
     curves = {load: (along(c, load), across(c, load)) for load in loads}
     _check_curves(path, curves)
-    return by_similarity(lambda k, load: curves[load][0](k), lambda k, load: curves[load][1](k), loads,
-                         name=Path(path).name)  # fmt: skip
+    return by_similarity(
+        lambda k, load: curves[load][0](k), lambda k, load: curves[load][1](k), loads, name=Path(path).name
+    )
 
 
 def along(c: dict[str, float], load: float) -> Curve:
@@ -104,8 +105,9 @@ def _properties(path: str | Path) -> dict[str, Property]:
         if equals:
             key = name.strip().upper()
             if key in found and key in (*NEEDED, *UNITS):
-                raise InputError(path, f"line {line}, {key}", value.strip(),
-                                 f"stands in line {found[key].line} already")
+                raise InputError(
+                    path, f"line {line}, {key}", value.strip(), f"stands in line {found[key].line} already"
+                )
             found[key] = Property(value.strip().strip("'\""), line)
     return found
 
@@ -117,8 +119,9 @@ def _check(path: str | Path, found: dict[str, Property]) -> None:
         if found[name].text.lower() not in allowed:
             raise _wrong(path, found, name, f"must be '{allowed[0]}'")
     if "FITTYP" in found and _number(path, found, "FITTYP") not in VERSIONS:
-        raise _wrong(path, found, "FITTYP", "is of other equations; read are those of MF-Tyre 5.x and PAC2002 (5, 6, "
-                     "50, 51, 52)")  # fmt: skip
+        raise _wrong(
+            path, found, "FITTYP", "is of other equations; read are those of MF-Tyre 5.x and PAC2002 (5, 6, 50, 51, 52)"
+        )
     for name in NEEDED:
         if name not in found:
             raise InputError(path, name, None, "is missing; needed are " + ", ".join(NEEDED))
@@ -143,5 +146,9 @@ def _check_curves(path: str | Path, curves: dict[float, tuple[Curve, Curve]]) ->
     for load, pair in curves.items():
         for letter, curve in zip("XY", pair, strict=True):
             if not (0.0 < curve.D <= 3.0 and 0.0 < curve.C <= 2.0 and 0.0 < curve.B < 1e4):
-                raise InputError(path, f"P*{letter}* at {load:g} N", [curve.D, curve.B, curve.C],
-                                 "give no friction: peak from 0 to 3, B above 0, C from 0 to 2")  # fmt: skip
+                raise InputError(
+                    path,
+                    f"P*{letter}* at {load:g} N",
+                    [curve.D, curve.B, curve.C],
+                    "give no friction: peak from 0 to 3, B above 0, C from 0 to 2",
+                )

@@ -28,8 +28,13 @@ class Trailer(Truck):
     drawbar_mass: float = quantity("kg", "of the drawbar with the front axle")
     drawbar_inertia: float = quantity("kg m^2", "of both about the vertical through the front axle")
     hook: float = Field(default=-3.5, description="m, of the hook ahead of the truck's centre of mass", lt=0.0)
-    fold: float = Field(default=math.pi / 2.0, gt=0.0, le=math.pi, description="rad, of the drawbar against the "
-                        "truck, and of the body against it: beyond it a train jackknifes, and a run ends")  # fmt: skip
+    fold: float = Field(
+        default=math.pi / 2.0,
+        gt=0.0,
+        le=math.pi,
+        description="rad, of the drawbar against the "
+        "truck, and of the body against it: beyond it a train jackknifes, and a run ends",
+    )
 
 
 def hooked(trailer: Trailer, transfer: bool = True) -> Plane:
@@ -63,8 +68,9 @@ def _wheels(trailer: Trailer, first: int, transfer: bool) -> tuple[np.ndarray, .
     return unit, np.full(4, first + 1), place, radius, spin, static, by_x, by_y
 
 
-def follow(plane: Plane, tables: Tables, state: np.ndarray, hook: np.ndarray, step: float, slope: float,
-           torques: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+def follow(
+    plane: Plane, tables: Tables, state: np.ndarray, hook: np.ndarray, step: float, slope: float, torques: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """A hooked trailer behind a hook of given velocities (n + 1, 2) in m/s, one at every step (s).
 
     state (2, 2 + U) : positions and rates at the start; slope : see ``advance``; torques (W,) : of its brakes, N m.
@@ -76,8 +82,17 @@ def follow(plane: Plane, tables: Tables, state: np.ndarray, hook: np.ndarray, st
     states, forces = np.empty((len(hook), *state.shape)), np.empty((len(hook) - 1, 2))
     states[0] = state
     turning = np.hypot(*state[1, :2]) / plane.radius
-    if not _follow(states, forces, turning, np.ascontiguousarray(hook), step, slope * GRAVITY * step, plane,
-                   tables.packed, np.asarray(torques, float)):  # fmt: skip
+    if not _follow(
+        states,
+        forces,
+        turning,
+        np.ascontiguousarray(hook),
+        step,
+        slope * GRAVITY * step,
+        plane,
+        tables.packed,
+        np.asarray(torques, float),
+    ):
         raise InputError("", "hook", None, "no loads were found: its motion is too wild for the trailer")
     return states, forces
 
@@ -94,8 +109,17 @@ def _follow(states, forces, turning, hook, step, regular, plane, tables, torques
             return False
         states[n + 1] = state
         headings(0.5 * (states[n, 0] + state[0]), units)
-        inertia(units, 0.5 * (states[n, 1] + state[1]), plane.masses, plane.inertias, plane.reach, mass, right, along,
-                across)  # fmt: skip
+        inertia(
+            units,
+            0.5 * (states[n, 1] + state[1]),
+            plane.masses,
+            plane.inertias,
+            plane.reach,
+            mass,
+            right,
+            along,
+            across,
+        )
         forces[n] = (mass @ found - right)[:2]
         for i in range(wheels):
             psi = 0.5 * (states[n, 0, 2 + plane.unit[i]] + state[0, 2 + plane.unit[i]])
@@ -106,8 +130,14 @@ def _follow(states, forces, turning, hook, step, regular, plane, tables, torques
 
 
 CHOSEN = Trailer(
-    mass=4500.0, yaw_inertia=15000.0, height=1.2, drawbar=2.5, drawbar_mass=700.0, drawbar_inertia=500.0, hook=-3.5,
+    mass=4500.0,
+    yaw_inertia=15000.0,
+    height=1.2,
+    drawbar=2.5,
+    drawbar_mass=700.0,
+    drawbar_inertia=500.0,
+    hook=-3.5,
     front=Axle(x=2.0, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.5),
     rear=Axle(x=-2.0, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.5),
-)  # fmt: skip
+)
 """An unladen trailer of two axles behind the paper's truck. All of it is chosen: the paper prints no trailer data."""

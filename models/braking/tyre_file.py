@@ -33,8 +33,12 @@ def tyre_table(path: str | Path) -> TyreTable:
     angles, loads, slips = (nodes for nodes, _ in axes)
     shape = angles.size, loads.size, slips.size
     if np.prod(shape) > MOST_NODES:
-        raise InputError(path, "rows", int(np.prod(shape)), "combinations of slip angle, load and slip are too many: "
-                         "are the same values repeated with other digits?")  # fmt: skip
+        raise InputError(
+            path,
+            "rows",
+            int(np.prod(shape)),
+            "combinations of slip angle, load and slip are too many: are the same values repeated with other digits?",
+        )
     row = _row_of_each(path, lines, np.ravel_multi_index([place for _, place in axes], shape), axes)
     mu_x, mu_y = (columns[name][row].reshape(shape) for name in ("mu_x", "mu_y"))
     g, h = factors(mu_y)
@@ -57,10 +61,12 @@ def _columns(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
 
 def _check_ranges(path: str | Path, lines: np.ndarray, columns: dict[str, np.ndarray]) -> None:
     for name, least, most, allowed in (
-        ("slip angle", 0.0, np.pi / 2.0, "must be from 0 to 90 deg"), ("slip", 0.0, 1.0, "must be from 0 to 1"),
-        ("load", 1.0, 1e6, "must be from 1 N to 1000 kN"), ("mu_x", 0.0, LARGEST_FRICTION, "must be from 0 to 3"),
+        ("slip angle", 0.0, np.pi / 2.0, "must be from 0 to 90 deg"),
+        ("slip", 0.0, 1.0, "must be from 0 to 1"),
+        ("load", 1.0, 1e6, "must be from 1 N to 1000 kN"),
+        ("mu_x", 0.0, LARGEST_FRICTION, "must be from 0 to 3"),
         ("mu_y", 0.0, LARGEST_FRICTION, "must be from 0 to 3"),
-    ):  # fmt: skip
+    ):
         wrong = np.flatnonzero(~((columns[name] >= least) & (columns[name] <= most * (1.0 + 1e-12))))
         if wrong.size:
             raise _at(path, lines, name, wrong[0], columns[name][wrong[0]], allowed)
@@ -85,16 +91,29 @@ def _row_of_each(path: str | Path, lines: np.ndarray, number: np.ndarray, axes: 
     missing = np.flatnonzero(np.bincount(number, minlength=int(np.prod(shape))) == 0)
     if missing.size:
         angle, load, slip = (nodes[i] for (nodes, _), i in zip(axes, np.unravel_index(missing[0], shape), strict=True))
-        raise InputError(path, "rows", None, f"{missing.size} of {np.prod(shape)} combinations are missing, the first: "
-                         f"slip angle {np.rad2deg(angle):g} deg, load {load / 1e3:g} kN, slip {slip:g}")  # fmt: skip
+        raise InputError(
+            path,
+            "rows",
+            None,
+            f"{missing.size} of {np.prod(shape)} combinations are missing, the first: "
+            f"slip angle {np.rad2deg(angle):g} deg, load {load / 1e3:g} kN, slip {slip:g}",
+        )
     return order
 
 
-def _check_product(path: str | Path, lines: np.ndarray, row: np.ndarray, mu_x: np.ndarray, mu_y: np.ndarray,
-                   product: np.ndarray) -> None:  # fmt: skip
+def _check_product(
+    path: str | Path, lines: np.ndarray, row: np.ndarray, mu_x: np.ndarray, mu_y: np.ndarray, product: np.ndarray
+) -> None:
     off = np.abs(product - mu_y)
     worst = int(off.argmax())
     if off.flat[worst] > PRODUCT * max(mu_x.max(), mu_y.max()):
-        raise _at(path, lines, "mu_y", row.flat[worst], mu_y.flat[worst], "is no product of g(slip angle, slip) and "
-                  f"h(slip angle, load): the best has {product.flat[worst]:.4g} here, more than {PRODUCT:.0%} of the "
-                  "largest away")
+        raise _at(
+            path,
+            lines,
+            "mu_y",
+            row.flat[worst],
+            mu_y.flat[worst],
+            "is no product of g(slip angle, slip) and "
+            f"h(slip angle, load): the best has {product.flat[worst]:.4g} here, more than {PRODUCT:.0%} of the "
+            "largest away",
+        )

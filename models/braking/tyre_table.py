@@ -61,8 +61,9 @@ class TyreTable:
             if values.shape != shape:
                 raise InputError(self.name, name, values.shape, f"must have the shape {shape} of its nodes")
             if not np.isfinite(values).all() or values.min() < 0.0 or values.max() > LARGEST_FRICTION:
-                raise InputError(self.name, name, float(np.abs(values).max()), "must be numbers from 0 to "
-                                 f"{LARGEST_FRICTION:g}")  # fmt: skip
+                raise InputError(
+                    self.name, name, float(np.abs(values).max()), f"must be numbers from 0 to {LARGEST_FRICTION:g}"
+                )
         if self.mu_x[:, :, 0].any():
             raise InputError(self.name, "mu_x", float(self.mu_x[:, :, 0].max()), "must be 0 at slip 0")
         if self.h[0].any():
@@ -73,15 +74,22 @@ class TyreTable:
         """Both together not above the largest mu_x or mu_y: linear in slip and load, so only angles lie between."""
         peak = max(self.mu_x.max(), (self.g[:, None, :] * self.h[:, :, None]).max())
         for share in (0.0, 0.25, 0.5, 0.75) if self.angles.size > 1 else (0.0,):
-            x, g, h = (values + share * np.diff(values, axis=0, append=values[-1:]) for values in
-                       (self.mu_x, self.g, self.h))  # fmt: skip
+            x, g, h = (
+                values + share * np.diff(values, axis=0, append=values[-1:]) for values in (self.mu_x, self.g, self.h)
+            )
             total = np.hypot(x, g[:, None, :] * h[:, :, None])
             if total.max() > peak * (1.0 + ROUNDED):
                 i, j, k = np.unravel_index(total.argmax(), total.shape)
-                place = (f"slip angle {np.rad2deg(self.angles[i]):.4g} deg, load {self.loads[j]:g} N, slip "
-                         f"{self.slips[k]:g}")  # fmt: skip
-                raise InputError(self.name, place, float(total[i, j, k]), "both together must not be above the largest "
-                                 f"of either alone, {peak:.6g}, by more than {ROUNDED:.0%}")  # fmt: skip
+                place = (
+                    f"slip angle {np.rad2deg(self.angles[i]):.4g} deg, load {self.loads[j]:g} N, slip {self.slips[k]:g}"
+                )
+                raise InputError(
+                    self.name,
+                    place,
+                    float(total[i, j, k]),
+                    "both together must not be above the largest "
+                    f"of either alone, {peak:.6g}, by more than {ROUNDED:.0%}",
+                )
 
     @property
     def cornering(self) -> float:

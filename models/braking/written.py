@@ -25,8 +25,9 @@ class Turned(NamedTuple):
     time: float
 
 
-def turned(vehicle: Truck, tyre: TyreTable, steer: float, torques: tuple[float, float], speed: float, until: float) -> (
-        Turned):  # fmt: skip
+def turned(
+    vehicle: Truck, tyre: TyreTable, steer: float, torques: tuple[float, float], speed: float, until: float
+) -> Turned:
     """From steady rolling at a speed to another one (m/s), front wheels steered (rad), torques of the axles (N m).
 
     The tyre's friction must not depend on the load. Raises RunFailed if the vehicle does not slow down in 200 s.

@@ -51,8 +51,14 @@ class Answer:
         if name not in self.quantities and word in SCALARS and path is not None and not path.sampled:
             return Quantity(path.unit, tuple(np.array([SCALARS[word](one)]) for one in path.cases))
         if name not in self.quantities:
-            raise InputError(file, "quantities", name, "no such quantity in this scene, whose own are, each also with "
-                             "'rms' or 'max' before it if it is a path", tuple(self.quantities))  # fmt: skip
+            raise InputError(
+                file,
+                "quantities",
+                name,
+                "no such quantity in this scene, whose own are, each also with "
+                "'rms' or 'max' before it if it is a path",
+                tuple(self.quantities),
+            )
         return self.quantities[name]
 
 
@@ -67,8 +73,12 @@ def sizes(full: Sequence[np.ndarray]) -> np.ndarray:
 
 def rounding(answer: Answer, unit: str) -> float:
     """Size up to which a quantity of a unit does not move, but for rounding."""
-    alike = [np.sqrt(case.max()) if one.sampled else abs(case).max(initial=0.0)
-             for one in answer.quantities.values() if one.unit == unit for case in one.cases]  # fmt: skip
+    alike = [
+        np.sqrt(case.max()) if one.sampled else abs(case).max(initial=0.0)
+        for one in answer.quantities.values()
+        if one.unit == unit
+        for case in one.cases
+    ]
     return max(NOTHING, ROUNDING * float(max(alike, default=0.0)))
 
 
@@ -102,8 +112,13 @@ def less(one: Cases, full: Cases) -> Cases:
     for a, b in zip(one, full, strict=True):
         few, many = sorted((len(a), len(b)))
         if few != many and (few < 2 or (many - 1) % (few - 1)):
-            raise InputError("", "quantities", None, "paths of runs that end by themselves cannot be compared: ask for "
-                             "'rms' or 'max' of them, or for another number")  # fmt: skip
+            raise InputError(
+                "",
+                "quantities",
+                None,
+                "paths of runs that end by themselves cannot be compared: ask for "
+                "'rms' or 'max' of them, or for another number",
+            )
         every = [(len(path) - 1) // max(few - 1, 1) or 1 for path in (a, b)]
         found.append(a[:: every[0]] - b[:: every[1]])
     return tuple(found)

@@ -78,8 +78,15 @@ class Chooser:
 
     progress(share) is told the share that is spent of the runs that the search may take."""
 
-    def __init__(self, scene: Any, engine: str, quantities: list[str], tolerance: float, window: float = WINDOW,
-                 progress: Callable[[float], None] = lambda share: None) -> None:  # fmt: skip
+    def __init__(
+        self,
+        scene: Any,
+        engine: str,
+        quantities: list[str],
+        tolerance: float,
+        window: float = WINDOW,
+        progress: Callable[[float], None] = lambda share: None,
+    ) -> None:
         self.tolerance, self.progress = tolerance, progress
         self.whole = Screen(Variants(scene, engine), quantities)
         self.alike = self.whole.sampled == set(quantities)
@@ -198,22 +205,42 @@ class Chooser:
         """The choice; InputError where nothing was found by which it could be better, for chance alone."""
         if not choice.more or choice.left_out or choice.times > 1:
             return choice
-        raise InputError(self.whole.variants.scene.file, "tolerance", self.tolerance, "is too fine for so few samples: "
-                         "what could go changes the quantities by less, but by chance it may be more; about "
-                         f"{choice.more:.2g} times as many samples would tell")  # fmt: skip
+        raise InputError(
+            self.whole.variants.scene.file,
+            "tolerance",
+            self.tolerance,
+            "is too fine for so few samples: "
+            "what could go changes the quantities by less, but by chance it may be more; about "
+            f"{choice.more:.2g} times as many samples would tell",
+        )
 
     def _choice(self, chosen: Set) -> Choice:
         times, found, chance = self._confirmed[chosen]
         whole = self.whole.variants
         shown = [(frozenset[str](), 1), (frozenset[str](), self._confirmed[frozenset()][0]), (chosen, times)]
         runs = [run for key in shown if (run := whole.of(*key)) is not None]
-        seconds = [run.counts["calls"] * self.screen.variants.per_call(left_out)
-                   for run, (left_out, _) in zip(runs, shown, strict=True)]  # fmt: skip
+        seconds = [
+            run.counts["calls"] * self.screen.variants.per_call(left_out)
+            for run, (left_out, _) in zip(runs, shown, strict=True)
+        ]
         calls = [run.counts["calls"] for run in runs]
         told, rest = self.told(chosen, times), self.teller.remainder(chosen)
-        return Choice(self.effects, tuple(sorted(chosen)), times, told, rest, found, chance,
-                      self.holds(found + chance), tuple(calls), tuple(seconds), self.rounds, self._spent(),
-                      min(self._doubtful, default=0.0), self.ended)  # fmt: skip
+        return Choice(
+            self.effects,
+            tuple(sorted(chosen)),
+            times,
+            told,
+            rest,
+            found,
+            chance,
+            self.holds(found + chance),
+            tuple(calls),
+            tuple(seconds),
+            self.rounds,
+            self._spent(),
+            min(self._doubtful, default=0.0),
+            self.ended,
+        )
 
     def _spent(self) -> int:
         """Calls of all runs so far."""
@@ -266,8 +293,9 @@ class Chooser:
             alone = {one: self.share(frozenset([one])) for one in self.effects}
             pairs = [pair for pair in combinations(self.effects, 2) if max(alone[one] for one in pair) > BUDGET]
             pairs.sort(key=lambda pair: sum(alone[one] for one in pair))
-            self._pairs = [frozenset(pair) for pair in pairs
-                           if not self._exhausted() and self.share(frozenset(pair)) <= BUDGET]
+            self._pairs = [
+                frozenset(pair) for pair in pairs if not self._exhausted() and self.share(frozenset(pair)) <= BUDGET
+            ]
         return self._pairs
 
     def _next(self, chosen: Set, banned: set[Set], steps: list[Set]) -> Set:
@@ -284,5 +312,3 @@ class Chooser:
             if score > most:
                 best, most = step - chosen, score
         return best
-
-

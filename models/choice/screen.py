@@ -34,8 +34,12 @@ class Screen:
         self.sampled = {name for name, one in found.items() if one.sampled}
         for name, size in self.sizes.items():
             if not (np.isfinite(size).all() and (size > rounding(full, found[name].unit)).any()):
-                raise InputError(variants.scene.file, f"quantities.{name}", None, "does not move in this scene, so "
-                                 "that there is nothing to hold it to")  # fmt: skip
+                raise InputError(
+                    variants.scene.file,
+                    f"quantities.{name}",
+                    None,
+                    "does not move in this scene, so that there is nothing to hold it to",
+                )
         for name in self.sampled:
             self._check_samples(name)
 
@@ -44,8 +48,13 @@ class Screen:
         share = max(float(case.max() / case.sum()) for case in self.full[name])
         if share > FEW:
             m = len(self.full[name][0])
-            raise InputError(self.variants.scene.file, f"quantities.{name}", None, f"is made up to {100 * share:.0f} % "
-                             f"by one sample of {m}, so that chance decides: ask for more or longer ones")  # fmt: skip
+            raise InputError(
+                self.variants.scene.file,
+                f"quantities.{name}",
+                None,
+                f"is made up to {100 * share:.0f} % "
+                f"by one sample of {m}, so that chance decides: ask for more or longer ones",
+            )
 
     def between(self, one: Answer | None, other: Answer | None) -> dict[str, Cases] | None:
         """Differences of two runs, quantity by quantity; None where one of them is missing."""
@@ -62,15 +71,22 @@ class Screen:
         """Relative changes (quantities,); infinite where there is none."""
         if change is None:
             return np.full(len(self.quantities), np.inf)
-        return np.array([by_chance(change[name], self.full[name])[0] if name in self.sampled
-                         else relative(change[name], self.sizes[name]) for name in self.quantities])  # fmt: skip
+        return np.array(
+            [
+                by_chance(change[name], self.full[name])[0]
+                if name in self.sampled
+                else relative(change[name], self.sizes[name])
+                for name in self.quantities
+            ]
+        )
 
     def chance(self, change: dict[str, Cases] | None) -> np.ndarray:
         """What chance may add to these (quantities,): nothing where a quantity is no mean of samples."""
         if change is None:
             return np.zeros(len(self.quantities))
-        return np.array([by_chance(change[name], self.full[name])[1] if name in self.sampled else 0.0
-                         for name in self.quantities])  # fmt: skip
+        return np.array(
+            [by_chance(change[name], self.full[name])[1] if name in self.sampled else 0.0 for name in self.quantities]
+        )
 
     def alone(self, effect: str) -> dict[str, Cases] | None:
         """d of an effect."""

@@ -27,9 +27,14 @@ def system_of(scene: Any) -> ModuleType:
     folder = Path(__file__).parent / "systems"
     names = {path.stem.replace("_", "-"): path.stem for path in sorted(folder.glob("*.py")) if path.stem != "__init__"}
     if scene.system not in names:
-        raise InputError(scene.file, "system", scene.system, "has no runs in time that effects could be priced or "
-                         "chosen by: linear scenes of ride have closed forms, and scenes of these systems have runs",
-                         tuple(names))  # fmt: skip
+        raise InputError(
+            scene.file,
+            "system",
+            scene.system,
+            "has no runs in time that effects could be priced or "
+            "chosen by: linear scenes of ride have closed forms, and scenes of these systems have runs",
+            tuple(names),
+        )
     return import_module(f"models.choice.systems.{names[scene.system]}")
 
 

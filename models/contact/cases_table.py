@@ -11,15 +11,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from models.contact.accuracy import (
-    band,
-    cells_error,
-    halved,
-    moment_band,
-    slenderness,
-    spin_share,
-    used_with_moment,
-)
+from models.contact.accuracy import band, cells_error, halved, moment_band, slenderness, spin_share, used_with_moment
 from models.contact.built import Built
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_load
@@ -33,8 +25,19 @@ from models.whole_files import whole_file
 MOTION = {"load": NEWTONS, "friction": SHARES, "xi_x": SHARES, "xi_y": SHARES, "spin": PER_METRE}
 BY_AXES = {"a": METRES, "b": METRES, **MOTION}
 BY_CURVATURES = {"A": PER_METRE, "B": PER_METRE, **MOTION}
-HEADER = ("line [-]", "fx [N]", "fy [N]", "mz [N m]", "stick [-]", "dissipation [N]", "error_of_cells [N]",
-          "error_of_theory [N]", "moment_error_of_cells [N m]", "moment_error_of_theory [N m]", "status")  # fmt: skip
+HEADER = (
+    "line [-]",
+    "fx [N]",
+    "fy [N]",
+    "mz [N m]",
+    "stick [-]",
+    "dissipation [N]",
+    "error_of_cells [N]",
+    "error_of_theory [N]",
+    "moment_error_of_cells [N m]",
+    "moment_error_of_theory [N m]",
+    "status",
+)
 ANSWERS = 9
 """Columns of numbers behind the line."""
 Progress = Callable[[int], None]
@@ -42,8 +45,14 @@ Extend = Callable[[Built], Built]
 """What the effects of a scene make of the rows of a block."""
 
 
-def answer(path: Path, out: Path, pair: Pair, method: Method, progress: Progress = lambda rows: None,
-           extend: Extend = lambda built: built) -> dict[str, int]:  # fmt: skip
+def answer(
+    path: Path,
+    out: Path,
+    pair: Pair,
+    method: Method,
+    progress: Progress = lambda rows: None,
+    extend: Extend = lambda built: built,
+) -> dict[str, int]:
     """Answer the table at ``path`` into ``out``; returns how many rows there are and how many were wrong.
 
     Raises InputError for a file or a header that cannot be used; a wrong row gets a status and stops nothing.
@@ -86,8 +95,9 @@ def _answered(block: Block, pair: Pair, method: Method, extend: Extend) -> tuple
     return found, wrong
 
 
-def _sound(values: dict[str, np.ndarray], solve: Callable[[dict[str, Any]], np.ndarray]
-           ) -> tuple[np.ndarray, dict[int, str]]:  # fmt: skip
+def _sound(
+    values: dict[str, np.ndarray], solve: Callable[[dict[str, Any]], np.ndarray]
+) -> tuple[np.ndarray, dict[int, str]]:
     """Answers of all rows; rows that are refused are found by halving, and the others answered without them."""
     count = len(next(iter(values.values())))
     if count == 0:
@@ -116,19 +126,27 @@ def _forces(values: dict[str, Any], pair: Pair, method: Method, extend: Extend) 
     else:
         a, b = values["a"], values["b"]
     choices: dict[str, Any] = method.model_dump(include={"march", "bound", "flexibilities"})
-    fine, coarse = (fastsim(a, b, load, friction, xi_x, xi_y, spin, pair, cells=n, **choices)
-                    for n in (method.cells, halved(method.cells)))  # fmt: skip
+    fine, coarse = (
+        fastsim(a, b, load, friction, xi_x, xi_y, spin, pair, cells=n, **choices)
+        for n in (method.cells, halved(method.cells))
+    )
     limit = friction * np.maximum(load, 0.0)
     a, b = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
     most, share = limit * np.maximum(a, b), spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu)
-    relative, other = (np.divide([one.fx, one.fy, one.mz], [limit, limit, most], out=np.zeros((3, limit.size)),
-                                 where=limit > 0) for one in (fine, coarse))  # fmt: skip
+    relative, other = (
+        np.divide([one.fx, one.fy, one.mz], [limit, limit, most], out=np.zeros((3, limit.size)), where=limit > 0)
+        for one in (fine, coarse)
+    )
     left = cells_error(relative, other, method.cells, method.order)
     used, wider = np.hypot(relative[0], relative[1]), slenderness(a, b)
     theory = wider * limit * band(method.band, used, share)
     moment = wider * most * moment_band(method.band, used_with_moment(used, relative[2]), share)
-    return np.column_stack([fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation, limit * left, theory, most * left,
-                            moment]) + 0.0  # fmt: skip
+    return (
+        np.column_stack(
+            [fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation, limit * left, theory, most * left, moment]
+        )
+        + 0.0
+    )
 
 
 def _write(file: TextIO, block: Block, found: np.ndarray, wrong: dict[int, str]) -> None:

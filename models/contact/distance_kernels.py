@@ -86,8 +86,11 @@ def least_of_row(row):
     least, where = np.inf, 0.0
     for i in range(row.size - 3):
         a, b, c, d = row[i], row[i + 1], row[i + 2], row[i + 3]
-        for t in (0.0, lowest((-a + 3.0 * b - 3.0 * c + d) / 2.0, (2.0 * a - 5.0 * b + 4.0 * c - d) / 2.0,
-                              (c - a) / 2.0), 1.0):  # fmt: skip
+        for t in (
+            0.0,
+            lowest((-a + 3.0 * b - 3.0 * c + d) / 2.0, (2.0 * a - 5.0 * b + 4.0 * c - d) / 2.0, (c - a) / 2.0),
+            1.0,
+        ):
             w, _ = weights(t)
             value = w[0] * a + w[1] * b + w[2] * c + w[3] * d
             if value < least:

@@ -14,8 +14,9 @@ from models.strict import Strict
 class Falling(Strict):
     """[falling_friction]: ``Falling(floor=0.4, decay=0.6, speed=20.0)``."""
 
-    floor: float = Field(gt=0.0, le=1.0, description="friction at endless slip by that at none",
-                         json_schema_extra={"unit": ""})  # fmt: skip
+    floor: float = Field(
+        gt=0.0, le=1.0, description="friction at endless slip by that at none", json_schema_extra={"unit": ""}
+    )
     decay: float = Field(ge=0.0, le=1e6, description="of the exponential", json_schema_extra={"unit": "s/m"})
     speed: float = Field(ge=0.0, le=1e4, description="rolling speed", json_schema_extra={"unit": "m/s"})
 

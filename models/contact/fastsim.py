@@ -63,9 +63,22 @@ class Creep:
     wear_number: Array
 
 
-def fastsim(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair, *, cells: int = 21,
-            bound: Bound = "intermediate", flexibilities: Flexibilities = "blended", march: March = "second-order",
-            falling: Falling | None = None) -> Creep:  # fmt: skip
+def fastsim(
+    a: Any,
+    b: Any,
+    load: Any,
+    mu: Any,
+    xi_x: Any,
+    xi_y: Any,
+    spin: Any,
+    pair: Pair,
+    *,
+    cells: int = 21,
+    bound: Bound = "intermediate",
+    flexibilities: Flexibilities = "blended",
+    march: March = "second-order",
+    falling: Falling | None = None,
+) -> Creep:
     """Creep forces on one ellipse or on many.
 
     Parameters
@@ -108,18 +121,34 @@ class Ellipse:
     plain numbers, in microseconds; ratio = a/b. Options are those of ``fastsim``. Raises InputError.
     """
 
-    def __init__(self, ratio: float, pair: Pair, *, cells: int = 21, bound: Bound = "intermediate",
-                 flexibilities: Flexibilities = "blended", march: March = "second-order") -> None:  # fmt: skip
+    def __init__(
+        self,
+        ratio: float,
+        pair: Pair,
+        *,
+        cells: int = 21,
+        bound: Bound = "intermediate",
+        flexibilities: Flexibilities = "blended",
+        march: March = "second-order",
+    ) -> None:
         check_choices(cells, bound, flexibilities, march)
         self.ratio = number("ratio", ratio, "a ratio a/b of semi-axes from 1e-6 to 1e6", 1e-6, 1e6)
         self.net: Grid = grid(cells, int(strips_of(np.array(self.ratio), cells)), bound)
         unit = 1e-3
         self._unit = tuple(float(value) / unit for value in linear_flexibilities(unit, unit / self.ratio, pair))
-        self._fixed = (1.0 / self.ratio, *self._unit, self.net.strips, self.net.cells, self.net.middle,
-                       KINDS[flexibilities], MARCHES[march])  # fmt: skip
+        self._fixed = (
+            1.0 / self.ratio,
+            *self._unit,
+            self.net.strips,
+            self.net.cells,
+            self.net.middle,
+            KINDS[flexibilities],
+            MARCHES[march],
+        )
 
-    def __call__(self, a: float, load: float, mu: float, xi_x: float, xi_y: float, spin: float
-                 ) -> tuple[float, float, float]:  # fmt: skip
+    def __call__(
+        self, a: float, load: float, mu: float, xi_x: float, xi_y: float, spin: float
+    ) -> tuple[float, float, float]:
         """Forces and moment; a : semi-axis along the direction of rolling (m)."""
         given = (a, load, mu, xi_x, xi_y, spin)
         try:
@@ -137,8 +166,11 @@ class Ellipse:
 def check_choices(cells: int, bound: str, flexibilities: str, march: str) -> None:
     """Raise InputError for an option that is not one."""
     whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
-    for name, value, known in (("bound", bound, tuple(POWERS)), ("march", march, tuple(MARCHES)),
-                               ("flexibilities", flexibilities, tuple(KINDS))):  # fmt: skip
+    for name, value, known in (
+        ("bound", bound, tuple(POWERS)),
+        ("march", march, tuple(MARCHES)),
+        ("flexibilities", flexibilities, tuple(KINDS)),
+    ):
         if value not in known:
             raise InputError("", name, value, "is not known", known)
 
@@ -149,8 +181,9 @@ def require_second_order(march: str) -> None:
         raise InputError("", "march", march, "must be second-order where friction falls with the speed of slip")
 
 
-def contacts_of(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair
-             ) -> tuple[Array, tuple[int, ...]]:  # fmt: skip
+def contacts_of(
+    a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair
+) -> tuple[Array, tuple[int, ...]]:
     """The contacts (n, 10) as the kernels read them, and the shape they had; those without load have axes of 0.1 m."""
     axes = {name: quantity(name, value, "a semi-axis in m, zero or more", 0.0) for name, value in (("a", a), ("b", b))}
     given = together(

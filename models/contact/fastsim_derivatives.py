@@ -55,9 +55,21 @@ class Derivatives:
     slopes: Array
 
 
-def derivatives(a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair, *, cells: int = 21,
-                bound: Bound = "intermediate", flexibilities: Flexibilities = "blended", growing: bool = True
-                ) -> Derivatives:  # fmt: skip
+def derivatives(
+    a: Any,
+    b: Any,
+    load: Any,
+    mu: Any,
+    xi_x: Any,
+    xi_y: Any,
+    spin: Any,
+    pair: Pair,
+    *,
+    cells: int = 21,
+    bound: Bound = "intermediate",
+    flexibilities: Flexibilities = "blended",
+    growing: bool = True,
+) -> Derivatives:
     """Derivatives of the forces of ``fastsim`` with the second-order march; the same parameters and errors.
 
     growing : whether the semi-axes grow with the load, as its cube root (Hertz, bodies of given shape), or stay

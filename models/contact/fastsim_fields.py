@@ -23,9 +23,22 @@ from models.contact.material import Pair
 from models.errors import InputError
 
 
-def fastsim_fields(a: float, b: float, load: float, mu: float, xi_x: float, xi_y: float, spin: float, pair: Pair, *,
-                   cells: int = 21, bound: Bound = "intermediate", flexibilities: Flexibilities = "blended",
-                   march: March = "second-order", falling: Falling | None = None) -> Fields:  # fmt: skip
+def fastsim_fields(
+    a: float,
+    b: float,
+    load: float,
+    mu: float,
+    xi_x: float,
+    xi_y: float,
+    spin: float,
+    pair: Pair,
+    *,
+    cells: int = 21,
+    bound: Bound = "intermediate",
+    flexibilities: Flexibilities = "blended",
+    march: March = "second-order",
+    falling: Falling | None = None,
+) -> Fields:
     """Pressure, traction and slip of one ellipse, plain numbers, as ``fastsim`` marches them.
 
     Arrays of the shape (strips, cells in a strip), each strip from its leading edge back. The pressure is that of the
@@ -53,9 +66,17 @@ def fastsim_fields(a: float, b: float, load: float, mu: float, xi_x: float, xi_y
     peak = max(load, 0.0) * net.middle / (contact[A] * contact[B]) * half / spread
     scale, shape = mu * peak, (y.size, cells)
     whole = np.ones(shape)
-    return Fields(contact[A] * half * net.cells[CENTRE], contact[B] * y * whole, 2 * contact[A] * half / cells * whole,
-                  2 * contact[B] / y.size * whole, peak * net.cells[BOUND], scale * relative[0], scale * relative[1],
-                  relative[2] > 0, whole * peak > 0)  # fmt: skip
+    return Fields(
+        contact[A] * half * net.cells[CENTRE],
+        contact[B] * y * whole,
+        2 * contact[A] * half / cells * whole,
+        2 * contact[B] / y.size * whole,
+        peak * net.cells[BOUND],
+        scale * relative[0],
+        scale * relative[1],
+        relative[2] > 0,
+        whole * peak > 0,
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -71,6 +92,15 @@ def _strip(own: Any, strip: Any, cells: Any, slip: Any, march: int, found: Any) 
         elif i == 0:
             x, y, slips = cut(-0.5 * u, -0.5 * (v0 + v1 * cells[MIDDLE, 0]), cells[BOUND, 0])
         else:
-            x, y, slips = advance(x, y, slips, u, v0 + v1 * cells[MIDDLE, i], -2.0 / cells.shape[1] * v1,
-                                  cells[BOUND, i], cells[BEFORE, i], cells[RATE, i])  # fmt: skip
+            x, y, slips = advance(
+                x,
+                y,
+                slips,
+                u,
+                v0 + v1 * cells[MIDDLE, i],
+                -2.0 / cells.shape[1] * v1,
+                cells[BOUND, i],
+                cells[BEFORE, i],
+                cells[RATE, i],
+            )
         found[0, i], found[1, i], found[2, i] = x, y, slips

@@ -132,9 +132,12 @@ def blend(contact, bound, kind):
     whole = grown + slides**3
     left = math.exp(-whole)
     steep, more = left * GROWTH * grown / square, left * 6.0 * slides**2 * level
-    return (-math.expm1(-whole), of_x * x * (steep * OF_X**2 + more / SLIDING),
-            of_y * (steep * (y + AGAINST * turns * z) + more * y / SLIDING),
-            of_z * (steep * turns * (turns * z + AGAINST * y) - more * slides * z))  # fmt: skip
+    return (
+        -math.expm1(-whole),
+        of_x * x * (steep * OF_X**2 + more / SLIDING),
+        of_y * (steep * (y + AGAINST * turns * z) + more * y / SLIDING),
+        of_z * (steep * turns * (turns * z + AGAINST * y) - more * slides * z),
+    )
 
 
 @lean

@@ -31,15 +31,18 @@ def influence(x: np.ndarray, y: np.ndarray, dx: float, dy: float, pair: "Pair") 
     """
     primitives = sum(
         sign_x * sign_y * _primitives(x + sign_x * dx / 2, y + sign_y * dy / 2)
-        for sign_x in (1, -1) for sign_y in (1, -1)
-    )  # fmt: skip
+        for sign_x in (1, -1)
+        for sign_y in (1, -1)
+    )
     x_part, y_part, cross, x_slope, y_slope = np.moveaxis(np.asarray(primitives), -1, 0)
     nu, mismatch = pair.nu, pair.mismatch
-    numbers = np.array([
-        [(1 - nu) * x_part + y_part, nu * cross, -mismatch * x_slope],
-        [nu * cross, x_part + (1 - nu) * y_part, -mismatch * y_slope],
-        [mismatch * x_slope, mismatch * y_slope, (1 - nu) * (x_part + y_part)],
-    ]) / (np.pi * pair.G)  # fmt: skip
+    numbers = np.array(
+        [
+            [(1 - nu) * x_part + y_part, nu * cross, -mismatch * x_slope],
+            [nu * cross, x_part + (1 - nu) * y_part, -mismatch * y_slope],
+            [mismatch * x_slope, mismatch * y_slope, (1 - nu) * (x_part + y_part)],
+        ]
+    ) / (np.pi * pair.G)
     return np.moveaxis(numbers, (0, 1), (-2, -1))
 
 

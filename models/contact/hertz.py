@@ -83,8 +83,10 @@ def by_axes(a: float, b: float, pair: Pair, *, load: float | None = None, approa
     The curvatures follow from both: the same axes under twice the load are those of bodies curved twice as much.
     Raises InputError as ``by_load`` does.
     """
-    a, b = (float(quantity(name, value, "a semi-axis in m, above 0", LEAST_AXIS, LARGEST_AXIS))
-            for name, value in (("a", a), ("b", b)))  # fmt: skip
+    a, b = (
+        float(quantity(name, value, "a semi-axis in m, above 0", LEAST_AXIS, LARGEST_AXIS))
+        for name, value in (("a", a), ("b", b))
+    )
     if (load is None) == (approach is None):
         raise InputError("", "load", load, "give either the load (N) or the approach (m)")
     short, g = min(a, b), min(a, b) / max(a, b)
@@ -100,18 +102,26 @@ def by_axes(a: float, b: float, pair: Pair, *, load: float | None = None, approa
 
 def _curvatures(A: Any, B: Any) -> dict[str, Array]:
     """Both curvatures as arrays; raises InputError where they are none of a Hertzian contact."""
-    found = {name: quantity(name, value, "a curvature in 1/m, at most 1e12", most=1e12)
-             for name, value in (("A", A), ("B", B))}  # fmt: skip
+    found = {
+        name: quantity(name, value, "a curvature in 1/m, at most 1e12", most=1e12)
+        for name, value in (("A", A), ("B", B))
+    }
     for name, value in found.items():
         if (value <= 0.0).any():
-            raise InputError("", name, float(value.min()), "must be above 0: bodies that are flat to each other in one "
-                             "direction, conform or interpenetrate do not touch on an ellipse; compute them as "
-                             "non-Hertzian contact")  # fmt: skip
+            raise InputError(
+                "",
+                name,
+                float(value.min()),
+                "must be above 0: bodies that are flat to each other in one "
+                "direction, conform or interpenetrate do not touch on an ellipse; compute them as "
+                "non-Hertzian contact",
+            )
     A, B = together(**found)
     flattest = float(np.maximum(A, B).min(initial=np.inf))
     if flattest < FLATTEST:
-        raise InputError("", "A, B", flattest, f"the larger of both must be {FLATTEST:g} 1/m or more; radii are in m, "
-                         "not in mm")  # fmt: skip
+        raise InputError(
+            "", "A, B", flattest, f"the larger of both must be {FLATTEST:g} 1/m or more; radii are in m, not in mm"
+        )
     return found
 
 

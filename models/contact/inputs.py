@@ -58,9 +58,11 @@ def whole_number(name: str, value: Any, least: int, most: int) -> int:
 def creepages(xi_x: Any, xi_y: Any, spin: Any, read: Callable[..., Any] = quantity) -> dict[str, Any]:
     """Creepages and spin (1/m) by their names, each read by ``quantity`` or by ``number``."""
     allowed, turn = f"a creepage within +-{LARGEST_CREEPAGE:g}", f"a spin in 1/m within +-{LARGEST_SPIN:g}"
-    return {"xi_x": read("xi_x", xi_x, allowed, -LARGEST_CREEPAGE, LARGEST_CREEPAGE),
-            "xi_y": read("xi_y", xi_y, allowed, -LARGEST_CREEPAGE, LARGEST_CREEPAGE),
-            "spin": read("spin", spin, turn, -LARGEST_SPIN, LARGEST_SPIN)}  # fmt: skip
+    return {
+        "xi_x": read("xi_x", xi_x, allowed, -LARGEST_CREEPAGE, LARGEST_CREEPAGE),
+        "xi_y": read("xi_y", xi_y, allowed, -LARGEST_CREEPAGE, LARGEST_CREEPAGE),
+        "spin": read("spin", spin, turn, -LARGEST_SPIN, LARGEST_SPIN),
+    }
 
 
 def together(**arrays: Array) -> tuple[Array, ...]:

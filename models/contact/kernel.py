@@ -70,8 +70,9 @@ def net(cells: int) -> Array:
     Narrow ellipses have more strips: there is one net for every number of strips that may be asked for.
     """
     if isinstance(cells, bool) or not isinstance(cells, int) or not (cells == 0 or LEAST_CELLS <= cells <= MOST_CELLS):
-        raise InputError("", "cells", cells, f"must be a whole number from {LEAST_CELLS} to {MOST_CELLS}, or 0 for the "
-                         "linear theory")  # fmt: skip
+        raise InputError(
+            "", "cells", cells, f"must be a whole number from {LEAST_CELLS} to {MOST_CELLS}, or 0 for the linear theory"
+        )
     parts, counts = [], range(0)
     if cells:
         counts = range(int(strips_of(np.array(1.0), cells)), int(strips_of(np.array(1e-9), cells)) + 2, 2)
@@ -124,10 +125,15 @@ def _status(given, own, any_shape):
     else:  # without a load the axes may be none
         shaped = (small >= LEAST_AXIS or own[PRESSING] <= 0.0) and small >= 0.0 and large <= LARGEST_AXIS
     plausible = (
-        shaped and own[PRESSING] <= most and 0.0 <= own[FRICTION] <= LARGEST_FRICTION
-        and abs(own[CREEP_X]) <= LARGEST_CREEPAGE and abs(own[CREEP_Y]) <= LARGEST_CREEPAGE
-        and abs(own[TURNING]) <= LARGEST_SPIN and own[MODULUS] > 0.0 and 0.0 <= own[POISSON] <= 0.5
-    )  # fmt: skip
+        shaped
+        and own[PRESSING] <= most
+        and 0.0 <= own[FRICTION] <= LARGEST_FRICTION
+        and abs(own[CREEP_X]) <= LARGEST_CREEPAGE
+        and abs(own[CREEP_Y]) <= LARGEST_CREEPAGE
+        and abs(own[TURNING]) <= LARGEST_SPIN
+        and own[MODULUS] > 0.0
+        and 0.0 <= own[POISSON] <= 0.5
+    )
     return FINE if plausible else NOT_PLAUSIBLE
 
 

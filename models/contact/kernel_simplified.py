@@ -74,9 +74,23 @@ def table(distance: Distance, cells: int = 21, options: Options = PLAIN) -> Arra
         raise InputError("", "distance", None, f"has {len(patches)} valleys: the compiled theory takes one patch")
     (patch,) = patches
     (x, root_x), (y, root_y) = patch.lines
-    head = [-cells, _law().address, options.net, SHAPES[options.shape], FITS[options.fit], patch.low, patch.edge,
-            distance.x[0], distance.y[0], distance.dx, distance.dy, *patch.bottom[:2],
-            x.size, y.size, *distance.padded.shape]  # fmt: skip
+    head = [
+        -cells,
+        _law().address,
+        options.net,
+        SHAPES[options.shape],
+        FITS[options.fit],
+        patch.low,
+        patch.edge,
+        distance.x[0],
+        distance.y[0],
+        distance.dx,
+        distance.dy,
+        *patch.bottom[:2],
+        x.size,
+        y.size,
+        *distance.padded.shape,
+    ]
     made = np.concatenate((head, x, root_x, y, root_y, distance.padded.ravel()), dtype=float)
     made.setflags(write=False)
     return made
@@ -100,8 +114,18 @@ def fit_at(numbers, depth, modulus):
     head = carray(numbers, (_HEAD,))
     after = _HEAD + 2 * int(head[_LINES_X] + head[_LINES_Y])
     padded = carray(beyond(numbers, after), (int(head[_ROWS]), int(head[_COLUMNS])))
-    return crude_fit(padded, (head[_X], head[_Y]), (head[_DX], head[_DY]), box_at(numbers, head, depth), depth,
-                     head[_LOW], int(head[_NET]), int(head[_SHAPE]), int(head[_FIT]), modulus)  # fmt: skip
+    return crude_fit(
+        padded,
+        (head[_X], head[_Y]),
+        (head[_DX], head[_DY]),
+        box_at(numbers, head, depth),
+        depth,
+        head[_LOW],
+        int(head[_NET]),
+        int(head[_SHAPE]),
+        int(head[_FIT]),
+        modulus,
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -180,8 +204,19 @@ def _roll(own, numbers, head, depth, stiffness, load, out):
             u = tangential(crude, dx, dy, own[POISSON]) / (math.pi * shear)
             fitted = tangential_fit(u, crude, cover, dx, dy, int(head[_FIT]))
             flexibility = fitted if fitted > 0.0 else flexibility
-        fx, fy, mz, stuck, area = march(y, low_x, high_x, width, pressure, own[FRICTION], flexibility, own[CREEP_X],
-                                        own[CREEP_Y], own[TURNING], traction)  # fmt: skip
+        fx, fy, mz, stuck, area = march(
+            y,
+            low_x,
+            high_x,
+            width,
+            pressure,
+            own[FRICTION],
+            flexibility,
+            own[CREEP_X],
+            own[CREEP_Y],
+            own[TURNING],
+            traction,
+        )
     out[FX], out[FY], out[MZ], out[STICK] = fx, fy, mz, stuck / area
     out[AXIS_A], out[AXIS_B] = 0.5 * (box[1] - box[0]), 0.5 * (box[3] - box[2])
     out[NORMAL], out[APPROACH] = load, own[PRESSING]

@@ -22,8 +22,9 @@ def solve(apply: Map, precondition: Map, wanted: np.ndarray, tolerance: float, m
     left = np.append(size, np.zeros(most))
     basis[0] = wanted / size
     for count in range(1, most + 1):
-        triangle[:count, count - 1] = _turned(_orthogonalise(basis, count, apply(precondition(basis[count - 1]))),
-                                              turns, left)  # fmt: skip
+        triangle[:count, count - 1] = _turned(
+            _orthogonalise(basis, count, apply(precondition(basis[count - 1]))), turns, left
+        )
         if abs(left[count]) <= tolerance * size:
             return precondition(np.linalg.solve(triangle[:count, :count], left[:count]) @ basis[:count])
     raise RunFailed("linear solver", f"residual {abs(left[most]) / size:.2g} after {most} products")

@@ -88,6 +88,11 @@ class Pair:
     def require_likeness(self) -> None:
         """Raise InputError for a pair too unlike to leave K out where there is friction (see LARGEST_MISMATCH)."""
         if abs(self.mismatch) > LARGEST_MISMATCH:
-            raise InputError("", "pair", None, f"materials too unlike for a theory that takes them as quasi-identical: "
-                             f"Kalker's K = {self.mismatch:.3g} must be within +-{LARGEST_MISMATCH:g}, or the pressure "
-                             "makes slip of its own")  # fmt: skip
+            raise InputError(
+                "",
+                "pair",
+                None,
+                f"materials too unlike for a theory that takes them as quasi-identical: "
+                f"Kalker's K = {self.mismatch:.3g} must be within +-{LARGEST_MISMATCH:g}, or the pressure "
+                "makes slip of its own",
+            )

@@ -44,8 +44,12 @@ class Pressed:
     def __post_init__(self) -> None:
         shape = (np.size(self.y), np.size(self.x))
         if np.shape(self.pressure) != shape or min(shape) < 2:
-            raise InputError("", "pressure", list(np.shape(self.pressure)),
-                             f"must have the shape (ny, nx) of y and x = {shape}, two cells or more each")
+            raise InputError(
+                "",
+                "pressure",
+                list(np.shape(self.pressure)),
+                f"must have the shape (ny, nx) of y and x = {shape}, two cells or more each",
+            )
         quantity("pressure", self.pressure, "a pressure in Pa, zero or more", 0.0)
         for name, nodes in (("x", self.x), ("y", self.y)):
             steps = np.diff(quantity(name, nodes, "a place in m"))
@@ -99,8 +103,15 @@ def centres(cells: int, step: float) -> np.ndarray:
     return (np.arange(cells) - (cells - 1) / 2) * step
 
 
-def solve_normal(distance: np.ndarray, dx: float, dy: float, pair: "Pair", *, load: float | None = None,
-                 approach: float | None = None) -> NormalSolution:  # fmt: skip
+def solve_normal(
+    distance: np.ndarray,
+    dx: float,
+    dy: float,
+    pair: "Pair",
+    *,
+    load: float | None = None,
+    approach: float | None = None,
+) -> NormalSolution:
     """Pressure and contact area of two bodies pressed together.
 
     Parameters
@@ -148,8 +159,9 @@ def _apart(distance: np.ndarray, x: np.ndarray, y: np.ndarray, approach: float |
     return NormalSolution(np.zeros(distance.shape), x, y, least, distance - least, 0.0, 0)
 
 
-def _conjugate_gradients(distance: np.ndarray, displace: Convolution, load: float | None, approach: float | None,
-                         cell: float) -> tuple[np.ndarray, int]:  # fmt: skip
+def _conjugate_gradients(
+    distance: np.ndarray, displace: Convolution, load: float | None, approach: float | None, cell: float
+) -> tuple[np.ndarray, int]:
     """Pressure (ny, nx) that meets the contact conditions, and the iterations taken."""
     pressure = _start(distance, displace, load, approach, cell)
     direction, square, restart = np.zeros_like(pressure), 1.0, True
@@ -175,8 +187,9 @@ def _conjugate_gradients(distance: np.ndarray, displace: Convolution, load: floa
     raise RunFailed("normal problem", f"contact conditions not met in {MOST_ITERATIONS} iterations")
 
 
-def _start(distance: np.ndarray, displace: Convolution, load: float | None, approach: float | None,
-           cell: float) -> np.ndarray:  # fmt: skip
+def _start(
+    distance: np.ndarray, displace: Convolution, load: float | None, approach: float | None, cell: float
+) -> np.ndarray:
     """A first pressure: even over the grid for a load, proportional to the overlap for an approach."""
     if load is not None:
         return np.full(distance.shape, load / (distance.size * cell))
@@ -190,8 +203,15 @@ def _violation(gap: np.ndarray, contact: np.ndarray, displacement: np.ndarray) -
     return float(max(inside, outside) / displacement.max())
 
 
-def _proved(pressure: np.ndarray, distance: np.ndarray, displace: Convolution, approach: float | None, x: np.ndarray,
-            y: np.ndarray, iterations: int) -> NormalSolution:  # fmt: skip
+def _proved(
+    pressure: np.ndarray,
+    distance: np.ndarray,
+    displace: Convolution,
+    approach: float | None,
+    x: np.ndarray,
+    y: np.ndarray,
+    iterations: int,
+) -> NormalSolution:
     """The solution with its conditions evaluated afresh."""
     contact = pressure > 0
     if contact[[0, -1]].any() or contact[:, [0, -1]].any():

@@ -35,8 +35,12 @@ def contact(scene: ContactScene) -> Contact:
     method, built = scene.method, built_of(scene)
     friction, pair = built.friction, built.pair
     if built.falling is not None and method.name != "fastsim":
-        raise InputError(scene.file, "method.name", method.name, "has constant friction, and an effect of this scene "
-                         "makes it fall: use fastsim")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "method.name",
+            method.name,
+            "has constant friction, and an effect of this scene makes it fall: use fastsim",
+        )
     if scene.profiles is not None:
         places = touches(scene, built)
         pressed = press([touch.patch for touch in places], pair, load=built.load, approach=built.approach)
@@ -70,8 +74,14 @@ def touches(scene: ContactScene, built: Built) -> list[Touch]:
     assert p is not None
     track = Track(gauge=p.gauge, gauge_depth=p.gauge_depth, inclination=p.inclination)
     wheelset = Wheelset(radius=p.radius, back_to_back=p.back_to_back)
-    return wheel_on_rail(built.profiles["wheel"], built.profiles["rail"], lateral_shift=p.lateral_shift, yaw=p.yaw,
-                         track=track, wheelset=wheelset)  # fmt: skip
+    return wheel_on_rail(
+        built.profiles["wheel"],
+        built.profiles["rail"],
+        lateral_shift=p.lateral_shift,
+        yaw=p.yaw,
+        track=track,
+        wheelset=wheelset,
+    )
 
 
 def _profile(scene: ContactScene, kind: Literal["wheel", "rail"]) -> Profile:

@@ -59,8 +59,10 @@ class Patch:
     @cached_property
     def lines(self) -> tuple[Table, Table]:
         """Lines along x and along y with the root of the least height above the bottom, linear for a parabola."""
-        return tuple(_rooted(valley[0], valley[1], at, self.low) for valley, at in
-                     ((self.distance.valley_x, self.bottom[0]), (self.distance.valley_y, self.bottom[1])))  # type: ignore[return-value]  # fmt: skip
+        return tuple(
+            _rooted(valley[0], valley[1], at, self.low)
+            for valley, at in ((self.distance.valley_x, self.bottom[0]), (self.distance.valley_y, self.bottom[1]))
+        )  # type: ignore[return-value]
 
     def box(self, depth: float) -> Box:
         """Rectangle x0, x1, y0, y1 (m) about {h < depth}, continuous in the depth.
@@ -72,8 +74,13 @@ class Patch:
         if depth > self.edge:
             if self.edge - self.low <= NO_DEPTH:
                 raise no_bottom()
-            raise InputError("", "distance", None, f"contact at a depth of {depth:.3g} m reaches the edge of the area "
-                             "over which the undeformed distance is known: give a larger area")  # fmt: skip
+            raise InputError(
+                "",
+                "distance",
+                None,
+                f"contact at a depth of {depth:.3g} m reaches the edge of the area "
+                "over which the undeformed distance is known: give a larger area",
+            )
         root = np.sqrt(max(depth - self.low, 0.0))
         (x, rx), (y, ry) = self.lines
         return (*sides(x, rx, self.bottom[0], root), *sides(y, ry, self.bottom[1], root))
@@ -81,8 +88,12 @@ class Patch:
 
 def no_bottom() -> InputError:
     """The error of a distance that does not rise to all sides: it falls to one, or is flat."""
-    return InputError("", "distance", None, "has no bottom inside the area over which it is known: it must rise from "
-                      "its least value to all sides")  # fmt: skip
+    return InputError(
+        "",
+        "distance",
+        None,
+        "has no bottom inside the area over which it is known: it must rise from its least value to all sides",
+    )
 
 
 def separate(distance: Distance, ridge: float = RIDGE) -> list[Patch]:
@@ -107,10 +118,13 @@ def _cut(distance: Distance, axis: int, ridge: float) -> list[tuple[Distance, tu
     ends = [0, *(k for k in inner if 3 <= k < nodes.size - 3), nodes.size - 1]
     everything = slice(None)
     return [
-        (distance.part(*((everything, slice(a, b + 1)) if axis else (slice(a, b + 1), everything))),
-         (a > 0, b < nodes.size - 1))
-        for a, b in pairwise(ends) if b - a >= 3
-    ]  # fmt: skip
+        (
+            distance.part(*((everything, slice(a, b + 1)) if axis else (slice(a, b + 1), everything))),
+            (a > 0, b < nodes.size - 1),
+        )
+        for a, b in pairwise(ends)
+        if b - a >= 3
+    ]
 
 
 def ridges(heights: np.ndarray, least: float) -> list[int]:

@@ -20,8 +20,12 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
 def describe(scene: ContactScene) -> str:
     """The scene's plan as text: bodies, geometry, contact, creepage and theory."""
     wheel, rail = scene.bodies.wheel, scene.bodies.rail
-    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"), _line("wheel", _material(wheel)),
-             _line("rail", _material(rail))]  # fmt: skip
+    lines = [
+        scene.title,
+        _line("scene", f"{scene.file}, study {scene.study}"),
+        _line("wheel", _material(wheel)),
+        _line("rail", _material(rail)),
+    ]
     lines.append(_line(scene.geometry, _values(getattr(scene, scene.geometry))))
     if scene.contact is not None:
         lines.append(_line("contact", _values(scene.contact)))

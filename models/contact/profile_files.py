@@ -63,8 +63,13 @@ def _check_taping(wheel: Profile, path: Path) -> None:
     """Refuse a wheel whose y and z count from elsewhere, its flange's back or the axle."""
     middle = float(np.interp(0.0, wheel.y, wheel.z, left=np.nan, right=np.nan))
     if not abs(middle) <= OFF_TAPING:
-        raise InputError(path, "profile at y = 0, in m", middle, "y must count from the taping line and z from the "
-                         f"tread there, to within {OFF_TAPING:g} m: shift the profile")  # fmt: skip
+        raise InputError(
+            path,
+            "profile at y = 0, in m",
+            middle,
+            "y must count from the taping line and z from the "
+            f"tread there, to within {OFF_TAPING:g} m: shift the profile",
+        )
 
 
 def _lines(path: Path) -> list[str]:
@@ -98,8 +103,9 @@ def _columns(lines: list[str], path: Path) -> Points:
     rows = [(k, _numbers(line, k, path)) for k, line in plain if line.strip()]
     for k, row in rows:
         if len(row) > 2:
-            raise InputError(path, f"line {k}", lines[k - 1].strip()[:SHOWN], f"must hold y and z, found {len(row)} "
-                             "numbers")  # fmt: skip
+            raise InputError(
+                path, f"line {k}", lines[k - 1].strip()[:SHOWN], f"must hold y and z, found {len(row)} numbers"
+            )
     y, z = _points([row for _, row in rows])
     return y * MM, z * MM
 
@@ -113,8 +119,12 @@ def _miniprof(lines: list[str], path: Path) -> Points:
             if key.strip().lower() == "columndef":
                 columns = [name.strip().upper() for name in value.split(",")]
             if line.strip() and not equals:
-                raise InputError(path, f"line {k}", line.strip()[:SHOWN], "must be key=value: a MiniProf header ends "
-                                 "with an empty line")  # fmt: skip
+                raise InputError(
+                    path,
+                    f"line {k}",
+                    line.strip()[:SHOWN],
+                    "must be key=value: a MiniProf header ends with an empty line",
+                )
             heading = bool(line.strip())
         elif line.strip():
             rows.append(_numbers(line, k, path))
@@ -146,9 +156,19 @@ def _simpack(lines: list[str], path: Path) -> Points:
 
 
 DEFAULTS = {
-    "shift.y": 0.0, "shift.z": 0.0, "rotate": 0.0, "bound.y.min": 1.0, "bound.y.max": 0.0, "bound.z.min": 1.0,
-    "bound.z.max": 0.0, "mirror.y": 0.0, "mirror.z": 0.0, "inversion": 0.0, "units.len.f": 1e3, "units.ang.f": 1.0,
-}  # fmt: skip
+    "shift.y": 0.0,
+    "shift.z": 0.0,
+    "rotate": 0.0,
+    "bound.y.min": 1.0,
+    "bound.y.max": 0.0,
+    "bound.z.min": 1.0,
+    "bound.z.max": 0.0,
+    "mirror.y": 0.0,
+    "mirror.z": 0.0,
+    "inversion": 0.0,
+    "units.len.f": 1e3,
+    "units.ang.f": 1.0,
+}
 """Keys of a Simpack file that change its points; bounds whose lower one is larger are none."""
 
 

@@ -80,13 +80,18 @@ def _check(y: np.ndarray, z: np.ndarray, smoothing: float, file: object) -> None
         raise InputError(file, "profile", None, "must hold finite numbers")
     width = float(np.ptp(y))
     if not 0.01 <= width <= 0.5:
-        raise InputError(file, "profile", width, "is its width in m, which must be from 0.01 to 0.5: is the unit "
-                         "right?")  # fmt: skip
+        raise InputError(
+            file, "profile", width, "is its width in m, which must be from 0.01 to 0.5: is the unit right?"
+        )
     steps = np.diff(y)
     there, back = float(steps[steps > 0.0].sum()), float(-steps[steps < 0.0].sum())
     if min(there, back) > TURNING * max(there, back):
-        raise InputError(file, "profile", None, f"runs {there:.3g} m along y and {back:.3g} m against it: points must "
-                         "follow the contour, y before z")  # fmt: skip
+        raise InputError(
+            file,
+            "profile",
+            None,
+            f"runs {there:.3g} m along y and {back:.3g} m against it: points must follow the contour, y before z",
+        )
     _check_spikes(np.column_stack((y, z)), file)
     if not 0.0 <= smoothing <= 0.05:
         raise InputError(file, "smoothing", smoothing, "must be a wavelength from 0 to 0.05 m")
@@ -98,8 +103,12 @@ def _check_spikes(points: np.ndarray, file: object) -> None:
     spikes = np.minimum(way[:-1], way[1:]) > np.maximum(2.0 * straight, SPIKE)
     if spikes.any():
         y, z = points[1 + int(np.argmax(spikes))]
-        raise InputError(file, "profile", [float(y), float(z)], f"sticks out between its neighbours: {spikes.sum()} "
-                         "such points (m); take out what was measured wrongly")  # fmt: skip
+        raise InputError(
+            file,
+            "profile",
+            [float(y), float(z)],
+            f"sticks out between its neighbours: {spikes.sum()} such points (m); take out what was measured wrongly",
+        )
 
 
 def _check_rough(y: np.ndarray, keep: slice, file: object) -> None:
@@ -109,9 +118,14 @@ def _check_rough(y: np.ndarray, keep: slice, file: object) -> None:
         rough = np.logical_and.accumulate(highest - beyond < BACK)
         lost = float(np.max(beyond[rough], initial=last) - last)
         if lost > BACK:
-            raise InputError(file, "profile", float(abs(last)), f"is |y| (m) where the contour turns back by less than "
-                             f"{BACK:g} m, as noise or rounding makes it, and {lost:.2g} m beyond it would be lost: "
-                             "give a smoothing, from 0.002 m on")  # fmt: skip
+            raise InputError(
+                file,
+                "profile",
+                float(abs(last)),
+                f"is |y| (m) where the contour turns back by less than "
+                f"{BACK:g} m, as noise or rounding makes it, and {lost:.2g} m beyond it would be lost: "
+                "give a smoothing, from 0.002 m on",
+            )
 
 
 def _smoothed(length: np.ndarray, values: np.ndarray, even: np.ndarray, smoothing: float) -> np.ndarray:

@@ -29,8 +29,9 @@ class SlipOperator:
     comes from. The symmetric part of C then has the symbol (1 - cos)^2 times that of the positive definite A.
     """
 
-    def __init__(self, columns: int, rows: int, dx: float, dy: float, pair: "Pair",
-                 weights: tuple[float, ...] = UPSTREAM) -> None:  # fmt: skip
+    def __init__(
+        self, columns: int, rows: int, dx: float, dy: float, pair: "Pair", weights: tuple[float, ...] = UPSTREAM
+    ) -> None:
         x, y = offsets(columns, dx), offsets(rows, dy)[:, None]
         ahead = np.append(x, x[-1] + dx * np.arange(1, len(weights)))
         displacement = influence(ahead, y, dx, dy, pair)[..., : Y + 1, : Y + 1] * (pair.G / dx)

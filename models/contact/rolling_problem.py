@@ -103,14 +103,15 @@ def solve_shift(pressed: Pressed, mu: float, shift_x: float, shift_y: float, pai
     The problem of Cattaneo (1938) and Mindlin (1949): s = shift + u. Arguments and errors as of ``solve_rolling``, with
     shifts in m; in the result ``slip`` is in m and ``power`` the work of friction in J.
     """
-    way_x, way_y = (number(name, value, "a shift in m, at most 0.1", -0.1, 0.1) for name, value in
-                    (("shift_x", shift_x), ("shift_y", shift_y)))  # fmt: skip
+    way_x, way_y = (
+        number(name, value, "a shift in m, at most 0.1", -0.1, 0.1)
+        for name, value in (("shift_x", shift_x), ("shift_y", shift_y))
+    )
     by_cell = _rubbed(pressed, mu, lambda x, y, length: rigid_slip(x, y, way_x, way_y, 0.0) / length, pair, IN_PLACE)
     return replace(by_cell, slip=by_cell.slip * pressed.dx, power=by_cell.power * pressed.dx)
 
 
-def _rubbed(pressed: Pressed, mu: float, rigid: RigidSlip, pair: "Pair",
-            weights: tuple[float, ...]) -> RollingSolution:  # fmt: skip
+def _rubbed(pressed: Pressed, mu: float, rigid: RigidSlip, pair: "Pair", weights: tuple[float, ...]) -> RollingSolution:
     """Solution for a rigid slip, on the cells in contact."""
     mu = number("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0)
     pair.require_likeness()
@@ -173,8 +174,13 @@ class _Cells:
         rows, columns = (count + count % 2 for count in self.bound.shape)
         bound = np.zeros((rows, columns))
         bound[: self.y.size, : self.x.size] = self.bound
-        return _Cells(self.x[::2] + self.dx / 2, self.y[::2] + self.dy / 2, 2 * self.dx, 2 * self.dy,
-                      bound.reshape(rows // 2, 2, columns // 2, 2).mean(axis=(1, 3)))  # fmt: skip
+        return _Cells(
+            self.x[::2] + self.dx / 2,
+            self.y[::2] + self.dy / 2,
+            2 * self.dx,
+            2 * self.dy,
+            bound.reshape(rows // 2, 2, columns // 2, 2).mean(axis=(1, 3)),
+        )
 
 
 def _solve(cells: _Cells, rigid: RigidSlip, pair: "Pair", weights: tuple[float, ...]) -> tuple[_State, int]:
@@ -210,8 +216,10 @@ def _settled(operator: SlipOperator, rigid: np.ndarray, state: _State) -> tuple[
     relaxation, done = RELAXATION, 0
     while state.residual > TOLERANCE:
         if done == MOST_ROUNDS:
-            raise RunFailed("rolling problem", f"conditions of stick and slip met to {state.residual:.2g} only "
-                            f"after {MOST_ROUNDS} rounds")  # fmt: skip
+            raise RunFailed(
+                "rolling problem",
+                f"conditions of stick and slip met to {state.residual:.2g} only after {MOST_ROUNDS} rounds",
+            )
         swept = _swept(operator, rigid, state, relaxation)
         nearest = swept if swept.residual <= TOLERANCE else min(swept, _turned(operator, rigid, swept), key=_residual)
         relaxation *= 1.0 if nearest.residual < state.residual else SLOWER

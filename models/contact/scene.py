@@ -57,8 +57,13 @@ class Radii(Strict):
         for axis in ("x", "y"):
             value = sum(1.0 / radius for name, radius in self if radius is not None and name.endswith(axis)) / 2
             if value <= 0:
-                raise InputError(file, f"radii.wheel_{axis}, rail_{axis}", None, f"are flat or conform along {axis}: "
-                                 f"half the sum of their curvatures is {value:.4g} 1/m and must be above 0")
+                raise InputError(
+                    file,
+                    f"radii.wheel_{axis}, rail_{axis}",
+                    None,
+                    f"are flat or conform along {axis}: "
+                    f"half the sum of their curvatures is {value:.4g} 1/m and must be above 0",
+                )
             found.append(value)
         return found[0], found[1]
 
@@ -201,8 +206,13 @@ def _check_geometry(scene: ContactScene) -> None:
 
 def _check_profiles(profiles: Profiles, file: str) -> None:
     """A turned or mirrored rail, and a wheel in mm, are told as what they are."""
-    for key, least, most in (("inclination", -0.5, 0.5), ("radius", 0.02, 5.0), ("gauge", 0.1, 3.0),
-                             ("back_to_back", 0.1, 3.0), ("gauge_depth", 0.0, 0.1)):  # fmt: skip
+    for key, least, most in (
+        ("inclination", -0.5, 0.5),
+        ("radius", 0.02, 5.0),
+        ("gauge", 0.1, 3.0),
+        ("back_to_back", 0.1, 3.0),
+        ("gauge_depth", 0.0, 0.1),
+    ):
         value = getattr(profiles, key)
         if not least <= value <= most:
             unit = "rad" if key == "inclination" else "m"
@@ -215,9 +225,14 @@ OF_CASES = ("contact", "creepage", "sweep")
 """Tables whose content every row of a table of cases has itself."""
 
 
-LARGEST = {"contact.load": LARGEST_LOAD, "contact.approach": LARGEST_APPROACH, "contact.friction": 10.0,
-           "creepage.xi_x": LARGEST_CREEPAGE, "creepage.xi_y": LARGEST_CREEPAGE,
-           "creepage.spin": LARGEST_SPIN}  # fmt: skip
+LARGEST = {
+    "contact.load": LARGEST_LOAD,
+    "contact.approach": LARGEST_APPROACH,
+    "contact.friction": 10.0,
+    "creepage.xi_x": LARGEST_CREEPAGE,
+    "creepage.xi_y": LARGEST_CREEPAGE,
+    "creepage.spin": LARGEST_SPIN,
+}
 """What the theories take, of either sign."""
 
 
@@ -258,8 +273,12 @@ def _check_sweep(scene: ContactScene) -> None:
         raise InputError(scene.file, "sweep.spacing", sweep.spacing, allowed)
     if sweep.of in scene.creepage.model_fields_set:
         value = getattr(scene.creepage, sweep.of)
-        raise InputError(scene.file, f"creepage.{sweep.of}", value, "is swept: drop this key; on the command line "
-                         "give the whole table, as in --set creepage={xi_x=1e-3}")  # fmt: skip
+        raise InputError(
+            scene.file,
+            f"creepage.{sweep.of}",
+            value,
+            "is swept: drop this key; on the command line give the whole table, as in --set creepage={xi_x=1e-3}",
+        )
 
 
 ON_PROFILES = ("simplified", "exact")
@@ -274,8 +293,9 @@ def _check_method(scene: ContactScene) -> None:
     if scene.cases is not None and method.name != "fastsim":
         raise InputError(scene.file, "method.name", method.name, "a table of cases is computed by fastsim")
     if scene.profiles is not None and method.name not in ON_PROFILES:
-        raise InputError(scene.file, "method.name", method.name, "needs an ellipse; for profiles use "
-                         + " or ".join(ON_PROFILES))  # fmt: skip
+        raise InputError(
+            scene.file, "method.name", method.name, "needs an ellipse; for profiles use " + " or ".join(ON_PROFILES)
+        )
 
 
 def _check_friction(scene: ContactScene) -> None:

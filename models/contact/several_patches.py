@@ -81,8 +81,9 @@ def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
     return Net(x, y, height, pressure, cover, (dx, dy), volume)
 
 
-def together(nets: Sequence[Net], pair: Pair, kind: int, lows: np.ndarray, depths: np.ndarray
-             ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+def together(
+    nets: Sequence[Net], pair: Pair, kind: int, lows: np.ndarray, depths: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Stiffnesses 1/W (Pa/m), zero where there is no load, and approaches (m) of patches at their depths (m)."""
     loaded = [k for k, net in enumerate(nets) if net.volume > 0.0]
     pushed = {(k, m): _by(nets[m], net, pair) for k, net in enumerate(nets) for m in loaded}
@@ -96,8 +97,10 @@ def together(nets: Sequence[Net], pair: Pair, kind: int, lows: np.ndarray, depth
         least = LEAST * (depths - lows)[loaded] / [np.mean(pushed[k, k]) for k in loaded]
         stiffness[loaded] = np.maximum(np.linalg.lstsq(products, right, rcond=None)[0], least)
     raised = [sum((stiffness[m] * pushed[k, m] for m in loaded), nets[k].height) for k in range(len(nets))]
-    approach = [(net.pressure * u).sum() / net.pressure.sum() if net.volume > 0.0 else float(u[0, 0]) + depth - low
-                for net, u, depth, low in zip(nets, raised, depths, lows, strict=True)]  # fmt: skip
+    approach = [
+        (net.pressure * u).sum() / net.pressure.sum() if net.volume > 0.0 else float(u[0, 0]) + depth - low
+        for net, u, depth, low in zip(nets, raised, depths, lows, strict=True)
+    ]
     return stiffness, np.array(approach)
 
 
@@ -116,8 +119,9 @@ def _product(net: Net, one: np.ndarray, other: np.ndarray, kind: int) -> float:
     return float(covariances(one, other, net.cover)[1])
 
 
-def settled(patches: Sequence[Patch], start: np.ndarray, load: float | None, pair: Pair, options: tuple[int, int, int]
-            ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+def settled(
+    patches: Sequence[Patch], start: np.ndarray, load: float | None, pair: Pair, options: tuple[int, int, int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Depths (m) of patches with the rigid approach (m) last, their stiffnesses (Pa/m) and loads (N).
 
     start : depths and approach near the answer, the approach the answer itself if there is no load. load : N along the
@@ -136,8 +140,12 @@ def settled(patches: Sequence[Patch], start: np.ndarray, load: float | None, pai
         return np.append((reached - approach * along) / unit, last), found, stiffness, loads
 
     for method, factor, share in TRIES:
-        solved = root(lambda over: state(over)[0], share * (start - zero) / unit, method=method,
-                      options={"xtol": 1e-14, "factor": factor})  # fmt: skip
+        solved = root(
+            lambda over: state(over)[0],
+            share * (start - zero) / unit,
+            method=method,
+            options={"xtol": 1e-14, "factor": factor},
+        )
         off, found, stiffness, loads = state(solved.x)
         if np.abs(off).max() <= CLOSE:
             return found, stiffness, loads

@@ -147,8 +147,14 @@ class Rolling:
     fields: tuple[Fields, ...]
 
 
-def press(bodies: Distance | Sequence[Patch], pair: Pair, *, load: float | None = None, approach: float | None = None,
-          options: Options = PLAIN) -> NormalContact:  # fmt: skip
+def press(
+    bodies: Distance | Sequence[Patch],
+    pair: Pair,
+    *,
+    load: float | None = None,
+    approach: float | None = None,
+    options: Options = PLAIN,
+) -> NormalContact:
     """Area, pressure and approach of two bodies, by a load (N) or by a rigid approach (m).
 
     bodies : their undeformed distance, or the patches of a wheel on a rail.
@@ -181,8 +187,17 @@ def load_at_depth(patch: Patch, depth: float, pair: Pair, options: Options = PLA
         return PatchPressure(patch, depth, 0.0, depth, 0.0, (0.0, 0.0, 0.0, 0.0))
     box, (origin, step) = patch.box(depth), _grid(patch)
     stiffness, approach, volume = crude_fit(
-        patch.distance.padded, origin, step, box, depth, patch.low, options.net, SHAPES[options.shape],
-        FITS[options.fit], pair.modulus)  # fmt: skip
+        patch.distance.padded,
+        origin,
+        step,
+        box,
+        depth,
+        patch.low,
+        options.net,
+        SHAPES[options.shape],
+        FITS[options.fit],
+        pair.modulus,
+    )
     if not (volume > 0.0 and np.isfinite(stiffness)):  # so shallow that rounding leaves nothing of it
         return PatchPressure(patch, depth, 0.0, depth, 0.0, box)
     return PatchPressure(patch, depth, stiffness, approach, volume * stiffness, box)
@@ -203,8 +218,12 @@ def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, optio
         return _gathered(alone.approach / along, (alone,), pair, options)
 
     def alone_at(reached: float) -> float:
-        return _total([load_at_depth(patch, depth, pair, options)
-                       for patch, depth in zip(patches, _shallow(patches, reached), strict=True)])  # fmt: skip
+        return _total(
+            [
+                load_at_depth(patch, depth, pair, options)
+                for patch, depth in zip(patches, _shallow(patches, reached), strict=True)
+            ]
+        )
 
     return _shared(patches, _found(alone_at, load, lowest, np.inf), load, pair, options)
 
@@ -216,8 +235,13 @@ def _found(load_at: Callable[[float], float], load: float, lowest: float, limit:
     low, high = 0.0, min(1e-6, limit - lowest)
     while load_at(lowest + high) < load:
         if lowest + high >= limit:
-            raise InputError("", "load", load, "makes contact reach the edge of the area over which the distance is "
-                             f"known (there it carries {load_at(limit):.4g} N): give a larger area")  # fmt: skip
+            raise InputError(
+                "",
+                "load",
+                load,
+                "makes contact reach the edge of the area over which the distance is "
+                f"known (there it carries {load_at(limit):.4g} N): give a larger area",
+            )
         low, high = high, min(2.0 * high, limit - lowest)
     return lowest + float(brentq(lambda over: load_at(lowest + over) - load, low, high, xtol=1e-20, rtol=1e-14))
 
@@ -237,10 +261,18 @@ def _shared(patches: list[Patch], approach: float, load: float | None, pair: Pai
     start = np.array([*_shallow(patches, approach), approach])
     ways = (options.net, SHAPES[options.shape], FITS[options.fit])
     (*depths, reached), stiffnesses, loads = settled(patches, start, load, pair, ways)
-    parts = [PatchPressure(patch, float(depth), float(stiffness), float(reached * np.cos(patch.lean)), float(carried),
-                           patch.box(float(depth)))
-             for patch, depth, stiffness, carried in zip(patches, depths, stiffnesses, loads, strict=True)
-             if carried > 0.0]  # fmt: skip
+    parts = [
+        PatchPressure(
+            patch,
+            float(depth),
+            float(stiffness),
+            float(reached * np.cos(patch.lean)),
+            float(carried),
+            patch.box(float(depth)),
+        )
+        for patch, depth, stiffness, carried in zip(patches, depths, stiffnesses, loads, strict=True)
+        if carried > 0.0
+    ]
     return _gathered(float(reached), tuple(parts), pair, options)
 
 
@@ -262,8 +294,9 @@ def _strips(part: PatchPressure, rows: int, cells: int, shape: int) -> tuple[np.
     return strips(patch.distance.padded, origin, step, part.box, part.depth, patch.low, rows, cells, shape)
 
 
-def roll(pressed: NormalContact, friction: float, xi_x: float, xi_y: float, spin: float, *,
-         cells: int = CELLS) -> Rolling:  # fmt: skip
+def roll(
+    pressed: NormalContact, friction: float, xi_x: float, xi_y: float, spin: float, *, cells: int = CELLS
+) -> Rolling:
     """Forces of steady rolling: FASTSIM twice on the fine net of each patch, W_1 = W_2 refitted in between.
 
     friction : coefficient. xi_x, xi_y : creepages. spin : 1/m. cells : strips, and cells in each, 3 or more. Spin and
@@ -282,8 +315,10 @@ def roll(pressed: NormalContact, friction: float, xi_x: float, xi_y: float, spin
     # constant over the patch.
     for part, strip, traction in zip(pressed.patches, fine, tractions, strict=True):
         _march(strip, 1.0 / part.stiffness, creepage, traction)
-    crude_tractions = [gather(*strip[:4], traction, part.box, pressed.options.net)
-                       for part, strip, traction in zip(pressed.patches, fine, tractions, strict=True)]  # fmt: skip
+    crude_tractions = [
+        gather(*strip[:4], traction, part.box, pressed.options.net)
+        for part, strip, traction in zip(pressed.patches, fine, tractions, strict=True)
+    ]
     flexibilities = _refitted(pressed, crude_tractions)
     rolled = [_march(*one) for one in zip(fine, flexibilities, [creepage] * len(fine), tractions, strict=True)]
     fx, fy, mz, stuck, area = (float(sum(found[k] for found in rolled)) for k in range(5))
@@ -300,8 +335,9 @@ def _fine(part: PatchPressure, options: Options, cells: int) -> tuple[Any, ...]:
     return y, low, high, width, pressure
 
 
-def _march(fine: tuple[Any, ...], flexibility: float, creepage: tuple[float, ...],
-           traction: np.ndarray) -> tuple[float, ...]:  # fmt: skip
+def _march(
+    fine: tuple[Any, ...], flexibility: float, creepage: tuple[float, ...], traction: np.ndarray
+) -> tuple[float, ...]:
     """FASTSIM on the strips of a patch, into its tractions; creepage: friction first."""
     friction, *motion = creepage
     return march(*fine, friction, flexibility, *motion, traction)
@@ -331,5 +367,14 @@ def _fields(fine: tuple[Any, ...], traction: np.ndarray, friction: float) -> Fie
     slips = np.hypot(traction[..., 0], traction[..., 1]) >= friction * pressure * (1.0 - 1e-9)
     shape = pressure.shape
     lines, lengths = np.broadcast_to(y[:, None], shape), np.broadcast_to(length, shape)
-    return Fields(x, lines, lengths, np.full(shape, width), pressure, traction[..., 0], traction[..., 1], slips,
-                  np.full(shape, True))  # fmt: skip
+    return Fields(
+        x,
+        lines,
+        lengths,
+        np.full(shape, width),
+        pressure,
+        traction[..., 0],
+        traction[..., 1],
+        slips,
+        np.full(shape, True),
+    )

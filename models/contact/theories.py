@@ -168,8 +168,9 @@ def _exact(grids: Sequence[Pressed], motion: Motion, friction: float, pair: Pair
     """The sum over patches that do not feel each other's tractions."""
     found = [solve_rolling(grid, friction, *motion, pair) for grid in grids]
     areas = [grid.area for grid in grids]
-    stuck = sum(np.count_nonzero(one.stick & grid.contact) * grid.dx * grid.dy
-                for one, grid in zip(found, grids, strict=True))  # fmt: skip
+    stuck = sum(
+        np.count_nonzero(one.stick & grid.contact) * grid.dx * grid.dy for one, grid in zip(found, grids, strict=True)
+    )
     fields = tuple(_fields(one, grid) for one, grid in zip(found, grids, strict=True))
     fx, fy, mz = (float(sum(getattr(one, name) for one in found)) for name in ("fx", "fy", "mz"))
     return Rolled(fx, fy, mz, float(stuck / sum(areas)), -float(np.dot((fx, fy, mz), motion)), fields)
@@ -177,8 +178,17 @@ def _exact(grids: Sequence[Pressed], motion: Motion, friction: float, pair: Pair
 
 def _fields(found: RollingSolution, grid: Pressed) -> Fields:
     x, y = np.meshgrid(grid.x, grid.y)
-    return Fields(x, y, np.full_like(x, grid.dx), np.full_like(x, grid.dy), grid.pressure, found.traction[..., 0],
-                  found.traction[..., 1], ~found.stick, grid.contact)  # fmt: skip
+    return Fields(
+        x,
+        y,
+        np.full_like(x, grid.dx),
+        np.full_like(x, grid.dy),
+        grid.pressure,
+        found.traction[..., 0],
+        found.traction[..., 1],
+        ~found.stick,
+        grid.contact,
+    )
 
 
 def _placed(fields: Sequence[Fields], places: Sequence[float]) -> tuple[Fields, ...]:
@@ -199,8 +209,10 @@ def _solved(part: PatchPressure, cells: int, pair: Pair) -> NormalSolution:
             refused = error
     if not any(part.patch.cut):
         raise refused
-    allowed = ("does not take patches of wheel and rail that have grown together: use simplified, a smaller load or "
-               "another lateral_shift")  # fmt: skip
+    allowed = (
+        "does not take patches of wheel and rail that have grown together: use simplified, a smaller load or "
+        "another lateral_shift"
+    )
     raise InputError("", "method.name", "exact", allowed)
 
 

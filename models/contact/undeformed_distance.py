@@ -70,8 +70,9 @@ class Distance:
         return self._valley(np.ascontiguousarray(self.padded.T), self.x, self.y, self.dy)
 
     @staticmethod
-    def _valley(padded: np.ndarray, along: np.ndarray, across: np.ndarray,
-                step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    def _valley(
+        padded: np.ndarray, along: np.ndarray, across: np.ndarray, step: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         finer = 2
         least, where = valley(padded, finer)
         return np.linspace(along[0], along[-1], least.size), least, across[0] + where * step
@@ -81,8 +82,12 @@ class Distance:
         return Distance(self.x[x], self.y[y], self.height[y, x])
 
 
-def from_function(height: Callable[[np.ndarray, np.ndarray], np.ndarray], x: tuple[float, float],
-                  y: tuple[float, float], nodes: int = NODES) -> Distance:  # fmt: skip
+def from_function(
+    height: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    x: tuple[float, float],
+    y: tuple[float, float],
+    nodes: int = NODES,
+) -> Distance:
     """Distance from a formula ``height(x, y)`` in m, of arrays in m, over the rectangle x[0]..x[1], y[0]..y[1].
 
     Raises InputError for an empty rectangle and for a formula without a finite answer of the right shape.
@@ -104,8 +109,10 @@ def from_arrays(x: np.ndarray, y: np.ndarray, height: np.ndarray) -> Distance:
 
     Raises InputError for a wrong shape, uneven nodes, fewer than four of them, or values that are not finite.
     """
-    nodes = {name: quantity(name, array, f"places in m within +-{LARGEST:g}", -LARGEST, LARGEST)
-             for name, array in (("x", x), ("y", y))}  # fmt: skip
+    nodes = {
+        name: quantity(name, array, f"places in m within +-{LARGEST:g}", -LARGEST, LARGEST)
+        for name, array in (("x", x), ("y", y))
+    }
     height = quantity("height", height, f"finite everywhere, in m within +-{LARGEST:g}", -LARGEST, LARGEST)
     for name, array in nodes.items():
         if array.ndim != 1 or array.size < 4:

@@ -129,8 +129,13 @@ class Side:
         over = (points[:, 1] >= self.rail.y[0]) & (points[:, 1] <= self.rail.y[-1])
         over &= np.concatenate([np.diff(points[:, 1]) > 0.0, [True]])
         if np.count_nonzero(over) < 10:
-            raise InputError("", "lateral_shift", pose.shift, "leaves no part of the wheel above the rail: profiles, "
-                             "radius, back_to_back, gauge and shift do not fit")  # fmt: skip
+            raise InputError(
+                "",
+                "lateral_shift",
+                pose.shift,
+                "leaves no part of the wheel above the rail: profiles, "
+                "radius, back_to_back, gauge and shift do not fit",
+            )
         return points[over], self.rail.curve(points[over, 1]) - points[over, 2]
 
     def clearance(self, pose: Pose) -> float:
@@ -141,8 +146,15 @@ class Side:
         return float(gap[k] - 0.5 * rise**2 / bend) if bend > abs(rise) else float(gap.min())
 
 
-def wheel_on_rail(wheel: Profile, rail: Profile, *, lateral_shift: float = 0.0, yaw: float = 0.0,
-                  track: Track | None = None, wheelset: Wheelset | None = None) -> list[Touch]:  # fmt: skip
+def wheel_on_rail(
+    wheel: Profile,
+    rail: Profile,
+    *,
+    lateral_shift: float = 0.0,
+    yaw: float = 0.0,
+    track: Track | None = None,
+    wheelset: Wheelset | None = None,
+) -> list[Touch]:
     """Touching places of the right wheel, the one that touches first, others by their gap while this is below 0.2 mm.
 
     wheel, rail : profiles; the rail upright, ``track.inclination`` turns it (0 for one that is measured as it lies).
@@ -166,8 +178,12 @@ def laid(rail: Profile, track: Track) -> Profile:
     y, z = inclined.y, inclined.z - inclined.z.min()
     inner = (y < y[np.argmin(z)]) & (z <= track.gauge_depth)
     if not inner.any() or z[0] < track.gauge_depth:
-        raise InputError("", "rail", float(z[0]), f"is the depth (m) to which the gauge side is known; the gauge is "
-                         f"measured at {track.gauge_depth:g} m")  # fmt: skip
+        raise InputError(
+            "",
+            "rail",
+            float(z[0]),
+            f"is the depth (m) to which the gauge side is known; the gauge is measured at {track.gauge_depth:g} m",
+        )
     k = int(np.argmax(inner))  # the contour crosses the depth just before this point
     face = y[k] - (y[k] - y[k - 1]) * (track.gauge_depth - z[k]) / (z[k - 1] - z[k])
     return Profile(y - face + track.gauge / 2.0, z, inclined.smoothing)
@@ -254,8 +270,7 @@ def _rail_heights(rail: Profile, place: np.ndarray, angle: float) -> tuple[np.nd
     return s[keep], n[keep]
 
 
-def _wheel_heights(side: Side, pose: Pose, place: np.ndarray, angle: float, x: np.ndarray,
-                   s: np.ndarray) -> np.ndarray:  # fmt: skip
+def _wheel_heights(side: Side, pose: Pose, place: np.ndarray, angle: float, x: np.ndarray, s: np.ndarray) -> np.ndarray:
     """The wheel over the plane that touches the rail, (s, x): Newton's method on distance to the axle = radius."""
     along = np.array([0.0, np.cos(angle), np.sin(angle)])
     into = np.array([0.0, -np.sin(angle), np.cos(angle)])

@@ -22,9 +22,17 @@ from models.errors import RunFailed
 from models.seconds import cost
 
 Parts = tuple[float, float, float]
-KINDS: dict[str, Parts] = {"x": (1, 0, 0), "y": (0, 1, 0), "spin": (0, 0, 1), "x+y": (1, 1, 0), "x+spin": (1, 0, 1),
-                           "y+spin": (0, 1, 1), "y-spin": (0, 1, -1), "x+y+spin": (1, 1, 1),
-                           "x-y+spin": (1, -1, 1)}  # fmt: skip
+KINDS: dict[str, Parts] = {
+    "x": (1, 0, 0),
+    "y": (0, 1, 0),
+    "spin": (0, 0, 1),
+    "x+y": (1, 1, 0),
+    "x+spin": (1, 0, 1),
+    "y+spin": (0, 1, 1),
+    "y-spin": (0, 1, -1),
+    "x+y+spin": (1, 1, 1),
+    "x-y+spin": (1, -1, 1),
+}
 """Parts of the three creepages, each in units of its linear scale."""
 FINEST, ENOUGH = (40, 80), 0.005
 """Cells along each axis of the exact theory, halved once for the forces and twice for their error; the finer grid is
@@ -210,11 +218,19 @@ def cheapest(points: list[Point], target: float, error: Callable[[Point], float]
     return min(meets, key=lambda one: one.seconds, default=None)
 
 
-def ellipse_cases(a: float, b: float, load: float, friction: float, pair: Pair, levels: tuple[float, ...],
-                  kinds: dict[str, Parts] = KINDS) -> list[Case]:  # fmt: skip
+def ellipse_cases(
+    a: float,
+    b: float,
+    load: float,
+    friction: float,
+    pair: Pair,
+    levels: tuple[float, ...],
+    kinds: dict[str, Parts] = KINDS,
+) -> list[Case]:
     """All kinds and levels on one ellipse, without their forces."""
-    return [Case(a, b, load, friction, pair, kind, parts, level)
-            for (kind, parts), level in product(kinds.items(), levels)]  # fmt: skip
+    return [
+        Case(a, b, load, friction, pair, kind, parts, level) for (kind, parts), level in product(kinds.items(), levels)
+    ]
 
 
 TARGETS = (0.05, 0.02, 0.01, 0.005)
@@ -223,9 +239,13 @@ TARGETS = (0.05, 0.02, 0.01, 0.005)
 
 def cheapest_lines(points: list[Point]) -> list[tuple[str, ...]]:
     """For every target: the cheapest that meets it in the mean, and the one that does in 95 of 100 cases."""
-    return [(f"{100 * target:g} %", *(_told(cheapest(points, target, error), error)
-                                      for error in (lambda one: one.mean, lambda one: one.most)))
-            for target in TARGETS]  # fmt: skip
+    return [
+        (
+            f"{100 * target:g} %",
+            *(_told(cheapest(points, target, error), error) for error in (lambda one: one.mean, lambda one: one.most)),
+        )
+        for target in TARGETS
+    ]
 
 
 def _told(one: Point | None, error: Callable[[Point], float]) -> str:

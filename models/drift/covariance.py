@@ -48,8 +48,17 @@ def carried(path: Path, deviation: float) -> np.ndarray:
     """Covariances (samples + 1, 8, 8) at the samples of a path, of noise of ``deviation`` (N); 0 at its start."""
     matrices = np.zeros((path.samples + 1, 8, 8))
     own, march = path.assembly, path.march(_compile_covariance)
-    march(own.initial.copy(), path.step, path.per_sample, path.table(path.forces), _weights(path), path.rows,
-          own.parameters.array(), deviation**2, matrices)  # fmt: skip
+    march(
+        own.initial.copy(),
+        path.step,
+        path.per_sample,
+        path.table(path.forces),
+        _weights(path),
+        path.rows,
+        own.parameters.array(),
+        deviation**2,
+        matrices,
+    )
     return matrices
 
 

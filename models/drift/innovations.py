@@ -56,8 +56,10 @@ class Consistency:
         if self.consistent:
             return f"its innovations are as stated: {self.figures[0]}"
         wrong = "; ".join(map(str, (figure for figure in self.figures if not figure.inside)))
-        return (f"its innovations are not what model and stated deviations make: {wrong}; in brackets where those "
-                f"of a right filter lie, but for one run in {1 / LEVEL:.0f}")  # fmt: skip
+        return (
+            f"its innovations are not what model and stated deviations make: {wrong}; in brackets where those "
+            f"of a right filter lie, but for one run in {1 / LEVEL:.0f}"
+        )
 
 
 def consistency(innovations: np.ndarray, names: Sequence[str]) -> Consistency:

@@ -83,8 +83,9 @@ class _Steps:
 class PitchFilter(ExtendedKalmanFilter):
     """The vehicle over one step after the other; ``x`` (7,), ``P`` (7, 7) as filterpy names them."""
 
-    def __init__(self, step: PitchStep, start: np.ndarray, covariance: np.ndarray, intensity: float,
-                 measured: Measurement) -> None:  # fmt: skip
+    def __init__(
+        self, step: PitchStep, start: np.ndarray, covariance: np.ndarray, intensity: float, measured: Measurement
+    ) -> None:
         """start (7,), covariance (7, 7); intensity: variance (N^2) of a force sample, per step of the filter."""
         super().__init__(dim_x=STATES, dim_z=1)
         self.step, self.intensity, self.measured = step, intensity, measured
@@ -119,12 +120,22 @@ class PitchFilter(ExtendedKalmanFilter):
     def _of(self, there: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Columns that the bits of a number name, what each sees of the state (m, 7), and its noise (m, m)."""
         chosen = np.array([i for i in range(len(self.measured.columns)) if there >> i & 1], dtype=int)
-        return (chosen, self._I[[self.measured.columns[i] for i in chosen]],
-                np.diag([self.measured.deviations[i] ** 2 for i in chosen]))  # fmt: skip
+        return (
+            chosen,
+            self._I[[self.measured.columns[i] for i in chosen]],
+            np.diag([self.measured.deviations[i] ** 2 for i in chosen]),
+        )
 
 
-def estimate(assembly: Assembly, measured: Measurement, deviation: float, *, start_deviation: float = 0.0,
-             inertia_deviation: float = 0.0, smoother: bool = False) -> Estimate:  # fmt: skip
+def estimate(
+    assembly: Assembly,
+    measured: Measurement,
+    deviation: float,
+    *,
+    start_deviation: float = 0.0,
+    inertia_deviation: float = 0.0,
+    smoother: bool = False,
+) -> Estimate:
     """Filter the pitch of a force-excited assembly over its run.
 
     deviation : N, standard deviation of the noise of each force sample, white

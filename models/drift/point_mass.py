@@ -95,12 +95,18 @@ def _check(deviation: float, step: float, mass: float, damping: float, length: f
     """Deviation, damping and length are zero or more, step and mass above zero, and all finite."""
     finite = all(map(math.isfinite, (deviation, step, mass, damping, length)))
     if not finite or min(deviation, damping, length) < 0 or min(step, mass) <= 0:
-        raise InputError("", "point mass", None, f"none has deviation {deviation:g}, step {step:g}, mass {mass:g}, "
-                         f"damping {damping:g} over {length:g} s or steps")  # fmt: skip
+        raise InputError(
+            "",
+            "point mass",
+            None,
+            f"none has deviation {deviation:g}, step {step:g}, mass {mass:g}, "
+            f"damping {damping:g} over {length:g} s or steps",
+        )
 
 
-def paths(count: int, steps: int, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0,
-          seed: int = 0) -> np.ndarray:  # fmt: skip
+def paths(
+    count: int, steps: int, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0, seed: int = 0
+) -> np.ndarray:
     """Monte Carlo: errors (count, 2) of position (m) and velocity (m/s) of Euler paths after ``steps`` steps.
 
     Raises InputError as ``discrete`` does.

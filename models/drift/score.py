@@ -54,8 +54,11 @@ class Limits(Strict):
     damage_error: float = Field(default=0.05, gt=0, description="largest |damage ratio - 1| of any section force")
     pitch_error: float = Field(default=0.02, gt=0, description="largest pitch error, rad")
     artificial_share: float = Field(
-        default=0.15, gt=0, description="rms of the artificial moment by that of I pitch'' and of the artificial "
-        "vertical force by that of m3 z3'', both up to 15 Hz")  # fmt: skip
+        default=0.15,
+        gt=0,
+        description="rms of the artificial moment by that of I pitch'' and of the artificial "
+        "vertical force by that of m3 z3'', both up to 15 Hz",
+    )
 
 
 @dataclass(frozen=True)
@@ -121,16 +124,22 @@ def own_figures(run: Result, p: Parameters) -> Own:
     inertia, heave = p.I * np.diff(run["pitch_rate"]) / step, p.m3 * np.diff(run["z3_rate"]) / step
     moment = inertia - _means(_natural_moment(run, p), step)
     force = heave - _means(p.m3 * p.g - run["f3"] - run["f4"], step)
-    band = {name: low_pass(values, step) for name, values in
-            (("moment", moment), ("inertia", inertia), ("force", force), ("heave", heave))}  # fmt: skip
+    band = {
+        name: low_pass(values, step)
+        for name, values in (("moment", moment), ("inertia", inertia), ("force", force), ("heave", heave))
+    }
     counts = run.counts()
     return Own(
-        moment_rms=rms(moment), moment_max=float(np.abs(moment).max()), moment_share=_share(moment, inertia),
+        moment_rms=rms(moment),
+        moment_max=float(np.abs(moment).max()),
+        moment_share=_share(moment, inertia),
         moment_share_band=_share(band["moment"], band["inertia"]),
         force_share_band=_share(band["force"], band["heave"]),
-        pitch_max=float(np.abs(run["pitch"]).max()), seconds=float(run.data.attrs["seconds"]),
-        force_calls=counts.get("force calls", 0), steps=counts.get("steps", 0),
-    )  # fmt: skip
+        pitch_max=float(np.abs(run["pitch"]).max()),
+        seconds=float(run.data.attrs["seconds"]),
+        force_calls=counts.get("force calls", 0),
+        steps=counts.get("steps", 0),
+    )
 
 
 def errors(run: Result, truth: Result, slope: float = SLOPE) -> Errors:
@@ -146,9 +155,10 @@ def errors(run: Result, truth: Result, slope: float = SLOPE) -> Errors:
         damage={name: damage_ratio(loads[name], true[name], slope) for name in CHANNELS},
         force_rms={name: rms(loads[name] - true[name]) for name in CHANNELS},
         vertical_damage={name: damage_ratio(run[name], truth[name], slope) for name in ("f3", "f4")},
-        pitch_max=float(np.abs(pitch).max()), pitch_rms=rms(pitch),
+        pitch_max=float(np.abs(pitch).max()),
+        pitch_rms=rms(pitch),
         heave_max=float(np.abs(run["z3"] - truth["z3"]).max()),
-    )  # fmt: skip
+    )
 
 
 def verdict(own: Own, found: Errors, effects: Iterable[str], limits: Limits) -> Verdict:
@@ -186,8 +196,15 @@ def uncertainty(run: Result) -> float:
     return 2.0 * float(run["pitch_deviation"].max()) if "pitch_deviation" in run.data else 0.0
 
 
-def blind_verdict(own: Own, effects: Iterable[str], duration: float, limits: Limits, trusted: float | None = None,
-                  consistent: bool | None = None, uncertainty: float = 0.0) -> Verdict:  # fmt: skip
+def blind_verdict(
+    own: Own,
+    effects: Iterable[str],
+    duration: float,
+    limits: Limits,
+    trusted: float | None = None,
+    consistent: bool | None = None,
+    uncertainty: float = 0.0,
+) -> Verdict:
     """The verdict of an engineer, who has no true run: by the run's own figures alone. Damage is not among them.
 
     ``accepted``: the pitch is held to a measured one (MEASURED), the artificial moment is within its limit and the
@@ -226,16 +243,22 @@ def _free(duration: float, trusted: float | None) -> Verdict:
 
 def _beyond(found: Errors, limits: Limits) -> list[str]:
     """What the true run shows to be wrong."""
-    damage = [f"damage of {name} x {ratio:.3g}" for name, ratio in found.damage.items()
-              if not abs(ratio - 1.0) <= limits.damage_error]  # fmt: skip
+    damage = [
+        f"damage of {name} x {ratio:.3g}"
+        for name, ratio in found.damage.items()
+        if not abs(ratio - 1.0) <= limits.damage_error
+    ]
     return damage + ([] if found.pitch_max <= limits.pitch_error else [f"pitch wrong by {found.pitch_max:.2g} rad"])
 
 
 def _burden(own: Own, limits: Limits) -> list[str]:
     """What the run itself shows to be wrong."""
     shares = {"moment": (own.moment_share_band, "I pitch''"), "force": (own.force_share_band, "m3 z3''")}
-    return [f"artificial {name} {share:.0%} of {whole}" for name, (share, whole) in shares.items()
-            if not share <= limits.artificial_share]  # fmt: skip
+    return [
+        f"artificial {name} {share:.0%} of {whole}"
+        for name, (share, whole) in shares.items()
+        if not share <= limits.artificial_share
+    ]
 
 
 def rms(values: np.ndarray) -> float:
@@ -274,6 +297,11 @@ def _step(run: Result) -> float:
     """Spacing (s) of the rows."""
     steps = np.diff(run.times)
     if len(steps) < LEAST or np.ptp(steps) > 1e-6 * steps[0] or steps[0] > COARSEST:
-        raise InputError("", "times", None, f"the score needs {LEAST} rows or more, equally spaced by {COARSEST:g} s "
-                         "or less: leave run.output_step out")
+        raise InputError(
+            "",
+            "times",
+            None,
+            f"the score needs {LEAST} rows or more, equally spaced by {COARSEST:g} s "
+            "or less: leave run.output_step out",
+        )
     return float(steps.mean())

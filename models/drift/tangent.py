@@ -144,15 +144,19 @@ class Path:
     def table(self, signal: Any) -> np.ndarray:
         """A signal at the stages of all steps, shape (rows, channels)."""
         count = self.per_sample * self.samples
-        return signal.sample(0.0, self.step, count) if self.forces.held else signal.sample(0.0, self.step / 2,
-                                                                                          2 * count + 1)
+        return (
+            signal.sample(0.0, self.step, count)
+            if self.forces.held
+            else signal.sample(0.0, self.step / 2, 2 * count + 1)
+        )
 
     def march(self, compile_march: Any):
         """A compiled march that fits the assembly."""
         return march_along(compile_march, self.assembly.mode, self.assembly.vehicle.geometry)
 
-    def carry(self, columns: np.ndarray, errors: np.ndarray | None = None,
-              other: Parameters | None = None) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    def carry(
+        self, columns: np.ndarray, errors: np.ndarray | None = None, other: Parameters | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Path (n + 1, 8) and error columns (n + 1, m, 8) that begin as ``columns`` (m, 8).
 
         errors : (3 steps, m, 2), errors of the forces (N) at the start, the middle and the end of each step; other :
@@ -165,8 +169,19 @@ class Path:
         pushes = np.zeros((3 * count, len(columns), 2)) if errors is None else errors
         states, kept = np.empty((count + 1, 8)), np.empty((count + 1, *columns.shape))
         march = self.march(compile_carry)
-        march(self.assembly.initial.copy(), np.array(columns, dtype=float), self.step, count, inputs, pushes, self.rows,
-              p, wrong, states, kept)  # fmt: skip
+        march(
+            self.assembly.initial.copy(),
+            np.array(columns, dtype=float),
+            self.step,
+            count,
+            inputs,
+            pushes,
+            self.rows,
+            p,
+            wrong,
+            states,
+            kept,
+        )
         return states, kept
 
     @property

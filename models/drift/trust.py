@@ -172,8 +172,19 @@ def _steady(assembly: Assembly, angle: float) -> dict[str, float]:
     from models.measured.axle_forces import AxleForces, steady
 
     path, p = path_of(assembly), assembly.parameters
-    found = steady(AxleForces(_covering(path), path.forces.period, p, ((), ()), assembly.scene.run.duration,
-                              turn=assembly.mode == "force-body"))  # fmt: skip
+    found = steady(
+        AxleForces(
+            _covering(path),
+            path.forces.period,
+            p,
+            ((), ()),
+            assembly.scene.run.duration,
+            turn=assembly.mode == "force-body",
+        )
+    )
     ways = {"mean of the wheel forces": angle * (p.a + p.b), "balance of the axles": angle}
-    return {name: math.sqrt(2 * way / abs(acceleration)) for (name, way), acceleration, seen in
-            zip(ways.items(), found.accelerations.tolist(), found.seen, strict=True) if seen}  # fmt: skip
+    return {
+        name: math.sqrt(2 * way / abs(acceleration))
+        for (name, way), acceleration, seen in zip(ways.items(), found.accelerations.tolist(), found.seen, strict=True)
+        if seen
+    }

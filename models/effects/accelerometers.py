@@ -90,8 +90,9 @@ class Accelerometers:
         values = readings(places, y[:, 3], y[:, 7], moved[:, 2], moved[:, 3], assembly.parameters.g)
         for i, sensor in enumerate(p.sensors.values()):
             if sensor.bracket is not None:
-                values[:, i] = on_bracket(values[:, i], 1 / p.sampling_rate, sensor.bracket.frequency,
-                                          sensor.bracket.damping)  # fmt: skip
+                values[:, i] = on_bracket(
+                    values[:, i], 1 / p.sampling_rate, sensor.bracket.frequency, sensor.bracket.damping
+                )
         noise = normal(p.seed, p.path, len(values), 3 * len(places), source=ACCELEROMETERS)
         return values + p.deviation * noise.reshape(values.shape)
 

@@ -34,8 +34,12 @@ class Parameters(Strict):
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The assembly with the contact points among its results."""
     if assembly.mode == "force-body":
-        raise InputError(assembly.scene.file, "effects.contact_points", None,
-                         "contact points move vertically: use frame = 'inertial' for the wheel forces")
+        raise InputError(
+            assembly.scene.file,
+            "effects.contact_points",
+            None,
+            "contact points move vertically: use frame = 'inertial' for the wheel forces",
+        )
     return replace(assembly, outputs=(*assembly.outputs, contact_points))
 
 
@@ -47,10 +51,13 @@ def contact_points(assembly: Assembly, times: np.ndarray, states: np.ndarray) ->
     pieces = forces.polynomials()
     tyres = (("front", p.k1, p.d1), ("rear", p.k2, p.d2))
     return {
-        f"zeta{i + 1}": ("m", f"contact point under the {name} wheel, down",
-                         states[:, i] - compression(pieces[:, :, i], forces.period, stiffness, damping, times))
+        f"zeta{i + 1}": (
+            "m",
+            f"contact point under the {name} wheel, down",
+            states[:, i] - compression(pieces[:, :, i], forces.period, stiffness, damping, times),
+        )
         for i, (name, stiffness, damping) in enumerate(tyres)
-    }  # fmt: skip
+    }
 
 
 def compression(pieces: np.ndarray, period: float, stiffness: float, damping: float, times: np.ndarray) -> np.ndarray:

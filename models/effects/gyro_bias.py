@@ -45,8 +45,15 @@ class Biased:
         p, rate = self.parameters, self.gyro.parameters.sampling_rate
         unit, meaning, read = self.gyro(assembly, times, states)["gyro"]
         number = numbers(times, rate)
-        drift = bias(int(number[-1]) + 1, 1 / rate, p.turn_on * DEGREES_PER_HOUR, p.instability * DEGREES_PER_HOUR,
-                     p.correlation_time, p.seed, p.path)[number]  # fmt: skip
+        drift = bias(
+            int(number[-1]) + 1,
+            1 / rate,
+            p.turn_on * DEGREES_PER_HOUR,
+            p.instability * DEGREES_PER_HOUR,
+            p.correlation_time,
+            p.seed,
+            p.path,
+        )[number]
         return {"gyro": (unit, meaning, read + drift), "gyro_bias": ("rad/s", "bias of the gyro", drift)}
 
 

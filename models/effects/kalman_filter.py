@@ -35,13 +35,26 @@ EXCLUDES = ("pitch_spring", "high_pass", "prescribed_pitch", "prescribed_heave_a
 AFTER = ("wheel_forces", "force_noise")
 COST = "a filter over all samples before the run, about 0.1 ms each; one native spring-damper and one moment over time"
 EXAMPLE = {"file": "pitch.csv", "force_deviation": 8.0, "pitch_deviation": 0.5}
-COUNTS = {"exudyn": {"native items": 2, "callbacks": 1},
-          "mujoco": {"native items": 1, "callbacks": 1}, "all": {"channels": 10}}  # fmt: skip
+COUNTS = {
+    "exudyn": {"native items": 2, "callbacks": 1},
+    "mujoco": {"native items": 1, "callbacks": 1},
+    "all": {"channels": 10},
+}
 
 Channels = dict[str, tuple[str, str, np.ndarray]]
 """Name -> unit, meaning, values."""
-CHANNELS = ("kalman_moment", "inertia_moment", "pitch_estimate", "pitch_rate_estimate", "pitch_deviation",
-            "pitch_rate_deviation", "inertia_share", "kalman_used", "kalman_missed", "kalman_surprise")  # fmt: skip
+CHANNELS = (
+    "kalman_moment",
+    "inertia_moment",
+    "pitch_estimate",
+    "pitch_rate_estimate",
+    "pitch_deviation",
+    "pitch_rate_deviation",
+    "inertia_share",
+    "kalman_used",
+    "kalman_missed",
+    "kalman_surprise",
+)
 
 
 BANDWIDTH = 3.0
@@ -58,14 +71,20 @@ filter has 1; one that is sure of a model with 5 % wrong inertia 1.1 to 1.3."""
 class Parameters(Strict):
     """[effects.kalman_filter]; a deviation per measured column, at least one."""
 
-    file: str = Field(description="CSV with the columns time [s] and pitch [rad] and/or pitch_rate [rad/s]; nose up; "
-                                  "empty or nan where nothing was measured")  # fmt: skip
+    file: str = Field(
+        description="CSV with the columns time [s] and pitch [rad] and/or pitch_rate [rad/s]; nose up; "
+        "empty or nan where nothing was measured"
+    )
     force_deviation: float = quantity("N", "standard deviation of the noise of each force sample")
     pitch_deviation: float | None = quantity("rad", "standard deviation of each measured pitch", default=None)
     rate_deviation: float | None = quantity("rad/s", "standard deviation of each measured pitch rate", default=None)
     start_deviation: float = quantity("rad", "standard deviation of the pitch at the start", default=0.0, zero=True)
-    inertia_deviation: float = quantity("", "standard deviation of the share by which the chassis' 1/I may be wrong; 0 "
-                                            "trusts it", default=0.0, zero=True)
+    inertia_deviation: float = quantity(
+        "",
+        "standard deviation of the share by which the chassis' 1/I may be wrong; 0 trusts it",
+        default=0.0,
+        zero=True,
+    )
     bandwidth: float = quantity("Hz", "of the moment that draws the vehicle to the estimate", default=BANDWIDTH)
     damping_ratio: float = quantity("", "of the same", default=0.7)
     smoother: bool = Field(False, description="use all measurements for every time, later ones too")
@@ -81,8 +100,11 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     spring = PitchSpring("chassis", stiffness, damping)
     vehicle = replace(assembly.vehicle, pitch_springs=(*assembly.vehicle.pitch_springs, spring))
     guided = replace(assembly, vehicle=vehicle).with_moment(Sampled(moment, guide.period, held=False))
-    return replace(guided, outputs=(*guided.outputs, partial(_channels, guide, stiffness, damping)),
-                   doubts=(*guided.doubts, *_doubts(p, guide)))  # fmt: skip
+    return replace(
+        guided,
+        outputs=(*guided.outputs, partial(_channels, guide, stiffness, damping)),
+        doubts=(*guided.doubts, *_doubts(p, guide)),
+    )
 
 
 def pull(assembly: Assembly, p: Parameters) -> tuple[float, float]:
@@ -126,8 +148,14 @@ def guide_of(assembly: Assembly, p: Parameters) -> Guide:
     measured = _measurement(assembly, p)
     key = _digest(assembly, measured, p)
     if key not in _LATEST:
-        found = estimate(assembly, measured, p.force_deviation, start_deviation=p.start_deviation,
-                         inertia_deviation=p.inertia_deviation, smoother=p.smoother)  # fmt: skip
+        found = estimate(
+            assembly,
+            measured,
+            p.force_deviation,
+            start_deviation=p.start_deviation,
+            inertia_deviation=p.inertia_deviation,
+            smoother=p.smoother,
+        )
         _LATEST.clear()
         _LATEST[key] = _read(assembly, found, measured)
     return _LATEST[key]
@@ -139,17 +167,38 @@ def _read(assembly: Assembly, found: "Estimate", measured: "Measurement") -> Gui
     deviations = np.sqrt(found.errors()[:, [PITCH, RATE], [PITCH, RATE]])
     share, names = found.states[:, INERTIA], {PITCH: "pitch", RATE: "pitch_rate"}
     fits = consistency(found.innovations, [names[column] for column in measured.columns])
-    return Guide(found.period, found.states, found.states[:, [PITCH, RATE]], deviations, share,
-                 share * suspension_moment(assembly, found.states), np.cumsum(found.used), np.cumsum(found.missed),
-                 np.nancumsum(found.surprises), fits)
+    return Guide(
+        found.period,
+        found.states,
+        found.states[:, [PITCH, RATE]],
+        deviations,
+        share,
+        share * suspension_moment(assembly, found.states),
+        np.cumsum(found.used),
+        np.cumsum(found.missed),
+        np.nancumsum(found.surprises),
+        fits,
+    )
 
 
 def _digest(assembly: Assembly, measured: "Measurement", p: Parameters) -> str:
     forces = assembly.input
     assert isinstance(forces, Sampled | Smooth)
-    named = (assembly.mode, assembly.vehicle.geometry, assembly.scene.run.duration, forces.period, forces.held,
-             type(forces).__name__, measured.period, measured.columns, measured.deviations, p.force_deviation,
-             p.start_deviation, p.inertia_deviation, p.smoother)  # fmt: skip
+    named = (
+        assembly.mode,
+        assembly.vehicle.geometry,
+        assembly.scene.run.duration,
+        forces.period,
+        forces.held,
+        type(forces).__name__,
+        measured.period,
+        measured.columns,
+        measured.deviations,
+        p.force_deviation,
+        p.start_deviation,
+        p.inertia_deviation,
+        p.smoother,
+    )
     arrays = (assembly.parameters.array(), assembly.initial, forces.values, measured.values)
     return sha256(b"".join((repr(named).encode(), *(array.tobytes() for array in arrays)))).hexdigest()
 
@@ -170,8 +219,12 @@ def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
         if not np.isfinite(column).any():
             raise InputError(path, f"column {name!r}", None, "holds no number at all: leave its deviation out")
     if len(values) * period < scene.run.duration * (1 - 1e-9):
-        raise InputError(scene.file, f"{place}.file", p.file,
-                         f"ends at {len(values) * period:g} s, but the run lasts {scene.run.duration:g} s")
+        raise InputError(
+            scene.file,
+            f"{place}.file",
+            p.file,
+            f"ends at {len(values) * period:g} s, but the run lasts {scene.run.duration:g} s",
+        )
     _check_periods(assembly, p, period)
     return Measurement(values, period, tuple(own[1] for own in given.values()), tuple(own[2] for own in given.values()))
 
@@ -180,18 +233,26 @@ def _check_periods(assembly: Assembly, p: Parameters, period: float) -> None:
     assert assembly.input is not None and assembly.input.period is not None
     short, long = sorted((period, assembly.input.period))
     if not divides(short, long):
-        raise InputError(assembly.scene.file, "effects.kalman_filter.file", p.file,
-                         f"is sampled every {period:g} s and the forces every {assembly.input.period:g} s: one must be "
-                         "a multiple of the other")
+        raise InputError(
+            assembly.scene.file,
+            "effects.kalman_filter.file",
+            p.file,
+            f"is sampled every {period:g} s and the forces every {assembly.input.period:g} s: one must be "
+            "a multiple of the other",
+        )
 
 
 def _check_surprise(assembly: Assembly, p: Parameters, guide: Guide) -> None:
     """A filter whose measurement contradicts its forces or its model would draw the vehicle anywhere."""
     mean = float(guide.surprise[-1] / max(guide.used[-1], 1))
     if mean > SURPRISE:
-        raise InputError(assembly.scene.file, "effects.kalman_filter", None,
-                         f"{p.file} contradicts forces and model: the squares of the innovations are {mean:.3g} times "
-                         f"what the deviations allow (at most {SURPRISE:g}): check sign and unit, or state larger ones")
+        raise InputError(
+            assembly.scene.file,
+            "effects.kalman_filter",
+            None,
+            f"{p.file} contradicts forces and model: the squares of the innovations are {mean:.3g} times "
+            f"what the deviations allow (at most {SURPRISE:g}): check sign and unit, or state larger ones",
+        )
 
 
 def _doubts(p: Parameters, guide: Guide) -> tuple[str, ...]:
@@ -200,8 +261,11 @@ def _doubts(p: Parameters, guide: Guide) -> tuple[str, ...]:
         return ()
     square = guide.consistency.figures[0]
     known = f"the stated deviation of the pitch, up to {guide.deviations[:, 0].max():.2g} rad, is not to be relied upon"
-    remedy = ("the stated deviations are too large: state smaller ones" if square.value < square.low else
-              f"check {p.file} for a bias, a delay and its unit, the inertia, and the stated deviations")  # fmt: skip
+    remedy = (
+        "the stated deviations are too large: state smaller ones"
+        if square.value < square.low
+        else f"check {p.file} for a bias, a delay and its unit, the inertia, and the stated deviations"
+    )
     return (f"the filter contradicts {p.file}: {guide.consistency}; {known}; {remedy}",)
 
 
@@ -212,12 +276,17 @@ def _check_bandwidth(assembly: Assembly, p: Parameters, guide: Guide) -> None:
     share = math.sqrt(assembly.parameters.I / rigid_pitch(assembly.parameters).total)
     growth = share * float(np.sqrt(np.mean(guide.values[:, 1] ** 2)))
     if 2 * math.pi * p.bandwidth <= growth:
-        raise InputError(assembly.scene.file, "effects.kalman_filter.bandwidth", p.bandwidth,
-                         f"must be above {growth / (2 * math.pi):.3g} Hz: a pitch error grows at {growth:.3g} 1/s here")
+        raise InputError(
+            assembly.scene.file,
+            "effects.kalman_filter.bandwidth",
+            p.bandwidth,
+            f"must be above {growth / (2 * math.pi):.3g} Hz: a pitch error grows at {growth:.3g} 1/s here",
+        )
 
 
-def _channels(guide: Guide, stiffness: float, damping: float, assembly: Assembly, times: np.ndarray,
-              states: np.ndarray) -> Channels:  # fmt: skip
+def _channels(
+    guide: Guide, stiffness: float, damping: float, assembly: Assembly, times: np.ndarray, states: np.ndarray
+) -> Channels:
     """The moment and what it follows, at the saved times."""
     grid = guide.period * np.arange(len(guide.values))
     pitch, rate, pitch_deviation, rate_deviation, inertia, lacking = (
@@ -237,4 +306,4 @@ def _channels(guide: Guide, stiffness: float, damping: float, assembly: Assembly
         "kalman_used": ("", "measured values that the filter has taken in so far", guide.used[latest]),
         "kalman_missed": ("", "measured values so far that were no numbers", guide.missed[latest]),
         "kalman_surprise": ("", "sum of the normalised innovations squared so far", guide.surprise[latest]),
-    }  # fmt: skip
+    }

@@ -18,8 +18,12 @@ AFTER = ("wheel_forces", "force_noise")
 COST = "two constraints in Exudyn; two degrees of freedom less and an inverse-dynamics pass in MuJoCo"
 EXAMPLE = {"file": "motion.csv"}
 BESIDE = {"wheel_forces": {"file": "forces.csv", "interpolation": "linear"}}
-COUNTS = {"reference": {"degrees of freedom": -2}, "exudyn": {"native items": 2, "callbacks": 4},
-          "mujoco": {"degrees of freedom": -2}, "all": {"channels": 3}}  # fmt: skip
+COUNTS = {
+    "reference": {"degrees of freedom": -2},
+    "exudyn": {"native items": 2, "callbacks": 4},
+    "mujoco": {"degrees of freedom": -2},
+    "all": {"channels": 3},
+}
 
 
 class Parameters(Strict):

@@ -18,8 +18,12 @@ AFTER = ("wheel_forces", "force_noise")
 COST = "one constraint in Exudyn; one degree of freedom less and an inverse-dynamics pass in MuJoCo"
 EXAMPLE = {"file": "pitch.csv"}
 BESIDE = {"wheel_forces": {"file": "forces.csv", "interpolation": "linear"}}
-COUNTS = {"reference": {"degrees of freedom": -1}, "exudyn": {"native items": 1, "callbacks": 2},
-          "mujoco": {"degrees of freedom": -1}, "all": {"channels": 2}}  # fmt: skip
+COUNTS = {
+    "reference": {"degrees of freedom": -1},
+    "exudyn": {"native items": 1, "callbacks": 2},
+    "mujoco": {"degrees of freedom": -1},
+    "all": {"channels": 2},
+}
 
 
 class Parameters(Strict):

@@ -33,8 +33,12 @@ class Parameters(Strict):
     speed: float = quantity("m/s", "constant speed of the vehicle")
     gd: float | None = quantity("m^3", "study: one-sided roughness at 0.1 1/m", default=None)
     grade: float | None = Field(
-        None, gt=-STEEPEST, lt=STEEPEST, json_schema_extra={"unit": "rad"},
-        description="study, hills, iso8608: slope angle that the road comes to after its fade-in, positive uphill")
+        None,
+        gt=-STEEPEST,
+        lt=STEEPEST,
+        json_schema_extra={"unit": "rad"},
+        description="study, hills, iso8608: slope angle that the road comes to after its fade-in, positive uphill",
+    )
     road_class: Literal["A", "B", "C", "D", "E", "F", "G", "H"] | None = Field(None, description="iso8608: class")
     seed: int | None = Field(None, ge=0, lt=2**128, description="iso8608: seed of the phases")
     level: Literal["one-sided", "two-sided"] | None = Field(None, description="iso8608: how the class's level is read")
@@ -61,13 +65,18 @@ def _check_keys(file: str, p: Parameters) -> None:
     for name in given:
         if name not in OWN[p.source]:
             own = ", ".join(("speed", *OWN[p.source]))
-            raise InputError(file, f"effects.road.{name}", getattr(p, name),
-                             f"has no meaning for source = {p.source!r}, which takes {own}")
+            raise InputError(
+                file,
+                f"effects.road.{name}",
+                getattr(p, name),
+                f"has no meaning for source = {p.source!r}, which takes {own}",
+            )
     for name in NEEDED.get(p.source, ()):
         if name not in given:
             meaning = str(type(p).model_fields[name].description).partition(": ")[2]
-            raise InputError(file, f"effects.road.{name}", None,
-                             f"is missing: source = {p.source!r} needs it ({meaning})")
+            raise InputError(
+                file, f"effects.road.{name}", None, f"is missing: source = {p.source!r} needs it ({meaning})"
+            )
 
 
 def _profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[float, ...]]:
@@ -122,6 +131,10 @@ def _check_length(scene: Any, p: Parameters, raw: Any, distance: float, run_in: 
     if run_in > total:
         raise InputError(scene.file, "effects.road.run_in", run_in, f"the road {p.file} is only {total:g} m long")
     if p.beyond_end == "refused" and distance > total * (1 + 1e-9):
-        raise InputError(scene.file, "effects.road.beyond_end", "refused",
-                         f"the road {p.file} ends at {total:g} m and the run needs {distance:g} m: shorten "
-                         "run.duration, lower effects.road.speed or set this to 'mirrored'")
+        raise InputError(
+            scene.file,
+            "effects.road.beyond_end",
+            "refused",
+            f"the road {p.file} ends at {total:g} m and the run needs {distance:g} m: shorten "
+            "run.duration, lower effects.road.speed or set this to 'mirrored'",
+        )

@@ -30,9 +30,12 @@ def beside_reference(engine: str, assembly: Assembly, settings: Settings, run: T
     gap, where = relative_gap(run, truth)
     allowed = min(max(MARGIN * _expected(engine, assembly, settings, truth), FLOOR), CEILING)
     if not gap <= allowed:
-        raise RunFailed(engine, f"its states are {100 * gap:.3g} % of the largest motion away from the reference at "
-                                f"{where:.3g} s, where its order and step explain at most {100 * allowed:.3g} %: "
-                                f"`twinrig validate --engine {engine}` says what is wrong")  # fmt: skip
+        raise RunFailed(
+            engine,
+            f"its states are {100 * gap:.3g} % of the largest motion away from the reference at "
+            f"{where:.3g} s, where its order and step explain at most {100 * allowed:.3g} %: "
+            f"`twinrig validate --engine {engine}` says what is wrong",
+        )
     return f"states within {gap:.1e} of the largest motion from the reference"
 
 

@@ -90,8 +90,9 @@ class Carried:
         driven = Driven(bodies(plane), np.zeros(3), table, held, lambda block, t, n: fill(block, n, table))
         self._model: FreeModel = free_model(engine, driven)
 
-    def advance(self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float, steer: np.ndarray,
-                *rest: Any) -> tuple[int, float]:  # fmt: skip
+    def advance(
+        self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float, steer: np.ndarray, *rest: Any
+    ) -> tuple[int, float]:
         """As ``models.braking.advance.advance``, a step at a time, each moved by the engine."""
         time, report = 0.0, rest[-1]
         for n in range(len(torques) - 1):

@@ -70,8 +70,9 @@ class OnSprings:
         rows = table[-ROW * wheels :].reshape(wheels, ROW)
         return OnEngine(table, rows, np.zeros(wheels), self._liveliness, engine or self._model), go, by_steps
 
-    def advance(self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float,
-                *rest: Any) -> tuple[int, float]:  # fmt: skip
+    def advance(
+        self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float, *rest: Any
+    ) -> tuple[int, float]:
         """As ``models.braking.advance.advance``, ``state`` (2, n) having all coordinates and their rates.
 
         A run begins with zeros in the accelerations ``found``. Raises RunFailed where the vehicle turns over.
@@ -81,8 +82,9 @@ class OnSprings:
             status, time = go(state, turning, torques, step, *rest, own)
         return self._sound(status, time), time
 
-    def moving(self, told: Any, kept: Any, sample: float, braking: Any,
-               *rest: Any) -> Iterator[tuple[int, float, float, float]]:  # fmt: skip
+    def moving(
+        self, told: Any, kept: Any, sample: float, braking: Any, *rest: Any
+    ) -> Iterator[tuple[int, float, float, float]]:
         """As ``models.braking.samples.samples``; Refused for a step that is too long, RunFailed as ``advance``."""
         own, _, by_steps = self._parts
         step = sample / (braking.torques.shape[0] - 1)
@@ -97,8 +99,11 @@ class OnSprings:
         """Refuse a step (s) at which a mode of the vehicle on its springs and tyres would grow."""
         if step in self._allowed:
             return
-        _check_step(self.engine, linearise(self.vehicle.handling.vehicle),
-                    Settings(INTEGRATORS[self.engine], step, LONG_RUN * step))  # fmt: skip
+        _check_step(
+            self.engine,
+            linearise(self.vehicle.handling.vehicle),
+            Settings(INTEGRATORS[self.engine], step, LONG_RUN * step),
+        )
         self._allowed.add(step)
 
     def _sound(self, status: int, time: float) -> int:
@@ -108,8 +113,15 @@ class OnSprings:
             raise RunFailed(self.engine, "the engine gave up", time)
         return status
 
-    def rolling(self, state: np.ndarray, steer: np.ndarray, plane: Plane, kind: np.ndarray, road: Any,
-                tables: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    def rolling(
+        self,
+        state: np.ndarray,
+        steer: np.ndarray,
+        plane: Plane,
+        kind: np.ndarray,
+        road: Any,
+        tables: tuple[np.ndarray, ...],
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
         surface, known = np.empty((steer.size, 3)), self._known
         none, motion, report = np.zeros(steer.size), np.empty((steer.size, 3)), np.empty((steer.size, REPORTED))

@@ -243,5 +243,8 @@ def check_step(engine: str, wheels: Wheels, method: str, step: float, steps: int
     about, like = linear(replace(wheels, count=1)), "Euler" if method == "discrete" else method
     if growth(like, step, steps * step, about) > np.log(GROWTH):
         longest = limit(like, step, LONG_RUN * step, about)
-        raise Refused(engine, f"step {step:g} s exceeds the stability limit of {method}, {0.999 * longest:.3g} s, for "
-                              f"wheels at {wheels.speed:g} m/s: shorten it, or take an implicit method")  # fmt: skip
+        raise Refused(
+            engine,
+            f"step {step:g} s exceeds the stability limit of {method}, {0.999 * longest:.3g} s, for "
+            f"wheels at {wheels.speed:g} m/s: shorten it, or take an implicit method",
+        )

@@ -65,19 +65,32 @@ class Rolling:
     for implicit solvers by the generic object; without them Exudyn differentiates by 2 size calls of ``of``.
     """
 
-    def __init__(self, wheels: Wheels, of: Callable[[Any, Any], Any] | None, route: str = ROUTES[0],
-                 slopes: Callable[[Any, Any, float, float], Array] | None = None) -> None:  # fmt: skip
+    def __init__(
+        self,
+        wheels: Wheels,
+        of: Callable[[Any, Any], Any] | None,
+        route: str = ROUTES[0],
+        slopes: Callable[[Any, Any, float, float], Array] | None = None,
+    ) -> None:
         self._container = exu.SystemContainer()
         self.mbs: Any = self._container.AddSystem()
         self.wheels, self._slopes = wheels, slopes
         masses, k, d = wheels.masses[:FREEDOMS], wheels.stiffness, wheels.damping
         self._nodes = []
         for _ in range(wheels.count):
-            node = self.mbs.AddNode(items.NodeGenericODE2(
-                numberOfODE2Coordinates=FREEDOMS, referenceCoordinates=[0.0] * FREEDOMS,
-                initialCoordinates=[0.0] * FREEDOMS, initialCoordinates_t=[0.0] * FREEDOMS))  # fmt: skip
-            self.mbs.AddObject(items.ObjectGenericODE2(
-                nodeNumbers=[node], massMatrix=np.diag(masses), stiffnessMatrix=np.diag(k), dampingMatrix=np.diag(d)))
+            node = self.mbs.AddNode(
+                items.NodeGenericODE2(
+                    numberOfODE2Coordinates=FREEDOMS,
+                    referenceCoordinates=[0.0] * FREEDOMS,
+                    initialCoordinates=[0.0] * FREEDOMS,
+                    initialCoordinates_t=[0.0] * FREEDOMS,
+                )
+            )
+            self.mbs.AddObject(
+                items.ObjectGenericODE2(
+                    nodeNumbers=[node], massMatrix=np.diag(masses), stiffnessMatrix=np.diag(k), dampingMatrix=np.diag(d)
+                )
+            )
             self._nodes.append(node)
         if of is not None:
             {"generic object": self._object, "loads": self._loads, "before each step": self._before}[route](of)
@@ -87,13 +100,21 @@ class Rolling:
         slopes, more = self._slopes, dict[str, Any]()
         if slopes is not None:  # those of the left-hand side
             more["jacobianUserFunction"] = lambda mbs, t, item, q, v, by_q, by_v: -slopes(q, v, by_q, by_v)
-        self.mbs.AddObject(items.ObjectGenericODE2(
-            nodeNumbers=self._nodes, massMatrix=exu.MatrixContainer(),
-            forceUserFunction=lambda mbs, t, item, q, v: of(q, v), **more))  # fmt: skip
+        self.mbs.AddObject(
+            items.ObjectGenericODE2(
+                nodeNumbers=self._nodes,
+                massMatrix=exu.MatrixContainer(),
+                forceUserFunction=lambda mbs, t, item, q, v: of(q, v),
+                **more,
+            )
+        )
 
     def _markers(self) -> list[Any]:
-        return [self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=i))
-                for node in self._nodes for i in range(FREEDOMS)]  # fmt: skip
+        return [
+            self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=i))
+            for node in self._nodes
+            for i in range(FREEDOMS)
+        ]
 
     def _loads(self, of: Callable[[Any, Any], Any]) -> None:
         """The first load computes the forces of all."""
@@ -119,8 +140,9 @@ class Rolling:
 
         self.mbs.SetPreStepUserFunction(hold)
 
-    def run(self, q: Array, v: Array, steps: int, step: float = 1e-4, solver: str = "ExplicitEuler",
-            tolerance: float = 0.0) -> Array:  # fmt: skip
+    def run(
+        self, q: Array, v: Array, steps: int, step: float = 1e-4, solver: str = "ExplicitEuler", tolerance: float = 0.0
+    ) -> Array:
         """State (2 size,) after some steps from positions and rates (size,); RunFailed unless it is finite.
 
         tolerance : relative, of a solver that picks its own steps, at most ``step`` long; 0 for steps as they are.

@@ -15,8 +15,12 @@ from models.engines.mujoco_callback import _array_at
 from models.engines.mujoco_layout import check, offset
 from models.errors import RunFailed
 
-JOINTS = (("slide", (1.0, 0.0, 0.0)), ("slide", (0.0, 1.0, 0.0)), ("slide", (0.0, 0.0, 1.0)),
-          ("hinge", (0.0, 0.0, 1.0)))  # fmt: skip
+JOINTS = (
+    ("slide", (1.0, 0.0, 0.0)),
+    ("slide", (0.0, 1.0, 0.0)),
+    ("slide", (0.0, 0.0, 1.0)),
+    ("hinge", (0.0, 0.0, 1.0)),
+)
 INTEGRATORS = ("Euler", "RK4")
 
 

@@ -74,19 +74,27 @@ def _point(built: Build, bodies: dict[str, Any], point: Point) -> Any:
 
 
 def _strut(mbs: Any, strut: Strut, marker: Callable[[Point], Any]) -> None:
-    mbs.AddObject(items.CartesianSpringDamper(
-        markerNumbers=[marker(strut.lower), marker(strut.upper)],
-        stiffness=[0, strut.stiffness, 0], damping=[0, strut.damping, 0],
-    ))  # fmt: skip
+    mbs.AddObject(
+        items.CartesianSpringDamper(
+            markerNumbers=[marker(strut.lower), marker(strut.upper)],
+            stiffness=[0, strut.stiffness, 0],
+            damping=[0, strut.damping, 0],
+        )
+    )
 
 
 def _pitch_spring(built: Build, spring: PitchSpring) -> None:
-    ground = built.mbs.AddMarker(items.MarkerNodeCoordinate(
-        nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
-    built.mbs.AddObject(items.CoordinateSpringDamper(
-        markerNumbers=[ground, built.places[spring.body, "pitch"]],
-        stiffness=spring.stiffness, damping=spring.damping, **_dead_band(built, spring),
-    ))  # fmt: skip
+    ground = built.mbs.AddMarker(
+        items.MarkerNodeCoordinate(nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0)
+    )
+    built.mbs.AddObject(
+        items.CoordinateSpringDamper(
+            markerNumbers=[ground, built.places[spring.body, "pitch"]],
+            stiffness=spring.stiffness,
+            damping=spring.damping,
+            **_dead_band(built, spring),
+        )
+    )
 
 
 def _dead_band(built: Build, spring: PitchSpring) -> dict[str, Any]:
@@ -113,14 +121,24 @@ def _linear(assembly: Assembly) -> Build:
     linear = tuple(strut for strut in assembly.vehicle.struts if not strut.pushes_only)
     mass, damping, stiffness = matrices(replace(assembly.vehicle, struts=linear))
     zero = [0.0] * len(mass)
-    node = mbs.AddNode(items.NodeGenericODE2(
-        referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero,
-        numberOfODE2Coordinates=len(mass)))
+    node = mbs.AddNode(
+        items.NodeGenericODE2(
+            referenceCoordinates=zero,
+            initialCoordinates=zero,
+            initialCoordinates_t=zero,
+            numberOfODE2Coordinates=len(mass),
+        )
+    )
     weight = [body.mass * assembly.vehicle.gravity for body in assembly.vehicle.bodies]
-    mbs.AddObject(items.ObjectGenericODE2(
-        nodeNumbers=[node], massMatrix=mass, dampingMatrix=damping, stiffnessMatrix=stiffness,
-        forceVector=[*weight, *zero[len(weight):]],
-    ))  # fmt: skip
+    mbs.AddObject(
+        items.ObjectGenericODE2(
+            nodeNumbers=[node],
+            massMatrix=mass,
+            dampingMatrix=damping,
+            stiffnessMatrix=stiffness,
+            forceVector=[*weight, *zero[len(weight) :]],
+        )
+    )
     for i, place in enumerate(assembly.vehicle.coordinates()):
         built.places[place] = _marker(mbs, node, i)
     built.nodes = {"vehicle": node}
@@ -162,12 +180,17 @@ def _pushing_tyre(built: Build, tyre: Strut, height: Reader, rate: Reader) -> No
         return max(min(pressed + d * (speed - rate(mbs, t, 0.0)), 2.0 * pressed), 0.0)
 
     law: Any = force  # its type hints do not know that a function is one
-    ground = built.mbs.AddMarker(items.MarkerNodeCoordinate(
-        nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
-    built.mbs.AddObject(items.CoordinateSpringDamper(
-        markerNumbers=[ground, built.places[wheel, "z"]], stiffness=tyre.stiffness, damping=tyre.damping,
-        springForceUserFunction=law,
-    ))  # fmt: skip
+    ground = built.mbs.AddMarker(
+        items.MarkerNodeCoordinate(nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0)
+    )
+    built.mbs.AddObject(
+        items.CoordinateSpringDamper(
+            markerNumbers=[ground, built.places[wheel, "z"]],
+            stiffness=tyre.stiffness,
+            damping=tyre.damping,
+            springForceUserFunction=law,
+        )
+    )
     built.callbacks += 1
 
 
@@ -198,20 +221,25 @@ def _prescribe(built: Build, assembly: Assembly, settings: Settings) -> list[Any
         return []
     table = assembly.input.sample(0.0, settings.step / 2, 2 * settings.steps + 1).T.tolist()
     places = [assembly.vehicle.coordinates()[i] for i in assembly.guided]
-    return [_constraint(built, place, table[2 + i], table[2 + len(places) + i], 2.0 / settings.step)
-            for i, place in enumerate(places)]
+    return [
+        _constraint(built, place, table[2 + i], table[2 + len(places) + i], 2.0 / settings.step)
+        for i, place in enumerate(places)
+    ]
 
 
 def _constraint(built: Build, place: tuple[str, str], path: list[float], rate: list[float], per_time: float) -> Any:
     """A coordinate that follows a path given at half steps."""
-    ground = built.mbs.AddMarker(items.MarkerNodeCoordinate(
-        nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
+    ground = built.mbs.AddMarker(
+        items.MarkerNodeCoordinate(nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0)
+    )
     built.callbacks += 2
-    return built.mbs.AddObject(items.CoordinateConstraint(
-        markerNumbers=[ground, built.places[place]],
-        offsetUserFunction=lambda mbs, t, item, offset: path[round(t * per_time)],
-        offsetUserFunction_t=lambda mbs, t, item, offset: rate[round(t * per_time)],
-    ))  # fmt: skip
+    return built.mbs.AddObject(
+        items.CoordinateConstraint(
+            markerNumbers=[ground, built.places[place]],
+            offsetUserFunction=lambda mbs, t, item, offset: path[round(t * per_time)],
+            offsetUserFunction_t=lambda mbs, t, item, offset: rate[round(t * per_time)],
+        )
+    )
 
 
 class ExudynModel:
@@ -224,8 +252,9 @@ class ExudynModel:
             self.clock = Clock(assembly.input, settings)
             _drive(self.built, assembly, self.clock)
         for i, tyre in enumerate(tyre for tyre in assembly.vehicle.tyres if tyre.pushes_only):
-            read = (_flat, _flat) if assembly.input is None else (self.clock.reader(i, 1.0),
-                                                                  self.clock.reader(2 + i, 1.0))  # fmt: skip
+            read = (
+                (_flat, _flat) if assembly.input is None else (self.clock.reader(i, 1.0), self.clock.reader(2 + i, 1.0))
+            )
             _pushing_tyre(self.built, tyre, *read)
         if assembly.moment is not None:
             _load(self.built, ("chassis", "pitch"), Clock(assembly.moment, settings).reader(0, 1.0))
@@ -239,14 +268,22 @@ class ExudynModel:
 
     def _add_sensors(self) -> list[tuple[Any, Any]]:
         kinds = exu.OutputVariableType
+
         def sensor(node: Any, kind: Any) -> Any:
-            return self.built.mbs.AddSensor(items.SensorNode(
-                nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind))
+            return self.built.mbs.AddSensor(
+                items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind)
+            )
+
         nodes = self.built.nodes.values()
         sensors = [(sensor(node, kinds.Coordinates), sensor(node, kinds.Coordinates_t)) for node in nodes]
-        self._multipliers = [self.built.mbs.AddSensor(items.SensorObject(
-            objectNumber=constraint, storeInternal=True, writeToFile=False, outputVariableType=kinds.Force))
-            for constraint in self.constraints]  # fmt: skip
+        self._multipliers = [
+            self.built.mbs.AddSensor(
+                items.SensorObject(
+                    objectNumber=constraint, storeInternal=True, writeToFile=False, outputVariableType=kinds.Force
+                )
+            )
+            for constraint in self.constraints
+        ]
         return sensors
 
     def _find_columns(self) -> list[int]:
@@ -272,7 +309,9 @@ class ExudynModel:
     def _wanted(self, time: float) -> np.ndarray:
         """Accelerations of the prescribed coordinates, if any."""
         guided = self.assembly.guided
-        return np.empty(0) if not guided or self.assembly.input is None else self.assembly.input.at(time)[-len(guided):]
+        return (
+            np.empty(0) if not guided or self.assembly.input is None else self.assembly.input.at(time)[-len(guided) :]
+        )
 
     def _free_acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
         """The same with nothing enforced on prescribed coordinates."""
@@ -295,8 +334,11 @@ class ExudynModel:
     def plan(self) -> dict[str, int]:
         """What was built: degrees of freedom, native items, callbacks."""
         data = self.built.mbs.systemData
-        return {"degrees of freedom": 4, "native items": data.NumberOfObjects() + data.NumberOfLoads(),
-                "callbacks": self.built.callbacks}
+        return {
+            "degrees of freedom": 4,
+            "native items": data.NumberOfObjects() + data.NumberOfLoads(),
+            "callbacks": self.built.callbacks,
+        }
 
     def _options(self) -> Any:
         """Exudyn's settings for this run; nothing is written to files."""
@@ -366,8 +408,9 @@ class ExudynModel:
         times = positions[0][:, 0]
         if self.assembly.vehicle.geometry == "linear":
             return times, np.hstack([positions[0][:, 1:], rates[0][:, 1:]])
-        halves = [np.column_stack([part[0][:, 2], part[1][:, 2], part[2][:, 2], part[2][:, 3]])
-                  for part in (positions, rates)]
+        halves = [
+            np.column_stack([part[0][:, 2], part[1][:, 2], part[2][:, 2], part[2][:, 3]]) for part in (positions, rates)
+        ]
         return self._on_grid(times), np.hstack(halves)
 
     def _on_grid(self, times: np.ndarray) -> np.ndarray:

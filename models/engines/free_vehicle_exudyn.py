@@ -42,9 +42,12 @@ class FreeExudyn(FreeModel):
         tree, node = built.links[driven.vehicle.bodies[0].name][0], next(iter(built.places.values()))[0]
         mbs.SetObjectParameter(tree, "gravity", driven.gravity.tolist())
         mbs.SetObjectParameter(tree, "forceUserFunction", user_function(driven))
-        self._sensors = [mbs.AddSensor(items.SensorNode(
-            nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind))
-            for kind in (KINDS.Coordinates, KINDS.Coordinates_t)]  # fmt: skip
+        self._sensors = [
+            mbs.AddSensor(
+                items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind)
+            )
+            for kind in (KINDS.Coordinates, KINDS.Coordinates_t)
+        ]
         mbs.Assemble()
 
     def _started(self, q: np.ndarray, v: np.ndarray) -> Any:

@@ -27,8 +27,13 @@ def timed_law(kernel: Any) -> Any:
 
     @cfunc(types.void(types.voidptr, types.voidptr))
     def law(model, data):
-        kernel(_array_at(model, numbers), carray(_double_at(data, time), (1,))[0], _array_at(data, position),
-               _array_at(data, rate), _array_at(data, force))  # fmt: skip
+        kernel(
+            _array_at(model, numbers),
+            carray(_double_at(data, time), (1,))[0],
+            _array_at(data, position),
+            _array_at(data, rate),
+            _array_at(data, force),
+        )
 
     return law
 

@@ -47,8 +47,11 @@ class HubModel(ABC):
     def __init__(self, engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> None:
         """Refused where the step does not divide the duration or the inputs are not one row per half step."""
         if not divides(step, duration):
-            raise Refused(engine, f"the step {step:g} s does not divide the duration {duration:g} s; use for "
-                                       f"example {fitting(step, duration)} s")
+            raise Refused(
+                engine,
+                f"the step {step:g} s does not divide the duration {duration:g} s; use for "
+                f"example {fitting(step, duration)} s",
+            )
         self.engine, self.vehicle, self.step, self.steps = engine, vehicle, step, round(duration / step)
         _check(engine, vehicle, drive, 2 * self.steps + 1)
         check_step(engine, vehicle, step, duration)
@@ -85,8 +88,13 @@ class HubModel(ABC):
     def work(self) -> tuple[np.ndarray, ...]:
         """Room for the compiled forces: motion of the joints, their forces, those of elements, hubs, stabiliser."""
         own = self.vehicle
-        return (np.empty((self.size + 1, PER_MOTION)), np.zeros(self.size), np.empty(len(own.elements)),
-                np.empty((len(own.hubs), WRENCH)), np.empty(2))  # fmt: skip
+        return (
+            np.empty((self.size + 1, PER_MOTION)),
+            np.zeros(self.size),
+            np.empty(len(own.elements)),
+            np.empty((len(own.hubs), WRENCH)),
+            np.empty(2),
+        )
 
 
 def check_step(engine: str, vehicle: CutVehicle, step: float, duration: float) -> None:

@@ -46,8 +46,14 @@ def _spec(vehicle: Vehicle, settings: Settings, guided: Collection[int] = ()) ->
     places = {axle.wheel: axle.x for axle in vehicle.axles}
     joints = {place for i, place in enumerate(vehicle.coordinates()) if i not in guided}
     for body in vehicle.bodies:
-        own = spec.worldbody.add_body(name=body.name, pos=[places.get(body.name, 0.0), 0, 0], mass=body.mass,
-                                      ipos=[0, 0, 0], inertia=[body.pitch_inertia or 1.0] * 3, explicitinertial=True)
+        own = spec.worldbody.add_body(
+            name=body.name,
+            pos=[places.get(body.name, 0.0), 0, 0],
+            mass=body.mass,
+            ipos=[0, 0, 0],
+            inertia=[body.pitch_inertia or 1.0] * 3,
+            explicitinertial=True,
+        )
         if (body.name, "z") in joints:
             own.add_joint(name=f"{body.name} z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
         if (body.name, "pitch") in joints:
@@ -79,17 +85,27 @@ def _suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, joints: set
     spec.body(strut.upper.body).add_site(name=f"{strut.name} upper", pos=[strut.upper.x, 0, 0])
     spec.body(strut.lower.body).add_site(name=f"{strut.name} lower")
     spec.add_actuator(
-        name=strut.name, target=f"{strut.name} upper", refsite=f"{strut.name} lower",
-        trntype=mujoco.mjtTrn.mjTRN_SITE, gear=[0, 0, 1, 0, 0, 0], gainprm=[0.0] * 10,
-        biastype=mujoco.mjtBias.mjBIAS_AFFINE, biasprm=[0, -strut.stiffness, -strut.damping, *[0] * 7],
-    )  # fmt: skip
+        name=strut.name,
+        target=f"{strut.name} upper",
+        refsite=f"{strut.name} lower",
+        trntype=mujoco.mjtTrn.mjTRN_SITE,
+        gear=[0, 0, 1, 0, 0, 0],
+        gainprm=[0.0] * 10,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+        biasprm=[0, -strut.stiffness, -strut.damping, *[0] * 7],
+    )
 
 
 def _held(spec: mujoco.MjSpec, vehicle: Vehicle, gear: float) -> None:
     """One motor per wheel for forces that stay constant over a step; they come first among the controls."""
     for axle in vehicle.axles:
-        spec.add_actuator(name=f"{axle.name} force", target=f"{axle.wheel} z", trntype=mujoco.mjtTrn.mjTRN_JOINT,
-                          gear=[gear, 0, 0, 0, 0, 0], gainprm=[1.0 if gear else 0.0, *[0] * 9])
+        spec.add_actuator(
+            name=f"{axle.name} force",
+            target=f"{axle.wheel} z",
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            gear=[gear, 0, 0, 0, 0, 0],
+            gainprm=[1.0 if gear else 0.0, *[0] * 9],
+        )
 
 
 @dataclass
@@ -117,8 +133,9 @@ def _drive(assembly: Assembly, settings: Settings) -> Drive:
         return Drive(controls=held)
     from models.engines.mujoco_callback import body_fixed_law, pushing_law, table_law
 
-    pushing = tuple(number for tyre in assembly.vehicle.tyres if tyre.pushes_only
-                    for number in (tyre.stiffness, tyre.damping))  # fmt: skip
+    pushing = tuple(
+        number for tyre in assembly.vehicle.tyres if tyre.pushes_only for number in (tyre.stiffness, tyre.damping)
+    )
     if pushing:
         road = np.zeros((1, 4)) if signal is None else signal.sample(0.0, h / 2, 2 * n + 1)
         return Drive(road, law=pushing_law(), tyres=pushing)
@@ -139,8 +156,9 @@ def _generalised(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
     """Forces (rows, 2 or 3) on the free heave coordinates that the input stands for; motors apply held ones."""
     if assembly.mode == "road":
         tyres = assembly.vehicle.tyres
-        return np.column_stack([tyre.stiffness * inputs[:, i] + tyre.damping * inputs[:, 2 + i]
-                                for i, tyre in enumerate(tyres)])
+        return np.column_stack(
+            [tyre.stiffness * inputs[:, i] + tyre.damping * inputs[:, 2 + i] for i, tyre in enumerate(tyres)]
+        )
     held = assembly.input is not None and assembly.input.held
     forces = np.zeros((len(inputs), 2)) if held else -inputs[:, :2]
     if not assembly.guided:
@@ -154,8 +172,9 @@ def _guidance(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
     """What prescribed coordinates add to the strut forces on the free heave coordinates, shape (rows, 2 or 3)."""
     count = len(assembly.guided)
     path, rate = (inputs[:, 2 + i * count : 2 + (i + 1) * count] for i in range(2))
-    z, pitch, dz, turn = (path[:, 0], path[:, 1], rate[:, 0], rate[:, 1]) if count == 2 else (
-        0.0, path[:, 0], 0.0, rate[:, 0])
+    z, pitch, dz, turn = (
+        (path[:, 0], path[:, 1], rate[:, 0], rate[:, 1]) if count == 2 else (0.0, path[:, 0], 0.0, rate[:, 0])
+    )
     exact = assembly.vehicle.geometry == "exact"
     sine, cosine = (np.sin(pitch), np.cos(pitch)) if exact else (pitch, np.ones_like(pitch))
     forces = np.zeros((len(inputs), 3))
@@ -318,8 +337,11 @@ class MujocoModel:
     def plan(self) -> dict[str, int]:
         """What was built: degrees of freedom, native items, callbacks."""
         native = self.model.nu + self.model.ntendon + int((self.model.jnt_stiffness != 0).sum())
-        return {"degrees of freedom": self.model.nv, "native items": native,
-                "callbacks": int(self.drive.law is not None)}
+        return {
+            "degrees of freedom": self.model.nv,
+            "native items": native,
+            "callbacks": int(self.drive.law is not None),
+        }
 
     def _counts(self) -> dict[str, int]:
         n = self.settings.steps

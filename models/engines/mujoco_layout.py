@@ -61,8 +61,13 @@ def offset(structure: str, field: str) -> int:
 
 def check(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Compare offsets with the addresses of the bound arrays; raises RuntimeError on a mismatch."""
-    pairs = (("mjModel", model, "numeric_data"), ("mjModel", model, "qpos0"),
-             ("mjData", data, "qfrc_passive"), ("mjData", data, "qvel"), ("mjData", data, "qpos"))
+    pairs = (
+        ("mjModel", model, "numeric_data"),
+        ("mjModel", model, "qpos0"),
+        ("mjData", data, "qfrc_passive"),
+        ("mjData", data, "qvel"),
+        ("mjData", data, "qpos"),
+    )
     for structure, owner, field in pairs:
         found = ctypes.c_void_p.from_address(owner._address + offset(structure, field)).value
         if found != getattr(owner, field).ctypes.data:

@@ -56,10 +56,19 @@ def _library() -> ctypes.CDLL:
 def native(model: mujoco.MjModel, data: mujoco.MjData) -> Native:
     """A model with its data, both of which must outlive it."""
     time = ctypes.c_double.from_address(data._address + offset("mjData", "time"))
-    forward, step = (ctypes.cast(getattr(_library(), name), ctypes.c_void_p).value or 0
-                     for name in ("mj_forward", "mj_step"))  # fmt: skip
-    return Native(data.qpos, data.qvel, data.qacc, np.ctypeslib.as_array(ctypes.pointer(time), (1,)), forward, step,
-                  model._address, data._address)  # fmt: skip
+    forward, step = (
+        ctypes.cast(getattr(_library(), name), ctypes.c_void_p).value or 0 for name in ("mj_forward", "mj_step")
+    )
+    return Native(
+        data.qpos,
+        data.qvel,
+        data.qacc,
+        np.ctypeslib.as_array(ctypes.pointer(time), (1,)),
+        forward,
+        step,
+        model._address,
+        data._address,
+    )
 
 
 @lean

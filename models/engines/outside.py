@@ -47,8 +47,11 @@ def register(name: str) -> None:
     integrates = callable(getattr(found, "integrate", None))
     missing = [] if integrates else [own for own in ("run", "acceleration") if not callable(getattr(found, own, None))]
     if missing:
-        raise _unusable(name, f"has no {' and no '.join(missing)}(): an engine has run() and acceleration(time, "
-                              "state), an integrator has integrate(f, times, start, tolerance)")  # fmt: skip
+        raise _unusable(
+            name,
+            f"has no {' and no '.join(missing)}(): an engine has run() and acceleration(time, "
+            "state), an integrator has integrate(f, times, start, tolerance)",
+        )
     own = bool(getattr(found, "constraints", False))
     CATALOGUE[name] = {name: Integrator(order, "any", constraints=integrates or own)}
     RECOMMENDED[name], OUTSIDE[name] = name, found
@@ -138,8 +141,15 @@ class Integrated(Reference):
             within = times[inside]
             last = [] if len(within) and within[-1] > end - small else [end]
             grid = np.array([start, *within, *last])
-            answer = _asked(self.name, "integrate", self.integrate, self._rhs(start, end, calls), grid, y.copy(),
-                            self.settings.tolerance)  # fmt: skip
+            answer = _asked(
+                self.name,
+                "integrate",
+                self.integrate,
+                self._rhs(start, end, calls),
+                grid,
+                y.copy(),
+                self.settings.tolerance,
+            )
             found = _numbers(self.name, "integrate", answer, (len(grid), 8))
             states[inside], y = found[1 : 1 + len(within)], found[-1]
             if not np.isfinite(y).all():

@@ -116,11 +116,17 @@ def check(engine: str, assembly: "Assembly", settings: Settings) -> None:
         raise Refused(engine, MISSING[engine, settings.integrator])
     _whole(engine, settings.step, "the duration", settings.duration)
     if assembly.guided and not integrator.constraints:
-        raise Refused(engine, f"{settings.integrator} does not solve for a prescribed pitch: its enforced moment would "
-                              f"be wrong without a word; use {_constrained(engine)}")
+        raise Refused(
+            engine,
+            f"{settings.integrator} does not solve for a prescribed pitch: its enforced moment would "
+            f"be wrong without a word; use {_constrained(engine)}",
+        )
     if assembly.guided and settings.integrator == "GeneralizedAlpha" and settings.spectral_radius > 0.95:
-        raise Refused(engine, f"a spectral radius of {settings.spectral_radius} never damps the error of the enforced "
-                              "moment at the start; use at most 0.95 (0.6 is recommended)")
+        raise Refused(
+            engine,
+            f"a spectral radius of {settings.spectral_radius} never damps the error of the enforced "
+            "moment at the start; use at most 0.95 (0.6 is recommended)",
+        )
     for signal in (assembly.input, assembly.moment):
         if signal is not None:
             _reading(engine, integrator, settings, signal)
@@ -135,35 +141,55 @@ def _reading(engine: str, integrator: Integrator, settings: Settings, signal: Si
     if signal.period is not None:
         _sampling(engine, integrator, settings, signal.period, signal.held)
     if integrator.adaptive and engine != "reference" and settings.step > signal.resolution:
-        raise Refused(engine, f"{settings.integrator} may take steps of {settings.step:g} s and miss details of the "
-                              f"input, which are {signal.resolution:.3g} s long: use a step of at most that")
+        raise Refused(
+            engine,
+            f"{settings.integrator} may take steps of {settings.step:g} s and miss details of the "
+            f"input, which are {signal.resolution:.3g} s long: use a step of at most that",
+        )
     if signal.period is None and not integrator.adaptive and settings.step > WAVE * signal.resolution:
-        raise Refused(engine, f"a step of {settings.step:g} s passes over whole waves of the road, whose finest "
-                              f"details are {signal.resolution:.3g} s long, and would see another one: use at most "
-                              f"{WAVE * signal.resolution:.3g} s, a quarter of it to follow them")
+        raise Refused(
+            engine,
+            f"a step of {settings.step:g} s passes over whole waves of the road, whose finest "
+            f"details are {signal.resolution:.3g} s long, and would see another one: use at most "
+            f"{WAVE * signal.resolution:.3g} s, a quarter of it to follow them",
+        )
 
 
 def _sampling(engine: str, integrator: Integrator, settings: Settings, period: float, held: bool) -> None:
     if integrator.adaptive and engine != "reference":
         if held:
-            raise Refused(engine, f"{settings.integrator} picks its own steps and cannot hold samples over them; "
-                                  "use a fixed-step integrator")
+            raise Refused(
+                engine,
+                f"{settings.integrator} picks its own steps and cannot hold samples over them; "
+                "use a fixed-step integrator",
+            )
         return
     if held and not integrator.holds:
-        raise Refused(engine, f"{settings.integrator} reads a held sample half a step late, which costs it its order: "
-                              "use interpolation = 'linear' or 'smooth', or an explicit Runge-Kutta integrator")
+        raise Refused(
+            engine,
+            f"{settings.integrator} reads a held sample half a step late, which costs it its order: "
+            "use interpolation = 'linear' or 'smooth', or an explicit Runge-Kutta integrator",
+        )
     if not integrator.adaptive:
         _whole(engine, settings.step, "the sampling period", period)
 
 
 def _whole(engine: str, step: float, whole: str, length: float) -> None:
     if not divides(step, length):
-        raise Refused(engine, f"the step {step:g} s does not divide {whole} {length:g} s; "
-                              f"use for example {fitting(step, length)} s")
+        raise Refused(
+            engine,
+            f"the step {step:g} s does not divide {whole} {length:g} s; use for example {fitting(step, length)} s",
+        )
 
 
-def guard(engine: str, times: np.ndarray, states: np.ndarray, duration: float, note: str = "",
-          enforced: np.ndarray | None = None) -> None:  # fmt: skip
+def guard(
+    engine: str,
+    times: np.ndarray,
+    states: np.ndarray,
+    duration: float,
+    note: str = "",
+    enforced: np.ndarray | None = None,
+) -> None:
     """Raise RunFailed unless the run is finite, of sane size and complete in time.
 
     times (n,), states (n, anything), duration in s; ``note`` is what the engine itself reported; ``enforced``
@@ -202,8 +228,9 @@ def _reason(finite: bool, sane: bool) -> str:
     return "time ran backwards" if sane else f"the state grew beyond {SIZE_BOUND:g}: no vehicle any more"
 
 
-def landings_followed(engine: str, assembly: "Assembly", settings: Settings, times: np.ndarray,
-                      states: np.ndarray) -> None:  # fmt: skip
+def landings_followed(
+    engine: str, assembly: "Assembly", settings: Settings, times: np.ndarray, states: np.ndarray
+) -> None:
     """Raise RunFailed where fixed steps were too long for what tyres that only push met: a step that is stable on the
     road may still jump over a landing.
 
@@ -216,8 +243,9 @@ def landings_followed(engine: str, assembly: "Assembly", settings: Settings, tim
     check_resolved(engine, times, states[:, :4], states[:, 4:], np.array([p.m1, p.m2, p.m3, p.I]))
 
 
-def balanced(engine: str, times: np.ndarray, enforced: np.ndarray,
-             balance: Callable[[int], tuple[np.ndarray, np.ndarray]]) -> None:  # fmt: skip
+def balanced(
+    engine: str, times: np.ndarray, enforced: np.ndarray, balance: Callable[[int], tuple[np.ndarray, np.ndarray]]
+) -> None:
     """Raise RunFailed unless multipliers (n, 1 or 2) agree with the balance of moments (the last) and of forces.
 
     ``balance`` gives, for a row, what is needed and the inertia terms m3 z3'' and I beta'' (N, N m), beside which
@@ -230,6 +258,9 @@ def balanced(engine: str, times: np.ndarray, enforced: np.ndarray,
     off = np.sqrt(np.mean((enforced[rows] - wanted) ** 2, axis=0))
     for i in np.flatnonzero(~(off <= BALANCE_BOUND * size + 1e-3))[::-1]:
         what, unit, data = ("moment", "N m", "pitch") if i == len(size) - 1 else ("force", "N", "heave")
-        raise RunFailed(engine, f"the enforced {what} misses the balance of {what}s by {off[i]:.3g} {unit} (rms) of "
-                                f"{size[i]:.3g}: the {data} is too rough for this step; smooth its data "
-                                "(bandwidth) or shorten it")
+        raise RunFailed(
+            engine,
+            f"the enforced {what} misses the balance of {what}s by {off[i]:.3g} {unit} (rms) of "
+            f"{size[i]:.3g}: the {data} is too rough for this step; smooth its data "
+            "(bandwidth) or shorten it",
+        )

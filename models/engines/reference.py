@@ -180,8 +180,16 @@ class Reference:
 
         tolerance = max(self.settings.tolerance, 3e-14)
         longest = math.inf if self._input is None else self._input.resolution
-        solution = solve_ivp(rhs, (start, end), y, method=self.settings.integrator, dense_output=dense,
-                             rtol=tolerance, atol=tolerance * 1e-2, max_step=longest)
+        solution = solve_ivp(
+            rhs,
+            (start, end),
+            y,
+            method=self.settings.integrator,
+            dense_output=dense,
+            rtol=tolerance,
+            atol=tolerance * 1e-2,
+            max_step=longest,
+        )
         if not solution.success:
             raise RunFailed("reference", solution.message, solution.t[-1], solution.y[:, -1])
         return solution

@@ -25,8 +25,9 @@ from models.vehicles.spatial import SpatialVehicle, Vector
 class SpatialExudyn:
     """One vehicle in one Exudyn system."""
 
-    def __init__(self, vehicle: SpatialVehicle, settings: Settings | None, speed: float | None,
-                 road: np.ndarray | None) -> None:  # fmt: skip
+    def __init__(
+        self, vehicle: SpatialVehicle, settings: Settings | None, speed: float | None, road: np.ndarray | None
+    ) -> None:
         self.vehicle, self.settings = vehicle, settings
         self.size = len(vehicle.coordinates())
         per_time = 2.0 / settings.step if settings is not None and road is not None else 0.0
@@ -36,9 +37,15 @@ class SpatialExudyn:
         mbs = self.mbs = self.built.mbs
         places = [self.built.places[place] for place in vehicle.coordinates()]
         self._nodes = list(dict.fromkeys(node for node, _ in places))
-        self._sensors = [[mbs.AddSensor(items.SensorNode(
-            nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind)) for node in self._nodes]
-            for kind in (KINDS.Coordinates, KINDS.Coordinates_t)]  # fmt: skip
+        self._sensors = [
+            [
+                mbs.AddSensor(
+                    items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind)
+                )
+                for node in self._nodes
+            ]
+            for kind in (KINDS.Coordinates, KINDS.Coordinates_t)
+        ]
         mbs.Assemble()
         self._columns = [mbs.GetNodeODE2Index(node) + index for node, index in places]
 
@@ -82,8 +89,9 @@ class SpatialExudyn:
         self._start(zero, zero)
         with self.road.still(self._flat[0]):
             found = {i: self._linearised(i * h) for weight in DIFFERENCES for i in (weight, -weight)}
-        stiffness, damping = (sum(w * i * (found[i][part] + found[-i][part]) for i, w in DIFFERENCES.items())
-                              for part in (1, 2))  # fmt: skip
+        stiffness, damping = (
+            sum(w * i * (found[i][part] + found[-i][part]) for i, w in DIFFERENCES.items()) for part in (1, 2)
+        )
         motion = EngineKinematics(self.vehicle, self._shift, self._turn)
         return linear_vehicle("exudyn", self.vehicle, motion, found[1][0], damping, stiffness, self._road_columns())
 
@@ -154,11 +162,16 @@ class SpatialExudyn:
 
     def plan(self) -> dict[str, int]:
         """What was built: degrees of freedom, native items, callbacks, and curves among these."""
-        return {"degrees of freedom": self.size, "native items": self.mbs.systemData.NumberOfObjects(),
-                "callbacks": self.built.callbacks, "curves": curves(self.vehicle)}  # fmt: skip
+        return {
+            "degrees of freedom": self.size,
+            "native items": self.mbs.systemData.NumberOfObjects(),
+            "callbacks": self.built.callbacks,
+            "curves": curves(self.vehicle),
+        }
 
 
-def build(vehicle: SpatialVehicle, settings: Settings | None, speed: float | None,
-          road: np.ndarray | None) -> SpatialExudyn:  # fmt: skip
+def build(
+    vehicle: SpatialVehicle, settings: Settings | None, speed: float | None, road: np.ndarray | None
+) -> SpatialExudyn:
     """The Exudyn model of a vehicle in space."""
     return SpatialExudyn(vehicle, settings, speed, road)

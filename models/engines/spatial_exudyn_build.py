@@ -35,14 +35,29 @@ KINDS = exu.OutputVariableType
 lists: Any = exu
 items: Any = typed_items
 """Exudyn's type hints know neither how its lists are made nor that a function is a user function."""
-JOINTS = dict(zip(FREEDOMS, (
-    exu.JointType.PrismaticX, exu.JointType.PrismaticY, exu.JointType.PrismaticZ,
-    exu.JointType.RevoluteX, exu.JointType.RevoluteY, exu.JointType.RevoluteZ), strict=True))  # fmt: skip
+JOINTS = dict(
+    zip(
+        FREEDOMS,
+        (
+            exu.JointType.PrismaticX,
+            exu.JointType.PrismaticY,
+            exu.JointType.PrismaticZ,
+            exu.JointType.RevoluteX,
+            exu.JointType.RevoluteY,
+            exu.JointType.RevoluteZ,
+        ),
+        strict=True,
+    )
+)
 
 
-SLIDES = dict(zip(FREEDOMS, (
-    [[1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
-    ), strict=False))  # fmt: skip
+SLIDES = dict(
+    zip(
+        FREEDOMS,
+        ([[1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], [[0, 0, -1], [0, 1, 0], [1, 0, 0]]),
+        strict=False,
+    )
+)
 """Where a body of one slide has its own axes: its first one lies along the slide."""
 
 
@@ -137,9 +152,12 @@ class Build:
 
     def connect(self, first: Any, second: Any, law: Callable[[Any, Any], list[float]]) -> None:
         """Two points and the force (N, space's axes) on the first by the second's position and rate beside it."""
-        self.mbs.AddObject(items.CartesianSpringDamper(
-            markerNumbers=[first, second],
-            springForceUserFunction=lambda mbs, t, item, apart, rate, k, d, offset: law(apart, rate)))  # fmt: skip
+        self.mbs.AddObject(
+            items.CartesianSpringDamper(
+                markerNumbers=[first, second],
+                springForceUserFunction=lambda mbs, t, item, apart, rate, k, d, offset: law(apart, rate),
+            )
+        )
         self.callbacks += 1
 
 
@@ -158,8 +176,12 @@ class Link:
         """Add a body's mass with its centre there."""
         mass = self.mass + body.mass
         centre = (self.mass * self.centre + body.mass * at) / mass if mass else at
-        self.inertia = (self.inertia + _carried(self.mass, self.centre - centre)
-                        + np.array(body.inertia, float) + _carried(body.mass, at - centre))  # fmt: skip
+        self.inertia = (
+            self.inertia
+            + _carried(self.mass, self.centre - centre)
+            + np.array(body.inertia, float)
+            + _carried(body.mass, at - centre)
+        )
         self.mass, self.centre = mass, centre
 
 
@@ -185,15 +207,24 @@ def _tree(built: Build, bodies: list[Body]) -> None:
         links[parent].load(body, np.subtract(body.position, origin))
         last[body.name] = parent, origin
     n, zero = len(links), [0.0] * len(links)
-    node = built.mbs.AddNode(items.NodeGenericODE2(
-        referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero, numberOfODE2Coordinates=n))
-    tree = built.mbs.AddObject(items.ObjectKinematicTree(
-        nodeNumber=node, gravity=[0, 0, -built.vehicle.gravity], jointTypes=[link.joint for link in links],
-        linkParents=[link.parent for link in links], jointTransformations=lists.Matrix3DList([np.eye(3)] * n),
-        jointOffsets=lists.Vector3DList([link.offset for link in links]),
-        linkInertiasCOM=lists.Matrix3DList([link.inertia for link in links]),
-        linkCOMs=lists.Vector3DList([link.centre for link in links]),
-        linkMasses=[link.mass for link in links]))  # fmt: skip
+    node = built.mbs.AddNode(
+        items.NodeGenericODE2(
+            referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero, numberOfODE2Coordinates=n
+        )
+    )
+    tree = built.mbs.AddObject(
+        items.ObjectKinematicTree(
+            nodeNumber=node,
+            gravity=[0, 0, -built.vehicle.gravity],
+            jointTypes=[link.joint for link in links],
+            linkParents=[link.parent for link in links],
+            jointTransformations=lists.Matrix3DList([np.eye(3)] * n),
+            jointOffsets=lists.Vector3DList([link.offset for link in links]),
+            linkInertiasCOM=lists.Matrix3DList([link.inertia for link in links]),
+            linkCOMs=lists.Vector3DList([link.centre for link in links]),
+            linkMasses=[link.mass for link in links],
+        )
+    )
     built.links |= {body.name: (tree, *last[body.name]) for body in bodies}
     built.places |= {place: (node, i) for i, place in enumerate(places)}
 
@@ -201,14 +232,22 @@ def _tree(built: Build, bodies: list[Body]) -> None:
 def _slider(built: Build, body: Body) -> None:
     """A body of one slide on the ground that carries nothing: with trees of one link a car takes 1.6 times as long."""
     still = [0.0]
-    node = built.mbs.AddNode(items.Node1D(
-        referenceCoordinates=still, initialCoordinates=still, initialVelocities=still))
-    mass = built.mbs.AddObject(items.Mass1D(nodeNumber=node, mass=body.mass, referencePosition=list(body.position),
-                                            referenceRotation=SLIDES[body.freedoms[0]]))  # fmt: skip
+    node = built.mbs.AddNode(
+        items.Node1D(referenceCoordinates=still, initialCoordinates=still, initialVelocities=still)
+    )
+    mass = built.mbs.AddObject(
+        items.Mass1D(
+            nodeNumber=node,
+            mass=body.mass,
+            referencePosition=list(body.position),
+            referenceRotation=SLIDES[body.freedoms[0]],
+        )
+    )
     built.links[body.name], built.places[body.name, body.freedoms[0]] = (mass, None, body.position), (node, 0)
     if body.freedoms == ("z",) and built.vehicle.gravity:
-        built.mbs.AddLoad(items.LoadCoordinate(markerNumber=built.coordinate(node, 0),
-                                               load=-body.mass * built.vehicle.gravity))  # fmt: skip
+        built.mbs.AddLoad(
+            items.LoadCoordinate(markerNumber=built.coordinate(node, 0), load=-body.mass * built.vehicle.gravity)
+        )
 
 
 def _trees(vehicle: SpatialVehicle) -> list[list[Body]]:
@@ -223,8 +262,10 @@ def _spring(built: Build, spring: SpringDamper) -> None:
     """Native where Exudyn has an item for it: along a global axis, or along any axis of a body that never turns."""
     axis, ends = np.array(spring.axis), [spring.one, spring.two]
     upright = np.count_nonzero(axis) == 1
-    one, two = (built.marker(end, point, not upright) for end, point in zip(
-        ends, (spring.point_one, spring.point_two), strict=True))  # fmt: skip
+    one, two = (
+        built.marker(end, point, not upright)
+        for end, point in zip(ends, (spring.point_one, spring.point_two), strict=True)
+    )
     rest = np.subtract(spring.point_two, spring.point_one)
     curved = spring.travel_force or spring.rate_force or spring.friction
     if curved or not (upright or any(not built.vehicle.turns(end) for end in ends)):
@@ -232,15 +273,25 @@ def _spring(built: Build, spring: SpringDamper) -> None:
         return
     sunk = built.held.parts[spring.name] / spring.stiffness if spring.stiffness else 0.0
     if upright:
-        built.mbs.AddObject(items.CartesianSpringDamper(
-            markerNumbers=[one, two], stiffness=spring.stiffness * axis**2, damping=spring.damping * axis**2,
-            offset=rest - sunk * axis))  # fmt: skip
+        built.mbs.AddObject(
+            items.CartesianSpringDamper(
+                markerNumbers=[one, two],
+                stiffness=spring.stiffness * axis**2,
+                damping=spring.damping * axis**2,
+                offset=rest - sunk * axis,
+            )
+        )
         return
     sign = -1 if built.vehicle.turns(spring.one) else 1  # the axis is one of the first marker's body
-    built.mbs.AddObject(items.LinearSpringDamper(
-        markerNumbers=[one, two][::sign], axisMarker0=sign * built.own(ends[::sign][0], axis),
-        stiffness=spring.stiffness, damping=spring.damping,
-        offset=float(axis @ rest) - sunk))  # fmt: skip
+    built.mbs.AddObject(
+        items.LinearSpringDamper(
+            markerNumbers=[one, two][::sign],
+            axisMarker0=sign * built.own(ends[::sign][0], axis),
+            stiffness=spring.stiffness,
+            damping=spring.damping,
+            offset=float(axis @ rest) - sunk,
+        )
+    )
 
 
 def _law(spring: SpringDamper, axis: np.ndarray, rest: np.ndarray, held: float) -> Callable[[Any, Any], list[float]]:
@@ -286,8 +337,9 @@ def _bar(built: Build, bar: AntiRollBar) -> None:
         node, index = built.places[bar.body, "rx"]
         still = built.coordinate(built.mbs.AddNode(items.NodePointGround()), 0)
         rolling = built.coordinate(node, index)
-        built.mbs.AddObject(items.CoordinateSpringDamper(
-            markerNumbers=[still, rolling], springForceUserFunction=on_body))  # fmt: skip
+        built.mbs.AddObject(
+            items.CoordinateSpringDamper(markerNumbers=[still, rolling], springForceUserFunction=on_body)
+        )
         built.callbacks += 1
 
 
@@ -295,12 +347,20 @@ def _turning_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadTable
     """A spring-damper to the flat ground, and what the road adds as a load; ``by_road`` (2 w,): what it adds (N)."""
     marker, held = built.marker(tyre.body, tyre.point), built.held.tyres[tyre.name]
     sunk = held / tyre.stiffness if tyre.stiffness else 0.0
-    built.mbs.AddObject(items.CartesianSpringDamper(
-        markerNumbers=[built.marker(None, tyre.point), marker], stiffness=[0, 0, tyre.stiffness],
-        damping=[0, 0, tyre.damping], offset=[0, 0, sunk]))  # fmt: skip
+    built.mbs.AddObject(
+        items.CartesianSpringDamper(
+            markerNumbers=[built.marker(None, tyre.point), marker],
+            stiffness=[0, 0, tyre.stiffness],
+            damping=[0, 0, tyre.damping],
+            offset=[0, 0, sunk],
+        )
+    )
     force = road.forces(np.outer(by_road, (0.0, 0.0, 1.0)))
-    built.mbs.AddLoad(items.LoadForceVector(
-        markerNumber=marker, loadVectorUserFunction=lambda mbs, t, load: force.rows[round(t * road.per_time)]))
+    built.mbs.AddLoad(
+        items.LoadForceVector(
+            markerNumber=marker, loadVectorUserFunction=lambda mbs, t, load: force.rows[round(t * road.per_time)]
+        )
+    )
     built.callbacks += 1
 
 
@@ -309,8 +369,10 @@ def _steady_tyres(built: Build, tyres: list[Tyre], by_road: np.ndarray, road: Ro
 
     by_road : (2 w, tyres), what the road adds to each (N).
     """
-    lifts = [[built.places[name, "z"] for name in built.vehicle.chain(tyre.body) if (name, "z") in built.places]
-             for tyre in tyres]  # fmt: skip
+    lifts = [
+        [built.places[name, "z"] for name in built.vehicle.chain(tyre.body) if (name, "z") in built.places]
+        for tyre in tyres
+    ]
     nodes = list(dict.fromkeys(node for places in lifts for node, _ in places))
     if not nodes:
         return
@@ -322,11 +384,16 @@ def _steady_tyres(built: Build, tyres: list[Tyre], by_road: np.ndarray, road: Ro
             row[first[node] + index] = 1.0
     stiffness, damping, held = np.array([(t.stiffness, t.damping, built.held.tyres[t.name]) for t in tyres]).T
     force = road.forces(by_road @ rows)
-    built.mbs.AddObject(items.ObjectGenericODE2(
-        nodeNumbers=nodes, massMatrix=np.zeros((rows.shape[1],) * 2), stiffnessMatrix=rows.T * stiffness @ rows,
-        **({"dampingMatrix": rows.T * damping @ rows} if damping.any() else {}),
-        **({"forceVector": rows.T @ held} if held.any() else {}),
-        forceUserFunction=lambda mbs, t, item, q, v: force.rows[round(t * road.per_time)]))  # fmt: skip
+    built.mbs.AddObject(
+        items.ObjectGenericODE2(
+            nodeNumbers=nodes,
+            massMatrix=np.zeros((rows.shape[1],) * 2),
+            stiffnessMatrix=rows.T * stiffness @ rows,
+            **({"dampingMatrix": rows.T * damping @ rows} if damping.any() else {}),
+            **({"forceVector": rows.T @ held} if held.any() else {}),
+            forceUserFunction=lambda mbs, t, item, q, v: force.rows[round(t * road.per_time)],
+        )
+    )
     built.callbacks += 1
 
 
@@ -341,8 +408,12 @@ def _pushing_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadTable
         return [0.0, 0.0, -max(min(elastic + c * (rate - speed[2]), 2.0 * elastic), 0.0)]
 
     on_road = (tyre.point[0], tyre.point[1], 0.0)
-    built.mbs.AddObject(items.CartesianSpringDamper(
-        markerNumbers=[built.marker(None, on_road), built.marker(tyre.body, tyre.point)], springForceUserFunction=law))
+    built.mbs.AddObject(
+        items.CartesianSpringDamper(
+            markerNumbers=[built.marker(None, on_road), built.marker(tyre.body, tyre.point)],
+            springForceUserFunction=law,
+        )
+    )
     built.callbacks += 1
 
 
@@ -387,9 +458,12 @@ def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadTable) -> B
         _side_force(built, force, float(speed or 0.0))
     for drag in vehicle.drags:
         centre = vehicle.body(drag.body).position
-        built.mbs.AddObject(items.CartesianSpringDamper(
-            markerNumbers=[built.marker(None, centre), built.marker(drag.body, centre)],
-            damping=[drag.coefficient * float(speed or 0.0), 0, 0]))  # fmt: skip
+        built.mbs.AddObject(
+            items.CartesianSpringDamper(
+                markerNumbers=[built.marker(None, centre), built.marker(drag.body, centre)],
+                damping=[drag.coefficient * float(speed or 0.0), 0, 0],
+            )
+        )
     for tyre in vehicle.tyres:
         built.marker(tyre.body, tyre.point)
     for output in vehicle.outputs:

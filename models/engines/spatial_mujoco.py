@@ -57,8 +57,15 @@ def _spec(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = NO
             parent = joined[0].parent
         below = spec.worldbody if parent is None else spec.body(numbers[parent])
         origin = (0.0, 0.0, 0.0) if parent is None else vehicle.body(parent).position
-        own = below.add_body(name=numbers[body.name], pos=np.subtract(body.position, origin), ipos=[0, 0, 0], mass=1.0,
-                             iquat=_principal(body)[1], inertia=[1.0, 1.0, 1.0], explicitinertial=True)  # fmt: skip
+        own = below.add_body(
+            name=numbers[body.name],
+            pos=np.subtract(body.position, origin),
+            ipos=[0, 0, 0],
+            mass=1.0,
+            iquat=_principal(body)[1],
+            inertia=[1.0, 1.0, 1.0],
+            explicitinertial=True,
+        )
         for one in joined:
             _join(own, one, numbers[one.name], np.subtract(one.position, body.position))
     return spec
@@ -93,8 +100,9 @@ def _weigh(model: mujoco.MjModel, numbers: Numbers, bodies: tuple[Body, ...]) ->
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
-def _compiled(vehicle: SpatialVehicle, step: float, integrator: str, speed: float | None, road: np.ndarray,
-              per_time: float) -> mujoco.MjModel:  # fmt: skip
+def _compiled(
+    vehicle: SpatialVehicle, step: float, integrator: str, speed: float | None, road: np.ndarray, per_time: float
+) -> mujoco.MjModel:
     """The model with all numbers of the callback in its numeric data."""
     spec = _spec(vehicle, step)
     spec.option.integrator = OWN_NAMES[integrator]
@@ -112,8 +120,9 @@ def _compiled(vehicle: SpatialVehicle, step: float, integrator: str, speed: floa
 class SpatialMujoco:
     """One vehicle in one MuJoCo model."""
 
-    def __init__(self, vehicle: SpatialVehicle, settings: Settings | None, speed: float | None,
-                 road: np.ndarray | None) -> None:  # fmt: skip
+    def __init__(
+        self, vehicle: SpatialVehicle, settings: Settings | None, speed: float | None, road: np.ndarray | None
+    ) -> None:
         self.vehicle, self.settings = vehicle, settings
         self._flat = np.zeros(2 * len(vehicle.tyres))
         step, integrator = (settings.step, settings.integrator) if settings else (1e-3, "RK4")
@@ -172,8 +181,7 @@ class SpatialMujoco:
         mujoco.mj_fullM(self.model, self.data, mass)
         mass = mass[np.ix_(self.numbers.columns, self.numbers.columns)]
         motion = EngineKinematics(self.vehicle, self._shift, self._turn)
-        return linear_vehicle("mujoco", self.vehicle, motion, mass, -mass @ damping, -mass @ stiffness,
-                              mass @ road)  # fmt: skip
+        return linear_vehicle("mujoco", self.vehicle, motion, mass, -mass @ damping, -mass @ stiffness, mass @ road)
 
     def _on_road(self, row: np.ndarray, road: np.ndarray) -> np.ndarray:
         """Accelerations in the design position on a road (2 w,)."""
@@ -229,11 +237,16 @@ class SpatialMujoco:
 
     def plan(self) -> dict[str, int]:
         """What was built: degrees of freedom, native items, callbacks, and curves within them."""
-        return {"degrees of freedom": self.model.nv, "native items": self.model.nbody - 1 + self.model.njnt,
-                "callbacks": 1, "curves": curves(self.vehicle)}  # fmt: skip
+        return {
+            "degrees of freedom": self.model.nv,
+            "native items": self.model.nbody - 1 + self.model.njnt,
+            "callbacks": 1,
+            "curves": curves(self.vehicle),
+        }
 
 
-def build(vehicle: SpatialVehicle, settings: Settings | None, speed: float | None,
-          road: np.ndarray | None) -> SpatialMujoco:  # fmt: skip
+def build(
+    vehicle: SpatialVehicle, settings: Settings | None, speed: float | None, road: np.ndarray | None
+) -> SpatialMujoco:
     """The MuJoCo model of a vehicle in space."""
     return SpatialMujoco(vehicle, settings, speed, road)

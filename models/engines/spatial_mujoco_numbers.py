@@ -29,7 +29,8 @@ class Numbers:
         order = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
         self.bodies = {name: int(model.body(order[_last(carriers, name)]).id) for name in order}
         self.joints: dict[tuple[str, str], int] = {
-            (name, freedom): int(model.joint(f"{order[name]} {freedom}").id) for name, freedom in vehicle.coordinates()}
+            (name, freedom): int(model.joint(f"{order[name]} {freedom}").id) for name, freedom in vehicle.coordinates()
+        }
         self.columns = np.array(list(self.joints.values()))
 
 
@@ -66,15 +67,39 @@ def elements(vehicle: SpatialVehicle, speed: float | None) -> list[Element]:
     held, v, found = preloads(vehicle), float(speed or 0.0), []
     for s in vehicle.springs:
         points = ((s.two, s.point_two, s.axis), (s.one, s.point_one, _scaled(s.axis, -1.0)))
-        found.append(Element(points, s.stiffness, s.damping, held.parts[s.name], (s.friction, s.friction_rate),
-                             on_travel=s.travel_force, on_rate=s.rate_force))  # fmt: skip
+        found.append(
+            Element(
+                points,
+                s.stiffness,
+                s.damping,
+                held.parts[s.name],
+                (s.friction, s.friction_rate),
+                on_travel=s.travel_force,
+                on_rate=s.rate_force,
+            )
+        )
     for bar in vehicle.bars:
         down, up = _scaled(UP, -1.0 / bar.track), _scaled(UP, 1.0 / bar.track)
-        found.append(Element(((bar.left, bar.point_left, down), (bar.right, bar.point_right, up)), bar.stiffness,
-                             bar.damping, held.parts[bar.name], own=(bar.body, "rx")))  # fmt: skip
+        found.append(
+            Element(
+                ((bar.left, bar.point_left, down), (bar.right, bar.point_right, up)),
+                bar.stiffness,
+                bar.damping,
+                held.parts[bar.name],
+                own=(bar.body, "rx"),
+            )
+        )
     for i, tyre in enumerate(vehicle.tyres):
-        found.append(Element(((tyre.body, tyre.point, UP),), tyre.stiffness, tyre.damping,
-                             -held.tyres[tyre.name], tyre=i, one_sided=tyre.pushes_only))  # fmt: skip
+        found.append(
+            Element(
+                ((tyre.body, tyre.point, UP),),
+                tyre.stiffness,
+                tyre.damping,
+                -held.tyres[tyre.name],
+                tyre=i,
+                one_sided=tyre.pushes_only,
+            )
+        )
     for f in vehicle.side_forces:
         steered = (((f.chassis, "rx"), -f.stiffness * f.roll_steer), ((f.chassis, "rz"), -f.stiffness))
         found.append(Element(((f.body, f.point, (0.0, 1.0, 0.0)),), damping=f.stiffness / v, steered=steered))
@@ -110,8 +135,9 @@ def packed(vehicle: SpatialVehicle, acting: list[Element], model: mujoco.MjModel
     return Packed((len(bodies), len(laws), len(points)), found)
 
 
-def _body(vehicle: SpatialVehicle, name: str, moving: list[str], model: mujoco.MjModel,
-          numbers: Numbers) -> list[float]:  # fmt: skip
+def _body(
+    vehicle: SpatialVehicle, name: str, moving: list[str], model: mujoco.MjModel, numbers: Numbers
+) -> list[float]:
     """A body that may turn, or carries one that may."""
     body, number = vehicle.body(name), numbers.bodies[name]
     first, count = max(int(model.body_jntadr[number]), 0), len(body.freedoms)
@@ -123,8 +149,12 @@ def _body(vehicle: SpatialVehicle, name: str, moving: list[str], model: mujoco.M
 def _points(acting: list[Element], vehicle: SpatialVehicle, name: str) -> list[list[float]]:
     """Where the elements act on a body that may turn."""
     centre = vehicle.body(name).position
-    return [[i, *np.subtract(point, centre), *axis] for i, element in enumerate(acting)
-            for body, point, axis in element.points if body == name and vehicle.turns(name)]  # fmt: skip
+    return [
+        [i, *np.subtract(point, centre), *axis]
+        for i, element in enumerate(acting)
+        for body, point, axis in element.points
+        if body == name and vehicle.turns(name)
+    ]
 
 
 def _element(element: Element, vehicle: SpatialVehicle, numbers: Numbers) -> list[float]:
@@ -153,6 +183,7 @@ def _more(element: Element, numbers: Numbers) -> list[float]:
     if not (element.friction[0] or steered or any(curves)):
         return []
     counts = [len(curve.arguments) if curve else 0 for curve in curves]
-    pairs = [value for curve in curves if curve for pair in zip(curve.arguments, curve.forces, strict=True)
-             for value in pair]  # fmt: skip
+    pairs = [
+        value for curve in curves if curve for pair in zip(curve.arguments, curve.forces, strict=True) for value in pair
+    ]
     return [*element.friction, *(steered or [-1, 0.0, -1, 0.0]), *counts, *pairs]

@@ -25,8 +25,9 @@ from models.vehicles.spatial_linear import linearise, outputs, wheels
 
 INTEGRATORS = {"exudyn": "RK44", "mujoco": "RK4"}
 """What each engine calls the classical Runge-Kutta method."""
-METHODS = {engine: tuple(name for name, method in CATALOGUE[engine].items() if method.nodes != "any")
-           for engine in INTEGRATORS}  # fmt: skip
+METHODS = {
+    engine: tuple(name for name, method in CATALOGUE[engine].items() if method.nodes != "any") for engine in INTEGRATORS
+}
 """All that read nothing between half steps."""
 DIFFERENCES = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
 """Weights of f(i h) - f(-i h) in h f'(0): central differences of order six (by their defining equations)."""
@@ -65,8 +66,13 @@ class SpatialModel(Protocol):
         ...
 
 
-def build(engine: str, vehicle: SpatialVehicle, settings: Settings | None = None, speed: float | None = None,
-          road: np.ndarray | None = None) -> SpatialModel:  # fmt: skip
+def build(
+    engine: str,
+    vehicle: SpatialVehicle,
+    settings: Settings | None = None,
+    speed: float | None = None,
+    road: np.ndarray | None = None,
+) -> SpatialModel:
     """Build a vehicle in "exudyn" or "mujoco".
 
     settings : wanted for runs in time; Refused where the step does not fit or a mode would grow.
@@ -74,8 +80,11 @@ def build(engine: str, vehicle: SpatialVehicle, settings: Settings | None = None
     road : heights (m) under the tyres, then their rates (m/s), at every half step: (2 steps + 1, 2 w); None: flat.
     """
     if vehicle.limits:
-        raise Refused(engine, "a reduced vehicle has bodies without mass, rigid springs or locked freedoms, which only "
-                              "the closed form of the reference has: use --engine reference, or the whole vehicle")
+        raise Refused(
+            engine,
+            "a reduced vehicle has bodies without mass, rigid springs or locked freedoms, which only "
+            "the closed form of the reference has: use --engine reference, or the whole vehicle",
+        )
     linear = linearise(vehicle, speed)
     if settings is not None:
         _check(engine, linear, settings, road)
@@ -87,15 +96,22 @@ def build(engine: str, vehicle: SpatialVehicle, settings: Settings | None = None
 def _check(engine: str, linear: LinearVehicle, settings: Settings, road: np.ndarray | None) -> None:
     """Refuse what would run and be wrong."""
     if settings.integrator not in METHODS[engine]:
-        raise Refused(engine, f"vehicles in space march with {' or '.join(METHODS[engine])}, not with "
-                              f"{settings.integrator}")
+        raise Refused(
+            engine, f"vehicles in space march with {' or '.join(METHODS[engine])}, not with {settings.integrator}"
+        )
     if not divides(settings.step, settings.duration):
-        raise Refused(engine, f"the step {settings.step:g} s does not divide the duration {settings.duration:g} s; "
-                              f"use for example {fitting(settings.step, settings.duration)} s")
+        raise Refused(
+            engine,
+            f"the step {settings.step:g} s does not divide the duration {settings.duration:g} s; "
+            f"use for example {fitting(settings.step, settings.duration)} s",
+        )
     shape = (2 * settings.steps + 1, 2 * len(linear.wheels))
     if road is not None and (road.shape != shape or not np.isfinite(road).all()):
-        raise Refused(engine, f"the road must be {shape[0]} rows (half steps) of {shape[1]} finite numbers (heights, "
-                              f"then rates under {len(linear.wheels)} tyres)")
+        raise Refused(
+            engine,
+            f"the road must be {shape[0]} rows (half steps) of {shape[1]} finite numbers (heights, "
+            f"then rates under {len(linear.wheels)} tyres)",
+        )
     _check_step(engine, linear, settings)
 
 
@@ -107,8 +123,11 @@ def _check_step(engine: str, linear: LinearVehicle, settings: Settings) -> None:
     name, h, duration = settings.integrator, settings.step, settings.duration
     poles = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
     if growth(name, h, duration, own) > math.log(GROWTH) + max(0.0, float(poles.real.max())) * duration:
-        raise Refused(engine, f"at a step of {h:g} s {name} lets a mode of the vehicle grow; use at most "
-                              f"{limit(name, h, duration, own):.3g} s")
+        raise Refused(
+            engine,
+            f"at a step of {h:g} s {name} lets a mode of the vehicle grow; use at most "
+            f"{limit(name, h, duration, own):.3g} s",
+        )
 
 
 def difference_step(vehicle: SpatialVehicle) -> float:
@@ -118,23 +137,25 @@ def difference_step(vehicle: SpatialVehicle) -> float:
 
 def curves(vehicle: SpatialVehicle) -> int:
     """How many curves and dry frictions a vehicle has."""
-    return sum(
-        (s.travel_force is not None) + (s.rate_force is not None) + (s.friction != 0) for s in vehicle.springs
-    )
+    return sum((s.travel_force is not None) + (s.rate_force is not None) + (s.friction != 0) for s in vehicle.springs)
 
 
 def jacobian(function: Callable[[np.ndarray], np.ndarray], size: int, step: float) -> np.ndarray:
     """(outputs, size) of a function of (size,) at 0, by the central differences of DIFFERENCES."""
-    columns = [sum(weight * (function(i * step * unit) - function(-i * step * unit))
-                   for i, weight in DIFFERENCES.items()) / step for unit in np.eye(size)]  # fmt: skip
+    columns = [
+        sum(weight * (function(i * step * unit) - function(-i * step * unit)) for i, weight in DIFFERENCES.items())
+        / step
+        for unit in np.eye(size)
+    ]
     return np.column_stack(columns)
 
 
 class EngineKinematics(Kinematics):
     """Motion of points and bodies as an engine gives it: its Jacobians in the design position."""
 
-    def __init__(self, vehicle: SpatialVehicle, shift: Callable[[str, Vector], np.ndarray],
-                 turn: Callable[[str], np.ndarray]) -> None:  # fmt: skip
+    def __init__(
+        self, vehicle: SpatialVehicle, shift: Callable[[str, Vector], np.ndarray], turn: Callable[[str], np.ndarray]
+    ) -> None:
         super().__init__(vehicle)
         self._shift, self._turn = shift, turn
 
@@ -147,17 +168,34 @@ class EngineKinematics(Kinematics):
         return self._turn(body)
 
 
-def linear_vehicle(engine: str, vehicle: SpatialVehicle, motion: EngineKinematics, mass: np.ndarray,
-                   damping: np.ndarray, stiffness: np.ndarray, road: np.ndarray) -> LinearVehicle:  # fmt: skip
+def linear_vehicle(
+    engine: str,
+    vehicle: SpatialVehicle,
+    motion: EngineKinematics,
+    mass: np.ndarray,
+    damping: np.ndarray,
+    stiffness: np.ndarray,
+    road: np.ndarray,
+) -> LinearVehicle:
     """An engine's linear vehicle; ``road`` (n, 2 w): generalised forces per road height, then per rate."""
     by_height, by_rate = np.split(road, 2, axis=1)
     source = f"{engine}, " + ("loaded" if vehicle.gravity else "unloaded")
-    return LinearVehicle(mass, damping, stiffness, by_height, by_rate, vehicle.coordinates(), wheels(vehicle),
-                         outputs(vehicle, motion), source)  # fmt: skip
+    return LinearVehicle(
+        mass,
+        damping,
+        stiffness,
+        by_height,
+        by_rate,
+        vehicle.coordinates(),
+        wheels(vehicle),
+        outputs(vehicle, motion),
+        source,
+    )
 
 
-def sound(engine: str, settings: Settings, times: np.ndarray, states: np.ndarray, note: str,
-          counts: dict[str, int]) -> SpatialRun:  # fmt: skip
+def sound(
+    engine: str, settings: Settings, times: np.ndarray, states: np.ndarray, note: str, counts: dict[str, int]
+) -> SpatialRun:
     """The run, where it passes the guard of all runs."""
     guard(engine, times, states, settings.duration, note)
     positions, rates = np.split(states, 2, axis=1)

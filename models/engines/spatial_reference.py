@@ -80,8 +80,14 @@ class SpatialReference:
                     arm[k] += q[self.index[body.name, freedom]]
                     own[:, self.index[body.name, freedom]] = below.rotation[:, k]
             centre, shift, rest = below.at(arm, omega)
-            m = Motion(centre, below.rotation, shift + own, below.turn.copy(),
-                       rest + 2 * across(omega) @ own @ v, below.turn_rest.copy())  # fmt: skip
+            m = Motion(
+                centre,
+                below.rotation,
+                shift + own,
+                below.turn.copy(),
+                rest + 2 * across(omega) @ own @ v,
+                below.turn_rest.copy(),
+            )
             for k, freedom in enumerate(FREEDOMS[3:]):
                 if freedom in body.freedoms:
                     i, axis = self.index[body.name, freedom], m.rotation[:, k]
@@ -103,8 +109,10 @@ class SpatialReference:
         for spring in self.vehicle.springs:
             out += self._spring(spring)
         for bar in self.vehicle.bars:
-            (left, rows), (right, others) = (self._point(bar.left, bar.point_left),
-                                             self._point(bar.right, bar.point_right))  # fmt: skip
+            (left, rows), (right, others) = (
+                self._point(bar.left, bar.point_left),
+                self._point(bar.right, bar.point_right),
+            )
             apart, row = left[2] - bar.point_left[2] - right[2] + bar.point_right[2], (rows - others)[2] / bar.track
             roll = np.eye(self.size)[self.index[bar.body, "rx"]]
             moment = self.held.parts[bar.name] + bar.stiffness * (roll @ self.q - apart / bar.track)
@@ -116,8 +124,9 @@ class SpatialReference:
             out += (max(min(pressed, 2.0 * elastic), 0.0) if tyre.pushes_only else pressed) * rows[2]
         for side in self.vehicle.side_forces:
             rows = self._point(side.body, side.point)[1]
-            roll, yaw = (self.q[self.index[side.chassis, f]] if (side.chassis, f) in self.index else 0.0
-                         for f in ("rx", "rz"))  # fmt: skip
+            roll, yaw = (
+                self.q[self.index[side.chassis, f]] if (side.chassis, f) in self.index else 0.0 for f in ("rx", "rz")
+            )
             out += side.stiffness * (side.roll_steer * roll + yaw - rows[1] @ self.v / self.speed) * rows[1]
         for drag in self.vehicle.drags:
             row = self.motions[drag.body].shift[0]

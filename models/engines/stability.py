@@ -158,9 +158,12 @@ def check_step(engine: str, assembly: "Assembly", settings: "Settings") -> None:
     if grown <= math.log(GROWTH):
         return
     longest = limit(settings.integrator, settings.step, max(settings.duration, LONG_RUN * settings.step), linear)
-    raise Refused(engine, f"step {settings.step:g} s exceeds the stability limit {_down(longest):g} s of "
-                          f"{settings.integrator} for this vehicle (fastest pole {_pole(linear)}): an error would grow "
-                          f"1e{grown / math.log(10):.0f}-fold over the run; shorten the step")
+    raise Refused(
+        engine,
+        f"step {settings.step:g} s exceeds the stability limit {_down(longest):g} s of "
+        f"{settings.integrator} for this vehicle (fastest pole {_pole(linear)}): an error would grow "
+        f"1e{grown / math.log(10):.0f}-fold over the run; shorten the step",
+    )
 
 
 def _down(value: float) -> float:

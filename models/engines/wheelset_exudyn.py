@@ -43,11 +43,20 @@ def tree(mbs: Any, node: Any, numbers: np.ndarray, body: np.ndarray) -> Any:
     """The wheelset of ``Equations.body`` on a node of five coordinates; ``numbers`` is the table of the rails."""
     zero = [[0.0, 0.0, 0.0]] * JOINTS
     inertias = [np.zeros((3, 3))] * (JOINTS - 1) + [np.diag(body[[ACROSS, ALONG, ACROSS]])]
-    return mbs.AddObject(items.ObjectKinematicTree(
-        nodeNumber=node, gravity=leaning(GRAVITY, body), jointTypes=CHAIN, linkParents=list(range(-1, JOINTS - 1)),
-        jointTransformations=lists.Matrix3DList([np.eye(3)] * JOINTS), jointOffsets=lists.Vector3DList(zero),
-        linkInertiasCOM=lists.Matrix3DList(inertias), linkCOMs=lists.Vector3DList(zero),
-        linkMasses=[0.0] * (JOINTS - 1) + [body[MASS]], forceUserFunction=rails(numbers)))  # fmt: skip
+    return mbs.AddObject(
+        items.ObjectKinematicTree(
+            nodeNumber=node,
+            gravity=leaning(GRAVITY, body),
+            jointTypes=CHAIN,
+            linkParents=list(range(-1, JOINTS - 1)),
+            jointTransformations=lists.Matrix3DList([np.eye(3)] * JOINTS),
+            jointOffsets=lists.Vector3DList(zero),
+            linkInertiasCOM=lists.Matrix3DList(inertias),
+            linkCOMs=lists.Vector3DList(zero),
+            linkMasses=[0.0] * (JOINTS - 1) + [body[MASS]],
+            forceUserFunction=rails(numbers),
+        )
+    )
 
 
 def suspension(mbs: Any, wheelset: Any, body: np.ndarray) -> None:
@@ -55,11 +64,15 @@ def suspension(mbs: Any, wheelset: Any, body: np.ndarray) -> None:
     ground = mbs.AddObject(items.ObjectGround())
     for arm in (body[ARM], -body[ARM]):
         frame = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=ground, localPosition=[0.0, arm, body[SUNK]]))
-        end = mbs.AddMarker(items.MarkerKinematicTreeRigid(
-            objectNumber=wheelset, linkNumber=JOINTS - 1, localPosition=[0.0, arm, 0.0]))  # fmt: skip
+        end = mbs.AddMarker(
+            items.MarkerKinematicTreeRigid(objectNumber=wheelset, linkNumber=JOINTS - 1, localPosition=[0.0, arm, 0.0])
+        )
         if body[KX : DZ + 1].any():
-            mbs.AddObject(items.CartesianSpringDamper(
-                markerNumbers=[frame, end], stiffness=body[KX : KZ + 1], damping=body[DX : DZ + 1]))  # fmt: skip
+            mbs.AddObject(
+                items.CartesianSpringDamper(
+                    markerNumbers=[frame, end], stiffness=body[KX : KZ + 1], damping=body[DX : DZ + 1]
+                )
+            )
         mbs.AddLoad(items.LoadForceVector(markerNumber=end, loadVector=leaning(body[CARRIED], body)))
 
 
@@ -72,13 +85,21 @@ class ExudynWheelset(EngineWheelset):
     def _system(self) -> tuple[Any, list[Any]]:
         """System and the sensors of positions and of rates."""
         mbs, zero = exu.SystemContainer().AddSystem(), [0.0] * JOINTS
-        node = mbs.AddNode(items.NodeGenericODE2(
-            referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero,
-            numberOfODE2Coordinates=JOINTS))  # fmt: skip
+        node = mbs.AddNode(
+            items.NodeGenericODE2(
+                referenceCoordinates=zero,
+                initialCoordinates=zero,
+                initialCoordinates_t=zero,
+                numberOfODE2Coordinates=JOINTS,
+            )
+        )
         suspension(mbs, tree(mbs, node, table(self.given), self.body), self.body)
-        sensors = [mbs.AddSensor(items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False,
-                                                  outputVariableType=kind))
-                   for kind in (KINDS.Coordinates, KINDS.Coordinates_t)]  # fmt: skip
+        sensors = [
+            mbs.AddSensor(
+                items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind)
+            )
+            for kind in (KINDS.Coordinates, KINDS.Coordinates_t)
+        ]
         mbs.Assemble()
         return mbs, sensors
 

@@ -18,8 +18,13 @@ from models.rail.equations import ACROSS, ALONG, ARM, CARRIED, DX, KX, MASS, SUN
 from models.rail.joint_forces import joint_forces, table
 from models.rail.wheelset import GRAVITY
 
-JOINTS = (("SLIDE", (0.0, 1.0, 0.0)), ("SLIDE", (0.0, 0.0, 1.0)), ("HINGE", (0.0, 0.0, 1.0)),
-          ("HINGE", (1.0, 0.0, 0.0)), ("HINGE", (0.0, 1.0, 0.0)))  # fmt: skip
+JOINTS = (
+    ("SLIDE", (0.0, 1.0, 0.0)),
+    ("SLIDE", (0.0, 0.0, 1.0)),
+    ("HINGE", (0.0, 0.0, 1.0)),
+    ("HINGE", (1.0, 0.0, 0.0)),
+    ("HINGE", (0.0, 1.0, 0.0)),
+)
 """Kind and axis, from the track to the wheelset."""
 
 

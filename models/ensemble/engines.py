@@ -57,8 +57,13 @@ class MujocoThreads(NoisePaths):
             controls = np.concatenate([model.padded(model.drive.controls) for model in models])
         working = models[: self.threads]
         with models[0].callback(), quiet():
-            found, _ = rollout.rollout([model.model for model in models], [model.data for model in working],
-                                       np.tile(start, (len(models), 1)), control=controls, nstep=self.settings.steps)
+            found, _ = rollout.rollout(
+                [model.model for model in models],
+                [model.data for model in working],
+                np.tile(start, (len(models), 1)),
+                control=controls,
+                nstep=self.settings.steps,
+            )
         states = np.concatenate((np.tile(self.base.initial, (len(models), 1, 1)), found[:, :, 1:9]), axis=1)
         return states, any(model.warnings() for model in working)
 
@@ -67,8 +72,9 @@ class MujocoThreads(NoisePaths):
         return {**super().facts(), "way": "threads"}
 
 
-def mujoco_threads(scene: Scene, times: np.ndarray, truth: np.ndarray | None = None, threshold: float = DRIFT,
-                   threads: int = 2) -> MujocoThreads:  # fmt: skip
+def mujoco_threads(
+    scene: Scene, times: np.ndarray, truth: np.ndarray | None = None, threshold: float = DRIFT, threads: int = 2
+) -> MujocoThreads:
     """The job of ``noise_paths`` in MuJoCo's threads."""
     return MujocoThreads(**vars(noise_paths(scene, times, truth, threshold, "mujoco")), threads=threads)
 

@@ -92,18 +92,28 @@ class NoisePaths:
         """Everything that the paths depend on."""
         forces = self.base.input
         return {
-            "engine": self.engine, "settings": vars(self.settings), "scene": self.base.scene.table(),
-            "forces": getattr(forces, "values", None), "start": self.base.initial,
-            "rows": self.rows, "truth": self.truth, "threshold": self.threshold,
-        }  # fmt: skip
+            "engine": self.engine,
+            "settings": vars(self.settings),
+            "scene": self.base.scene.table(),
+            "forces": getattr(forces, "values", None),
+            "start": self.base.initial,
+            "rows": self.rows,
+            "truth": self.truth,
+            "threshold": self.threshold,
+        }
 
 
 def _labelled(states: np.ndarray, drift_off: float, failed: float) -> Arrays:
     return {"states": states, "drift_off": np.array(drift_off), "failed": np.array(failed)}
 
 
-def noise_paths(scene: Scene, times: np.ndarray, truth: np.ndarray | None = None, threshold: float = DRIFT,
-                engine: str = "reference") -> NoisePaths:  # fmt: skip
+def noise_paths(
+    scene: Scene,
+    times: np.ndarray,
+    truth: np.ndarray | None = None,
+    threshold: float = DRIFT,
+    engine: str = "reference",
+) -> NoisePaths:
     """The job of a scene: ``times`` (s) are kept, multiples of the step.
 
     truth : pitch (rad) of the true path at every step, shape (steps + 1,); None takes the run of the same scene in
@@ -114,8 +124,12 @@ def noise_paths(scene: Scene, times: np.ndarray, truth: np.ndarray | None = None
         raise InputError(scene.file, "effects.force_noise", None, "is missing: without it all paths are the same")
     settings = settings_of(scene, engine)
     if CATALOGUE[engine][settings.integrator].adaptive:
-        raise InputError(scene.file, f"engines.{engine}.integrator", settings.integrator,
-                         "picks its own steps: an ensemble keeps states at common times and needs fixed ones")
+        raise InputError(
+            scene.file,
+            f"engines.{engine}.integrator",
+            settings.integrator,
+            "picks its own steps: an ensemble keeps states at common times and needs fixed ones",
+        )
     base, rest = _split(scene)
     true = _quiet_pitch(scene) if truth is None else truth
     if true.shape != (settings.steps + 1,):

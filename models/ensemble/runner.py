@@ -92,9 +92,16 @@ class _Memory:
         return self.blocks.pop(block)
 
 
-def run_paths(job: Job, paths: int, folder: Path | None = None, executor: Executor | None = None,
-              block: int = BLOCK, progress: Callable[[Progress], None] = lambda state: None,
-              lost: Callable[[range, str], Arrays] | None = None, ahead: int = AHEAD) -> Arrays:  # fmt: skip
+def run_paths(
+    job: Job,
+    paths: int,
+    folder: Path | None = None,
+    executor: Executor | None = None,
+    block: int = BLOCK,
+    progress: Callable[[Progress], None] = lambda state: None,
+    lost: Callable[[range, str], Arrays] | None = None,
+    ahead: int = AHEAD,
+) -> Arrays:
     """Arrays of all paths 0 to ``paths`` - 1, the same bits on any executor, in any order and after any interruption.
 
     folder : keeps every finished block; one that holds blocks of the same job is resumed, one of another job is
@@ -118,8 +125,14 @@ def run_paths(job: Job, paths: int, folder: Path | None = None, executor: Execut
         return _together([lost(cut[i], failed[i]) if lost and i in failed else store.load(i) for i in range(len(cut))])
 
 
-def _compute(job: Job, cut: list[range], store: Store | _Memory, executor: Executor | None,
-             progress: Callable[[Progress], None], ahead: int) -> dict[int, str]:  # fmt: skip
+def _compute(
+    job: Job,
+    cut: list[range],
+    store: Store | _Memory,
+    executor: Executor | None,
+    progress: Callable[[Progress], None],
+    ahead: int,
+) -> dict[int, str]:
     """Compute and save the missing blocks; returns the reasons of those that failed."""
     missing = [i for i in range(len(cut)) if not store.has(i)]
     paths = sum(map(len, cut))
@@ -140,8 +153,9 @@ def _compute(job: Job, cut: list[range], store: Store | _Memory, executor: Execu
     return failed
 
 
-def _answers(job: Job, cut: list[range], missing: list[int], executor: Executor | None,
-             ahead: int) -> Generator[tuple[int, Arrays | _Failure]]:  # fmt: skip
+def _answers(
+    job: Job, cut: list[range], missing: list[int], executor: Executor | None, ahead: int
+) -> Generator[tuple[int, Arrays | _Failure]]:
     """Blocks and their answers, as they come."""
     if executor is None:
         yield from ((i, _attempt(job, cut[i])) for i in missing)

@@ -37,8 +37,9 @@ class Processes(Executor):
         One that struck a worker while it imports would break the pool, and the process that keeps the blocks could
         wait for it for ever.
         """
-        pool = ProcessPoolExecutor(self._workers, mp_context=self._context, initializer=_prepare_worker,
-                                   initargs=(self._theirs,))  # fmt: skip
+        pool = ProcessPoolExecutor(
+            self._workers, mp_context=self._context, initializer=_prepare_worker, initargs=(self._theirs,)
+        )
         with _interrupts_held():
             for _ in range(self._workers):
                 pool.submit(os.getpid)

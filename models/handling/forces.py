@@ -34,8 +34,31 @@ from models.handling.tree import (
 from models.handling.tyre import FIRST
 from models.stack import row
 
-(COUNT, JOINTS, POINTS, PARTS, TYRES, KNOTS, WAVES, CHASSIS, DRAG, DRAG_X, DRAG_Y, DRAG_Z, CELLS, STRIPS, MIDDLE,
- OF_POINTS, OF_PARTS, OF_TYRES, OF_KNOTS, OF_WAVES, OF_CELLS, OF_STRIPS, HEADER) = range(23)  # fmt: skip
+(
+    COUNT,
+    JOINTS,
+    POINTS,
+    PARTS,
+    TYRES,
+    KNOTS,
+    WAVES,
+    CHASSIS,
+    DRAG,
+    DRAG_X,
+    DRAG_Y,
+    DRAG_Z,
+    CELLS,
+    STRIPS,
+    MIDDLE,
+    OF_POINTS,
+    OF_PARTS,
+    OF_TYRES,
+    OF_KNOTS,
+    OF_WAVES,
+    OF_CELLS,
+    OF_STRIPS,
+    HEADER,
+) = range(23)
 """Head: count of all numbers; how many coordinates, points, parts, tyres, knots of a control (three), waves; the
 chassis' last coordinate; drag (N s^2/m^2) and its place from there; cells, strips and middle of the net; where each
 begins."""
@@ -43,8 +66,25 @@ STEER, BRAKE, DRIVE, FIRST_PUSH = range(4)
 PUSHED_BY, PUSHED_AT, PUSH_AXIS, PER_PUSH = 0, 1, 4, 7
 """Of a push from outside: the coordinate that moves its body last, its place from there (m), its axis in the frame of
 the carrier. These rows, and then their count, stand before the controls, the last of which are their forces (N)."""
-(KNUCKLE, ROTOR, POINT, HEIGHT, STATIC, VERTICAL, VISCOUS, RADIUS, HALF_WIDTH, BRISTLES, GRIP, STEERED, BRAKED, DRIVEN,
- INCLINED, BRAKE_RATE, PER_TYRE) = range(17)  # fmt: skip
+(
+    KNUCKLE,
+    ROTOR,
+    POINT,
+    HEIGHT,
+    STATIC,
+    VERTICAL,
+    VISCOUS,
+    RADIUS,
+    HALF_WIDTH,
+    BRISTLES,
+    GRIP,
+    STEERED,
+    BRAKED,
+    DRIVEN,
+    INCLINED,
+    BRAKE_RATE,
+    PER_TYRE,
+) = range(17)
 """Numbers of a tyre: coordinates of its wheel and of its spin (-1: fixed); its point; height of that at rest (m); F0
 (N), k_z, c_z; R, b (m), k (N/m^3), mu; shares of steering, brake and drive; inclination (rad); spin (rad/s) at which
 the brake's torque is whole."""
@@ -81,10 +121,15 @@ def touch(tyre, waves, count, steer, steering, v, chassis, frame, tree, contact,
     """
     spot, own = row(tree[1], PER_SPOT, int(tyre[POINT])), row(tree[0], PER_LINK, int(tyre[KNUCKLE]))
     p, turning, axle = three(spot, WHERE), three(own, TURNING), _axle(steer, tyre[INCLINED])
-    passing = plus(three(spot, RATE), (frame[TO_FRONT] - frame[YAWING] * p[1], frame[TO_LEFT] + frame[YAWING] * p[0],
-                                       0.0))  # fmt: skip
-    zeta, dx, dy = height(waves, count, frame[X] + frame[COSINE] * p[0] - frame[SINE] * p[1],
-                          frame[Y] + frame[SINE] * p[0] + frame[COSINE] * p[1])  # fmt: skip
+    passing = plus(
+        three(spot, RATE), (frame[TO_FRONT] - frame[YAWING] * p[1], frame[TO_LEFT] + frame[YAWING] * p[0], 0.0)
+    )
+    zeta, dx, dy = height(
+        waves,
+        count,
+        frame[X] + frame[COSINE] * p[0] - frame[SINE] * p[1],
+        frame[Y] + frame[SINE] * p[0] + frame[COSINE] * p[1],
+    )
     upwards = -(frame[COSINE] * dx + frame[SINE] * dy), frame[SINE] * dx - frame[COSINE] * dy, 1.0
     elastic, rising = max(tyre[STATIC] + tyre[VERTICAL] * (zeta - (p[2] - tyre[HEIGHT])), 0.0), dot(passing, upwards)
     load = max(elastic - tyre[VISCOUS] * rising, 0.0) if elastic > 0.0 else 0.0
@@ -105,7 +150,11 @@ def touch(tyre, waves, count, steer, steering, v, chassis, frame, tree, contact,
     slide[3] = -spin * dot(cross(axle, down), along)
     pressing = load * long
     contact[A], contact[B], contact[LOAD], contact[MU] = (
-        math.sqrt(tyre[RADIUS] * pressing / tyre[VERTICAL]), tyre[HALF_WIDTH], pressing, tyre[GRIP])  # fmt: skip
+        math.sqrt(tyre[RADIUS] * pressing / tyre[VERTICAL]),
+        tyre[HALF_WIDTH],
+        pressing,
+        tyre[GRIP],
+    )
     contact[FIRST] = contact[FIRST + 1] = contact[FIRST + 2] = 1.0 / tyre[BRISTLES]
     report[PRESS], report[ANGLE] = pressing, steer
     report[SLIP_X], report[SLIP_Y], report[TURN], report[TREAD] = slide[0], slide[1], slide[2], slide[3]
@@ -122,8 +171,13 @@ def touch(tyre, waves, count, steer, steering, v, chassis, frame, tree, contact,
 @lean
 def creep(tyre, found, way, chassis, f, tree, report):
     """Forces ``found`` of one tyre's contact, and its load, onto its wheel; the moment about the axle onto its spin."""
-    own, rotor, ground, centre, axle = row(tree[0], PER_LINK, int(tyre[KNUCKLE])), int(tyre[ROTOR]), tree[2], three(
-        way, CENTRE), three(way, AXLE)  # fmt: skip
+    own, rotor, ground, centre, axle = (
+        row(tree[0], PER_LINK, int(tyre[KNUCKLE])),
+        int(tyre[ROTOR]),
+        tree[2],
+        three(way, CENTRE),
+        three(way, AXLE),
+    )
     force = plus(times(three(way, ROLLING), found[0]), times(three(way, ACROSS), found[1]))
     turning = times(three(way, NORMAL), found[2])
     moment = plus(cross(three(way, DOWN), force), turning)

@@ -76,8 +76,14 @@ def read(handling: Handling, run: SpatialRun, engine: str = "") -> Drive:
     """Reports of a run; RunFailed where a tyre's force is not finite, or the step cannot follow."""
     count, tyres = len(run.times), len(handling.vehicle.tyres)
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
-    kernel.reports(handling.numbers, run.times, np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates),
-               report, ledger)  # fmt: skip
+    kernel.reports(
+        handling.numbers,
+        run.times,
+        np.ascontiguousarray(run.positions),
+        np.ascontiguousarray(run.rates),
+        report,
+        ledger,
+    )
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
     _check_upright(handling, run.times, run.positions, engine)
@@ -91,8 +97,11 @@ def _check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine
     leans = [h.vehicle.coordinates().index((SWAY, turn)) for turn in ("rx", "ry")]
     over = (np.abs(positions[:, leans]) > UPRIGHT).any(axis=1)
     if over.any():
-        raise RunFailed(engine, f"the car turns over: it leans by more than {UPRIGHT} rad; drive more slowly or "
-                        "steer less", float(times[np.argmax(over)]))  # fmt: skip
+        raise RunFailed(
+            engine,
+            f"the car turns over: it leans by more than {UPRIGHT} rad; drive more slowly or steer less",
+            float(times[np.argmax(over)]),
+        )
 
 
 def _check_step(h: Handling, run: SpatialRun, report: np.ndarray, engine: str) -> None:
@@ -108,9 +117,13 @@ def _check_step(h: Handling, run: SpatialRun, report: np.ndarray, engine: str) -
         damped = holds * stiffness * lightness / np.maximum(np.abs(own[:, at.TREAD]), SLOW)
         if step * damped.max() > LIMIT:
             row = int(np.argmax(step * damped > LIMIT))
-            raise RunFailed(engine, f"tyre {tyre.name!r}, at {own[row, at.TREAD]:.3g} m/s, damps its wheel faster than "
-                                    f"steps of {step:g} s can follow; use at most {0.9 * LIMIT / damped.max():.2g} s, "
-                                    "or end the run before", float(run.times[row]))  # fmt: skip
+            raise RunFailed(
+                engine,
+                f"tyre {tyre.name!r}, at {own[row, at.TREAD]:.3g} m/s, damps its wheel faster than "
+                f"steps of {step:g} s can follow; use at most {0.9 * LIMIT / damped.max():.2g} s, "
+                "or end the run before",
+                float(run.times[row]),
+            )
 
 
 def energy(drive: Drive) -> np.ndarray:

@@ -111,8 +111,14 @@ def leave(numbers, frame, tree, f, ledger):
     table = start(numbers)
     if numbers[DRAG] != 0.0:
         _drag(numbers, frame, tree, ledger)
-    inwards(beyond(table, HEADER), int(numbers[JOINTS]), beyond(table, int(numbers[OF_POINTS])),
-            int(numbers[POINTS]), tree, f)  # fmt: skip
+    inwards(
+        beyond(table, HEADER),
+        int(numbers[JOINTS]),
+        beyond(table, int(numbers[OF_POINTS])),
+        int(numbers[POINTS]),
+        tree,
+        f,
+    )
     ahead, aside, turn = tree[2]
     f[0] += frame[0] * ahead - frame[1] * aside
     f[1] += frame[1] * ahead + frame[0] * aside
@@ -157,13 +163,31 @@ def all_forces(numbers, t, q, v, f, report, ledger):
     steer, steering = control(numbers, int(numbers[OF_KNOTS]), STEER, knots, t)
     braking = control(numbers, int(numbers[OF_KNOTS]), BRAKE, knots, t)[0]
     driving = control(numbers, int(numbers[OF_KNOTS]), DRIVE, knots, t)[0]
-    contacts, slides, found, ways = (array(doubles(10 * w), (w, 10)), array(doubles(4 * w), (w, 4)),
-                                     array(doubles(4 * w), (w, 4)), doubles(WAY * w))  # fmt: skip
+    contacts, slides, found, ways = (
+        array(doubles(10 * w), (w, 10)),
+        array(doubles(4 * w), (w, 4)),
+        array(doubles(4 * w), (w, 4)),
+        doubles(WAY * w),
+    )
     tyres, waves = beyond(table, int(numbers[OF_TYRES])), numbers[int(numbers[OF_WAVES]) :]
     for i in range(w):
         tyre = row(tyres, PER_TYRE, i)
-        touch(tyre, waves, int(numbers[WAVES]), tyre[STEERED] * steer, tyre[STEERED] * steering, v, chassis, frame,
-              tree, contacts[i], slides[i], row(ways, WAY, i), ledger, report[i])  # fmt: skip
+        touch(
+            tyre,
+            waves,
+            int(numbers[WAVES]),
+            tyre[STEERED] * steer,
+            tyre[STEERED] * steering,
+            v,
+            chassis,
+            frame,
+            tree,
+            contacts[i],
+            slides[i],
+            row(ways, WAY, i),
+            ledger,
+            report[i],
+        )
     cells = array(beyond(table, int(numbers[OF_CELLS])), (5, int(numbers[CELLS])))
     strips = array(beyond(table, int(numbers[OF_STRIPS])), (4, int(numbers[STRIPS])))
     tyre_forces(contacts, slides, strips, cells, numbers[MIDDLE], found)
@@ -182,8 +206,7 @@ def forces(numbers, t, q, v, f):
     head = array(numbers, (HEADER,))
     n, w = int(head[JOINTS]), int(head[TYRES])
     report, ledger = array(doubles(REPORTED * w), (w, REPORTED)), array(doubles(LEDGER), (LEDGER,))
-    all_forces(array(numbers, (int(head[COUNT]),)), t, array(q, (n,)), array(v, (n,)), array(f, (n,)), report,
-               ledger)  # fmt: skip
+    all_forces(array(numbers, (int(head[COUNT]),)), t, array(q, (n,)), array(v, (n,)), array(f, (n,)), report, ledger)
 
 
 @lean

@@ -120,14 +120,30 @@ def _table(own: Handling) -> np.ndarray:
     tyres, knots = [_tyre(own, i, points) for i in range(len(free.tyres))], _knots(own.controls, own.pushes)
     pushes = _pushes(own)
     held = {*pushes[at.PUSHED_BY : -1 : at.PER_PUSH], *(row[tree.JOINT] for row in points.rows)}
-    sections = [_joints(free, held), np.ravel(points.rows), np.ravel([row for row, _ in parts]), np.ravel(tyres),
-                pushes, knots.ravel(), own.waves.ravel(), of.cells.ravel(), of.strips.ravel()]  # fmt: skip
+    sections = [
+        _joints(free, held),
+        np.ravel(points.rows),
+        np.ravel([row for row, _ in parts]),
+        np.ravel(tyres),
+        pushes,
+        knots.ravel(),
+        own.waves.ravel(),
+        of.cells.ravel(),
+        of.strips.ravel(),
+    ]
     begins = at.HEADER + np.cumsum([0, *(section.size for section in sections)])
     curves = _put_curves(parts, sections[2], int(begins[-1]))
     joint, place = _place(free, chassis.name, chassis.position)
     drag = own.given.drags[0].coefficient / 2.0 if own.given.drags else 0.0
-    counts = [begins[-1] + curves.size, len(free.coordinates()), len(points.rows), len(parts), len(free.tyres),
-              knots.shape[2], len(own.waves)]  # fmt: skip
+    counts = [
+        begins[-1] + curves.size,
+        len(free.coordinates()),
+        len(points.rows),
+        len(parts),
+        len(free.tyres),
+        knots.shape[2],
+        len(own.waves),
+    ]
     places = [*begins[1:4], *begins[5:-1]]  # pushes are found from the controls
     head = [*counts, joint, drag, *place, of.cells.shape[1], of.strips.shape[1], of.middle, *places]
     return np.concatenate([np.array(head, float), *sections, curves])
@@ -173,8 +189,9 @@ _Part = tuple[list[float], tuple[Curve | None, ...]]
 def _springs(own: Handling, points: _Points) -> Iterator[_Part]:
     for s in own.vehicle.springs:
         if s.two is None:
-            raise InputError(own.vehicle.name, f"springs[{s.name}].bodies", s.name,
-                             "a free vehicle is not tied to the ground")  # fmt: skip
+            raise InputError(
+                own.vehicle.name, f"springs[{s.name}].bodies", s.name, "a free vehicle is not tied to the ground"
+            )
         ends = points.number(s.one, s.point_one), points.number(s.two, s.point_two)
         rest = float(np.dot(np.subtract(s.point_two, s.point_one), s.axis))
         law = [s.stiffness, s.damping, own.held.parts[s.name], s.friction, s.friction_rate, rest]
@@ -226,9 +243,24 @@ def _tyre(own: Handling, i: int, points: _Points) -> list[float]:
     brake = share * (c.front_brake if front else (1.0 - c.front_brake) / rear)
     drive = share * (c.front_drive if front else (1.0 - c.front_drive) / rear)
     side = np.sign(tyre.point[1])
-    return [joint, places.index(spins) if spins in places else -1, points.number(tyre.body, tyre.point),
-            tyre.point[2], load, tyre.stiffness, tyre.damping, radius, of.half_width, bristles, of.friction,
-            float(front), brake, drive, side * of.inclination, of.brake_rate]  # fmt: skip
+    return [
+        joint,
+        places.index(spins) if spins in places else -1,
+        points.number(tyre.body, tyre.point),
+        tyre.point[2],
+        load,
+        tyre.stiffness,
+        tyre.damping,
+        radius,
+        of.half_width,
+        bristles,
+        of.friction,
+        float(front),
+        brake,
+        drive,
+        side * of.inclination,
+        of.brake_rate,
+    ]
 
 
 def _pushes(own: Handling) -> np.ndarray:
@@ -237,8 +269,11 @@ def _pushes(own: Handling) -> np.ndarray:
     for push in own.pushes:
         if push.body not in names:
             raise InputError(own.given.name, "pushes", push.body, "no such body", names)
-    rows = [[joint, *place, *push.axis] for push in own.pushes
-            for joint, place in [_place(own.vehicle, push.body, push.point)]]  # fmt: skip
+    rows = [
+        [joint, *place, *push.axis]
+        for push in own.pushes
+        for joint, place in [_place(own.vehicle, push.body, push.point)]
+    ]
     return np.array([*np.ravel(rows), len(rows)])
 
 
@@ -246,6 +281,7 @@ def _knots(controls: Controls, pushes: tuple[Push, ...]) -> np.ndarray:
     """(3 + pushes, 2, k): times and values of steer, brake, drive and pushes, filled up with the last knot."""
     all_knots = (controls.steer, controls.brake, controls.drive, *(push.size for push in pushes))
     most = max(map(len, all_knots))
-    filled = [(*knots, *[(knots[-1][0] + 1.0 + i, knots[-1][1]) for i in range(most - len(knots))])
-              for knots in all_knots]  # fmt: skip
+    filled = [
+        (*knots, *[(knots[-1][0] + 1.0 + i, knots[-1][1]) for i in range(most - len(knots))]) for knots in all_knots
+    ]
     return np.array(filled, float).transpose(0, 2, 1)

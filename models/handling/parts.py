@@ -10,8 +10,22 @@ from models.compiled import lean
 from models.handling.tree import PER_SPOT, PUSH, RATE, WHERE, add, dot, plus, three, times
 from models.stack import beyond, row
 
-(STIFFNESS, DAMPING, HELD, FRICTION, FRICTION_RATE, REST, OWN, OWN_GAIN, ONE, TWO, AXIS, ON_TRAVEL, ON_RATE,
- PER_PART) = (*range(11), 13, 14, 15)  # fmt: skip
+(
+    STIFFNESS,
+    DAMPING,
+    HELD,
+    FRICTION,
+    FRICTION_RATE,
+    REST,
+    OWN,
+    OWN_GAIN,
+    ONE,
+    TWO,
+    AXIS,
+    ON_TRAVEL,
+    ON_RATE,
+    PER_PART,
+) = (*range(11), 13, 14, 15)
 """Numbers of a part, as ``SpringDamper`` has them; its travel at rest; a coordinate that adds to it (-1: none), and by
 how much; its points; its axis; where the table has its curves (0: nowhere), count, offset, slope, corners and bends."""
 

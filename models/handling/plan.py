@@ -26,14 +26,19 @@ def describe(scene: HandlingScene) -> str:
     lines = [
         scene.title,
         _line("scene", f"{scene.file}, study {scene.study}"),
-        _line("vehicle", f"{free.name}: {len(free.coordinates())} freedoms on a carrier that turns through any angle, "
-                         f"{mass:.6g} kg"),
+        _line(
+            "vehicle",
+            f"{free.name}: {len(free.coordinates())} freedoms on a carrier that turns through any angle, {mass:.6g} kg",
+        ),
         _line("tyres", f"brushes of {own.cells} cells per strip, mu = {own.friction:g}; static loads {loads}"),
-        _line("road", f"ISO 8608 class {scene.road.iso8608}, {scene.road.waves} plane waves, where a manoeuvre is "
-                      "rough, else flat"),
+        _line(
+            "road",
+            f"ISO 8608 class {scene.road.iso8608}, {scene.road.waves} plane waves, where a manoeuvre is "
+            "rough, else flat",
+        ),
         *(_line(name, _manoeuvre(scene, name)) for name in scene.manoeuvres),
         _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
-    ]  # fmt: skip
+    ]
     never = "compliance of the carcass, roll and pitch of wheels, steering system"
     return "\n".join([*lines, *effect_lines(scene, 18), _line("never", never)])
 

@@ -149,6 +149,8 @@ def _check_way(scene: HandlingScene, place: str, own: Manoeuvre) -> None:
     """Refuse steps within which a rough road has whole waves."""
     way, fastest = own.speed * scene.run.step, SHORTEST / scene.run.step
     if own.rough and way > SHORTEST:
-        allowed = f"goes {way:.3g} m in a step, over whole waves of the road, the shortest of {SHORTEST:g} m: at " \
-                  f"most {fastest:.4g} m/s, or a smaller run.step"
+        allowed = (
+            f"goes {way:.3g} m in a step, over whole waves of the road, the shortest of {SHORTEST:g} m: at "
+            f"most {fastest:.4g} m/s, or a smaller run.step"
+        )
         raise InputError(scene.file, f"{place}.speed", own.speed, allowed)

@@ -127,8 +127,10 @@ def _turned(along, x, y, z, cosine, sine):
 @lean
 def out(own, local, first):
     """Three numbers along a link's axes as a vector of the carrier's."""
-    return plus(plus(times(three(own, TURNED), local[first]), times(three(own, TURNED + 3), local[first + 1])),
-                times(three(own, TURNED + 6), local[first + 2]))  # fmt: skip
+    return plus(
+        plus(times(three(own, TURNED), local[first]), times(three(own, TURNED + 3), local[first + 1])),
+        times(three(own, TURNED + 6), local[first + 2]),
+    )
 
 
 @lean

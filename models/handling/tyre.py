@@ -85,8 +85,9 @@ def _mix(slides, backwards, found):
         found[i, 2] = share * found[i, 2] - (1.0 - share) * backwards[i, 2]
 
 
-def brush(load: float, mu: float, half_length: float, half_width: float, stiffness: float, slides: np.ndarray,
-          cells: int = 21) -> np.ndarray:  # fmt: skip
+def brush(
+    load: float, mu: float, half_length: float, half_width: float, stiffness: float, slides: np.ndarray, cells: int = 21
+) -> np.ndarray:
     """fx, fy (N), mz (N m) (m, 3) of one tyre at ``slides`` (m, 4), as ``tyre_forces`` takes them.
 
     load in N; mu; half_length, half_width of the patch in m; stiffness of its bristles in N/m^3.

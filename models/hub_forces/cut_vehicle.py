@@ -78,24 +78,46 @@ def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
     whole = replace(guided(vehicle, chassis), gravity=GRAVITY, drags=())
     held = preloads(whole)
     springs = [_spring(spring, held.parts[spring.name]) for spring in whole.springs]
-    bars = [Element(bar.name, bar.left, bar.right, np.array(bar.point_left), np.array(bar.point_right),
-                    np.array([0.0, 0.0, 1.0 / bar.track]), bar.stiffness, bar.damping, held.parts[bar.name])
-            for bar in whole.bars]  # fmt: skip
+    bars = [
+        Element(
+            bar.name,
+            bar.left,
+            bar.right,
+            np.array(bar.point_left),
+            np.array(bar.point_right),
+            np.array([0.0, 0.0, 1.0 / bar.track]),
+            bar.stiffness,
+            bar.damping,
+            held.parts[bar.name],
+        )
+        for bar in whole.bars
+    ]
     loads = np.array([held.tyres[tyre.name] for tyre in whole.tyres])
     return CutVehicle(chassis, _tree(whole, chassis), whole, (*springs, *bars), loads)
 
 
 def _spring(s: SpringDamper, held: float) -> Element:
     assert s.two is not None
-    return Element(s.name, s.one, s.two, np.array(s.point_one), np.array(s.point_two), np.array(s.axis), s.stiffness,
-                   s.damping, held)  # fmt: skip
+    return Element(
+        s.name,
+        s.one,
+        s.two,
+        np.array(s.point_one),
+        np.array(s.point_two),
+        np.array(s.axis),
+        s.stiffness,
+        s.damping,
+        held,
+    )
 
 
 def _tree(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
     """Heading and pitch on carriers without mass, roll on the chassis, all others behind it."""
     own = vehicle.body(chassis)
-    carriers = (Body(f"{chassis} heading", 0.0, own.position, ("x", "y", "z", "rz")),
-                Body(f"{chassis} pitch", 0.0, own.position, ("ry",), parent=f"{chassis} heading"))  # fmt: skip
+    carriers = (
+        Body(f"{chassis} heading", 0.0, own.position, ("x", "y", "z", "rz")),
+        Body(f"{chassis} pitch", 0.0, own.position, ("ry",), parent=f"{chassis} heading"),
+    )
     turned = replace(own, freedoms=("rx",), parent=f"{chassis} pitch")
     others = tuple(body for body in vehicle.bodies if body.name != chassis)
     return SpatialVehicle(vehicle.name, (*carriers, turned, *others), (), (), vehicle.axles, gravity=vehicle.gravity)
@@ -107,14 +129,22 @@ def _check(vehicle: SpatialVehicle, chassis: str) -> None:
         raise InputError(vehicle.name, "chassis", chassis, "no such body", names)
     own = vehicle.body(chassis)
     if len(own.freedoms) != 6 or own.parent is not None:
-        raise InputError(vehicle.name, f"bodies[{chassis}].freedoms", own.freedoms,
-                         "what is left of a vehicle without tyres is free: its chassis needs x, y, z, rx, ry and rz")
+        raise InputError(
+            vehicle.name,
+            f"bodies[{chassis}].freedoms",
+            own.freedoms,
+            "what is left of a vehicle without tyres is free: its chassis needs x, y, z, rx, ry and rz",
+        )
     for spring in vehicle.springs:
         if spring.two is None:
             raise InputError(vehicle.name, f"springs[{spring.name}].bodies", "ground", "a cut vehicle has no ground")
         if spring.travel_force or spring.rate_force or spring.friction:
-            raise InputError(vehicle.name, f"springs[{spring.name}]", None,
-                             "has a curve or friction: the cut vehicle knows linear springs and dampers alone")
+            raise InputError(
+                vehicle.name,
+                f"springs[{spring.name}]",
+                None,
+                "has a curve or friction: the cut vehicle knows linear springs and dampers alone",
+            )
     for bar in vehicle.bars:
         if bar.body != chassis:
             place = f"anti_roll_bars[{bar.name}].body"

@@ -33,5 +33,8 @@ def check_halved(engine: str, run: HubRun, names: list[str], again: Callable[[fl
     changes = np.abs(fine - run.elements[: rows + 1]).max(axis=0) / np.maximum(largest, LEAST * largest.max())
     worst = int(changes.argmax())
     if not changes[worst] <= ALLOWED:
-        raise RunFailed(engine, f"steps of {step:g} s are too long: half of them change the force of "
-                        f"{names[worst]!r} by {changes[worst]:.2g} of its largest; use a smaller step")  # fmt: skip
+        raise RunFailed(
+            engine,
+            f"steps of {step:g} s are too long: half of them change the force of "
+            f"{names[worst]!r} by {changes[worst]:.2g} of its largest; use a smaller step",
+        )

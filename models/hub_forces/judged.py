@@ -17,8 +17,11 @@ if TYPE_CHECKING:
     from models.measured.recording import Recording
 
 ANGLES: tuple[tuple[Quantity, str], ...] = (
-    ("angle", "roll"), ("angle", "pitch"), ("angular rate", "roll"), ("angular rate", "pitch"),
-)  # fmt: skip
+    ("angle", "roll"),
+    ("angle", "pitch"),
+    ("angular rate", "roll"),
+    ("angular rate", "pitch"),
+)
 WRENCH: tuple[tuple[Quantity, str], ...] = tuple((what, axis) for what in ("force", "moment") for axis in "xyz")
 REMEDY = "Correct the columns of the file, or map them in a scene of the system measured"
 """Files of hub forces have no channel map, of which the checks of recordings speak."""
@@ -30,13 +33,20 @@ def judged(scene: "HubScene", vehicle: CutVehicle) -> tuple[Finding, ...]:
 
     forces, angles = scene.measured(vehicle)
     recording = _recording(scene, vehicle, forces, angles)
-    found = [replace(each, text=_of_file(each.text)) for each in check(recording, vehicle)
-             if each.check not in scene.forces.accept]  # fmt: skip
+    found = [
+        replace(each, text=_of_file(each.text))
+        for each in check(recording, vehicle)
+        if each.check not in scene.forces.accept
+    ]
     errors = [each for each in found if each.weight == "error"]
     if errors:
         names = json.dumps(list(dict.fromkeys(each.check for each in errors)))
-        raise InputError(scene.file, "forces.file", scene.forces.file, f"{' '.join(each.text for each in errors)} "
-                         f"{REMEDY}; if it is meant so: accept = {names} under [forces].")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "forces.file",
+            scene.forces.file,
+            f"{' '.join(each.text for each in errors)} {REMEDY}; if it is meant so: accept = {names} under [forces].",
+        )
     return tuple(each for each in found if each.weight == "doubt")
 
 
@@ -53,9 +63,21 @@ def _recording(scene: "HubScene", vehicle: CutVehicle, forces: HubForces, angles
 
     named = [(hub, what, axis, str(scene.forces.file)) for hub in vehicle.hubs for what, axis in WRENCH]
     named += [(vehicle.chassis, what, axis, str(scene.angles.file)) for what, axis in ANGLES]
-    signals = tuple(Signal(f"{at} {what} {axis}", file, f"{at} {what} {axis}", what, at, axis,
-                           scene.forces.frame if at in vehicle.hubs else "body", 1, UNITS[what], 1.0)
-                    for at, what, axis, file in named)  # fmt: skip
+    signals = tuple(
+        Signal(
+            f"{at} {what} {axis}",
+            file,
+            f"{at} {what} {axis}",
+            what,
+            at,
+            axis,
+            scene.forces.frame if at in vehicle.hubs else "body",
+            1,
+            UNITS[what],
+            1.0,
+        )
+        for at, what, axis, file in named
+    )
     count = min(len(forces.samples), len(angles.samples))
     samples = np.hstack([forces.samples[:count], angles.samples[:count]])
     return Recording(signals, MemoryColumns(tuple(s.name for s in signals), samples), forces.period)

@@ -26,8 +26,28 @@ from models.hub_forces.mechanics import (
 )
 from models.stack import array, at, beyond, doubles, start
 
-(JOINTS, BODIES, ELEMENTS, HUBS, ROAD, FRAME, GUIDE, PER_TIME, ROWS, COLUMNS, GRAVITY, CHASSIS, SPEED, ROLL_STIFFNESS,
- ROLL_DAMPING, PITCH_STIFFNESS, PITCH_DAMPING, HOLDING, ALL, HEADER) = range(20)  # fmt: skip
+(
+    JOINTS,
+    BODIES,
+    ELEMENTS,
+    HUBS,
+    ROAD,
+    FRAME,
+    GUIDE,
+    PER_TIME,
+    ROWS,
+    COLUMNS,
+    GRAVITY,
+    CHASSIS,
+    SPEED,
+    ROLL_STIFFNESS,
+    ROLL_DAMPING,
+    PITCH_STIFFNESS,
+    PITCH_DAMPING,
+    HOLDING,
+    ALL,
+    HEADER,
+) = range(20)
 """Head: counts; whether tyres on a road act; frame of the hub forces; what stabilises; rows of inputs per second, rows,
 columns; m/s^2; the chassis' last joint; m/s; the pull's N m/rad, N m s/rad; 1/s of the held motion; count of all."""
 FRAMES = ("hub", "body", "inertial")
@@ -129,9 +149,14 @@ def parts(numbers):
     two = one + PER_BODY * b
     three = two + PER_ELEMENT * e
     four = three + PER_HUB * h
-    return (head, numbers[HEADER:one].reshape(n, PER_JOINT), numbers[one:two].reshape(b, PER_BODY),
-            numbers[two:three].reshape(e, PER_ELEMENT), numbers[three:four].reshape(h, PER_HUB),
-            numbers[four:].reshape(int(head[ROWS]), int(head[COLUMNS])))  # fmt: skip
+    return (
+        head,
+        numbers[HEADER:one].reshape(n, PER_JOINT),
+        numbers[one:two].reshape(b, PER_BODY),
+        numbers[two:three].reshape(e, PER_ELEMENT),
+        numbers[three:four].reshape(h, PER_HUB),
+        numbers[four:].reshape(int(head[ROWS]), int(head[COLUMNS])),
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -144,8 +169,12 @@ def forces(numbers, t, q, v, m, out, inside, wrenches, moments):
     head, joints, bodies, elements, hubs, inputs = parts(numbers)
     row = inputs[min(max(int(np.rint(t * head[PER_TIME])), 0), len(inputs) - 1)]
     chassis, count = int(head[CHASSIS]), len(hubs)
-    place, wrench, axis, by = (array(doubles(3), (3,)), array(doubles(6), (6,)), array(doubles(3), (3,)),
-                               array(doubles(3), (3,)))  # fmt: skip
+    place, wrench, axis, by = (
+        array(doubles(3), (3,)),
+        array(doubles(6), (6,)),
+        array(doubles(3), (3,)),
+        array(doubles(3), (3,)),
+    )
     travel = array(doubles(len(joints)), (len(joints),))
     move(joints, q, v, m)
     for i in range(len(elements)):
@@ -194,8 +223,17 @@ def accelerate(numbers, t, q, v, out):
     n, e, h = len(joints), len(elements), len(hubs)
     m, mass = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n * n), (n, n))
     out[:] = 0.0
-    forces(numbers, t, q, v, m, out, array(doubles(e), (e,)), array(doubles(WRENCH * h), (h, WRENCH)),
-           array(doubles(2), (2,)))  # fmt: skip
+    forces(
+        numbers,
+        t,
+        q,
+        v,
+        m,
+        out,
+        array(doubles(e), (e,)),
+        array(doubles(WRENCH * h), (h, WRENCH)),
+        array(doubles(2), (2,)),
+    )
     inertia(joints, bodies, m, head[GRAVITY], mass, out)
     solve(mass, array(start(out), (1, n)))
 
@@ -225,9 +263,17 @@ def joint_forces(numbers, t, q, v, f):
     """Add the joints' forces to ``f``, for callbacks: all but the time (s) are pointers to doubles."""
     head = array(numbers, (HEADER,))
     n, e, h = int(head[JOINTS]), int(head[ELEMENTS]), int(head[HUBS])
-    forces(array(numbers, (int(head[ALL]),)), t, array(q, (n,)), array(v, (n,)),
-           array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(f, (n,)), array(doubles(e), (e,)),
-           array(doubles(WRENCH * h), (h, WRENCH)), array(doubles(2), (2,)))  # fmt: skip
+    forces(
+        array(numbers, (int(head[ALL]),)),
+        t,
+        array(q, (n,)),
+        array(v, (n,)),
+        array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)),
+        array(f, (n,)),
+        array(doubles(e), (e,)),
+        array(doubles(WRENCH * h), (h, WRENCH)),
+        array(doubles(2), (2,)),
+    )
 
 
 @njit(cache=True, error_model="numpy")

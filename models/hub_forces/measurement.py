@@ -57,8 +57,10 @@ def two_tracks(vehicle: CutVehicle, left: Profile, right: Profile, speed: float,
     """
     shortest = WAVE * min(left.finest, right.finest)
     if speed * step > shortest * (1 + 1e-9):
-        allowed = f"goes {speed * step:.3g} m in a step of {step:g} s, over whole waves of the road, the shortest of " \
-                  f"{shortest:.3g} m: at most {shortest / step:.4g} m/s, or a smaller step"
+        allowed = (
+            f"goes {speed * step:.3g} m in a step of {step:g} s, over whole waves of the road, the shortest of "
+            f"{shortest:.3g} m: at most {shortest / step:.4g} m/s, or a smaller step"
+        )
         raise InputError("", "road.speed", speed, allowed)
     times, front = 0.5 * step * np.arange(2 * steps + 1), max(vehicle.whole.axles)
     heights, rates = [], []
@@ -83,7 +85,13 @@ def recorded(run: HubRun, frame: str, every: int) -> tuple[HubForces, Angles]:
     return HubForces(wrenches.reshape(len(wrenches), -1), period, frame), Angles(angles, period)
 
 
-def model(engine: str, vehicle: CutVehicle, forces: HubForces, step: float, duration: float,
-          interpolation: Interpolation = "linear") -> HubModel:  # fmt: skip
+def model(
+    engine: str,
+    vehicle: CutVehicle,
+    forces: HubForces,
+    step: float,
+    duration: float,
+    interpolation: Interpolation = "linear",
+) -> HubModel:
     """The cut vehicle on measured hub forces, free."""
     return build(engine, vehicle, forces.drive(step, round(duration / step), interpolation), step, duration)

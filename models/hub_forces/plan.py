@@ -22,9 +22,12 @@ def check(scene: HubScene, engines: tuple[str, ...]) -> None:
     if scene.forces.frame == "inertial":
         growth = float(rigid(vehicle).toppling().max()) / (2 * np.pi)
         if scene.stabilise.bandwidth <= growth:
-            raise InputError(scene.file, "stabilise.bandwidth", scene.stabilise.bandwidth,
-                             f"must be above {growth:.3g} Hz: forces that keep their directions topple the vehicle so "
-                             "fast")
+            raise InputError(
+                scene.file,
+                "stabilise.bandwidth",
+                scene.stabilise.bandwidth,
+                f"must be above {growth:.3g} Hz: forces that keep their directions topple the vehicle so fast",
+            )
     if scene.forces.file is not None:
         judged(scene, vehicle)
 
@@ -41,15 +44,25 @@ def describe(scene: HubScene) -> str:
     vehicle, forces = scene.cut_vehicle(), scene.forces
     own = rigid(vehicle)
     source = f"file {forces.file}" if forces.file else f"virtual measurement at {forces.sampling_rate:g} Hz"
-    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"),
-             _line("vehicle", f"{vehicle.tree.name}: {vehicle.size} freedoms, {own.mass:.6g} kg, cut at "
-                              f"{', '.join(vehicle.hubs)}"),
-             _line("inside", f"{len(vehicle.elements)} springs, mounts and bars, in the chassis' axes"),
-             _line("forces", f"{source}, six per hub in the frame {forces.frame!r}, {forces.interpolation}"),
-             _line("noise", _noise(scene))]
+    lines = [
+        scene.title,
+        _line("scene", f"{scene.file}, study {scene.study}"),
+        _line(
+            "vehicle",
+            f"{vehicle.tree.name}: {vehicle.size} freedoms, {own.mass:.6g} kg, cut at {', '.join(vehicle.hubs)}",
+        ),
+        _line("inside", f"{len(vehicle.elements)} springs, mounts and bars, in the chassis' axes"),
+        _line("forces", f"{source}, six per hub in the frame {forces.frame!r}, {forces.interpolation}"),
+        _line("noise", _noise(scene)),
+    ]
     if scene.road is not None:
-        lines.append(_line("road", f"ISO 8608 class {scene.road.iso8608}, two independent tracks, seeds "
-                                   f"{scene.road.seed} and {scene.road.seed + 1}, {scene.road.speed:g} m/s"))
+        lines.append(
+            _line(
+                "road",
+                f"ISO 8608 class {scene.road.iso8608}, two independent tracks, seeds "
+                f"{scene.road.seed} and {scene.road.seed + 1}, {scene.road.speed:g} m/s",
+            )
+        )
     lines.append(_line("run", f"{scene.run.duration:g} s, Runge-Kutta 4, {scene.run.step:g} s"))
     if scene.study == COMPARING:
         lines.append(_line("compared", "free, with kalman_filter, with prescribed_angles: a scene each"))

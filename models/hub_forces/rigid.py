@@ -44,8 +44,7 @@ class Rigid:
         """Variances (m, 3) of roll, pitch, heading (rad^2) at times (m,) from rest."""
         return np.outer(times**3 / 3, period * np.diag(self.turning(deviation)))
 
-    def position_variance(self, deviation: np.ndarray, period: float, times: np.ndarray,
-                          frame: str) -> np.ndarray:  # fmt: skip
+    def position_variance(self, deviation: np.ndarray, period: float, times: np.ndarray, frame: str) -> np.ndarray:
         """Variances (m, 3) of x, y, z (m^2) at times (m,) from rest, forces in a frame."""
         force = period * (deviation.reshape(-1, 6)[:, :3] ** 2).sum(axis=0) / self.mass**2
         found = np.outer(times**3 / 3, force)

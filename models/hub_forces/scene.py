@@ -118,8 +118,12 @@ class HubScene(SceneFile):
         forces, period = read_time_series(path, columns)
         angles, other = read_time_series(self.path(self.angles.file, "angles.file"), ANGLES)
         if abs(other - period) > 1e-9 * period:
-            raise InputError(self.file, "angles.file", self.angles.file,
-                             f"is sampled every {other:g} s and the forces every {period:g} s: they must agree")
+            raise InputError(
+                self.file,
+                "angles.file",
+                self.angles.file,
+                f"is sampled every {other:g} s and the forces every {period:g} s: they must agree",
+            )
         last = period * (min(len(forces), len(angles)) - 1)
         if last < self.run.duration * (1 - 1e-9):
             raise InputError(self.file, "run.duration", self.run.duration, f"the files end at {last:g} s")
@@ -145,8 +149,11 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Hu
 
 def _check_file_only(file: str, scene: HubScene) -> None:
     """What a virtual measurement can choose, and files have as they are."""
-    for table, name, own in (("forces", "sampling_rate", scene.forces), ("forces", "noise", scene.forces),
-                             ("angles", "noise", scene.angles)):  # fmt: skip
+    for table, name, own in (
+        ("forces", "sampling_rate", scene.forces),
+        ("forces", "noise", scene.forces),
+        ("angles", "noise", scene.angles),
+    ):
         if name in own.model_fields_set:
             raise InputError(file, f"{table}.{name}", getattr(own, name), f"is that of {table}.file: drop it")
 

@@ -149,8 +149,13 @@ def felt(numbers, every, states, guides, carried, points, own_axes, out):
     """
     head, joints, bodies, elements, hubs, _ = parts(numbers)
     n, b, e, h, chassis = len(joints), len(bodies), len(elements), len(hubs), int(head[CHASSIS])
-    m, mass, sides, inside, travels = np.empty((n + 1, PER_MOTION)), np.empty((n, n)), np.empty((1, n)), np.empty(
-        e), np.empty(e)  # fmt: skip
+    m, mass, sides, inside, travels = (
+        np.empty((n + 1, PER_MOTION)),
+        np.empty((n, n)),
+        np.empty((1, n)),
+        np.empty(e),
+        np.empty(e),
+    )
     wrenches, moments, acting, wrench = np.empty((h, WRENCH)), np.empty(2), np.empty((b + h + 2 * e, 9)), np.empty(6)
     per_time = head[PER_TIME]
     for i in range(len(states)):

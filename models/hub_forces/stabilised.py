@@ -30,8 +30,15 @@ class Stabilised:
         from models.hub_forces.tilt_filter import estimate
 
         own = self.scene
-        return estimate(self.vehicle, self.forces, self.angles, own.deviations(self.vehicle), own.angles.deviations,
-                        own.stabilise.model, own.file)  # fmt: skip
+        return estimate(
+            self.vehicle,
+            self.forces,
+            self.angles,
+            own.deviations(self.vehicle),
+            own.angles.deviations,
+            own.stabilise.model,
+            own.file,
+        )
 
     def drive(self, method: Method, step: float, steps: int) -> Drive:
         """Inputs of so many steps (s), roll and pitch held by a method; raises InputError."""

@@ -60,14 +60,25 @@ def table(vehicle: CutVehicle, drive: Drive, step: float) -> np.ndarray:
     """All numbers for a run at a step (s)."""
     joined = joints(vehicle)
     heavy = [body for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)]
-    bodies = [[joined.last[body.name], body.mass, *np.subtract(body.position, joined.origin[body.name]),
-               *np.ravel(body.inertia)] for body in heavy]  # fmt: skip
+    bodies = [
+        [
+            joined.last[body.name],
+            body.mass,
+            *np.subtract(body.position, joined.origin[body.name]),
+            *np.ravel(body.inertia),
+        ]
+        for body in heavy
+    ]
     elements = [_element(vehicle, joined, i) for i in range(len(vehicle.elements))]
     hubs = [_hub(vehicle, joined, i) for i in range(len(vehicle.hubs))]
     inputs = drive.hubs if drive.guide is None else np.hstack([drive.hubs, drive.guide])
     head = np.zeros(kernel.HEADER)
     head[[kernel.JOINTS, kernel.BODIES, kernel.ELEMENTS, kernel.HUBS]] = (
-        len(joined.rows), len(bodies), len(elements), len(hubs))  # fmt: skip
+        len(joined.rows),
+        len(bodies),
+        len(elements),
+        len(hubs),
+    )
     head[[kernel.ROAD, kernel.FRAME, kernel.SPEED]] = drive.road, kernel.FRAMES.index(drive.frame), drive.speed
     head[[kernel.PER_TIME, kernel.ROWS, kernel.COLUMNS]] = 2.0 / step, *inputs.shape
     head[[kernel.GRAVITY, kernel.CHASSIS, kernel.HOLDING]] = vehicle.tree.gravity, ROLL, drive.holding
@@ -94,5 +105,3 @@ def _hub(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:
     law = (tyre.stiffness, tyre.damping, side.stiffness if side else 0.0, side.roll_steer if side else 0.0)
     arm = np.subtract(tyre.point, joined.origin[tyre.body])
     return [joined.last[tyre.body], *arm, tyre.point[2], vehicle.loads[i], *law, tyre.pushes_only]
-
-

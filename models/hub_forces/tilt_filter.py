@@ -69,8 +69,16 @@ class TiltFilter:
     force_deviation : (6 h,), N and N m, of each sample; angle_deviations : rad and rad/s; model : rad/s^2.
     """
 
-    def __init__(self, vehicle: CutVehicle, frame: str, period: float, force_deviation: np.ndarray,
-                 angle_deviations: tuple[float, float], model: float, file: str = "") -> None:  # fmt: skip
+    def __init__(
+        self,
+        vehicle: CutVehicle,
+        frame: str,
+        period: float,
+        force_deviation: np.ndarray,
+        angle_deviations: tuple[float, float],
+        model: float,
+        file: str = "",
+    ) -> None:
         _check(frame, period, angle_deviations, model)
         self.rigid, self.frame, self.period, self.file = rigid(vehicle), frame, period, file
         self.forces_noise = self.rigid.turning(force_deviation)[:2, :2]
@@ -98,8 +106,13 @@ class TiltFilter:
         given = turning, angles, self.period, self.noise, self.variances
         own.surprise += march(own.x, own.p, *given, own.sums, states, spread)
         if not self.surprise <= SURPRISE:
-            raise InputError(self.file, "angles", None, "contradict the hub forces: the squares of the innovations are "
-                             f"{self.surprise:.3g} times what the deviations allow (at most {SURPRISE:g}): {REMEDY}")
+            raise InputError(
+                self.file,
+                "angles",
+                None,
+                "contradict the hub forces: the squares of the innovations are "
+                f"{self.surprise:.3g} times what the deviations allow (at most {SURPRISE:g}): {REMEDY}",
+            )
         return states, spread
 
     @property
@@ -122,13 +135,17 @@ class TiltFilter:
     def doubts(self) -> tuple[str, ...]:
         """What the innovations say against the measurement: too large, or with a mean; an angle that is wrong by a
         constant leaves no trace in them."""
-        large = (f"the filter's innovations squared are {self.surprise:.3g} times what the stated deviations allow (up "
-                 f"to {SURPRISED:g} is not said): {REMEDY}")  # fmt: skip
+        large = (
+            f"the filter's innovations squared are {self.surprise:.3g} times what the stated deviations allow (up "
+            f"to {SURPRISED:g} is not said): {REMEDY}"
+        )
         mean, error = self.biases()
-        biased = [f"the filter's innovations of {name} have a mean of {own:+.2g} deviations (of a right filter at most "
-                  f"{BIASED:g}, and {SURE * wide:.2g} by chance): a gyro or forces have an offset, or an angle drifts"
-                  for name, own, wide in zip(VALUES, mean, error, strict=True)
-                  if abs(own) > max(BIASED, SURE * wide)]  # fmt: skip
+        biased = [
+            f"the filter's innovations of {name} have a mean of {own:+.2g} deviations (of a right filter at most "
+            f"{BIASED:g}, and {SURE * wide:.2g} by chance): a gyro or forces have an offset, or an angle drifts"
+            for name, own, wide in zip(VALUES, mean, error, strict=True)
+            if abs(own) > max(BIASED, SURE * wide)
+        ]
         return (*([large] if self.surprise > SURPRISED else []), *biased)
 
     def _check_balance(self, turning: np.ndarray, rates: np.ndarray) -> None:
@@ -152,17 +169,26 @@ class TiltFilter:
         share = np.sqrt(unexplained / np.where(whole > 0, whole, 1.0))
         for name, found in zip(("roll", "pitch"), share, strict=True):
             if not found <= UNEXPLAINED:
-                raise InputError(self.file, f"angles.{name}_rate", None, f"contradicts the hub forces: {found:.0%} of "
-                                 "it is not the integral of their moment "
-                                 f"(at most {UNEXPLAINED:.0%}): {REMEDY}")  # fmt: skip
+                raise InputError(
+                    self.file,
+                    f"angles.{name}_rate",
+                    None,
+                    f"contradicts the hub forces: {found:.0%} of "
+                    "it is not the integral of their moment "
+                    f"(at most {UNEXPLAINED:.0%}): {REMEDY}",
+                )
 
 
 def _check(frame: str, period: float, angle_deviations: tuple[float, float], model: float) -> None:
     """Refuse what is no frame, no period and no deviation; a value without any error is none, either."""
     if frame not in get_args(Frame):
         raise InputError("", "frame", frame, "is none", get_args(Frame))
-    for name, value in (("period", period), ("angle_deviations", min(angle_deviations)), ("model", model),
-                        ("angle_deviations", max(angle_deviations))):  # fmt: skip
+    for name, value in (
+        ("period", period),
+        ("angle_deviations", min(angle_deviations)),
+        ("model", model),
+        ("angle_deviations", max(angle_deviations)),
+    ):
         if not 0.0 < value < math.inf:
             raise InputError("", name, value, "must be above 0, and finite")
 
@@ -181,12 +207,20 @@ def _level_line(values: np.ndarray) -> np.ndarray:
     return values - np.outer(line, line @ values / (line @ line))
 
 
-def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, force_deviation: np.ndarray,
-             angle_deviations: tuple[float, float], model: float, file: str = "") -> Tilt:  # fmt: skip
+def estimate(
+    vehicle: CutVehicle,
+    forces: HubForces,
+    angles: Angles,
+    force_deviation: np.ndarray,
+    angle_deviations: tuple[float, float],
+    model: float,
+    file: str = "",
+) -> Tilt:
     """Filter angles sampled with the forces, see ``TiltFilter``; raises InputError also where nothing was measured."""
     if len(forces.samples) != len(angles.samples):
-        raise InputError(file, "angles", len(angles.samples), f"must be as many samples as the forces', "
-                         f"{len(forces.samples)}")  # fmt: skip
+        raise InputError(
+            file, "angles", len(angles.samples), f"must be as many samples as the forces', {len(forces.samples)}"
+        )
     if np.isnan(angles.samples).all():
         raise InputError(file, "angles", None, "hold no number: there is nothing to follow")
     own = TiltFilter(vehicle, forces.frame, forces.period, force_deviation, angle_deviations, model, file)

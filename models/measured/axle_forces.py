@@ -65,9 +65,11 @@ LAG = 0.02, 2.0
 ALIKE = 0.3
 """Correlation from which on one axle is said to repeat the other."""
 IN_FILE: dict[Wrong, str] = {
-    "sign": "forces up on the wheels are positive; turn its sign", "unit": "correct the unit in its header",
-    "gain": "check its calibration factor", "size": "check its calibration factor and the vehicle's parameters",
-}  # fmt: skip
+    "sign": "forces up on the wheels are positive; turn its sign",
+    "unit": "correct the unit in its header",
+    "gain": "check its calibration factor",
+    "size": "check its calibration factor and the vehicle's parameters",
+}
 """Remedies where the column of a file, and no channel map, says what a signal is."""
 
 
@@ -168,8 +170,14 @@ def axles(recording: Recording, parameters: Parameters) -> AxleForces | None:
         return None
     front, rear = (np.asarray(sum(_straight(recording.samples(s)) for s in own)) for own in signals)
     turn = all(s.frame != "inertial" for own in signals for s in own)
-    return AxleForces(np.column_stack([front, rear]), recording.period, parameters, (signals[0], signals[1]),
-                      recording.duration, turn=turn)  # fmt: skip
+    return AxleForces(
+        np.column_stack([front, rear]),
+        recording.period,
+        parameters,
+        (signals[0], signals[1]),
+        recording.duration,
+        turn=turn,
+    )
 
 
 def _straight(values: np.ndarray) -> np.ndarray:
@@ -208,8 +216,10 @@ def steady(own: AxleForces) -> Steady:
     units = np.array([GRAVITY, own.arms[1, 0] * own.loads[0] * GRAVITY / (own.parameters.g or GRAVITY)])
     level = _slope(times, _blocks(own.rise))
     climbing = _slope(times, _blocks(own.rise), _blocks(pitch)) if abs(pitch).max() < STEEP else level
-    risen, turned = (_known(found, unit, gained, own.lasted) for found, unit, gained in
-                     ((level, units[0], RISE), (_slope(times, _blocks(rate)), units[1], SWING)))  # fmt: skip
+    risen, turned = (
+        _known(found, unit, gained, own.lasted)
+        for found, unit, gained in ((level, units[0], RISE), (_slope(times, _blocks(rate)), units[1], SWING))
+    )
     risen = min(risen, _known(climbing, units[0], RISE, own.lasted), key=lambda found: abs(found[0]) / found[1])
     return Steady(np.array([risen[0], turned[0]]), np.array([risen[1], turned[1]]), units)
 
@@ -252,8 +262,15 @@ def check(own: AxleForces) -> list[Finding]:
     """All findings; what an earlier one explains, a later one does not name again."""
     largest = float(np.abs(own.forces).max())
     if largest > IMPOSSIBLE * own.loads.sum():
-        return [_error(own, "weight", f"A wheel force of {largest:.4g} N is none of a vehicle that weighs "
-                       f"{own.loads.sum():.4g} N.", largest, "N")]  # fmt: skip
+        return [
+            _error(
+                own,
+                "weight",
+                f"A wheel force of {largest:.4g} N is none of a vehicle that weighs {own.loads.sum():.4g} N.",
+                largest,
+                "N",
+            )
+        ]
     for look in (_sparse, _explained, _coarse, _balance, _start):
         found = look(own)
         if found:
@@ -265,9 +282,11 @@ def _sparse(own: AxleForces) -> list[Finding]:
     """A long record of which a run takes next to nothing, too sparse for a wheel."""
     if len(own.forces) < MANY or own.lasted < UNUSED * own.duration or own.period < 0.5 / BAND[1]:
         return []
-    text = (f"The samples lie {own.period:.4g} s apart and last for {own.lasted:.4g} s, of which the run takes "
-            f"{own.duration:.4g} s; forces of a wheel move with up to {BAND[1]:g} Hz. If their times are in "
-            "milliseconds, head the column time [ms].")  # fmt: skip
+    text = (
+        f"The samples lie {own.period:.4g} s apart and last for {own.lasted:.4g} s, of which the run takes "
+        f"{own.duration:.4g} s; forces of a wheel move with up to {BAND[1]:g} Hz. If their times are in "
+        "milliseconds, head the column time [ms]."
+    )
     return [Finding("times", "doubt", "wheel forces", text, own.period, "s", own.names)]
 
 
@@ -277,20 +296,37 @@ def _explained(own: AxleForces) -> list[Finding]:
     if p.g == 0:
         return []
     if own.empty.any():
-        text = " ".join(counted_from_load(axle[0].name, mean, load) for axle, mean, load, empty in
-                        zip(own.signals, own.means, own.loads, own.empty, strict=True) if empty)  # fmt: skip
+        text = " ".join(
+            counted_from_load(axle[0].name, mean, load)
+            for axle, mean, load, empty in zip(own.signals, own.means, own.loads, own.empty, strict=True)
+            if empty
+        )
         return [_error(own, "weight", text, 100 * (own.means.sum() / own.loads.sum() - 1), "%")]
     wheels = np.array([p.m1, p.m2]) * p.g
     missing = own.loads - own.means
     if _near(missing, wheels, own.loads) and not _near(missing, 0 * wheels, own.loads):
-        return [_error(own, "weight", f"The wheel forces lack {missing[0]:.4g} N in front and {missing[1]:.4g} N at "
-                       f"the rear on average, the weight of the wheels ({wheels[0]:.4g} N and {wheels[1]:.4g} N): they "
-                       "were measured above the wheels. Add it, with the wheels' inertia force if they move.",
-                       100 * (own.means.sum() / own.loads.sum() - 1), "%")]  # fmt: skip
+        return [
+            _error(
+                own,
+                "weight",
+                f"The wheel forces lack {missing[0]:.4g} N in front and {missing[1]:.4g} N at "
+                f"the rear on average, the weight of the wheels ({wheels[0]:.4g} N and {wheels[1]:.4g} N): they "
+                "were measured above the wheels. Add it, with the wheels' inertia force if they move.",
+                100 * (own.means.sum() / own.loads.sum() - 1),
+                "%",
+            )
+        ]
     if _near(own.means, own.loads / 2, own.loads / 2):
-        return [_error(own, "weight", f"The wheel forces are half the static loads of the axles ({own.loads[0]:.5g} N "
-                       f"and {own.loads[1]:.5g} N): they are of one wheel of each axle. Add those of the other.", -50.0,
-                       "%")]  # fmt: skip
+        return [
+            _error(
+                own,
+                "weight",
+                f"The wheel forces are half the static loads of the axles ({own.loads[0]:.5g} N "
+                f"and {own.loads[1]:.5g} N): they are of one wheel of each axle. Add those of the other.",
+                -50.0,
+                "%",
+            )
+        ]
     return _exchanged(own)
 
 
@@ -303,9 +339,11 @@ def _exchanged(own: AxleForces) -> list[Finding]:
     as_is, crossed = (np.abs(each / own.loads - 1).max() for each in (own.means, own.means[::-1]))
     if crossed > LIKE or as_is < 3 * crossed or not steady(own).seen[1]:
         return []
-    text = (f"Front and rear are exchanged: {own.means[0]:.5g} N in front and {own.means[1]:.5g} N at the rear on "
-            f"average, where {own.loads[0]:.5g} N and {own.loads[1]:.5g} N rest. Exchange their columns, or a and b of "
-            "the vehicle.")  # fmt: skip
+    text = (
+        f"Front and rear are exchanged: {own.means[0]:.5g} N in front and {own.means[1]:.5g} N at the rear on "
+        f"average, where {own.loads[0]:.5g} N and {own.loads[1]:.5g} N rest. Exchange their columns, or a and b of "
+        "the vehicle."
+    )
     return [_error(own, "swapped", text, 100 * float(as_is), "%")]
 
 
@@ -316,8 +354,17 @@ def _coarse(own: AxleForces) -> list[Finding]:
         for_axle = f"the {load:.5g} N that rest on it on average"
         kind, text = sentence(float(mean / load), axle[0], for_axle, own.remedies)
         if kind in ("sign", "unit") or (kind == "size" and far):
-            found.append(Finding("weight" if kind == "size" else kind, "error", axle[0].at, text, float(mean / load),
-                                 "1", tuple(s.name for s in axle)))  # fmt: skip
+            found.append(
+                Finding(
+                    "weight" if kind == "size" else kind,
+                    "error",
+                    axle[0].at,
+                    text,
+                    float(mean / load),
+                    "1",
+                    tuple(s.name for s in axle),
+                )
+            )
     return found
 
 
@@ -330,11 +377,16 @@ def _balance(own: AxleForces) -> list[Finding]:
     weight: Weight = "error" if (beyond & _far(own, found)).any() else "doubt"
     excess = np.linalg.solve(own.arms, np.where(found.seen, found.accelerations, 0.0))
     share = excess / own.loads
-    told = " and ".join(_excess(*each) for each in zip(("the front axle", "the rear axle"), excess, share, strict=True)
-                        if abs(each[2]) > SMALL / 2)  # fmt: skip
-    text = (f"On average {told} against what rests there: {_motion(own, found)}. Check calibration, zero and the "
-            "vehicle's masses and a, b; a vehicle that brakes or accelerates has forces along the road, too, which "
-            "this model has not.")  # fmt: skip
+    told = " and ".join(
+        _excess(*each)
+        for each in zip(("the front axle", "the rear axle"), excess, share, strict=True)
+        if abs(each[2]) > SMALL / 2
+    )
+    text = (
+        f"On average {told} against what rests there: {_motion(own, found)}. Check calibration, zero and the "
+        "vehicle's masses and a, b; a vehicle that brakes or accelerates has forces along the road, too, which "
+        "this model has not."
+    )
     kind = "balance" if found.seen[1] else "weight"
     size = float(found.shares[1] if found.seen[1] else found.shares[0])
     return [Finding(kind, weight, "wheel forces", text, 100 * size, "%", own.names)]
@@ -363,10 +415,12 @@ def _start(own: AxleForces) -> list[Finding]:
     last = own.pitch[1][min(len(own.forces) - 1, round(own.duration / own.period))]
     if not own.rests or own.parameters.g == 0 or np.abs(first).max() < OFF or abs(last) < max(STEEP, _noise(own)):
         return []
-    text = (f"The run begins at rest, and the wheel forces {first[0]:+.1%} in front and {first[1]:+.1%} at the rear "
-            "off the static loads: they begin in the middle of a motion, or are not of this vehicle, and turn it by "
-            f"{last:+.3g} rad in {own.duration:g} s. Begin where the vehicle stands or drives on a smooth road, or "
-            "give its state under [start].")  # fmt: skip
+    text = (
+        f"The run begins at rest, and the wheel forces {first[0]:+.1%} in front and {first[1]:+.1%} at the rear "
+        "off the static loads: they begin in the middle of a motion, or are not of this vehicle, and turn it by "
+        f"{last:+.3g} rad in {own.duration:g} s. Begin where the vehicle stands or drives on a smooth road, or "
+        "give its state under [start]."
+    )
     return [Finding("start", "doubt", "wheel forces", text, float(last), "rad", own.names)]
 
 
@@ -394,8 +448,10 @@ def _order(own: AxleForces) -> list[Finding]:
     late, alike, other = _delay(own)
     if alike < ALIKE or late > 0 or alike < 1.5 * other:
         return []
-    text = (f"The rear axle feels the road {-late:.3g} s before the front axle (correlation {alike:.2f}): front and "
-            "rear are exchanged, or time runs backwards, unless the vehicle drove so.")  # fmt: skip
+    text = (
+        f"The rear axle feels the road {-late:.3g} s before the front axle (correlation {alike:.2f}): front and "
+        "rear are exchanged, or time runs backwards, unless the vehicle drove so."
+    )
     return [Finding("swapped", "doubt", "wheel forces", text, late, "s", own.names)]
 
 
@@ -420,12 +476,13 @@ def _delay(own: AxleForces) -> tuple[float, float, float]:
 
 def _good(own: AxleForces) -> Finding:
     found = steady(own)
-    text = (f"The mean wheel forces carry the vehicle to {found.shares[0]:+.2%} of its weight; an error of "
-            f"{100 * found.known[0] / GRAVITY:.2g} % would be seen, of one axle of "
-            f"{100 * abs(found.known[1] / (own.arms[1] * own.loads)).max():.2g} %.")
+    text = (
+        f"The mean wheel forces carry the vehicle to {found.shares[0]:+.2%} of its weight; an error of "
+        f"{100 * found.known[0] / GRAVITY:.2g} % would be seen, of one axle of "
+        f"{100 * abs(found.known[1] / (own.arms[1] * own.loads)).max():.2g} %."
+    )
     return Finding("weight", "note", "", text, 100 * float(found.shares[0]), "%", own.names)
 
 
 def _error(own: AxleForces, kind: str, text: str, size: float, unit: str) -> Finding:
     return Finding(kind, "error", "wheel forces", text, float(size), unit, own.names)
-

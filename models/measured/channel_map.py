@@ -12,9 +12,14 @@ from models.measured.signal import Frame, Quantity, Signal
 from models.measured.units import conversion
 
 AXES: dict[Quantity, tuple[str, ...]] = {
-    "force": ("x", "y", "z"), "moment": ("x", "y", "z"), "acceleration": ("x", "y", "z"),
-    "angular rate": ("roll", "pitch", "yaw"), "angle": ("roll", "pitch", "yaw"), "travel": (), "strain": (),
-}  # fmt: skip
+    "force": ("x", "y", "z"),
+    "moment": ("x", "y", "z"),
+    "acceleration": ("x", "y", "z"),
+    "angular rate": ("roll", "pitch", "yaw"),
+    "angle": ("roll", "pitch", "yaw"),
+    "travel": (),
+    "strain": (),
+}
 """Components that a quantity can have; none along a connector, which has its own direction."""
 
 
@@ -24,8 +29,11 @@ def signals(scene: MeasuredScene, sources: Sequence[Source], places: Places) -> 
     What is measured at a connector, and any strain, is only compared with. Raises InputError at the first channel that
     is not in its file, is there or in the map twice, or whose unit, place, component or frame makes no sense.
     """
-    rows = [(f"files, {file.file}, {row.channel!r}", row, source)
-            for file, source in zip(scene.files, sources, strict=True) for row in file.channels]  # fmt: skip
+    rows = [
+        (f"files, {file.file}, {row.channel!r}", row, source)
+        for file, source in zip(scene.files, sources, strict=True)
+        for row in file.channels
+    ]
     names = [row.channel for _, row, _ in rows]
     found = list[Signal]()
     for place, row, source in rows:
@@ -53,8 +61,21 @@ def _signal(file: str, place: str, row: MappedChannel, source: Source, places: P
     if frame not in frames:
         raise InputError(file, f"{place}, frame", frame, f"is no frame of {row.quantity} at {row.at!r}", frames)
     check = row.check or row.quantity == "strain" or row.at in places.connectors
-    return Signal(name, source.path.name, row.channel, row.quantity, row.at, row.component, frame, row.sign, unit,
-                  factor, zero=row.zero, gravity=row.gravity, check=check)  # fmt: skip
+    return Signal(
+        name,
+        source.path.name,
+        row.channel,
+        row.quantity,
+        row.at,
+        row.component,
+        frame,
+        row.sign,
+        unit,
+        factor,
+        zero=row.zero,
+        gravity=row.gravity,
+        check=check,
+    )
 
 
 def find(source: Source, name: str, file: str, place: str) -> Channel:
@@ -67,8 +88,12 @@ def find(source: Source, name: str, file: str, place: str) -> Channel:
     same = re.compile(re.escape(name) + r" \(\d+\)")
     numbered = [channel.name for channel in source.channels if same.fullmatch(channel.name)]
     if numbered:
-        raise InputError(file, place, name, f"is there {len(numbered)} times in {source.path.name}: name one of "
-                         f"{', '.join(map(repr, numbered))}")  # fmt: skip
+        raise InputError(
+            file,
+            place,
+            name,
+            f"is there {len(numbered)} times in {source.path.name}: name one of {', '.join(map(repr, numbered))}",
+        )
     raise InputError(file, place, name, f"no such channel in {source.path.name}{_near(name, source)}")
 
 
@@ -88,15 +113,20 @@ def _check_place(file: str, place: str, row: MappedChannel, places: Places) -> N
     if kinds and not any(row.at in names for names in kinds.values()):
         known = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds.items() if names)
         every = tuple(name for names in kinds.values() for name in names)
-        raise InputError(file, f"{place}, at", row.at, f"the vehicle has no such place for {row.quantity} ({known})"
-                         f"{suggestion(row.at, every)}")  # fmt: skip
+        raise InputError(
+            file,
+            f"{place}, at",
+            row.at,
+            f"the vehicle has no such place for {row.quantity} ({known}){suggestion(row.at, every)}",
+        )
     along = row.at in places.connectors and row.quantity in ("force", "moment")
     axes = () if along else AXES[row.quantity]
     if row.component not in (axes or ("",)):
         own = "has a direction of its own: leave component out"
         allowed = f"must be {', '.join(axes[:-1])} or {axes[-1]}" if axes else own
-        raise InputError(file, f"{place}, component", row.component or None,
-                         f"{allowed} ({row.quantity} at {row.at!r})")  # fmt: skip
+        raise InputError(
+            file, f"{place}, component", row.component or None, f"{allowed} ({row.quantity} at {row.at!r})"
+        )
 
 
 def _check_new(file: str, place: str, signal: Signal, found: list[Signal]) -> None:
@@ -106,13 +136,19 @@ def _check_new(file: str, place: str, signal: Signal, found: list[Signal]) -> No
             raise InputError(file, place, signal.channel, "is mapped twice: each channel is one signal")
         same = (other.quantity, other.at, other.component) == (signal.quantity, signal.at, signal.component)
         if same and not (signal.check or other.check):
-            raise InputError(file, place, signal.channel, f"measures the same as {other.channel!r}: say check = true "
-                             "of one of them")  # fmt: skip
+            raise InputError(
+                file, place, signal.channel, f"measures the same as {other.channel!r}: say check = true of one of them"
+            )
 
 
 def _check_frames(file: str, found: list[Signal], places: Places) -> None:
     own = {signal.frame: signal for signal in found if signal.at in places.hubs and not signal.check}
     if len(own) > 1:
         one, two = list(own.values())[:2]
-        raise InputError(file, "files", None, f"hub forces must all be in one frame: {one.channel!r} is in "
-                         f"{one.frame!r}, {two.channel!r} in {two.frame!r}")  # fmt: skip
+        raise InputError(
+            file,
+            "files",
+            None,
+            f"hub forces must all be in one frame: {one.channel!r} is in "
+            f"{one.frame!r}, {two.channel!r} in {two.frame!r}",
+        )

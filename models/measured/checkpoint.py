@@ -33,8 +33,12 @@ class Checkpoint:
             raise InputError(self.path, "", None, f"is no checkpoint of a run: remove its folder ({error})") from error
         other = [name for name in sorted({*of, *self.of}) if of.get(name) != self.of.get(name)]
         if other:
-            raise InputError(self.path, "", None, f"is of a run with another {' and another '.join(other)}: choose "
-                             "another folder, or remove this one")  # fmt: skip
+            raise InputError(
+                self.path,
+                "",
+                None,
+                f"is of a run with another {' and another '.join(other)}: choose another folder, or remove this one",
+            )
         return arrays
 
     def save(self, **arrays: np.ndarray) -> None:

@@ -79,8 +79,14 @@ class Grid:
         return np.rint((times - self.start) / self.period).astype(np.int64)
 
 
-def record(scene: MeasuredScene, sources: Sequence[Source], signals: Sequence[Signal], hubs: Sequence[str],
-           folder: Path, progress: Progress = lambda text, part: None) -> Recording:  # fmt: skip
+def record(
+    scene: MeasuredScene,
+    sources: Sequence[Source],
+    signals: Sequence[Signal],
+    hubs: Sequence[str],
+    folder: Path,
+    progress: Progress = lambda text, part: None,
+) -> Recording:
     """Bring mapped signals of opened files onto one clock, into columns in ``folder``, and extend them by the effects.
 
     hubs : where forces are put in; these set the clock. What is in the folder from the same files is taken as it is.
@@ -92,8 +98,9 @@ def record(scene: MeasuredScene, sources: Sequence[Source], signals: Sequence[Si
     groups = [each for source, shift, drift in placing for each in _groups(source, signals, shift, drift)]
     leading = [group for group in groups if any(s.at in hubs and not s.check for s in group.signals)]
     if not leading:
-        raise InputError(scene.file, "files", None, "no channel is mapped to a hub: wheel forces are what drives the "
-                         "vehicle")  # fmt: skip
+        raise InputError(
+            scene.file, "files", None, "no channel is mapped to a hub: wheel forces are what drives the vehicle"
+        )
     grid = _grid(scene, leading)
     noticed += [finding for group in groups for finding in (*group.timing.findings, *_outside(scene, group, grid))]
     columns = _columns(folder, scene, signals, sources, grid)
@@ -140,8 +147,14 @@ def _rule(scene: MeasuredScene, groups: list[Group], grid: Grid) -> Finding:
         ways.setdefault(way, []).append(own)
     by = "the scene" if scene.clock.rate else "the wheel forces"
     told = "; ".join(f"{way}: {', '.join(dict.fromkeys(names))}" for way, names in ways.items())
-    return Finding("clock", "note", "recording", f"The clock is that of {by}, {1 / grid.period:.6g} Hz, {grid.count} "
-                   f"samples; {told}.", 1 / grid.period, "Hz")  # fmt: skip
+    return Finding(
+        "clock",
+        "note",
+        "recording",
+        f"The clock is that of {by}, {1 / grid.period:.6g} Hz, {grid.count} samples; {told}.",
+        1 / grid.period,
+        "Hz",
+    )
 
 
 def placed(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float], datetime | None, list[Finding]]:
@@ -179,8 +192,12 @@ def _grid(scene: MeasuredScene, leading: list[Group]) -> Grid:
     fastest = min(leading, key=lambda group: group.timing.period)
     period = 1.0 / own.rate if own.rate else fastest.timing.period
     if period < fastest.timing.period * (1 - SAME):
-        raise InputError(scene.file, "clock.rate", own.rate, "is faster than the wheel forces, "
-                         f"{fastest.timing.rate:g} Hz, which adds nothing")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "clock.rate",
+            own.rate,
+            f"is faster than the wheel forces, {fastest.timing.rate:g} Hz, which adds nothing",
+        )
     first, last = max(g.timing.times[0] for g in leading), min(g.timing.times[-1] for g in leading)
     if first >= last:
         spans = "; ".join(f"{g.source.path.name}: {g.timing.times[0]:.6g} to {g.timing.end:.6g} s" for g in leading)
@@ -192,8 +209,9 @@ def _grid(scene: MeasuredScene, leading: list[Group]) -> Grid:
     if own.duration is not None and start + own.duration > last + period:
         raise InputError(scene.file, "clock.duration", own.duration, f"the wheel forces last {last - start:.6g} s")
     if count < LEAST:
-        raise InputError(scene.file, "clock", None, f"{count} sample(s) of wheel forces are left: at least {LEAST} are "
-                         "needed")  # fmt: skip
+        raise InputError(
+            scene.file, "clock", None, f"{count} sample(s) of wheel forces are left: at least {LEAST} are needed"
+        )
     return Grid(start, period, count)
 
 
@@ -203,18 +221,30 @@ def _outside(scene: MeasuredScene, group: Group, grid: Grid) -> Iterator[Finding
     late, early = group.timing.times[0] - grid.start, end - group.timing.end
     place = f"{group.source.path.name}: {', '.join(group.names[:3])}{', ...' if len(group.names) > 3 else ''}"
     if late >= end - grid.start or early >= end - grid.start:
-        raise InputError(scene.file, "files", None, f"{place} lies wholly outside the wheel forces "
-                         f"({grid.start:.6g} to {end:.6g} s): it runs from {group.timing.times[0]:.6g} to "
-                         f"{group.timing.end:.6g} s; set offset")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "files",
+            None,
+            f"{place} lies wholly outside the wheel forces "
+            f"({grid.start:.6g} to {end:.6g} s): it runs from {group.timing.times[0]:.6g} to "
+            f"{group.timing.end:.6g} s; set offset",
+        )
     missing = max(late, 0.0) + max(early, 0.0)
     if missing > 2 * max(grid.period, group.timing.period):
-        yield Finding("overlap", "doubt", group.source.path.name, f"{place} covers the recording but for "
-                      f"{missing:.4g} s at its ends, where nothing is known of it.", missing, "s",
-                      (group.signals[0].name,))  # fmt: skip
+        yield Finding(
+            "overlap",
+            "doubt",
+            group.source.path.name,
+            f"{place} covers the recording but for {missing:.4g} s at its ends, where nothing is known of it.",
+            missing,
+            "s",
+            (group.signals[0].name,),
+        )
 
 
-def _columns(folder: Path, scene: MeasuredScene, signals: Sequence[Signal], sources: Sequence[Source],
-             grid: Grid) -> Columns:  # fmt: skip
+def _columns(
+    folder: Path, scene: MeasuredScene, signals: Sequence[Signal], sources: Sequence[Source], grid: Grid
+) -> Columns:
     """Columns of this recording, or those begun from the same files; InputError where the folder holds others."""
     files = {source.path.name: [(at := source.path.stat()).st_size, at.st_mtime_ns] for source in sources}
     own = [[s.channel, s.sign, s.factor, s.zero] for s in signals]
@@ -271,8 +301,9 @@ def _resampled(group: Group, grid: Grid, columns: Columns, folder: Path) -> list
     times, order, absurd = grid.times(), group.timing.order, list[Finding]()
     for signal in group.signals:
         values = raw.read(signal.channel)
-        values, finding = without_absurd(signal, values if order is None else values[order],
-                                         group.timing.times - grid.start)  # fmt: skip
+        values, finding = without_absurd(
+            signal, values if order is None else values[order], group.timing.times - grid.start
+        )
         absurd += [finding] if finding else []
         columns.put((signal.name,), 0, onto(group.timing.times, values, group.timing.period, times)[:, None])
     raw.remove()

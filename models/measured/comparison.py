@@ -66,8 +66,9 @@ def _same(own: SectionRun, signal: Signal, answer: Answer) -> bool:
     return signal.frame != "inertial" or signal.quantity == "angle"
 
 
-def overlay(recording: Recording, run: Outcome, signal: Signal, answer: Answer, first: int = 0,
-            count: int | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+def overlay(
+    recording: Recording, run: Outcome, signal: Signal, answer: Answer, first: int = 0, count: int | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times (n,) in s, measured and computed values (n,) at the run's answers ``first`` and following."""
     skip = round(run.period / recording.period)
     computed = run.columns.read(answer.name, first, min(count or run.done, run.done - first))
@@ -75,17 +76,23 @@ def overlay(recording: Recording, run: Outcome, signal: Signal, answer: Answer, 
     return run.period * (first + np.arange(len(computed))), measured, computed
 
 
-def compare(recording: Recording, run: Outcome, signal: Signal, answer: Answer,
-            slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> Compared:  # fmt: skip
+def compare(
+    recording: Recording, run: Outcome, signal: Signal, answer: Answer, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)
+) -> Compared:
     """Compare a channel with its answer over all that was run."""
     _, measured, computed = overlay(recording, run, signal, answer)
     known = np.isfinite(measured)
     error, size = computed - measured, float(np.std(measured[known])) if known.any() else math.nan
     left = float(np.var(error[known])) if known.any() else math.nan
-    return Compared(signal, answer, float(np.mean(error[known])) if known.any() else math.nan,
-                    _bands(measured, error, run.period), 1.0 - left / size**2 if size > 0 else math.nan,
-                    {slope: _ratio(computed[known], measured[known], slope) for slope in slopes},
-                    _trusted(error - np.mean(error[known]), size, run.period))  # fmt: skip
+    return Compared(
+        signal,
+        answer,
+        float(np.mean(error[known])) if known.any() else math.nan,
+        _bands(measured, error, run.period),
+        1.0 - left / size**2 if size > 0 else math.nan,
+        {slope: _ratio(computed[known], measured[known], slope) for slope in slopes},
+        _trusted(error - np.mean(error[known]), size, run.period),
+    )
 
 
 def _ratio(computed: np.ndarray, measured: np.ndarray, slope: float) -> float:

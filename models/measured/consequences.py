@@ -55,8 +55,10 @@ class Consequence:
         """0 harmless, 1 a doubt or not known, 2 beyond what may be accepted."""
         if not self.section:
             return 1
-        return max(sum(abs(value) > bound for bound in bounds) for value, bounds in
-                   ((self.force, FORCE), (self.damage - 1.0, DAMAGE)))  # fmt: skip
+        return max(
+            sum(abs(value) > bound for bound in bounds)
+            for value, bounds in ((self.force, FORCE), (self.damage - 1.0, DAMAGE))
+        )
 
     def __str__(self) -> str:
         """With figures, for an engineer."""
@@ -66,8 +68,9 @@ class Consequence:
         return f"{where}: changes {self.section} by {self.force:.1%} of its rms, its damage is {self.damage:.3g} times"
 
 
-def consequences(findings: Iterable[Finding], recording: Recording, run: Run, answers: Sequence[Answer],
-                 folder: Path) -> tuple[Consequence, ...]:  # fmt: skip
+def consequences(
+    findings: Iterable[Finding], recording: Recording, run: Run, answers: Sequence[Answer], folder: Path
+) -> tuple[Consequence, ...]:
     """One for every doubt; run : makes a run of a recording in a folder; answers : the section forces that count."""
     shutil.rmtree(folder, ignore_errors=True)
     known, out = dict[int, Outcome](), list[Consequence]()
@@ -131,8 +134,11 @@ def _worst(finding: Finding, recorded: Outcome, right: Outcome, answers: Sequenc
     pairs = {a: (recorded.samples(a)[first:], right.samples(a)[first:]) for a in answers}
     size = {a: rms(own - own.mean()) for a, (_, own) in pairs.items()}
     most = {unit: max(size[a] for a in pairs if a.unit == unit) for unit in {a.unit for a in pairs}}
-    every = [Consequence(finding, a.name, rms(one - own) / size[a], damage_ratio(one, own, SLOPE))
-             for a, (one, own) in pairs.items() if size[a] > SMALL * most[a.unit]]  # fmt: skip
+    every = [
+        Consequence(finding, a.name, rms(one - own) / size[a], damage_ratio(one, own, SLOPE))
+        for a, (one, own) in pairs.items()
+        if size[a] > SMALL * most[a.unit]
+    ]
     return max(every, key=lambda one: (one.grade, abs(one.force)), default=Consequence(finding))
 
 
@@ -204,7 +210,15 @@ def _bridged(finding: Finding, signals: Sequence[Signal], samples: Samples, peri
 
 
 CORRECTIONS: dict[str, Callable[[Finding, Sequence[Signal], Samples, float], Samples]] = {
-    "shift": _late, "drift": _drifted, "gain": _gained, "sign": _gained, "unit": _gained, "offset": _offset,
-    "lever": _referred, "spikes": _smooth, "gaps": _bridged, "no value": _bridged,
-}  # fmt: skip
+    "shift": _late,
+    "drift": _drifted,
+    "gain": _gained,
+    "sign": _gained,
+    "unit": _gained,
+    "offset": _offset,
+    "lever": _referred,
+    "spikes": _smooth,
+    "gaps": _bridged,
+    "no value": _bridged,
+}
 """By the name of the check."""

@@ -43,9 +43,16 @@ def count(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> Coun
     least, greatest = float(load.min()), float(load.max())
     levels = np.linspace(least, greatest, LEVELS + 1)
     ranges = np.linspace(0.0, greatest - least, RANGES + 1)[1:]
-    return Counted({slope: summed(spans, counts, slope) for slope in slopes}, levels,
-                   level_crossings(turns, levels), ranges, range_pairs(spans, counts, ranges), least, greatest,
-                   float(load.mean()))  # fmt: skip
+    return Counted(
+        {slope: summed(spans, counts, slope) for slope in slopes},
+        levels,
+        level_crossings(turns, levels),
+        ranges,
+        range_pairs(spans, counts, ranges),
+        least,
+        greatest,
+        float(load.mean()),
+    )
 
 
 def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:

@@ -62,16 +62,18 @@ def check(faults: Faults, signals: Iterable[Signal], file: str = "", place: str 
     named += [(f"{kind}.channels", name) for kind, own in lists.items() if own for name in own.channels]
     for kind, name in named:
         if name not in known:
-            raise InputError(file, f"{place}.{kind}", name, f"no such channel, transducer or quantity"
-                             f"{suggestion(name, known)}")  # fmt: skip
+            raise InputError(
+                file, f"{place}.{kind}", name, f"no such channel, transducer or quantity{suggestion(name, known)}"
+            )
     for kind in ("noise", "delay"):
         for name, value in tables[kind].items():
             if value < 0:
                 raise InputError(file, f"{place}.{kind}.{name}", value, "must be 0 or more")
 
 
-def measured(faults: Faults, signals: tuple[Signal, ...], truth: np.ndarray, step: float, every: int, seed: int,
-             path: int = 0) -> np.ndarray:  # fmt: skip
+def measured(
+    faults: Faults, signals: tuple[Signal, ...], truth: np.ndarray, step: float, every: int, seed: int, path: int = 0
+) -> np.ndarray:
     """Samples (m, signals) of every ``every``-th row of the truth (n, signals), ``step`` (s) apart; NaN: no sample.
 
     seed and path name the noise: the same ones give the same samples, whoever asks.

@@ -7,15 +7,29 @@ from pathlib import Path
 
 from models.errors import InputError
 
-EXTENSIONS = {".csv": "CSV", ".txt": "CSV", ".tsv": "CSV", ".mf4": "ASAM MDF", ".mdf": "ASAM MDF", ".dat": "ASAM MDF",
-              ".rsp": "RPC III", ".rpc": "RPC III", ".drv": "RPC III", ".tim": "RPC III", ".tdms": "TDMS"}  # fmt: skip
+EXTENSIONS = {
+    ".csv": "CSV",
+    ".txt": "CSV",
+    ".tsv": "CSV",
+    ".mf4": "ASAM MDF",
+    ".mdf": "ASAM MDF",
+    ".dat": "ASAM MDF",
+    ".rsp": "RPC III",
+    ".rpc": "RPC III",
+    ".drv": "RPC III",
+    ".tim": "RPC III",
+    ".tdms": "TDMS",
+}
 """Extension of a file that can be read -> its usual format."""
 READABLE = {b"MDF ": "ASAM MDF", b"UnFinMF": "ASAM MDF", b"TDSm": "TDMS", b"FORMAT\0": "RPC III"}
 """First bytes of a file that can be read -> its format; any other text is read as CSV."""
 KNOWN = "CSV, ASAM MDF (.mf4), MTS RPC III (.rsp) and TDMS can be read"
 AS_CSV = "save its channels as CSV with a column time [s]"
-BEGINS = {"ASAM MDF": "ASAM MDF, which begins with MDF", "TDMS": "TDMS, which begins with TDSm",
-          "RPC III": "MTS RPC III (response .rsp, drive .drv, time history .tim), which begins with FORMAT"}
+BEGINS = {
+    "ASAM MDF": "ASAM MDF, which begins with MDF",
+    "TDMS": "TDMS, which begins with TDSm",
+    "RPC III": "MTS RPC III (response .rsp, drive .drv, time history .tim), which begins with FORMAT",
+}
 """Format -> what it is called and how it begins."""
 AGAIN = f"write it anew from the software that has it, or {AS_CSV}"
 DECODE = "decode its messages with their database (.dbc) into MDF 4, with asammdf or the logger's software"
@@ -36,23 +50,51 @@ KINDS = (
     Kind("an Excel or OpenDocument workbook", "save the sheet as CSV UTF-8", rb"(?!)", (".xlsx", ".xlsm", ".ods")),
     Kind("an Excel workbook of 1997 to 2003", "save the sheet as CSV UTF-8", rb"\xd0\xcf\x11\xe0", (".xls",)),
     Kind("text in UTF-32", "save it as UTF-8", rb"\xff\xfe\0\0|\0\0\xfe\xff"),
-    Kind("a MATLAB file", "write its channels as CSV with a column time [s]: writetable in MATLAB, scipy.io.loadmat in "
-         "Python", rb"MATLAB", (".mat",)),
-    Kind("HDF5", "write its channels as CSV with a column time [s], or as MDF 4: h5py in Python opens it", rb"\x89HDF",
-         (".h5", ".hdf5", ".hdf")),
-    Kind("Parquet", "write it as CSV with a column time [s]: pandas.read_parquet(...).to_csv(...) in Python", rb"PAR1",
-         (".parquet",)),
-    Kind("Arrow or Feather", "write it as CSV with a column time [s]: pandas.read_feather(...).to_csv(...) in Python",
-         rb"ARROW1", (".feather", ".arrow")),
+    Kind(
+        "a MATLAB file",
+        "write its channels as CSV with a column time [s]: writetable in MATLAB, scipy.io.loadmat in Python",
+        rb"MATLAB",
+        (".mat",),
+    ),
+    Kind(
+        "HDF5",
+        "write its channels as CSV with a column time [s], or as MDF 4: h5py in Python opens it",
+        rb"\x89HDF",
+        (".h5", ".hdf5", ".hdf"),
+    ),
+    Kind(
+        "Parquet",
+        "write it as CSV with a column time [s]: pandas.read_parquet(...).to_csv(...) in Python",
+        rb"PAR1",
+        (".parquet",),
+    ),
+    Kind(
+        "Arrow or Feather",
+        "write it as CSV with a column time [s]: pandas.read_feather(...).to_csv(...) in Python",
+        rb"ARROW1",
+        (".feather", ".arrow"),
+    ),
     Kind("a trace of bus messages (Vector BLF)", DECODE, rb"LOGG", (".blf",)),
-    Kind("a trace of bus messages (Vector ASC)", DECODE, rb"(?i)(date [^\n]*\n\s*base (hex|dec)|base (hex|dec) )",
-         (".asc",)),
+    Kind(
+        "a trace of bus messages (Vector ASC)",
+        DECODE,
+        rb"(?i)(date [^\n]*\n\s*base (hex|dec)|base (hex|dec) )",
+        (".asc",),
+    ),
     Kind("a trace of bus messages (PEAK)", DECODE, rb";\$FILEVERSION", (".trc",)),
     Kind("a trace of bus messages (candump)", DECODE, rb"\s*\(\d+\.\d+\)\s+\w+\s", ()),
-    Kind("the header of a DIAdem data set, whose samples are in other files", "export the data set as TDMS",
-         rb"(?i)(DIAEXTENDED|DIADEM|#BEGINGLOBALHEADER)", ()),
-    Kind("the header of a DIAdem or ASAM ODS data set, whose samples are in another file", "export the data set as "
-         "TDMS or MDF 4", rb"<\?xml[^>]*>\s*(<!--.*?-->\s*)*<(usi:tdm|atfx)", (".tdm", ".tdx", ".atfx")),
+    Kind(
+        "the header of a DIAdem data set, whose samples are in other files",
+        "export the data set as TDMS",
+        rb"(?i)(DIAEXTENDED|DIADEM|#BEGINGLOBALHEADER)",
+        (),
+    ),
+    Kind(
+        "the header of a DIAdem or ASAM ODS data set, whose samples are in another file",
+        "export the data set as TDMS or MDF 4",
+        rb"<\?xml[^>]*>\s*(<!--.*?-->\s*)*<(usi:tdm|atfx)",
+        (".tdm", ".tdx", ".atfx"),
+    ),
     Kind("the index of a TDMS file", "name the .tdms file beside it, which has the data", rb"TDSh", (".tdms_index",)),
     Kind("a LabVIEW measurement file", f"write TDMS in LabVIEW, or {AS_CSV}", rb"LabVIEW Measurement", (".lvm",)),
     Kind("a universal file of modal analysis", AS_CSV, rb"\s{1,4}-1\s", (".unv", ".uff")),
@@ -74,7 +116,7 @@ KINDS = (
     Kind("a PDF", AS_CSV, rb"%PDF", (".pdf",)),
     Kind("sound", AS_CSV, rb"RIFF....WAVE", (".wav",)),
     Kind("an SQLite database", AS_CSV, rb"SQLite format 3", (".db", ".sqlite")),
-)  # fmt: skip
+)
 """What measurements come as, beside the formats that can be read; the first that fits is the one."""
 WORKBOOK, ARRAYS = KINDS[0], next(kind for kind in KINDS if ".npz" in kind.extensions)
 

@@ -29,8 +29,10 @@ class Finding:
 
 def queries(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """As plain values, for JSON."""
-    return [{"check": f.check, "weight": f.weight, "place": f.place, "text": f.text, "size": f.size, "unit": f.unit}
-            for f in findings]  # fmt: skip
+    return [
+        {"check": f.check, "weight": f.weight, "place": f.place, "text": f.text, "size": f.size, "unit": f.unit}
+        for f in findings
+    ]
 
 
 def lines(findings: Iterable[Finding]) -> list[str]:

@@ -15,23 +15,30 @@ CORNERS = {
     "fr": r"fr|rf|vr|rv|front ?right|right ?front|vorne? ?rechts|rechts ?vorne?",
     "rl": r"rl|lr|hl|lh|rear ?left|left ?rear|hinten ?links|links ?hinten",
     "rr": r"rr|hr|rh|rear ?right|right ?rear|hinten ?rechts|rechts ?hinten",
-}  # fmt: skip
+}
 """Hub of r19_free -> what it is called in names."""
 SPRINGS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 """Hub -> spring of r19_free."""
 WORDS: dict[Quantity, str] = {
-    "force": r"f[xyz]|force|rad(last|kraft)|kraft|load", "moment": r"m[xyz]|moment|torque|drehmoment",
+    "force": r"f[xyz]|force|rad(last|kraft)|kraft|load",
+    "moment": r"m[xyz]|moment|torque|drehmoment",
     "acceleration": r"a[xyz]|acc|accel(eration)?|beschl(eunigung)?",
     "angular rate": r"(roll|pitch|yaw|nick|wank|gier) ?(rate|vel)|(nick|wank|gier)(rate|geschwindigkeit)|gyro|w[xyz]",
     "angle": r"roll|pitch|yaw|heading|nick(winkel)?|wank(winkel)?|gier(winkel)?",
-    "travel": r"travel|federweg|weg|defl(ection)?|disp(lacement)?", "strain": r"strain|dms|sg|eps",
-}  # fmt: skip
-AXES = {"x": r"[fmaw]?x|long(itudinal)?|längs", "y": r"[fmaw]?y|lat(eral)?|quer",
-        "z": r"[fmaw]?z|vert(ical)?|hoch|vertikal"}  # fmt: skip
-PARTS = (r"strut|damper|shock|absorber|spring|coil ?over|feder|d(ä|ae|a)mpf|sto(ß|ss)d|bellow|balg|top ?mount|domlager|"
-         r"bump ?stop|puffer|tie ?rod|track ?rod|push ?rod|pull ?rod|spurstange|druckstrebe|lenker|\barm\b|wishbone|"
-         r"\blink\b|stange|(roll|sway|torsion) ?bar|stabi|bush|buchse|ball ?joint|gelenk|sub ?frame|hilfsrahmen|"
-         r"lagerung|mount\b|\b(shk|spr|dmp|dmpr|damp|arb|coil|mcpherson|leaf)\b")
+    "travel": r"travel|federweg|weg|defl(ection)?|disp(lacement)?",
+    "strain": r"strain|dms|sg|eps",
+}
+AXES = {
+    "x": r"[fmaw]?x|long(itudinal)?|längs",
+    "y": r"[fmaw]?y|lat(eral)?|quer",
+    "z": r"[fmaw]?z|vert(ical)?|hoch|vertikal",
+}
+PARTS = (
+    r"strut|damper|shock|absorber|spring|coil ?over|feder|d(ä|ae|a)mpf|sto(ß|ss)d|bellow|balg|top ?mount|domlager|"
+    r"bump ?stop|puffer|tie ?rod|track ?rod|push ?rod|pull ?rod|spurstange|druckstrebe|lenker|\barm\b|wishbone|"
+    r"\blink\b|stange|(roll|sway|torsion) ?bar|stabi|bush|buchse|ball ?joint|gelenk|sub ?frame|hilfsrahmen|"
+    r"lagerung|mount\b|\b(shk|spr|dmp|dmpr|damp|arb|coil|mcpherson|leaf)\b"
+)
 """Parts of a suspension in names, whose forces are not those of a hub."""
 WHEEL = r"(mess)?rad(last|kraft)?|wheel(force|load)?|wft|rmr|hub|spindle|naben?(kraft)?|tyre|tire|reifen"
 """A wheel in names."""
@@ -70,8 +77,15 @@ def guess(channel: Channel) -> Guess | None:
     doubts = [f"the file names no unit: is it {unit}?"] if unit else []
     part = _part(words, family) if what in ("force", "moment") else ""
     if part:
-        return Guess(channel.name, what, "", "", unit, " ".join(doubts), f"left out: of a part of the suspension "
-                     f"({part}), not of a hub; at a connector it can be compared with")  # fmt: skip
+        return Guess(
+            channel.name,
+            what,
+            "",
+            "",
+            unit,
+            " ".join(doubts),
+            f"left out: of a part of the suspension ({part}), not of a hub; at a connector it can be compared with",
+        )
     strange = _strange(words) if what == "force" and corner and not component else ""
     if what == "force" and corner and not component:
         component = "z"
@@ -115,9 +129,19 @@ def _has(names: str, words: str) -> bool:
 def scene_text(source: Source) -> str:
     """A scene for this file, as TOML, with what was guessed, and as comments what was not."""
     found = {channel.name: guess(channel) for channel in source.channels}
-    lines = [f'title = "{source.path.stem}"', 'system = "measured"', 'study = "recording"', "", "[vehicle]",
-             'file = "r19_free"                # or a file of your own, whose tyres are then the hubs below',
-             'chassis = "body"', "", "[[files]]", f'file = "{source.path.name}"', "channels = ["]  # fmt: skip
+    lines = [
+        f'title = "{source.path.stem}"',
+        'system = "measured"',
+        'study = "recording"',
+        "",
+        "[vehicle]",
+        'file = "r19_free"                # or a file of your own, whose tyres are then the hubs below',
+        'chassis = "body"',
+        "",
+        "[[files]]",
+        f'file = "{source.path.name}"',
+        "channels = [",
+    ]
     lines += [_row(name, own) for name, own in found.items()]
     return "\n".join([*lines, "]", ""])
 
@@ -127,8 +151,13 @@ def _row(name: str, own: Guess | None) -> str:
     if own is None:
         return f"  # {{ channel = {_quoted(name)} }},  # not known"
     free = own.quantity in ("travel", "strain") or bool(own.left_out and not own.at)
-    entries = {"channel": name, "quantity": own.quantity, "at": own.at or "?",
-               "component": own.component or ("" if free else "?"), "unit": own.unit}  # fmt: skip
+    entries = {
+        "channel": name,
+        "quantity": own.quantity,
+        "at": own.at or "?",
+        "component": own.component or ("" if free else "?"),
+        "unit": own.unit,
+    }
     text = ", ".join(f"{key} = {_quoted(value)}" for key, value in entries.items() if value)
     told = " ".join(word for word in (own.doubt, own.left_out) if word)
     unsure = own.left_out or "?" in entries.values()

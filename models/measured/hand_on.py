@@ -15,8 +15,14 @@ from models.measured.sections import Answer
 NAME = "section_forces"
 
 
-def hand_on(run: Outcome, folder: Path, formats: Iterable[str], answers: Sequence[Answer] | None = None,
-            start: datetime | None = None, comment: str = "") -> list[Path]:  # fmt: skip
+def hand_on(
+    run: Outcome,
+    folder: Path,
+    formats: Iterable[str],
+    answers: Sequence[Answer] | None = None,
+    start: datetime | None = None,
+    comment: str = "",
+) -> list[Path]:
     """Write forces and moments of a run, or the answers named, as ``section_forces.EXT`` for every extension.
 
     Names, units and comments (axes and signs) go along, block by block. Returns the paths; raises InputError where a
@@ -33,8 +39,14 @@ def forces(answers: Iterable[Answer]) -> tuple[Answer, ...]:
 
 def group(run: Outcome, answers: Sequence[Answer]) -> Group:
     """Answers of a run as channels of one clock."""
-    return Group(tuple(answer.name for answer in answers), tuple(answer.unit for answer in answers),
-                 tuple(answer.comment for answer in answers), run.period, run.done, _blocks(run, answers))  # fmt: skip
+    return Group(
+        tuple(answer.name for answer in answers),
+        tuple(answer.unit for answer in answers),
+        tuple(answer.comment for answer in answers),
+        run.period,
+        run.done,
+        _blocks(run, answers),
+    )
 
 
 def _blocks(run: Outcome, answers: Sequence[Answer]) -> Iterator[np.ndarray]:

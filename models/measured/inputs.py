@@ -27,7 +27,11 @@ BRIDGED = 0.1
 """s: the longest gap that is bridged."""
 COMPONENTS: tuple[tuple[Quantity, str], ...] = tuple((q, axis) for q in ("force", "moment") for axis in "xyz")
 ANGLES: tuple[tuple[Quantity, str], ...] = (
-    ("angle", "roll"), ("angle", "pitch"), ("angular rate", "roll"), ("angular rate", "pitch"))  # fmt: skip
+    ("angle", "roll"),
+    ("angle", "pitch"),
+    ("angular rate", "roll"),
+    ("angular rate", "pitch"),
+)
 WINDOW, OVERLAP = 4096, 96
 """Answers in a stretch whose spline is made at once, and samples beside it: what is farther has weights below 1e-30."""
 
@@ -61,8 +65,12 @@ class Grid:
         """InputError unless step and period are multiples of one another."""
         ratio = max(self.step / self.period, self.period / self.step)
         if abs(ratio - round(ratio)) > 1e-9 * ratio:
-            raise InputError(file, "run.step", self.step, f"must be a part or a multiple of the recording's period of "
-                             f"{self.period:g} s")  # fmt: skip
+            raise InputError(
+                file,
+                "run.step",
+                self.step,
+                f"must be a part or a multiple of the recording's period of {self.period:g} s",
+            )
 
     def rows(self, samples: np.ndarray, count: int) -> np.ndarray:
         """Rows at half steps 0 .. count - 1 after the first of ``samples`` (n, columns), on straight lines."""
@@ -72,8 +80,12 @@ class Grid:
         """Rows at half steps 0 .. count - 1 after the second of ``samples`` (n, columns), by the cubic through the two
         samples before and the two after each."""
         at, u = self._places(count)
-        weights = (-u * (u - 1) * (u - 2) / 6, (u + 1) * (u - 1) * (u - 2) / 2, -(u + 1) * u * (u - 2) / 2,
-                   (u + 1) * u * (u - 1) / 6)  # fmt: skip
+        weights = (
+            -u * (u - 1) * (u - 2) / 6,
+            (u + 1) * (u - 1) * (u - 2) / 2,
+            -(u + 1) * u * (u - 2) / 2,
+            (u + 1) * u * (u - 1) / 6,
+        )
         return np.asarray(sum(weight[:, None] * samples[at + i] for i, weight in enumerate(weights)))
 
     def _places(self, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -102,8 +114,11 @@ class Inputs:
         self.angles = [_found(used, *what, vehicle.chassis) for what in ANGLES]
         self.yaw = _found(used, "angular rate", "yaw", vehicle.chassis)
         self._check()
-        self._gaps = {signal: self._gaps_of(signal) for signal in [*self.hubs, *(self.angles[:2] if enforced else [])]
-                      if signal is not None}  # fmt: skip
+        self._gaps = {
+            signal: self._gaps_of(signal)
+            for signal in [*self.hubs, *(self.angles[:2] if enforced else [])]
+            if signal is not None
+        }
 
     @property
     def frame(self) -> str:
@@ -134,8 +149,9 @@ class Inputs:
             roll, pitch = np.nan_to_num(found[:, :2]).T
             p, q, r = np.nan_to_num(found[:, 2]), np.nan_to_num(found[:, 3]), np.nan_to_num(yaw)
             known = np.isfinite(found[:, 2:])
-            rates = np.column_stack([p + (q * np.sin(roll) + r * np.cos(roll)) * np.tan(pitch),
-                                     q * np.cos(roll) - r * np.sin(roll)])  # fmt: skip
+            rates = np.column_stack(
+                [p + (q * np.sin(roll) + r * np.cos(roll)) * np.tan(pitch), q * np.cos(roll) - r * np.sin(roll)]
+            )
             found[:, 2:] = np.where(known, rates, np.nan)
         return found
 
@@ -154,15 +170,26 @@ class Inputs:
             own = self.hubs[WRENCH * i : WRENCH * i + WRENCH]
             if own[2] is None:
                 raise InputError("", "files.channels", None, f"no vertical force is put in at the hub {hub!r}")
-            without = [axis for signal, axis in zip(own, ("Fx", "Fy", "Fz", "Mx", "My", "Mz"), strict=True)
-                       if signal is None]  # fmt: skip
+            without = [
+                axis for signal, axis in zip(own, ("Fx", "Fy", "Fz", "Mx", "My", "Mz"), strict=True) if signal is None
+            ]
             if without:
-                self.findings.append(Finding("components", "doubt", hub, f"{', '.join(without)} of the hub {hub} were "
-                                             "not measured and are taken as 0."))  # fmt: skip
+                self.findings.append(
+                    Finding(
+                        "components",
+                        "doubt",
+                        hub,
+                        f"{', '.join(without)} of the hub {hub} were not measured and are taken as 0.",
+                    )
+                )
         frames = {signal.frame for signal in self.hubs if signal is not None}
         if len(frames) > 1 or not frames <= set(FRAMES):
-            raise InputError("", "files.channels", None, f"hub forces must all be in one frame of {', '.join(FRAMES)}: "
-                             f"these are in {', '.join(sorted(frames))}")  # fmt: skip
+            raise InputError(
+                "",
+                "files.channels",
+                None,
+                f"hub forces must all be in one frame of {', '.join(FRAMES)}: these are in {', '.join(sorted(frames))}",
+            )
 
     def _gaps_of(self, signal: Signal) -> tuple[Bridge, ...]:
         """Gaps of a signal; InputError where one is too long to be bridged."""
@@ -170,16 +197,30 @@ class Inputs:
         if not found:
             return ()
         for gap in (gap for gap in found if np.isnan(gap.doubt)):
-            raise InputError(signal.file, signal.channel, None, f"is silent from {gap.first * period:.6g} s to "
-                             f"{gap.end * period:.6g} s: gaps of at most {BRIDGED:g} s are bridged; take a stretch "
-                             "without this one (clock.start, clock.duration)")  # fmt: skip
+            raise InputError(
+                signal.file,
+                signal.channel,
+                None,
+                f"is silent from {gap.first * period:.6g} s to "
+                f"{gap.end * period:.6g} s: gaps of at most {BRIDGED:g} s are bridged; take a stretch "
+                "without this one (clock.start, clock.duration)",
+            )
         longest = max(gap.end - gap.first for gap in found) * period
         worst = max(found, key=lambda gap: gap.doubt)
-        self.findings.append(Finding(
-            "gaps", "doubt", signal.name, f"{signal.name} is silent {len(found)} times, for at most {longest:.3g} s: "
-            f"bridged by what the channel itself makes most likely, with a standard deviation of {worst.doubt:.3g} "
-            f"{UNITS[signal.quantity]} at {worst.first * period:.6g} s, the largest.", longest, "s", (signal.name,),
-            (found[0].first * period, found[-1].end * period)))  # fmt: skip
+        self.findings.append(
+            Finding(
+                "gaps",
+                "doubt",
+                signal.name,
+                f"{signal.name} is silent {len(found)} times, for at most {longest:.3g} s: "
+                f"bridged by what the channel itself makes most likely, with a standard deviation of {worst.doubt:.3g} "
+                f"{UNITS[signal.quantity]} at {worst.first * period:.6g} s, the largest.",
+                longest,
+                "s",
+                (signal.name,),
+                (found[0].first * period, found[-1].end * period),
+            )
+        )
         return tuple(Bridge(gap.first, values[gap.first : gap.end]) for gap in found)
 
 

@@ -24,8 +24,11 @@ def describe(path: Path) -> str:
     lines = [f"{path.name}: {len(source.channels)} channels{began}"]
     lines += [f"  {line}" for line in source.comment.splitlines()[:10]]
     width = max([len(channel.name) for channel in source.channels], default=0)
-    lines += [f"  {'channel':<{width}} {'unit':<9}{'rate':>10} {'samples':>10} {'from':>9} {'to':>9} {'least':>11} "
-              f"{'most':>11}", f"  {'':<{width}} {'':<9}{'[Hz]':>10} {'':>10} {'[s]':>9} {'[s]':>9}"]  # fmt: skip
+    lines += [
+        f"  {'channel':<{width}} {'unit':<9}{'rate':>10} {'samples':>10} {'from':>9} {'to':>9} {'least':>11} "
+        f"{'most':>11}",
+        f"  {'':<{width}} {'':<9}{'[Hz]':>10} {'':>10} {'[s]':>9} {'[s]':>9}",
+    ]
     ranges = {name: text for group in _groups(source) for name, text in _ranges(source, group).items()}
     lines += [f"  {c.name:<{width}} {c.unit:<9}{ranges[c.name]}" for c in source.channels]
     lines += [f"  {finding.weight}: {finding.text}" for finding in source.noticed]
@@ -47,8 +50,10 @@ def _ranges(source: Source, names: list[str]) -> dict[str, str]:
     if not blocks:
         return dict.fromkeys(names, f"{'':>10} {0:>10}")
     rate = _rate(np.concatenate([np.diff(block.times) for block in blocks]))
-    low, high = (fun([fun(block.values, axis=0, initial=start, where=np.isfinite(block.values)) for block in blocks],
-                     axis=0) for fun, start in ((np.min, np.inf), (np.max, -np.inf)))  # fmt: skip
+    low, high = (
+        fun([fun(block.values, axis=0, initial=start, where=np.isfinite(block.values)) for block in blocks], axis=0)
+        for fun, start in ((np.min, np.inf), (np.max, -np.inf))
+    )
     head = f"{rate:>10} {count:>10} {blocks[0].times[0]:>9.6g} {blocks[-1].times[-1]:>9.6g}"
     return {name: f"{head} {a:>11.5g} {b:>11.5g}" for name, a, b in zip(names, low, high, strict=True)}
 

@@ -11,8 +11,15 @@ from models.measured.gaps import gaps
 from models.measured.signal import Quantity, Signal
 
 NAME = "no value"
-LIMITS: dict[Quantity, float] = {"force": 1e6, "moment": 1e6, "acceleration": 1e4, "angular rate": 1e3, "angle": 100.0,
-                                 "travel": 100.0, "strain": 1.0}  # fmt: skip
+LIMITS: dict[Quantity, float] = {
+    "force": 1e6,
+    "moment": 1e6,
+    "acceleration": 1e4,
+    "angular rate": 1e3,
+    "angle": 100.0,
+    "travel": 100.0,
+    "strain": 1.0,
+}
 """SI: ten times and more what the transducers of a vehicle measure (a force of 100 t, 1000 g)."""
 FAR = 1000.0
 """Times the departure from the median that half of all samples do not exceed. A wrong unit makes all samples large
@@ -44,8 +51,18 @@ def _finding(signal: Signal, values: np.ndarray, times: np.ndarray, absurd: np.n
     first, end = runs[0][0], runs[-1][1] - 1
     count, written = int(absurd.sum()), values[first] / (signal.sign * signal.factor) + signal.zero
     many = f"{count} samples in {len(runs)} stretch(es) are" if count > 1 else "a sample is"
-    text = (f"{signal.file}, {signal.channel}: {many} no {signal.quantity}: {written:.4g} {signal.unit}".rstrip()
-            + f" at {times[first]:.6g} s is an exporter's mark for no value, or a spike of the telemetry. Such samples "
-            "are taken as not measured.")  # fmt: skip
-    return Finding(NAME, "doubt", signal.name, text, float(count), "samples", (signal.name,),
-                   (float(times[first]), float(times[end])))  # fmt: skip
+    text = (
+        f"{signal.file}, {signal.channel}: {many} no {signal.quantity}: {written:.4g} {signal.unit}".rstrip()
+        + f" at {times[first]:.6g} s is an exporter's mark for no value, or a spike of the telemetry. Such samples "
+        "are taken as not measured."
+    )
+    return Finding(
+        NAME,
+        "doubt",
+        signal.name,
+        text,
+        float(count),
+        "samples",
+        (signal.name,),
+        (float(times[first]), float(times[end])),
+    )

@@ -26,8 +26,14 @@ def write_pattern(scene: MeasuredScene, found: VirtualMeasurement, samples: np.n
     factors = np.array([signal.factor for signal in found.signals])
     blocks = (samples[i : i + BLOCK] / factors for i in range(0, len(samples), BLOCK))
     comments = tuple(f"{s.quantity} {s.component} at {s.at}, axes {s.frame}" for s in found.signals)
-    group = Group(tuple(s.channel for s in found.signals), tuple(s.unit for s in found.signals), comments,
-                  found.period, len(samples), blocks)  # fmt: skip
+    group = Group(
+        tuple(s.channel for s in found.signals),
+        tuple(s.unit for s in found.signals),
+        comments,
+        found.period,
+        len(samples),
+        blocks,
+    )
     file = write(folder / f"measured.{scene.virtual.format}", [group], BEGAN, f"{COMMENT}: {scene.title}")
     path = folder / "scene.toml"
     write_whole(path, _text(scene, found, file.name))

@@ -37,8 +37,10 @@ from models.time_series import write_time_series
 CHASSIS = "chassis"
 STEP = 1e-3
 """s, the longest step: the fastest pole of the published vehicle needs one below 2.8 ms."""
-UNSEEN = ("free, with forces that turn with the vehicle and no measured pitch: an offset, or forces of another frame, "
-          "would drive it off unseen")  # fmt: skip
+UNSEEN = (
+    "free, with forces that turn with the vehicle and no measured pitch: an offset, or forces of another frame, "
+    "would drive it off unseen"
+)
 EFFECTS = {"kalman": "kalman_filter", "prescribed": "prescribed_pitch"}
 SPRINGS = {"f3": "front spring", "f4": "rear spring"}
 
@@ -80,8 +82,9 @@ def run(job: PlaneJob, folder: Path, limits: Limits | None = None) -> PlaneRun:
     until = limited.until[1] if limited and limited.until else result.times[-1]
     effects = [job.effect] if job.effect else []
     # whether the filter's innovations are as large as stated is not asked: deviations of a recording are estimates
-    verdict = score.blind_verdict(own, effects, result.times[-1], limits or Limits(), until,
-                                  uncertainty=score.uncertainty(result))  # fmt: skip
+    verdict = score.blind_verdict(
+        own, effects, result.times[-1], limits or Limits(), until, uncertainty=score.uncertainty(result)
+    )
     if job.effect is None and verdict.word == "accepted":
         verdict = _beside_pitch(job, result, limits or Limits(), verdict)
     return PlaneRun(result, limited, verdict, _outcome(result, said, folder))
@@ -103,8 +106,11 @@ def _beside_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdic
     off = float(np.abs(score.low_pass(result["pitch"] + beside, float(result.times[1]))).max())
     if off <= limits.pitch_error:
         return verdict
-    return Verdict("stabilise", f"free, and its pitch is up to {off:.2g} rad off the measured one "
-                   f"(at most {limits.pitch_error:g}): check the frame of the forces and their offsets")  # fmt: skip
+    return Verdict(
+        "stabilise",
+        f"free, and its pitch is up to {off:.2g} rad off the measured one "
+        f"(at most {limits.pitch_error:g}): check the frame of the forces and their offsets",
+    )
 
 
 def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
@@ -114,17 +120,34 @@ def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
     write_time_series(folder / "wheel_forces.csv", forces, period)
     frames = {signal.frame for axle in AXLES for signal in axle_signals(job.recording, axle)}
     if len(frames & {"inertial"}) != len(frames) and "inertial" in frames:
-        raise InputError(job.file, "files.channels", None, "vertical forces must all keep their direction in space, or "
-                         "all turn with the vehicle")  # fmt: skip
+        raise InputError(
+            job.file,
+            "files.channels",
+            None,
+            "vertical forces must all keep their direction in space, or all turn with the vehicle",
+        )
     fixed = frames == {"inertial"} or job.hold.method == "prescribed"  # an enforced pitch does not feel the frame
-    effects: dict[str, Any] = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "smooth",
-                                                "frame": "inertial" if fixed else "body",
-                                                "accept": list(axle_forces.CHECKS)}}  # fmt: skip
+    effects: dict[str, Any] = {
+        "wheel_forces": {
+            "file": "wheel_forces.csv",
+            "interpolation": "smooth",
+            "frame": "inertial" if fixed else "body",
+            "accept": list(axle_forces.CHECKS),
+        }
+    }
     if job.effect:
         effects[job.effect] = _held(job, folder, said)
     step = job.step or period / math.ceil(period / STEP * (1 - 1e-9))
-    scene = build({"title": "recording", "vehicle": {"parameters": job.parameters}, "effects": effects,
-                   "run": {"duration": job.recording.duration, "step": step}}, job.file, folder)  # fmt: skip
+    scene = build(
+        {
+            "title": "recording",
+            "vehicle": {"parameters": job.parameters},
+            "effects": effects,
+            "run": {"duration": job.recording.duration, "step": step},
+        },
+        job.file,
+        folder,
+    )
     _check_axles(job, scene)
     return scene, tuple(said)
 
@@ -143,8 +166,12 @@ def trusted(scene: Scene, deviation: float) -> Trust | None:
 def _axle(job: PlaneJob, axle: str, said: list[Finding]) -> np.ndarray:
     signals = axle_signals(job.recording, axle)
     if len(signals) != (1 if signals and signals[0].at == axle else 2):
-        raise InputError(job.file, "files.channels", None, f"the vertical force is needed at {AXLES[axle][0]!r}, or at "
-                         f"both {AXLES[axle][1]!r} and {AXLES[axle][2]!r}")  # fmt: skip
+        raise InputError(
+            job.file,
+            "files.channels",
+            None,
+            f"the vertical force is needed at {AXLES[axle][0]!r}, or at both {AXLES[axle][1]!r} and {AXLES[axle][2]!r}",
+        )
     return np.asarray(sum(_whole(job, signal, said) for signal in signals))
 
 
@@ -152,20 +179,35 @@ def _whole(job: PlaneJob, signal: Signal, said: list[Finding]) -> np.ndarray:
     """Samples of a signal, short gaps bridged; InputError for a long one."""
     values, gaps = filled(job.recording.samples(signal), period := job.recording.period, BRIDGED)
     if not np.isfinite(values).all():
-        raise InputError(signal.file, signal.channel, None, f"has a gap of more than {BRIDGED:g} s: take a stretch "
-                         "without it (clock.start, clock.duration)")  # fmt: skip
+        raise InputError(
+            signal.file,
+            signal.channel,
+            None,
+            f"has a gap of more than {BRIDGED:g} s: take a stretch without it (clock.start, clock.duration)",
+        )
     if gaps:
         longest = max(gap.end - gap.first for gap in gaps) * period
-        said.append(Finding("gaps", "doubt", signal.name, f"{signal.name} is silent {len(gaps)} times, for at most "
-                            f"{longest:.3g} s: bridged.", longest, "s", (signal.name,)))  # fmt: skip
+        said.append(
+            Finding(
+                "gaps",
+                "doubt",
+                signal.name,
+                f"{signal.name} is silent {len(gaps)} times, for at most {longest:.3g} s: bridged.",
+                longest,
+                "s",
+                (signal.name,),
+            )
+        )
     return values
 
 
 def _held(job: PlaneJob, folder: Path, said: list[Finding]) -> dict[str, Any]:
     """The effect's table, and its file of pitch and rate, nose up."""
     hold, columns, deviations = job.hold, dict[str, tuple[str, np.ndarray]](), dict[str, float]()
-    known = (("angle", "pitch", "rad", "pitch_deviation", hold.angle),
-             ("angular rate", "pitch_rate", "rad/s", "rate_deviation", hold.rate))  # fmt: skip
+    known = (
+        ("angle", "pitch", "rad", "pitch_deviation", hold.angle),
+        ("angular rate", "pitch_rate", "rad/s", "rate_deviation", hold.rate),
+    )
     for quantity, name, unit, key, deviation in known:
         found = [s for s in job.recording.find(quantity, CHASSIS, "pitch") if not s.check]
         if found and (job.hold.method == "kalman" or quantity == "angle"):
@@ -191,12 +233,23 @@ def _check_axles(job: PlaneJob, scene: Scene) -> None:
 def _outcome(result: Result, said: tuple[Finding, ...], folder: Path) -> Outcome:
     """Body-frame section forces and pitch as answers, x forward, z up, nose down positive as in every recording."""
     forces = section_forces(result["f3"], result["f4"], result["pitch"])
-    found = {Answer(f"{spring} F{axis}", "N", f"on the {CHASSIS} in its axes, {'forward' if axis == 'x' else 'upward'} "
-                    "positive", spring, "force", spring, axis): forces[f"{name}{axis}"]
-             for name, spring in SPRINGS.items() for axis in "xz"}  # fmt: skip
+    found = {
+        Answer(
+            f"{spring} F{axis}",
+            "N",
+            f"on the {CHASSIS} in its axes, {'forward' if axis == 'x' else 'upward'} positive",
+            spring,
+            "force",
+            spring,
+            axis,
+        ): forces[f"{name}{axis}"]
+        for name, spring in SPRINGS.items()
+        for axis in "xz"
+    }
     found[Answer(f"{CHASSIS} pitch", "rad", "nose down positive", "", "angle", CHASSIS, "pitch")] = -result["pitch"]
-    found[Answer(f"{CHASSIS} pitch rate", "rad/s", "nose down positive", "", "angular rate", CHASSIS,
-                 "pitch")] = -result["pitch_rate"]  # fmt: skip
+    found[
+        Answer(f"{CHASSIS} pitch rate", "rad/s", "nose down positive", "", "angular rate", CHASSIS, "pitch")
+    ] = -result["pitch_rate"]
     columns = Columns(folder / "run.f64", tuple(answer.name for answer in found), len(result.times))
     columns.write(0, np.column_stack(list(found.values())))
     surprise = result["kalman_surprise"][-1] / result["kalman_used"][-1] if "kalman_used" in result.data else math.nan

@@ -46,16 +46,22 @@ def mapped(scene: MeasuredScene, sources: Sequence[Source], rig: Rig) -> tuple[S
     wanted += [("angular rate", axis) for axis in rig.angles] if scene.stabilise.method == "kalman" else []
     for quantity, axis in wanted:
         if (quantity, rig.chassis, axis) not in driving:
-            raise InputError(scene.file, "stabilise.method", scene.stabilise.method, f"needs the {quantity} "
-                             f"{axis!r} of {rig.chassis!r}, which no channel is mapped to: map it, or say 'none'")
+            raise InputError(
+                scene.file,
+                "stabilise.method",
+                scene.stabilise.method,
+                f"needs the {quantity} "
+                f"{axis!r} of {rig.chassis!r}, which no channel is mapped to: map it, or say 'none'",
+            )
     return found
 
 
 def _check_names(scene: MeasuredScene, rig: Rig) -> None:
     for name, sensor in scene.sensors.items():
         if sensor.body not in rig.places.bodies:
-            raise InputError(scene.file, f"sensors.{name}.body", sensor.body, "the vehicle has no such body",
-                             rig.places.bodies)  # fmt: skip
+            raise InputError(
+                scene.file, f"sensors.{name}.body", sensor.body, "the vehicle has no such body", rig.places.bodies
+            )
     for name in (name for name in scene.levers if name not in rig.hubs):
         raise InputError(scene.file, "levers", name, "the vehicle has no such hub", rig.hubs)
     for name in scene.hand_on.sections or ():
@@ -77,25 +83,36 @@ def describe(scene: MeasuredScene) -> str:
     rig = scene.rig()
     _check_names(scene, rig)
     size = f"{rig.vehicle.size} freedoms, cut at {', '.join(rig.hubs)}" if rig.vehicle else "the pitch plane"
-    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"),
-             _line("vehicle", f"{rig.name}: {size}")]
+    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"), _line("vehicle", f"{rig.name}: {size}")]
     lines += _virtual(scene) if scene.virtual is not None else _files(scene, rig)
     own = scene.stabilise
-    how = {"kalman": f"Kalman filter of roll and pitch, a moment towards it of {own.bandwidth:g} Hz",
-           "prescribed": f"measured roll and pitch enforced, smoothed at {own.smoothing:g} Hz",
-           "none": "nothing"}  # fmt: skip
-    lines += [_line("runs", f"free, and held by: {how[own.method]}; {scene.run.engine}"),
-              _line("hand on", f"{', '.join(scene.hand_on.sections or ['every section'])}; as "
-                               f"{', '.join(scene.hand_on.formats)}; damage of slopes "
-                               f"{', '.join(f'{slope:g}' for slope in scene.hand_on.slopes)}")]  # fmt: skip
+    how = {
+        "kalman": f"Kalman filter of roll and pitch, a moment towards it of {own.bandwidth:g} Hz",
+        "prescribed": f"measured roll and pitch enforced, smoothed at {own.smoothing:g} Hz",
+        "none": "nothing",
+    }
+    lines += [
+        _line("runs", f"free, and held by: {how[own.method]}; {scene.run.engine}"),
+        _line(
+            "hand on",
+            f"{', '.join(scene.hand_on.sections or ['every section'])}; as "
+            f"{', '.join(scene.hand_on.formats)}; damage of slopes "
+            f"{', '.join(f'{slope:g}' for slope in scene.hand_on.slopes)}",
+        ),
+    ]
     return "\n".join([*lines, *effect_lines(scene)])
 
 
 def _virtual(scene: MeasuredScene) -> list[str]:
     own = scene.virtual
     assert own is not None
-    return [_line("measured", f"virtually: {own.duration:g} s on ISO 8608 class {own.road.iso8608} at "
-                              f"{own.road.speed:g} m/s, {own.sampling_rate:g} Hz, as {own.format} and back")]
+    return [
+        _line(
+            "measured",
+            f"virtually: {own.duration:g} s on ISO 8608 class {own.road.iso8608} at "
+            f"{own.road.speed:g} m/s, {own.sampling_rate:g} Hz, as {own.format} and back",
+        )
+    ]
 
 
 def _files(scene: MeasuredScene, rig: Rig) -> list[str]:
@@ -108,8 +125,9 @@ def _files(scene: MeasuredScene, rig: Rig) -> list[str]:
         for s in (s for s in found if s.file == source.path.name):
             what = f"{s.quantity} {s.component}".strip()
             sign, use = "-" if s.sign < 0 else "", ", only compared with" if s.check else ""
-            lines.append(_line("", f"{s.channel:<24} {what} at {s.at}, axes {s.frame}, {sign}{s.factor:g} x "
-                                   f"[{s.unit}]{use}"))  # fmt: skip
+            lines.append(
+                _line("", f"{s.channel:<24} {what} at {s.at}, axes {s.frame}, {sign}{s.factor:g} x [{s.unit}]{use}")
+            )
         lines += [_line(f.weight, f.text) for f in source.noticed]
     return lines
 

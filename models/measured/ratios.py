@@ -35,15 +35,19 @@ def wrong(ratio: float, signal: Signal) -> tuple[Wrong, str]:
     if abs(ratio - 1) <= GAIN:
         return "gain", ""
     own = NAMES[signal.quantity]
-    far = {(own[taken] != signal.factor, abs(np.log(ratio * own[true] / own[taken]))): f"{true} taken for {taken}"
-           for true in own for taken in own
-           if true != taken and {1.0, signal.factor} & {own[true], own[taken]}}  # fmt: skip
+    far = {
+        (own[taken] != signal.factor, abs(np.log(ratio * own[true] / own[taken]))): f"{true} taken for {taken}"
+        for true in own
+        for taken in own
+        if true != taken and {1.0, signal.factor} & {own[true], own[taken]}
+    }
     near = [pair for pair in far if pair[1] <= NEAR]
     return ("unit", far[min(near)]) if near else ("size", "")
 
 
-def sentence(ratio: float, signal: Signal, against: str,
-             remedies: Mapping[Wrong, str] | None = None) -> tuple[Wrong, str]:  # fmt: skip
+def sentence(
+    ratio: float, signal: Signal, against: str, remedies: Mapping[Wrong, str] | None = None
+) -> tuple[Wrong, str]:
     """What is wrong, and a complete sentence; ``against`` says what the true value was taken from.
 
     remedies : what to do about each, None for those of a channel map.
@@ -52,20 +56,27 @@ def sentence(ratio: float, signal: Signal, against: str,
     reads = f"{signal.name} reads {ratio:.4g} times {against}"
     own = f"{signal.name} reads {abs(ratio - 1):.2%} too {'much' if ratio > 1 else 'little'} against {against}"
     texts: dict[Wrong, str] = {
-        "sign": f"{reads}: its sign is wrong", "unit": f"{reads}, as {unit} does", "gain": own,
+        "sign": f"{reads}: its sign is wrong",
+        "unit": f"{reads}, as {unit} does",
+        "gain": own,
         "size": f"{reads}, which no usual unit explains",
-    }  # fmt: skip
+    }
     between = "; " if kind == "sign" else ": "
     return kind, f"{texts[kind]}{between}{(remedies or _in_map(signal))[kind]}."
 
 
 def _in_map(signal: Signal) -> dict[Wrong, str]:
     """Remedies of a channel map."""
-    return {"sign": f"give sign = {-signal.sign} in the channel map", "unit": "correct its unit in the channel map",
-            "gain": "check its calibration factor", "size": "check its calibration factor and the vehicle file"}
+    return {
+        "sign": f"give sign = {-signal.sign} in the channel map",
+        "unit": "correct its unit in the channel map",
+        "gain": "check its calibration factor",
+        "size": "check its calibration factor and the vehicle file",
+    }
 
 
 def counted_from_load(name: str, mean: float, load: float) -> str:
     """A sentence on a vertical force whose mean (N) is nothing beside the static load (N)."""
-    return (f"{name} reads {mean:.4g} N on average, less than it varies: it counts from the static load; add "
-            f"{load:.5g} N.")  # fmt: skip
+    return (
+        f"{name} reads {mean:.4g} N on average, less than it varies: it counts from the static load; add {load:.5g} N."
+    )

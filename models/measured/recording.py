@@ -40,8 +40,9 @@ class Recording:
 
     def find(self, quantity: str, at: str = "", component: str = "") -> tuple[Signal, ...]:
         """Signals of a quantity, of one place or component if named, in the order of the map."""
-        return tuple(s for s in self.signals if s.quantity == quantity and at in ("", s.at)
-                     and component in ("", s.component))  # fmt: skip
+        return tuple(
+            s for s in self.signals if s.quantity == quantity and at in ("", s.at) and component in ("", s.component)
+        )
 
     def samples(self, signal: Signal) -> np.ndarray:
         """All samples (count,) of one signal, SI; NaN where nothing was measured."""

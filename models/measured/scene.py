@@ -112,8 +112,11 @@ class MeasuredScene(SceneFile):
     vehicle: Vehicle
     files: list[MeasuredFile] = Field(default=[], description="what was measured")
     virtual: VirtualTable | None = Field(default=None, description="a virtual measurement in place of files")
-    levers: dict[str, float] = Field(default={}, description="hub -> m by which the point that its moments are about "
-                                                             "lies above it; of the contact patch minus the radius")
+    levers: dict[str, float] = Field(
+        default={},
+        description="hub -> m by which the point that its moments are about "
+        "lies above it; of the contact patch minus the radius",
+    )
     sensors: dict[str, Sensor] = Field(default={}, description="where accelerometers sit")
     clock: Clock = Clock()
     noise: Deviations = Deviations()
@@ -129,8 +132,9 @@ class MeasuredScene(SceneFile):
         if own.file is None:
             assert own.parameters is not None
             return in_plane(own.parameters)
-        return in_space(cut(load_vehicle(own.file, self.folder, self.file, "vehicle.file"), own.chassis),
-                        tuple(self.sensors))  # fmt: skip
+        return in_space(
+            cut(load_vehicle(own.file, self.folder, self.file, "vehicle.file"), own.chassis), tuple(self.sensors)
+        )
 
     def plane(self) -> Parameters | None:
         """Parameters of the pitch-plane vehicle that is driven; None of a vehicle in space; raises InputError."""
@@ -154,8 +158,12 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Me
 def _check_vehicle(scene: MeasuredScene) -> None:
     own = scene.vehicle
     if (own.file is None) == (own.parameters is None):
-        raise InputError(scene.file, "vehicle", None, "name either file, of a vehicle in space, or parameters, of the "
-                         "pitch-plane vehicle")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "vehicle",
+            None,
+            "name either file, of a vehicle in space, or parameters, of the pitch-plane vehicle",
+        )
     if own.parameters is not None and "chassis" in own.model_fields_set:
         raise InputError(scene.file, "vehicle.chassis", own.chassis, "belongs to a vehicle file: drop it")
     if own.parameters is not None and scene.virtual is not None:

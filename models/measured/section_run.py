@@ -104,12 +104,20 @@ def check(own: SectionRun) -> None:
         raise InputError(own.file, "files", None, f"the recording has {own.recording.count} samples: nothing to run")
     check_step(own.engine, own.vehicle, own.grid.step, own.grid.step * own.grid.every)
     if own.hold.method == "kalman" and own.hold.bandwidth * own.grid.step > STIFF:
-        raise InputError(own.file, "stabilise.bandwidth", own.hold.bandwidth, f"must be at most {STIFF:g} of the rate "
-                         f"of the run's steps, {STIFF / own.grid.step:g} Hz")  # fmt: skip
+        raise InputError(
+            own.file,
+            "stabilise.bandwidth",
+            own.hold.bandwidth,
+            f"must be at most {STIFF:g} of the rate of the run's steps, {STIFF / own.grid.step:g} Hz",
+        )
     used = [signal for signal in own.recording.signals if not signal.check and signal.at == own.vehicle.chassis]
     if own.hold.method != "none" and not any(signal.quantity in ("angle", "angular rate") for signal in used):
-        raise InputError(own.file, "stabilise.method", own.hold.method, "needs roll and pitch or their rates at the "
-                         f"body {own.vehicle.chassis!r}; 'none' runs without")  # fmt: skip
+        raise InputError(
+            own.file,
+            "stabilise.method",
+            own.hold.method,
+            f"needs roll and pitch or their rates at the body {own.vehicle.chassis!r}; 'none' runs without",
+        )
 
 
 def run(own: SectionRun, folder: Path, progress: Progress = lambda done, of: None, block: float = BLOCK) -> Outcome:
@@ -153,9 +161,15 @@ class _March:
     def outcome(self) -> Outcome:
         """What there is until now."""
         grid = self.own.grid
-        return Outcome(self.columns, self.own.sections.answers, grid.period * grid.skip, self.done,
-                       self.filter.surprise if self.filter else math.nan, tuple(self.inputs.findings),
-                       self.filter.doubts() if self.filter else ())  # fmt: skip
+        return Outcome(
+            self.columns,
+            self.own.sections.answers,
+            grid.period * grid.skip,
+            self.done,
+            self.filter.surprise if self.filter else math.nan,
+            tuple(self.inputs.findings),
+            self.filter.doubts() if self.filter else (),
+        )
 
     def advance(self) -> None:
         """March a block and save it; RunFailed with the outcome until then."""
@@ -187,8 +201,11 @@ class _March:
         if not bad.any() and len(states) == steps + 1:
             return states, None
         good = int(np.argmax(bad)) if bad.any() else len(states)
-        reason = (f"the vehicle topples: roll or pitch beyond {UPRIGHT} rad" if good < len(states) and toppled[good]
-                  else "the state became infinite or not a number")  # fmt: skip
+        reason = (
+            f"the vehicle topples: roll or pitch beyond {UPRIGHT} rad"
+            if good < len(states) and toppled[good]
+            else "the state became infinite or not a number"
+        )
         states = states[: max(good, 1)]
         at = began + (len(states) - 1) * self.own.grid.step
         return states, RunFailed(self.own.engine, reason, at, states[-1])
@@ -236,8 +253,15 @@ class _March:
 
         own, hold = self.own, self.own.hold
         deviations = np.tile(np.repeat([hold.force, hold.moment], 3), len(own.vehicle.hubs))
-        return TiltFilter(own.vehicle, self.inputs.frame, own.recording.period, deviations, (hold.angle, hold.rate),
-                          hold.model, own.file)  # fmt: skip
+        return TiltFilter(
+            own.vehicle,
+            self.inputs.frame,
+            own.recording.period,
+            deviations,
+            (hold.angle, hold.rate),
+            hold.model,
+            own.file,
+        )
 
     def _save(self) -> None:
         known = vars(self.filter.state) if self.filter else {}
@@ -251,8 +275,11 @@ def _inputs_of(own: SectionRun, inputs: Inputs) -> dict[str, str]:
     idle = np.zeros((1, 6 * len(inputs.hubs)))
     vehicle = digest(table(own.vehicle, Drive(idle), own.grid.step), own.vehicle.tree.coordinates())
     return {
-        "vehicle": vehicle, "recording": digest_of(own.recording, inputs.used), "stabiliser": repr(own.hold),
-        "engine": f"{own.engine} {version(library)}", "step": repr(own.grid.step),
+        "vehicle": vehicle,
+        "recording": digest_of(own.recording, inputs.used),
+        "stabiliser": repr(own.hold),
+        "engine": f"{own.engine} {version(library)}",
+        "step": repr(own.grid.step),
         "list of sections": digest(own.sections.answers, own.sections.frame),
         "version": f"{version('twinrig')} {sources}",
-    }  # fmt: skip
+    }

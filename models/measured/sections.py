@@ -21,15 +21,24 @@ from models.measured.checks.place import Place
 from models.measured.signal import Quantity, Signal
 
 AXES: tuple[tuple[str, Quantity, str, str], ...] = (
-    ("Fx", "force", "x", "N"), ("Fy", "force", "y", "N"), ("Fz", "force", "z", "N"),
-    ("Mx", "moment", "x", "N m"), ("My", "moment", "y", "N m"), ("Mz", "moment", "z", "N m"),
-)  # fmt: skip
+    ("Fx", "force", "x", "N"),
+    ("Fy", "force", "y", "N"),
+    ("Fz", "force", "z", "N"),
+    ("Mx", "moment", "x", "N m"),
+    ("My", "moment", "y", "N m"),
+    ("Mz", "moment", "z", "N m"),
+)
 MOTION: tuple[tuple[str, Quantity | None, str, str], ...] = (
-    ("x", None, "", "m"), ("y", None, "", "m"), ("z", None, "", "m"), ("heading", "angle", "yaw", "rad"),
-    ("pitch", "angle", "pitch", "rad"), ("roll", "angle", "roll", "rad"),
-    ("roll rate", "angular rate", "roll", "rad/s"), ("pitch rate", "angular rate", "pitch", "rad/s"),
+    ("x", None, "", "m"),
+    ("y", None, "", "m"),
+    ("z", None, "", "m"),
+    ("heading", "angle", "yaw", "rad"),
+    ("pitch", "angle", "pitch", "rad"),
+    ("roll", "angle", "roll", "rad"),
+    ("roll rate", "angular rate", "roll", "rad/s"),
+    ("pitch rate", "angular rate", "pitch", "rad/s"),
     ("yaw rate", "angular rate", "yaw", "rad/s"),
-)  # fmt: skip
+)
 """Of the chassis: position and angles in the space, rates about its own axes."""
 
 
@@ -96,8 +105,13 @@ class Sections:
     def read(self, numbers: np.ndarray, states: np.ndarray, every: int) -> np.ndarray:
         """Answers (n, answers) of states (n, 2 c), ``every`` half steps apart; ``numbers`` as in ``HubModel``."""
         guides, carried, points = self._guides
-        count = (2 * len(self.vehicle.elements) + CHASSIS_ROW + MOMENTS + POINT * len(points)
-                 + WRENCH * (len(guides) + len(self.vehicle.hubs)))  # fmt: skip
+        count = (
+            2 * len(self.vehicle.elements)
+            + CHASSIS_ROW
+            + MOMENTS
+            + POINT * len(points)
+            + WRENCH * (len(guides) + len(self.vehicle.hubs))
+        )
         out = np.empty((len(states), count))
         felt(numbers, float(every), np.ascontiguousarray(states), guides, carried, points, self.frame == "hub", out)
         return out[:, self.columns]
@@ -119,26 +133,66 @@ def _answers(vehicle: CutVehicle, frame: str, points: tuple[Point, ...]) -> list
     found = list[Answer]()
     for e in vehicle.elements:
         bar, sign = e.unit != "N", "along its own axis, compression positive"
-        found.append(Answer(f"{e.name} {'M' if bar else 'F'}", e.unit, "moment, left end pushed up positive" if bar else
-                            sign, e.name, "moment" if bar else "force", e.name))  # fmt: skip
+        found.append(
+            Answer(
+                f"{e.name} {'M' if bar else 'F'}",
+                e.unit,
+                "moment, left end pushed up positive" if bar else sign,
+                e.name,
+                "moment" if bar else "force",
+                e.name,
+            )
+        )
     for e in vehicle.elements:
         bar = e.unit != "N"
-        found.append(Answer(f"{e.name} travel", "rad" if bar else "m", "from the design position, compression positive",
-                            e.name, "travel", e.name))  # fmt: skip
-    found += [Answer(f"{vehicle.chassis} {name}", unit, "of the chassis, x forward, y left, z up", "", what,
-                     vehicle.chassis if what else "", axis) for name, what, axis, unit in MOTION]  # fmt: skip
-    found += [Answer(f"stabiliser {name}", "N m", "artificial moment on the chassis", component=name)
-              for name in ("roll", "pitch")]  # fmt: skip
+        found.append(
+            Answer(
+                f"{e.name} travel",
+                "rad" if bar else "m",
+                "from the design position, compression positive",
+                e.name,
+                "travel",
+                e.name,
+            )
+        )
+    found += [
+        Answer(
+            f"{vehicle.chassis} {name}",
+            unit,
+            "of the chassis, x forward, y left, z up",
+            "",
+            what,
+            vehicle.chassis if what else "",
+            axis,
+        )
+        for name, what, axis, unit in MOTION
+    ]
+    found += [
+        Answer(f"stabiliser {name}", "N m", "artificial moment on the chassis", component=name)
+        for name in ("roll", "pitch")
+    ]
     free = len(found) * [False]
     for name in guided(vehicle):
         axes = "chassis" if frame == "body" else name
-        found += [Answer(f"{name} guide {axis}", unit, f"on {name} from what carries it, axes of {axes}",
-                         f"{name} guide") for axis, _, _, unit in AXES]  # fmt: skip
+        found += [
+            Answer(f"{name} guide {axis}", unit, f"on {name} from what carries it, axes of {axes}", f"{name} guide")
+            for axis, _, _, unit in AXES
+        ]
         free += [_slides(vehicle, name, frame, axis) for axis, *_ in AXES]
     for hub, tyre in zip(vehicle.hubs, vehicle.whole.tyres, strict=True):
         axes = "chassis" if frame == "body" else tyre.body
-        found += [Answer(f"{hub} hub {axis}", unit, f"on the hub from outside, axes of {axes}", f"{hub} hub", what, hub,
-                         component) for axis, what, component, unit in AXES]  # fmt: skip
+        found += [
+            Answer(
+                f"{hub} hub {axis}",
+                unit,
+                f"on the hub from outside, axes of {axes}",
+                f"{hub} hub",
+                what,
+                hub,
+                component,
+            )
+            for axis, what, component, unit in AXES
+        ]
     for p in points:
         text = f"{'with' if p.gravity else 'without'} gravity, axes of {p.body}"
         found += [Answer(f"{p.name} a{axis}", "m/s^2", text, "", "acceleration", p.name, axis) for axis in "xyz"]

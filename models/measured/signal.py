@@ -5,9 +5,14 @@ from typing import Literal
 
 Quantity = Literal["force", "moment", "acceleration", "angular rate", "angle", "travel", "strain"]
 UNITS: dict[Quantity, str] = {
-    "force": "N", "moment": "N m", "acceleration": "m/s^2", "angular rate": "rad/s", "angle": "rad", "travel": "m",
+    "force": "N",
+    "moment": "N m",
+    "acceleration": "m/s^2",
+    "angular rate": "rad/s",
+    "angle": "rad",
+    "travel": "m",
     "strain": "-",
-}  # fmt: skip
+}
 """The SI unit of each quantity: that of every recording."""
 Frame = Literal["hub", "body", "inertial", "sensor"]
 

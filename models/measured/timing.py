@@ -60,8 +60,10 @@ def timing(times: np.ndarray, place: str, signals: tuple[str, ...] = ()) -> Timi
     wrong = _no_times(times)
     if wrong.any():
         kept, first = timing(times[~wrong], place, signals), int(np.argmax(wrong))
-        text = (f"{place}: {np.count_nonzero(wrong)} samples have no time, the first is number {first + 1} with "
-                f"{times[first]:.4g} s; they are left out.")  # fmt: skip
+        text = (
+            f"{place}: {np.count_nonzero(wrong)} samples have no time, the first is number {first + 1} with "
+            f"{times[first]:.4g} s; they are left out."
+        )
         order = np.flatnonzero(~wrong) if kept.order is None else np.flatnonzero(~wrong)[kept.order]
         absurd = Finding("time", "doubt", place, text, float(np.count_nonzero(wrong)), "samples", signals)
         return replace(kept, order=order, findings=(absurd, *kept.findings))
@@ -94,21 +96,40 @@ def _of_times(times: np.ndarray, place: str, signals: tuple[str, ...]) -> Timing
     even = rounded(times)
     if even is not None:
         same = whole - 1 - len(rising)
-        say("time", "note", f"the times are rounded{f', so that {same} of {whole} repeat themselves' if same else ''}: "
+        say(
+            "time",
+            "note",
+            f"the times are rounded{f', so that {same} of {whole} repeat themselves' if same else ''}: "
             f"an even clock of {1 / even[1]:.9g} Hz explains them all, and is taken with all {whole} samples",
-            float(same), "samples", (times[0], times[-1]))  # fmt: skip
+            float(same),
+            "samples",
+            (times[0], times[-1]),
+        )
         return Timing(even[0] + even[1] * np.arange(whole), None, even[1], tuple(findings))
     period = float(f"{np.median(rising):.9g}")
     if (steps < 0).any():
         deepest, at = -float(steps.min()), int(np.argmax(steps < -SHUFFLED * period))
         if deepest > SHUFFLED * period:
             keep = keep[: at + 1]
-            say("time", "error", f"the clock goes back by {deepest:.6g} s at {times[at]:.6g} s: there are two "
-                "measurements in the file, which must be taken apart; what follows is left out", deepest, "s",
-                (times[at + 1], times[at]))  # fmt: skip
+            say(
+                "time",
+                "error",
+                f"the clock goes back by {deepest:.6g} s at {times[at]:.6g} s: there are two "
+                "measurements in the file, which must be taken apart; what follows is left out",
+                deepest,
+                "s",
+                (times[at + 1], times[at]),
+            )
         else:
-            say("time", "doubt", f"{np.count_nonzero(steps < 0)} times are earlier than the one before them, by up to "
-                f"{deepest:.3g} s; the samples are put in order", deepest, "s", times[[at, at + 1]])
+            say(
+                "time",
+                "doubt",
+                f"{np.count_nonzero(steps < 0)} times are earlier than the one before them, by up to "
+                f"{deepest:.3g} s; the samples are put in order",
+                deepest,
+                "s",
+                times[[at, at + 1]],
+            )
         keep = keep[np.argsort(times[keep], kind="stable")]
         order = keep
     again = np.diff(times[keep]) == 0
@@ -116,8 +137,15 @@ def _of_times(times: np.ndarray, place: str, signals: tuple[str, ...]) -> Timing
         first, count = float(times[keep][1:][again][0]), int(np.count_nonzero(again))
         text = f"{count} of {len(keep)} times are there more than once, the first at {first:.6g} s; "
         if count > SEVERAL * len(keep):
-            say("time", "error", f"{text}no even clock explains them, and without these samples the forces are others: "
-                "export the times with more digits, or mend them", float(count), "samples", (first, first))
+            say(
+                "time",
+                "error",
+                f"{text}no even clock explains them, and without these samples the forces are others: "
+                "export the times with more digits, or mend them",
+                float(count),
+                "samples",
+                (first, first),
+            )
         else:
             say("time", "doubt", f"{text}of each the first sample is taken", float(count), "samples", (first, first))
         keep = keep[np.concatenate(([True], ~again))]
@@ -169,9 +197,15 @@ def _gaps(times: np.ndarray, period: float, say: Say) -> None:
     if len(wide):
         longest = wide[np.argmax(steps[wide])]
         lost = float(np.sum(steps[wide] - period))
-        say("clock gaps", "note", f"{len(wide)} gap(s) in its clock, {lost:.4g} s in all, the longest from "
+        say(
+            "clock gaps",
+            "note",
+            f"{len(wide)} gap(s) in its clock, {lost:.4g} s in all, the longest from "
             f"{times[longest]:.6g} to {times[longest + 1]:.6g} s ({steps[longest]:.4g} s); nothing was measured there",
-            float(steps[longest]), "s", times[[longest, longest + 1]])  # fmt: skip
+            float(steps[longest]),
+            "s",
+            times[[longest, longest + 1]],
+        )
 
 
 def _jitter(times: np.ndarray, period: float, say: Say) -> None:
@@ -180,6 +214,12 @@ def _jitter(times: np.ndarray, period: float, say: Say) -> None:
     spread = float(own.std())
     if spread > EVEN * period:
         weight: Weight = "doubt" if spread > JITTER * period else "note"
-        say("jitter", weight, f"the clock jitters: its steps of {1e3 * period:.6g} ms have a standard deviation of "
+        say(
+            "jitter",
+            weight,
+            f"the clock jitters: its steps of {1e3 * period:.6g} ms have a standard deviation of "
             f"{1e3 * spread:.3g} ms ({spread / period:.1%}); the times of the file are believed",
-            spread, "s", times[[0, -1]])  # fmt: skip
+            spread,
+            "s",
+            times[[0, -1]],
+        )

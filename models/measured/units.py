@@ -8,22 +8,46 @@ from models.errors import InputError, suggestion
 from models.measured.signal import UNITS, Quantity
 
 SPELT = {
-    "Grad": "degree", "Grad/s": "degree/s", "deg.": "degree", "deg./s": "degree/s", "U/min": "rpm", "rev/min": "rpm",
-    "kp": "kgf", "Newton": "N", "newton": "N", "-": "", "strain": "", "ustrain": "microstrain",
-}  # fmt: skip
+    "Grad": "degree",
+    "Grad/s": "degree/s",
+    "deg.": "degree",
+    "deg./s": "degree/s",
+    "U/min": "rpm",
+    "rev/min": "rpm",
+    "kp": "kgf",
+    "Newton": "N",
+    "newton": "N",
+    "-": "",
+    "strain": "",
+    "ustrain": "microstrain",
+}
 """Whole spellings that pint does not know or takes for something else: Grad is German for degree, to pint 1e9 rad."""
 AMBIGUOUS = ("grad",)
 """Degrees to some, gon to others."""
 GRAVITY = ("g", "G", "gn", "g_n")
 """In a unit of acceleration; to pint a gram."""
-TURNS = {"radian", "milliradian", "microradian", "degree", "millidegree", "turn", "revolutions_per_minute", "grade",
-         "arcminute", "arcsecond"}  # fmt: skip
+TURNS = {
+    "radian",
+    "milliradian",
+    "microradian",
+    "degree",
+    "millidegree",
+    "turn",
+    "revolutions_per_minute",
+    "grade",
+    "arcminute",
+    "arcsecond",
+}
 """One of these must be in a unit of an angle: to pint turns, percent and pure numbers are one kind."""
 EXAMPLES: dict[Quantity, tuple[str, ...]] = {
-    "force": ("N", "kN", "lbf"), "moment": ("N m", "kN m", "lbf ft"), "acceleration": ("m/s^2", "g", "mm/s^2"),
-    "angular rate": ("rad/s", "deg/s", "rpm"), "angle": ("rad", "mrad", "deg"), "travel": ("m", "mm", "in"),
+    "force": ("N", "kN", "lbf"),
+    "moment": ("N m", "kN m", "lbf ft"),
+    "acceleration": ("m/s^2", "g", "mm/s^2"),
+    "angular rate": ("rad/s", "deg/s", "rpm"),
+    "angle": ("rad", "mrad", "deg"),
+    "travel": ("m", "mm", "in"),
     "strain": ("m/m", "um/m", "microstrain", "%"),
-}  # fmt: skip
+}
 
 
 def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float:
@@ -35,8 +59,13 @@ def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float
     if found is None:
         raise InputError(file, place, unit, f"no such unit is known: write {_like(quantity)}{_meant(unit, quantity)}")
     if not found.is_compatible_with(_si(quantity)):
-        raise InputError(file, place, unit, f"{_kind(found)}, and the channel is mapped as {quantity}: write "
-                         f"{_like(quantity)}, or map it as what it is{_meant(unit, quantity)}")  # fmt: skip
+        raise InputError(
+            file,
+            place,
+            unit,
+            f"{_kind(found)}, and the channel is mapped as {quantity}: write "
+            f"{_like(quantity)}, or map it as what it is{_meant(unit, quantity)}",
+        )
     turned = bool(TURNS & set(re.split(r"[^a-z_]+", str(found))))
     if turned != (quantity in ("angle", "angular rate")):
         what = "is a unit of angle" if turned else "does not say whether of a turn, a degree or a radian"

@@ -30,16 +30,28 @@ DISAGREES = 0.15
 wrong by 5 % and a delay of 2 ms at 10 Hz together stay below it."""
 LOUD = 1 / 3
 """Part of a check channel that may be noise."""
-WORDS = {"I pitch''": "what turns the chassis", "the measured pitch": "measured roll and pitch",
-         "pitch wrong": "roll or pitch wrong", "pitch known": "roll or pitch known", "pitch of": "roll or pitch of"}
+WORDS = {
+    "I pitch''": "what turns the chassis",
+    "the measured pitch": "measured roll and pitch",
+    "pitch wrong": "roll or pitch wrong",
+    "pitch known": "roll or pitch known",
+    "pitch of": "roll or pitch of",
+}
 """What ``score`` says of the pitch plane, and what it means here."""
 EFFECTS = {"kalman": {"kalman_filter"}, "prescribed": {"prescribed_pitch"}, "none": set[str]()}
 """Methods of holding a run, by the names that ``score`` has for them."""
 
 
-def judge(run: Outcome, vehicle: CutVehicle, hold: Hold, sampled: float, limits: Limits = LIMITS,
-          trusted: float | None = None, compared: Sequence[Compared] = (),
-          noise: Mapping[str, float] | None = None) -> Verdict:  # fmt: skip
+def judge(
+    run: Outcome,
+    vehicle: CutVehicle,
+    hold: Hold,
+    sampled: float,
+    limits: Limits = LIMITS,
+    trusted: float | None = None,
+    compared: Sequence[Compared] = (),
+    noise: Mapping[str, float] | None = None,
+) -> Verdict:
     """The verdict of an engineer, who has no true run.
 
     sampled : s, sampling period of the recording. trusted : s, predicted for a free run (``trust``), None if not known.
@@ -47,8 +59,14 @@ def judge(run: Outcome, vehicle: CutVehicle, hold: Hold, sampled: float, limits:
     """
     shares = {own.signal.name: disagreement(own, (noise or {}).get(own.signal.name, 0.0)) for own in compared}
     off = {name: share for name, share in shares.items() if not share <= DISAGREES}
-    found = score.blind_verdict(own_figures(run, vehicle), EFFECTS[hold.method], run.period * (run.done - 1), limits,
-                                trusted, uncertainty=uncertainty(vehicle, hold, sampled))  # fmt: skip
+    found = score.blind_verdict(
+        own_figures(run, vehicle),
+        EFFECTS[hold.method],
+        run.period * (run.done - 1),
+        limits,
+        trusted,
+        uncertainty=uncertainty(vehicle, hold, sampled),
+    )
     if not off:
         return _in_space(found)
     told = ", ".join(f"{name} by {share:.0%}" for name, share in off.items())
@@ -59,14 +77,17 @@ def surprised(run: Outcome) -> tuple[Finding, ...]:
     """Doubts where the filter that held a run was surprised by its measurements, or calls them biased."""
     if not run.surprise > SURPRISED:
         return tuple(Finding("filter", "doubt", "recording", f"{text[0].upper()}{text[1:]}.") for text in run.doubts)
-    text = (f"The filter's innovations squared are {run.surprise:.3g} times what the noise of forces and angles "
-            "allows: a channel is off by a little (gain, offset, delay, a spike, a held value, a load that is not in "
-            "the vehicle file), and forces along the vehicle, which small angles make, may be wrong by much.")
+    text = (
+        f"The filter's innovations squared are {run.surprise:.3g} times what the noise of forces and angles "
+        "allows: a channel is off by a little (gain, offset, delay, a spike, a held value, a load that is not in "
+        "the vehicle file), and forces along the vehicle, which small angles make, may be wrong by much."
+    )
     return (Finding("filter", "doubt", "recording", text, run.surprise, "1"),)
 
 
-def judge_beside_truth(run: Outcome, true: VirtualMeasurement, hold: Hold, limits: Limits = LIMITS,
-                       slope: float = SLOPE) -> Verdict:  # fmt: skip
+def judge_beside_truth(
+    run: Outcome, true: VirtualMeasurement, hold: Hold, limits: Limits = LIMITS, slope: float = SLOPE
+) -> Verdict:
     """The verdict on a run of a virtual measurement, beside the true one."""
     found = errors(run, true, slope)
     return _in_space(score.verdict(own_figures(run, true.vehicle), found, EFFECTS[hold.method], limits))
@@ -83,8 +104,10 @@ def _in_space(found: Verdict) -> Verdict:
 def own_figures(run: Outcome, vehicle: CutVehicle) -> Own:
     """Figures of a run by itself, of roll or pitch, whichever is worse; cost is not among them (0)."""
     inertia, chassis = np.diag(rigid(vehicle).inertia), vehicle.chassis
-    axes = [_axis(_named(run, f"stabiliser {name}"), _named(run, f"{chassis} {name} rate"), inertia[i], run.period)
-            for i, name in enumerate(("roll", "pitch"))]  # fmt: skip
+    axes = [
+        _axis(_named(run, f"stabiliser {name}"), _named(run, f"{chassis} {name} rate"), inertia[i], run.period)
+        for i, name in enumerate(("roll", "pitch"))
+    ]
     worse = max(axes, key=lambda own: own.moment_share_band)
     tilt = max(float(np.abs(_named(run, f"{chassis} {name}")).max()) for name in ("roll", "pitch"))
     return replace(worse, pitch_max=tilt)
@@ -94,9 +117,17 @@ def _axis(moment: np.ndarray, rate: np.ndarray, inertia: float, period: float) -
     """Artificial moment (n,), N m, beside the inertia times what the rate (n,), rad/s, changes by."""
     moment, turning = 0.5 * (moment[1:] + moment[:-1]), inertia * np.diff(rate) / period
     held, whole = low_pass(moment, period), low_pass(turning, period)
-    return Own(moment_rms=rms(moment), moment_max=float(np.abs(moment).max()), moment_share=_share(moment, turning),
-               moment_share_band=_share(held, whole), force_share_band=0.0, pitch_max=0.0, seconds=0.0, force_calls=0,
-               steps=0)  # fmt: skip
+    return Own(
+        moment_rms=rms(moment),
+        moment_max=float(np.abs(moment).max()),
+        moment_share=_share(moment, turning),
+        moment_share_band=_share(held, whole),
+        force_share_band=0.0,
+        pitch_max=0.0,
+        seconds=0.0,
+        force_calls=0,
+        steps=0,
+    )
 
 
 def _share(part: np.ndarray, whole: np.ndarray) -> float:
@@ -117,8 +148,11 @@ def uncertainty(vehicle: CutVehicle, hold: Hold, period: float) -> float:
         return 2.0 * hold.angle * math.sqrt(min(2.0 * hold.smoothing * period, 1.0))
     corner = 2.0 * math.pi * hold.bandwidth
     pushed = np.diag(rigid(vehicle).turning(np.tile(np.repeat([hold.force, hold.moment], 3), len(vehicle.hubs))))[:2]
-    each = (hold.angle**2 * corner / (4 * DAMPING) + hold.rate**2 * DAMPING / corner
-            + float(pushed.max()) / (4 * DAMPING * corner**3))  # fmt: skip
+    each = (
+        hold.angle**2 * corner / (4 * DAMPING)
+        + hold.rate**2 * DAMPING / corner
+        + float(pushed.max()) / (4 * DAMPING * corner**3)
+    )
     return 2.0 * math.sqrt(period * each)
 
 
@@ -131,8 +165,10 @@ def errors(run: Outcome, true: VirtualMeasurement, slope: float = SLOPE) -> Erro
         found = _named(run, f"{element.name} {'M' if element.unit != 'N' else 'F'}")
         damage[element.name] = damage_ratio(found, loads[:, i], slope)
         force[element.name] = rms(found - loads[:, i])
-    off = {name: _named(run, f"{true.vehicle.chassis} {name}") - states[:, i]
-           for name, i in (("roll", ROLL), ("pitch", PITCH), ("z", Z))}  # fmt: skip
+    off = {
+        name: _named(run, f"{true.vehicle.chassis} {name}") - states[:, i]
+        for name, i in (("roll", ROLL), ("pitch", PITCH), ("z", Z))
+    }
     tilt = np.maximum(np.abs(off["roll"]), np.abs(off["pitch"]))
     return Errors(damage, force, {}, float(tilt.max()), rms(tilt), float(np.abs(off["z"]).max()))
 

@@ -25,14 +25,23 @@ from models.steps import divides, fitting
 from models.strict import Strict, quantity
 
 FILE_UNITS: dict[Quantity, tuple[str, float]] = {
-    "force": ("kN", 1e3), "moment": ("N*m", 1.0), "acceleration": ("m/s^2", 1.0),
-    "angular rate": ("deg/s", np.pi / 180), "angle": ("deg", np.pi / 180), "travel": ("mm", 1e-3), "strain": ("-", 1.0),
-}  # fmt: skip
+    "force": ("kN", 1e3),
+    "moment": ("N*m", 1.0),
+    "acceleration": ("m/s^2", 1.0),
+    "angular rate": ("deg/s", np.pi / 180),
+    "angle": ("deg", np.pi / 180),
+    "travel": ("mm", 1e-3),
+    "strain": ("-", 1.0),
+}
 """Unit of each quantity in the files that are written, and its factor: those of a test track, not SI throughout."""
 HUB: tuple[tuple[str, Quantity, str], ...] = (
-    ("fx", "force", "x"), ("fy", "force", "y"), ("fz", "force", "z"),
-    ("mx", "moment", "x"), ("my", "moment", "y"), ("mz", "moment", "z"),
-)  # fmt: skip
+    ("fx", "force", "x"),
+    ("fy", "force", "y"),
+    ("fz", "force", "z"),
+    ("mx", "moment", "x"),
+    ("my", "moment", "y"),
+    ("mz", "moment", "z"),
+)
 """Channels of a hub, after its name and an underscore: quantity and component."""
 
 
@@ -48,7 +57,8 @@ class VirtualTable(Strict):
     sampling_rate: float = quantity("Hz", "of every channel", default=1000.0)
     frame: Frame = Field(default="hub", description="axes of the hub forces")
     accelerometers: dict[str, Place] = Field(
-        default={}, description="tri-axial ones on the chassis: name and place x, y, z in the vehicle's design axes, m")
+        default={}, description="tri-axial ones on the chassis: name and place x, y, z in the vehicle's design axes, m"
+    )
     travels: list[str] = Field(default=[], description="springs, mounts or bars whose travel is a check channel")
     sections: list[str] = Field(default=[], description="springs, mounts or bars whose force is a check channel")
     faults: Faults = Field(default=Faults(), description="what the transducers add to the truth")
@@ -100,11 +110,20 @@ def check(vehicle: CutVehicle, own: VirtualTable, file: str = "") -> tuple[Signa
     """Signals of all channels; InputError for steps that do not fit one another, and for names that nothing has."""
     period = 1.0 / own.sampling_rate
     if not divides(own.step, own.duration):
-        raise InputError(file, "virtual.step", own.step, f"must divide virtual.duration = {own.duration:g} s, as "
-                         f"{fitting(own.step, own.duration)} s does")  # fmt: skip
+        raise InputError(
+            file,
+            "virtual.step",
+            own.step,
+            f"must divide virtual.duration = {own.duration:g} s, as {fitting(own.step, own.duration)} s does",
+        )
     if not (divides(own.step, period) and divides(period, own.duration)):
-        raise InputError(file, "virtual.sampling_rate", own.sampling_rate, "its period must be a multiple of "
-                         f"virtual.step = {own.step:g} s and divide virtual.duration = {own.duration:g} s")
+        raise InputError(
+            file,
+            "virtual.sampling_rate",
+            own.sampling_rate,
+            "its period must be a multiple of "
+            f"virtual.step = {own.step:g} s and divide virtual.duration = {own.duration:g} s",
+        )
     known = tuple(element.name for element in vehicle.elements)
     for place, names in (("travels", own.travels), ("sections", own.sections)):
         for name in (name for name in names if name not in known):
@@ -125,10 +144,13 @@ def _signals(vehicle: CutVehicle, own: VirtualTable) -> tuple[Signal, ...]:
     found = [_signal(f"{hub}_{name}", what, hub, axis, own.frame) for hub in vehicle.hubs for name, what, axis in HUB]
     found += [_signal(name, "angle", body, name, "inertial") for name in ("roll", "pitch")]
     found += [_signal(f"{name}_rate", "angular rate", body, name, "body") for name in ("roll", "pitch", "yaw")]
-    found += [_signal(f"{name}_a{axis}", "acceleration", name, axis, "body") for name in own.accelerometers
-              for axis in "xyz"]  # fmt: skip
-    found += [_signal(f"{name}_force", "force" if elements[name].unit == "N" else "moment", name, "", "body", True)
-              for name in own.sections]  # fmt: skip
+    found += [
+        _signal(f"{name}_a{axis}", "acceleration", name, axis, "body") for name in own.accelerometers for axis in "xyz"
+    ]
+    found += [
+        _signal(f"{name}_force", "force" if elements[name].unit == "N" else "moment", name, "", "body", True)
+        for name in own.sections
+    ]
     return (*found, *(_signal(f"{name}_travel", "travel", name, "", "body", True) for name in own.travels))
 
 
@@ -153,9 +175,13 @@ def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
     """Rates (n, 3) about the chassis' own axes, rad/s, of roll and pitch (n, 2), rad, and the rates (n, 3) of roll,
     pitch and heading, which is turned first, then pitch, then roll."""
     (roll, pitch), (droll, dpitch, dheading) = angles.T, rates.T
-    return np.column_stack([droll - dheading * np.sin(pitch),
-                            dpitch * np.cos(roll) + dheading * np.sin(roll) * np.cos(pitch),
-                            -dpitch * np.sin(roll) + dheading * np.cos(roll) * np.cos(pitch)])  # fmt: skip
+    return np.column_stack(
+        [
+            droll - dheading * np.sin(pitch),
+            dpitch * np.cos(roll) + dheading * np.sin(roll) * np.cos(pitch),
+            -dpitch * np.sin(roll) + dheading * np.cos(roll) * np.cos(pitch),
+        ]
+    )
 
 
 def _checks(vehicle: CutVehicle, run: HubRun, drive: Drive, own: VirtualTable) -> np.ndarray:
@@ -178,8 +204,13 @@ def map_lines(signals: tuple[Signal, ...], file: str, offset: float = 0.0) -> st
     """The scene's table of a file that holds these channels, as TOML; ``offset`` (s) is added to its clock."""
     lines = ["[[files]]", f'file = "{file}"', *([f"offset = {offset}"] if offset else []), "channels = ["]
     for signal in signals:
-        entry = {"channel": signal.channel, "quantity": signal.quantity, "at": signal.at, "component": signal.component,
-                 "frame": signal.frame}  # fmt: skip
+        entry = {
+            "channel": signal.channel,
+            "quantity": signal.quantity,
+            "at": signal.at,
+            "component": signal.component,
+            "frame": signal.frame,
+        }
         text = ", ".join(f'{key} = "{value}"' for key, value in entry.items() if value)
         lines.append(f"  {{ {text}{', check = true' if signal.check else ''} }},")
     return "\n".join([*lines, "]", ""])

@@ -4,6 +4,18 @@ from models.vehicles.pitch_plane import Parameters
 
 SOURCE = "chosen for twinrig: the published set with each pair of equal values pulled apart"
 PARAMETERS = Parameters(
-    a=1.3, b=0.8, m1=14.0, m2=18.0, m3=720.0, I=540.0,
-    k1=1.9e5, k2=2.3e5, k3=0.9e5, k4=1.2e5, d1=1.8e2, d2=2.6e2, d3=0.9e4, d4=1.2e4,
-)  # fmt: skip
+    a=1.3,
+    b=0.8,
+    m1=14.0,
+    m2=18.0,
+    m3=720.0,
+    I=540.0,
+    k1=1.9e5,
+    k2=2.3e5,
+    k3=0.9e5,
+    k4=1.2e5,
+    d1=1.8e2,
+    d2=2.6e2,
+    d3=0.9e4,
+    d4=1.2e4,
+)

@@ -15,13 +15,19 @@ def describe(scene: WheelRailScene) -> str:
     lines = [
         scene.title,
         _line("scene", f"{scene.file}, study {scene.study}"),
-        _line("wheel", f"{p.wheel}, radius {1e3 * w.radius:g} mm, backs {1e3 * p.back_to_back:g} mm apart, taping line "
-                       f"{1e3 * p.taping:g} mm from a back"),
-        _line("rail", f"{p.rail}, turned by {p.inclination:g} rad, gauge {1e3 * p.gauge:g} mm at "
-                      f"{1e3 * p.gauge_depth:g} mm below the top"),
+        _line(
+            "wheel",
+            f"{p.wheel}, radius {1e3 * w.radius:g} mm, backs {1e3 * p.back_to_back:g} mm apart, taping line "
+            f"{1e3 * p.taping:g} mm from a back",
+        ),
+        _line(
+            "rail",
+            f"{p.rail}, turned by {p.inclination:g} rad, gauge {1e3 * p.gauge:g} mm at "
+            f"{1e3 * p.gauge_depth:g} mm below the top",
+        ),
         _line("wheelset", f"{w.load / 1e3:g} kN on each wheel, {w.speed:g} m/s"),
         _line("positions", f"{at.count} from {1e3 * at.start:g} to {1e3 * at.stop:g} mm to the right"),
-    ]  # fmt: skip
+    ]
     return "\n".join([*lines, *(_line(name, case_text(case.yaw, case.friction)) for name, case in scene.cases.items())])
 
 

@@ -40,8 +40,9 @@ class Case(Strict):
     """[cases.NAME]: how the wheelset stands and whether it rolls."""
 
     yaw: float = quantity("rad/m", "yaw for each metre of displacement", default=0.0, signed=True)
-    friction: float = quantity("", "coefficient of friction; 0 for a wheelset that is pressed only", default=0.0,
-                               zero=True)  # fmt: skip
+    friction: float = quantity(
+        "", "coefficient of friction; 0 for a wheelset that is pressed only", default=0.0, zero=True
+    )
 
 
 class WheelRailScene(SceneFile):
@@ -58,16 +59,23 @@ class WheelRailScene(SceneFile):
     def contact(self, case: Case) -> Contact:
         """Profiles, track and wheelset in touch; raises InputError for files that are no profiles."""
         side = self.profiles.side(self.wheelset.radius)
-        return Contact(side, self.wheelset.load, self.wheelset.speed, case.friction,
-                       Pair(self.bodies.wheel, self.bodies.rail))  # fmt: skip
+        return Contact(
+            side, self.wheelset.load, self.wheelset.speed, case.friction, Pair(self.bodies.wheel, self.bodies.rail)
+        )
 
 
 BOUNDS = {
-    "profiles.inclination": (-0.5, 0.5, "rad"), "profiles.gauge": (0.1, 3.0, "m"),
-    "profiles.back_to_back": (0.1, 3.0, "m"), "profiles.gauge_depth": (1e-3, 0.1, "m"),
-    "profiles.taping": (0.01, 0.2, "m"), "wheelset.radius": (0.02, 5.0, "m"), "wheelset.load": (1.0, 5e5, "N"),
-    "wheelset.speed": (0.01, 200.0, "m/s"), "positions.start": (-0.03, 0.03, "m"), "positions.stop": (-0.03, 0.03, "m"),
-}  # fmt: skip
+    "profiles.inclination": (-0.5, 0.5, "rad"),
+    "profiles.gauge": (0.1, 3.0, "m"),
+    "profiles.back_to_back": (0.1, 3.0, "m"),
+    "profiles.gauge_depth": (1e-3, 0.1, "m"),
+    "profiles.taping": (0.01, 0.2, "m"),
+    "wheelset.radius": (0.02, 5.0, "m"),
+    "wheelset.load": (1.0, 5e5, "N"),
+    "wheelset.speed": (0.01, 200.0, "m/s"),
+    "positions.start": (-0.03, 0.03, "m"),
+    "positions.stop": (-0.03, 0.03, "m"),
+}
 """Smallest and largest values that are no slip of a unit."""
 LARGEST_YAW, LARGEST_FRICTION = 0.1, 1.0
 """rad; coefficient."""
@@ -89,8 +97,13 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Wh
 def _check_case(scene: WheelRailScene, name: str, case: Case) -> None:
     largest = float(np.abs(case.yaw * scene.positions.values()).max())
     if largest > LARGEST_YAW:
-        raise InputError(scene.file, f"cases.{name}.yaw", case.yaw, f"turns the wheelset by {largest:.3g} rad, more "
-                         f"than {LARGEST_YAW:g}: the yaw is in rad for each metre of displacement")  # fmt: skip
+        raise InputError(
+            scene.file,
+            f"cases.{name}.yaw",
+            case.yaw,
+            f"turns the wheelset by {largest:.3g} rad, more "
+            f"than {LARGEST_YAW:g}: the yaw is in rad for each metre of displacement",
+        )
     if case.friction > LARGEST_FRICTION:
         raise InputError(scene.file, f"cases.{name}.friction", case.friction, f"must be at most {LARGEST_FRICTION:g}")
 
@@ -100,6 +113,7 @@ def _with_files(scene: WheelRailScene) -> WheelRailScene:
     named = {kind: getattr(scene.profiles, kind) for kind in ("wheel", "rail")}
     files = {kind: str(scene.path(name, f"profiles.{kind}")) for kind, name in named.items() if Path(name).suffix}
     if scene.profiles.smoothing and not files:
-        raise InputError(scene.file, "profiles.smoothing", scene.profiles.smoothing, "has no meaning for built-in "
-                         "profiles")  # fmt: skip
+        raise InputError(
+            scene.file, "profiles.smoothing", scene.profiles.smoothing, "has no meaning for built-in profiles"
+        )
     return scene.model_copy(update={"profiles": scene.profiles.model_copy(update=files)})

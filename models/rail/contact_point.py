@@ -38,5 +38,12 @@ def cone_on_rail(side, y, z, roll, yaw, radius, half_gauge, conicity, head):
     turned = inward * cr - ca * sr
     way_x, way_y, way_z = cy * sa - sy * turned, sy * sa + cy * turned, inward * sr + ca * cr
     rolling = (n_z * axis_y - n_y * axis_z) / (n_z * way_y - n_y * way_z)
-    return (penetration, rolling, n_y, n_z,
-            apex_x + rolling * way_x, apex_y + rolling * way_y, apex_z + rolling * way_z)  # fmt: skip
+    return (
+        penetration,
+        rolling,
+        n_y,
+        n_z,
+        apex_x + rolling * way_x,
+        apex_y + rolling * way_y,
+        apex_z + rolling * way_z,
+    )

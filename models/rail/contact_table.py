@@ -228,9 +228,15 @@ class Contact:
             normal *= self.load / (normal - lifted)
         raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
 
-    def _rolled(self, side: Side, pose: Pose, touches: list[Touch], pressed: NormalContact,
-                creepages: list[Triple], loads: list[float]
-                ) -> tuple[list[Triple], float, float]:  # fmt: skip
+    def _rolled(
+        self,
+        side: Side,
+        pose: Pose,
+        touches: list[Touch],
+        pressed: NormalContact,
+        creepages: list[Triple],
+        loads: list[float],
+    ) -> tuple[list[Triple], float, float]:
         """Creep forces of each patch, the vertical part of their sum, upwards on the rail, and moment about the axle.
 
         A patch that the simplified theory leaves without contact has none.
@@ -254,8 +260,11 @@ class Contact:
         axle, place = pose.turn[:, 1], _arm(side, pose, touch)
         velocity = spin * np.cross(axle, place) + np.array([self.speed, 0.0, 0.0])
         across, into = _axes(touch)
-        return (float(velocity[0] / self.speed), float(velocity @ across / self.speed),
-                float(spin * axle @ into / self.speed))  # fmt: skip
+        return (
+            float(velocity[0] / self.speed),
+            float(velocity @ across / self.speed),
+            float(spin * axle @ into / self.speed),
+        )
 
 
 @cache
@@ -275,8 +284,11 @@ def _standing(found: Placed) -> Placed:
     for name, places in (("right", found.right), ("left", found.left)):
         least = min(place.below_tip for place in places)
         if least < CLIMBED:
-            raise RunFailed("contact table", f"at {1e3 * found.shift:g} mm the {name} wheel has climbed its flange and "
-                            f"touches {1e3 * least:.1f} mm below the tip: no wheelset stays there")  # fmt: skip
+            raise RunFailed(
+                "contact table",
+                f"at {1e3 * found.shift:g} mm the {name} wheel has climbed its flange and "
+                f"touches {1e3 * least:.1f} mm below the tip: no wheelset stays there",
+            )
     return found
 
 
@@ -357,9 +369,13 @@ def _place(side: Side, pose: Pose, rows: list[tuple[Touch, Triple, Triple, Share
     touch, creep, _, _ = max(rows, key=lambda row: row[-1].load)
     top = float(side.rail.y[np.argmin(side.rail.z)])
     loads = np.array([share.load for *_, share in rows])
-    y, x = (float(np.average(values, weights=loads)) for values in zip(
-        *((one.rail_y + top + share.y * math.cos(one.angle), one.x + share.x) for one, _, _, share in rows),
-        strict=True))  # fmt: skip
+    y, x = (
+        float(np.average(values, weights=loads))
+        for values in zip(
+            *((one.rail_y + top + share.y * math.cos(one.angle), one.x + share.x) for one, _, _, share in rows),
+            strict=True,
+        )
+    )
     fx, fy = (float(sum(force[k] for _, _, force, _ in rows)) for k in (0, 1))
     mz = sum(_moment_at(side, pose, touch, other, force) for other, _, force, _ in rows)
     vertical = sum(share.load * math.cos(one.angle) for one, _, _, share in rows)
@@ -368,10 +384,31 @@ def _place(side: Side, pose: Pose, rows: list[tuple[Touch, Triple, Triple, Share
     tip = float(side.wheel.z.max() - side.wheel.curve(touch.wheel_y))
     along, across = _curvatures(touch.patch.distance)
     falling = math.atan(float(side.rail.curve(y, 1)))
-    return Place(touch.x, touch.rail_y + top, y, top, x, touch.wheel_y, touch.angle, falling, _radius(side, touch), tip,
-                 along, across, float(loads.sum()), vertical, fx, fy, mz, *creep,
-                 max(share.peak for *_, share in rows),
-                 sum(share.area for *_, share in rows), length, width, approach)  # fmt: skip
+    return Place(
+        touch.x,
+        touch.rail_y + top,
+        y,
+        top,
+        x,
+        touch.wheel_y,
+        touch.angle,
+        falling,
+        _radius(side, touch),
+        tip,
+        along,
+        across,
+        float(loads.sum()),
+        vertical,
+        fx,
+        fy,
+        mz,
+        *creep,
+        max(share.peak for *_, share in rows),
+        sum(share.area for *_, share in rows),
+        length,
+        width,
+        approach,
+    )
 
 
 def _curvatures(distance: Distance) -> tuple[float, float]:

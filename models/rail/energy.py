@@ -61,8 +61,13 @@ def ledger(equations: Equations, path: Path) -> Ledger:
     """The ledger of a path by RK4, of any implementation, whose every step was kept."""
     states, w = path.states, equations.wheelset
     gravity = -(w.mass * GRAVITY + 2.0 * equations.body[CARRIED]) * states[:, Z]
-    return Ledger(path.times, _kinetic(equations, states), _suspension(equations.body, states)[0], gravity,
-                  *_works(equations, path).T)  # fmt: skip
+    return Ledger(
+        path.times,
+        _kinetic(equations, states),
+        _suspension(equations.body, states)[0],
+        gravity,
+        *_works(equations, path).T,
+    )
 
 
 def _works(equations: Equations, path: Path) -> np.ndarray:
@@ -81,8 +86,15 @@ def _there(equations: Equations, states: np.ndarray) -> tuple[np.ndarray, np.nda
     for state, rate, contact in zip(states, rates, contacts, strict=True):
         eq.rates(state, *equations.given, rate, contact)
     out = -contacts.sum(axis=1)
-    return rates, np.column_stack([out[:, ELASTIC_POWER], equations.speed * out[:, FX], _suspension(
-        equations.body, states)[1], out[:, DAMPING_POWER], out[:, POWER]])  # fmt: skip
+    return rates, np.column_stack(
+        [
+            out[:, ELASTIC_POWER],
+            equations.speed * out[:, FX],
+            _suspension(equations.body, states)[1],
+            out[:, DAMPING_POWER],
+            out[:, POWER],
+        ]
+    )
 
 
 def _kinetic(equations: Equations, states: np.ndarray) -> np.ndarray:

@@ -109,8 +109,24 @@ def _hold(state, body, turn_x, turn_y, axle_x, axle_y, axle_z, force, moment):
 @njit(cache=True, nogil=True, error_model="numpy")
 def march(state, speed, step, count, every, body, p, strips, cells, middle, law, path, reports):
     """RK4: ``count`` steps (s) from ``state``, which is moved; every so many steps one goes into path and reports."""
-    return _march(state, speed, step, count, every, body, p, strips, cells, middle, law, path, reports, room_for(p),
-                  np.empty((3, STATES)), np.empty((0, REPORTED)))  # fmt: skip
+    return _march(
+        state,
+        speed,
+        step,
+        count,
+        every,
+        body,
+        p,
+        strips,
+        cells,
+        middle,
+        law,
+        path,
+        reports,
+        room_for(p),
+        np.empty((3, STATES)),
+        np.empty((0, REPORTED)),
+    )
 
 
 @lean
@@ -175,8 +191,9 @@ class Equations:
         carried = (w.load - w.mass * GRAVITY) / 2.0
         sunk = self._static_height() if w.profiles else float(w.ellipse.approach) / w.slant[1]
         held = [w.stiffness_x, w.stiffness_y, w.stiffness_z, w.damping_x, w.damping_y, w.damping_z]
-        return np.array([w.mass, w.spin_inertia, w.yaw_inertia, w.half_spacing, *held, carried, sunk, self.lean,
-                         any(held)])  # fmt: skip
+        return np.array(
+            [w.mass, w.spin_inertia, w.yaw_inertia, w.half_spacing, *held, carried, sunk, self.lean, any(held)]
+        )
 
     @cached_property
     def given(self) -> tuple:
@@ -272,17 +289,25 @@ class Equations:
         for k in sorted(set(path.contacts[:, :, LOAD].argmax(axis=0))):
             rate = float(np.abs(np.linalg.eigvals(slopes(partial(Equations.rates, self), path.states[k]))).max())
             if not step * rate <= LIMIT_OF_RK4:
-                raise RunFailed(engine, f"the step of {step:g} s is too large for contacts that carry "
-                                f"{path.contacts[k, :, LOAD].max():.3g} N, whose motion has a rate of {rate:.4g} 1/s",
-                                path.times[k])  # fmt: skip
+                raise RunFailed(
+                    engine,
+                    f"the step of {step:g} s is too large for contacts that carry "
+                    f"{path.contacts[k, :, LOAD].max():.3g} N, whose motion has a rate of {rate:.4g} 1/s",
+                    path.times[k],
+                )
 
     def _steps(self, state: np.ndarray, duration: float, step: float, every: int) -> int:
         """Number of steps of a run that is possible."""
         if quantity("state", state, "ten finite numbers").shape != (STATES,):
             raise InputError("", "state", None, f"must be {STATES} finite numbers")
         if not 0.0 < number("step", step, "a step in s") * self._fastest <= STIFF:
-            raise InputError("", "step", step, f"must be above 0 and at most {STIFF / self._fastest:.3g} s: the "
-                             f"fastest motion has a rate of {self._fastest:.4g} 1/s")  # fmt: skip
+            raise InputError(
+                "",
+                "step",
+                step,
+                f"must be above 0 and at most {STIFF / self._fastest:.3g} s: the "
+                f"fastest motion has a rate of {self._fastest:.4g} 1/s",
+            )
         if not divides(step, number("duration", duration, "a time in s")):
             raise InputError("", "duration", duration, f"must be a whole number of steps of {step:g} s, 1 or more")
         count = round(duration / step)

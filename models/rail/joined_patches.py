@@ -45,8 +45,9 @@ class Share:
     piece: int
 
 
-def press_exactly(patches: Sequence[Patch], near: Sequence[PatchPressure], load: float, approach: float, pair: Pair
-                  ) -> tuple[list[Share], float]:  # fmt: skip
+def press_exactly(
+    patches: Sequence[Patch], near: Sequence[PatchPressure], load: float, approach: float, pair: Pair
+) -> tuple[list[Share], float]:
     """The patches' shares under a vertical load (N), and the vertical approach (m).
 
     near : the patches in contact by the simplified theory, whose areas place the grid; approach : theirs (m). Raises
@@ -60,8 +61,9 @@ def press_exactly(patches: Sequence[Patch], near: Sequence[PatchPressure], load:
     return _pressed(patches, near, load, approach, pair, MARGINS[-1])
 
 
-def _pressed(patches: Sequence[Patch], near: Sequence[PatchPressure], load: float, approach: float, pair: Pair,
-             margin: float) -> tuple[list[Share], float]:  # fmt: skip
+def _pressed(
+    patches: Sequence[Patch], near: Sequence[PatchPressure], load: float, approach: float, pair: Pair, margin: float
+) -> tuple[list[Share], float]:
     x, y = _grid(near, margin)
     cosines = np.cos([patch.lean for patch in patches])
     heights = np.array([_height(patch, x, y) for patch in patches])
@@ -78,8 +80,10 @@ def _pressed(patches: Sequence[Patch], near: Sequence[PatchPressure], load: floa
         whole, approach = whole * load / vertical, reached
         if close:
             pieces, _ = label(solved.contact, np.ones((3, 3)))
-            return [_share(solved.pressure * (owner == k), x, y, patch.place, cell, pieces)
-                    for k, patch in enumerate(patches)], approach  # fmt: skip
+            return [
+                _share(solved.pressure * (owner == k), x, y, patch.place, cell, pieces)
+                for k, patch in enumerate(patches)
+            ], approach
     raise RunFailed("joined patches", "the patches' shares of the load were not found")
 
 
@@ -111,9 +115,15 @@ def _share(pressure: np.ndarray, x: np.ndarray, y: np.ndarray, place: float, cel
     if total == 0.0:
         return Share(0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0), 0.0, 0)
     box = (*_ends(x, pressure.sum(axis=0) > 0.0), *_ends(y, pressure.sum(axis=1) > 0.0))
-    return Share(total * cell, float((pressure.sum(axis=0) @ x) / total),
-                 float((pressure.sum(axis=1) @ y) / total) - place, float(np.count_nonzero(pressure) * cell), box,
-                 float(pressure.max()), int(pieces.flat[np.argmax(pressure)]))  # fmt: skip
+    return Share(
+        total * cell,
+        float((pressure.sum(axis=0) @ x) / total),
+        float((pressure.sum(axis=1) @ y) / total) - place,
+        float(np.count_nonzero(pressure) * cell),
+        box,
+        float(pressure.max()),
+        int(pieces.flat[np.argmax(pressure)]),
+    )
 
 
 def _ends(at: np.ndarray, inside: np.ndarray) -> tuple[float, float]:

@@ -79,8 +79,23 @@ def joint_forces(numbers, q, v, f):
     velocity = np.array([head[SPEED], y_rate, z_rate])
     turning = np.array([cy * roll_rate + axle_x * spin, sy * roll_rate + axle_y * spin, yaw_rate + axle_z * spin])
     force, moment = np.zeros(3), np.zeros(3)
-    wheel_forces(y, z, roll, yaw, velocity, turning, contact, net, along, head[MIDDLE], int(head[LAW]), force, moment,
-                 np.empty((0, REPORTED)), room_for(contact))  # fmt: skip
+    wheel_forces(
+        y,
+        z,
+        roll,
+        yaw,
+        velocity,
+        turning,
+        contact,
+        net,
+        along,
+        head[MIDDLE],
+        int(head[LAW]),
+        force,
+        moment,
+        np.empty((0, REPORTED)),
+        room_for(contact),
+    )
     out[0] += force[1]
     out[1] += force[2]
     out[2] += moment[2]

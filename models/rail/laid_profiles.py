@@ -35,8 +35,9 @@ class Profiles(Strict):
 
     wheel: str = Field(default="S1002", description="built-in wheel, or the file of one")
     rail: str = Field(default="UIC60", description="built-in rail, or the file of one")
-    smoothing: float = quantity("m", "wavelength of which half is left, for profiles from files", default=0.0,
-                                zero=True)  # fmt: skip
+    smoothing: float = quantity(
+        "m", "wavelength of which half is left, for profiles from files", default=0.0, zero=True
+    )
     gauge: float = quantity("m", "between the rails, gauge_depth below their tops", default=1.435)
     gauge_depth: float = quantity("m", "below the tops, at which the gauge is measured", default=0.014)
     inclination: float = quantity("rad", "of the rails, towards each other", default=0.025, signed=True)
@@ -46,9 +47,11 @@ class Profiles(Strict):
     def side(self, radius: float) -> Side:
         """The right wheel of a radius (m) on its rail; raises InputError for files that are no profiles."""
         rail = _profile(self.rail, "rail", self.smoothing)
-        return Side(_profile(self.wheel, "wheel", self.smoothing),
-                    laid(rail, Track(self.gauge, self.gauge_depth, self.inclination)),
-                    Wheelset(radius, self.back_to_back, self.taping))  # fmt: skip
+        return Side(
+            _profile(self.wheel, "wheel", self.smoothing),
+            laid(rail, Track(self.gauge, self.gauge_depth, self.inclination)),
+            Wheelset(radius, self.back_to_back, self.taping),
+        )
 
     def touching(self, radius: float, shift: float) -> tuple[float, float]:
         """Height z (m) over that in the middle, and roll (rad), at which both wheels just touch; InputError if none."""
@@ -98,8 +101,7 @@ def _cuts(side: Side) -> list[float]:
 
 
 def _first(side: Side, shift: float) -> tuple[float, np.ndarray, np.ndarray] | None:
-    """Place of first contact from the taping line, places and gaps (m) there; None where wheels and rails do not meet.
-    """
+    """Place of first contact from the taping line, places and gaps (m) there; None where the profiles do not meet."""
     try:
         pose = placed(side, shift, 0.0)
     except InputError:
@@ -120,8 +122,9 @@ def _ridge(side: Side, before: tuple[float, float], after: tuple[float, float]) 
         if after[0] - before[0] < CLOSE:
             between = (own > min(before[1], after[1])) & (own < max(before[1], after[1]))
             return float(own[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE else None
-        before, after = ((before, (middle, here)) if abs(here - before[1]) > abs(here - after[1]) else
-                         ((middle, here), after))  # fmt: skip
+        before, after = (
+            (before, (middle, here)) if abs(here - before[1]) > abs(here - after[1]) else ((middle, here), after)
+        )
     return None
 
 

@@ -40,8 +40,14 @@ class NoCriticalSpeed(InputError):
 
     def __init__(self, unstable: bool) -> None:
         self.unstable = unstable
-        super().__init__("", "wheelset", None, f"is unstable at {LOWEST_SPEED:g} m/s already: its suspension is too "
-                         "soft" if unstable else f"is stable up to {HIGHEST_SPEED:g} m/s: there is no critical speed")
+        super().__init__(
+            "",
+            "wheelset",
+            None,
+            f"is unstable at {LOWEST_SPEED:g} m/s already: its suspension is too soft"
+            if unstable
+            else f"is stable up to {HIGHEST_SPEED:g} m/s: there is no critical speed",
+        )
 
 
 @dataclass(frozen=True)
@@ -103,9 +109,10 @@ def _contacts(w: Wheelset) -> list[tuple[np.ndarray, np.ndarray]]:
 def _suspension(w: Wheelset) -> tuple[np.ndarray, np.ndarray]:
     """Damping and stiffness of the primary suspension; roll goes with the lateral displacement."""
     arm = w.half_spacing**2
-    return tuple(2.0 * np.diag([y + z * arm * w.tilt**2, x * arm])
-                 for x, y, z in ((w.damping_x, w.damping_y, w.damping_z),
-                                 (w.stiffness_x, w.stiffness_y, w.stiffness_z)))  # type: ignore[return-value]  # fmt: skip
+    return tuple(
+        2.0 * np.diag([y + z * arm * w.tilt**2, x * arm])
+        for x, y, z in ((w.damping_x, w.damping_y, w.damping_z), (w.stiffness_x, w.stiffness_y, w.stiffness_z))
+    )  # type: ignore[return-value]
 
 
 def _gravity(w: Wheelset) -> np.ndarray:

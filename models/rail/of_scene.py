@@ -39,8 +39,12 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
         base = _judged(parse(path), path.name, "")
     profiles = _profiles(scene, base)
     if profiles is not None and FLANGE in override:
-        raise InputError(scene.file, f"wheelset.override.{FLANGE}", override[FLANGE], "has no meaning beside profiles, "
-                         "which have flanges of their own: drop one of them")  # fmt: skip
+        raise InputError(
+            scene.file,
+            f"wheelset.override.{FLANGE}",
+            override[FLANGE],
+            "has no meaning beside profiles, which have flanges of their own: drop one of them",
+        )
     values = {key: getattr(base, key) for key in Wheelset.model_fields} | {"profiles": profiles}
     return extended(_judged(values | override, scene.file, "wheelset.override"), scene)
 

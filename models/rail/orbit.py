@@ -175,8 +175,11 @@ def solved(guess: Orbit, unknown: Unknown, *, precise: bool = True) -> Orbit:
 def refined(orbit: Orbit, unknown: Unknown) -> Orbit:
     """The orbit at half the step, with the changes that halving made."""
     half = solved(replace(orbit, steps=2 * orbit.steps), unknown, precise=False)
-    return replace(half, error=abs(getattr(half, unknown) - getattr(orbit, unknown)),
-                   frequency_error=abs(half.frequency - orbit.frequency))  # fmt: skip
+    return replace(
+        half,
+        error=abs(getattr(half, unknown) - getattr(orbit, unknown)),
+        frequency_error=abs(half.frequency - orbit.frequency),
+    )
 
 
 def _end(equations: Equations, state: np.ndarray, period: float, steps: int) -> np.ndarray:

@@ -27,21 +27,35 @@ def describe(scene: WheelsetScene) -> str:
     changed = ", ".join(f"{name} = {value:g}" for name, value in own.override.items())
     ellipse, run, speeds = wheelset.ellipse, scene.run, scene.speeds.all()
     lines = [
-        scene.title, _line("scene", f"{scene.file}, study {scene.study}"),
+        scene.title,
+        _line("scene", f"{scene.file}, study {scene.study}"),
         _line("wheelset", own.parameters + (f", but {changed}" if changed else "")),
-        _line("", f"{wheelset.mass:g} kg, {wheelset.load:g} N on both rails, 5 freedoms: lateral, vertical, roll, yaw, "
-                  "spin"),
+        _line(
+            "",
+            f"{wheelset.mass:g} kg, {wheelset.load:g} N on both rails, 5 freedoms: lateral, vertical, roll, yaw, spin",
+        ),
         _line("wheels", _wheels(wheelset)),
-        _line("contact", f"{LAWS[scene.contact.law].format(scene.contact.cells)}; at rest a = {1e3 * ellipse.a:.3g} "
-                         f"mm, b = {1e3 * ellipse.b:.3g} mm; friction {wheelset.friction:g}"),
-        _line("flange", "that of the profile" if wheelset.profiles else
-              f"after {1e3 * wheelset.flange_clearance:g} mm, {wheelset.flange_stiffness:g} N/m"),
+        _line(
+            "contact",
+            f"{LAWS[scene.contact.law].format(scene.contact.cells)}; at rest a = {1e3 * ellipse.a:.3g} "
+            f"mm, b = {1e3 * ellipse.b:.3g} mm; friction {wheelset.friction:g}",
+        ),
+        _line(
+            "flange",
+            "that of the profile"
+            if wheelset.profiles
+            else f"after {1e3 * wheelset.flange_clearance:g} mm, {wheelset.flange_stiffness:g} N/m",
+        ),
         _line("held by", _suspension(wheelset)),
-        _line("Klingel", f"wavelength {klingel(wheelset):.5g} m"), _line("critical", _critical(wheelset)),
+        _line("Klingel", f"wavelength {klingel(wheelset):.5g} m"),
+        _line("critical", _critical(wheelset)),
         _line("speeds", f"{len(speeds)} from {speeds.min():g} to {speeds.max():g} m/s"),
-        _line("paths", f"at {' and '.join(f'{speed:g}' for speed in path_speeds(scene))} m/s, {run.duration:g} s in "
-                       f"steps of {run.step:g} s, from {1e3 * run.displacement:g} mm and {run.yaw:g} rad"),
-    ]  # fmt: skip
+        _line(
+            "paths",
+            f"at {' and '.join(f'{speed:g}' for speed in path_speeds(scene))} m/s, {run.duration:g} s in "
+            f"steps of {run.step:g} s, from {1e3 * run.displacement:g} mm and {run.yaw:g} rad",
+        ),
+    ]
     return "\n".join([*lines, *effect_lines(scene), "", *ENGINES])
 
 
@@ -61,10 +75,13 @@ def _wheels(wheelset: Wheelset) -> str:
 def _suspension(wheelset: Wheelset) -> str:
     """Springs and dampers of one side along each axis, in words."""
     w = wheelset
-    parts = [f"{axis} {spring:g} N/m and {damper:g} N s/m"
-             for axis, spring, damper in zip("xyz", (w.stiffness_x, w.stiffness_y, w.stiffness_z),
-                                             (w.damping_x, w.damping_y, w.damping_z), strict=True)
-             if spring or damper]  # fmt: skip
+    parts = [
+        f"{axis} {spring:g} N/m and {damper:g} N s/m"
+        for axis, spring, damper in zip(
+            "xyz", (w.stiffness_x, w.stiffness_y, w.stiffness_z), (w.damping_x, w.damping_y, w.damping_z), strict=True
+        )
+        if spring or damper
+    ]
     return f"on each side, {w.half_spacing:g} m from the middle: {', '.join(parts)}" if parts else "nothing: it is free"
 
 

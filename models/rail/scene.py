@@ -41,8 +41,9 @@ class RunTable(Strict):
     step: float = quantity("s", "step of RK4 in every implementation", default=5e-4)
     displacement: float = quantity("m", "lateral, at the beginning, to the right", default=5e-3, signed=True)
     yaw: float = quantity("rad", "at the beginning, to the right", default=0.0, signed=True)
-    speeds: list[float] = Field(default_factory=list, description="of the paths, m/s; 0.9 and 1.1 of the critical one "
-                                "if not given")  # fmt: skip
+    speeds: list[float] = Field(
+        default_factory=list, description="of the paths, m/s; 0.9 and 1.1 of the critical one if not given"
+    )
 
 
 class WheelsetScene(SceneFile):
@@ -72,8 +73,12 @@ def _check_speeds(scene: WheelsetScene) -> None:
     check_speeds(scene.file, scene.speeds)
     start, stop = scene.speeds.start, scene.speeds.stop
     if start is not None and stop is not None and start >= stop:
-        raise InputError(scene.file, "speeds.stop", stop, f"must be above speeds.start = {start:g} m/s; for one speed "
-                         f"write speeds.values = [{start:g}]")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "speeds.stop",
+            stop,
+            f"must be above speeds.start = {start:g} m/s; for one speed write speeds.values = [{start:g}]",
+        )
     listed = {f"speeds.values.{i}": speed for i, speed in enumerate(scene.speeds.values)}
     listed |= {"speeds.stop": stop or 0.0} | {f"run.speeds.{i}": speed for i, speed in enumerate(scene.run.speeds)}
     for place, speed in listed.items():

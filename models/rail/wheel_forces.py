@@ -41,8 +41,27 @@ LAWS = {"linear": LINEAR, "fastsim": FASTSIM}
 RADIUS, HALF_GAUGE, CONICITY, HEAD, MODULUS, SHEAR, POISSON, FRICTION, DAMPING, CLEARANCE, FLANGE, NUMBERS = range(12)
 """Numbers of the contact, as ``numbers`` gives them (SI): modulus is E*, flange its spring's stiffness; then those of
 the profiles, if the wheelset has some."""
-(LOAD, FX, FY, MZ, XI_1, XI_2, XI_3, A, B, DEPTH, POWER, ANGLE, PLACE_X, PLACE_Y, PLACE_Z, FLANGE_FORCE, ELASTIC_POWER,
- DAMPING_POWER, REPORTED) = range(19)  # fmt: skip
+(
+    LOAD,
+    FX,
+    FY,
+    MZ,
+    XI_1,
+    XI_2,
+    XI_3,
+    A,
+    B,
+    DEPTH,
+    POWER,
+    ANGLE,
+    PLACE_X,
+    PLACE_Y,
+    PLACE_Z,
+    FLANGE_FORCE,
+    ELASTIC_POWER,
+    DAMPING_POWER,
+    REPORTED,
+) = range(19)
 """Columns of what a patch reports: normal force, creep forces and moment on the wheel in its own axes, creepages and
 spin, semi-axes, penetration, power of the creep forces (W), angle of the rail's surface (rad), place from the
 wheelset's centre in the track's axes (m), lateral force of a cone's flange (N), powers of the elastic normal force and
@@ -71,8 +90,19 @@ class Room(NamedTuple):
 def numbers(wheelset: Wheelset) -> np.ndarray:
     """The contact's numbers, in the order above: (11,), or more for profiles."""
     w, pair = wheelset, wheelset.pair
-    found = [w.radius, w.half_gauge, w.conicity, w.head_radius, pair.modulus, pair.G, pair.nu, w.friction,
-             w.contact_damping, w.flange_clearance, w.flange_stiffness]  # fmt: skip
+    found = [
+        w.radius,
+        w.half_gauge,
+        w.conicity,
+        w.head_radius,
+        pair.modulus,
+        pair.G,
+        pair.nu,
+        w.friction,
+        w.contact_damping,
+        w.flange_clearance,
+        w.flange_stiffness,
+    ]
     return np.concatenate((found, profile_numbers(w.profiles, w.radius))) if w.profiles else np.array(found)
 
 
@@ -95,8 +125,14 @@ def patches(p):
 def room_for(p):
     """``Room`` for the contacts of these numbers."""
     n = patches(p)
-    return Room(np.empty((4, 3)), np.empty((n, TOUCH)), np.empty((n, 10)), np.empty((n, MOVED)), np.empty((n, 4)),
-                np.empty((n, 4)))  # fmt: skip
+    return Room(
+        np.empty((4, 3)),
+        np.empty((n, TOUCH)),
+        np.empty((n, 10)),
+        np.empty((n, MOVED)),
+        np.empty((n, 4)),
+        np.empty((n, 4)),
+    )
 
 
 @inlined
@@ -108,8 +144,9 @@ def contact_points(y, z, roll, yaw, p, touches):
         if p.size > NUMBERS:
             profile_on_rail(side, y, z, roll, yaw, p[NUMBERS:], p[MODULUS], own)
             continue
-        depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, y, z, roll, yaw, p[RADIUS], p[HALF_GAUGE],
-                                                            p[CONICITY], p[HEAD])  # fmt: skip
+        depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(
+            side, y, z, roll, yaw, p[RADIUS], p[HALF_GAUGE], p[CONICITY], p[HEAD]
+        )
         touch = own[0]
         touch[DEEP], touch[N_Y], touch[N_Z], touch[X_], touch[Y_], touch[Z_] = depth, n_y, n_z, cx, cy, cz
         touch[ALONG], touch[ACROSS] = _along(rolling, p[CONICITY]), 0.5 / p[HEAD]
@@ -149,8 +186,14 @@ def _one_way(sign, contacts, slip, speed, p, strips, cells, middle, law, found):
     else:
         for k in range(len(contacts)):
             found[k, 0], found[k, 1], found[k, 2] = _linear(
-                contacts[k, 0], contacts[k, 1], contacts[k, XI_X], contacts[k, XI_X + 1], contacts[k, SPIN], p[SHEAR],
-                p[POISSON])  # fmt: skip
+                contacts[k, 0],
+                contacts[k, 1],
+                contacts[k, XI_X],
+                contacts[k, XI_X + 1],
+                contacts[k, SPIN],
+                p[SHEAR],
+                p[POISSON],
+            )
 
 
 @lean
@@ -212,8 +255,29 @@ def _linear_cones(y, z, roll, yaw, velocity, turning, p, force, moment, report):
         load, push = elastic * max(0.0, 1.0 + damping * rate), _flange(side, y, p)
         _act(n_y, n_z, cx, cy, cz, load, push, fx, fy, mz, force, moment)
         if len(report) > 0:
-            _tell(n_y, n_z, cx, cy, cz, depth, a, b, load, push, vx, vy, aside, turn, rate, elastic, fx, fy, mz, speed,
-                  report[0 if side == RIGHT else 1])  # fmt: skip
+            _tell(
+                n_y,
+                n_z,
+                cx,
+                cy,
+                cz,
+                depth,
+                a,
+                b,
+                load,
+                push,
+                vx,
+                vy,
+                aside,
+                turn,
+                rate,
+                elastic,
+                fx,
+                fy,
+                mz,
+                speed,
+                report[0 if side == RIGHT else 1],
+            )
 
 
 @lean
@@ -226,8 +290,9 @@ def _patch_by_patch(y, z, roll, yaw, velocity, turning, p, strips, cells, middle
             push = _flange(RIGHT if 2 * k < n else LEFT, y, p) if p.size == NUMBERS else 0.0
             _press(touches[k], velocity, turning, p, push, contacts[some], motion[some])
             motion[some, PATCH], some = k, some + 1
-    creep(contacts[:some], motion[:some], velocity[0], p, strips, cells, middle, law, room.other[:some],
-          room.found[:some])  # fmt: skip
+    creep(
+        contacts[:some], motion[:some], velocity[0], p, strips, cells, middle, law, room.other[:some], room.found[:some]
+    )
     report[:] = 0.0
     for i in range(some):
         k = int(motion[i, PATCH])
@@ -236,9 +301,29 @@ def _patch_by_patch(y, z, roll, yaw, velocity, turning, p, strips, cells, middle
         fx, fy, mz = room.found[i, 0], room.found[i, 1], room.found[i, 2]
         _act(n_y, n_z, cx, cy, cz, load, push, fx, fy, mz, force, moment)
         if len(report) > 0:
-            _tell(n_y, n_z, cx, cy, cz, touches[k, DEEP], a, b, load, push, motion[i, VX], motion[i, VY],
-                  motion[i, ASIDE], motion[i, TURN], motion[i, RATE], motion[i, ELASTIC], fx, fy, mz, velocity[0],
-                  report[k])  # fmt: skip
+            _tell(
+                n_y,
+                n_z,
+                cx,
+                cy,
+                cz,
+                touches[k, DEEP],
+                a,
+                b,
+                load,
+                push,
+                motion[i, VX],
+                motion[i, VY],
+                motion[i, ASIDE],
+                motion[i, TURN],
+                motion[i, RATE],
+                motion[i, ELASTIC],
+                fx,
+                fy,
+                mz,
+                velocity[0],
+                report[k],
+            )
 
 
 @inlined

@@ -84,8 +84,9 @@ class Wheelset(Strict):
     def coned(self, equivalent: float) -> "Wheelset":
         """The same wheelset with cones of this equivalent conicity, as profiles have one at some amplitude."""
         most = min(LARGEST_CONICITY, 0.999 * self.half_gauge / self.radius)
-        found = brentq(lambda c: self.changed(conicity=c).equivalent_conicity - equivalent, LEAST_CONICITY, most,
-                       xtol=1e-15)  # fmt: skip
+        found = brentq(
+            lambda c: self.changed(conicity=c).equivalent_conicity - equivalent, LEAST_CONICITY, most, xtol=1e-15
+        )
         return self.changed(conicity=float(found))
 
     def changed(self, **values: Any) -> "Wheelset":
@@ -101,8 +102,24 @@ class Wheelset(Strict):
 
 
 CHOSEN = Wheelset(
-    mass=1200.0, spin_inertia=100.0, yaw_inertia=750.0, radius=0.46, half_gauge=0.75, conicity=0.05, head_radius=0.3,
-    load=1.0e5, half_spacing=1.0, stiffness_x=2.0e5, stiffness_y=4.0e5, stiffness_z=6.0e5, damping_x=2.0e3,
-    damping_y=2.0e3, damping_z=4.0e3, friction=0.3, flange_clearance=0.007, flange_stiffness=1.5e7, contact_damping=0.5,
-)  # fmt: skip
+    mass=1200.0,
+    spin_inertia=100.0,
+    yaw_inertia=750.0,
+    radius=0.46,
+    half_gauge=0.75,
+    conicity=0.05,
+    head_radius=0.3,
+    load=1.0e5,
+    half_spacing=1.0,
+    stiffness_x=2.0e5,
+    stiffness_y=4.0e5,
+    stiffness_z=6.0e5,
+    damping_x=2.0e3,
+    damping_y=2.0e3,
+    damping_z=4.0e3,
+    friction=0.3,
+    flange_clearance=0.007,
+    flange_stiffness=1.5e7,
+    contact_damping=0.5,
+)
 """A wheelset with values of the usual size. They are chosen, not published: no source is claimed for them."""

@@ -75,8 +75,17 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
     if (error[finite] > UNCERTAIN).any():
         _refuse(system.names[int(np.where(finite, error, 0.0).argmax())], float(error[finite].max()))
     V, P = V.astype(float), P.astype(float)
-    return Covariance(system.names, V @ P @ V.T, np.where(finite, variance, np.inf), status, reason,
-                      grown.rate, grown.power, residual, error)  # fmt: skip
+    return Covariance(
+        system.names,
+        V @ P @ V.T,
+        np.where(finite, variance, np.inf),
+        status,
+        reason,
+        grown.rate,
+        grown.power,
+        residual,
+        error,
+    )
 
 
 def silence(C: np.ndarray, P: np.ndarray) -> np.ndarray:
@@ -96,19 +105,18 @@ def hits(system: DelayedSystem) -> tuple[list[np.ndarray], list[np.ndarray], lis
     return B, D, delays
 
 
-def _responses(A: np.ndarray, B: Sequence[np.ndarray], delays: Sequence[float],
-               independent: bool) -> list[np.ndarray]:  # fmt: skip
+def _responses(A: np.ndarray, B: Sequence[np.ndarray], delays: Sequence[float], independent: bool) -> list[np.ndarray]:
     """F_j, the response just before each hit: zero for noise that no axle has met before."""
     before = [np.zeros_like(B[0])]
     for j in range(1, len(B)):
         none = independent or len(A) == 0
-        before.append(np.zeros_like(B[0]) if none else
-                      expm(A * (delays[j] - delays[j - 1])) @ (before[-1] + B[j - 1]))  # fmt: skip
+        before.append(np.zeros_like(B[0]) if none else expm(A * (delays[j] - delays[j - 1])) @ (before[-1] + B[j - 1]))
     return before
 
 
-def _stable(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float],
-            independent: bool) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
+def _stable(
+    split: Parts, B: Sequence[np.ndarray], delays: Sequence[float], independent: bool
+) -> tuple[np.ndarray, np.ndarray, float]:
     """Covariance of the stable part, its last correction, and the residual that is left."""
     return lyapunov(split.S, intensity(split.S, [(split.W @ b).astype(float) for b in B], delays, independent))
 
@@ -167,10 +175,13 @@ UNCERTAIN = 1e-6
 
 def _refuse(name: str, error: float) -> None:
     raise InputError(
-        "", f"output {name}", None, f"its variance would be known to {error:.1g} of itself only: the rates of the "
+        "",
+        f"output {name}",
+        None,
+        f"its variance would be known to {error:.1g} of itself only: the rates of the "
         "vehicle and of the road lie too many decades apart, or a motion hardly dies out; look for a stiffness, "
-        "damping or mass, or a corner of the road, that is far off"
-    )  # fmt: skip
+        "damping or mass, or a corner of the road, that is far off",
+    )
 
 
 REFINEMENTS, REFINED = 6, 1e-11
@@ -178,8 +189,14 @@ REFINEMENTS, REFINED = 6, 1e-11
 is enough but where a motion hardly dies out; each takes as many digits off the error as the first solution had."""
 
 
-def _with_marginal(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float], independent: bool, P: np.ndarray,
-                   correction: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+def _with_marginal(
+    split: Parts,
+    B: Sequence[np.ndarray],
+    delays: Sequence[float],
+    independent: bool,
+    P: np.ndarray,
+    correction: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The same for the whole state (marginal first), its correction and basis, motions that diffuse left out.
 
     A motion that does not diffuse lives from the first hit to the last: integrals over that window.
@@ -220,8 +237,15 @@ CANCELLED, SILENT = 1e-9, 1e-12
 symmetry, and all of them rounding: motions are told to about ten digits, and states at rest to those of P."""
 
 
-def verdicts(D: Sequence[np.ndarray], variance: np.ndarray, floor: np.ndarray, grown: Growth, fastest: float,
-             accuracy: float, split: Parts | None = None) -> tuple[tuple[str, ...], tuple[str, ...]]:  # fmt: skip
+def verdicts(
+    D: Sequence[np.ndarray],
+    variance: np.ndarray,
+    floor: np.ndarray,
+    grown: Growth,
+    fastest: float,
+    accuracy: float,
+    split: Parts | None = None,
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Status and reason of every output.
 
     White noise that comes through D counts if, up to the ``fastest`` rate of the system (1/s), it carries more than
@@ -238,14 +262,20 @@ def _verdict(white: bool, rate: float, power: int, split: Parts | None) -> tuple
         return INFINITE, WHITE
     if power:
         after = np.sqrt(rate * 100.0**power)
-        return DIFFUSING, (f"the road drives a motion that nothing pulls back and that this output sees: its variance "
-                           f"grows as {rate:.4g} t^{power} (t in s), a standard deviation of {after:.3g} after "
-                           "100 s")  # fmt: skip
+        return DIFFUSING, (
+            f"the road drives a motion that nothing pulls back and that this output sees: its variance "
+            f"grows as {rate:.4g} t^{power} (t in s), a standard deviation of {after:.3g} after "
+            "100 s"
+        )
     if split is None or not split.marginal:
         return FINITE, "every motion dies out"
-    return FINITE, (f"{split.marginal} states are of motions that nothing pulls back, but this output does not see "
-                    "them, or sees only what the road does not drive in the long run")  # fmt: skip
+    return FINITE, (
+        f"{split.marginal} states are of motions that nothing pulls back, but this output does not see "
+        "them, or sees only what the road does not drive in the long run"
+    )
 
 
-WHITE = ("white noise of the road reaches this output directly, at all frequencies alike (tyre damping under a road "
-         "filter of first order does that): take a road filter of second order, or a limited band")  # fmt: skip
+WHITE = (
+    "white noise of the road reaches this output directly, at all frequencies alike (tyre damping under a road "
+    "filter of first order does that): take a road filter of second order, or a limited band"
+)

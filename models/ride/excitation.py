@@ -67,8 +67,10 @@ def _outputs(
     """C (p, n) and one D (p, k) per axle; what the noise reaches at once stands in D."""
     n = len(vehicle.mass)
     m = len(excitation.F)
-    of = {key: np.array([getattr(output, key) for output in vehicle.outputs]) for key in
-          ("acceleration", "rate", "displacement", "road", "road_rate")}  # fmt: skip
+    of = {
+        key: np.array([getattr(output, key) for output in vehicle.outputs])
+        for key in ("acceleration", "rate", "displacement", "road", "road_rate")
+    }
     C = of["acceleration"] @ A[n : 2 * n]
     C[:, :n] += of["displacement"]
     C[:, n : 2 * n] += of["rate"]

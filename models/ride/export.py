@@ -18,9 +18,13 @@ def matrices(system: DelayedSystem, covariance: Covariance) -> dict[str, Any]:
     found: dict[str, Any] = {"A": system.A, "C": system.C}
     for i, (B, D) in enumerate(zip(system.B, system.D, strict=True), start=1):
         found |= {f"B{i}": B, f"D{i}": D}
-    return found | {"delays": np.array(system.delays), "independent": system.independent,
-                    "outputs": np.array(system.names), "P": covariance.P,
-                    "deviation": covariance.deviation}  # fmt: skip
+    return found | {
+        "delays": np.array(system.delays),
+        "independent": system.independent,
+        "outputs": np.array(system.names),
+        "P": covariance.P,
+        "deviation": covariance.deviation,
+    }
 
 
 def save(system: DelayedSystem, covariance: Covariance, stem: Path) -> list[Path]:
@@ -44,5 +48,6 @@ def state_space(system: DelayedSystem) -> "control.StateSpace":
     from control import StateSpace
 
     names = [f"w{i}_{k}" for i, B in enumerate(system.B, 1) for k in range(1, B.shape[1] + 1)]
-    return StateSpace(system.A, np.hstack(system.B), system.C, np.hstack(system.D), inputs=names,
-                      outputs=list(system.names))  # fmt: skip
+    return StateSpace(
+        system.A, np.hstack(system.B), system.C, np.hstack(system.D), inputs=names, outputs=list(system.names)
+    )

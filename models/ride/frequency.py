@@ -49,8 +49,10 @@ def transfer(vehicle: LinearVehicle, omega: np.ndarray) -> np.ndarray:
     s = 1j * np.asarray(omega, float)[:, None, None]
     stiffness = vehicle.stiffness + s * vehicle.damping + s**2 * vehicle.mass
     motion = np.linalg.solve(stiffness, vehicle.road_stiffness + s * vehicle.road_damping)
-    of = {key: np.array([getattr(output, key) for output in vehicle.outputs])
-          for key in ("acceleration", "rate", "displacement", "road", "road_rate")}  # fmt: skip
+    of = {
+        key: np.array([getattr(output, key) for output in vehicle.outputs])
+        for key in ("acceleration", "rate", "displacement", "road", "road_rate")
+    }
     rows = of["displacement"] + s * of["rate"] + s**2 * of["acceleration"]
     return rows @ motion + of["road"] + s * of["road_rate"]
 
@@ -63,8 +65,9 @@ def road(excitation: Excitation, speed: float, omega: np.ndarray) -> np.ndarray:
     return np.array([heights @ filtered for heights in excitation.heights])
 
 
-def spectra(vehicle: LinearVehicle, excitation: Excitation, speed: float, omega: np.ndarray,
-            weights: Weights | None = None) -> np.ndarray:  # fmt: skip
+def spectra(
+    vehicle: LinearVehicle, excitation: Excitation, speed: float, omega: np.ndarray, weights: Weights | None = None
+) -> np.ndarray:
     """Two-sided densities (n, p) over the angular frequency (rad/s): a variance is the integral over both signs."""
     parts = _parts(vehicle, excitation, speed, omega, weights or {})
     if excitation.independent:
@@ -74,8 +77,9 @@ def spectra(vehicle: LinearVehicle, excitation: Excitation, speed: float, omega:
     return (abs(turned.sum(axis=0)) ** 2).sum(axis=2) / (2 * np.pi)
 
 
-def _parts(vehicle: LinearVehicle, excitation: Excitation, speed: float, omega: np.ndarray,
-           weights: Weights) -> np.ndarray:  # fmt: skip
+def _parts(
+    vehicle: LinearVehicle, excitation: Excitation, speed: float, omega: np.ndarray, weights: Weights
+) -> np.ndarray:
     """Outputs by the noise of each axle (a, n, p, k), smooth: without the delays."""
     return _weighted(vehicle, omega, weights) @ road(excitation, speed, omega)
 
@@ -88,8 +92,9 @@ def _weighted(vehicle: LinearVehicle, omega: np.ndarray, weights: Weights) -> np
     return whole
 
 
-def quadrature(vehicle: LinearVehicle, excitation: Excitation, speed: float,
-               weights: Weights | None = None) -> Quadrature:  # fmt: skip
+def quadrature(
+    vehicle: LinearVehicle, excitation: Excitation, speed: float, weights: Weights | None = None
+) -> Quadrature:
     """Variances as integrals over all frequencies, weighted outputs in place of their own; inf where one diverges.
 
     The error holds what halving the panels changes, the tail beyond the last one, and what a last digit of the
@@ -132,8 +137,9 @@ def _check_stable(vehicle: LinearVehicle) -> None:
         raise Unstable(worst.real, abs(worst.imag) / (2 * np.pi))
 
 
-def _halved(over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, whole: np.ndarray,
-            limit: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:  # fmt: skip
+def _halved(
+    over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, whole: np.ndarray, limit: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, int]:
     """Sums (p,) over panels, each halved until that changes it by no more than ``limit`` (p,); the last changes."""
     variance, error = np.zeros_like(limit), np.zeros_like(limit)
     taken, lowest = 2 * len(edges), edges[0, 1] / 64
@@ -156,8 +162,9 @@ TO_LEGENDRE = (DEGREES[:, None] + 0.5) * eval_legendre(DEGREES[:, None], NODES) 
 """Coefficients of the Legendre polynomials (degree, node) by the values at the nodes."""
 
 
-def _integrals(parts: np.ndarray, centre: np.ndarray, half: np.ndarray, excitation: Excitation,
-               speed: float) -> np.ndarray:  # fmt: skip
+def _integrals(
+    parts: np.ndarray, centre: np.ndarray, half: np.ndarray, excitation: Excitation, speed: float
+) -> np.ndarray:
     """Variances (panels, p) of the sum of delayed parts (a, panels, nodes, p, k); both signs of the frequency."""
     found = np.einsum("ambpk,ambpk,b->mp", parts, parts.conj(), GAUSS).real
     for j in range(1, len(parts)) if not excitation.independent else ():

@@ -35,8 +35,17 @@ class Ride:
         return float(self.times[1] - self.times[0])
 
 
-def ridden(engine: str, vehicle: SpatialVehicle, road: RoadPath, duration: float, *, seed: int = 0, path: int = 0,
-           skipped: float = 0.0, every: int = 1) -> Ride:  # fmt: skip
+def ridden(
+    engine: str,
+    vehicle: SpatialVehicle,
+    road: RoadPath,
+    duration: float,
+    *,
+    seed: int = 0,
+    path: int = 0,
+    skipped: float = 0.0,
+    every: int = 1,
+) -> Ride:
     """Drive over a road from rest for about ``duration`` (s); outputs ``every`` so many steps after ``skipped`` (s).
 
     Raises InputError for damped tyres on a road whose heights have no rates.
@@ -75,4 +84,3 @@ def row_of(output: Output) -> np.ndarray:
 
 def _bent(vehicle: SpatialVehicle, part: str) -> bool:
     return any(s.name == part and (s.travel_force or s.rate_force or s.friction) for s in vehicle.springs)
-

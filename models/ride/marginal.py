@@ -36,9 +36,12 @@ class Unstable(InputError):
         where = "at this speed" if speed is None else f"at {speed:g} m/s"
         how = f"that swings at {frequency:.4g} Hz" if frequency else "that does not swing"
         super().__init__(
-            "", "vehicle", None, f"is unstable: a motion {how} grows at a rate of {growth:.4g} 1/s, twofold in "
-            f"{np.log(2) / growth:.3g} s, so nothing has a stationary variance; it must be stable {where}"
-        )  # fmt: skip
+            "",
+            "vehicle",
+            None,
+            f"is unstable: a motion {how} grows at a rate of {growth:.4g} 1/s, twofold in "
+            f"{np.log(2) / growth:.3g} s, so nothing has a stationary variance; it must be stable {where}",
+        )
 
 
 @dataclass(frozen=True)
@@ -87,8 +90,18 @@ def parts(A: np.ndarray, accuracy: float = ACCURACY) -> Parts:
         _decouple(form, V, W, size)
     S, T, back = _by_motions(form[k:, k:])
     stable = (V[:, k:] @ T, back @ W[k:]) if k else (T, back)
-    return Parts(form[:k, :k], scale[:, None] * V[:, :k], W[:k] / scale, S, scale[:, None] * stable[0],
-                 stable[1] / scale, zeros, scale, norm, _by_slowest(left, rest[undamped:, undamped:]))  # fmt: skip
+    return Parts(
+        form[:k, :k],
+        scale[:, None] * V[:, :k],
+        W[:k] / scale,
+        S,
+        scale[:, None] * stable[0],
+        stable[1] / scale,
+        zeros,
+        scale,
+        norm,
+        _by_slowest(left, rest[undamped:, undamped:]),
+    )
 
 
 FREE = 1e-3
@@ -98,9 +111,12 @@ a vehicle comes to rest."""
 
 def _refuse(fastest: float) -> None:
     raise InputError(
-        "", "vehicle", None, f"has a motion so fast, {fastest:.2g} 1/s, that its slow ones cannot be told from free "
-        "ones: look for a mass or an inertia that is far too small, a stiffness or damping that is far too large"
-    )  # fmt: skip
+        "",
+        "vehicle",
+        None,
+        f"has a motion so fast, {fastest:.2g} 1/s, that its slow ones cannot be told from free "
+        "ones: look for a mass or an inertia that is far too small, a stiffness or damping that is far too large",
+    )
 
 
 def _balanced(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
@@ -202,8 +218,15 @@ class Growth:
     power: np.ndarray
 
 
-def growth(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float], C: np.ndarray, independent: bool,
-           variance: np.ndarray, accuracy: float = ACCURACY) -> Growth:  # fmt: skip
+def growth(
+    split: Parts,
+    B: Sequence[np.ndarray],
+    delays: Sequence[float],
+    C: np.ndarray,
+    independent: bool,
+    variance: np.ndarray,
+    accuracy: float = ACCURACY,
+) -> Growth:
     """What noise through B_i (n, k), delays tau_i (s), does to y = C x along the marginal motions.
 
     Axles that meet the same noise act as one input, the sum of e^(-M tau_i) W0 B_i: what the first one starts, the
@@ -214,8 +237,9 @@ def growth(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float], C: np
     carried = [np.eye(split.marginal) if independent else expm(-split.M * delay) for delay in delays]
     G = join([E @ split.W0 @ b for E, b in zip(carried, B, strict=True)])
     reach = np.linalg.norm(split.W0 * split.scale, axis=1, keepdims=True)
-    G_size = join([abs(E) @ reach * np.linalg.norm(b / split.scale[:, None], axis=0)
-                   for E, b in zip(carried, B, strict=True)])  # fmt: skip
+    G_size = join(
+        [abs(E) @ reach * np.linalg.norm(b / split.scale[:, None], axis=0) for E, b in zip(carried, B, strict=True)]
+    )
     seen = C @ split.V0
     seen_size = np.linalg.norm(C * split.scale, axis=1, keepdims=True) * np.ones(split.marginal)
     z, least = split.zeros, TOLD * accuracy
@@ -226,8 +250,9 @@ def growth(split: Parts, B: Sequence[np.ndarray], delays: Sequence[float], C: np
     return Growth(rate, np.where((power == 0) & (swung > 0), 1, power))
 
 
-def _of_zeros(N: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray, C_size: np.ndarray,
-              least: float, most: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+def _of_zeros(
+    N: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray, C_size: np.ndarray, least: float, most: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Rates and powers (p,): h(t) = sum of C N^l G t^l / l!, whose highest power wins; a rate above ``most`` counts."""
     rate, power = np.zeros(len(C)), np.zeros(len(C), int)
     step, step_size = G, G_size
@@ -242,8 +267,9 @@ def _of_zeros(N: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray, C
     return rate, power
 
 
-def _of_undamped(T: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray, C_size: np.ndarray,
-                 least: float, most: np.ndarray) -> np.ndarray:  # fmt: skip
+def _of_undamped(
+    T: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray, C_size: np.ndarray, least: float, most: np.ndarray
+) -> np.ndarray:
     """Rates (p,): the mean square of the response C e^(T t) G, frequency by frequency; one above ``most`` counts."""
     rate = np.zeros(len(C))
     values, vectors = np.linalg.eig(T)

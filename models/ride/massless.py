@@ -53,8 +53,10 @@ def first_order(
     pull = vehicle.damping @ V
     inert = Y.T @ vehicle.mass @ Y
     A = np.vstack([v_a, _solved(inert, Y.T @ (force - pull @ slow)), slow, path @ f])
-    B = tuple(np.vstack([np.zeros((a, k)), _solved(inert, Y.T @ (d - pull @ s)), s, w])
-              for d, s, w in zip(direct, slow_noise, noise, strict=True))  # fmt: skip
+    B = tuple(
+        np.vstack([np.zeros((a, k)), _solved(inert, Y.T @ (d - pull @ s)), s, w])
+        for d, s, w in zip(direct, slow_noise, noise, strict=True)
+    )
     back = np.linalg.inv(np.hstack([Y, V, E]))
     C, D = _outputs(vehicle, q, A, B, z, rate, [heights @ each for each in noise])
     names = tuple(output.name for output in vehicle.outputs)
@@ -79,11 +81,20 @@ def _split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return vectors[:, on] / scale[:, None], vectors[:, ~on] / scale[:, None]
 
 
-def _outputs(vehicle: LinearVehicle, q: np.ndarray, A: np.ndarray, B: tuple[np.ndarray, ...], z: np.ndarray,
-             rate: np.ndarray, noise: list[np.ndarray]) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:  # fmt: skip
+def _outputs(
+    vehicle: LinearVehicle,
+    q: np.ndarray,
+    A: np.ndarray,
+    B: tuple[np.ndarray, ...],
+    z: np.ndarray,
+    rate: np.ndarray,
+    noise: list[np.ndarray],
+) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
     """C (p, x) and D (p, k) per axle, without rounding; what would see the derivative of white noise has infinite D."""
-    of = {key: np.array([getattr(output, key) for output in vehicle.outputs]) for key in
-          ("acceleration", "rate", "displacement", "road", "road_rate")}  # fmt: skip
+    of = {
+        key: np.array([getattr(output, key) for output in vehicle.outputs])
+        for key in ("acceleration", "rate", "displacement", "road", "road_rate")
+    }
     v = q @ A
     C = of["displacement"] @ q + of["rate"] @ v + of["acceleration"] @ v @ A + of["road"] @ z + of["road_rate"] @ rate
     D = []
@@ -94,5 +105,3 @@ def _outputs(vehicle: LinearVehicle, q: np.ndarray, A: np.ndarray, B: tuple[np.n
         worse = abs(of["acceleration"] @ (q @ b)) > NOTHING * (abs(of["acceleration"]) @ abs(q) @ abs(b))
         D.append(np.where(worse, np.inf, np.where(told, direct, 0.0)))
     return C, tuple(D)
-
-

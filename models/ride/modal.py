@@ -124,8 +124,9 @@ def _joined(block: Modes, coupling: np.ndarray, values: np.ndarray) -> np.ndarra
     return block.V @ ((block.inverse @ coupling) / (values - block.values[:, None]))
 
 
-def _summed(s: np.ndarray, C: np.ndarray, inputs: list[np.ndarray], delays: list[float], independent: bool,
-            condition: float) -> Modal | str:  # fmt: skip
+def _summed(
+    s: np.ndarray, C: np.ndarray, inputs: list[np.ndarray], delays: list[float], independent: bool, condition: float
+) -> Modal | str:
     """Variances of y = C x, x_m' = s_m x_m + noise through the inputs, hit after hit."""
     before = np.zeros_like(inputs[0])
     Q = np.zeros((len(s), len(s)), complex)

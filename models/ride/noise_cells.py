@@ -28,8 +28,14 @@ class Nodes:
     step: np.ndarray
 
 
-def steps(profile: SpeedProfile, begin: float, instants: Sequence[float] | np.ndarray, motion: float, road: float,
-          reach: float) -> np.ndarray:  # fmt: skip
+def steps(
+    profile: SpeedProfile,
+    begin: float,
+    instants: Sequence[float] | np.ndarray,
+    motion: float,
+    road: float,
+    reach: float,
+) -> np.ndarray:
     """Ends (N + 1,) of steps (s) from ``begin`` to the profile's end; its points and ``instants`` are among them.
 
     A step times the fastest rate of the motion (1/s) and of the road met (``road`` in 1/m) is at most ``reach``.

@@ -88,8 +88,16 @@ class Copies:
         return second - 2 * self.mean * first + self.mean**2
 
 
-def copies_in_time(vehicle: SpatialVehicle, excitation: Excitation, speed: float, duration: float, *,
-                   copies: int = 500, seed: int = 0, longest: float | None = None) -> Copies:  # fmt: skip
+def copies_in_time(
+    vehicle: SpatialVehicle,
+    excitation: Excitation,
+    speed: float,
+    duration: float,
+    *,
+    copies: int = 500,
+    seed: int = 0,
+    longest: float | None = None,
+) -> Copies:
     """Run the copies for ``duration`` (s) after they have forgotten their beginning.
 
     longest : largest step (s); by itself it comes from the fastest rates.
@@ -105,8 +113,9 @@ def copies_in_time(vehicle: SpatialVehicle, excitation: Excitation, speed: float
         march.over(portion[: 2 * left + 1], _first(settling, number * BLOCK))
         if left <= BLOCK:
             break
-    return Copies(march.names, march.sums.swapaxes(1, 2) / len(range(0, counted, EVERY)), road.step,
-                  counted * road.step)  # fmt: skip
+    return Copies(
+        march.names, march.sums.swapaxes(1, 2) / len(range(0, counted, EVERY)), road.step, counted * road.step
+    )
 
 
 class March:
@@ -188,11 +197,22 @@ def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[Spring
     motion = np.linalg.solve(plain.mass, np.hstack(forced))
     own = [*(("force", s.name) for s in springs), *(("tyre force", tyre.name) for tyre in pushing)]
     read = np.array([[float((o.kind, _part(o)) == force) for force in own] for o in vehicle.outputs])
-    read = np.hstack([[np.concatenate([o.displacement, o.rate, o.road, o.road_rate, o.acceleration])
-                       for o in plain.outputs], read.reshape(len(plain.outputs), -1)])  # fmt: skip
+    read = np.hstack(
+        [
+            [np.concatenate([o.displacement, o.rate, o.road, o.road_rate, o.acceleration]) for o in plain.outputs],
+            read.reshape(len(plain.outputs), -1),
+        ]
+    )
     friction = np.array([(s.friction, s.friction_rate) for s in springs]).reshape(-1, 2)
-    return Laws(rows, motion, read, *_hinges([[s.travel_force, s.rate_force] for s in springs]), friction, heights,
-                _of_tyres(vehicle, pushing))  # fmt: skip
+    return Laws(
+        rows,
+        motion,
+        read,
+        *_hinges([[s.travel_force, s.rate_force] for s in springs]),
+        friction,
+        heights,
+        _of_tyres(vehicle, pushing),
+    )
 
 
 def _part(output: SpatialOutput) -> str:

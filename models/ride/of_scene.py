@@ -60,21 +60,33 @@ def vehicle_of(scene: RideScene) -> SpatialVehicle:
 
 
 def _built(scene: RideScene) -> Built:
-    return extended(Built(load_vehicle(scene.vehicle.file, scene.folder, scene.file, "vehicle.file",
-                                       reduced=scene.study == CLOSED)), scene)
+    return extended(
+        Built(
+            load_vehicle(scene.vehicle.file, scene.folder, scene.file, "vehicle.file", reduced=scene.study == CLOSED)
+        ),
+        scene,
+    )
 
 
 def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:
     """Refuse curves and friction where nobody has said that their slopes at rest shall stand for them, and tyres that
     may lift."""
     if vehicle.lifts:
-        raise InputError(scene.file, "effects.lift_off", None, "has no covariance: use the study ride_nonlinear, whose "
-                         "copies and engines run in time, or leave it out")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "effects.lift_off",
+            None,
+            "has no covariance: use the study ride_nonlinear, whose copies and engines run in time, or leave it out",
+        )
     bent = [s.name for s in vehicle.springs if s.travel_force or s.rate_force or s.friction]
     if bent and not scene.vehicle.small_motion:
-        raise InputError(scene.file, "vehicle.file", scene.vehicle.file,
-                         f"has curves or friction ({', '.join(bent)}), whose slopes at rest can be 60 % wrong: "
-                         "use the study ride_nonlinear, or say vehicle.small_motion = true")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "vehicle.file",
+            scene.vehicle.file,
+            f"has curves or friction ({', '.join(bent)}), whose slopes at rest can be 60 % wrong: "
+            "use the study ride_nonlinear, or say vehicle.small_motion = true",
+        )
 
 
 def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear:
@@ -96,11 +108,14 @@ def road_of(scene: RideScene, wheels: tuple[Wheel, ...]) -> TwoTrackRoad:
         fitted = fitted_road(scene).road
         return TwoTrackRoad(replace(fitted.mean, cutoff=road.cutoff), replace(fitted.roll, cutoff=road.cutoff))
     if road.q_mean is not None and road.q_roll is not None:
-        return TwoTrackRoad(ShapeFilter(road.corner_mean, road.q_mean, road.cutoff),
-                            ShapeFilter(road.corner_roll, road.q_roll, road.cutoff))  # fmt: skip
+        return TwoTrackRoad(
+            ShapeFilter(road.corner_mean, road.q_mean, road.cutoff),
+            ShapeFilter(road.corner_roll, road.q_roll, road.cutoff),
+        )
     level = road.level if road.iso8608 is None else level_of_class(road.iso8608)
-    return road_of_level(half_track_of(scene, wheels), level, corners=(road.corner_mean, road.corner_roll),
-                         cutoff=road.cutoff)  # fmt: skip
+    return road_of_level(
+        half_track_of(scene, wheels), level, corners=(road.corner_mean, road.corner_roll), cutoff=road.cutoff
+    )
 
 
 def fitted_road(scene: RideScene) -> "FittedRoad":

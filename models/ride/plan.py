@@ -69,8 +69,10 @@ def met(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[str, str]:
     place = "its own place" if road.wheels == "own" else "that of the front wheel on its side"
     if len({wheel.y for wheel in placed}) == 1:
         place = f"{placed[0].y:g} m for all: one track"
-    return (f"left and right {road.left_right}: {LEFT_RIGHT[road.left_right]}; y is {place}",
-            f"axles {road.front_rear}: {FRONT_REAR[road.front_rear]}")  # fmt: skip
+    return (
+        f"left and right {road.left_right}: {LEFT_RIGHT[road.left_right]}; y is {place}",
+        f"axles {road.front_rear}: {FRONT_REAR[road.front_rear]}",
+    )
 
 
 def _line(head: str, text: str) -> str:
@@ -124,8 +126,10 @@ def doubts(vehicle: SpatialVehicle) -> list[str]:
     if not odd:
         return []
     listed = ", ".join(f"{f:.3g}" for f in odd[:4])
-    return [f"is every value in SI units (kg, m, N/m)? Without damping the vehicle has frequencies of {listed} Hz; "
-            f"those of road vehicles lie from {USUAL[0]:g} to {USUAL[1]:g} Hz"]  # fmt: skip
+    return [
+        f"is every value in SI units (kg, m, N/m)? Without damping the vehicle has frequencies of {listed} Hz; "
+        f"those of road vehicles lie from {USUAL[0]:g} to {USUAL[1]:g} Hz"
+    ]
 
 
 def _speed(scene: RideScene) -> str:

@@ -53,16 +53,25 @@ def road_in_path(
     steady, by_speed = 2.0 * one.A - two.A, two.A - one.A
     A = steady[np.ix_(rest, rest)]
     known = np.linalg.pinv(np.hstack([excitation.F, excitation.G]))
-    T = np.hstack([
-        np.hstack([by_speed[np.ix_(rest, at)], B[rest]]) @ known
-        for at, B in zip(road.reshape(axles, m), one.B, strict=True)
-    ])  # fmt: skip
+    T = np.hstack(
+        [
+            np.hstack([by_speed[np.ix_(rest, at)], B[rest]]) @ known
+            for at, B in zip(road.reshape(axles, m), one.B, strict=True)
+        ]
+    )
     basis = np.zeros_like(one.A)
     basis[rest, : len(rest)], basis[road, len(rest) :] = np.eye(len(rest)), np.eye(len(road))
     basis[np.ix_(rest, np.arange(len(rest), len(basis)))] = T
     inputs = steady[np.ix_(rest, road)] + A @ T
-    return RoadInPath(A, inputs.reshape(-1, axles, m), basis, (2.0 * one.C - two.C) @ basis, (two.C - one.C) @ basis,
-                      one.names, excitation)  # fmt: skip
+    return RoadInPath(
+        A,
+        inputs.reshape(-1, axles, m),
+        basis,
+        (2.0 * one.C - two.C) @ basis,
+        (two.C - one.C) @ basis,
+        one.names,
+        excitation,
+    )
 
 
 def at_speed(

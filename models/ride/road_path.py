@@ -66,8 +66,9 @@ class RoadPath:
             yield self._under(F, heights, met, lags, 2 * steps + 1)
             met, path = met[2 * steps :], path + 1
 
-    def _under(self, F: np.ndarray, heights: Sequence[np.ndarray], met: np.ndarray, lags: np.ndarray,
-               count: int) -> np.ndarray:  # fmt: skip
+    def _under(
+        self, F: np.ndarray, heights: Sequence[np.ndarray], met: np.ndarray, lags: np.ndarray, count: int
+    ) -> np.ndarray:
         """Heights and rates (count, 2 w, copies) of what the filters met, every axle after its lag."""
         out = np.zeros((count, 2 * len(heights[0]), met.shape[2]))
         for lag, H in zip(lags, heights, strict=True):
@@ -80,8 +81,13 @@ class RoadPath:
 def check_rates(vehicle: SpatialVehicle, excitation: Excitation, file: str = "") -> None:
     """Raise InputError for damped tyres on a road whose heights have no rates: a run in time cannot read them."""
     if any(tyre.damping for tyre in vehicle.tyres) and not RoadPath(excitation, 1.0, 1.0).has_rates:
-        raise InputError(file, "road.cutoff", None, "is missing: damped tyres see the road's rate, which without "
-                         "a second corner is white noise and has no values in time")  # fmt: skip
+        raise InputError(
+            file,
+            "road.cutoff",
+            None,
+            "is missing: damped tyres see the road's rate, which without "
+            "a second corner is white noise and has no values in time",
+        )
 
 
 def road_path(excitation: Excitation, speed: float, longest: float) -> RoadPath:

@@ -39,7 +39,8 @@ class Road(Strict):
 
     level: float = quantity("m", "S0: a track's spectrum tends to S0 / Omega^2, two-sided", default=LEVEL)
     iso8608: Literal["A", "B", "C", "D", "E", "F", "G", "H"] | None = Field(
-        default=None, description="class instead of a level: its mean, one-sided as the standard has it")
+        default=None, description="class instead of a level: its mean, one-sided as the standard has it"
+    )
     q_mean: float | None = quantity("m", "intensity of the mean process instead of a level", default=None, zero=True)
     q_roll: float | None = quantity("1/m", "intensity of the roll process", default=None, zero=True)
     corner_mean: float = quantity("rad/m", "corner of the mean process", default=MEAN_CORNER)

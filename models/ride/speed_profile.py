@@ -19,8 +19,13 @@ class SpeedProfile:
         if len(self.times) != len(self.speeds) or len(self.times) < 2:
             sizes = f"{len(self.times)} times, {len(self.speeds)} speeds"
             raise InputError(file, place, sizes, "must be a table of two points or more, a time and a speed each")
-        _check(self.speeds, (self.speeds >= 0.0) & np.isfinite(self.speeds), f"{place}.speed",
-               "must be 0 or above, in m/s: the road is met from one side only", file)  # fmt: skip
+        _check(
+            self.speeds,
+            (self.speeds >= 0.0) & np.isfinite(self.speeds),
+            f"{place}.speed",
+            "must be 0 or above, in m/s: the road is met from one side only",
+            file,
+        )
         rises = np.append(True, np.diff(self.times) > 0.0) & np.isfinite(self.times)
         _check(self.times, rises, f"{place}.time", "must rise from point to point, in s", file)
         pieces = np.diff(self.times)

@@ -95,8 +95,9 @@ def bent(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
     return tuple(s for s in vehicle.springs if s.travel_force or s.rate_force or s.friction)
 
 
-def statistically_linear(vehicle: SpatialVehicle, excitation: Excitation, speed: float,
-                         scale: float = 1.0) -> StatisticallyLinear:  # fmt: skip
+def statistically_linear(
+    vehicle: SpatialVehicle, excitation: Excitation, speed: float, scale: float = 1.0
+) -> StatisticallyLinear:
     """Replace the bent springs of a vehicle on a road at a constant speed (m/s).
 
     scale : of the travels and rates that the first gains are taken at. Where different ones lead to different fixed
@@ -105,8 +106,12 @@ def statistically_linear(vehicle: SpatialVehicle, excitation: Excitation, speed:
     Raises Unstable where a replaced vehicle leaves its equilibrium on its own, RunFailed where no fixed point is found.
     """
     if vehicle.lifts:
-        raise InputError(vehicle.name, "tyres", None, "may lift, and no linear vehicle stands for that: take copies in "
-                         "time, or tyres that stay on the road")  # fmt: skip
+        raise InputError(
+            vehicle.name,
+            "tyres",
+            None,
+            "may lift, and no linear vehicle stands for that: take copies in time, or tyres that stay on the road",
+        )
     return _Search(vehicle, excitation, speed).found(scale)
 
 
@@ -144,8 +149,11 @@ class _Search:
             wanted = self._gains(moments)
             changes.append(_largest(wanted, gains))
             if len(changes) >= MOST:
-                raise RunFailed("statistical linearisation", f"gains still change by {changes[-1]:.1e} after {MOST} "
-                                "iterations: the vehicle has no one way to move on this road")  # fmt: skip
+                raise RunFailed(
+                    "statistical linearisation",
+                    f"gains still change by {changes[-1]:.1e} after {MOST} "
+                    "iterations: the vehicle has no one way to move on this road",
+                )
             if len(changes) > 1 and changes[-1] > 0.9 * changes[-2] and changes[-1] > SETTLED:
                 part = max(0.5 * part, 0.1)
             gains = gains + part * (wanted - gains)
@@ -184,8 +192,9 @@ class _Search:
                 return position
         raise RunFailed("statistical linearisation", "no mean position balances the mean forces of the bent springs")
 
-    def _result(self, gains: np.ndarray, moments: _Moments, position: np.ndarray,
-                changes: list[float]) -> StatisticallyLinear:  # fmt: skip
+    def _result(
+        self, gains: np.ndarray, moments: _Moments, position: np.ndarray, changes: list[float]
+    ) -> StatisticallyLinear:
         linear = self._replaced(gains, self.vehicle)
         system = excited(linear, self.excitation, self.speed)
         covariance = stationary(system)
@@ -193,16 +202,23 @@ class _Search:
         springs = {s.name: self._spring(i, gains[i], moments) for i, s in enumerate(self.springs)}
         told = zip(covariance.names, left, covariance.status, strict=True)
         sentences = tuple(_sentence(*each) for each in told)
-        return StatisticallyLinear(linear, system, covariance, self._means(springs, linear, position), springs, left,
-                                   sentences, tuple(changes))  # fmt: skip
+        return StatisticallyLinear(
+            linear, system, covariance, self._means(springs, linear, position), springs, left, sentences, tuple(changes)
+        )
 
     def _spring(self, i: int, gains: np.ndarray, moments: _Moments) -> BentSpring:
         s, mean, d, r = self.springs[i], float(moments.mean[i]), float(moments.travel[i]), float(moments.rate[i])
         travel, rate = of_travel(s, mean, d), of_rate(s, r)
         lost = travel[2] + rate[2]
         total = lost + (gains[0] * d) ** 2 + (gains[1] * r) ** 2
-        return BentSpring((float(gains[0]), float(gains[1])), mean, d, r, s.stiffness * mean + travel[0] + rate[0],
-                          float(lost / total) if total else 0.0)  # fmt: skip
+        return BentSpring(
+            (float(gains[0]), float(gains[1])),
+            mean,
+            d,
+            r,
+            s.stiffness * mean + travel[0] + rate[0],
+            float(lost / total) if total else 0.0,
+        )
 
     def _means(self, springs: dict[str, BentSpring], linear: LinearVehicle, position: np.ndarray) -> np.ndarray:
         """Means (p,) of the outputs; the force of a bent spring is not its gain times its mean travel."""
@@ -212,8 +228,9 @@ class _Search:
                 means[i] = springs[spec.part].force
         return means
 
-    def _left_out(self, gains: np.ndarray, linear: LinearVehicle, moments: _Moments, system: DelayedSystem,
-                  covariance: Covariance) -> np.ndarray:  # fmt: skip
+    def _left_out(
+        self, gains: np.ndarray, linear: LinearVehicle, moments: _Moments, system: DelayedSystem, covariance: Covariance
+    ) -> np.ndarray:
         """Shares (p,) of the outputs' variances that the left-out forces would add, each law's by itself."""
         if not self.springs:
             return np.zeros(len(linear.outputs))
@@ -232,8 +249,12 @@ class _Search:
     def _own_forces(self) -> np.ndarray:
         """(p, 2 springs): outputs that read the force of a bent spring itself."""
         names = [s.name for s in self.springs] * 2
-        return np.array([[float(isinstance(spec, PartOutput) and spec.kind == "force" and spec.part == name)
-                          for name in names] for spec in self.vehicle.outputs])  # fmt: skip
+        return np.array(
+            [
+                [float(isinstance(spec, PartOutput) and spec.kind == "force" and spec.part == name) for name in names]
+                for spec in self.vehicle.outputs
+            ]
+        )
 
 
 def _ratio(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
@@ -244,8 +265,10 @@ def _ratio(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
 def _forced(linear: LinearVehicle, rows: np.ndarray, own: np.ndarray) -> LinearVehicle:
     """The vehicle with forces along rows (f, n) in the place of the road's heights; ``own`` (p, f): read at once."""
     none = np.zeros(len(rows))
-    outputs = tuple(Output(o.name, o.unit, o.kind, o.acceleration, o.rate, o.displacement, read, none)
-                    for o, read in zip(linear.outputs, own, strict=True))  # fmt: skip
+    outputs = tuple(
+        Output(o.name, o.unit, o.kind, o.acceleration, o.rate, o.displacement, read, none)
+        for o, read in zip(linear.outputs, own, strict=True)
+    )
     wheels = tuple(Wheel(str(i), 0.0, 0.0, 0) for i in range(len(rows)))
     return replace(linear, road_stiffness=-rows.T, road_damping=np.zeros(rows.T.shape), wheels=wheels, outputs=outputs)
 
@@ -264,8 +287,10 @@ def _sentence(name: str, share: float, status: str) -> str:
     for most, error, shape in GRADES:
         if share <= most:
             return said + f"its deviation is good to {100 * error:.0f} %, and {shape}"
-    return said + (f"the covariance is no longer good (deviations were found up to {100 * BEYOND:.0f} % off, and far "
-                   "from Gaussian): take Monte Carlo")  # fmt: skip
+    return said + (
+        f"the covariance is no longer good (deviations were found up to {100 * BEYOND:.0f} % off, and far "
+        "from Gaussian): take Monte Carlo"
+    )
 
 
 def promised(share: float) -> float:

@@ -42,9 +42,14 @@ class Sweep:
         return self.deviation[self.cases.index(case), :, self.outputs.index(output)]
 
 
-def sweep(vehicle: Callable[[float], LinearVehicle], excitations: Mapping[str, Excitation],
-          speeds: Sequence[float] | np.ndarray, filters: Mapping[str, str] | None = None,
-          accuracy: float = ACCURACY, fast: bool = True) -> Sweep:  # fmt: skip
+def sweep(
+    vehicle: Callable[[float], LinearVehicle],
+    excitations: Mapping[str, Excitation],
+    speeds: Sequence[float] | np.ndarray,
+    filters: Mapping[str, str] | None = None,
+    accuracy: float = ACCURACY,
+    fast: bool = True,
+) -> Sweep:
     """Stationary variances of a vehicle, given as a function of the speed (m/s), on each road at each speed.
 
     filters : weightings by output, as ``weighted`` takes them. fast : False sends every point the direct way.
@@ -83,8 +88,9 @@ ASKED = "asked for"
 """Reason of a direct answer that was wanted."""
 
 
-def _quick(system: DelayedSystem, states: int, excitation: Excitation, speed: float, shared: Shared,
-           accuracy: float) -> tuple[np.ndarray, tuple[str, ...], tuple[str, ...]] | str:  # fmt: skip
+def _quick(
+    system: DelayedSystem, states: int, excitation: Excitation, speed: float, shared: Shared, accuracy: float
+) -> tuple[np.ndarray, tuple[str, ...], tuple[str, ...]] | str:
     """Variance, status and reason of every output by the fast route, or why it cannot be trusted here."""
     quick = modal(system, states, excitation.F, speed, shared)
     if isinstance(quick, str):

@@ -22,8 +22,9 @@ PER_LOBE = 8
 TOGETHER = 2000
 
 
-def standard_errors(vehicle: LinearVehicle, excitation: Excitation, speed: float,
-                    duration: float) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+def standard_errors(
+    vehicle: LinearVehicle, excitation: Excitation, speed: float, duration: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Standard errors (p,) of an output's mean, and of its mean square, over a time of ``duration`` (s)."""
     step = 2.0 * np.pi / duration / PER_LOBE
     omega = step * (np.arange(int(2.0 * np.pi * HIGHEST / step)) + 0.5)

@@ -111,8 +111,9 @@ def varying_speed(
         seen.append(_seen(form, P, float(profile.speed(np.array(end))), status))
     deviation, height = np.split(np.sqrt(seen), [len(status)], axis=1)
     at = np.array(time)
-    return VaryingSpeed(form.names, status, at, profile.path(at), profile.speed(at), deviation, height,
-                        form.basis @ P @ form.basis.T)  # fmt: skip
+    return VaryingSpeed(
+        form.names, status, at, profile.path(at), profile.speed(at), deviation, height, form.basis @ P @ form.basis.T
+    )
 
 
 def quasi_stationary(
@@ -139,8 +140,9 @@ def quasi_stationary(
     return found[which]
 
 
-def _moments(form: RoadInPath, profile: SpeedProfile, P: np.ndarray, instants: Sequence[float] | np.ndarray,
-             reach: float) -> Iterator[tuple[float, np.ndarray]]:  # fmt: skip
+def _moments(
+    form: RoadInPath, profile: SpeedProfile, P: np.ndarray, instants: Sequence[float] | np.ndarray, reach: float
+) -> Iterator[tuple[float, np.ndarray]]:
     """End of each step of the drive and the covariance there, from P at its beginning on.
 
     Where the vehicle moves from the beginning, the steps begin earlier: the first axle is ahead of the last one.
@@ -237,8 +239,13 @@ def _met_before(form: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
 def _rest(form: RoadInPath) -> np.ndarray:
     """State (y, f) of a vehicle at rest over the states f of its road: (n + a m, a m)."""
     if np.linalg.cond(form.A) > 1.0 / (1e3 * np.finfo(float).eps):
-        raise InputError("", "drive.speed.0", 0.0, "must be above 0: this vehicle has a motion that nothing pulls "
-                         "back, so it knows no state of rest to begin in")  # fmt: skip
+        raise InputError(
+            "",
+            "drive.speed.0",
+            0.0,
+            "must be above 0: this vehicle has a motion that nothing pulls "
+            "back, so it knows no state of rest to begin in",
+        )
     inputs = form.inputs.reshape(len(form.A), -1)
     return np.vstack([-np.linalg.solve(form.A, inputs), np.eye(inputs.shape[1])])
 

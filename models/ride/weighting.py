@@ -62,9 +62,7 @@ class Weighting:
 
 
 def weighting(
-    name: str,
-    transition: tuple[float, float, float] | None,
-    step: tuple[float, float, float, float] | None = None,
+    name: str, transition: tuple[float, float, float] | None, step: tuple[float, float, float, float] | None = None
 ) -> Weighting:
     """Weighting from the standard's parameters: transition (f3, f4, Q4), step (f5, Q5, f6, Q6); Hz.
 

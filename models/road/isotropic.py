@@ -101,9 +101,14 @@ def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence
 
     def part(k: float) -> float:
         along = quad(
-            lambda x: covariance(math.hypot(x, distance)) / scale, 0.0, math.inf, weight="cos", wvar=k, epsabs=1e-12,
+            lambda x: covariance(math.hypot(x, distance)) / scale,
+            0.0,
+            math.inf,
+            weight="cos",
+            wvar=k,
+            epsabs=1e-12,
             limlst=500,
-        )  # fmt: skip
+        )
         return float(along[0]) * scale / math.pi
 
     return np.array([part(k) for k in wavenumber])

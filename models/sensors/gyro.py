@@ -21,8 +21,9 @@ DEGREES_PER_ROOT_HOUR = math.pi / 180 / 60
 """In rad per sqrt(s)."""
 
 
-def bias(count: int, period: float, turn_on: float, instability: float, correlation_time: float, seed: int,
-         path: int) -> np.ndarray:  # fmt: skip
+def bias(
+    count: int, period: float, turn_on: float, instability: float, correlation_time: float, seed: int, path: int
+) -> np.ndarray:
     """Bias (count,) in rad/s at samples ``period`` (s) apart, one path of the process.
 
     turn_on, instability : standard deviations (rad/s); correlation_time : tau (s). The recursion over a period is
@@ -38,8 +39,9 @@ def bias(count: int, period: float, turn_on: float, instability: float, correlat
     return turn_on * drawn[0] + instability * lfilter([1.0], [1.0, -kept], kicks)
 
 
-def angle_variance(time: np.ndarray, walk: float, turn_on: float, instability: float,
-                   correlation_time: float) -> np.ndarray:  # fmt: skip
+def angle_variance(
+    time: np.ndarray, walk: float, turn_on: float, instability: float, correlation_time: float
+) -> np.ndarray:
     """Variance (rad^2) of the integrated angle's error after ``time`` (s), any shape.
 
     s^2 t + turn_on^2 t^2 + 2 instability^2 tau^2 (t/tau - 1 + exp(-t/tau)); the last bracket is written as

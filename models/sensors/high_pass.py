@@ -16,8 +16,13 @@ def check_cut_off(count: int, period: float, cut_off: float, file: str = "", pla
     if not 0 < cut_off < 0.5 / period:
         raise InputError(file, place, cut_off, f"the cut-off must lie between 0 and {0.5 / period:g} Hz")
     if count <= round(1 / (cut_off * period)):
-        raise InputError(file, place, cut_off, f"a record of {(count - 1) * period:g} s is shorter than one period of "
-                         f"the cut-off, {1 / cut_off:g} s: raise the cut-off")
+        raise InputError(
+            file,
+            place,
+            cut_off,
+            f"a record of {(count - 1) * period:g} s is shorter than one period of "
+            f"the cut-off, {1 / cut_off:g} s: raise the cut-off",
+        )
 
 
 def high_pass(values: np.ndarray, period: float, cut_off: float) -> np.ndarray:

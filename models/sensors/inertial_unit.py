@@ -28,8 +28,9 @@ def random_walk(deviation: float, rate: float) -> float:
     return deviation / rate**0.5
 
 
-def measured_attitude(rates: np.ndarray, period: float, deviation: np.ndarray, start: np.ndarray, paths: range,
-                      seed: int = 0) -> np.ndarray:  # fmt: skip
+def measured_attitude(
+    rates: np.ndarray, period: float, deviation: np.ndarray, start: np.ndarray, paths: range, seed: int = 0
+) -> np.ndarray:
     """Quaternions (n + 1, paths, 4) that noisy rates give, held over each period and integrated by exact rotations.
 
     rates : true local rates (n, 3) in rad/s, one for each period (s); deviation : (3,) in rad/s per sample, each axis

@@ -25,8 +25,9 @@ class _Rates(ExtendedKalmanFilter):
         self.x += u
 
 
-def filter_rates(found: Spin, period: float, start: np.ndarray, noise: float,
-                 deviation: float = 0.0) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+def filter_rates(
+    found: Spin, period: float, start: np.ndarray, noise: float, deviation: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     """Local rates (n, 3) in rad/s and their stated standard deviations (n, 3).
 
     start : (3,) rad/s at the first sample, known to ``deviation`` (rad/s); noise : standard deviation of each
@@ -34,8 +35,12 @@ def filter_rates(found: Spin, period: float, start: np.ndarray, noise: float,
     filter leaves out: between neighbouring predictions, and between a prediction and the measurement after it.
     """
     if not noise > 0:
-        raise InputError("", "noise", noise, "the standard deviation of the readings must be above 0 (m/s^2): it "
-                         "weighs integration against measurement")
+        raise InputError(
+            "",
+            "noise",
+            noise,
+            "the standard deviation of the readings must be above 0 (m/s^2): it weighs integration against measurement",
+        )
     frame, planar = found.array.frame, found.array.planar
     pairs = PAIRS[: 3 if planar else 6]
     indices = tuple(np.array(pairs).T)

@@ -100,9 +100,12 @@ def spin(array: SensorArray, readings: np.ndarray) -> Spin:
         raise InputError("", "readings", str(readings.shape), f"must have the shape (n, {len(array.names)}, 3)")
     if not np.isfinite(readings).all():
         sample, sensor, axis = np.argwhere(~np.isfinite(readings))[0]
-        raise InputError("", f"sensor {array.names[sensor]}, sample {sample} along {'xyz'[axis]}",
-                         float(readings[sample, sensor, axis]),
-                         "must be a finite number: repair it or leave the sensor out")
+        raise InputError(
+            "",
+            f"sensor {array.names[sensor]}, sample {sample} along {'xyz'[axis]}",
+            float(readings[sample, sensor, axis]),
+            "must be a finite number: repair it or leave the sensor out",
+        )
     local = readings - readings.mean(axis=1, keepdims=True)
     relative = np.einsum("ji,nsj->nis", array.frame, local)
     return Spin(array, relative @ array.weights, relative)
@@ -237,9 +240,17 @@ def integrate_rates(found: Spin, period: float, start: np.ndarray) -> np.ndarray
     return np.column_stack([c.real, c.imag, w3]) @ found.array.frame.T
 
 
-def motion(array: SensorArray, readings: np.ndarray, period: float, start: Start | None = None, gravity: float = 9.81,
-           zeroed: bool = False, rates: np.ndarray | None = None, turning_cut_off: float | None = None,
-           position_cut_off: float | None = None) -> Motion:  # fmt: skip
+def motion(
+    array: SensorArray,
+    readings: np.ndarray,
+    period: float,
+    start: Start | None = None,
+    gravity: float = 9.81,
+    zeroed: bool = False,
+    rates: np.ndarray | None = None,
+    turning_cut_off: float | None = None,
+    position_cut_off: float | None = None,
+) -> Motion:
     """Motion of the body's reference point and axes, steps 1 to 6 of the paper.
 
     readings : (n, sensors, 3) in m/s^2, local; specific force, or with ``zeroed`` set to zero at rest on level
@@ -264,8 +275,14 @@ def motion(array: SensorArray, readings: np.ndarray, period: float, start: Start
     return Motion(alpha, w, orientation, acceleration, velocity, position)
 
 
-def reference_acceleration(array: SensorArray, readings: np.ndarray, orientation: np.ndarray, alpha: np.ndarray,
-                           rates: np.ndarray, down: np.ndarray) -> np.ndarray:  # fmt: skip
+def reference_acceleration(
+    array: SensorArray,
+    readings: np.ndarray,
+    orientation: np.ndarray,
+    alpha: np.ndarray,
+    rates: np.ndarray,
+    down: np.ndarray,
+) -> np.ndarray:
     """Acceleration (n, 3) in m/s^2, global, of the reference point: the mean over all sensors, eq. (23)."""
     lever = (skew(alpha) + skew(rates) @ skew(rates)) @ array.positions.mean(axis=0)
     return np.einsum("nij,nj->ni", matrix(orientation), readings.mean(axis=1) - lever) + down

@@ -35,9 +35,14 @@ class GimbalLock(InputError):
 
     def __init__(self, sample: int, pitch: float) -> None:
         self.sample, self.pitch = sample, pitch
-        super().__init__("", f"orientation, sample {sample}", None, "gimbal lock: at a pitch of "
-                         f"{np.degrees(pitch):.6g} degrees roll and yaw turn about the same axis; use the quaternion "
-                         "or the matrix")
+        super().__init__(
+            "",
+            f"orientation, sample {sample}",
+            None,
+            "gimbal lock: at a pitch of "
+            f"{np.degrees(pitch):.6g} degrees roll and yaw turn about the same axis; use the quaternion "
+            "or the matrix",
+        )
 
 
 def skew(v: np.ndarray) -> np.ndarray:
@@ -104,8 +109,13 @@ def _check_turned(rates: np.ndarray, period: float) -> None:
     """Refuse rates that say too little of what lies between their samples."""
     fastest = float(np.linalg.norm(rates, axis=-1).max())
     if fastest * period > HALF:
-        raise InputError("", "rates", fastest, f"must be at most {HALF / period:.4g} rad/s for samples every "
-                         f"{period:g} s, half a turn from one to the next: are they in degrees?")
+        raise InputError(
+            "",
+            "rates",
+            fastest,
+            f"must be at most {HALF / period:.4g} rad/s for samples every "
+            f"{period:g} s, half a turn from one to the next: are they in degrees?",
+        )
 
 
 def integrals(values: np.ndarray, period: float) -> np.ndarray:
@@ -141,8 +151,12 @@ def _chain(start, steps):
         found[0, j] = start[j]
         for i in range(steps.shape[0]):
             e, f, g, h = steps[i, j]
-            a, b, c, d = (a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
-                          a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e)  # fmt: skip
+            a, b, c, d = (
+                a * e - b * f - c * g - d * h,
+                a * f + b * e + c * h - d * g,
+                a * g - b * h + c * e + d * f,
+                a * h + b * g - c * f + d * e,
+            )
             size = np.sqrt(a * a + b * b + c * c + d * d)
             a, b, c, d = a / size, b / size, c / size, d / size
             found[i + 1, j, 0], found[i + 1, j, 1], found[i + 1, j, 2], found[i + 1, j, 3] = a, b, c, d
@@ -168,8 +182,9 @@ def from_matrix(s: np.ndarray) -> np.ndarray:
 def from_cardan(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> np.ndarray:
     """Unit quaternions (..., 4) of S = Rz(yaw) Ry(pitch) Rx(roll), all in rad."""
     axes = np.eye(3)
-    parts = [exponential(np.asarray(angle, dtype=float)[..., None] * axes[i])
-             for i, angle in enumerate((roll, pitch, yaw))]  # fmt: skip
+    parts = [
+        exponential(np.asarray(angle, dtype=float)[..., None] * axes[i]) for i, angle in enumerate((roll, pitch, yaw))
+    ]
     return product(product(parts[2], parts[1]), parts[0])
 
 

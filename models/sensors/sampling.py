@@ -24,8 +24,10 @@ def check_rate(scene: Scene, place: str, rate: float) -> None:
     for engine in CATALOGUE:
         step = float(scene.settings(engine).step or 0)
         if not divides(step, 1 / rate):
-            allowed = (f"its period {1 / rate:g} s must be a multiple of {engine}'s step {step:g} s; use a step of "
-                       f"{fitting(step, 1 / rate)} s or another rate")  # fmt: skip
+            allowed = (
+                f"its period {1 / rate:g} s must be a multiple of {engine}'s step {step:g} s; use a step of "
+                f"{fitting(step, 1 / rate)} s or another rate"
+            )
             raise InputError(scene.file, place, rate, allowed)
 
 

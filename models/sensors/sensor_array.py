@@ -76,9 +76,11 @@ class SensorArray:
         lines = [f"{len(self.names)} sensors, spread {spreads} m along their principal directions"]
         if self.planar:
             lies = "lie in a plane" if self.flat else f"lie nearly in a plane (flatness {flatness:.2g})"
-            lines += [f"the sensors {lies} with the normal ({normal}): about axes in that plane the plain formula "
-                      f"{'gives half the angular acceleration plus a bias' if self.flat else self._amplified()}; "
-                      "the formula for a plane is used, integrated together with the rates"]  # fmt: skip
+            lines += [
+                f"the sensors {lies} with the normal ({normal}): about axes in that plane the plain formula "
+                f"{'gives half the angular acceleration plus a bias' if self.flat else self._amplified()}; "
+                "the formula for a plane is used, integrated together with the rates"
+            ]
         gains = ", ".join(f"{value:.2f}" for value in self.gains())
         lines += [f"noise of 1 m/s^2 in the readings gives ({gains}) rad/s^2 in roll, pitch and yaw acceleration"]
         if self.redundancy == 0:
@@ -103,12 +105,21 @@ def sensor_array(positions: Mapping[str, Sequence[float]], formula: Formula = "a
         raise InputError("", "sensors", None, "each position must be three finite numbers x, y, z in m")
     frame, spreads, rows = np.linalg.svd((places - places.mean(axis=0)).T, full_matrices=False)
     if not spreads[1] > LINE * spreads[0]:
-        raise InputError("", "sensors", None, "the sensors lie on a line, about which the body could turn unseen: "
-                         "put one of them elsewhere")
+        raise InputError(
+            "",
+            "sensors",
+            None,
+            "the sensors lie on a line, about which the body could turn unseen: put one of them elsewhere",
+        )
     flat, near = (spreads[2] < limit * spreads[1] for limit in (PLANE, FLAT))
     if formula == "spatial" and flat:
-        raise InputError("", "formula", formula, "the sensors lie in a plane, where this formula gives half of the "
-                         "angular acceleration plus a bias without a word: use 'auto' or 'plane'")
+        raise InputError(
+            "",
+            "formula",
+            formula,
+            "the sensors lie in a plane, where this formula gives half of the "
+            "angular acceleration plus a bias without a word: use 'auto' or 'plane'",
+        )
     up = np.copysign(1.0, frame[np.abs(frame[:, 2]).argmax(), 2])  # the normal along its axis, not against it
     hand = np.array([1.0, up * np.linalg.det(frame), up])  # e1, e2, n right-handed
     weights = (rows.T * hand / np.where(spreads > 0, spreads, 1.0))[:, : 2 if flat else 3]

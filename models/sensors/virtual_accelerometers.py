@@ -5,8 +5,14 @@ import numpy as np
 from models.sensors.rotations import from_cardan, matrix, skew
 
 
-def readings(places: np.ndarray, pitch: np.ndarray, rate: np.ndarray, heave_acceleration: np.ndarray,
-             pitch_acceleration: np.ndarray, gravity: float) -> np.ndarray:  # fmt: skip
+def readings(
+    places: np.ndarray,
+    pitch: np.ndarray,
+    rate: np.ndarray,
+    heave_acceleration: np.ndarray,
+    pitch_acceleration: np.ndarray,
+    gravity: float,
+) -> np.ndarray:
     """Specific forces (n, sensors, 3) in m/s^2, in the chassis' axes (x forward, y right, z down), eqs (16), (17).
 
     places : (sensors, 3) in m from the centre of mass, local; pitch (rad, nose up), its rate and acceleration, and

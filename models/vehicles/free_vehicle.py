@@ -23,8 +23,9 @@ PLANE: tuple[Freedom, ...] = ("x", "y", "rz")
 REST: tuple[Freedom, ...] = ("z", "rx", "ry")
 
 
-def free_vehicle(vehicle: SpatialVehicle, gravity: float = 9.81, spin_inertia: float = 0.0,
-                 fixed: tuple[str, ...] = ()) -> SpatialVehicle:  # fmt: skip
+def free_vehicle(
+    vehicle: SpatialVehicle, gravity: float = 9.81, spin_inertia: float = 0.0, fixed: tuple[str, ...] = ()
+) -> SpatialVehicle:
     """The vehicle on a carrier, bodies in the order of a walk through their tree, without side forces, drag, outputs.
 
     gravity : m/s^2; spin_inertia : kg m^2 of each wheel about its axle, 0 for wheels that do not spin; fixed : tyres
@@ -33,19 +34,28 @@ def free_vehicle(vehicle: SpatialVehicle, gravity: float = 9.81, spin_inertia: f
     chassis = chassis_of(vehicle)
     x, y, _ = chassis.position
     bodies = [Body(CARRIER, 0.0, (0.0, 0.0, 0.0), PLANE), Body(SWAY, 0.0, (x, y, 0.0), REST, parent=CARRIER)]
-    bodies += [replace(body, freedoms=(), parent=SWAY) if body.name == chassis.name else body
-               for body in guided(vehicle, chassis.name).bodies]  # fmt: skip
+    bodies += [
+        replace(body, freedoms=(), parent=SWAY) if body.name == chassis.name else body
+        for body in guided(vehicle, chassis.name).bodies
+    ]
     turning = ((0.0, 0.0, 0.0), (0.0, spin_inertia, 0.0), (0.0, 0.0, 0.0))
-    bodies += [Body(rotor(tyre.name), SPECK, tyre.point, ("ry",), turning, tyre.body)
-               for tyre in vehicle.tyres if spin_inertia and tyre.name not in fixed]  # fmt: skip
+    bodies += [
+        Body(rotor(tyre.name), SPECK, tyre.point, ("ry",), turning, tyre.body)
+        for tyre in vehicle.tyres
+        if spin_inertia and tyre.name not in fixed
+    ]
     bars = tuple(_swaying(bar) if bar.body == chassis.name else bar for bar in vehicle.bars)
     return replace(vehicle, bodies=_walked(bodies), bars=bars, side_forces=(), drags=(), outputs=(), gravity=gravity)
 
 
 def guided(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
     """The vehicle with all that had no parent on its chassis, in whose axes it moves."""
-    return replace(vehicle, bodies=tuple(
-        body if body.parent or body.name == chassis else replace(body, parent=chassis) for body in vehicle.bodies))
+    return replace(
+        vehicle,
+        bodies=tuple(
+            body if body.parent or body.name == chassis else replace(body, parent=chassis) for body in vehicle.bodies
+        ),
+    )
 
 
 def chassis_of(vehicle: SpatialVehicle) -> Body:
@@ -53,8 +63,12 @@ def chassis_of(vehicle: SpatialVehicle) -> Body:
     names = {force.chassis for force in vehicle.side_forces}
     missing = [tyre.name for tyre in vehicle.tyres if tyre.name not in {force.name for force in vehicle.side_forces}]
     if missing or len(names) != 1:
-        raise InputError(vehicle.name, f"tyres[{missing[0]}].cornering" if missing else "chassis", None,
-                         "a vehicle that is steered needs a chassis, and the cornering stiffness of every tyre")
+        raise InputError(
+            vehicle.name,
+            f"tyres[{missing[0]}].cornering" if missing else "chassis",
+            None,
+            "a vehicle that is steered needs a chassis, and the cornering stiffness of every tyre",
+        )
     chassis = vehicle.body(names.pop())
     if chassis.parent is not None or set(chassis.freedoms) != set(FREEDOMS):
         allowed = "a vehicle that is steered needs a chassis with the freedoms x, y, z, rx, ry, rz and without a parent"

@@ -43,11 +43,20 @@ def limited(linear: LinearVehicle, vehicle: "SpatialVehicle", limits: Limits) ->
     M, N = massless(linear.mass, vehicle, limits.massless), _free(vehicle, limits)
     if not N.size:
         raise InputError("", "effects", None, "nothing is left that could move")
-    outputs = tuple(replace(o, acceleration=o.acceleration @ N, rate=o.rate @ N, displacement=o.displacement @ N)
-                    for o in linear.outputs)  # fmt: skip
-    return replace(linear, mass=N.T @ M @ N, damping=N.T @ linear.damping @ N, stiffness=N.T @ linear.stiffness @ N,
-                   road_stiffness=N.T @ linear.road_stiffness, road_damping=N.T @ linear.road_damping,
-                   coordinates=tuple(("", str(i)) for i in range(N.shape[1])), outputs=outputs), N  # fmt: skip
+    outputs = tuple(
+        replace(o, acceleration=o.acceleration @ N, rate=o.rate @ N, displacement=o.displacement @ N)
+        for o in linear.outputs
+    )
+    return replace(
+        linear,
+        mass=N.T @ M @ N,
+        damping=N.T @ linear.damping @ N,
+        stiffness=N.T @ linear.stiffness @ N,
+        road_stiffness=N.T @ linear.road_stiffness,
+        road_damping=N.T @ linear.road_damping,
+        coordinates=tuple(("", str(i)) for i in range(N.shape[1])),
+        outputs=outputs,
+    ), N
 
 
 def massless(mass: np.ndarray, vehicle: "SpatialVehicle", names: frozenset[str]) -> np.ndarray:
@@ -56,8 +65,9 @@ def massless(mass: np.ndarray, vehicle: "SpatialVehicle", names: frozenset[str])
 
     if not names:
         return mass
-    light = tuple(replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in names else body
-                  for body in vehicle.bodies)  # fmt: skip
+    light = tuple(
+        replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in names else body for body in vehicle.bodies
+    )
     return mass_of(replace(vehicle, bodies=light))
 
 
@@ -67,6 +77,9 @@ def _free(vehicle: "SpatialVehicle", limits: Limits) -> np.ndarray:
 
     coordinates, motion = vehicle.coordinates(), Kinematics(vehicle)
     kept = np.eye(len(coordinates))[:, [c not in limits.locked for c in coordinates]]
-    rows = [np.array(s.axis) @ (motion.shift(s.two, s.point_two) - motion.shift(s.one, s.point_one)) @ kept
-            for s in vehicle.springs if s.name in limits.rigid]  # fmt: skip
+    rows = [
+        np.array(s.axis) @ (motion.shift(s.two, s.point_two) - motion.shift(s.one, s.point_one)) @ kept
+        for s in vehicle.springs
+        if s.name in limits.rigid
+    ]
     return kept @ null_space(np.array(rows), rcond=NOTHING) if rows else kept

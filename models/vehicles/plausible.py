@@ -87,8 +87,11 @@ class Whole:
 
     def struts(self, wheel: str) -> list[SpringDamper]:
         """Springs and dampers that hold a wheel or an axle up to another body."""
-        return [s for s in self.vehicle.springs if s.two is not None and wheel in (s.one, s.two)
-                and abs(s.axis[2]) > UPRIGHT]  # fmt: skip
+        return [
+            s
+            for s in self.vehicle.springs
+            if s.two is not None and wheel in (s.one, s.two) and abs(s.axis[2]) > UPRIGHT
+        ]
 
 
 def plausible(vehicle: SpatialVehicle, accept: Sequence[str] = ()) -> tuple[Finding, ...]:
@@ -108,13 +111,24 @@ def _beyond(value: float, usual: tuple[float, float]) -> bool:
 
 def _masses(whole: Whole) -> Iterator[Finding]:
     if _beyond(whole.total, MASS):
-        yield _query("mass", "mass of the vehicle", f"{whole.total:.4g} kg; usual are {MASS[0]:g} to {MASS[1]:g} kg. "
-                     f"{_tonnes(whole.total)}", whole.total, "kg")  # fmt: skip
+        yield _query(
+            "mass",
+            "mass of the vehicle",
+            f"{whole.total:.4g} kg; usual are {MASS[0]:g} to {MASS[1]:g} kg. {_tonnes(whole.total)}",
+            whole.total,
+            "kg",
+        )
     unsprung = sum(whole.vehicle.body(name).mass for name in whole.wheels)
     if whole.wheels and not _beyond(whole.total, MASS) and whole.total - unsprung < LIGHT * unsprung:
-        yield _query("mass", f"bodies[{whole.carried.name}].mass", f"{whole.carried.mass:.4g} kg; all that is carried "
-                     f"weighs {whole.total - unsprung:.4g} kg, wheels and axles {unsprung:.4g} kg. "
-                     f"{_tonnes(whole.carried.mass)}", whole.carried.mass, "kg")  # fmt: skip
+        yield _query(
+            "mass",
+            f"bodies[{whole.carried.name}].mass",
+            f"{whole.carried.mass:.4g} kg; all that is carried "
+            f"weighs {whole.total - unsprung:.4g} kg, wheels and axles {unsprung:.4g} kg. "
+            f"{_tonnes(whole.carried.mass)}",
+            whole.carried.mass,
+            "kg",
+        )
 
 
 def _tonnes(value: float) -> str:
@@ -128,8 +142,13 @@ def _sizes(whole: Whole) -> Iterator[Finding]:
             yield _query("size", name, f"{value:.4g} m; usual are {usual[0]:g} to {usual[1]:g} m. {metres}", value, "m")
     for body in whole.vehicle.bodies:
         if _beyond(body.position[2], (-0.01, HEIGHT)):
-            yield _query("size", f"bodies[{body.name}].position", f"{body.position[2]:.4g} m above the ground; usual "
-                         f"are 0 to {HEIGHT:g} m. {metres}", body.position[2], "m")  # fmt: skip
+            yield _query(
+                "size",
+                f"bodies[{body.name}].position",
+                f"{body.position[2]:.4g} m above the ground; usual are 0 to {HEIGHT:g} m. {metres}",
+                body.position[2],
+                "m",
+            )
 
 
 def _inertias(whole: Whole) -> Iterator[Finding]:
@@ -140,16 +159,26 @@ def _inertias(whole: Whole) -> Iterator[Finding]:
         span, own = spans[freedom], about[freedom]
         radius = (own / body.mass) ** 0.5
         if span and freedom in body.freedoms and own and _beyond(radius / span, usual):
-            yield _query("inertia", f"bodies[{body.name}].inertia", f"{own:.4g} kg m^2 about {freedom[1]} is a radius "
-                         f"of gyration of {radius:.3g} m, {radius / span:.2g} of the "
-                         f"{'track' if freedom == 'rx' else 'wheelbase'}; usual are {usual[0]:g} to {usual[1]:g}", own,
-                         "kg m^2")  # fmt: skip
+            yield _query(
+                "inertia",
+                f"bodies[{body.name}].inertia",
+                f"{own:.4g} kg m^2 about {freedom[1]} is a radius "
+                f"of gyration of {radius:.3g} m, {radius / span:.2g} of the "
+                f"{'track' if freedom == 'rx' else 'wheelbase'}; usual are {usual[0]:g} to {usual[1]:g}",
+                own,
+                "kg m^2",
+            )
     for each in whole.vehicle.bodies:
         low, middle, high = sorted(np.diag(each.inertia).tolist())
         if low > 0 and high > 1.05 * (low + middle):
-            yield _query("inertia", f"bodies[{each.name}].inertia", f"{high:.4g} kg m^2 about one axis is more than "
-                         f"the sum of the other two, {low + middle:.4g}, which no body has", high,
-                         "kg m^2")  # fmt: skip
+            yield _query(
+                "inertia",
+                f"bodies[{each.name}].inertia",
+                f"{high:.4g} kg m^2 about one axis is more than "
+                f"the sum of the other two, {low + middle:.4g}, which no body has",
+                high,
+                "kg m^2",
+            )
 
 
 def _struts(whole: Whole) -> Iterator[Finding]:
@@ -158,14 +187,25 @@ def _struts(whole: Whole) -> Iterator[Finding]:
         struts = whole.struts(wheel)
         if not any(slopes_at_rest(strut)[0] for strut in struts) and wheel != whole.carried.name:
             kind = "damper alone" if struts else "strut"
-            yield _query("strut", f"bodies[{wheel}]", f"{'a' if struts else 'no'} {kind} holds the body up on it: a "
-                         "spring between them is missing", float(len(struts)), "1")  # fmt: skip
+            yield _query(
+                "strut",
+                f"bodies[{wheel}]",
+                f"{'a' if struts else 'no'} {kind} holds the body up on it: a spring between them is missing",
+                float(len(struts)),
+                "1",
+            )
         for strut in struts:
             apart = _apart(strut, wheel, tyres)
             if apart > FAR:
                 point = strut.point_one if strut.one == wheel else strut.point_two
-                yield _query("strut", f"springs[{strut.name}]", f"its point {[round(x, 4) for x in point]} lies "
-                             f"{apart:.3g} m from the wheel or axle {wheel!r}; usual are at most {FAR:g} m", apart, "m")
+                yield _query(
+                    "strut",
+                    f"springs[{strut.name}]",
+                    f"its point {[round(x, 4) for x in point]} lies "
+                    f"{apart:.3g} m from the wheel or axle {wheel!r}; usual are at most {FAR:g} m",
+                    apart,
+                    "m",
+                )
 
 
 def _apart(strut: SpringDamper, wheel: str, tyres: tuple[Tyre, ...]) -> float:
@@ -194,19 +234,36 @@ def _loads(whole: Whole) -> Iterator[Finding]:
     for tyre in whole.vehicle.tyres:
         axles.setdefault(tyre.axle, []).append(tyre)
         if whole.held[tyre.name] < 0:
-            yield _query("load", f"tyres[{tyre.name}]", f"its static load is {whole.held[tyre.name]:.4g} N: the wheel "
-                         "pulls on the road. The centre of mass lies beyond the axles, or an axle at a wrong place",
-                         whole.held[tyre.name], "N")  # fmt: skip
+            yield _query(
+                "load",
+                f"tyres[{tyre.name}]",
+                f"its static load is {whole.held[tyre.name]:.4g} N: the wheel "
+                "pulls on the road. The centre of mass lies beyond the axles, or an axle at a wrong place",
+                whole.held[tyre.name],
+                "N",
+            )
     for tyres in axles.values():
         loads = [whole.held[tyre.name] for tyre in tyres]
         names = " and ".join(tyre.name for tyre in tyres)
         if len(axles) > 1 and 0 <= sum(loads) < SHARE * weight:
-            yield _query("load", f"tyres[{names}]", f"carry {sum(loads):.4g} N of {weight:.4g} N, "
-                         f"{sum(loads) / weight:.1%}; usual are at least {SHARE:.0%} on an axle", sum(loads), "N")
+            yield _query(
+                "load",
+                f"tyres[{names}]",
+                f"carry {sum(loads):.4g} N of {weight:.4g} N, "
+                f"{sum(loads) / weight:.1%}; usual are at least {SHARE:.0%} on an axle",
+                sum(loads),
+                "N",
+            )
         for what, unit, own in (("load", "N", loads), ("stiffness", "N/m", [tyre.stiffness for tyre in tyres])):
             if min(own) >= 0 and max(own) > UNEVEN * min(own):
-                yield _query(what, f"tyres[{names}]", f"the {what}s {min(own):.4g} and {max(own):.4g} {unit} of one "
-                             f"axle differ by more than {UNEVEN:g} times", max(own) / max(min(own), 1e-300), "1")
+                yield _query(
+                    what,
+                    f"tyres[{names}]",
+                    f"the {what}s {min(own):.4g} and {max(own):.4g} {unit} of one "
+                    f"axle differ by more than {UNEVEN:g} times",
+                    max(own) / max(min(own), 1e-300),
+                    "1",
+                )
 
 
 def _frequencies(whole: Whole) -> Iterator[Finding]:
@@ -215,20 +272,36 @@ def _frequencies(whole: Whole) -> Iterator[Finding]:
     sunk = _sunk(whole)
     bounce = (GRAVITY / sunk) ** 0.5 / (2 * np.pi) if sunk > 0 else float("inf")
     if _beyond(bounce, BOUNCE):
-        yield _query("frequency", f"bodies[{whole.carried.name}]", f"sinks {sunk:.4g} m under the vehicle's weight, a "
-                     f"natural frequency of {bounce:.3g} Hz; usual are {BOUNCE[0]:g} to {BOUNCE[1]:g} Hz. {remedy}",
-                     bounce, "Hz")  # fmt: skip
+        yield _query(
+            "frequency",
+            f"bodies[{whole.carried.name}]",
+            f"sinks {sunk:.4g} m under the vehicle's weight, a "
+            f"natural frequency of {bounce:.3g} Hz; usual are {BOUNCE[0]:g} to {BOUNCE[1]:g} Hz. {remedy}",
+            bounce,
+            "Hz",
+        )
     for wheel in whole.wheels:
         hop = _hop(whole, wheel)
         if hop is not None and _beyond(hop, HOP):
-            yield _query("frequency", f"bodies[{wheel}]", f"between road and body it hops at {hop:.3g} Hz; usual are "
-                         f"{HOP[0]:g} to {HOP[1]:g} Hz. {remedy}", hop, "Hz")  # fmt: skip
+            yield _query(
+                "frequency",
+                f"bodies[{wheel}]",
+                f"between road and body it hops at {hop:.3g} Hz; usual are {HOP[0]:g} to {HOP[1]:g} Hz. {remedy}",
+                hop,
+                "Hz",
+            )
     for tyre in whole.vehicle.tyres:
         pressed = whole.held[tyre.name] / tyre.stiffness
         if pressed > 0 and _beyond(pressed, PRESSED):
-            yield _query("frequency", f"tyres[{tyre.name}].stiffness", f"{tyre.stiffness:.4g} N/m gives way by "
-                         f"{pressed:.3g} m under {whole.held[tyre.name]:.4g} N; usual are {PRESSED[0]:g} to "
-                         f"{PRESSED[1]:g} m. {remedy}", pressed, "m")  # fmt: skip
+            yield _query(
+                "frequency",
+                f"tyres[{tyre.name}].stiffness",
+                f"{tyre.stiffness:.4g} N/m gives way by "
+                f"{pressed:.3g} m under {whole.held[tyre.name]:.4g} N; usual are {PRESSED[0]:g} to "
+                f"{PRESSED[1]:g} m. {remedy}",
+                pressed,
+                "m",
+            )
 
 
 def _sunk(whole: Whole) -> float:
@@ -271,6 +344,12 @@ def _dampers(whole: Whole) -> Iterator[Finding]:
             continue
         share = strut.damping / (2 * (stiffness * load / GRAVITY) ** 0.5)
         if _beyond(share, DAMPING):
-            yield _query("damping", f"springs[{name}].damping", f"{strut.damping:.4g} N s/m is {share:.2g} of the "
-                         f"critical damping of what rests on it; usual are {DAMPING[0]:g} to {DAMPING[1]:g}. Damping "
-                         "is in N s/m, not in N s/mm", share, "1")  # fmt: skip
+            yield _query(
+                "damping",
+                f"springs[{name}].damping",
+                f"{strut.damping:.4g} N s/m is {share:.2g} of the "
+                f"critical damping of what rests on it; usual are {DAMPING[0]:g} to {DAMPING[1]:g}. Damping "
+                "is in N s/m, not in N s/mm",
+                share,
+                "1",
+            )

@@ -19,8 +19,10 @@ def in_space(p: Parameters) -> SpatialVehicle:
     """The vehicle of a parameter set without a width, wheels 0.3 m and chassis 0.6 m above the ground (which is of no
     account); entries are called after the parameters."""
     chassis, still = "chassis: m3, I", ((0.0,) * 3,) * 3
-    ends = (("front", p.b, p.m1, p.k1, p.d1, p.k3, p.d3, "m1", "k1, d1", "k3, d3"),
-            ("rear", -p.a, p.m2, p.k2, p.d2, p.k4, p.d4, "m2", "k2, d2", "k4, d4"))  # fmt: skip
+    ends = (
+        ("front", p.b, p.m1, p.k1, p.d1, p.k3, p.d3, "m1", "k1, d1", "k3, d3"),
+        ("rear", -p.a, p.m2, p.k2, p.d2, p.k4, p.d4, "m2", "k2, d2", "k4, d4"),
+    )
     bodies = [Body(chassis, p.m3, (0.0, 0.0, 0.6), ("z", "ry"), ((0.0,) * 3, (0.0, p.I, 0.0), (0.0,) * 3))]
     springs, tyres = list[SpringDamper](), list[Tyre]()
     for i, (end, x, mass, tyre, tyre_damper, spring, damper, m, kd_tyre, kd_spring) in enumerate(ends):

@@ -120,8 +120,12 @@ def preloads(vehicle: SpatialVehicle) -> Preloads:
     loads = {name: -k * float(row @ sunk) for name, (row, k, _) in tyres.items()}
     for tyre in vehicle.tyres:
         if tyre.pushes_only and not loads[tyre.name] > 0.0:
-            raise InputError(vehicle.name, f"tyres[{tyre.name}]", loads[tyre.name],
-                             "N is its load at rest: a tyre that only pushes must bear one")  # fmt: skip
+            raise InputError(
+                vehicle.name,
+                f"tyres[{tyre.name}]",
+                loads[tyre.name],
+                "N is its load at rest: a tyre that only pushes must bear one",
+            )
     return Preloads({name: k * float(row @ sunk) for name, (row, k, _) in parts.items()}, loads)
 
 
@@ -192,14 +196,28 @@ def _speed_forces(
 
 
 UNITS = {
-    "acceleration": "m/s^2", "velocity": "m/s", "displacement": "m",
-    "angular acceleration": "rad/s^2", "angular velocity": "rad/s", "angle": "rad",
-    "travel": "m", "travel rate": "m/s", "force": "N", "tyre force": "N", "tyre deflection": "m",
-}  # fmt: skip
+    "acceleration": "m/s^2",
+    "velocity": "m/s",
+    "displacement": "m",
+    "angular acceleration": "rad/s^2",
+    "angular velocity": "rad/s",
+    "angle": "rad",
+    "travel": "m",
+    "travel rate": "m/s",
+    "force": "N",
+    "tyre force": "N",
+    "tyre deflection": "m",
+}
 """Unit of each kind of output; of an anti-roll bar rad, rad/s and N m."""
 
-_ORDER = {"acceleration": 2, "velocity": 1, "displacement": 0,
-          "angular acceleration": 2, "angular velocity": 1, "angle": 0}  # fmt: skip
+_ORDER = {
+    "acceleration": 2,
+    "velocity": 1,
+    "displacement": 0,
+    "angular acceleration": 2,
+    "angular velocity": 1,
+    "angle": 0,
+}
 
 
 def _output(

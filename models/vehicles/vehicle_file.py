@@ -50,8 +50,9 @@ def shipped() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in SHIPPED.glob("*.toml")))
 
 
-def load_vehicle(name: str, folder: str | Path = ".", file: str = "", place: str = "",
-                 reduced: bool = False) -> SpatialVehicle:  # fmt: skip
+def load_vehicle(
+    name: str, folder: str | Path = ".", file: str = "", place: str = "", reduced: bool = False
+) -> SpatialVehicle:
     """A vehicle that comes with twinrig, by its name, or a user's TOML file, relative to ``folder``; unloaded.
 
     ``file`` and ``place`` say who asked for it, for the message if there is none. reduced : may it have [reduced]?
@@ -60,8 +61,12 @@ def load_vehicle(name: str, folder: str | Path = ".", file: str = "", place: str
     path = vehicle_path(name, folder, file, place)
     vehicle = build_vehicle(parse(path), path.name)
     if vehicle.limits and not reduced:
-        raise InputError(file, place, name, "has a table [reduced], which only the study ride of linear vehicles "
-                         "reads: name the whole vehicle here")  # fmt: skip
+        raise InputError(
+            file,
+            place,
+            name,
+            "has a table [reduced], which only the study ride of linear vehicles reads: name the whole vehicle here",
+        )
     return vehicle
 
 
@@ -89,8 +94,9 @@ def _read(table: Mapping[str, Any], file: str) -> VehicleTable:
             raise
         entry = table[found[1]][int(found[2])]
         name = entry.get("name") if isinstance(entry, Mapping) else None
-        raise InputError(file, _place(found[1], name or int(found[2])) + error.place[found.end() :],
-                         error.value, error.allowed) from None  # fmt: skip
+        raise InputError(
+            file, _place(found[1], name or int(found[2])) + error.place[found.end() :], error.value, error.allowed
+        ) from None
 
 
 def _place(table: str, entry: object, key: str = "") -> str:
@@ -208,11 +214,18 @@ class _Builder:
         if not any(acts):
             raise self._fault(f"{place}.stiffness", None, "is missing: neither spring, damper, curve nor friction")
         return SpringDamper(
-            spring.name, one, two, *points, axis, spring.stiffness, spring.damping,
+            spring.name,
+            one,
+            two,
+            *points,
+            axis,
+            spring.stiffness,
+            spring.damping,
             self._curve(f"{place}.travel_force", spring.travel_force),
             self._curve(f"{place}.rate_force", spring.rate_force),
-            spring.friction, spring.friction_rate,
-        )  # fmt: skip
+            spring.friction,
+            spring.friction_rate,
+        )
 
     def _ends(self, place: str, bodies: Sequence[str]) -> tuple[str, str | None]:
         """The two bodies, None for the ground."""

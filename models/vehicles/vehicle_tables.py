@@ -122,9 +122,18 @@ class DragTable(Strict):
 
 
 Kind = Literal[
-    "acceleration", "velocity", "displacement", "angular acceleration", "angular velocity", "angle",
-    "travel", "travel rate", "force", "tyre force", "tyre deflection",
-]  # fmt: skip
+    "acceleration",
+    "velocity",
+    "displacement",
+    "angular acceleration",
+    "angular velocity",
+    "angle",
+    "travel",
+    "travel rate",
+    "force",
+    "tyre force",
+    "tyre deflection",
+]
 
 
 class OutputTable(Strict):

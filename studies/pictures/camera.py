@@ -54,8 +54,7 @@ class Camera:
         return np.stack([width / 2.0 + scale * own[..., 0], height / 2.0 - scale * own[..., 1]], -1), near
 
 
-def picture(camera: Camera, layers: list[list[Surface]], width: int, height: int,
-            sky: np.ndarray) -> np.ndarray:  # fmt: skip
+def picture(camera: Camera, layers: list[list[Surface]], width: int, height: int, sky: np.ndarray) -> np.ndarray:
     """Image (h, w, 3) of surfaces before a sky, whose two colours are those of the picture's top and of the horizon.
 
     A later layer lies over all earlier ones, as arrows over bodies do.
@@ -75,8 +74,9 @@ def picture(camera: Camera, layers: list[list[Surface]], width: int, height: int
     return halved(image)
 
 
-def _shaded(camera: Camera, surfaces: list[Surface], width: int, height: int,
-            haze: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+def _shaded(
+    camera: Camera, surfaces: list[Surface], width: int, height: int, haze: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What ``paint`` takes, of the triangles that lie before the eye."""
     corners, near = camera.seen(np.concatenate([one.corners for one in surfaces]), 2 * width, 2 * height)
     normals = np.concatenate([one.normals for one in surfaces])

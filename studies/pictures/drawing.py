@@ -19,11 +19,14 @@ def drawn(motion: Motion, stage: Stage, k: int, width: int, height: int) -> np.n
     poses = {name: pose(motion, stage, name, k) for name in stage.shapes}
     bodies = [surface.moved(*poses[name]) for name, shapes in stage.shapes.items() for surface in shapes]
     around = stage.scenery(float(motion.times[k]))
-    struts = [rod(_point(poses[s.one], s.point_one), _point(poses[s.two], s.point_two), 0.025, GREY)
-              for s in stage.struts]  # fmt: skip
+    struts = [
+        rod(_point(poses[s.one], s.point_one), _point(poses[s.two], s.point_two), 0.025, GREY) for s in stage.struts
+    ]
     thick = THICKNESS * height / stage.camera.pixels(height)
-    arrows = [arrow(*line, thick, stage.kinds[own.kind].colour)
-              for own, line in zip(motion.arrows, lines(motion, stage, k), strict=True)]  # fmt: skip
+    arrows = [
+        arrow(*line, thick, stage.kinds[own.kind].colour)
+        for own, line in zip(motion.arrows, lines(motion, stage, k), strict=True)
+    ]
     return picture(stage.camera, [around + struts + bodies, [own for own in arrows if own]], width, height, SKY)
 
 

@@ -54,7 +54,8 @@ class Page:
         for i, motion in enumerate(self.motions):
             left = EDGE + i * (self._wide + EDGE)
             page[TOP : TOP + TALL, left : left + self._wide] = eight_bits(
-                drawn(motion, self.stage, k, self._wide, TALL))
+                drawn(motion, self.stage, k, self._wide, TALL)
+            )
         return page
 
     def tallest(self) -> int:
@@ -71,8 +72,15 @@ class Page:
         self._figure.text(EDGE / WIDTH, 0.96, self.stage.title, fontsize=15, weight="bold")
         for i, motion in enumerate(self.motions):
             left = EDGE + i * (self._wide + EDGE)
-            self._figure.text(left / WIDTH, 1 - (TOP - 5) / HEIGHT, LABELS[motion.engine], fontsize=12, weight="bold",
-                              color=COLOURS[motion.engine], va="bottom")  # fmt: skip
+            self._figure.text(
+                left / WIDTH,
+                1 - (TOP - 5) / HEIGHT,
+                LABELS[motion.engine],
+                fontsize=12,
+                weight="bold",
+                color=COLOURS[motion.engine],
+                va="bottom",
+            )
 
     def _legend(self) -> None:
         """An arrow of each kind as long as its round force is at the camera's target, and what is drawn."""
@@ -80,8 +88,18 @@ class Page:
         for name, kind in self.stage.kinds.items():
             length = kind.scale * kind.legend * self.stage.camera.pixels(TALL)
             arrow = FancyArrow(
-                left, row * HEIGHT, length, 0.0, width=3.5, head_width=12, head_length=min(15, length),
-                length_includes_head=True, color=kind.colour, lw=0, transform=IdentityTransform())  # fmt: skip
+                left,
+                row * HEIGHT,
+                length,
+                0.0,
+                width=3.5,
+                head_width=12,
+                head_length=min(15, length),
+                length_includes_head=True,
+                color=kind.colour,
+                lw=0,
+                transform=IdentityTransform(),
+            )
             self._figure.add_artist(arrow)
             text = self._figure.text((left + length + 8) / WIDTH, row, f"{name}, {kind.legend / 1e3:g} kN", va="center")
             left += length + 8 + text.get_window_extent().width + 34
@@ -120,8 +138,10 @@ def difference(motions: list[Motion]) -> str:
     if len(motions) == 1:
         return f"poses as {LABELS[motions[0].engine]} reports them"
     places, turns, forces = gaps(*motions)
-    return ("poses as each engine reports them; largest difference over the film: "
-            f"places {places:.1e} m, rotations {turns:.1e} rad, forces {forces:.1e} N")  # fmt: skip
+    return (
+        "poses as each engine reports them; largest difference over the film: "
+        f"places {places:.1e} m, rotations {turns:.1e} rad, forces {forces:.1e} N"
+    )
 
 
 def eight_bits(image: np.ndarray) -> np.ndarray:

@@ -32,8 +32,13 @@ RIM: Colour = (0.78, 0.79, 0.8)
 def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[Motion]]:
     """The stage, and the motion of each engine at the steps that are nearest to ``times`` (s)."""
     run = {"duration": float(np.ceil(duration + AHEAD / SPEED)), "step": 1e-3}
-    scene = scene_of({"title": "pitch plane", "run": run,
-                      "effects": {"road": {"source": "iso8608", "road_class": "D", "seed": SEED, "speed": SPEED}}})
+    scene = scene_of(
+        {
+            "title": "pitch plane",
+            "run": run,
+            "effects": {"road": {"source": "iso8608", "road_class": "D", "seed": SEED, "speed": SPEED}},
+        }
+    )
     assembly = assemble(scene)
     runs = [_motion(engine, assembly, times) for engine in engines]
     return stage(assembly, runs[0][1]), [motion for motion, _ in runs]
@@ -69,8 +74,10 @@ def _exudyn(model: Any, states: np.ndarray) -> Poses:
     coordinates = np.zeros((len(states), 7))
     coordinates[:, [1, 3, 5, 6]] = states
     places, turns = of_exudyn(mbs, {name: partial(ask, node) for name, node in nodes.items()}, coordinates)
-    return ({name: place @ PLANE.T for name, place in places.items()},
-            {name: PLANE @ turn @ PLANE.T for name, turn in turns.items()})  # fmt: skip
+    return (
+        {name: place @ PLANE.T for name, place in places.items()},
+        {name: PLANE @ turn @ PLANE.T for name, turn in turns.items()},
+    )
 
 
 def _offset(assembly: Assembly, body: str) -> np.ndarray:
@@ -102,8 +109,18 @@ def stage(assembly: Assembly, channels: Channels) -> Stage:
     struts = tuple(Strut("chassis", (axle.x, 0.0, 0.0), axle.wheel, (0.0, 0.0, 0.0)) for axle in assembly.vehicle.axles)
     caption = f"displacements and road drawn {MAGNIFIED:g} times as large; forces on wheels and chassis"
     camera = Camera((1.5, 4.6, -1.5), (0.0, 0.0, -0.66), (0.0, 0.0, -1.0), 0.46)
-    return Stage(f"Pitch-plane vehicle at {SPEED:g} m/s on a road of class D", caption, shapes(assembly), rest, camera,
-                 KINDS, CURVE, road.at, MAGNIFIED, struts=struts)  # fmt: skip
+    return Stage(
+        f"Pitch-plane vehicle at {SPEED:g} m/s on a road of class D",
+        caption,
+        shapes(assembly),
+        rest,
+        camera,
+        KINDS,
+        CURVE,
+        road.at,
+        MAGNIFIED,
+        struts=struts,
+    )
 
 
 def shapes(assembly: Assembly) -> dict[str, list[Surface]]:

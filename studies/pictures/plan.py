@@ -13,7 +13,11 @@ def describe(scene: PictureScene) -> str:
     film = scene.film
     long = film.frames / film.frames_per_second
     shown = f"{film.duration:g} s of the run in {film.frames} frames, {long:g} s of film"
-    lines = [scene.title, f"  scene      {scene.file}, study {scene.study}", f"  vehicle    {scene.vehicle}",
-             f"  film       {shown}, {film.format}"]  # fmt: skip
+    lines = [
+        scene.title,
+        f"  scene      {scene.file}, study {scene.study}",
+        f"  vehicle    {scene.vehicle}",
+        f"  film       {shown}, {film.format}",
+    ]
     said = missing(film.format)
     return "\n".join([*lines, f"  note       {said}"] if said else lines)

@@ -22,8 +22,13 @@ from studies.pictures.shapes import Colour, Surface, ball, box, extruded, revolv
 SPEED, STEP, SEED, GUST = 20.0, 1e-3, 3, 0.5
 """m/s, largest step (s), seed of the road, lateral speed of the body at the start (m/s)."""
 MAGNIFIED = 4.0
-SCENE = {"title": "", "system": "ride", "vehicle": {"file": "r19_free"}, "road": {"iso8608": "C"},
-         "speeds": {"values": [SPEED]}}  # fmt: skip
+SCENE = {
+    "title": "",
+    "system": "ride",
+    "vehicle": {"file": "r19_free"},
+    "road": {"iso8608": "C"},
+    "speeds": {"values": [SPEED]},
+}
 KINDS = {"wheel load": Kind((0.0, 0.62, 0.45), 1.6e-4, 4e3), "side force": Kind((0.84, 0.2, 0.0), 6e-4, 1e3)}
 CURVE = Curve("wheel load", (0.0, 0.0, 1.0), "of the road on the tyres, static part included")
 PAINT: Colour = (0.16, 0.42, 0.72)
@@ -81,11 +86,15 @@ def _exudyn(model: Any, positions: np.ndarray) -> Poses:
 def arrows(vehicle: SpatialVehicle, run: SpatialRun, road: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
     """Wheel loads, static ones included, and side forces, both at the road, from the states of a run (small motion)."""
     own = linearise(vehicle, SPEED).outputs
-    found = [run.rates @ one.rate + run.positions @ one.displacement + road @ np.concatenate([one.road, one.road_rate])
-             for one in own]  # fmt: skip
+    found = [
+        run.rates @ one.rate + run.positions @ one.displacement + road @ np.concatenate([one.road, one.road_rate])
+        for one in own
+    ]
     held = preloads(replace(vehicle, gravity=GRAVITY)).tyres
-    loads = [_arrow("wheel load", vehicle, tyre.name, tyre.body, tyre.point, held[tyre.name] + force, 2, poses)
-             for tyre, force in zip(vehicle.tyres, found, strict=False)]  # fmt: skip
+    loads = [
+        _arrow("wheel load", vehicle, tyre.name, tyre.body, tyre.point, held[tyre.name] + force, 2, poses)
+        for tyre, force in zip(vehicle.tyres, found, strict=False)
+    ]
     names = vehicle.coordinates()
     sides = []
     for side, speed in zip(vehicle.side_forces, found[len(vehicle.tyres) :], strict=True):
@@ -95,8 +104,9 @@ def arrows(vehicle: SpatialVehicle, run: SpatialRun, road: np.ndarray, poses: Po
     return (*loads, *sides)
 
 
-def _arrow(kind: str, vehicle: SpatialVehicle, name: str, body: str, point: Any, force: np.ndarray, axis: int,
-           poses: Poses) -> Arrow:  # fmt: skip
+def _arrow(
+    kind: str, vehicle: SpatialVehicle, name: str, body: str, point: Any, force: np.ndarray, axis: int, poses: Poses
+) -> Arrow:
     """A force along an axis of the space, at the road under a point of a body."""
     arm = np.subtract((point[0], point[1], 0.0), vehicle.body(body).position)
     points = poses[0][body] + poses[1][body] @ arm
@@ -121,15 +131,16 @@ def shapes(vehicle: SpatialVehicle) -> dict[str, list[Surface]]:
     """Wheels where there are tyres, a car about the chassis, an engine and occupants within it."""
     found = {tyre.body: _wheel(vehicle.body(tyre.body).position[2]) for tyre in vehicle.tyres}
     found["engine"] = [box(0.5, 0.7, 0.45, ENGINE)]
-    found |= {f"{side} seat": [ball(0.13, PERSON).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON).at(0.0, 0.0, 0.02)]
-              for side in ("left", "right")}  # fmt: skip
+    found |= {
+        f"{side} seat": [ball(0.13, PERSON).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON).at(0.0, 0.0, 0.02)]
+        for side in ("left", "right")
+    }
     found["body"] = _car(vehicle)
     return found
 
 
 def _wheel(radius: float) -> list[Surface]:
-    tyre = revolved([-0.1, -0.1, -0.07, 0.07, 0.1, 0.1],
-                    np.array([0.62, 0.92, 1.0, 1.0, 0.92, 0.62]) * radius, RUBBER)  # fmt: skip
+    tyre = revolved([-0.1, -0.1, -0.07, 0.07, 0.1, 0.1], np.array([0.62, 0.92, 1.0, 1.0, 0.92, 0.62]) * radius, RUBBER)
     return [tyre, revolved([-0.09, -0.09, 0.09, 0.09], np.array([0.0, 0.64, 0.64, 0.0]) * radius, RIM)]
 
 
@@ -137,7 +148,14 @@ def _car(vehicle: SpatialVehicle) -> list[Surface]:
     """Two convex outlines, through which one sees what is inside, about the chassis' own centre."""
     x, _, z = vehicle.body("body").position
     front, rear = max(t.point[0] for t in vehicle.tyres), min(t.point[0] for t in vehicle.tyres)
-    lower = [(rear - 0.7, 0.4), (rear - 0.55, 0.27), (front + 0.6, 0.27), (front + 0.72, 0.45), (front + 0.6, 0.68),
-             (front - 0.35, 0.88), (rear - 0.6, 0.92)]  # fmt: skip
+    lower = [
+        (rear - 0.7, 0.4),
+        (rear - 0.55, 0.27),
+        (front + 0.6, 0.27),
+        (front + 0.72, 0.45),
+        (front + 0.6, 0.68),
+        (front - 0.35, 0.88),
+        (rear - 0.6, 0.92),
+    ]
     upper = [(rear - 0.45, 0.92), (front - 0.38, 0.88), (front - 1.05, 1.38), (rear + 0.15, 1.4)]
     return [extruded(np.array(lower) - [x, z], 1.66, PAINT, 0.42), extruded(np.array(upper) - [x, z], 1.4, PAINT, 0.3)]

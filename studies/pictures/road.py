@@ -48,8 +48,11 @@ class PassingRoad:
         """Lines along both edges."""
         side = self.half - 0.15
         starts = 4.0 * np.arange(-10, 11) - self.speed * time % 4.0
-        return [box(1.6, 0.1, 0.02, LINE).at(x, y, float(self._height(x + self.speed * time, y)) + 0.01 * self.up)
-                for x in starts for y in (-side, side)]  # fmt: skip
+        return [
+            box(1.6, 0.1, 0.02, LINE).at(x, y, float(self._height(x + self.speed * time, y)) + 0.01 * self.up)
+            for x in starts
+            for y in (-side, side)
+        ]
 
     def _height(self, way: np.ndarray, y: np.ndarray | float) -> np.ndarray:
         """Drawn height (m) at a place on the way and across it."""

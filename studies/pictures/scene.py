@@ -48,7 +48,9 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Pi
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(PictureScene, table, file, folder)
     if scene.film.frames > MOST_FRAMES:
-        allowed = (f"makes {scene.film.frames} frames (duration x slow motion x frames per second) where at most "
-                   f"{MOST_FRAMES} are drawn: show less of the run")  # fmt: skip
+        allowed = (
+            f"makes {scene.film.frames} frames (duration x slow motion x frames per second) where at most "
+            f"{MOST_FRAMES} are drawn: show less of the run"
+        )
         raise InputError(file, "film.duration", scene.film.duration, allowed)
     return scene

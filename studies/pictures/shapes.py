@@ -40,8 +40,9 @@ def faceted(corners: np.ndarray, colour: Colour, alpha: float = 1.0) -> Surface:
 def _patches(points: np.ndarray) -> np.ndarray:
     """Triangles of a net of points (a, b, 3)."""
     one, two, three, four = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
-    return np.concatenate([np.stack([one, two, three], 2).reshape(-1, 3, 3),
-                           np.stack([one, three, four], 2).reshape(-1, 3, 3)])  # fmt: skip
+    return np.concatenate(
+        [np.stack([one, two, three], 2).reshape(-1, 3, 3), np.stack([one, three, four], 2).reshape(-1, 3, 3)]
+    )
 
 
 def sheet(points: np.ndarray, colour: Colour, alpha: float = 1.0) -> Surface:
@@ -49,8 +50,7 @@ def sheet(points: np.ndarray, colour: Colour, alpha: float = 1.0) -> Surface:
     return faceted(_patches(points), colour, alpha)
 
 
-def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, alpha: float = 1.0,
-             pieces: int = 48) -> Surface:  # fmt: skip
+def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, alpha: float = 1.0, pieces: int = 48) -> Surface:
     """A line (axial, radii) turned about y, from left to right; round along, sharp at the line's corners."""
     angles = np.linspace(0.0, 2.0 * np.pi, pieces + 1)
     y, r = np.array(axial, float), np.array(radii, float)
@@ -74,8 +74,9 @@ def extruded(outline: np.ndarray, width: float, colour: Colour, alpha: float = 1
     """A convex outline (n, 2) in x and z, counter-clockwise from x to z, drawn out along y about the origin."""
     front = np.insert(outline, 1, -width / 2.0, axis=1)
     back = np.insert(outline, 1, width / 2.0, axis=1)
-    fan = [np.stack([np.broadcast_to(side[:1], side[2:].shape), side[1:-1], side[2:]], 1)
-           for side in (front, back[::-1])]  # fmt: skip
+    fan = [
+        np.stack([np.broadcast_to(side[:1], side[2:].shape), side[1:-1], side[2:]], 1) for side in (front, back[::-1])
+    ]
     closed = np.stack([np.vstack([front, front[:1]]), np.vstack([back, back[:1]])])
     return faceted(np.concatenate([*fan, _patches(closed)]), colour, alpha)
 
@@ -97,8 +98,9 @@ def ball(radius: float, colour: Colour, alpha: float = 1.0) -> Surface:
     return replace(found, normals=found.corners / radius)
 
 
-def between(tail: np.ndarray, head: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour,
-            alpha: float = 1.0) -> Surface:  # fmt: skip
+def between(
+    tail: np.ndarray, head: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour, alpha: float = 1.0
+) -> Surface:
     """A revolved line whose axis runs from one point to another; ``axial`` counts from the tail (m)."""
     along = (head - tail) / np.linalg.norm(head - tail)
     aside = np.cross(along, np.eye(3)[np.abs(along).argmin()])

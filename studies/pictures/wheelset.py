@@ -54,8 +54,9 @@ def _exudyn(own: Any, joints: np.ndarray) -> Poses:
     from models.engines.spatial_exudyn_build import items
 
     mbs = own._system[0]
-    middle = mbs.AddMarker(items.MarkerKinematicTreeRigid(
-        objectNumber=0, linkNumber=JOINTS - 1, localPosition=[0.0, 0.0, 0.0]))  # fmt: skip
+    middle = mbs.AddMarker(
+        items.MarkerKinematicTreeRigid(objectNumber=0, linkNumber=JOINTS - 1, localPosition=[0.0, 0.0, 0.0])
+    )
     mbs.Assemble()
     return of_exudyn(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)
 
@@ -69,8 +70,10 @@ def arrows(wheelset: Wheelset, path: Path) -> tuple[Arrow, ...]:
         sine, cosine, none = np.sin(contact[:, ANGLE]), np.cos(contact[:, ANGLE]), 0.0 * contact[:, ANGLE]
         normal = contact[:, LOAD, None] * np.stack([none, sine, -cosine], 1)
         creep = np.stack([contact[:, FX], contact[:, FY] * cosine, contact[:, FY] * sine], 1)
-        found += [Arrow(f"normal force, {name}", "normal force", "wheelset", points, normal),
-                  Arrow(f"creep force, {name}", "creep force", "wheelset", points, creep)]  # fmt: skip
+        found += [
+            Arrow(f"normal force, {name}", "normal force", "wheelset", points, normal),
+            Arrow(f"creep force, {name}", "creep force", "wheelset", points, creep),
+        ]
     return tuple(found)
 
 
@@ -85,25 +88,54 @@ def stage(wheelset: Wheelset) -> Stage:
     camera = Camera((2.75, 1.75, -0.95), (0.0, 0.12, 0.06), (0.0, 0.0, -1.0), 0.54)
     caption = f"displacements drawn {MAGNIFIED:g} times as large; forces on the wheels"
     title = f"Wheelset that hunts at {SPEED:g} m/s, creep forces by FASTSIM"
-    return Stage(title, caption, {"wheelset": shapes(wheelset)}, {"wheelset": (0.0, 0.0, 0.0)}, camera, KINDS, CURVE,
-                 lambda time: track(wheelset, SPEED * time), MAGNIFIED, ("wheelset",))  # fmt: skip
+    return Stage(
+        title,
+        caption,
+        {"wheelset": shapes(wheelset)},
+        {"wheelset": (0.0, 0.0, 0.0)},
+        camera,
+        KINDS,
+        CURVE,
+        lambda time: track(wheelset, SPEED * time),
+        MAGNIFIED,
+        ("wheelset",),
+    )
 
 
 def shapes(w: Wheelset) -> list[Surface]:
     """An axle and two wheels, whose treads are the model's cones; flanges stand off by the magnified clearance."""
-    found = [revolved([-w.half_spacing - 0.12, -w.half_spacing - 0.12, w.half_spacing + 0.12, w.half_spacing + 0.12],
-                      [0.0, 0.085, 0.085, 0.0], DARK)]  # fmt: skip
+    found = [
+        revolved(
+            [-w.half_spacing - 0.12, -w.half_spacing - 0.12, w.half_spacing + 0.12, w.half_spacing + 0.12],
+            [0.0, 0.085, 0.085, 0.0],
+            DARK,
+        )
+    ]
     inner, outer = 0.036 + MAGNIFIED * w.flange_clearance + 0.004, 0.075
     for side in (1.0, -1.0):
         across = np.array([-inner - 0.03, -inner - 0.025, -inner, outer, outer, 0.02, 0.02, 0.05, 0.05])
-        radii = np.array([0.0, w.radius + 0.028, w.radius + w.conicity * inner, w.radius - w.conicity * outer, 0.39,
-                          0.37, 0.19, 0.16, 0.0])  # fmt: skip
+        radii = np.array(
+            [
+                0.0,
+                w.radius + 0.028,
+                w.radius + w.conicity * inner,
+                w.radius - w.conicity * outer,
+                0.39,
+                0.37,
+                0.19,
+                0.16,
+                0.0,
+            ]
+        )
         across = w.half_gauge + across
         if side < 0:
             across, radii = -across[::-1], radii[::-1]
         found.append(revolved(across, radii, STEEL, pieces=72))
-        found += [box(0.09, 0.03, 0.09, BROWN).at(0.28 * np.cos(a), side * (w.half_gauge + y), 0.28 * np.sin(a))
-                  for a in np.arange(6) * np.pi / 3.0 for y in (0.016, -inner - 0.02)]  # fmt: skip
+        found += [
+            box(0.09, 0.03, 0.09, BROWN).at(0.28 * np.cos(a), side * (w.half_gauge + y), 0.28 * np.sin(a))
+            for a in np.arange(6) * np.pi / 3.0
+            for y in (0.016, -inner - 0.02)
+        ]
     return found
 
 
@@ -114,8 +146,11 @@ def track(w: Wheelset, way: float) -> list[Surface]:
     for side in (1.0, -1.0):
         y = side * w.half_gauge
         head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])
-        parts = [_along(head, last - first, STEEL), box(last - first, 0.02, 0.1, RAIL).at(0.0, 0.0, 0.1),
-                 box(last - first, 0.14, 0.02, RAIL).at(0.0, 0.0, 0.16)]  # fmt: skip
+        parts = [
+            _along(head, last - first, STEEL),
+            box(last - first, 0.02, 0.1, RAIL).at(0.0, 0.0, 0.1),
+            box(last - first, 0.14, 0.02, RAIL).at(0.0, 0.0, 0.16),
+        ]
         found += [part.at((first + last) / 2.0, y, top) for part in parts]
     phase = way % SLEEPERS
     for i in range(int(np.ceil(first / SLEEPERS)), int(np.floor(last / SLEEPERS)) + 1):

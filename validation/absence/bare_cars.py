@@ -28,8 +28,11 @@ def start() -> tuple[Handling, np.ndarray, np.ndarray]:
 def cars(steps: int) -> tuple[Job, Job]:
     """Runs of a bare car and of the written one, which pass the same guard, to positions and rates (steps + 1, 23)."""
     own, q, v = start()
-    model, by_hand, times = build("mujoco", own), hand_built_handling.run(own, q, v, STEP, steps), STEP * np.arange(
-        steps + 1)  # fmt: skip
+    model, by_hand, times = (
+        build("mujoco", own),
+        hand_built_handling.run(own, q, v, STEP, steps),
+        STEP * np.arange(steps + 1),
+    )
 
     def ours() -> tuple[np.ndarray, ...]:
         found = model.run(q, v, steps * STEP, STEP)

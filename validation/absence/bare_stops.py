@@ -20,8 +20,9 @@ Job = Callable[[], Path]
 
 def stops(speed: float) -> tuple[Job, Job]:
     """Stops of a bare vehicle from a speed (m/s), built beforehand, and of the written one."""
-    scene = bare("braking", brakes={"supply": SUPPLY},
-                 procedures={STOP: {"kind": "j_turn", "speed": speed, "steer": STEER}})  # fmt: skip
+    scene = bare(
+        "braking", brakes={"supply": SUPPLY}, procedures={STOP: {"kind": "j_turn", "speed": speed, "steer": STEER}}
+    )
     vehicle, start = ready(scene, STOP)
 
     def ours() -> Path:
@@ -33,9 +34,14 @@ def stops(speed: float) -> tuple[Job, Job]:
 def gap(ours: Path, theirs: Path) -> float:
     """Largest difference of states (m, rad, m/s, rad/s), of the wheels' turning (rad/s), of the tyres' forces by the
     largest one, and of pressures and torques by theirs."""
-    shares = [np.abs(one - other).max() / np.abs(other).max() for one, other in
-              ((ours.reports[..., :2], theirs.reports[..., :2]), (ours.pressures, theirs.pressures),
-               (ours.torques, theirs.torques))]  # fmt: skip
+    shares = [
+        np.abs(one - other).max() / np.abs(other).max()
+        for one, other in (
+            (ours.reports[..., :2], theirs.reports[..., :2]),
+            (ours.pressures, theirs.pressures),
+            (ours.torques, theirs.torques),
+        )
+    ]
     return float(max(np.abs(ours.states - theirs.states).max(), np.abs(ours.turning - theirs.turning).max(), *shares))
 
 

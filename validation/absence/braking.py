@@ -12,10 +12,15 @@ from models.braking.scene import BrakingScene
 
 ENGINES = ("reference", "exudyn", "mujoco")
 STOP = "stop"
-BARE: dict[str, Any] = {"title": "bare", "system": "braking", "road": {"stretches": [{"left": "snow"}]},
-                        "procedures": {STOP: {"kind": "j_turn", "speed": 3.0, "steer": 0.02}}}  # fmt: skip
-BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {"measured_pressures": ({}, {
-    "measured": {"file": "pressures.csv"}})}
+BARE: dict[str, Any] = {
+    "title": "bare",
+    "system": "braking",
+    "road": {"stretches": [{"left": "snow"}]},
+    "procedures": {STOP: {"kind": "j_turn", "speed": 3.0, "steer": 0.02}},
+}
+BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "measured_pressures": ({}, {"measured": {"file": "pressures.csv"}})
+}
 
 
 def write(folder: Path) -> None:
@@ -53,24 +58,30 @@ def _counts(vehicle: Any, controller: Any) -> dict[str, int]:
         chain.append(chain[-1].inner)
     last = chain[-1]
     return {
-        "coordinates": len(vehicle.coordinates), "wheels": plane.wheels,
+        "coordinates": len(vehicle.coordinates),
+        "wheels": plane.wheels,
         "lags": 0 if vehicle.relaxation is None else vehicle.relaxation.size,
         "moving loads": int(((plane.by_x != 0.0) | (plane.by_y != 0.0)).sum()),
         "time constants": int((chambers.fill > 0.0).sum() + (chambers.empty > 0.0).sum()),
         "kept commands": (len(still(chambers, vehicle.sample).commands) - 2) * plane.wheels,
-        "slow fillings": chambers.slow.size, "volumes": chambers.volumes.size,
+        "slow fillings": chambers.slow.size,
+        "volumes": chambers.volumes.size,
         "push-outs": int((brakes.push_out > 0.0).sum()),
         "loops": int(((brakes.release != brakes.push_out) | (brakes.falling != brakes.rising)).sum()),
-        "asked": len(chain) - 1, "files": int(isinstance(last, MeasuredPressures)),
+        "asked": len(chain) - 1,
+        "files": int(isinstance(last, MeasuredPressures)),
         "controllers": int(not isinstance(last, (CONTROLLERS["none"], MeasuredPressures))),
         "surfaces": int(max(vehicle.road.left.max(), vehicle.road.right.max())) + 1,
-        "tables": len(vehicle.tables.mu_x), **_sensed(chain, plane.wheels),
-    }  # fmt: skip
+        "tables": len(vehicle.tables.mu_x),
+        **_sensed(chain, plane.wheels),
+    }
 
 
 def _sensed(chain: list[Any], wheels: int) -> dict[str, int]:
     """Signals and pressures that do not arrive as they are."""
     read = [channels.conversion for one in chain if hasattr(one, "teeth") for channels in (one.wheels, one.pressures)]
-    return {"noisy signals": wheels * sum(own.noise > 0.0 for own in read),
-            "converted signals": wheels * sum(own.bits is not None for own in read),
-            "wrong signals": wheels * sum((own.gain, own.offset) != (1.0, 0.0) for own in read)}  # fmt: skip
+    return {
+        "noisy signals": wheels * sum(own.noise > 0.0 for own in read),
+        "converted signals": wheels * sum(own.bits is not None for own in read),
+        "wrong signals": wheels * sum((own.gain, own.offset) != (1.0, 0.0) for own in read),
+    }

@@ -8,12 +8,18 @@ import numpy as np
 from models.contact.scene import ContactScene
 
 ENGINES = ("reference",)
-BARE: dict[str, Any] = {"title": "bare", "system": "contact", "ellipse": {"a": 5e-3, "b": 4e-3},
-                        "contact": {"load": 8e4, "friction": 0.3}, "creepage": {"xi_x": 1e-3},
-                        "method": {"name": "linear"}}  # fmt: skip
+BARE: dict[str, Any] = {
+    "title": "bare",
+    "system": "contact",
+    "ellipse": {"a": 5e-3, "b": 4e-3},
+    "contact": {"load": 8e4, "friction": 0.3},
+    "creepage": {"xi_x": 1e-3},
+    "method": {"name": "linear"},
+}
 BOUNDED: dict[str, Any] = {"method": {"name": "simplified"}}
 BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
-    "profiles": (BOUNDED, BOUNDED | {"ellipse": None, "profiles": {}})}
+    "profiles": (BOUNDED, BOUNDED | {"ellipse": None, "profiles": {}})
+}
 
 
 def seen(scene: ContactScene, engine: str) -> tuple[dict[str, int], bytes]:
@@ -25,9 +31,11 @@ def seen(scene: ContactScene, engine: str) -> tuple[dict[str, int], bytes]:
         own, motions = of_scene.contact(scene), of_scene.creepages(scene)
     found = [own.roll(motion, 7) for motion in motions]
     counts = {
-        "bounded": int(not isinstance(own, Linear)), "areas of any shape": int(isinstance(own, Simplified)),
+        "bounded": int(not isinstance(own, Linear)),
+        "areas of any shape": int(isinstance(own, Simplified)),
         "half-spaces": int(isinstance(own, Exact | ExactOnEllipse)),
         "laws of friction": int(getattr(own, "choices", {}).get("falling") is not None),
-        "searches": searched.call_count, "motions with spin": sum(motion[2] != 0.0 for motion in motions),
-    }  # fmt: skip
+        "searches": searched.call_count,
+        "motions with spin": sum(motion[2] != 0.0 for motion in motions),
+    }
     return counts, np.array([[one.fx, one.fy, one.mz] for one in found]).tobytes()

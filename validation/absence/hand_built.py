@@ -24,22 +24,32 @@ def exudyn_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     ground = mbs.AddObject(items.ObjectGround())
-    nodes = [mbs.AddNode(items.NodePoint2D(initialCoordinates=[0, start[i]], initialVelocities=[0, start[4 + i]]))
-             for i in (0, 1)]  # fmt: skip
-    nodes.append(mbs.AddNode(items.NodeRigidBody2D(initialCoordinates=[0, start[2], start[3]],
-                                                   initialVelocities=[0, start[6], start[7]])))  # fmt: skip
-    wheels = [mbs.AddObject(items.MassPoint2D(nodeNumber=node, mass=mass))
-              for node, mass in zip(nodes, (p.m1, p.m2), strict=False)]  # fmt: skip
+    nodes = [
+        mbs.AddNode(items.NodePoint2D(initialCoordinates=[0, start[i]], initialVelocities=[0, start[4 + i]]))
+        for i in (0, 1)
+    ]
+    nodes.append(
+        mbs.AddNode(
+            items.NodeRigidBody2D(initialCoordinates=[0, start[2], start[3]], initialVelocities=[0, start[6], start[7]])
+        )
+    )
+    wheels = [
+        mbs.AddObject(items.MassPoint2D(nodeNumber=node, mass=mass))
+        for node, mass in zip(nodes, (p.m1, p.m2), strict=False)
+    ]
     chassis = mbs.AddObject(items.RigidBody2D(nodeNumber=nodes[2], mass=p.m3, inertia=p.I))
     for node, mass in zip(nodes, (p.m1, p.m2, p.m3), strict=True):
         heave = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=1))
         mbs.AddLoad(items.LoadCoordinate(markerNumber=heave, load=mass * p.g))
 
     def spring(upper, upper_x, lower, stiffness, damping):
-        ends = [mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=body, localPosition=[-x, 0, 0]))
-                for body, x in ((lower, 0.0), (upper, upper_x))]  # fmt: skip
-        mbs.AddObject(items.CartesianSpringDamper(
-            markerNumbers=ends, stiffness=[0, stiffness, 0], damping=[0, damping, 0]))  # fmt: skip
+        ends = [
+            mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=body, localPosition=[-x, 0, 0]))
+            for body, x in ((lower, 0.0), (upper, upper_x))
+        ]
+        mbs.AddObject(
+            items.CartesianSpringDamper(markerNumbers=ends, stiffness=[0, stiffness, 0], damping=[0, damping, 0])
+        )
 
     spring(wheels[0], 0.0, ground, p.k1, p.d1)
     spring(wheels[1], 0.0, ground, p.k2, p.d2)
@@ -49,8 +59,18 @@ def exudyn_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run
 
     def run() -> np.ndarray:
         read = march()
-        return np.column_stack([read[0][:, 2], read[1][:, 2], read[2][:, 2], read[2][:, 3],
-                                read[3][:, 2], read[4][:, 2], read[5][:, 2], read[5][:, 3]])  # fmt: skip
+        return np.column_stack(
+            [
+                read[0][:, 2],
+                read[1][:, 2],
+                read[2][:, 2],
+                read[2][:, 3],
+                read[3][:, 2],
+                read[4][:, 2],
+                read[5][:, 2],
+                read[5][:, 3],
+            ]
+        )
 
     return run
 
@@ -61,9 +81,11 @@ def exudyn_march(container: Any, mbs: Any, nodes: list[Any], step: float, steps:
     import exudyn.itemInterface as items
 
     kinds = exu.OutputVariableType
-    sensors = [mbs.AddSensor(items.SensorNode(
-        nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind))
-        for kind in (kinds.Coordinates, kinds.Coordinates_t) for node in nodes]  # fmt: skip
+    sensors = [
+        mbs.AddSensor(items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind))
+        for kind in (kinds.Coordinates, kinds.Coordinates_t)
+        for node in nodes
+    ]
     mbs.Assemble()
     options = exu.SimulationSettings()
     options.solution.file.write = False

@@ -53,8 +53,19 @@ def tyre(know, rate, w0, torque0, torque1, step, load, radius, spin, tables, rep
     """Fill the report (7,) of a wheel whose centre's speed along it changes at a ``rate``."""
     _, slips, _, mu_x, g, h = tables
     u0, v, sign, c, p = know[START], know[ASIDE], 1.0 if know[START] >= 0.0 else -1.0, int(know[CELL]), know[PART]
-    w, force, slip, locked = wheel_step(sign * u0, sign * (u0 + step * rate), sign * w0, torque0, torque1, step,
-                                        radius, spin, (0, 0, 0.0, c, p, 0, 0.0, load), slips, mu_x)  # fmt: skip
+    w, force, slip, locked = wheel_step(
+        sign * u0,
+        sign * (u0 + step * rate),
+        sign * w0,
+        torque0,
+        torque1,
+        step,
+        radius,
+        spin,
+        (0, 0, 0.0, c, p, 0, 0.0, load),
+        slips,
+        mu_x,
+    )
     k, part = place(slips, abs(slip))
     side = load * across(0, c, p, 0, 0.0, k, part, g, h)
     if slip > NEARLY and (know[ALONG] > 0.0 or v != 0.0):
@@ -68,8 +79,7 @@ def tyre(know, rate, w0, torque0, torque1, step, load, radius, spin, tables, rep
 
 @inlined
 def rounds(turning, torque0, torque1, step, most, truck, tables, known, found, last, report):
-    """Accelerations ``found`` (3,) that the tyres' forces give back; ``last`` (2, 3) is room. False if there are none.
-    """
+    """Accelerations ``found`` (3,) that the tyres' forces give back; ``last`` (2, 3) is room. False if none."""
     _, _, load, radius, spin, mass, inertia = truck
     left, before = math.inf, 0.0
     for n in range(most):
@@ -181,8 +191,22 @@ def march(speed, course, torque, sample, steps, slope, truck, tables, times, sta
             if parts <= 1:
                 part = go(now, turning, first, torque, step, course, regular, truck, tables, room, reports[n])
             else:
-                part = in_parts(parts, now, turning, first, torque, step, course, regular, truck, tables, room, ends,
-                                sums, reports[n])  # fmt: skip
+                part = in_parts(
+                    parts,
+                    now,
+                    turning,
+                    first,
+                    torque,
+                    step,
+                    course,
+                    regular,
+                    truck,
+                    tables,
+                    room,
+                    ends,
+                    sums,
+                    reports[n],
+                )
             used += part
             if part < step:
                 break
@@ -201,10 +225,30 @@ def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], 
 
     def marched() -> Path:
         times, states, turned, reports = (np.empty((samples, *shape)) for shape in ((), (6,), (4,), (4, COLUMNS)))
-        n = march(speed, course, torque, vehicle.sample, vehicle.substeps, vehicle.slope, truck, tyres, times, states,
-                  turned, reports)  # fmt: skip
+        n = march(
+            speed,
+            course,
+            torque,
+            vehicle.sample,
+            vehicle.substeps,
+            vehicle.slope,
+            truck,
+            tyres,
+            times,
+            states,
+            turned,
+            reports,
+        )
         applied = (np.arange(n) > 0.0)[:, None]
-        return Path(times[:n], states[:n].reshape(n, 2, 3), turned[:n], pressure * applied * np.ones(4),
-                    torque * applied, reports[1:n], True, ("x", "y", "heading_0"))  # fmt: skip
+        return Path(
+            times[:n],
+            states[:n].reshape(n, 2, 3),
+            turned[:n],
+            pressure * applied * np.ones(4),
+            torque * applied,
+            reports[1:n],
+            True,
+            ("x", "y", "heading_0"),
+        )
 
     return marched

@@ -66,8 +66,7 @@ def calls() -> tuple[Callable[[], np.ndarray], Callable[[], np.ndarray]]:
 
 
 def ratio_of_contacts(rounds: int) -> tuple[float, tuple[float, float, float]]:
-    """Largest difference of the forces by the largest force there can be, and the ratio of seconds with its interval.
-    """
+    """Largest difference of the forces by the largest force there can be; the ratio of seconds, its interval."""
     jobs = calls()
     ours, theirs = (job() for job in jobs)
     gap = float(np.abs(ours - theirs).max()) / (FRICTION * LOAD)

@@ -46,13 +46,35 @@ def law(numbers, q, v, f):
     places, pushes = doubles(12), doubles(12)
     moment = plus(_engine(mounts, head, frame, q, v, f), _seats(beyond(mounts, 3 * MOUNT), frame, q, v, f))
     for i in range(4):
-        moment = plus(moment, _wheel(row(wheels, WHEEL, i), frame, ahead, aside, head[0], q, v, 9 + 3 * i,
-                                     row(places, 3, i), row(pushes, 3, i), row(contacts, CONTACT, i)))  # fmt: skip
+        moment = plus(
+            moment,
+            _wheel(
+                row(wheels, WHEEL, i),
+                frame,
+                ahead,
+                aside,
+                head[0],
+                q,
+                v,
+                9 + 3 * i,
+                row(places, 3, i),
+                row(pushes, 3, i),
+                row(contacts, CONTACT, i),
+            ),
+        )
     _bar(head[6], head[7], head[8], 0, places, pushes, q, f)
     _bar(head[9], head[10], head[11], 2, places, pushes, q, f)
-    forces_within(array(contacts, (4, CONTACT)), array(beyond(cells, 5 * CELLS), (4, int(head[12]))),
-                  array(cells, (5, CELLS)), head[13], THREE, ORDER, array(slips, (4, PER_SLIP)),
-                  array(doubles(ROOM), (ROOM,)), array(found, (4, 4)))  # fmt: skip
+    forces_within(
+        array(contacts, (4, CONTACT)),
+        array(beyond(cells, 5 * CELLS), (4, int(head[12]))),
+        array(cells, (5, CELLS)),
+        head[13],
+        THREE,
+        ORDER,
+        array(slips, (4, PER_SLIP)),
+        array(doubles(ROOM), (ROOM,)),
+        array(found, (4, 4)),
+    )
     along, across, turn, lift = 0.0, 0.0, 0.0, 0.0
     for i in range(4):
         place, push, creep, k = row(places, 3, i), row(pushes, 3, i), row(found, 4, i), 9 + 3 * i
@@ -126,8 +148,11 @@ def _engine(mounts, head, frame, q, v, f):
         arm = plus(plus(times(ahead, m[3]), times(over, m[4])), times(high, m[5]))
         gap = plus(here, times(plus(joint, arm), -1.0))
         rate = plus(cross(turning, here), times(plus(passing, cross(own, arm)), -1.0))
-        force = (m[12] + m[6] * gap[0] + m[9] * rate[0], m[13] + m[7] * gap[1] + m[10] * rate[1],
-                 m[14] + m[8] * gap[2] + m[11] * rate[2])  # fmt: skip
+        force = (
+            m[12] + m[6] * gap[0] + m[9] * rate[0],
+            m[13] + m[7] * gap[1] + m[10] * rate[1],
+            m[14] + m[8] * gap[2] + m[11] * rate[2],
+        )
         total, twist = plus(total, force), plus(twist, cross(arm, force))
         moment = plus(moment, cross(force, gap))
     f[6] += dot(z, total)
@@ -155,8 +180,17 @@ def numbers_of(own: Handling) -> np.ndarray:
     car, of, held = own.vehicle, net(CELLS), own.held.parts
     springs, s, joint = {p.name: p for p in car.springs}, car.body("sway").position, car.body("engine").position
     bars = [number for bar in car.bars for number in (bar.stiffness, held[bar.name], 1.0 / bar.track)]
-    head = [s[0], own.given.drags[0].coefficient / 2.0, car.body("body").position[2], 0.0, joint[0] - s[0], joint[2],
-            *bars, len(of.strips[0]), of.middle]  # fmt: skip
+    head = [
+        s[0],
+        own.given.drags[0].coefficient / 2.0,
+        car.body("body").position[2],
+        0.0,
+        joint[0] - s[0],
+        joint[2],
+        *bars,
+        len(of.strips[0]),
+        of.middle,
+    ]
 
     def law(name: str) -> list[float]:
         return [springs[name].stiffness, springs[name].damping, held[name]]
@@ -167,13 +201,28 @@ def numbers_of(own: Handling) -> np.ndarray:
         sunk = load / tyre.stiffness
         radius = tyre.point[2] + sunk
         side = next(force.stiffness for force in own.given.side_forces if force.name == tyre.name)
-        wheels += [*np.subtract(tyre.point, s), strut[0], strut[2], *law(corner), *law(f"{corner} bush"), load,
-                   tyre.stiffness, tyre.point[2], radius, width, shape_factor(CELLS) * radius * sunk * width / side,
-                   own.tyres.friction]  # fmt: skip
-    mounts = [np.r_[np.subtract(springs[f"{name} mount.x"].point_one, s),
-                    np.subtract(springs[f"{name} mount.x"].point_one, joint),
-                    np.array([law(f"{name} mount.{axis}") for axis in "xyz"]).T.ravel()]
-              for name in ("left", "right", "rear")]  # fmt: skip
+        wheels += [
+            *np.subtract(tyre.point, s),
+            strut[0],
+            strut[2],
+            *law(corner),
+            *law(f"{corner} bush"),
+            load,
+            tyre.stiffness,
+            tyre.point[2],
+            radius,
+            width,
+            shape_factor(CELLS) * radius * sunk * width / side,
+            own.tyres.friction,
+        ]
+    mounts = [
+        np.r_[
+            np.subtract(springs[f"{name} mount.x"].point_one, s),
+            np.subtract(springs[f"{name} mount.x"].point_one, joint),
+            np.array([law(f"{name} mount.{axis}") for axis in "xyz"]).T.ravel(),
+        ]
+        for name in ("left", "right", "rear")
+    ]
     seats = [[*np.subtract(springs[name].point_one, s), *law(name)] for name in ("left seat", "right seat")]
     return np.concatenate([head, wheels, np.ravel(mounts), np.ravel(seats), of.cells.ravel(), of.strips.ravel()])
 
@@ -183,14 +232,28 @@ def model_of(own: Handling, step: float) -> mujoco.MjModel:
     car, table = own.vehicle, numbers_of(own)
     chassis = car.body("body")
     bodies = "".join(
-        BODY.format(name=name, joints="".join(JOINTS[kind] for kind in kinds),
-                    mass=car.body(name).mass + SPECK * (kinds == WHEELED),
-                    pos=_text(np.subtract(car.body(name).position, chassis.position)))
-        for name, kinds in RIDERS.items())  # fmt: skip
+        BODY.format(
+            name=name,
+            joints="".join(JOINTS[kind] for kind in kinds),
+            mass=car.body(name).mass + SPECK * (kinds == WHEELED),
+            pos=_text(np.subtract(car.body(name).position, chassis.position)),
+        )
+        for name, kinds in RIDERS.items()
+    )
     principal, axes = _principal(chassis)
-    built = mujoco.MjModel.from_xml_string(MJCF.format(
-        step=repr(step), gravity=_text(own.gravity), size=table.size, bodies=bodies, pos=_text(chassis.position),
-        mass=chassis.mass, axes=_text(axes), height=-chassis.position[2], x=-chassis.position[0]))  # fmt: skip
+    built = mujoco.MjModel.from_xml_string(
+        MJCF.format(
+            step=repr(step),
+            gravity=_text(own.gravity),
+            size=table.size,
+            bodies=bodies,
+            pos=_text(chassis.position),
+            mass=chassis.mass,
+            axes=_text(axes),
+            height=-chassis.position[2],
+            x=-chassis.position[0],
+        )
+    )
     built.body_inertia[1] = principal
     for name, kinds in RIDERS.items():
         spin = [0.0, own.tyres.spin_inertia, 0.0] if kinds == WHEELED else np.diagonal(car.body(name).inertia)
@@ -221,8 +284,12 @@ CORNERS = ("front left", "front right", "rear left", "rear right")
 WHEELED = "xzP"
 RIDERS = {"engine": "zRP", **dict.fromkeys(("fl", "fr", "rl", "rr"), WHEELED), "left seat": "z", "right seat": "z"}
 """Bodies on the chassis and their joints."""
-JOINTS = {"x": '<joint type="slide" axis="1 0 0"/>', "z": '<joint type="slide" axis="0 0 1"/>',
-          "R": '<joint type="hinge" axis="1 0 0"/>', "P": '<joint type="hinge" axis="0 1 0"/>'}  # fmt: skip
+JOINTS = {
+    "x": '<joint type="slide" axis="1 0 0"/>',
+    "z": '<joint type="slide" axis="0 0 1"/>',
+    "R": '<joint type="hinge" axis="1 0 0"/>',
+    "P": '<joint type="hinge" axis="0 1 0"/>',
+}
 BODY = """
       <body name="{name}" pos="{pos}">
         {joints}

@@ -38,8 +38,14 @@ class Car:
         """The numbers of a vehicle of this kind."""
         body, wheel = vehicle.bodies[:2]
         corners = [[*np.subtract(s.point_one, body.position), s.stiffness, s.damping] for s in vehicle.springs]
-        return cls(body.mass, tuple(np.diag(body.inertia).tolist()), wheel.mass, vehicle.tyres[0].stiffness,
-                   body.position, np.array(corners))  # fmt: skip
+        return cls(
+            body.mass,
+            tuple(np.diag(body.inertia).tolist()),
+            wheel.mass,
+            vehicle.tyres[0].stiffness,
+            body.position,
+            np.array(corners),
+        )
 
 
 def exudyn_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
@@ -53,28 +59,57 @@ def exudyn_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
     mbs: Any = container.AddSystem()
     mbs.AddObject(items.ObjectGround())
     kinds, zero, still = exu.JointType, np.zeros((3, 3)), [0.0, 0.0, 0.0]
-    nodes = [mbs.AddNode(items.NodeGenericODE2(referenceCoordinates=still, initialCoordinates=still,
-                                               initialCoordinates_t=still, numberOfODE2Coordinates=3))]  # fmt: skip
-    body = mbs.AddObject(items.ObjectKinematicTree(
-        nodeNumber=nodes[0], gravity=still, jointTypes=[kinds.PrismaticZ, kinds.RevoluteX, kinds.RevoluteY],
-        linkParents=[-1, 0, 1], jointTransformations=lists.Matrix3DList([np.eye(3)] * 3),
-        jointOffsets=lists.Vector3DList([np.array(car.centre), np.zeros(3), np.zeros(3)]),
-        linkInertiasCOM=lists.Matrix3DList([zero, zero, np.diag(car.inertia)]),
-        linkCOMs=lists.Vector3DList([np.zeros(3)] * 3), linkMasses=[0.0, 0.0, car.mass]))  # fmt: skip
+    nodes = [
+        mbs.AddNode(
+            items.NodeGenericODE2(
+                referenceCoordinates=still,
+                initialCoordinates=still,
+                initialCoordinates_t=still,
+                numberOfODE2Coordinates=3,
+            )
+        )
+    ]
+    body = mbs.AddObject(
+        items.ObjectKinematicTree(
+            nodeNumber=nodes[0],
+            gravity=still,
+            jointTypes=[kinds.PrismaticZ, kinds.RevoluteX, kinds.RevoluteY],
+            linkParents=[-1, 0, 1],
+            jointTransformations=lists.Matrix3DList([np.eye(3)] * 3),
+            jointOffsets=lists.Vector3DList([np.array(car.centre), np.zeros(3), np.zeros(3)]),
+            linkInertiasCOM=lists.Matrix3DList([zero, zero, np.diag(car.inertia)]),
+            linkCOMs=lists.Vector3DList([np.zeros(3)] * 3),
+            linkMasses=[0.0, 0.0, car.mass],
+        )
+    )
     upright = [[0, 0, -1], [0, 1, 0], [1, 0, 0]]
     for x, y, z, stiffness, damping in car.corners.tolist():
         node = mbs.AddNode(items.Node1D(referenceCoordinates=[0.0], initialCoordinates=[0.0], initialVelocities=[0.0]))
-        wheel = mbs.AddObject(items.Mass1D(nodeNumber=node, mass=car.wheel, referenceRotation=upright,
-                                           referencePosition=np.add(car.centre, (x, y, z)).tolist()))  # fmt: skip
-        ends = [mbs.AddMarker(items.MarkerKinematicTreeRigid(objectNumber=body, linkNumber=2, localPosition=[x, y, z])),
-                mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=wheel))]  # fmt: skip
-        mbs.AddObject(items.CartesianSpringDamper(
-            markerNumbers=ends, stiffness=[0, 0, stiffness], damping=[0, 0, damping]))  # fmt: skip
+        wheel = mbs.AddObject(
+            items.Mass1D(
+                nodeNumber=node,
+                mass=car.wheel,
+                referenceRotation=upright,
+                referencePosition=np.add(car.centre, (x, y, z)).tolist(),
+            )
+        )
+        ends = [
+            mbs.AddMarker(items.MarkerKinematicTreeRigid(objectNumber=body, linkNumber=2, localPosition=[x, y, z])),
+            mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=wheel)),
+        ]
+        mbs.AddObject(
+            items.CartesianSpringDamper(markerNumbers=ends, stiffness=[0, 0, stiffness], damping=[0, 0, damping])
+        )
         nodes.append(node)
     forces, per_time = (car.tyre * road).tolist(), 2.0 / step
-    mbs.AddObject(items.ObjectGenericODE2(
-        nodeNumbers=nodes[1:], massMatrix=np.zeros((4, 4)), stiffnessMatrix=car.tyre * np.eye(4),
-        forceUserFunction=lambda mbs, t, item, q, v: forces[round(t * per_time)]))  # fmt: skip
+    mbs.AddObject(
+        items.ObjectGenericODE2(
+            nodeNumbers=nodes[1:],
+            massMatrix=np.zeros((4, 4)),
+            stiffnessMatrix=car.tyre * np.eye(4),
+            forceUserFunction=lambda mbs, t, item, q, v: forces[round(t * per_time)],
+        )
+    )
     march = exudyn_march(container, mbs, nodes, step, steps)
     return lambda: np.hstack([found[:, 1:] for found in march()])
 
@@ -85,14 +120,28 @@ def mujoco_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
     from mujoco import rollout
 
     wheels = np.add(car.centre, car.corners[:, :3])
-    parts = [MJCF.format(i=i, strut=_text(corner[:3]), wheel=_text(place), mass=car.wheel, tyre=car.tyre)
-             for i, (corner, place) in enumerate(zip(car.corners, wheels, strict=True))]  # fmt: skip
+    parts = [
+        MJCF.format(i=i, strut=_text(corner[:3]), wheel=_text(place), mass=car.wheel, tyre=car.tyre)
+        for i, (corner, place) in enumerate(zip(car.corners, wheels, strict=True))
+    ]
     site, wheel, actuator = (
-        "".join(part.split("----\n")[k].format(k=corner[3], d=corner[4]) for part, corner in zip(
-            parts, car.corners.tolist(), strict=True)) for k in range(3))  # fmt: skip
-    model = mujoco.MjModel.from_xml_string(WHOLE.format(
-        step=step, centre=_text(np.array(car.centre)), mass=car.mass, site=site, wheel=wheel, actuator=actuator,
-        size=2 + road.size))  # fmt: skip
+        "".join(
+            part.split("----\n")[k].format(k=corner[3], d=corner[4])
+            for part, corner in zip(parts, car.corners.tolist(), strict=True)
+        )
+        for k in range(3)
+    )
+    model = mujoco.MjModel.from_xml_string(
+        WHOLE.format(
+            step=step,
+            centre=_text(np.array(car.centre)),
+            mass=car.mass,
+            site=site,
+            wheel=wheel,
+            actuator=actuator,
+            size=2 + road.size,
+        )
+    )
     model.body_inertia[1] = car.inertia  # no distribution of mass has these, and the compiler says so
     model.numeric_data[:] = [2.0 / step, car.tyre, *road.ravel()]
     mujoco.mj_setConst(model, mujoco.MjData(model))

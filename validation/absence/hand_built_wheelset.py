@@ -43,12 +43,33 @@ def rates(state, speed, p, told, out, report):
             moment = shear * (turn * xi_y - area**2 * coefficient_at(3, ratio, poisson) * xi_spin)
         left, down = n_z * aside - n_y * load, -n_y * aside - n_z * load
         fy, fz = fy + left, fz + down
-        mx, my, mz = (mx + (py * down - pz * left), my + (pz * ahead - px * down + n_y * moment),
-                      mz + (px * left - py * ahead + n_z * moment))  # fmt: skip
+        mx, my, mz = (
+            mx + (py * down - pz * left),
+            my + (pz * ahead - px * down + n_y * moment),
+            mz + (px * left - py * ahead + n_z * moment),
+        )
         if told:
             power = ahead * vx + aside * slip + moment * turning
-            line = (load, ahead, aside, moment, xi_x, xi_y, xi_spin, a, b, depth, power, np.arctan2(-n_y, n_z),
-                    px, py, pz, 0.0, -load * (n_y * vy + n_z * vz), 0.0)  # fmt: skip
+            line = (
+                load,
+                ahead,
+                aside,
+                moment,
+                xi_x,
+                xi_y,
+                xi_spin,
+                a,
+                b,
+                depth,
+                power,
+                np.arctan2(-n_y, n_z),
+                px,
+                py,
+                pz,
+                0.0,
+                -load * (n_y * vy + n_z * vz),
+                0.0,
+            )
             for k in range(COLUMNS):
                 report[0 if side == RIGHT else 1, k] = line[k]
     m1, level = cy * mx + sy * my, cy * my - sy * mx
@@ -81,8 +102,19 @@ def run(wheelset: Any, state: np.ndarray, speed: float, step: float, steps: int)
     """One run of a free wheelset (``models.rail.wheelset``) that gives its states (steps + 1, 10) and its contacts
     (steps + 1, 2, 18)."""
     w, pair = wheelset, wheelset.pair
-    p = (w.mass, w.spin_inertia, w.yaw_inertia, (w.load - w.mass * 9.81) / 2.0, w.radius, w.half_gauge, w.conicity,
-         w.head_radius, pair.modulus, pair.G, pair.nu)  # fmt: skip
+    p = (
+        w.mass,
+        w.spin_inertia,
+        w.yaw_inertia,
+        (w.load - w.mass * 9.81) / 2.0,
+        w.radius,
+        w.half_gauge,
+        w.conicity,
+        w.head_radius,
+        pair.modulus,
+        pair.G,
+        pair.nu,
+    )
 
     def marched() -> tuple[np.ndarray, np.ndarray]:
         path, reports = np.empty((steps + 1, STATES)), np.empty((steps + 1, 2, COLUMNS))

@@ -6,8 +6,11 @@ from models.handling.scene import HandlingScene
 
 ENGINES = ("mujoco", "exudyn")
 ROLLING = "rolling"
-BARE: dict[str, Any] = {"title": "bare", "system": "handling",
-                        "manoeuvres": {ROLLING: {"speed": 15.0, "duration": 0.01}}}  # fmt: skip
+BARE: dict[str, Any] = {
+    "title": "bare",
+    "system": "handling",
+    "manoeuvres": {ROLLING: {"speed": 15.0, "duration": 0.01}},
+}
 
 
 def seen(scene: HandlingScene, engine: str) -> tuple[dict[str, int], bytes]:
@@ -16,7 +19,10 @@ def seen(scene: HandlingScene, engine: str) -> tuple[dict[str, int], bytes]:
 
     own, said = scene.handling(ROLLING), scene.manoeuvres[ROLLING]
     controls = (own.controls.steer, own.controls.brake, own.controls.drive)
-    counts = {"waves": len(own.waves), "controls": sum(any(value for _, value in knots) for knots in controls),
-              "pushes": len(own.pushes),
-              "leaning wheels": len(own.vehicle.tyres) * (own.tyres.inclination != 0.0)}
+    counts = {
+        "waves": len(own.waves),
+        "controls": sum(any(value for _, value in knots) for knots in controls),
+        "pushes": len(own.pushes),
+        "leaning wheels": len(own.vehicle.tyres) * (own.tyres.inclination != 0.0),
+    }
     return counts, driven(engine, own, said.speed, said.duration, scene.run.step).run.positions.tobytes()

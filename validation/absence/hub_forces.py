@@ -12,9 +12,15 @@ from models.time_series import write_time_series
 ENGINES = ("reference", "exudyn", "mujoco")
 HUBS = ("fl", "fr", "rl", "rr")
 STEPS, STEP, PERIOD = 20, 1e-3, 2e-3
-BARE: dict[str, Any] = {"title": "bare", "system": "hub-forces", "vehicle": {"file": "r19_free"},
-                        "run": {"duration": STEPS * STEP, "step": STEP}, "stabilise": {"smoothing": 60.0},
-                        "angles": {"file": "angles.csv"}, "forces": {"file": "forces.csv", "frame": "inertial"}}
+BARE: dict[str, Any] = {
+    "title": "bare",
+    "system": "hub-forces",
+    "vehicle": {"file": "r19_free"},
+    "run": {"duration": STEPS * STEP, "step": STEP},
+    "stabilise": {"smoothing": 60.0},
+    "angles": {"file": "angles.csv"},
+    "forces": {"file": "forces.csv", "frame": "inertial"},
+}
 QUIET: dict[str, Any] = {"noise": "none"}
 ON_ROAD: dict[str, Any] = {"road": {}, "angles": QUIET, "forces": QUIET | {"frame": "inertial"}}
 BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
@@ -29,8 +35,9 @@ def write(folder: Path) -> None:
     """Forces that carry the vehicle, one of them rising, and angles of a vehicle that stands."""
     rising = np.linspace(0.0, 1.0, round(STEPS * STEP / PERIOD) + 1) ** 2
     units = {name: next(iter(known)) for name, known in COMPONENTS.items()}
-    forces = {f"{hub}_{name}": (units[name], (4e3 + 500.0 * rising) * (name == "fz"))
-              for hub in HUBS for name in COMPONENTS}  # fmt: skip
+    forces = {
+        f"{hub}_{name}": (units[name], (4e3 + 500.0 * rising) * (name == "fz")) for hub in HUBS for name in COMPONENTS
+    }
     write_time_series(folder / "forces.csv", forces, PERIOD)
     angles = {name: (next(iter(known)), 0.0 * rising) for name, known in ANGLES.items()}
     write_time_series(folder / "angles.csv", angles, PERIOD)
@@ -53,12 +60,16 @@ def seen(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
     curved = np.abs(np.diff(within, n=2, axis=0)).max() > 1e-9 * np.abs(within).max()
     noisy = _noisy(scene, truth, forces, angles)
     lifting = sum(tyre.pushes_only for tyre in vehicle.whole.tyres)
-    counts = {"runs on tyres": int(truth is not None), "tyres that lift": lifting, "noisy forces": noisy[0],
-              "noisy angles": noisy[1],
-              "pulled angles": 2 * int(table[kernel.GUIDE] == kernel.PULLED),
-              "enforced angles": 2 * int(table[kernel.GUIDE] == kernel.HELD),
-              "turning hubs": int(table[kernel.HUBS] * (table[kernel.FRAME] != kernel.FRAMES.index("inertial"))),
-              "curves between samples": int(curved)}  # fmt: skip
+    counts = {
+        "runs on tyres": int(truth is not None),
+        "tyres that lift": lifting,
+        "noisy forces": noisy[0],
+        "noisy angles": noisy[1],
+        "pulled angles": 2 * int(table[kernel.GUIDE] == kernel.PULLED),
+        "enforced angles": 2 * int(table[kernel.GUIDE] == kernel.HELD),
+        "turning hubs": int(table[kernel.HUBS] * (table[kernel.FRAME] != kernel.FRAMES.index("inertial"))),
+        "curves between samples": int(curved),
+    }
     return counts, model.run(stabilised.start(drive)).states.tobytes()
 
 

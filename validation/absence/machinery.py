@@ -95,8 +95,10 @@ def made_by_braking(engine: str) -> tuple[int, int]:
     """Arrays that more samples of a bare manoeuvre of a braked vehicle make, and how many more samples these are."""
     from models.braking.procedures import drive
 
-    slow, fast = (bare("braking", procedures={braking.STOP: {"kind": "j_turn", "speed": speed, "steer": 0.02}})
-                  for speed in (1.0, 3.0))  # fmt: skip
+    slow, fast = (
+        bare("braking", procedures={braking.STOP: {"kind": "j_turn", "speed": speed, "steer": 0.02}})
+        for speed in (1.0, 3.0)
+    )
     samples, counts = [], []
     for scene in (slow, fast):
         samples.append(len(drive(scene, braking.STOP, engine).times))
@@ -109,16 +111,56 @@ def rows() -> list[Row]:
     made, samples = zip(*map(made_by_braking, braking.ENGINES), strict=True)
     why = "a short run against a long one, by the count of numba's own memory; no effect is there that could make one"
     return [
-        at_most("absent.wheelset.arrays", SYSTEM, "arrays that 360 more steps of a bare wheelset make",
-                made_by_wheelset(0), "", 0, why, "none"),
-        at_most("absent.ride.arrays", SYSTEM, "arrays that 360 more steps of a bare ride make in MuJoCo and as copies",
-                made_by_ride(), "", 0, why, "none"),
-        at_most("absent.handling.arrays", SYSTEM, "arrays that 360 more steps of a bare car make in MuJoCo",
-                made_by_car(), "", 0, why, "none"),
-        at_most("absent.hub-forces.arrays", SYSTEM, "arrays that 15 more steps of a bare vehicle driven by its hub "
-                "forces make in the reference, Exudyn and MuJoCo together", sum(map(made_by_hubs, hub_forces.ENGINES)),
-                "", 0, why, "none"),
-        at_most("absent.braking.arrays", SYSTEM, f"arrays that {samples[0]} more samples of a bare braked vehicle "
-                "make in compiled code of the reference, Exudyn and MuJoCo together, in four steps each", sum(made), "",
-                0, why, "none"),
-    ]  # fmt: skip
+        at_most(
+            "absent.wheelset.arrays",
+            SYSTEM,
+            "arrays that 360 more steps of a bare wheelset make",
+            made_by_wheelset(0),
+            "",
+            0,
+            why,
+            "none",
+        ),
+        at_most(
+            "absent.ride.arrays",
+            SYSTEM,
+            "arrays that 360 more steps of a bare ride make in MuJoCo and as copies",
+            made_by_ride(),
+            "",
+            0,
+            why,
+            "none",
+        ),
+        at_most(
+            "absent.handling.arrays",
+            SYSTEM,
+            "arrays that 360 more steps of a bare car make in MuJoCo",
+            made_by_car(),
+            "",
+            0,
+            why,
+            "none",
+        ),
+        at_most(
+            "absent.hub-forces.arrays",
+            SYSTEM,
+            "arrays that 15 more steps of a bare vehicle driven by its hub "
+            "forces make in the reference, Exudyn and MuJoCo together",
+            sum(map(made_by_hubs, hub_forces.ENGINES)),
+            "",
+            0,
+            why,
+            "none",
+        ),
+        at_most(
+            "absent.braking.arrays",
+            SYSTEM,
+            f"arrays that {samples[0]} more samples of a bare braked vehicle "
+            "make in compiled code of the reference, Exudyn and MuJoCo together, in four steps each",
+            sum(made),
+            "",
+            0,
+            why,
+            "none",
+        ),
+    ]

@@ -16,20 +16,37 @@ from models.time_series import write_time_series
 ENGINES = ("reference", "exudyn", "mujoco")
 HUBS = ("fl", "fr", "rl", "rr")
 SAMPLES, PERIOD = 101, 1e-3
-CHANNELS = [*({"channel": hub, "quantity": "force", "at": hub, "component": "z", "frame": "inertial"} for hub in HUBS),
-            *({"channel": name, "quantity": "angular rate" if "rate" in name else "angle", "at": "body",
-               "component": name.partition("_")[0], "frame": "inertial"} for name in ANGLES)]  # fmt: skip
+CHANNELS = [
+    *({"channel": hub, "quantity": "force", "at": hub, "component": "z", "frame": "inertial"} for hub in HUBS),
+    *(
+        {
+            "channel": name,
+            "quantity": "angular rate" if "rate" in name else "angle",
+            "at": "body",
+            "component": name.partition("_")[0],
+            "frame": "inertial",
+        }
+        for name in ANGLES
+    ),
+]
 FILE: dict[str, Any] = {"file": "recording.csv", "channels": CHANNELS}
-BARE: dict[str, Any] = {"title": "bare", "system": "measured", "vehicle": {"file": "r19_free"}, "files": [FILE],
-                        "stabilise": {"method": "none", "smoothing": 20.0}}  # fmt: skip
+BARE: dict[str, Any] = {
+    "title": "bare",
+    "system": "measured",
+    "vehicle": {"file": "r19_free"},
+    "files": [FILE],
+    "stabilise": {"method": "none", "smoothing": 20.0},
+}
 VIRTUAL = {"duration": PERIOD * (SAMPLES - 1), "format": "csv"}
 ON_ROAD: dict[str, Any] = {"files": [], "virtual": VIRTUAL}
 FAULTS: dict[str, Any] = {
     "sensor_noise": {"noise": {"force": 8.0, "moment": 1.0, "angle": 1.75e-3, "angular rate": 5e-3}},
     "quantisation": {"quantisation": {"bits": 12}},
-    "late_channels": {"delay": {"force": 2e-3}}, "wrong_gains": {"gain": {"force": 0.01}},
-    "offsets": {"bias": {"force": 20.0}}, "dropouts": {"dropouts": {"rate": 20.0, "length": 5e-3}},
-}  # fmt: skip
+    "late_channels": {"delay": {"force": 2e-3}},
+    "wrong_gains": {"gain": {"force": 0.01}},
+    "offsets": {"bias": {"force": 20.0}},
+    "dropouts": {"dropouts": {"rate": 20.0, "length": 5e-3}},
+}
 """What the effects of transducers put in; of dropouts more than usual, so that a short recording has some."""
 BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "own_clocks": ({}, {"files": [FILE | {"drift": 1e-4}]}),
@@ -66,10 +83,13 @@ def seen(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:
         found = section_run.run(job, Path(name) / "run")
         path = b"".join(found.samples(answer).tobytes() for answer in found.answers)
     guides = {int(table[kernel.GUIDE]) for table in tables}
-    counts = {"runs on tyres": int(scene.virtual is not None), **faults,
-              "pulled angles": 2 * (guides == {kernel.PULLED}),
-              "enforced angles": 2 * (guides == {kernel.HELD}),
-              "moved clocks": sum(bool(file.offset or file.drift) for file in scene.files)}  # fmt: skip
+    counts = {
+        "runs on tyres": int(scene.virtual is not None),
+        **faults,
+        "pulled angles": 2 * (guides == {kernel.PULLED}),
+        "enforced angles": 2 * (guides == {kernel.HELD}),
+        "moved clocks": sum(bool(file.offset or file.drift) for file in scene.files),
+    }
     return counts, path
 
 
@@ -88,6 +108,8 @@ def _recorded(scene: MeasuredScene, engine: str, folder: Path) -> tuple[Recordin
         faulty = np.array([(samples != true.samples(Faults(), own.seed)).any(axis=0), np.isnan(samples).any(axis=0)])
         write_pattern(scene, true, samples, folder)
         scene = load(folder / "scene.toml")
-    sources, counts = plan.opened(scene), dict(zip(("faulty channels", "silent channels"),
-                                                   map(int, faulty.sum(axis=1)), strict=True))  # fmt: skip
+    sources, counts = (
+        plan.opened(scene),
+        dict(zip(("faulty channels", "silent channels"), map(int, faulty.sum(axis=1)), strict=True)),
+    )
     return record(scene, sources, plan.mapped(scene, sources, rig), rig.hubs, folder), counts

@@ -24,8 +24,15 @@ from validation.absence.probes import registered
 from validation.rows import Row, System, at_most, behaves
 
 SYSTEM: System = "effects"
-FILES = {"braking": "braking", "contact": "contact", "wheelset": "wheelset", "handling": "handling", "ride": "ride",
-         "hub-forces": "hub_forces", "measured": "measured"}  # fmt: skip
+FILES = {
+    "braking": "braking",
+    "contact": "contact",
+    "wheelset": "wheelset",
+    "handling": "handling",
+    "ride": "ride",
+    "hub-forces": "hub_forces",
+    "measured": "measured",
+}
 """System -> the file beside this one that has its bare scene and counts what a run of a scene is made of."""
 Counts = dict[str, dict[str, int]]
 """By engine; "all" where every engine agrees."""
@@ -73,8 +80,11 @@ def seen(system: str, scene: Any, quick: bool = False) -> dict[str, tuple[dict[s
 def controlled(system: str) -> tuple[str, ...]:
     """Effects that can be put into a bare scene, by their usual values or by hand."""
     modules = {name: module_of(system, name) for name in names_of(system)}
-    return tuple(name for name, module in modules.items() if name in by_hand(system)
-                 or hasattr(module, "put_in") or "file" not in getattr(module, "EXAMPLE", ("file",)))  # fmt: skip
+    return tuple(
+        name
+        for name, module in modules.items()
+        if name in by_hand(system) or hasattr(module, "put_in") or "file" not in getattr(module, "EXAMPLE", ("file",))
+    )
 
 
 def pair(system: str, effect: str) -> tuple[Any, Any]:
@@ -142,8 +152,13 @@ def _probed(system: str, first: dict[str, tuple[dict[str, int], bytes]], importe
         missing += [module for module in modules[name] if not _loaded([module])]
     last = seen(system, bare(system))
     callbacks = {engine: counts["callbacks"] for engine, (counts, _) in first.items() if engine != "reference"}
-    return {"imported": imported, "missing": missing, "adds": adds, "callbacks": callbacks,
-            "same": all(first[e][1] == last[e][1] for e in first)}  # fmt: skip
+    return {
+        "imported": imported,
+        "missing": missing,
+        "adds": adds,
+        "callbacks": callbacks,
+        "same": all(first[e][1] == last[e][1] for e in first),
+    }
 
 
 @contextmanager
@@ -175,37 +190,81 @@ def found() -> dict[str, Any]:
 def rows(quick: bool) -> list[Row]:
     """Absence of every effect of every system, and a positive control of each; quick: of every third, in one engine."""
     if quick:
-        return [row for system in FILES
-                for row in _present(system, {name: added(system, name, quick) for name in controlled(system)[::3]})]
+        return [
+            row
+            for system in FILES
+            for row in _present(system, {name: added(system, name, quick) for name in controlled(system)[::3]})
+        ]
     seen_there = found()
     present = [row for system, probe in seen_there["systems"].items() for row in _present(system, probe["adds"])]
-    engines = at_most("absent.references.engines", SYSTEM, "engines that bare scenes of braking, contact, wheelset and "
-                      "ride import by their references", len(seen_there["engines"]), "", 0, "a fresh process", "none")
-    return [*present, engines, *(row for system, probe in seen_there["systems"].items() for row in
-                                 _absent(system, probe))]  # fmt: skip
+    engines = at_most(
+        "absent.references.engines",
+        SYSTEM,
+        "engines that bare scenes of braking, contact, wheelset and ride import by their references",
+        len(seen_there["engines"]),
+        "",
+        0,
+        "a fresh process",
+        "none",
+    )
+    return [
+        *present,
+        engines,
+        *(row for system, probe in seen_there["systems"].items() for row in _absent(system, probe)),
+    ]
 
 
 def _absent(system: str, seen_there: dict[str, Any]) -> list[Row]:
     why = "in a fresh process in which none of them could have been imported, nor any effect's file read"
     return [
-        at_most(f"absent.{system}.modules", SYSTEM, f"{system}: modules of effects that a bare scene imports, and "
-                "those that no effect imports", len(seen_there["imported"]) + len(seen_there["missing"]), "", 0, why,
-                "none"),
-        behaves(f"absent.{system}.bits", SYSTEM, f"{system}: path of a bare scene, once without the files of effects, "
-                "once after all of them ran", "the same" if seen_there["same"] else "not the same", "the same",
-                "to the last bit, in every implementation"),
-        *(at_most(f"absent.{system}.callbacks.{engine}", SYSTEM, f"{system}: callbacks that a bare scene has in "
-                  f"{engine} beyond the one whose forces no engine has", count - 1, "", 0, "counted over all items of "
-                  "the system that marches, or in the engine's globals; no effect adds any but what its file says",
-                  "none") for engine, count in seen_there["callbacks"].items()),
-    ]  # fmt: skip
+        at_most(
+            f"absent.{system}.modules",
+            SYSTEM,
+            f"{system}: modules of effects that a bare scene imports, and those that no effect imports",
+            len(seen_there["imported"]) + len(seen_there["missing"]),
+            "",
+            0,
+            why,
+            "none",
+        ),
+        behaves(
+            f"absent.{system}.bits",
+            SYSTEM,
+            f"{system}: path of a bare scene, once without the files of effects, once after all of them ran",
+            "the same" if seen_there["same"] else "not the same",
+            "the same",
+            "to the last bit, in every implementation",
+        ),
+        *(
+            at_most(
+                f"absent.{system}.callbacks.{engine}",
+                SYSTEM,
+                f"{system}: callbacks that a bare scene has in {engine} beyond the one whose forces no engine has",
+                count - 1,
+                "",
+                0,
+                "counted over all items of "
+                "the system that marches, or in the engine's globals; no effect adds any but what its file says",
+                "none",
+            )
+            for engine, count in seen_there["callbacks"].items()
+        ),
+    ]
 
 
 def _present(system: str, more: dict[str, Counts]) -> list[Row]:
     """A row per effect of what it adds."""
-    return [behaves(f"absent.{system}.adds.{name}", SYSTEM, f"{system}: what {name} adds", _text(counts),
-                    _text(declared(system, name, counts)), "positive control: what its file says, and no more")
-            for name, counts in more.items()]  # fmt: skip
+    return [
+        behaves(
+            f"absent.{system}.adds.{name}",
+            SYSTEM,
+            f"{system}: what {name} adds",
+            _text(counts),
+            _text(declared(system, name, counts)),
+            "positive control: what its file says, and no more",
+        )
+        for name, counts in more.items()
+    ]
 
 
 def _text(counts: Counts) -> str:

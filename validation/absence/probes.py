@@ -52,9 +52,20 @@ def probe(table: Mapping[str, Any], folder: str = ".", **options: Any) -> dict[s
 
 def belongs_to_effects(module: str) -> bool:
     """Whether a module exists for the sake of an effect: none of these may be imported for a bare scene."""
-    owners = ("models.effects.", "models.road", "models.contact", "models.tyre", "models.brake", "models.sensors",
-              "models.time_series", "models.tables", "models.prescribed", "models.engines.mujoco_callback",
-              "models.engines.mujoco_layout", "pyopencrg")  # fmt: skip
+    owners = (
+        "models.effects.",
+        "models.road",
+        "models.contact",
+        "models.tyre",
+        "models.brake",
+        "models.sensors",
+        "models.time_series",
+        "models.tables",
+        "models.prescribed",
+        "models.engines.mujoco_callback",
+        "models.engines.mujoco_layout",
+        "pyopencrg",
+    )
     return module.startswith(owners)
 
 
@@ -151,9 +162,13 @@ def user_functions(model: Any) -> int:
 
 def _user_functions(mbs: Any) -> int:
     system = mbs.systemData
-    kinds = (("Node", system.NumberOfNodes()), ("Object", system.NumberOfObjects()),
-             ("Marker", system.NumberOfMarkers()), ("Load", system.NumberOfLoads()),
-             ("Sensor", system.NumberOfSensors()))  # fmt: skip
+    kinds = (
+        ("Node", system.NumberOfNodes()),
+        ("Object", system.NumberOfObjects()),
+        ("Marker", system.NumberOfMarkers()),
+        ("Load", system.NumberOfLoads()),
+        ("Sensor", system.NumberOfSensors()),
+    )
     items = [getattr(mbs, f"Get{kind}")(i) for kind, count in kinds for i in range(count)]
     assert items, "the system is empty"
     own = [getattr(mbs, name)() for name in dir(mbs) if name.startswith("Get") and name.endswith("UserFunction")]
@@ -168,8 +183,10 @@ def registered(engine: str) -> Iterator[list[int]]:
     if engine == "mujoco":
         import mujoco
 
-        patches = [mock.patch.object(mujoco, name, _setting(getattr(mujoco, name), found))
-                   for name in (f"set_mjcb_{callback}" for callback in CALLBACKS)]  # fmt: skip
+        patches = [
+            mock.patch.object(mujoco, name, _setting(getattr(mujoco, name), found))
+            for name in (f"set_mjcb_{callback}" for callback in CALLBACKS)
+        ]
     elif engine == "exudyn":
         import exudyn as exu
 

@@ -30,20 +30,39 @@ from validation.rows import Row, System, at_most, behaves
 
 SYSTEM: System = "effects"
 SPEEDS = (10.0, 20.0, 30.0)
-FOREIGN = ("exudyn", "mujoco", "numba", "pyopencrg", "slycot", "models.engines", "models.contact", "models.effects",
-           "models.drift", "models.road.fitted", "models.road.isotropic", "models.ride.varying_speed",
-           "models.ride.monte_carlo", "models.ride.frequency")  # fmt: skip
+FOREIGN = (
+    "exudyn",
+    "mujoco",
+    "numba",
+    "pyopencrg",
+    "slycot",
+    "models.engines",
+    "models.contact",
+    "models.effects",
+    "models.drift",
+    "models.road.fitted",
+    "models.road.isotropic",
+    "models.ride.varying_speed",
+    "models.ride.monte_carlo",
+    "models.ride.frequency",
+)
 """What a linear ride of the reference at constant speeds does without."""
 
 ENGINES = ("reference",)
 SPEED = 20.0
-BARE: dict[str, Any] = {"title": "bare", "system": "ride", "vehicle": {"file": "seven_freedoms"},
-                        "road": {"left_right": "equal", "front_rear": "equal"},
-                        "speeds": {"values": [SPEED]}}  # fmt: skip
+BARE: dict[str, Any] = {
+    "title": "bare",
+    "system": "ride",
+    "vehicle": {"file": "seven_freedoms"},
+    "road": {"left_right": "equal", "front_rear": "equal"},
+    "speeds": {"values": [SPEED]},
+}
 NARROW: dict[str, Any] = {"left_right": "equal", "front_rear": "equal"}
 BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
-    "curves": ({"vehicle": {"file": "quarter_car_nonlinear", "small_motion": True}},
-               {"vehicle": {"file": "quarter_car_nonlinear"}}),
+    "curves": (
+        {"vehicle": {"file": "quarter_car_nonlinear", "small_motion": True}},
+        {"vehicle": {"file": "quarter_car_nonlinear"}},
+    ),
     "varying_speed": ({}, {"speeds": None, "drive": {"time": [0.0, 0.5], "speed": [18.0, 22.0]}}),
     "measured_road": ({}, {"road": {**NARROW, "file": "road.csv", "track_width": 1.5}}),
 }
@@ -65,9 +84,15 @@ def seen(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
         road = of_scene.excitation_of(scene, wheels(vehicle))
     linear = of_scene.linear_vehicle(vehicle, engine)
     system = weighted(excited(linear(SPEED), road, SPEED), scene.weighting)
-    counts = {"states": len(system.A), "preloads": int(vehicle.gravity > 0.0), "fits": min(fitted.call_count, 1),
-              "delays": sum(length > 0.0 for length in road.lengths), "drives": int(scene.drive is not None),
-              "heights": len(np.unique(sum(road.heights), axis=0)), "bent springs": 0}  # fmt: skip
+    counts = {
+        "states": len(system.A),
+        "preloads": int(vehicle.gravity > 0.0),
+        "fits": min(fitted.call_count, 1),
+        "delays": sum(length > 0.0 for length in road.lengths),
+        "drives": int(scene.drive is not None),
+        "heights": len(np.unique(sum(road.heights), axis=0)),
+        "bent springs": 0,
+    }
     if scene.drive is not None:
         from models.ride.varying_speed import varying_speed
 
@@ -159,27 +184,59 @@ def rows(quick: bool = False) -> list[Row]:
     names = ("quarter_car", "quarter_car_nonlinear")
     bare, curved = (callbacks(name) for name in names)
     why = "counted from outside, in the modules of a fresh process, in the engine's items, in the system's size"
-    process = [] if quick else [
-        at_most("absent.ride.imports", SYSTEM, "modules of engines, of the compiler and of other routes that a linear "
-                "ride of the reference imports", len(imported("reference")), "", 0, why, "none"),
-    ]  # fmt: skip
+    process = (
+        []
+        if quick
+        else [
+            at_most(
+                "absent.ride.imports",
+                SYSTEM,
+                "modules of engines, of the compiler and of other routes that a linear ride of the reference imports",
+                len(imported("reference")),
+                "",
+                0,
+                why,
+                "none",
+            )
+        ]
+    )
     return [
         *process,
-        behaves("absent.ride.states", SYSTEM, "states of R19-ride: alone, with Wk, with Wk and Wd",
-                ", ".join(str(states(f)) for f in ({}, {"body centre": "Wk"},
-                                                   {"body centre": "Wk", "left occupant": "Wd"})),
-                "42, 50, 56", "twice 19 freedoms, two filters at each of two axles; Wk has 8 states, Wd 6"),
-        behaves("absent.ride.speed", SYSTEM, "linear vehicles that three speeds need: R19-ride, R19-free",
-                f"{linearised('r19_ride')}, {linearised('r19_free')}", "1, 3",
-                "without side forces and drag nothing depends on the speed"),
-        behaves("absent.ride.curves", SYSTEM, "curves and callbacks of a quarter car, then of one with three curves",
-                f"{_counts(bare)}; {_counts(curved)}",
-                "exudyn 0, 1, mujoco 0, 1; exudyn 3, 2, mujoco 3, 1",
-                "one callback reads the road, in MuJoCo all forces stand in it; a bent spring of Exudyn has its own"),
-        behaves("absent.ride.noise", SYSTEM, "outputs of a half car that white noise reaches: tyres without damping, "
-                "with it", f"{noisy(0.0)}, {noisy(100.0)}", "0, 2",
-                "the road's rate goes through tyre damping alone"),
-    ]  # fmt: skip
+        behaves(
+            "absent.ride.states",
+            SYSTEM,
+            "states of R19-ride: alone, with Wk, with Wk and Wd",
+            ", ".join(
+                str(states(f)) for f in ({}, {"body centre": "Wk"}, {"body centre": "Wk", "left occupant": "Wd"})
+            ),
+            "42, 50, 56",
+            "twice 19 freedoms, two filters at each of two axles; Wk has 8 states, Wd 6",
+        ),
+        behaves(
+            "absent.ride.speed",
+            SYSTEM,
+            "linear vehicles that three speeds need: R19-ride, R19-free",
+            f"{linearised('r19_ride')}, {linearised('r19_free')}",
+            "1, 3",
+            "without side forces and drag nothing depends on the speed",
+        ),
+        behaves(
+            "absent.ride.curves",
+            SYSTEM,
+            "curves and callbacks of a quarter car, then of one with three curves",
+            f"{_counts(bare)}; {_counts(curved)}",
+            "exudyn 0, 1, mujoco 0, 1; exudyn 3, 2, mujoco 3, 1",
+            "one callback reads the road, in MuJoCo all forces stand in it; a bent spring of Exudyn has its own",
+        ),
+        behaves(
+            "absent.ride.noise",
+            SYSTEM,
+            "outputs of a half car that white noise reaches: tyres without damping, with it",
+            f"{noisy(0.0)}, {noisy(100.0)}",
+            "0, 2",
+            "the road's rate goes through tyre damping alone",
+        ),
+    ]
 
 
 def _counts(found: dict[str, tuple[int, int]]) -> str:

@@ -22,10 +22,13 @@ SPEED, SHIFT = 60.0, 3e-3
 ENGINES = ("reference", "exudyn", "mujoco")
 FREE = {name: 0.0 for name in Wheelset.model_fields if name.startswith(("stiffness", "damping"))}
 BARE: dict[str, Any] = {
-    "title": "bare", "system": "wheelset", "contact": {"law": "linear"}, "speeds": {"values": [SPEED]},
+    "title": "bare",
+    "system": "wheelset",
+    "contact": {"law": "linear"},
+    "speeds": {"values": [SPEED]},
     "wheelset": {"override": {**FREE, "flange_stiffness": 0.0, "contact_damping": 0.0}},
     "run": {"duration": 0.01, "step": 5e-4, "displacement": 1e-3, "speeds": [SPEED]},
-}  # fmt: skip
+}
 """A free wheelset on cones without flanges."""
 
 
@@ -37,11 +40,14 @@ def seen(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], bytes]:
     _, body, contact, *_, law = own.given
     profiles = contact.size > forces.NUMBERS  # they have flanges of their own
     counts = {
-        "springs": int((body[eq.KX : eq.KZ + 1] > 0.0).sum()), "dampers": int((body[eq.DX : eq.DZ + 1] > 0.0).sum()),
-        "creep nets": int(law == forces.FASTSIM), "flanges": int(contact[forces.FLANGE] > 0.0 and not profiles),
-        "contact damping": int(contact[forces.DAMPING] > 0.0), "profiles": int(profiles),
+        "springs": int((body[eq.KX : eq.KZ + 1] > 0.0).sum()),
+        "dampers": int((body[eq.DX : eq.DZ + 1] > 0.0).sum()),
+        "creep nets": int(law == forces.FASTSIM),
+        "flanges": int(contact[forces.FLANGE] > 0.0 and not profiles),
+        "contact damping": int(contact[forces.DAMPING] > 0.0),
+        "profiles": int(profiles),
         **_built(own, engine),
-    }  # fmt: skip
+    }
     path = own.run(own.displaced(scene.run.displacement), scene.run.duration, scene.run.step)
     return counts, path.states.tobytes()
 
@@ -77,10 +83,20 @@ def rows() -> list[Row]:
     """All counts, each beside its positive control."""
     counts = [", ".join(map(str, springs(one))) for one in (CHOSEN, free(CHOSEN))]
     return [
-        behaves("absent.wheelset.fastsim", SYSTEM, "rates of a wheelset where FASTSIM's net is made of no numbers: "
-                "linear law, FASTSIM", ", ".join(without_net(law) for law in ("linear", "fastsim")),
-                "the same, no numbers", "what is not read cannot spoil anything"),
-        behaves("absent.wheelset.suspension", SYSTEM, "spring-dampers in Exudyn and actuators in MuJoCo: of the chosen "
-                "wheelset; of a free one", "; ".join(counts), "2, 6; 0, 2",
-                "one for each end in Exudyn; one for each direction in MuJoCo, where two hold the vehicle's weight"),
-    ]  # fmt: skip
+        behaves(
+            "absent.wheelset.fastsim",
+            SYSTEM,
+            "rates of a wheelset where FASTSIM's net is made of no numbers: linear law, FASTSIM",
+            ", ".join(without_net(law) for law in ("linear", "fastsim")),
+            "the same, no numbers",
+            "what is not read cannot spoil anything",
+        ),
+        behaves(
+            "absent.wheelset.suspension",
+            SYSTEM,
+            "spring-dampers in Exudyn and actuators in MuJoCo: of the chosen wheelset; of a free one",
+            "; ".join(counts),
+            "2, 6; 0, 2",
+            "one for each end in Exudyn; one for each direction in MuJoCo, where two hold the vehicle's weight",
+        ),
+    ]

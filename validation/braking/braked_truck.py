@@ -18,9 +18,20 @@ LOCKS = 1e9
 """Torque (N m) that locks a wheel at once."""
 
 
-def braked(torques: np.ndarray, *, tables: Tables | None = None, steer: float = 0.0, speed: float = 10.0,
-           until: float = 0.0, step: float = 5.5e-3, plane: Plane | None = None, go: Callable[..., Any] = advance,
-           yaw: float = 0.0, duration: float = 200.0, side: float = 0.0) -> Any:  # fmt: skip
+def braked(
+    torques: np.ndarray,
+    *,
+    tables: Tables | None = None,
+    steer: float = 0.0,
+    speed: float = 10.0,
+    until: float = 0.0,
+    step: float = 5.5e-3,
+    plane: Plane | None = None,
+    go: Callable[..., Any] = advance,
+    yaw: float = 0.0,
+    duration: float = 200.0,
+    side: float = 0.0,
+) -> Any:
     """State, time, last report and wheels' turning at the end of a stop, or at a speed (m/s) or a time (s) before.
 
     torques (4,) : N m; steer : rad, of the front wheels; yaw, side : rates at the start; go : ``advance`` or an
@@ -32,8 +43,20 @@ def braked(torques: np.ndarray, *, tables: Tables | None = None, steer: float = 
     found, report, time, status = np.zeros(3), np.zeros((4, REPORTED)), 0.0, FINE
     front, way = np.array([steer, steer, 0.0, 0.0]), road([Stretch(0.0, 0, 0)])
     while status == FINE and np.hypot(*state[1, :2]) > until and time < duration - 1e-9:
-        status, used = go(state, turning, np.tile(torques, (2, 1)), step, front, ICE.cornering, plane,
-                          np.zeros(4, dtype=int), way, tables.packed, found, report)  # fmt: skip
+        status, used = go(
+            state,
+            turning,
+            np.tile(torques, (2, 1)),
+            step,
+            front,
+            ICE.cornering,
+            plane,
+            np.zeros(4, dtype=int),
+            way,
+            tables.packed,
+            found,
+            report,
+        )
         time += used
     if status not in (FINE, AT_REST):
         raise RunFailed("braking", "the truck does not come to its end", time)
@@ -56,8 +79,11 @@ def transfer_errors(mu: float = 0.4) -> dict[str, float]:
     """
     plane, lift = truck(PAPER), PAPER.height / PAPER.wheelbase
     light, static = plane._replace(spin=np.full(4, 1e-9)), plane.static.reshape(2, 2).sum(1)
-    slowing = {"all wheels": mu * GRAVITY, "front wheels": mu * static[0] / (PAPER.mass * (1.0 - mu * lift)),
-               "rear wheels": mu * static[1] / (PAPER.mass * (1.0 + mu * lift))}  # fmt: skip
+    slowing = {
+        "all wheels": mu * GRAVITY,
+        "front wheels": mu * static[0] / (PAPER.mass * (1.0 - mu * lift)),
+        "rear wheels": mu * static[1] / (PAPER.mass * (1.0 + mu * lift)),
+    }
     torques, errors = {"all wheels": (1e5, 1e5), "front wheels": (1e5, 0.0), "rear wheels": (0.0, 1e5)}, {}
     for name, torque in torques.items():
         _, _, report, _ = braked(np.repeat(torque, 2), tables=constant(mu), plane=light, duration=0.5)

@@ -79,16 +79,28 @@ def distance(scheme, u, w, torque, mass, radius, inertia, slips, mu, step, most)
     return x, u
 
 
-def stopped(scheme: str, quarter: Quarter, tyre: TyreTable, torque: float, speed: float,
-            step: float) -> tuple[float, float]:  # fmt: skip
+def stopped(
+    scheme: str, quarter: Quarter, tyre: TyreTable, torque: float, speed: float, step: float
+) -> tuple[float, float]:
     """Stopping distance (m) by one of SCHEMES under a constant torque (N m), from rolling at a speed (m/s).
 
     A scheme may chatter or creep for ever. After PATIENCE times the time that the torque alone would take, the way
     until then is given, with the speed (m/s) that is left, else 0.
     """
     most = int(PATIENCE * speed * quarter.mass * quarter.radius / (torque * step))
-    return distance(SCHEMES.index(scheme), speed, speed / quarter.radius, torque, quarter.mass, quarter.radius,
-                    quarter.spin_inertia, tyre.slips, tyre.mu_x[0, 0], step, most)  # fmt: skip
+    return distance(
+        SCHEMES.index(scheme),
+        speed,
+        speed / quarter.radius,
+        torque,
+        quarter.mass,
+        quarter.radius,
+        quarter.spin_inertia,
+        tyre.slips,
+        tyre.mu_x[0, 0],
+        step,
+        most,
+    )
 
 
 def exact(quarter: Quarter, tyre: TyreTable, torque: float, speed: float) -> float:
@@ -109,7 +121,8 @@ def exact(quarter: Quarter, tyre: TyreTable, torque: float, speed: float) -> flo
         return float(min(rates_in(q, y)[0] / (r * torque / inertia) - SETTLED, 1.0 - y[0]))
 
     settled.terminal = True  # type: ignore[attr-defined]
-    part = solve_ivp(rates_in, (0.0, 1e9), [0.0, math.log(speed), 0.0], "DOP853", rtol=1e-12, atol=1e-14,
-                     events=settled)  # fmt: skip
+    part = solve_ivp(
+        rates_in, (0.0, 1e9), [0.0, math.log(speed), 0.0], "DOP853", rtol=1e-12, atol=1e-14, events=settled
+    )
     slip, log_speed, way = part.y[:, -1]
     return float(way + math.exp(2.0 * log_speed) * m / (2.0 * np.interp(slip, nodes, forces)))

@@ -39,8 +39,11 @@ def asked(drive: Drive, accelerations: np.ndarray) -> np.ndarray:
     masses, heights = np.array([(body.mass, body.position[2]) for body in free.bodies]).T
     radii = np.array([tyre.point[2] for tyre in free.tyres])
     roll, pitch = (drive.run.positions[-1, free.coordinates().index((SWAY, turn))] for turn in ("rx", "ry"))
-    spins = sum(own.tyres.spin_inertia / r for r, tyre in zip(radii, free.tyres, strict=True)
-                if tyre.name not in own.tyres.fixed)  # fmt: skip
+    spins = sum(
+        own.tyres.spin_inertia / r
+        for r, tyre in zip(radii, free.tyres, strict=True)
+        if tyre.name not in own.tyres.fixed
+    )
     leaning = GRAVITY * float(masses @ heights - masses.sum() * radii.mean())
     return leaning * np.array([pitch, -roll]) - accelerations * (masses @ heights + spins)
 

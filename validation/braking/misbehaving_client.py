@@ -25,14 +25,22 @@ def wrong(kind: str, number: int, link: socket.socket) -> None:
         os._exit(9)
     if kind == "late":
         time.sleep(0.8)
-    link.sendall({
-        "NaN": frame(number, mode=b"P", first=NAN), "infinite": frame(number, mode=b"P", first=float("inf")),
-        "NaN as a valve": frame(number, first=NAN), "negative pressure": frame(number, mode=b"P", first=-1.0),
-        "valve in no state": frame(number, first=0.5), "too few wheels": frame(number, wheels=3),
-        "too many bytes": frame(number) + b"\0", "part of a frame": frame(number)[:33],
-        "another protocol": b"HTTP/1.1 200 OK\r\n" + 63 * b" ", "answer to another sample": frame(number - 1),
-        "late": frame(number), "silence": b"",
-    }[kind])  # fmt: skip
+    link.sendall(
+        {
+            "NaN": frame(number, mode=b"P", first=NAN),
+            "infinite": frame(number, mode=b"P", first=float("inf")),
+            "NaN as a valve": frame(number, first=NAN),
+            "negative pressure": frame(number, mode=b"P", first=-1.0),
+            "valve in no state": frame(number, first=0.5),
+            "too few wheels": frame(number, wheels=3),
+            "too many bytes": frame(number) + b"\0",
+            "part of a frame": frame(number)[:33],
+            "another protocol": b"HTTP/1.1 200 OK\r\n" + 63 * b" ",
+            "answer to another sample": frame(number - 1),
+            "late": frame(number),
+            "silence": b"",
+        }[kind]
+    )
     link.recv(1)
 
 

@@ -30,21 +30,37 @@ Stretches = Sequence[tuple[float, Callable[[float], float]]]
 def own_distance(quarter: Quarter, brake: Brake, on: str, controller: Controller, speed: float, substeps: int) -> float:
     """Stopping distance (m) by the product's step."""
     tyre, one = surface(on), np.ones(1)
-    vehicle = Braked(quarter.plane, np.zeros(1, dtype=np.int64), stacked([tyre]), tyre.cornering,
-                     road([Stretch(0.0, 0, 0)]), of_wheels(brake), Chambers(FILL * one, EMPTY * one, SUPPLY),
-                     np.zeros(1), substeps=substeps)  # fmt: skip
+    vehicle = Braked(
+        quarter.plane,
+        np.zeros(1, dtype=np.int64),
+        stacked([tyre]),
+        tyre.cornering,
+        road([Stretch(0.0, 0, 0)]),
+        of_wheels(brake),
+        Chambers(FILL * one, EMPTY * one, SUPPLY),
+        np.zeros(1),
+        substeps=substeps,
+    )
     return float(vehicle.run(controller, speed).states[-1, 0, 0])
 
 
-def reference_distance(quarter: Quarter, brake: Brake, on: str, controller: Controller, speed: float,
-                       tolerance: float = 1e-10) -> float:  # fmt: skip
+def reference_distance(
+    quarter: Quarter, brake: Brake, on: str, controller: Controller, speed: float, tolerance: float = 1e-10
+) -> float:
     """The same by the reference, at a relative tolerance."""
     curve = SURFACES[on][0]
     return tight_distance(quarter, brake, [(0.0, lambda s: float(curve(np.array(s))))], controller, speed, tolerance)
 
 
-def tight_distance(quarter: Quarter, brake: Brake, stretches: Stretches, controller: Controller, speed: float,
-                   tolerance: float = 1e-10, method: Any = "DOP853") -> float:  # fmt: skip
+def tight_distance(
+    quarter: Quarter,
+    brake: Brake,
+    stretches: Stretches,
+    controller: Controller,
+    speed: float,
+    tolerance: float = 1e-10,
+    method: Any = "DOP853",
+) -> float:
     """Stopping distance (m) by the reference on a road of stretches; method : of scipy."""
     y, pressure, torque, number = np.array([0.0, speed, speed / quarter.radius]), 0.0, 0.0, 0
     while y[1] > SLOWEST:
@@ -106,8 +122,9 @@ def _sample(y: np.ndarray, law: Any, quarter: Quarter, stretches: Stretches, opt
         event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
     while now < SAMPLE:
         held = y[2] <= 1e-12 and law(now)[1] > radius * force(1.0)
-        found = solve_ivp(sliding if held else turning, (now, SAMPLE), y, **options,
-                          events=(lets_go if held else stops, passes))  # fmt: skip
+        found = solve_ivp(
+            sliding if held else turning, (now, SAMPLE), y, **options, events=(lets_go if held else stops, passes)
+        )
         now, y = float(found.t[-1]), found.y[:, -1].copy()
         if found.t_events[1].size:
             mu, end = _under(y[0], stretches)

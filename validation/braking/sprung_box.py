@@ -30,20 +30,31 @@ GRADIENT = 2e4
 @cache
 def box(stiffer: float = 1.0, spin_inertia: float = SPIN) -> Sprung:
     """1000 kg on four wheels of 30 kg, springs and tyres so many times as stiff, damped alike."""
-    wheels = {f"{x}{y}": (u * HALF, v * SIDE, RADIUS) for x, u in (("f", 1.0), ("r", -1.0))
-              for y, v in (("l", 1.0), ("r", -1.0))}  # fmt: skip
+    wheels = {
+        f"{x}{y}": (u * HALF, v * SIDE, RADIUS)
+        for x, u in (("f", 1.0), ("r", -1.0))
+        for y, v in (("l", 1.0), ("r", -1.0))
+    }
     up: Vector = (0.0, 0.0, 1.0)
-    return sprung(SpatialVehicle(
-        "box",
-        (Body("chassis", 1000.0, (0.0, 0.0, 0.55), FREEDOMS, TENSOR),
-         *(Body(name, 30.0, at, ("z",)) for name, at in wheels.items())),
-        tuple(SpringDamper(name, "chassis", name, at, at, up, SPRING * stiffer, DAMPER * stiffer**0.5)
-              for name, at in wheels.items()),
-        tuple(Tyre(name, name, at, "fr".index(name[0]), TYRE * stiffer) for name, at in wheels.items()),
-        (HALF, -HALF),
-        side_forces=tuple(SideForce(name, "chassis", (x, y, 0.0), "chassis", 5e4)
-                          for name, (x, y, _) in wheels.items()),
-    ), spin_inertia)  # fmt: skip
+    return sprung(
+        SpatialVehicle(
+            "box",
+            (
+                Body("chassis", 1000.0, (0.0, 0.0, 0.55), FREEDOMS, TENSOR),
+                *(Body(name, 30.0, at, ("z",)) for name, at in wheels.items()),
+            ),
+            tuple(
+                SpringDamper(name, "chassis", name, at, at, up, SPRING * stiffer, DAMPER * stiffer**0.5)
+                for name, at in wheels.items()
+            ),
+            tuple(Tyre(name, name, at, "fr".index(name[0]), TYRE * stiffer) for name, at in wheels.items()),
+            (HALF, -HALF),
+            side_forces=tuple(
+                SideForce(name, "chassis", (x, y, 0.0), "chassis", 5e4) for name, (x, y, _) in wheels.items()
+            ),
+        ),
+        spin_inertia,
+    )
 
 
 @cache
@@ -83,19 +94,35 @@ class Torques:
         return Command(pressures=self.torques / GRADIENT)
 
 
-def braked(own: Sprung, tyre: TyreTable, engine: str | None = "mujoco", steer: float = 0.0, step: float = 5.5e-3,
-           substeps: int = 1, supply: float = 6.0, gradient: float = GRADIENT) -> Braked:  # fmt: skip
+def braked(
+    own: Sprung,
+    tyre: TyreTable,
+    engine: str | None = "mujoco",
+    steer: float = 0.0,
+    step: float = 5.5e-3,
+    substeps: int = 1,
+    supply: float = 6.0,
+    gradient: float = GRADIENT,
+) -> Braked:
     """The vehicle on one surface, brakes that follow at once; without an engine the plane one.
 
     steer : rad, of the front wheels; supply : bar, for a controller of valves; gradient : N m/bar.
     """
     brake, none = Brake(push_out=0.0, release=0.0, rising=gradient, falling=gradient), np.zeros(4)
     return Braked(
-        truck(own.plane), none.astype(int), stacked([tyre]), tyre.cornering, road([Stretch(0.0, 0, 0)]),
-        of_wheels(brake, brake, brake, brake), Chambers(none + 0.03, none + 0.02, supply),
-        np.array([steer, steer, 0.0, 0.0]), substeps=substeps, sample=step,
-        engine=None if engine is None else OnSprings(engine, own), sprung=None if engine is None else own,
-    )  # fmt: skip
+        truck(own.plane),
+        none.astype(int),
+        stacked([tyre]),
+        tyre.cornering,
+        road([Stretch(0.0, 0, 0)]),
+        of_wheels(brake, brake, brake, brake),
+        Chambers(none + 0.03, none + 0.02, supply),
+        np.array([steer, steer, 0.0, 0.0]),
+        substeps=substeps,
+        sample=step,
+        engine=None if engine is None else OnSprings(engine, own),
+        sprung=None if engine is None else own,
+    )
 
 
 def stays(vehicle: Braked, path: Path, duration: float = 2.0) -> float:
@@ -104,7 +131,19 @@ def stays(vehicle: Braked, path: Path, duration: float = 2.0) -> float:
     report, largest = np.zeros((4, path.reports.shape[2])), 0.0
     torques = np.tile(path.torques[-1], (2, 1))
     for _ in range(round(duration / vehicle.sample)):
-        vehicle.engine.advance(state, turning, torques, vehicle.sample, vehicle.steer, vehicle.slope, vehicle.plane,
-                               vehicle.kind, vehicle.road, vehicle.tables.packed, found, report)  # fmt: skip
+        vehicle.engine.advance(
+            state,
+            turning,
+            torques,
+            vehicle.sample,
+            vehicle.steer,
+            vehicle.slope,
+            vehicle.plane,
+            vehicle.kind,
+            vehicle.road,
+            vehicle.tables.packed,
+            found,
+            report,
+        )
         largest = max(largest, float(np.hypot(*state[1, :2])), float(np.abs(turning * vehicle.plane.radius).max()))
     return largest

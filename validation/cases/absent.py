@@ -43,10 +43,18 @@ def added_to(effect: str) -> dict[str, Any]:
 def scene(effects: dict[str, Any], steps: int, folder: Path, guided: bool = False) -> Scene:
     """The asymmetric vehicle with some effects, released from a tilted start."""
     start = {} if guided else START
-    return build_scene({
-        "title": TITLE, "vehicle": {"parameters": "asymmetric_twin"}, "run": {"duration": steps * STEP, "step": STEP},
-        "start": start, "effects": effects, "engines": {"exudyn": GUIDED} if guided else {},
-    }, "absent", folder)  # fmt: skip
+    return build_scene(
+        {
+            "title": TITLE,
+            "vehicle": {"parameters": "asymmetric_twin"},
+            "run": {"duration": steps * STEP, "step": STEP},
+            "start": start,
+            "effects": effects,
+            "engines": {"exudyn": GUIDED} if guided else {},
+        },
+        "absent",
+        folder,
+    )
 
 
 def write_files(folder: Path) -> None:
@@ -100,8 +108,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         place = Path(name)
         write_files(place)
         rows = [*_imports(), *(row for engine in ENGINES for row in _absence(engine, place))]
-        rows += [_control(effect, place, ENGINES[i % len(ENGINES) :][:1] if quick else ENGINES)
-                 for i, effect in enumerate(EFFECTS)]  # fmt: skip
+        rows += [
+            _control(effect, place, ENGINES[i % len(ENGINES) :][:1] if quick else ENGINES)
+            for i, effect in enumerate(EFFECTS)
+        ]
     return rows + ride.rows(quick) + wheelset.rows() + machinery.rows() + of_systems.rows(quick), {}
 
 
@@ -112,11 +122,20 @@ def _imports() -> list[Row]:
     why = "a fresh process ran a scene without effects in all engines; counted in its list of modules"
     kernels = len(found["marches"]) + len(found["derivatives"])
     return [
-        at_most("absent.imports", SYSTEM, "modules of effects that a bare scene imports", len(foreign), "", 0, why,
-                "none"),
-        at_most("absent.kernels", SYSTEM, "kernels that a bare scene compiles beyond its own march", kernels - 1, "", 0,
-                "the same process; the reference compiles one march per kind of scene, when first asked", "none"),
-    ]  # fmt: skip
+        at_most(
+            "absent.imports", SYSTEM, "modules of effects that a bare scene imports", len(foreign), "", 0, why, "none"
+        ),
+        at_most(
+            "absent.kernels",
+            SYSTEM,
+            "kernels that a bare scene compiles beyond its own march",
+            kernels - 1,
+            "",
+            0,
+            "the same process; the reference compiles one march per kind of scene, when first asked",
+            "none",
+        ),
+    ]
 
 
 def _absence(engine: str, folder: Path) -> list[Row]:
@@ -129,21 +148,51 @@ def _absence(engine: str, folder: Path) -> list[Row]:
         callbacks += user_functions(model(scene({}, 20, folder), engine))
     why = "20 steps against 2,000 steps of a bare scene, watched around the engine's own march"
     return [
-        at_most(f"absent.frames.{engine}", SYSTEM, f"{engine}: Python functions entered by 1,980 more steps",
-                long.frames - short.frames, "", 0, why, "none"),
-        at_most(f"absent.memory.{engine}", SYSTEM, f"{engine}: memory that 1,980 more steps take beside their result",
-                long.memory - short.memory, "B", 1980, f"{why}; less than a byte per step is a wrapper's own", "none"),
-        at_most(f"absent.callbacks.{engine}", SYSTEM, f"{engine}: callbacks of a bare scene", callbacks, "", 0,
-                "counted over all items, and in the engine's globals before, during and after the march", "none"),
-    ]  # fmt: skip
+        at_most(
+            f"absent.frames.{engine}",
+            SYSTEM,
+            f"{engine}: Python functions entered by 1,980 more steps",
+            long.frames - short.frames,
+            "",
+            0,
+            why,
+            "none",
+        ),
+        at_most(
+            f"absent.memory.{engine}",
+            SYSTEM,
+            f"{engine}: memory that 1,980 more steps take beside their result",
+            long.memory - short.memory,
+            "B",
+            1980,
+            f"{why}; less than a byte per step is a wrapper's own",
+            "none",
+        ),
+        at_most(
+            f"absent.callbacks.{engine}",
+            SYSTEM,
+            f"{engine}: callbacks of a bare scene",
+            callbacks,
+            "",
+            0,
+            "counted over all items, and in the engine's globals before, during and after the march",
+            "none",
+        ),
+    ]
 
 
 def _control(effect: str, folder: Path, engines: Sequence[str] = ENGINES) -> Row:
     """Positive control: each effect changes the counts of every engine by exactly what it declares."""
     found = {engine: change(effect, engine, folder) for engine in engines}
     wanted = {engine: declared(effect, engine) for engine in engines}
-    return behaves(f"absent.present.{effect}", SYSTEM, f"what {effect} adds", _text(found), _text(wanted),
-                   "positive control: the counts that are zero above do move, and by as much as they should")
+    return behaves(
+        f"absent.present.{effect}",
+        SYSTEM,
+        f"what {effect} adds",
+        _text(found),
+        _text(wanted),
+        "positive control: the counts that are zero above do move, and by as much as they should",
+    )
 
 
 def _text(table: dict[str, dict[str, int]]) -> str:

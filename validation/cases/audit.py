@@ -16,10 +16,14 @@ STATES = 100
 
 def scene(parameters: str, geometry: str = "exact"):
     """The vehicle on the study road, whose input takes part in the audit."""
-    return build_scene({
-        "title": TITLE, "vehicle": {"parameters": parameters, "geometry": geometry},
-        "run": {"duration": 2.0, "step": 1e-3}, "effects": {"road": {"source": "study", "speed": 20.0}},
-    })  # fmt: skip
+    return build_scene(
+        {
+            "title": TITLE,
+            "vehicle": {"parameters": parameters, "geometry": geometry},
+            "run": {"duration": 2.0, "step": 1e-3},
+            "effects": {"road": {"source": "study", "speed": 20.0}},
+        }
+    )
 
 
 def difference(engine: str, parameters: str, geometry: str = "exact") -> float:
@@ -31,13 +35,18 @@ def difference(engine: str, parameters: str, geometry: str = "exact") -> float:
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """A row per engine, vehicle and geometry, the same in quick."""
     rows = [
-        at_most(f"audit.{engine}.{parameters}.{geometry}", SYSTEM,
-                f"acceleration, {engine} against the equations of the paper, {parameters}, {geometry} geometry",
-                difference(engine, parameters, geometry), "of the largest", 1e-12,
-                "both sides are a dozen products of doubles; 1e-12 leaves four digits for cancellation",
-                "handed over" if (engine, geometry) == ("exudyn", "linear") else "native")
+        at_most(
+            f"audit.{engine}.{parameters}.{geometry}",
+            SYSTEM,
+            f"acceleration, {engine} against the equations of the paper, {parameters}, {geometry} geometry",
+            difference(engine, parameters, geometry),
+            "of the largest",
+            1e-12,
+            "both sides are a dozen products of doubles; 1e-12 leaves four digits for cancellation",
+            "handed over" if (engine, geometry) == ("exudyn", "linear") else "native",
+        )
         for engine in ("exudyn", "mujoco")
         for parameters in ("itwm_drift", "asymmetric_twin")
         for geometry in ("exact", "linear")
-    ]  # fmt: skip
+    ]
     return rows, {}

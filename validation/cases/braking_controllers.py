@@ -31,8 +31,10 @@ SEED = 22
 FRONT = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
 LINE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
 WIDE = Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1800.0)
-PHASES = {"deep": FivePhase(1, e1=40.0, e2=60.0, e3=40.0, e4=10.0, e5=150.0, falling=60.0, fast=20.0, slow=15.0),
-          "shallow": FivePhase(1, e1=20.0, e2=30.0, e3=20.0, e4=2.0, e5=60.0, falling=60.0, fast=40.0, slow=8.0)}
+PHASES = {
+    "deep": FivePhase(1, e1=40.0, e2=60.0, e3=40.0, e4=10.0, e5=150.0, falling=60.0, fast=20.0, slow=15.0),
+    "shallow": FivePhase(1, e1=20.0, e2=30.0, e3=20.0, e4=2.0, e5=60.0, falling=60.0, fast=40.0, slow=8.0),
+}
 LOCK_FREE = 15.0 / 3.6
 """Speed (m/s) above which no wheel may lock but briefly: UN Regulation 13, annex 13; not checked against its text."""
 BRIEF = 0.1
@@ -47,8 +49,12 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, {}
     rows += _cycle_rows("deep")
-    stops = {f"{on}, {speed:g} m/s, {name}": stop(on, name, speed)
-             for on in ("ice", "snow", "dry") for speed in (11.11, 22.2) for name in CONTROLLED}  # fmt: skip
+    stops = {
+        f"{on}, {speed:g} m/s, {name}": stop(on, name, speed)
+        for on in ("ice", "snow", "dry")
+        for speed in (11.11, 22.2)
+        for name in CONTROLLED
+    }
     return [*rows, *_stop_rows(stops), *_substep_rows(), *_ensemble_rows()], {"stops": stops}
 
 
@@ -58,11 +64,16 @@ def tables(data: dict[str, Any]) -> list[Table]:
         return []
     shown = (("distance", 2), ("time", 2), ("used", 3), ("locked", 0))
     rows = [(name, *(f"{one[key]:.{digits}f}" for key, digits in shown)) for name, one in data["stops"].items()]
-    return [Table("Straight stops by controller", "Utilisation: mean deceleration above 15 km/h by that of the tyre's "
-                  "peak on all wheels; on the dry road the front brakes at their 8 bar bound it, not the tyres. "
-                  "Speed of the vehicle given, 4 substeps.",
-                  ("stop", "distance in m", "time in s", "utilisation", "longest lock above 15 km/h in ms"),
-                  tuple(rows))]  # fmt: skip
+    return [
+        Table(
+            "Straight stops by controller",
+            "Utilisation: mean deceleration above 15 km/h by that of the tyre's "
+            "peak on all wheels; on the dry road the front brakes at their 8 bar bound it, not the tyres. "
+            "Speed of the vehicle given, 4 substeps.",
+            ("stop", "distance in m", "time in s", "utilisation", "longest lock above 15 km/h in ms"),
+            tuple(rows),
+        )
+    ]
 
 
 def draw(data: dict[str, Any]) -> dict[str, Any]:
@@ -99,13 +110,33 @@ def _loop_rows() -> list[Row]:
             sense = sense and bool((np.diff(p) * np.diff(t) >= 0.0).all()) and t.min() >= 0.0
     rise = [torque(0, p, 0.0, of_wheels(WIDE)) for p in np.linspace(0.0, 0.75, 100)]
     return [
-        at_most("braking_controllers.loop", SYSTEM, "area of the brake's loop, whole and partial, by its closed form, "
-                "less 1", worst, "", 1e-3, "two lines and a hold between them", "closed form"),
-        behaves("braking_controllers.push_out", SYSTEM, "torque up to the push-out pressure",
-                "none" if not any(rise) else "some", "none", "the springs hold the shoes back"),
-        behaves("braking_controllers.sense", SYSTEM, "torque as pressure falls and rises",
-                "never reversed" if sense else "reversed", "never reversed", "friction loses work on every loop"),
-    ]  # fmt: skip
+        at_most(
+            "braking_controllers.loop",
+            SYSTEM,
+            "area of the brake's loop, whole and partial, by its closed form, less 1",
+            worst,
+            "",
+            1e-3,
+            "two lines and a hold between them",
+            "closed form",
+        ),
+        behaves(
+            "braking_controllers.push_out",
+            SYSTEM,
+            "torque up to the push-out pressure",
+            "none" if not any(rise) else "some",
+            "none",
+            "the springs hold the shoes back",
+        ),
+        behaves(
+            "braking_controllers.sense",
+            SYSTEM,
+            "torque as pressure falls and rises",
+            "never reversed" if sense else "reversed",
+            "never reversed",
+            "friction loses work on every loop",
+        ),
+    ]
 
 
 def _supply_row() -> Row:
@@ -119,9 +150,16 @@ def _supply_row() -> Row:
             for _ in range(500):
                 by_valves(np.full(4, valve), SAMPLE, air, chambers, brakes, torques)
     left = 8.0 * (reservoir / (reservoir + volumes.sum())) ** 5
-    return at_most("braking_controllers.strokes", SYSTEM, "pressure in the chambers at the fifth full stroke, by p "
-                   "(V / (V + v))^5, less 1", float(np.abs(air.pressure / left - 1.0).max()), "", 1e-6,
-                   "p V of reservoir and chambers together is kept but for what is let out", "closed form")  # fmt: skip
+    return at_most(
+        "braking_controllers.strokes",
+        SYSTEM,
+        "pressure in the chambers at the fifth full stroke, by p (V / (V + v))^5, less 1",
+        float(np.abs(air.pressure / left - 1.0).max()),
+        "",
+        1e-6,
+        "p V of reservoir and chambers together is kept but for what is let out",
+        "closed form",
+    )
 
 
 def _frozen(inertia: float = FRONT.spin_inertia) -> Frozen:
@@ -140,30 +178,65 @@ def _cycle_rows(name: str) -> list[Row]:
     own, (period, used) = limit_cycle(_frozen(), PHASES[name]), closed_form(PHASES[name])
     wrong = closed_form(PHASES[name], FRONT.spin_inertia * 1.001)[0]
     return [
-        at_most(f"braking_controllers.period_{name}", SYSTEM, f"period of the five-phase limit cycle, {name}, by the "
-                "exact one, less 1", own.period / period - 1.0, "", 1e-4, "frozen speed; every switch is located",
-                "closed form"),
-        at_most(f"braking_controllers.utilisation_{name}", SYSTEM, f"its mean friction by the peak, {name}, less the "
-                "exact one", own.utilisation - used, "", 1e-3, "as above", "closed form"),
-        behaves(f"braking_controllers.planted_{name}", SYSTEM, f"spin inertia wrong by 0.1 %, {name}",
-                "told" if abs(own.period / wrong - 1.0) > 1e-4 else "missed", "told", "a planted fault"),
+        at_most(
+            f"braking_controllers.period_{name}",
+            SYSTEM,
+            f"period of the five-phase limit cycle, {name}, by the exact one, less 1",
+            own.period / period - 1.0,
+            "",
+            1e-4,
+            "frozen speed; every switch is located",
+            "closed form",
+        ),
+        at_most(
+            f"braking_controllers.utilisation_{name}",
+            SYSTEM,
+            f"its mean friction by the peak, {name}, less the exact one",
+            own.utilisation - used,
+            "",
+            1e-3,
+            "as above",
+            "closed form",
+        ),
+        behaves(
+            f"braking_controllers.planted_{name}",
+            SYSTEM,
+            f"spin inertia wrong by 0.1 %, {name}",
+            "told" if abs(own.period / wrong - 1.0) > 1e-4 else "missed",
+            "told",
+            "a planted fault",
+        ),
         *_sampled_rows(name, own),
-    ]  # fmt: skip
+    ]
 
 
 def _sampled_rows(name: str, own: Cycle) -> Iterator[Row]:
     found = sampled(_frozen(), replace(PHASES[name]), cycles=5, skip=3)
-    yield finding(f"braking_controllers.sampled_{name}", SYSTEM, f"period of the same controller sampled every 5.5 ms, "
-                  f"{name}, by the continuous one, less 1", found.period / own.period - 1.0, "", 0.0,
-                  "each switch comes up to a sample late", "native")  # fmt: skip
+    yield finding(
+        f"braking_controllers.sampled_{name}",
+        SYSTEM,
+        f"period of the same controller sampled every 5.5 ms, {name}, by the continuous one, less 1",
+        found.period / own.period - 1.0,
+        "",
+        0.0,
+        "each switch comes up to a sample late",
+        "native",
+    )
 
 
 def truck_stop(on: str, name: str, speed: float) -> Recorded:
     """The paper's truck on one surface under a controller with its defaults."""
     tyre, plane = surface(on), truck(PAPER)
-    vehicle = Braked(plane, np.zeros(4, dtype=np.int64), stacked([tyre]), tyre.cornering, road([Stretch(0.0, 0, 0)]),
-                     of_wheels(PAPER_FRONT, PAPER_FRONT, PAPER_REAR, PAPER_REAR),
-                     Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0), np.zeros(4))  # fmt: skip
+    vehicle = Braked(
+        plane,
+        np.zeros(4, dtype=np.int64),
+        stacked([tyre]),
+        tyre.cornering,
+        road([Stretch(0.0, 0, 0)]),
+        of_wheels(PAPER_FRONT, PAPER_FRONT, PAPER_REAR, PAPER_REAR),
+        Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0),
+        np.zeros(4),
+    )
     return vehicle.run(CONTROLLERS[name](4), speed)
 
 
@@ -174,8 +247,13 @@ def stop(on: str, name: str, speed: float) -> dict[str, float]:
     last = int(np.argmax(speeds < LOCK_FREE))
     used = (speed**2 - speeds[last] ** 2) / (2.0 * path.states[last, 0, 0]) / GRAVITY / surface(on).mu_x.max()
     locked = 1e3 * SAMPLE * max(_longest(wheel > 0.0) for wheel in path.reports[:last, :, 5].T)
-    return {"distance": float(path.states[-1, 0, 0]), "time": float(path.times[-1]), "used": float(used),
-            "locked": float(locked), "stands": float(path.stands)}  # fmt: skip
+    return {
+        "distance": float(path.states[-1, 0, 0]),
+        "time": float(path.times[-1]),
+        "used": float(used),
+        "locked": float(locked),
+        "stands": float(path.stands),
+    }
 
 
 def _longest(flags: np.ndarray) -> int:
@@ -186,13 +264,25 @@ def _longest(flags: np.ndarray) -> int:
 
 def _stop_rows(stops: dict[str, dict[str, float]]) -> list[Row]:
     return [
-        at_most("braking_controllers.locks", SYSTEM, f"longest lock of any wheel above 15 km/h in {len(stops)} stops "
-                "of four controllers", max(one["locked"] for one in stops.values()), "ms", 1e3 * BRIEF,
-                "ice, snow and dry at 11.11 and 22.2 m/s; only briefly", "published"),
-        behaves("braking_controllers.stands", SYSTEM, "end of all of these stops",
-                "at rest" if all(one["stands"] for one in stops.values()) else "moving", "at rest",
-                "below 1.5 m/s all brakes are applied"),
-    ]  # fmt: skip
+        at_most(
+            "braking_controllers.locks",
+            SYSTEM,
+            f"longest lock of any wheel above 15 km/h in {len(stops)} stops of four controllers",
+            max(one["locked"] for one in stops.values()),
+            "ms",
+            1e3 * BRIEF,
+            "ice, snow and dry at 11.11 and 22.2 m/s; only briefly",
+            "published",
+        ),
+        behaves(
+            "braking_controllers.stands",
+            SYSTEM,
+            "end of all of these stops",
+            "at rest" if all(one["stands"] for one in stops.values()) else "moving",
+            "at rest",
+            "below 1.5 m/s all brakes are applied",
+        ),
+    ]
 
 
 def _substep_rows() -> list[Row]:
@@ -201,26 +291,63 @@ def _substep_rows() -> list[Row]:
         tight = reference_distance(FRONT, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed)
         for n in SUBSTEPS:
             own = own_distance(FRONT, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed, n)
-            rows.append(at_most(f"braking_controllers.stop_{on}_{n}", SYSTEM, "stopping distance of a quarter vehicle "
-                                f"under a sampled controller on {on}, {n} substeps, by the reference, less 1",
-                                own / tight - 1.0, "", 1e-2, "DOP853 at 1e-10 with locking as an event", "native"))
-    return rows  # fmt: skip
+            rows.append(
+                at_most(
+                    f"braking_controllers.stop_{on}_{n}",
+                    SYSTEM,
+                    "stopping distance of a quarter vehicle "
+                    f"under a sampled controller on {on}, {n} substeps, by the reference, less 1",
+                    own / tight - 1.0,
+                    "",
+                    1e-2,
+                    "DOP853 at 1e-10 with locking as an event",
+                    "native",
+                )
+            )
+    return rows
 
 
 def _ensemble_rows(runs: int = 24, fine: int = 32) -> list[Row]:
     """Two ensembles on ice from speeds drawn apart: one run proves nothing there."""
     random = np.random.default_rng(SEED)
     speeds = 11.11 * (1.0 + random.uniform(-0.002, 0.002, (2, runs)))
-    found = [np.array([own_distance(FRONT, PAPER_FRONT, "ice", CONTROLLERS["slip_bang_bang"](1), speed, n)
-                       for speed in some]) for some, n in zip(speeds, (4, fine), strict=True)]  # fmt: skip
+    found = [
+        np.array(
+            [own_distance(FRONT, PAPER_FRONT, "ice", CONTROLLERS["slip_bang_bang"](1), speed, n) for speed in some]
+        )
+        for some, n in zip(speeds, (4, fine), strict=True)
+    ]
     level = float(ttest_ind(*found, equal_var=False).pvalue)
     return [
-        at_most("braking_controllers.ice_mean", SYSTEM, f"mean stopping distance on ice of {runs} runs with 4 "
-                f"substeps, by that of {runs} others with {fine}, less 1",
-                float(found[0].mean() / found[1].mean() - 1.0), "", 1e-2,
-                "speeds drawn within 0.2 %; on ice single runs do not repeat", "shared kernel"),
-        finding("braking_controllers.ice_level", SYSTEM, "chance of a larger difference if their means are the same",
-                level, "", "above 0.05: no difference is shown", "Welch's test", "none"),
-        finding("braking_controllers.ice_scatter", SYSTEM, "standard deviation of the stopping distance on ice",
-                float(found[0].std(ddof=1)), "m", float(found[1].std(ddof=1)), "4 substeps beside more", "none"),
-    ]  # fmt: skip
+        at_most(
+            "braking_controllers.ice_mean",
+            SYSTEM,
+            f"mean stopping distance on ice of {runs} runs with 4 "
+            f"substeps, by that of {runs} others with {fine}, less 1",
+            float(found[0].mean() / found[1].mean() - 1.0),
+            "",
+            1e-2,
+            "speeds drawn within 0.2 %; on ice single runs do not repeat",
+            "shared kernel",
+        ),
+        finding(
+            "braking_controllers.ice_level",
+            SYSTEM,
+            "chance of a larger difference if their means are the same",
+            level,
+            "",
+            "above 0.05: no difference is shown",
+            "Welch's test",
+            "none",
+        ),
+        finding(
+            "braking_controllers.ice_scatter",
+            SYSTEM,
+            "standard deviation of the stopping distance on ice",
+            float(found[0].std(ddof=1)),
+            "m",
+            float(found[1].std(ddof=1)),
+            "4 substeps beside more",
+            "none",
+        ),
+    ]

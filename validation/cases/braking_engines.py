@@ -37,14 +37,33 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     own = turn(until)
     beside = {"written out": turned(PAPER, ICE, STEER, TORQUES, SPEED, until)}
     beside |= {name: turn(until, go=Carried(name, truck(PAPER)).advance) for name in ("exudyn", "mujoco")}
-    rows = [at_most(f"braking_engines.{name.replace(' ', '_')}", SYSTEM, f"end of the turn, {name} beside the compiled "
-                    "step at 1 ms", float(np.hypot(other.x - own.x, other.y - own.y)), "m", 5e-3,
-                    "the same vehicle by other equations and another method", "native" if name == "written out"
-                    else "shared kernel") for name, other in beside.items()]  # fmt: skip
+    rows = [
+        at_most(
+            f"braking_engines.{name.replace(' ', '_')}",
+            SYSTEM,
+            f"end of the turn, {name} beside the compiled step at 1 ms",
+            float(np.hypot(other.x - own.x, other.y - own.y)),
+            "m",
+            5e-3,
+            "the same vehicle by other equations and another method",
+            "native" if name == "written out" else "shared kernel",
+        )
+        for name, other in beside.items()
+    ]
     rows += [*_symmetry_rows(until, own), *_load_rows(), *_trailer_rows(quick)]
-    rows += [aim(f"braking_engines.speed.{steps}", SYSTEM, "compiled truck on ice, slip bang-bang in the loop, "
-                 f"samples of 5.5 ms in {steps} step(s), once", speed(steps), "times real time", 100.0,
-                 "asked for; by the processor's time, which wanders", "at least") for steps in (1, 4)]  # fmt: skip
+    rows += [
+        aim(
+            f"braking_engines.speed.{steps}",
+            SYSTEM,
+            f"compiled truck on ice, slip bang-bang in the loop, samples of 5.5 ms in {steps} step(s), once",
+            speed(steps),
+            "times real time",
+            100.0,
+            "asked for; by the processor's time, which wanders",
+            "at least",
+        )
+        for steps in (1, 4)
+    ]
     turns = {"compiled step": own, **beside}
     return rows, {name: list(where) for name, where in turns.items()}
 
@@ -54,8 +73,16 @@ def turn(until: float, steer: float = STEER, go: Callable[..., Any] = advance) -
     plane, state = truck(PAPER), np.zeros((2, 3))
     state[1, 0], turning, torques = SPEED, SPEED / plane.radius, np.tile(np.repeat(TORQUES, 2), (2, 1))
     found, report, passed = np.zeros(3), np.zeros((4, REPORTED)), 0.0
-    rest = (np.array([steer, steer, 0.0, 0.0]), ICE.cornering, plane, np.zeros(4, dtype=int),
-            road([Stretch(0.0, 0, 0)]), stacked([ICE]).packed, found, report)  # fmt: skip
+    rest = (
+        np.array([steer, steer, 0.0, 0.0]),
+        ICE.cornering,
+        plane,
+        np.zeros(4, dtype=int),
+        road([Stretch(0.0, 0, 0)]),
+        stacked([ICE]).packed,
+        found,
+        report,
+    )
     while True:
         before = state.copy()
         status, used = go(state, turning, torques, STEP, *rest)
@@ -72,8 +99,17 @@ def speed(steps: int) -> float:
     """Simulated seconds of a straight stop in one of the processor."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 6.0)
     brakes = of_wheels(PAPER_FRONT, PAPER_FRONT, PAPER_REAR, PAPER_REAR)
-    vehicle = Braked(truck(PAPER), np.zeros(4, dtype=int), stacked([ICE]), ICE.cornering, road([Stretch(0.0, 0, 0)]),
-                     brakes, chambers, np.zeros(4), steps)  # fmt: skip
+    vehicle = Braked(
+        truck(PAPER),
+        np.zeros(4, dtype=int),
+        stacked([ICE]),
+        ICE.cornering,
+        road([Stretch(0.0, 0, 0)]),
+        brakes,
+        chambers,
+        np.zeros(4),
+        steps,
+    )
     vehicle.run(SlipBangBang(wheels=4), SPEED, 0.1)
     start = time.process_time()
     path = vehicle.run(SlipBangBang(wheels=4), SPEED)
@@ -81,22 +117,59 @@ def speed(steps: int) -> float:
 
 
 def _load_rows() -> list[Row]:
-    rows = [at_most(f"braking_engines.transfer.{name.replace(' ', '-')}", SYSTEM, f"axle loads with the {name} locked",
-                    error, "relative", 1e-6, "loads are solved with the forces that they allow, not lagged",
-                    "closed form") for name, error in transfer_errors().items()]  # fmt: skip
-    return [*rows, at_most("braking_engines.locked-front", SYSTEM, "lateral way of a truck with steered, locked front "
-                           "wheels", abs(sideways_with_locked_front_wheels()), "m", 1e-3,
-                           "a locked wheel's force is against its way, wherever it points", "closed form")]  # fmt: skip
+    rows = [
+        at_most(
+            f"braking_engines.transfer.{name.replace(' ', '-')}",
+            SYSTEM,
+            f"axle loads with the {name} locked",
+            error,
+            "relative",
+            1e-6,
+            "loads are solved with the forces that they allow, not lagged",
+            "closed form",
+        )
+        for name, error in transfer_errors().items()
+    ]
+    return [
+        *rows,
+        at_most(
+            "braking_engines.locked-front",
+            SYSTEM,
+            "lateral way of a truck with steered, locked front wheels",
+            abs(sideways_with_locked_front_wheels()),
+            "m",
+            1e-3,
+            "a locked wheel's force is against its way, wherever it points",
+            "closed form",
+        ),
+    ]
 
 
 def _symmetry_rows(until: float, own: Turned) -> list[Row]:
     mirrored, straight = turn(until, -STEER), turn(until, 0.0)
     apart = max(abs(mirrored.x - own.x), abs(mirrored.y + own.y), abs(mirrored.heading + own.heading))
-    return [at_most("braking_engines.mirror", SYSTEM, "mirrored turn beside the turn", apart, "m, rad", 1e-9,
-                    "left and right differ by rounding alone", "closed form"),
-            at_most("braking_engines.no_yaw", SYSTEM, "yaw and lateral way without steering on equal friction",
-                    abs(straight.heading) + abs(straight.y), "m, rad", 0.0, "equal forces have no moment",
-                    "closed form")]  # fmt: skip
+    return [
+        at_most(
+            "braking_engines.mirror",
+            SYSTEM,
+            "mirrored turn beside the turn",
+            apart,
+            "m, rad",
+            1e-9,
+            "left and right differ by rounding alone",
+            "closed form",
+        ),
+        at_most(
+            "braking_engines.no_yaw",
+            SYSTEM,
+            "yaw and lateral way without steering on equal friction",
+            abs(straight.heading) + abs(straight.y),
+            "m, rad",
+            0.0,
+            "equal forces have no moment",
+            "closed form",
+        ),
+    ]
 
 
 def rolling(slope: float) -> Tables:
@@ -109,12 +182,32 @@ def rolling(slope: float) -> Tables:
 def _trailer_rows(quick: bool) -> list[Row]:
     """Straight pull at 0.2 m/s; circle of 15 m at 0.5 m/s in the full share."""
     why = "wheels that only roll: low speed, stiff tyres"
-    rows = [at_most("braking_engines.pull", SYSTEM, "drawbar angle on a straight pull, relative", straight_pull(),
-                    "", 1e-4, why, "closed form")]  # fmt: skip
+    rows = [
+        at_most(
+            "braking_engines.pull",
+            SYSTEM,
+            "drawbar angle on a straight pull, relative",
+            straight_pull(),
+            "",
+            1e-4,
+            why,
+            "closed form",
+        )
+    ]
     if not quick:
-        rows += [at_most(f"braking_engines.circle_{name}", SYSTEM, f"radius of the {name} axle on a circle, relative",
-                         off, "", 1e-4, why, "closed form")
-                 for name, off in zip(("front", "rear"), circle(), strict=True)]  # fmt: skip
+        rows += [
+            at_most(
+                f"braking_engines.circle_{name}",
+                SYSTEM,
+                f"radius of the {name} axle on a circle, relative",
+                off,
+                "",
+                1e-4,
+                why,
+                "closed form",
+            )
+            for name, off in zip(("front", "rear"), circle(), strict=True)
+        ]
     return rows
 
 
@@ -145,6 +238,11 @@ def circle(radius: float = 15.0, v: float = 0.5, step: float = 2e-4, duration: f
 def tables(data: dict[str, Any]) -> list[Table]:
     """Ends of the turn."""
     rows = tuple((name, *(f"{value:.6f}" for value in where)) for name, where in data.items())
-    return [Table("End of the turn", "On ice, front wheels steered by 0.03 rad, constant torques.",
-                  ("by", "x, m", "y, m", "heading, rad", "time, s"), rows)]  # fmt: skip
-
+    return [
+        Table(
+            "End of the turn",
+            "On ice, front wheels steered by 0.03 rad, constant torques.",
+            ("by", "x, m", "y, m", "heading, rad", "time, s"),
+            rows,
+        )
+    ]

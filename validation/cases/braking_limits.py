@@ -56,8 +56,10 @@ def finished(number: int) -> str:
 def _stops_row(ends: list[str]) -> Row:
     limits = [end for end in ends if any(limit in end for limit in LIMITS)]
     wrong = [f"{i}: {end}" for i, end in enumerate(ends) if end and end not in limits]
-    what = (f"{len(ends)} random legal stops, {len(limits)} of which end by a limit of the vehicle: those that do not "
-            f"finish: {'; '.join(wrong[:3])}")  # fmt: skip
+    what = (
+        f"{len(ends)} random legal stops, {len(limits)} of which end by a limit of the vehicle: those that do not "
+        f"finish: {'; '.join(wrong[:3])}"
+    )
     return within("braking_limits.stops", SYSTEM, what.removesuffix(": "), len(wrong), "", 0, 0, "asked for", "none")
 
 
@@ -76,37 +78,74 @@ def _end(scene: Any) -> RunFailed | None:
 
 def _jackknife_row() -> Row:
     """The drawbar's angle when the run ends, of a train whose truck slides round: against its limit."""
-    end = _end(_scene(
-        vehicle={"override": {"mass": 4200.0, "yaw_inertia": 15000.0}}, run={"duration": 6.0},
-        road={"stretches": [{"left": "snow"}]}, brakes={"supply": 8.0, "front": {"gradient": 1.0},
-                                                        "rear": {"gradient": 3000.0}, "trailer": {"gradient": 1.0}},
-        procedures={"p": {"kind": "turn", "speed": 12.0, "radius": 60.0}},
-        trailer=CHOSEN.model_copy(update={"fold": 1.0}).model_dump(),
-    ))  # fmt: skip
+    end = _end(
+        _scene(
+            vehicle={"override": {"mass": 4200.0, "yaw_inertia": 15000.0}},
+            run={"duration": 6.0},
+            road={"stretches": [{"left": "snow"}]},
+            brakes={
+                "supply": 8.0,
+                "front": {"gradient": 1.0},
+                "rear": {"gradient": 3000.0},
+                "trailer": {"gradient": 1.0},
+            },
+            procedures={"p": {"kind": "turn", "speed": 12.0, "radius": 60.0}},
+            trailer=CHOSEN.model_copy(update={"fold": 1.0}).model_dump(),
+        )
+    )
     kept = None if end is None or end.partial is None else end.partial.states[:, 0, 2:]
     angle = 0.0 if kept is None else float(np.abs(np.diff(kept, axis=1)).max())
     told = "" if end is None or "jackknifes" not in end.reason else end.reason
-    return within("braking_limits.jackknife", SYSTEM, f"largest angle of a hinge that is kept of a train that folds, "
-                  f"limit 1 rad: {told}", angle if told else math.nan, "rad", 1.0, 0.02, "a sample before the limit",
-                  "closed form")  # fmt: skip
+    return within(
+        "braking_limits.jackknife",
+        SYSTEM,
+        f"largest angle of a hinge that is kept of a train that folds, limit 1 rad: {told}",
+        angle if told else math.nan,
+        "rad",
+        1.0,
+        0.02,
+        "a sample before the limit",
+        "closed form",
+    )
 
 
 def _roll_rows() -> list[Row]:
     """A high truck of one track in a J-turn on dry road: lateral acceleration at which it is told to roll over."""
     track, height = 1.8, 2.2
     axle = {"track": track}
-    end = _end(_scene(
-        vehicle={"override": {"height": height, "front": axle, "rear": axle}}, load_transfer={"front": 0.5},
-        road={"stretches": [{"left": "dry"}]}, brakes={"supply": 0.5}, run={"duration": 3.0},
-        procedures={"p": {"kind": "j_turn", "speed": 20.0, "steering": [[0.0, 0.0], [2.0, 0.12]]}},
-    ))  # fmt: skip
+    end = _end(
+        _scene(
+            vehicle={"override": {"height": height, "front": axle, "rear": axle}},
+            load_transfer={"front": 0.5},
+            road={"stretches": [{"left": "dry"}]},
+            brakes={"supply": 0.5},
+            run={"duration": 3.0},
+            procedures={"p": {"kind": "j_turn", "speed": 20.0, "steering": [[0.0, 0.0], [2.0, 0.12]]}},
+        )
+    )
     reason = "" if end is None else end.reason
     limit = float(reason.rpartition("limit ")[2]) if "rolls over" in reason else math.nan
-    return [within("braking_limits.roll_over", SYSTEM, f"limit at which a vehicle rolls over: {reason}", limit, "m/s^2",
-                   GRAVITY * track / (2.0 * height), 0.005, "g t / (2 h); printed to two digits", "closed form"),
-            behaves("braking_limits.roll_over.kept", SYSTEM, "path until it rolls over",
-                    "kept" if end is not None and end.partial is not None and len(end.partial.times) > 50 else "lost",
-                    "kept", "the run ends there, and is not lost")]  # fmt: skip
+    return [
+        within(
+            "braking_limits.roll_over",
+            SYSTEM,
+            f"limit at which a vehicle rolls over: {reason}",
+            limit,
+            "m/s^2",
+            GRAVITY * track / (2.0 * height),
+            0.005,
+            "g t / (2 h); printed to two digits",
+            "closed form",
+        ),
+        behaves(
+            "braking_limits.roll_over.kept",
+            SYSTEM,
+            "path until it rolls over",
+            "kept" if end is not None and end.partial is not None and len(end.partial.times) > 50 else "lost",
+            "kept",
+            "the run ends there, and is not lost",
+        ),
+    ]
 
 
 def _slow_apply_row() -> Row:
@@ -115,9 +154,16 @@ def _slow_apply_row() -> Row:
     air, torques = still(chambers, 0.01), np.empty((5, 1))
     for _ in range(50):
         by_valves(np.full(1, SLOW), 0.01, air, chambers, of_wheels(LINE), torques)
-    return at_most("braking_limits.slow_apply", SYSTEM, "pressure after 0.5 s of slow apply, by its law, less 1",
-                   float(air.pressure[0]) / (8.0 * -math.expm1(-0.5 / 1.2)) - 1.0, "", 1e-12,
-                   "supply (1 - exp(-t / slow))", "closed form")  # fmt: skip
+    return at_most(
+        "braking_limits.slow_apply",
+        SYSTEM,
+        "pressure after 0.5 s of slow apply, by its law, less 1",
+        float(air.pressure[0]) / (8.0 * -math.expm1(-0.5 / 1.2)) - 1.0,
+        "",
+        1e-12,
+        "supply (1 - exp(-t / slow))",
+        "closed form",
+    )
 
 
 def _cycle_row() -> Row:
@@ -128,34 +174,54 @@ def _cycle_row() -> Row:
     forces = frozen.load * frozen.tyre.mu_x[0, 0]
     period, _ = cycle(Wheel(frozen.speed, frozen.radius, frozen.inertia, frozen.tyre.slips, forces), phases, 12)
     found = limit_cycle(frozen, replace(ROLLING), 1e-4).period
-    return at_most("braking_limits.cycle_from_rolling", SYSTEM, "period of the limit cycle that a rolling wheel "
-                   "reaches by a fast first application, by the exact one, less 1", found / period - 1.0, "", 1e-4,
-                   "the cycle does not know how it was begun", "closed form")  # fmt: skip
+    return at_most(
+        "braking_limits.cycle_from_rolling",
+        SYSTEM,
+        "period of the limit cycle that a rolling wheel reaches by a fast first application, by the exact one, less 1",
+        found / period - 1.0,
+        "",
+        1e-4,
+        "the cycle does not know how it was begun",
+        "closed form",
+    )
 
 
 def _yaw_row(speed: float) -> Row:
     """Final yaw of a stop on split friction, steps of 20 ms against 0.1 ms."""
+
     def yaw(substeps: int) -> float:
-        scene = _scene(procedures={"p": {"kind": "split", "speed": speed, "right": "ice"}}, brakes={"supply": 2.0},
-                       road={"stretches": [{"left": "dry"}]}, load_transfer={},
-                       run={"sample": 0.02, "substeps": substeps, "duration": 20.0})  # fmt: skip
+        scene = _scene(
+            procedures={"p": {"kind": "split", "speed": speed, "right": "ice"}},
+            brakes={"supply": 2.0},
+            road={"stretches": [{"left": "dry"}]},
+            load_transfer={},
+            run={"sample": 0.02, "substeps": substeps, "duration": 20.0},
+        )
         return float(drive(scene, "p").states[-1, 0, 2])
 
-    return within(f"braking_limits.yaw.{speed:g}", SYSTEM, f"yaw of a stop from {speed:g} m/s on split friction, steps "
-                  "of 20 ms by steps of 0.1 ms", yaw(1) / yaw(200), "", 1.0, 0.05,
-                  "a long step of a slow vehicle is cut; by whole steps it yaws 1.4 to 5.2 times as far",
-                  "shared kernel")  # fmt: skip
+    return within(
+        f"braking_limits.yaw.{speed:g}",
+        SYSTEM,
+        f"yaw of a stop from {speed:g} m/s on split friction, steps of 20 ms by steps of 0.1 ms",
+        yaw(1) / yaw(200),
+        "",
+        1.0,
+        0.05,
+        "a long step of a slow vehicle is cut; by whole steps it yaws 1.4 to 5.2 times as far",
+        "shared kernel",
+    )
 
 
 REFUSED: dict[str, Callable[[], Any]] = {
     "a supply of 10000 bar": lambda: _scene(procedures={"p": {}}, brakes={"supply": 1e4}),
     "a brake of 6e9 N m": lambda: _scene(procedures={"p": {}}, brakes={"front": {"gradient": 1e9}}),
     "a truck lighter than its wheels": lambda: drive(
-        _scene(procedures={"p": {}}, vehicle={"override": {"mass": 0.1}}), "p"),
+        _scene(procedures={"p": {}}, vehicle={"override": {"mass": 0.1}}), "p"
+    ),
     "a gain of 1e12": lambda: SlipPI(4, gain=1e12),
     "a complex threshold": lambda: FivePhase(4, e1=1j),  # type: ignore[arg-type]
     "slow apply faster than apply": lambda: _scene(procedures={"p": {}}, pressure={"slow": 0.01}),
-}  # fmt: skip
+}
 """What is beyond physics, and must be refused before it runs."""
 
 
@@ -165,8 +231,14 @@ def _refused_row(name: str, run: Callable[[], Any]) -> Row:
         found = "taken"
     except InputError as error:
         found = "refused" if error.place and error.value is not None else "refused without its value"
-    return behaves(f"braking_limits.refused.{name.replace(' ', '-')}", SYSTEM, name, found, "refused",
-                   "a vehicle that cannot be has no answer")  # fmt: skip
+    return behaves(
+        f"braking_limits.refused.{name.replace(' ', '-')}",
+        SYSTEM,
+        name,
+        found,
+        "refused",
+        "a vehicle that cannot be has no answer",
+    )
 
 
 def tables(data: dict[str, Any]) -> list[Table]:

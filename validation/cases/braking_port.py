@@ -35,17 +35,28 @@ TIMEOUT = 0.5
 PATIENT = 600.0
 """s for what a slow and busy machine does in time."""
 FAULTS = {
-    "NaN": "not a number", "infinite": "not a number", "NaN as a valve": "not a number",
-    "negative pressure": "below zero", "valve in no state": "no state of a valve", "too few wheels": "wrong length",
-    "too many bytes": "wrong length", "part of a frame": "silence", "another protocol": "wrong frame",
-    "answer to another sample": "wrong number", "silence": "silence", "late": "silence", "died": "crash",
-}  # fmt: skip
+    "NaN": "not a number",
+    "infinite": "not a number",
+    "NaN as a valve": "not a number",
+    "negative pressure": "below zero",
+    "valve in no state": "no state of a valve",
+    "too few wheels": "wrong length",
+    "too many bytes": "wrong length",
+    "part of a frame": "silence",
+    "another protocol": "wrong frame",
+    "answer to another sample": "wrong number",
+    "silence": "silence",
+    "late": "silence",
+    "died": "crash",
+}
 """What a second process does wrong, and the name under which the run must end."""
 CLASSES = {
     "raises": ("crash", "raise KeyError('speed')"),
     "never comes back": ("silence", "while True: pass"),
-    "catches everything": ("silence", "while True:\n            try: time.sleep(0.05)\n"
-                           "            except BaseException: pass"),
+    "catches everything": (
+        "silence",
+        "while True:\n            try: time.sleep(0.05)\n            except BaseException: pass",
+    ),
     "sleeps in C": ("silence", "ctypes.CDLL(None).sleep(1000)"),
     "stops its process": ("silence", "os.kill(os.getpid(), signal.SIGSTOP)"),
     "ends its process": ("crash", "os._exit(0)"),
@@ -68,9 +79,19 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     ways = _ways(folder, second=not quick)
     rows = _bits(ways, folder, 0.5 if quick else 4.0)
     costs = _costs(ways, folder, 5 if quick else 40)
-    rows += [finding(f"braking_port.cost.{_id(name)}", SYSTEM, f"one exchange, {name}, 95 % interval {low:.1f} to "
-                     f"{high:.1f}", cost, "us", "", f"median of rounds of {ROUND} in which all ways have their turn",
-                     "none") for name, (cost, low, high) in costs.items()]  # fmt: skip
+    rows += [
+        finding(
+            f"braking_port.cost.{_id(name)}",
+            SYSTEM,
+            f"one exchange, {name}, 95 % interval {low:.1f} to {high:.1f}",
+            cost,
+            "us",
+            "",
+            f"median of rounds of {ROUND} in which all ways have their turn",
+            "none",
+        )
+        for name, (cost, low, high) in costs.items()
+    ]
     told = [_process(kind, folder) for kind in (QUICK if quick else FAULTS)]
     told += [_class(kind, folder) for kind in (("catches everything",) if quick else CLASSES)]
     told += [] if quick else [_slave(kind, folder) for kind in SLAVES]
@@ -79,16 +100,26 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def _scene(folder: Path, duration: float, table: dict[str, Any]) -> Any:
     straight = {"straight": {"kind": "straight", "speed": 11.11}}
-    return build({"system": "braking", "title": "port", "procedures": straight, "run": {"duration": duration},
-                  "port": {"timeout": PATIENT, "start": PATIENT} | table}, "port.toml", folder)  # fmt: skip
+    return build(
+        {
+            "system": "braking",
+            "title": "port",
+            "procedures": straight,
+            "run": {"duration": duration},
+            "port": {"timeout": PATIENT, "start": PATIENT} | table,
+        },
+        "port.toml",
+        folder,
+    )
 
 
 def _ways(folder: Path, second: bool) -> dict[str, dict[str, Any] | str]:
     """Tables of all ways by name; text tells why one is not there."""
     ways: dict[str, dict[str, Any] | str] = {"callable": {"callable": EXAMPLE}}
     if second:
-        ways["second process in Python"] = {"command": [sys.executable, "-m", "models.braking.port.client", EXAMPLE,
-                                                        "{port}"]}  # fmt: skip
+        ways["second process in Python"] = {
+            "command": [sys.executable, "-m", "models.braking.port.client", EXAMPLE, "{port}"]
+        }
     ways["second process in C"] = _built_c(folder)
     ways["FMU"] = _built_fmu(folder)
     return ways
@@ -127,8 +158,14 @@ def _bits(ways: dict[str, dict[str, Any] | str], folder: Path, duration: float) 
 def _alive(path: Driven) -> Row:
     """Bits could be the same of a controller that does nothing."""
     turns = int((np.diff(np.sign(np.diff(path.pressures, axis=0)), axis=0) != 0).sum())
-    return behaves("braking_port.bits.alive", SYSTEM, f"pressures turn, here {turns} times",
-                   "yes" if turns > 8 else "no", "yes", "bits of a controller that does nothing prove nothing")
+    return behaves(
+        "braking_port.bits.alive",
+        SYSTEM,
+        f"pressures turn, here {turns} times",
+        "yes" if turns > 8 else "no",
+        "yes",
+        "bits of a controller that does nothing prove nothing",
+    )
 
 
 def _same(path: Driven, other: Driven) -> str:
@@ -141,8 +178,11 @@ def _costs(ways: dict[str, dict[str, Any] | str], folder: Path, rounds: int) -> 
     """Microseconds of one exchange by way: median of the rounds with its 95 % interval."""
     run, seconds = Run(np.full(4, 0.5), SAMPLE, folder=folder), dict[str, list[float]]()
     with ExitStack() as stack:
-        tables = {name: PortTable(timeout=PATIENT, start=PATIENT, **table) for name, table in ways.items()
-                  if isinstance(table, dict)}  # fmt: skip
+        tables = {
+            name: PortTable(timeout=PATIENT, start=PATIENT, **table)
+            for name, table in ways.items()
+            if isinstance(table, dict)
+        }
         controllers = {name: stack.enter_context(opened(table, run, Example(4)))[0] for name, table in tables.items()}
         for i in range(rounds):
             for name, controller in controllers.items():
@@ -151,8 +191,10 @@ def _costs(ways: dict[str, dict[str, Any] | str], folder: Path, rounds: int) -> 
 
 
 def _timed(controller: Controller, first: int) -> float:
-    samples = [Sample(i, round(1e9 * SAMPLE * i), np.full(4, 10.0 + 0.01 * (i % 7)), True, 6.0, 11.0)
-               for i in range(first, first + ROUND)]  # fmt: skip
+    samples = [
+        Sample(i, round(1e9 * SAMPLE * i), np.full(4, 10.0 + 0.01 * (i % 7)), True, 6.0, 11.0)
+        for i in range(first, first + ROUND)
+    ]
     start = time.perf_counter()
     for given in samples:
         ask(controller, given)
@@ -175,9 +217,13 @@ def _class(kind: str, folder: Path) -> dict[str, Any]:
     return _failed(f"class that {kind}", name, {"callable": "fails.py:Fails"}, folder)
 
 
-SLAVES = {"raises": ("crash", "raise ValueError('boom')"), "never comes back": ("silence", "while True: pass"),
-          "ends its process": ("crash", "os._exit(0)"), "crashes its process": ("crash", "ctypes.string_at(0)"),
-          "returns an error": ("crash", "return False")}  # fmt: skip
+SLAVES = {
+    "raises": ("crash", "raise ValueError('boom')"),
+    "never comes back": ("silence", "while True: pass"),
+    "ends its process": ("crash", "os._exit(0)"),
+    "crashes its process": ("crash", "ctypes.string_at(0)"),
+    "returns an error": ("crash", "return False"),
+}
 """What an FMU does, and the name under which the run must end."""
 
 
@@ -189,8 +235,9 @@ def _slave(kind: str, folder: Path) -> dict[str, Any]:
     well = f"        if self._number == {misbehaving_client.WELL}:\n            import ctypes, os\n            {does}\n"
     source = (Path(port.__path__[0]) / "example_slave.py").read_text().replace(line, well + line)
     (folder / "fails_slave.py").write_text(source)
-    return _failed(f"FMU that {kind}", name, {"fmu": FmuBuilder.build_FMU(folder / "fails_slave.py", dest=folder).name},
-                   folder)  # fmt: skip
+    return _failed(
+        f"FMU that {kind}", name, {"fmu": FmuBuilder.build_FMU(folder / "fails_slave.py", dest=folder).name}, folder
+    )
 
 
 def _failed(kind: str, name: str, table: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -231,11 +278,24 @@ def _fault_rows(one: dict[str, Any]) -> list[Row]:
     found = one["name"] if whole else f"{one['name']} at {one['number']}, {one['kept']} samples kept"
     key = f"braking_port.fault.{_id(one['kind'])}"
     return [
-        behaves(key, SYSTEM, f"{one['kind']}, after {well} samples that are kept", found, one["expected"],
-                "named, at its sample, with the path until then"),
-        aim(f"{key}.seconds", SYSTEM, f"{one['kind']}: until the run has ended, once", one["seconds"], "s",
-            2.0 * TIMEOUT, f"twice the time-out of {TIMEOUT:g} s"),
-    ]  # fmt: skip
+        behaves(
+            key,
+            SYSTEM,
+            f"{one['kind']}, after {well} samples that are kept",
+            found,
+            one["expected"],
+            "named, at its sample, with the path until then",
+        ),
+        aim(
+            f"{key}.seconds",
+            SYSTEM,
+            f"{one['kind']}: until the run has ended, once",
+            one["seconds"],
+            "s",
+            2.0 * TIMEOUT,
+            f"twice the time-out of {TIMEOUT:g} s",
+        ),
+    ]
 
 
 def _id(name: str) -> str:
@@ -247,8 +307,12 @@ def tables(data: dict[str, Any]) -> list[Table]:
     costs = tuple((name, f"{cost:.1f} ({low:.1f} to {high:.1f})") for name, (cost, low, high) in data["costs"].items())
     faults = tuple((one["kind"], one["message"], f"{one['seconds']:.3f}") for one in data["faults"])
     return [
-        Table("Cost of one exchange", f"Of {1e6 * SAMPLE:g} us between two samples; median with its 95 % "
-              "interval.", ("way", "us"), costs),
+        Table(
+            "Cost of one exchange",
+            f"Of {1e6 * SAMPLE:g} us between two samples; median with its 95 % interval.",
+            ("way", "us"),
+            costs,
+        ),
         Table("Controllers that fail", f"Time-out {TIMEOUT:g} s.", ("what it does", "message", "s, once"), faults),
     ]
 

@@ -22,14 +22,25 @@ FRONT = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
 """A front wheel of the paper's truck under what it bears while braking."""
 STEP = 5.5e-3
 """The paper's step (s)."""
-HEADLINE = {"ice, 3 % slip": ("ice", 0.03, 11.11), "dry, 6 % slip": ("dry", 0.06, 22.22),
-            "ice, light": ("ice", 0.003, 11.11), "dry, light": ("dry", 0.004, 22.22)}  # fmt: skip
+HEADLINE = {
+    "ice, 3 % slip": ("ice", 0.03, 11.11),
+    "dry, 6 % slip": ("dry", 0.06, 22.22),
+    "ice, light": ("ice", 0.003, 11.11),
+    "dry, light": ("dry", 0.004, 22.22),
+}
 """Surface, slip that settles, speed (m/s)."""
-FURTHER = {"snow": ("snow", 0.04, 13.9, 1.0, 1.0), "snow, light": ("snow", 0.004, 13.9, 1.0, 1.0),
-           "wet": ("wet", 0.05, 22.22, 1.0, 1.0), "wet, light": ("wet", 0.003, 22.22, 1.0, 1.0),
-           "slow": ("dry", 0.03, 3.0, 1.0, 1.0), "fast": ("dry", 0.03, 40.0, 1.0, 1.0),
-           "light vehicle": ("ice", 0.02, 11.11, 0.2, 1.0), "heavy vehicle": ("ice", 0.02, 11.11, 5.0, 1.0),
-           "light wheel": ("wet", 0.03, 11.11, 1.0, 0.1), "heavy wheel": ("wet", 0.03, 11.11, 1.0, 4.0)}  # fmt: skip
+FURTHER = {
+    "snow": ("snow", 0.04, 13.9, 1.0, 1.0),
+    "snow, light": ("snow", 0.004, 13.9, 1.0, 1.0),
+    "wet": ("wet", 0.05, 22.22, 1.0, 1.0),
+    "wet, light": ("wet", 0.003, 22.22, 1.0, 1.0),
+    "slow": ("dry", 0.03, 3.0, 1.0, 1.0),
+    "fast": ("dry", 0.03, 40.0, 1.0, 1.0),
+    "light vehicle": ("ice", 0.02, 11.11, 0.2, 1.0),
+    "heavy vehicle": ("ice", 0.02, 11.11, 5.0, 1.0),
+    "light wheel": ("wet", 0.03, 11.11, 1.0, 0.1),
+    "heavy wheel": ("wet", 0.03, 11.11, 1.0, 4.0),
+}
 """The same with factors of mass and spin inertia."""
 BOUND = 5e-4
 STEPS = {True: (STEP, 2e-2), False: (1e-4, 5e-4, 1e-3, 2e-3, STEP, 1e-2, 2e-2)}
@@ -55,8 +66,12 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows = [row for name, curve in curves.items() for row in _headline_rows(name, curve)]
     if not quick:
         rows += [_further_row(name, *one) for name, one in FURTHER.items()]
-    rows += [_sweep_row(("ice", "dry") if quick else tuple(SURFACES), LEVELS[SOME] if quick else LEVELS, STEPS[quick]),
-             _locked_row(), _release_row(), _friction_row(9 if quick else 25)]  # fmt: skip
+    rows += [
+        _sweep_row(("ice", "dry") if quick else tuple(SURFACES), LEVELS[SOME] if quick else LEVELS, STEPS[quick]),
+        _locked_row(),
+        _release_row(),
+        _friction_row(9 if quick else 25),
+    ]
     return rows, {"curves": curves, "steps": steps}
 
 
@@ -73,8 +88,15 @@ def steady(quarter: Quarter, tyre: TyreTable, slip: float) -> tuple[float, float
     return force, quarter.steady_torque(slip, force)
 
 
-def stop(quarter: Quarter, tyre: tuple[TyreTable, Tables], torque: float, speed: float, step: float = STEP,
-         after: float = 0.0, turning: float | None = None) -> Stop:  # fmt: skip
+def stop(
+    quarter: Quarter,
+    tyre: tuple[TyreTable, Tables],
+    torque: float,
+    speed: float,
+    step: float = STEP,
+    after: float = 0.0,
+    turning: float | None = None,
+) -> Stop:
     """Braked by a constant torque (N m) for more than it takes at the least of both forces, and ``after`` (s)."""
     least = min(torque / quarter.radius, quarter.mass * GRAVITY * float(tyre[0].mu_x[0, 0, -1]))
     steps = math.ceil((1.25 * speed * quarter.mass / least + 0.5 + after) / step) if torque > 0.0 else 1000
@@ -90,25 +112,56 @@ def _curve(name: str, slip: float, speed: float, steps: tuple[float, ...]) -> di
     own = [stop(FRONT, both, torque, speed, step).distance / true - 1.0 for step in steps]
     force = steady(FRONT, tyre, slip)[0]
     held = stop(FRONT, both, torque, speed, turning=(1.0 - slip) * speed / FRONT.radius).distance
-    return {"exact": true, "ours": own, "steady": held / (FRONT.mass * speed**2 / (2.0 * force)) - 1.0,
-            "others": {key: [way / true - 1.0 for way, _ in found] for key, found in others.items()},
-            "rolls": {key: [left for _, left in found] for key, found in others.items()},
-            "at": steps.index(STEP)}  # fmt: skip
+    return {
+        "exact": true,
+        "ours": own,
+        "steady": held / (FRONT.mass * speed**2 / (2.0 * force)) - 1.0,
+        "others": {key: [way / true - 1.0 for way, _ in found] for key, found in others.items()},
+        "rolls": {key: [left for _, left in found] for key, found in others.items()},
+        "at": steps.index(STEP),
+    }
 
 
 def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
     key, at = f"braking_stop.{name.replace(', ', '.').replace(' %', '').replace(' ', '.')}", curve["at"]
     why = f"asked for; the exact distance is {curve['exact']:.6f} m, from the slip's own equation to 1e-9"
-    rows = [at_most(f"{key}.distance", SYSTEM, f"{name}, 5.5 ms: stopping distance from rolling", curve["ours"][at], "",
-                    BOUND, why, "closed form"),
-            at_most(f"{key}.steady", SYSTEM, f"{name}, 5.5 ms: stopping distance at constant slip", curve["steady"], "",
-                    1e-7, "m v^2 / (2 F); exact in each step but the last, at rest", "closed form")]  # fmt: skip
+    rows = [
+        at_most(
+            f"{key}.distance",
+            SYSTEM,
+            f"{name}, 5.5 ms: stopping distance from rolling",
+            curve["ours"][at],
+            "",
+            BOUND,
+            why,
+            "closed form",
+        ),
+        at_most(
+            f"{key}.steady",
+            SYSTEM,
+            f"{name}, 5.5 ms: stopping distance at constant slip",
+            curve["steady"],
+            "",
+            1e-7,
+            "m v^2 / (2 F); exact in each step but the last, at rest",
+            "closed form",
+        ),
+    ]
     for scheme, errors in curve["others"].items():
         left = curve["rolls"][scheme][at]
         said = f", and still rolls at {left:.2g} m/s in {PATIENCE:g} times the time of stopping" if left else ""
-        rows.append(finding(f"{key}.{scheme.split()[-1].lower()}", SYSTEM, f"{name}, 5.5 ms: {scheme}{said}",
-                            100.0 * errors[at], "%", f"{100.0 * curve['ours'][at]:.1e} % of ours",
-                            "the same vehicle, torque and table", "closed form"))  # fmt: skip
+        rows.append(
+            finding(
+                f"{key}.{scheme.split()[-1].lower()}",
+                SYSTEM,
+                f"{name}, 5.5 ms: {scheme}{said}",
+                100.0 * errors[at],
+                "%",
+                f"{100.0 * curve['ours'][at]:.1e} % of ours",
+                "the same vehicle, torque and table",
+                "closed form",
+            )
+        )
     return rows
 
 
@@ -117,19 +170,29 @@ def _further_row(name: str, on: str, slip: float, speed: float, mass: float, spi
     tyre, _ = both = met(on)
     torque = steady(quarter, tyre, slip)[1]
     error = stop(quarter, both, torque, speed).distance / exact(quarter, tyre, torque, speed) - 1.0
-    return at_most(f"braking_stop.further.{name.replace(', ', '.').replace(' ', '-')}", SYSTEM,
-                   f"{name} ({on}, {100 * slip:g} % slip, {speed:g} m/s), 5.5 ms: stopping distance", error, "", BOUND,
-                   "as the four above", "closed form")  # fmt: skip
+    return at_most(
+        f"braking_stop.further.{name.replace(', ', '.').replace(' ', '-')}",
+        SYSTEM,
+        f"{name} ({on}, {100 * slip:g} % slip, {speed:g} m/s), 5.5 ms: stopping distance",
+        error,
+        "",
+        BOUND,
+        "as the four above",
+        "closed form",
+    )
 
 
 def faults_of(found: Stop, radius: float, brakes: bool) -> list[str]:
     """What is wrong with a stop: names of rules it breaks."""
     rim, speed = radius * found.path[:, TURNING], found.path[:, SPEED]
-    broken = {"no number": not np.isfinite(found.path).all(), "turns backwards": rim.min() < 0.0,
-              "turns faster than it rolls": (rim - speed).max() > 1e-12 * speed[0],
-              "does not stop": brakes and found.rest < 0,
-              "creeps": found.rest >= 0 and bool(np.abs(speed[found.rest :]).max() > 0.0
-                                                 or np.ptp(found.path[found.rest :, PLACE]) > 0.0)}  # fmt: skip
+    broken = {
+        "no number": not np.isfinite(found.path).all(),
+        "turns backwards": rim.min() < 0.0,
+        "turns faster than it rolls": (rim - speed).max() > 1e-12 * speed[0],
+        "does not stop": brakes and found.rest < 0,
+        "creeps": found.rest >= 0
+        and bool(np.abs(speed[found.rest :]).max() > 0.0 or np.ptp(found.path[found.rest :, PLACE]) > 0.0),
+    }
     return [name for name, wrong in broken.items() if wrong]
 
 
@@ -145,12 +208,23 @@ def _sweep_row(surfaces: tuple[str, ...], levels: np.ndarray, steps: tuple[float
             runs += 1
     some = f" (below {1e3 * STEP:g} ms every fifth level, but on {', '.join(ASKED)} all)"
     some = "" if set(surfaces) <= set(ASKED) else some
-    what = (f"{runs} stops from 11.11 m/s, in steps below 1 ms from {SLOW:g}: {len(surfaces)} surfaces, "
-            f"brakes from 0 to 1.5 of lock, steps of {1e3 * min(steps):g} to {1e3 * max(steps):g} ms{some}, "
-            f"watched for {AFTER:g} s of standstill: those with no number, a wheel speed outside 0 to v / r, no stop, "
-            f"or any motion after it: {'; '.join(wrong[:3])}")
-    return within("braking_stop.sweep", SYSTEM, what.removesuffix(": "), len(wrong), "runs", 0, 0,
-                  "asked for: v = 0 exactly at the end, and less than 1 mm/s after it", "none")  # fmt: skip
+    what = (
+        f"{runs} stops from 11.11 m/s, in steps below 1 ms from {SLOW:g}: {len(surfaces)} surfaces, "
+        f"brakes from 0 to 1.5 of lock, steps of {1e3 * min(steps):g} to {1e3 * max(steps):g} ms{some}, "
+        f"watched for {AFTER:g} s of standstill: those with no number, a wheel speed outside 0 to v / r, no stop, "
+        f"or any motion after it: {'; '.join(wrong[:3])}"
+    )
+    return within(
+        "braking_stop.sweep",
+        SYSTEM,
+        what.removesuffix(": "),
+        len(wrong),
+        "runs",
+        0,
+        0,
+        "asked for: v = 0 exactly at the end, and less than 1 mm/s after it",
+        "none",
+    )
 
 
 def _locked_row() -> Row:
@@ -160,8 +234,16 @@ def _locked_row() -> Row:
         torque = 2.0 * FRONT.mass * GRAVITY * FRONT.radius * float(tyre[0].mu_x.max())
         way = stop(FRONT, tyre, torque, 11.11, turning=0.0).distance
         errors.append(abs(way * 2.0 * GRAVITY * float(tyre[0].mu_x[0, 0, -1]) / 11.11**2 - 1.0))
-    return at_most("braking_stop.locked", SYSTEM, f"locked wheels on {len(SURFACES)} surfaces: stopping distance "
-                   "against v^2 / (2 mu g)", max(errors), "", 1e-9, "asked for", "closed form")  # fmt: skip
+    return at_most(
+        "braking_stop.locked",
+        SYSTEM,
+        f"locked wheels on {len(SURFACES)} surfaces: stopping distance against v^2 / (2 mu g)",
+        max(errors),
+        "",
+        1e-9,
+        "asked for",
+        "closed form",
+    )
 
 
 def _release_row() -> Row:
@@ -172,26 +254,44 @@ def _release_row() -> Row:
         times = step * np.arange(math.ceil(0.8 / step) + 1)
         found = braked(FRONT, tables, EVEN, np.maximum(sliding * (1.5 - times / 0.8037), 0.0), step, 20.0, 0.0)
         errors.append(abs(found.released - 0.5 * 0.8037))
-    return at_most("braking_stop.release", SYSTEM, f"locked wheels on {len(SURFACES)} surfaces under a torque that "
-                   "falls, steps of 1, 5.5 and 20 ms: time at which they turn again", max(errors), "s", 1e-3,
-                   "asked for: the time at which torque falls to that of sliding", "closed form")  # fmt: skip
+    return at_most(
+        "braking_stop.release",
+        SYSTEM,
+        f"locked wheels on {len(SURFACES)} surfaces under a torque that "
+        "falls, steps of 1, 5.5 and 20 ms: time at which they turn again",
+        max(errors),
+        "s",
+        1e-3,
+        "asked for: the time at which torque falls to that of sliding",
+        "closed form",
+    )
 
 
 def _friction_row(levels: int) -> Row:
     torque = 3.0 * FRONT.mass * GRAVITY * FRONT.radius
     ways = [stop(FRONT, met("ice", float(scale)), torque, 11.11).distance for scale in np.geomspace(0.3, 8.0, levels)]
-    return within("braking_stop.friction", SYSTEM, f"{levels} levels of friction, brakes beyond lock: those at which "
-                  "the stopping distance does not fall", sum(b >= a for a, b in pairwise(ways)), "", 0, 0, "asked for",
-                  "none")  # fmt: skip
+    return within(
+        "braking_stop.friction",
+        SYSTEM,
+        f"{levels} levels of friction, brakes beyond lock: those at which the stopping distance does not fall",
+        sum(b >= a for a, b in pairwise(ways)),
+        "",
+        0,
+        0,
+        "asked for",
+        "none",
+    )
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Error of the stopping distance by scheme and step."""
     names = ("ours", *SCHEMES)
-    lines = [(case, scheme, *(f"{100.0 * error:+.2g}{'*' if left else ''}" for error, left in _errors(curve, scheme)))
-             for case, curve in data["curves"].items() for scheme in names]  # fmt: skip
-    note = (f"In per cent of the exact distance. *: it does not stop in {PATIENCE:g} times its time;"
-            " the way until then.")
+    lines = [
+        (case, scheme, *(f"{100.0 * error:+.2g}{'*' if left else ''}" for error, left in _errors(curve, scheme)))
+        for case, curve in data["curves"].items()
+        for scheme in names
+    ]
+    note = f"In per cent of the exact distance. *: it does not stop in {PATIENCE:g} times its time; the way until then."
     heads = ("case", "scheme", *(f"{1e3 * step:g} ms" for step in data["steps"]))
     return [Table("Stopping distance of a quarter vehicle", note, heads, tuple(lines))]
 
@@ -213,8 +313,11 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
             errors = 100.0 * np.abs([error for error, _ in _errors(curve, scheme)])
             label = "exact wheel, mean force (ours)" if scheme == "ours" else scheme
             ax.loglog(1e3 * np.array(data["steps"]), np.maximum(errors, 1e-7), style, label=label)
-            never = [(1e3 * step, error) for step, error, (_, left) in
-                     zip(data["steps"], errors, _errors(curve, scheme), strict=True) if left]  # fmt: skip
+            never = [
+                (1e3 * step, error)
+                for step, error, (_, left) in zip(data["steps"], errors, _errors(curve, scheme), strict=True)
+                if left
+            ]
             ax.plot(*np.reshape(never, (-1, 2)).T, "x", color="black", markersize=9)
         ax.axhline(100.0 * BOUND, color="grey", linewidth=0.8)
         ax.axvline(1e3 * STEP, color="grey", linewidth=0.8, linestyle=":")
@@ -222,6 +325,8 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         ax.label_outer()
     figure.suptitle("A quarter vehicle braked to a stop by a constant torque")
     figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    caption = (f"Error of the stopping distance over the step; grey: the bound of {100 * BOUND:g} % and the paper's "
-               "step. Crosses: it has not stopped in three times its time. Errors below 1e-7 % are drawn there.")
+    caption = (
+        f"Error of the stopping distance over the step; grey: the bound of {100 * BOUND:g} % and the paper's "
+        "step. Crosses: it has not stopped in three times its time. Errors below 1e-7 % are drawn there."
+    )
     return [(caption, figure)]

@@ -65,8 +65,10 @@ def asked(scene: Drawn) -> Chooser:
 def changes_by_frequency(chooser: Chooser, choice: Choice) -> np.ndarray:
     """Changes (quantities,) of the worst listed speed."""
     left = without(chooser.held, choice.left_out)
-    ratios = [_by_frequency(whole, left, chooser.rows) / _by_frequency(whole, chooser.held, chooser.rows)
-              for whole in chooser.wholes]  # fmt: skip
+    ratios = [
+        _by_frequency(whole, left, chooser.rows) / _by_frequency(whole, chooser.held, chooser.rows)
+        for whole in chooser.wholes
+    ]
     return largest(np.sqrt(ratios) - 1)
 
 
@@ -81,8 +83,14 @@ def judged(scene: Drawn, second: bool) -> Judged:
     measured = 1.0
     if chosen:
         measured = measured_step(chooser, chosen) / measured_step(chooser, none)
-    return Judged(scene, choice, float(abs(two / one - 1).max()), changes,
-                  worst_nearby(chooser, chosen, DRAWS if chosen else 0, DRAWS), measured)  # fmt: skip
+    return Judged(
+        scene,
+        choice,
+        float(abs(two / one - 1).max()),
+        changes,
+        worst_nearby(chooser, chosen, DRAWS if chosen else 0, DRAWS),
+        measured,
+    )
 
 
 def _by_frequency(whole: Whole, held: Held, rows: list[int]) -> np.ndarray:
@@ -100,8 +108,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     pair.
     """
     seeds = FIRST if quick else range(SCENES_DRAWN)
-    found = [judged(drawn(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0),
-                    quick or seed < SECOND_ROUTE) for seed in seeds]  # fmt: skip
+    found = [
+        judged(drawn(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0), quick or seed < SECOND_ROUTE)
+        for seed in seeds
+    ]
     rows = [*_kept_rows(found), _identity_row(found), *_equal_rows(found)]
     if not quick:
         rows += [*_prediction_rows(found), *_saving_rows(found)]
@@ -115,34 +125,80 @@ def _kept_rows(found: list[Judged]) -> list[Row]:
     second = [one for one in found if one.by_frequency is not None]
     gap = max(float(abs(one.by_frequency - one.choice.confirmed).max()) for one in second)
     return [
-        within("choice_linear.kept", SYSTEM, f"share of {len(found)} random scenes whose tolerance is kept after "
-               "confirmation", share, "", 1.0, 0.05, "asked: 95 of 100", "none"),
-        behaves("choice_linear.honest", SYSTEM, "scenes reported as kept which a route finds broken", str(lies), "0",
-                "never reported as kept when it is not", "native"),
-        at_most("choice_linear.frequency", SYSTEM, f"confirmed changes against sums over frequencies of M, D, K with "
-                f"singular mass, {len(second)} scenes", gap, "", 1e-3, "what the frequency grid leaves", "native"),
-    ]  # fmt: skip
+        within(
+            "choice_linear.kept",
+            SYSTEM,
+            f"share of {len(found)} random scenes whose tolerance is kept after confirmation",
+            share,
+            "",
+            1.0,
+            0.05,
+            "asked: 95 of 100",
+            "none",
+        ),
+        behaves(
+            "choice_linear.honest",
+            SYSTEM,
+            "scenes reported as kept which a route finds broken",
+            str(lies),
+            "0",
+            "never reported as kept when it is not",
+            "native",
+        ),
+        at_most(
+            "choice_linear.frequency",
+            SYSTEM,
+            f"confirmed changes against sums over frequencies of M, D, K with singular mass, {len(second)} scenes",
+            gap,
+            "",
+            1e-3,
+            "what the frequency grid leaves",
+            "native",
+        ),
+    ]
 
 
 def _ratios(found: list[Judged]) -> np.ndarray:
     """Predicted by confirmed changes of all choices and quantities that are told from zero and below 5 %."""
-    pairs = [(p, c) for one in found
-             for p, c in zip(one.choice.predicted, one.choice.confirmed, strict=True) if TOLD[0] < abs(c) < TOLD[1]]
+    pairs = [
+        (p, c)
+        for one in found
+        for p, c in zip(one.choice.predicted, one.choice.confirmed, strict=True)
+        if TOLD[0] < abs(c) < TOLD[1]
+    ]
     return np.array([p / c for p, c in pairs])
 
 
 def _prediction_rows(found: list[Judged]) -> list[Row]:
     ratios = _ratios(found)
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0)))
-    return [within("choice_linear.predictions", SYSTEM, f"share of {len(ratios)} predicted changes below 5 % within a "
-                   "factor of 2 of the confirmed ones", share, "", 1.0, 0.05, "asked: within a factor of 2; where two "
-                   "larger changes cancel, what is left cannot be told that well", "none")]  # fmt: skip
+    return [
+        within(
+            "choice_linear.predictions",
+            SYSTEM,
+            f"share of {len(ratios)} predicted changes below 5 % within a factor of 2 of the confirmed ones",
+            share,
+            "",
+            1.0,
+            0.05,
+            "asked: within a factor of 2; where two larger changes cancel, what is left cannot be told that well",
+            "none",
+        )
+    ]
 
 
 def _identity_row(found: list[Judged]) -> Row:
-    return at_most("choice_linear.identity", SYSTEM, "variance of what is left by the whole scene's covariance and the "
-                   "reduced adjoint, against the reduced covariance, worst of all scenes",
-                   max(one.identity for one in found), "", 1e-12, "asked; an identity", "closed form")  # fmt: skip
+    return at_most(
+        "choice_linear.identity",
+        SYSTEM,
+        "variance of what is left by the whole scene's covariance and the "
+        "reduced adjoint, against the reduced covariance, worst of all scenes",
+        max(one.identity for one in found),
+        "",
+        1e-12,
+        "asked; an identity",
+        "closed form",
+    )
 
 
 def _equal_rows(found: list[Judged]) -> list[Row]:
@@ -151,27 +207,68 @@ def _equal_rows(found: list[Judged]) -> list[Row]:
     gaps = [abs(_saving(one) / one.measured - 1.0) for one in found]
     saving = [one for one in found if one.choice.left_out]
     return [
-        at_most("choice_linear.nearby", SYSTEM, f"largest change by the tolerance, {len(saving)} of {len(found)} "
-                f"scenes in which effects were left out, {DRAWS} random speeds of the range each, with every mass, "
-                "stiffness and damping up to 5 % off at random", max(one.nearby for one in found), "", 1.0,
-                "the tolerance holds nearby, too, or nothing is left out", "native"),
-        at_most("choice_linear.said", SYSTEM, f"share of {len(found)} scenes in which all that could go was refused, "
-                "with its reason", told / len(found), "", 0.1, "asked: at most a tenth", "none"),
-        at_most("choice_linear.equal_accuracy", SYSTEM, "saving in calls at equal accuracy as it is printed, against "
-                f"the covariance of what runs sample, worst of {len(saving)} scenes", max(gaps), "", 0.05, "asked; "
-                "standard deviations within the tolerance of the whole scene's exact ones, by what is left out and by "
-                "steps together", "closed form"),
-        behaves("choice_linear.saves", SYSTEM, "choices that leave effects out and save no calls",
-                str(sum(_saving(one) < 1.0 + WORTH for one in saving)), "0", "what saves nothing stays in", "none"),
-    ]  # fmt: skip
+        at_most(
+            "choice_linear.nearby",
+            SYSTEM,
+            f"largest change by the tolerance, {len(saving)} of {len(found)} "
+            f"scenes in which effects were left out, {DRAWS} random speeds of the range each, with every mass, "
+            "stiffness and damping up to 5 % off at random",
+            max(one.nearby for one in found),
+            "",
+            1.0,
+            "the tolerance holds nearby, too, or nothing is left out",
+            "native",
+        ),
+        at_most(
+            "choice_linear.said",
+            SYSTEM,
+            f"share of {len(found)} scenes in which all that could go was refused, with its reason",
+            told / len(found),
+            "",
+            0.1,
+            "asked: at most a tenth",
+            "none",
+        ),
+        at_most(
+            "choice_linear.equal_accuracy",
+            SYSTEM,
+            "saving in calls at equal accuracy as it is printed, against "
+            f"the covariance of what runs sample, worst of {len(saving)} scenes",
+            max(gaps),
+            "",
+            0.05,
+            "asked; "
+            "standard deviations within the tolerance of the whole scene's exact ones, by what is left out and by "
+            "steps together",
+            "closed form",
+        ),
+        behaves(
+            "choice_linear.saves",
+            SYSTEM,
+            "choices that leave effects out and save no calls",
+            str(sum(_saving(one) < 1.0 + WORTH for one in saving)),
+            "0",
+            "what saves nothing stays in",
+            "none",
+        ),
+    ]
 
 
 def _saving_rows(found: list[Judged]) -> list[Row]:
     saved = [_saving(one) for one in found if one.scene.tolerance == TOLERANCE]
-    return [finding("choice_linear.saving", SYSTEM, "calls at equal accuracy, whole scene by what is left, median of "
-                    f"{len(saved)} scenes at 2 % (upper quartile {np.percentile(saved, 75):.3g})",
-                    float(np.median(saved)), "times", "", "it depends on what is asked of which vehicle: a wheel's "
-                    "force needs the wheel", "none")]  # fmt: skip
+    return [
+        finding(
+            "choice_linear.saving",
+            SYSTEM,
+            "calls at equal accuracy, whole scene by what is left, median of "
+            f"{len(saved)} scenes at 2 % (upper quartile {np.percentile(saved, 75):.3g})",
+            float(np.median(saved)),
+            "times",
+            "",
+            "it depends on what is asked of which vehicle: a wheel's force needs the wheel",
+            "none",
+        )
+    ]
 
 
 def _saving(one: Judged) -> float:
@@ -192,15 +289,36 @@ def _pair() -> tuple[list[Row], dict[str, Any]]:
     alone, both = chooser.confirm(frozenset([mass])), chooser.confirm(frozenset([mass, damper]))
     step = chooser.cost(frozenset([mass, damper])).step / chooser.cost(frozenset()).step
     return [
-        behaves("choice_linear.pair.alone", SYSTEM, "wheels without mass under damped tyres: body acceleration",
-                "infinite" if np.isinf(alone[0]) else "finite", "infinite", "white noise reaches the body",
-                "closed form"),
-        behaves("choice_linear.pair.chosen", SYSTEM, "both are left out at 3 %, one for the other's sake",
-                "yes" if {mass, damper} <= set(choice.left_out) else "no", "yes",
-                f"together they change body acceleration by {100 * both[0]:.2f} %", "none"),
-        within("choice_linear.pair.step", SYSTEM, "step limit with both left out, by the whole scene's", step, "times",
-               691 / 24, 0.6, "published: 691 1/s fall to 24 1/s, as far as these digits go", "published"),
-    ], {"alone": alone.tolist(), "both": both.tolist(), "step": step}  # fmt: skip
+        behaves(
+            "choice_linear.pair.alone",
+            SYSTEM,
+            "wheels without mass under damped tyres: body acceleration",
+            "infinite" if np.isinf(alone[0]) else "finite",
+            "infinite",
+            "white noise reaches the body",
+            "closed form",
+        ),
+        behaves(
+            "choice_linear.pair.chosen",
+            SYSTEM,
+            "both are left out at 3 %, one for the other's sake",
+            "yes" if {mass, damper} <= set(choice.left_out) else "no",
+            "yes",
+            f"together they change body acceleration by {100 * both[0]:.2f} %",
+            "none",
+        ),
+        within(
+            "choice_linear.pair.step",
+            SYSTEM,
+            "step limit with both left out, by the whole scene's",
+            step,
+            "times",
+            691 / 24,
+            0.6,
+            "published: 691 1/s fall to 24 1/s, as far as these digits go",
+            "published",
+        ),
+    ], {"alone": alone.tolist(), "both": both.tolist(), "step": step}
 
 
 def _activity_rows() -> list[Row]:
@@ -213,19 +331,43 @@ def _activity_rows() -> list[Row]:
     rest = chooser.wholes[0].reduced(without(chooser.held, [locked]))
     change = float(np.sqrt(confirmed(rest, chooser.rows)[0] / chooser.full[0][0]) - 1.0)
     return [
-        finding("choice_linear.activity", SYSTEM, "share of energy activity that the body's pitch inertia holds", share,
-                "", 0.16, "published ranking, of a road whose details differ"),
-        at_most("choice_linear.activity.misleads", SYSTEM, "change of body acceleration with pitch locked", change, "",
-                1e-12, "a symmetric body bounces without pitch, however active that is", "closed form"),
-    ]  # fmt: skip
+        finding(
+            "choice_linear.activity",
+            SYSTEM,
+            "share of energy activity that the body's pitch inertia holds",
+            share,
+            "",
+            0.16,
+            "published ranking, of a road whose details differ",
+        ),
+        at_most(
+            "choice_linear.activity.misleads",
+            SYSTEM,
+            "change of body acceleration with pitch locked",
+            change,
+            "",
+            1e-12,
+            "a symmetric body bounces without pitch, however active that is",
+            "closed form",
+        ),
+    ]
 
 
 def _shown(one: Judged) -> dict[str, Any]:
     choice = one.choice
-    return {"tolerance": one.scene.tolerance, "predicted": choice.predicted.tolist(),
-            "confirmed": choice.confirmed.tolist(), "saving": _saving(one), "kept": choice.kept,
-            "nearby": one.nearby, "measured": one.measured, "said": list(choice.said),
-            "left out": len(choice.left_out), "of": len(choice.candidates), "rounds": choice.rounds}  # fmt: skip
+    return {
+        "tolerance": one.scene.tolerance,
+        "predicted": choice.predicted.tolist(),
+        "confirmed": choice.confirmed.tolist(),
+        "saving": _saving(one),
+        "kept": choice.kept,
+        "nearby": one.nearby,
+        "measured": one.measured,
+        "said": list(choice.said),
+        "left out": len(choice.left_out),
+        "of": len(choice.candidates),
+        "rounds": choice.rounds,
+    }
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
@@ -233,8 +375,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
     scenes = data["scenes"]
     saved = np.array([one["saving"] for one in scenes])
     rows = tuple((f"{share:g} %", f"{np.percentile(saved, share):.3g}") for share in (10, 25, 50, 75, 90))
-    note = (f"Calls at equal accuracy, whole scene by what is left, over {len(scenes)} scenes with "
-            "tolerances from 0.5 to 10 %.")  # fmt: skip
+    note = (
+        f"Calls at equal accuracy, whole scene by what is left, over {len(scenes)} scenes with "
+        "tolerances from 0.5 to 10 %."
+    )
     return [Table("What choosing effects saves", note, ("percentile", "times fewer calls"), rows)]
 
 
@@ -243,13 +387,19 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     from studies.figures import plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
-    predicted, confirmed_ = (100 * abs(np.array([v for one in data["scenes"] for v in one[key]]))
-                             for key in ("predicted", "confirmed"))  # fmt: skip
+    predicted, confirmed_ = (
+        100 * abs(np.array([v for one in data["scenes"] for v in one[key]])) for key in ("predicted", "confirmed")
+    )
     ends = np.array([1e-4, 12.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
     left.plot(confirmed_.clip(ends[0]), predicted.clip(ends[0]), "o", ms=4, color="#0072b2", label="a quantity")
-    left.set(xscale="log", yscale="log", xlabel="confirmed change [%] (at the end: smaller)",
-             ylabel="predicted change [%]", title="All that was left out, together")  # fmt: skip
+    left.set(
+        xscale="log",
+        yscale="log",
+        xlabel="confirmed change [%] (at the end: smaller)",
+        ylabel="predicted change [%]",
+        title="All that was left out, together",
+    )
     left.legend(loc="upper left")
     tolerance, saving = (np.array([one[key] for one in data["scenes"]]) for key in ("tolerance", "saving"))
     right.plot(100 * tolerance, saving, "o", ms=4, color="#d55e00")

@@ -18,8 +18,12 @@ TITLE = "Effects that a scene run in time calls for, chosen by runs and confirme
 SYSTEM: System = "effects"
 COUNTS = {"pitch-plane": 22, "wheelset": 3, "braking": 3, "ride": 7}
 """Scenes drawn of each system."""
-ENGINES = {"pitch-plane": ("reference", "mujoco"), "wheelset": ("reference", "mujoco", "exudyn"),
-           "braking": ("mujoco", "reference", "reference"), "ride": ("reference",)}  # fmt: skip
+ENGINES = {
+    "pitch-plane": ("reference", "mujoco"),
+    "wheelset": ("reference", "mujoco", "exudyn"),
+    "braking": ("mujoco", "reference", "reference"),
+    "ride": ("reference",),
+}
 """Implementations that take turns."""
 FRESH, AGAIN = 4, 77
 """Rides are judged by so many times as many copies as they were chosen with, on roads of this seed."""
@@ -108,10 +112,29 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def _kept(found: list[Judged]) -> list[Row]:
     kept = float(np.mean([one.choice.kept and one.honest for one in found]))
-    return [within("choice_nonlinear.kept", SYSTEM, f"share of {len(found)} random scenes whose tolerance is kept",
-                   kept, "", 1.0, 0.05, "asked: at least 95 of 100", "none"),
-            at_most("choice_nonlinear.honest", SYSTEM, "choices reported as kept that two more runs find broken",
-                    float(sum(not one.honest for one in found)), "", 0.0, "asked: never", "none")]  # fmt: skip
+    return [
+        within(
+            "choice_nonlinear.kept",
+            SYSTEM,
+            f"share of {len(found)} random scenes whose tolerance is kept",
+            kept,
+            "",
+            1.0,
+            0.05,
+            "asked: at least 95 of 100",
+            "none",
+        ),
+        at_most(
+            "choice_nonlinear.honest",
+            SYSTEM,
+            "choices reported as kept that two more runs find broken",
+            float(sum(not one.honest for one in found)),
+            "",
+            0.0,
+            "asked: never",
+            "none",
+        ),
+    ]
 
 
 def _refused() -> Row:
@@ -121,8 +144,14 @@ def _refused() -> Row:
         Chooser(asked.opened(FEWEST), ENGINES["ride"][0], list(asked.quantities), FINE).choose()
     except InputError as error:
         said = "refused" if "samples would tell" in error.allowed else error.allowed
-    return behaves("choice_nonlinear.refused", SYSTEM, f"a ride of {FEWEST} copies, tolerance {100 * FINE:g} %, where "
-                   "chance may add more than that", said, "refused", "and how many samples would tell")  # fmt: skip
+    return behaves(
+        "choice_nonlinear.refused",
+        SYSTEM,
+        f"a ride of {FEWEST} copies, tolerance {100 * FINE:g} %, where chance may add more than that",
+        said,
+        "refused",
+        "and how many samples would tell",
+    )
 
 
 def _pairs(found: list[Judged]) -> np.ndarray:
@@ -148,22 +177,54 @@ def _saving(found: list[Judged], system: str) -> list[Row]:
     name = f"choice_nonlinear.saving.{system}"
     note = "steps within a sample alone may grow" if system == "braking" else "it depends on the step that a scene has"
     return [
-        aim(name, SYSTEM, f"calls saved, median of {len(own)} scenes of {system}",
-            float(np.median(calls[:, 0] / calls[:, 2])), "times", 5.0, note, "at least"),
-        finding(f"{name}.step", SYSTEM, "the same by longer steps alone, with all effects",
-                float(np.median(calls[:, 0] / calls[:, 1])), "times", "", "what is left is due to effects", "none"),
-        finding(f"{name}.seconds", SYSTEM, "CPU seconds saved, each run once, median of the scenes",
-                float(np.median(seconds[:, 0] / seconds[:, 2])), "times", "", "of calls, and of what a call takes",
-                "none"),
-    ]  # fmt: skip
+        aim(
+            name,
+            SYSTEM,
+            f"calls saved, median of {len(own)} scenes of {system}",
+            float(np.median(calls[:, 0] / calls[:, 2])),
+            "times",
+            5.0,
+            note,
+            "at least",
+        ),
+        finding(
+            f"{name}.step",
+            SYSTEM,
+            "the same by longer steps alone, with all effects",
+            float(np.median(calls[:, 0] / calls[:, 1])),
+            "times",
+            "",
+            "what is left is due to effects",
+            "none",
+        ),
+        finding(
+            f"{name}.seconds",
+            SYSTEM,
+            "CPU seconds saved, each run once, median of the scenes",
+            float(np.median(seconds[:, 0] / seconds[:, 2])),
+            "times",
+            "",
+            "of calls, and of what a call takes",
+            "none",
+        ),
+    ]
 
 
 def _shown(one: Judged) -> dict[str, Any]:
     choice = one.choice
-    return {"system": one.system, "engine": one.engine, "tolerance": one.asked.tolerance,
-            "quantities": list(one.asked.quantities), "left out": list(choice.left_out), "times": choice.times,
-            "predicted": choice.predicted.tolist(), "confirmed": choice.confirmed.tolist(), "kept": choice.kept,
-            "calls": list(choice.calls), "seconds": list(choice.seconds)}  # fmt: skip
+    return {
+        "system": one.system,
+        "engine": one.engine,
+        "tolerance": one.asked.tolerance,
+        "quantities": list(one.asked.quantities),
+        "left out": list(choice.left_out),
+        "times": choice.times,
+        "predicted": choice.predicted.tolist(),
+        "confirmed": choice.confirmed.tolist(),
+        "kept": choice.kept,
+        "calls": list(choice.calls),
+        "seconds": list(choice.seconds),
+    }
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
@@ -175,11 +236,19 @@ def tables(data: dict[str, Any]) -> list[Table]:
         alone = [one["calls"][0] / one["calls"][1] for one in own]
         faster = [one["seconds"][0] / one["seconds"][2] for one in own]
         went = sorted({name for one in own for name in one["left out"]})
-        rows.append((system, str(len(own)), *(f"{np.median(values):.3g}" for values in (saved, alone, faster)),
-                     ", ".join(f"{name} {sum(name in one['left out'] for one in own)}" for name in went) or "none"))
+        rows.append(
+            (
+                system,
+                str(len(own)),
+                *(f"{np.median(values):.3g}" for values in (saved, alone, faster)),
+                ", ".join(f"{name} {sum(name in one['left out'] for one in own)}" for name in went) or "none",
+            )
+        )
     heads = ("system", "scenes", "fewer calls", "by steps alone", "fewer CPU seconds", "effects left out, how often")
-    note = ("Medians, times; tolerances are 0.5, 2 and 5 % in turn, of rides 1, 2 and 5 %. Each choice is confirmed "
-            "over the whole run.")  # fmt: skip
+    note = (
+        "Medians, times; tolerances are 0.5, 2 and 5 % in turn, of rides 1, 2 and 5 %. Each choice is confirmed "
+        "over the whole run."
+    )
     return [Table("What choosing effects and steps saves", note, heads, tuple(rows))]
 
 
@@ -192,14 +261,26 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
     for i, system in enumerate(data["systems"]):
         own = [one for one in data["scenes"] if one["system"] == system]
-        predicted, confirmed = (100 * np.array([value for one in own for value in one[key]])
-                                for key in ("predicted", "confirmed"))  # fmt: skip
+        predicted, confirmed = (
+            100 * np.array([value for one in own for value in one[key]]) for key in ("predicted", "confirmed")
+        )
         left.plot(confirmed.clip(ends[0]), predicted.clip(ends[0]), "os^D"[i], ms=4, color=f"C{i}", label=system)
         shift = 1.06 ** (i - 1)
-        right.plot([100 * one["tolerance"] * shift for one in own], [one["calls"][0] / one["calls"][2] for one in own],
-                   "os^D"[i], ms=4, color=f"C{i}", label=system)  # fmt: skip
-    left.set(xscale="log", yscale="log", xlabel="confirmed change [%] (at the end: smaller)",
-             ylabel="predicted change [%]", title="All that was left out, and longer steps")  # fmt: skip
+        right.plot(
+            [100 * one["tolerance"] * shift for one in own],
+            [one["calls"][0] / one["calls"][2] for one in own],
+            "os^D"[i],
+            ms=4,
+            color=f"C{i}",
+            label=system,
+        )
+    left.set(
+        xscale="log",
+        yscale="log",
+        xlabel="confirmed change [%] (at the end: smaller)",
+        ylabel="predicted change [%]",
+        title="All that was left out, and longer steps",
+    )
     right.axhline(5.0, color="#222222", ls="--", lw=0.8, label="5 times")
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls", title="What it saves")
     left.legend(loc="upper left")

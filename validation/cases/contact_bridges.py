@@ -147,10 +147,20 @@ class Prices:
         step, own, kernel = self.step(one), self.own(one), self.kernel(one)
         a, b, c = (part(one, True) for part in (self.step, self.own, self.kernel))
         share = median((a - b - c) / a)
-        return {"engine": one.engine, "method": one.method, "bridge": one.bridge, "law": one.what(),
-                "wheels": one.count, "main": one.law == MAIN, "step": step, "own": own, "kernel": kernel,
-                "over": step - own - kernel, "share": share,
-                "range": median(a)[1:]}  # fmt: skip
+        return {
+            "engine": one.engine,
+            "method": one.method,
+            "bridge": one.bridge,
+            "law": one.what(),
+            "wheels": one.count,
+            "main": one.law == MAIN,
+            "step": step,
+            "own": own,
+            "kernel": kernel,
+            "over": step - own - kernel,
+            "share": share,
+            "range": median(a)[1:],
+        }
 
 
 def _kernel_job(law: tuple[str, int], count: int) -> tuple[Callable[[], Any], int]:
@@ -181,8 +191,13 @@ def _job(one: Setup) -> tuple[Callable[[int], Any], int]:
 
 def _mujoco_job(one: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
     start, march = np.concatenate(wheels.state())[None], Marcher(model(wheels, STEP, one.method))
-    callback = {"none": lambda: None, "empty": lambda: empty_law().ctypes, "native": lambda: native_law().ctypes,
-                "jitted": lambda: python_law(add_forces), "plain": lambda: python_law(law)}[one.bridge]()  # fmt: skip
+    callback = {
+        "none": lambda: None,
+        "empty": lambda: empty_law().ctypes,
+        "native": lambda: native_law().ctypes,
+        "jitted": lambda: python_law(add_forces),
+        "plain": lambda: python_law(law),
+    }[one.bridge]()
 
     def job(steps: int) -> None:
         mujoco.set_mjcb_passive(callback)
@@ -210,8 +225,9 @@ def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
     def add(numbers: Array, q: Array, v: Array, f: Array) -> None:
         for k in range(0, wheels.size, FREEDOMS):
             hertz = by_approach(*wheels.curvatures, numbers[SUNK] + q[k + Z], wheels.pair)
-            creep = fastsim(hertz.a, hertz.b, hertz.load, wheels.mu, *_motion(wheels, q, v, k), wheels.pair,
-                            cells=wheels.cells)  # fmt: skip
+            creep = fastsim(
+                hertz.a, hertz.b, hertz.load, wheels.mu, *_motion(wheels, q, v, k), wheels.pair, cells=wheels.cells
+            )
             f[k : k + FREEDOMS] += creep.fx, creep.fy, wheels.load - hertz.load, creep.mz
 
     return add
@@ -248,8 +264,10 @@ def _price_rows(prices: Prices) -> list[Row]:
         else:
             value, low, high = median((step - own - kernel) / step)
             what, bound = "share of the bridge", 0.25
-        what = (f"{ENGINE_NAMES[one.engine]}, {one.method}: step with FASTSIM at four wheels (21 x 21, native, "
-                f"{spelled(step, 1e6)} us), {what}, 95 % interval {low:.3f} to {high:.3f}")  # fmt: skip
+        what = (
+            f"{ENGINE_NAMES[one.engine]}, {one.method}: step with FASTSIM at four wheels (21 x 21, native, "
+            f"{spelled(step, 1e6)} us), {what}, 95 % interval {low:.3f} to {high:.3f}"
+        )
         rows.append(aim(name, SYSTEM, what, value, "", bound, WHY))
     return rows
 
@@ -261,8 +279,14 @@ def _threads_row() -> Row:
     with installed(native_law()):
         one, two = (Marcher(built, threads).run(states, 100) for threads in (1, 2))
     same = "identical" if np.isfinite(one).all() and one.tobytes() == two.tobytes() else "different"
-    return behaves("contact_bridges.threads", SYSTEM, "MuJoCo, ten runs of 100 steps with FASTSIM in two threads "
-                   "beside one", same, "identical", "the kernel holds nothing between calls")  # fmt: skip
+    return behaves(
+        "contact_bridges.threads",
+        SYSTEM,
+        "MuJoCo, ten runs of 100 steps with FASTSIM in two threads beside one",
+        same,
+        "identical",
+        "the kernel holds nothing between calls",
+    )
 
 
 def _agreement_row() -> Row:
@@ -274,9 +298,16 @@ def _agreement_row() -> Row:
     other = Rolling(wheels, Forces(wheels).of).run(q, v, steps, 1e-4, "RK44")
     size = wheels.size
     scale = np.repeat([np.abs(path[:, :size]).max(), np.abs(path[:, size:]).max()], size)
-    return at_most("contact_bridges.agreement", SYSTEM, "state after 0.1 s with FASTSIM in MuJoCo beside Exudyn, by "
-                   "the largest displacement or rate", float((np.abs(path[-1] - other) / scale).max()), "", 1e-10,
-                   "the same kernel and method; what differs is rounding", "shared kernel")  # fmt: skip
+    return at_most(
+        "contact_bridges.agreement",
+        SYSTEM,
+        "state after 0.1 s with FASTSIM in MuJoCo beside Exudyn, by the largest displacement or rate",
+        float((np.abs(path[-1] - other) / scale).max()),
+        "",
+        1e-10,
+        "the same kernel and method; what differs is rounding",
+        "shared kernel",
+    )
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
@@ -284,17 +315,27 @@ def tables(data: dict[str, Any]) -> list[Table]:
     slow = slow_wheels.table(data["slow"])
     if "points" not in data:
         return [slow]
-    note = ("Microseconds per step, median of interleaved rounds, that of the step with its 95 % interval; "
-            "start of a run taken out. Kernel: the forces of all wheels in a compiled loop, times the calls per step. "
-            "Bridge: what the step takes beyond the engine's own and the kernel, for plain Python its slower kernel "
-            "too. Share: of the bridge in the step, median of the rounds with its 95 % interval. Rows time what they "
-            f"tell by itself, in {ROUNDS} rounds; here are {SHOWN} of all.")  # fmt: skip
+    note = (
+        "Microseconds per step, median of interleaved rounds, that of the step with its 95 % interval; "
+        "start of a run taken out. Kernel: the forces of all wheels in a compiled loop, times the calls per step. "
+        "Bridge: what the step takes beyond the engine's own and the kernel, for plain Python its slower kernel "
+        "too. Share: of the bridge in the step, median of the rounds with its 95 % interval. Rows time what they "
+        f"tell by itself, in {ROUNDS} rounds; here are {SHOWN} of all."
+    )
     heads = ("engine", "method", "wheels", "bridge", "law", "step", "engine's own", "kernel", "bridge's", "share [%]")
-    rows = tuple((p["engine"], p["method"], str(p["wheels"]), p["bridge"], p["law"],
-                  "{:.2f} ({:.2f} to {:.2f})".format(*(1e6 * value for value in (p["step"], *p["range"]))),
-                  *(f"{1e6 * p[part]:.2f}" for part in ("own", "kernel", "over")),
-                  "{:.0f} ({:.0f} to {:.0f})".format(*(100.0 * share for share in p["share"])))
-                 for p in data["points"])  # fmt: skip
+    rows = tuple(
+        (
+            p["engine"],
+            p["method"],
+            str(p["wheels"]),
+            p["bridge"],
+            p["law"],
+            "{:.2f} ({:.2f} to {:.2f})".format(*(1e6 * value for value in (p["step"], *p["range"]))),
+            *(f"{1e6 * p[part]:.2f}" for part in ("own", "kernel", "over")),
+            "{:.0f} ({:.0f} to {:.0f})".format(*(100.0 * share for share in p["share"])),
+        )
+        for p in data["points"]
+    )
     return [Table("Cost per step of a contact kernel inside an engine", note, heads, rows), slow]
 
 

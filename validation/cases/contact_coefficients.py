@@ -31,8 +31,17 @@ MISPRINT = 1.15
 """C23 at a/b = 0.8, nu = 1/4 as some copies of the table have it; 1.25 is right."""
 INNER, RESIDUAL = 3e-6, 1e-4
 """Relative residual at which the linear solver stops, and the slip that may be left, by the largest rigid slip."""
-SLENDER = ((1 / 30, 0.28), (1 / 20, 0.0), (1 / 20, 0.28), (1 / 20, 0.5), (20.0, 0.0), (20.0, 0.28), (20.0, 0.5),
-           (30.0, 0.28), (30.0, 0.5))  # fmt: skip
+SLENDER = (
+    (1 / 30, 0.28),
+    (1 / 20, 0.0),
+    (1 / 20, 0.28),
+    (1 / 20, 0.5),
+    (20.0, 0.0),
+    (20.0, 0.28),
+    (20.0, 0.5),
+    (30.0, 0.28),
+    (30.0, 0.5),
+)
 """Ratios a/b beyond the table, and Poisson's ratios."""
 WHY = "the same continuum problem solved on cells, extrapolated to none"
 
@@ -99,25 +108,41 @@ def _node_rows(nodes: np.ndarray) -> list[Row]:
     middle = (nodes[:, 0] > 0.19) & (nodes[:, 0] < 5.1)
     rows = [_worst(name, off[middle, i], nodes[middle], "a/b 0.2 to 5", BOUNDS[name]) for i, name in enumerate(NAMES)]
     if not middle.all():
-        rows += [_worst(name, off[~middle, i], nodes[~middle], "a/b 0.1 and 10", BOUNDS[name] * (1 + (name == "C33")))
-                 for i, name in enumerate(NAMES)]  # fmt: skip
+        rows += [
+            _worst(name, off[~middle, i], nodes[~middle], "a/b 0.1 and 10", BOUNDS[name] * (1 + (name == "C33")))
+            for i, name in enumerate(NAMES)
+        ]
     return rows
 
 
 def _worst(name: str, off: np.ndarray, nodes: np.ndarray, where: str, bound: float) -> Row:
     ratio, nu = nodes[int(off.argmax()), :2]
-    return at_most(f"contact_coefficients.{name}.{where.split()[1]}.{where.split()[-1]}", SYSTEM,
-                   f"{name} of the published table against the exact theory, {where}: worst of {len(off)}, at "
-                   f"{ratio:.4g}, nu {nu:g}", float(off.max()), "", bound, WHY, "published")  # fmt: skip
+    return at_most(
+        f"contact_coefficients.{name}.{where.split()[1]}.{where.split()[-1]}",
+        SYSTEM,
+        f"{name} of the published table against the exact theory, {where}: worst of {len(off)}, at "
+        f"{ratio:.4g}, nu {nu:g}",
+        float(off.max()),
+        "",
+        bound,
+        WHY,
+        "published",
+    )
 
 
 def _misprint(nodes: np.ndarray) -> Row:
     """What the same comparison says of the misprint."""
     node = nodes[(np.abs(nodes[:, 0] - 0.8) < 1e-9) & (nodes[:, 1] == 0.25)][0]
     off = abs(MISPRINT / node[4] - 1.0)
-    return behaves("contact_coefficients.misprint", SYSTEM, f"C23 = {MISPRINT} at a/b = 0.8, nu = 1/4, a misprint that "
-                   f"is about, off by {off:.1%}", "found" if off > BOUNDS["C23"] else "passed", "found",
-                   "a table that no one computes again keeps its misprints", "native")  # fmt: skip
+    return behaves(
+        "contact_coefficients.misprint",
+        SYSTEM,
+        f"C23 = {MISPRINT} at a/b = 0.8, nu = 1/4, a misprint that is about, off by {off:.1%}",
+        "found" if off > BOUNDS["C23"] else "passed",
+        "found",
+        "a table that no one computes again keeps its misprints",
+        "native",
+    )
 
 
 def _between() -> list[tuple[float, float]]:
@@ -135,10 +160,20 @@ def _between_rows(between: np.ndarray, nodes: np.ndarray) -> list[Row]:
     off = np.abs(deviation(between) - np.concatenate((along_ratio, along_nu)))
     spans = {"ratios": slice(0, count), "nu": slice(count, None)}
     why = "1 % is asked; the deviation of the nodes on both sides is taken off"
-    return [at_most(f"contact_coefficients.between.{span}.{name}", SYSTEM,
-                    f"{name} half-way between tabulated {span}: error of the interpolation, worst",
-                    float(off[part, i].max()), "", 0.01, why, "native")
-            for span, part in spans.items() for i, name in enumerate(NAMES)]  # fmt: skip
+    return [
+        at_most(
+            f"contact_coefficients.between.{span}.{name}",
+            SYSTEM,
+            f"{name} half-way between tabulated {span}: error of the interpolation, worst",
+            float(off[part, i].max()),
+            "",
+            0.01,
+            why,
+            "native",
+        )
+        for span, part in spans.items()
+        for i, name in enumerate(NAMES)
+    ]
 
 
 def _beyond_rows(beyond: np.ndarray) -> list[Row]:
@@ -146,13 +181,27 @@ def _beyond_rows(beyond: np.ndarray) -> list[Row]:
     off = np.abs(deviation(beyond))
     long = beyond[:, 0] > 1.0
     asymptotes, own = "Kalker's asymptotes, led on from the table", "nodes by the same theory; 30 lies between them"
-    parts = [(f"beyond.{name}", f"{name} at a/b {_span(beyond)}", off[:, i], 0.03, asymptotes)
-             for i, name in enumerate(NAMES[:3])]  # fmt: skip
-    parts += [("beyond.C33", f"C33 at a/b {_span(beyond[~long])}", off[~long, 3], 0.03, asymptotes),
-              ("beyond.C33.long", f"C33 at a/b {_span(beyond[long])}", off[long, 3], 0.1, own)]  # fmt: skip
-    return [at_most(f"contact_coefficients.{place}", SYSTEM, f"{what} against the exact theory, worst",
-                    float(values.max()), "", bound, why, "native")
-            for place, what, values, bound, why in parts]  # fmt: skip
+    parts = [
+        (f"beyond.{name}", f"{name} at a/b {_span(beyond)}", off[:, i], 0.03, asymptotes)
+        for i, name in enumerate(NAMES[:3])
+    ]
+    parts += [
+        ("beyond.C33", f"C33 at a/b {_span(beyond[~long])}", off[~long, 3], 0.03, asymptotes),
+        ("beyond.C33.long", f"C33 at a/b {_span(beyond[long])}", off[long, 3], 0.1, own),
+    ]
+    return [
+        at_most(
+            f"contact_coefficients.{place}",
+            SYSTEM,
+            f"{what} against the exact theory, worst",
+            float(values.max()),
+            "",
+            bound,
+            why,
+            "native",
+        )
+        for place, what, values, bound, why in parts
+    ]
 
 
 def _span(rows: np.ndarray) -> str:
@@ -164,11 +213,14 @@ def tables(data: dict[str, Any]) -> list[Table]:
     """Deviation of the table from the exact theory, node by node at nu = 1/4."""
     nodes = np.array(data["nodes"])
     some = nodes[nodes[:, 1] == 0.25]
-    rows = tuple((f"{node[0]:.4g}", *(f"{value:.4g} ({100 * part:+.2f} %)"
-                                      for value, part in zip(node[2:], parts, strict=True)))
-                 for node, parts in zip(some, deviation(some), strict=True))  # fmt: skip
-    note = ("Coefficients of the exact theory, nu = 1/4, and how far the published table is above them. C33 of the "
-            "table was recalled, not read.")  # fmt: skip
+    rows = tuple(
+        (f"{node[0]:.4g}", *(f"{value:.4g} ({100 * part:+.2f} %)" for value, part in zip(node[2:], parts, strict=True)))
+        for node, parts in zip(some, deviation(some), strict=True)
+    )
+    note = (
+        "Coefficients of the exact theory, nu = 1/4, and how far the published table is above them. C33 of the "
+        "table was recalled, not read."
+    )
     return [Table("Kalker's coefficients by the exact theory", note, ("a/b", *NAMES), rows)]
 
 
@@ -190,7 +242,16 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     for axes in (left, right):
         axes.axvspan(0.1, 10.0, color="0.9", zorder=0, label="table")
         axes.legend(loc="upper center", ncols=3, fontsize=8)
-    figure.suptitle("Kalker's table holds against the exact theory, and so does what leads on beyond it", x=0.01,
-                    ha="left", fontweight="bold")  # fmt: skip
-    return [("Creepage and spin coefficients; outside the grey range asymptotes take the table's place, for C33 of "
-             "long patches nodes of the exact theory.", figure)]
+    figure.suptitle(
+        "Kalker's table holds against the exact theory, and so does what leads on beyond it",
+        x=0.01,
+        ha="left",
+        fontweight="bold",
+    )
+    return [
+        (
+            "Creepage and spin coefficients; outside the grey range asymptotes take the table's place, for C33 of "
+            "long patches nodes of the exact theory.",
+            figure,
+        )
+    ]

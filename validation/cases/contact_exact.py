@@ -46,8 +46,14 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     quick: two cases up to 32 cells instead of all up to 80, every fourth contact of the sample by half the cells.
     """
     refined = _refined((8, 16, 32) if quick else (10, 20, 40, 80), ("x", "spin") if quick else tuple(CASES))
-    rows = [*_hertz_rows(), *_strip_rows(20 if quick else 80), *_shift_rows(), *_sliding_rows(), *_symmetry_rows(),
-            *_refinement_rows(refined)]  # fmt: skip
+    rows = [
+        *_hertz_rows(),
+        *_strip_rows(20 if quick else 80),
+        *_shift_rows(),
+        *_sliding_rows(),
+        *_symmetry_rows(),
+        *_refinement_rows(refined),
+    ]
     sample, sample_rows = _sample(quick)
     rows += [] if quick else [_converged_row()]
     return rows + sample_rows, {"refined": refined, "sample": sample, "strip": _strip(40, 0.5)[:2]}
@@ -79,11 +85,25 @@ def _hertz_rows() -> list[Row]:
             _row(f"{name}.approach", f"{where}: approach", abs(narrow[0]), 2e-4, "of order 2"),
             _row(f"{name}.pressure", f"{where}: greatest pressure", abs(narrow[1]), 4e-4, "of order 2"),
             _row(f"{name}.area", f"{where}: area", abs(narrow[2]), 0.02, "to a part of the cells along its edge"),
-            within(f"contact_exact.{name}.order", SYSTEM, "order of the greatest pressure, 21 to 63 cells",
-                   float(order[1]), "", 2.0, 0.4, "collocation at the middle of cells", "closed form"),
-            _row(f"{name}.residual", f"{where}: contact conditions unmet, by the displacement",
-                 max(coarse.residual, fine.residual), 1e-9, "the proof of the solution"),
-        ]  # fmt: skip
+            within(
+                f"contact_exact.{name}.order",
+                SYSTEM,
+                "order of the greatest pressure, 21 to 63 cells",
+                float(order[1]),
+                "",
+                2.0,
+                0.4,
+                "collocation at the middle of cells",
+                "closed form",
+            ),
+            _row(
+                f"{name}.residual",
+                f"{where}: contact conditions unmet, by the displacement",
+                max(coarse.residual, fine.residual),
+                1e-9,
+                "the proof of the solution",
+            ),
+        ]
     return rows
 
 
@@ -112,9 +132,16 @@ def _strip(cells: int, share: float) -> tuple[list[float], list[float], float]:
 
 def _strip_rows(cells: int) -> list[Row]:
     why = "first order in the cells: the leading edge of the zone that sticks; and the ellipse is no cylinder by 1e-3"
-    return [_row(f"carter.{share:g}", f"Carter's cylinder at {share:g} of the creepage of sliding, {cells} cells: "
-                 "force by mu N", abs(_strip(cells, share)[2]), 0.2 / cells, why)
-            for share in (0.2, 0.5, 0.8)]  # fmt: skip
+    return [
+        _row(
+            f"carter.{share:g}",
+            f"Carter's cylinder at {share:g} of the creepage of sliding, {cells} cells: force by mu N",
+            abs(_strip(cells, share)[2]),
+            0.2 / cells,
+            why,
+        )
+        for share in (0.2, 0.5, 0.8)
+    ]
 
 
 def shift(share: float, nu: float, cells: int) -> RollingSolution:
@@ -127,8 +154,16 @@ def shift(share: float, nu: float, cells: int) -> RollingSolution:
 
 def _shift_rows() -> list[Row]:
     why = "exact for nu = 0 (Johnson, Contact Mechanics, 1985, section 7.2); the cells err by 4e-4"
-    return [_row(f"cattaneo.{share:g}", f"Cattaneo and Mindlin's shift of a ball, {share:g} of sliding: force by mu N",
-                 abs(shift(share, 0.0, 40).fx / LIMIT + share), 1e-3, why) for share in (0.3, 0.8)]  # fmt: skip
+    return [
+        _row(
+            f"cattaneo.{share:g}",
+            f"Cattaneo and Mindlin's shift of a ball, {share:g} of sliding: force by mu N",
+            abs(shift(share, 0.0, 40).fx / LIMIT + share),
+            1e-3,
+            why,
+        )
+        for share in (0.3, 0.8)
+    ]
 
 
 def roll(name: str, cells: int, sign: float = 1.0, mirrored: float = 1.0) -> np.ndarray:
@@ -148,8 +183,15 @@ def _sliding_rows() -> list[Row]:
     for angle in (0.0, 0.7, 2.0):
         found = solve_rolling(pressed, MU, np.cos(angle), np.sin(angle), 0.0, PAIR)
         gap = np.hypot(found.fx + LIMIT * np.cos(angle), found.fy + LIMIT * np.sin(angle)) / LIMIT
-        rows.append(_row(f"sliding.{angle:g}", f"sliding at creepage 1, {angle:g} rad from x: force beside mu N "
-                         "against the creepage, by mu N", float(gap), 2.6e-3, "half of 0.3 degrees"))  # fmt: skip
+        rows.append(
+            _row(
+                f"sliding.{angle:g}",
+                f"sliding at creepage 1, {angle:g} rad from x: force beside mu N against the creepage, by mu N",
+                float(gap),
+                2.6e-3,
+                "half of 0.3 degrees",
+            )
+        )
     most = np.hypot(found.fx, found.fy) / LIMIT - 1.0
     return [*rows, _row("sliding.most", "force above mu N, by mu N", max(float(most), 0.0), 1e-12, "Coulomb")]
 
@@ -158,9 +200,16 @@ def _symmetry_rows() -> list[Row]:
     """Two runs that must agree but for what the residual leaves."""
     name, cells = "x, y against spin", 20
     there, back, mirror = roll(name, cells), roll(name, cells, -1.0), roll(name, cells, 1.0, -1.0)
-    return [_row("reversed", "F(-creepage) + F(creepage), by mu N", float(np.abs(there + back).max()), 1e-7, "odd"),
-            _row("mirrored", "forces beside those of the mirror image in y, by mu N",
-                 float(np.abs(there - mirror * [1, -1, -1]).max()), 1e-7, "no side is preferred")]  # fmt: skip
+    return [
+        _row("reversed", "F(-creepage) + F(creepage), by mu N", float(np.abs(there + back).max()), 1e-7, "odd"),
+        _row(
+            "mirrored",
+            "forces beside those of the mirror image in y, by mu N",
+            float(np.abs(there - mirror * [1, -1, -1]).max()),
+            1e-7,
+            "no side is preferred",
+        ),
+    ]
 
 
 def _refined(grids: tuple[int, ...], names: tuple[str, ...]) -> dict[str, list[list[float]]]:
@@ -175,14 +224,33 @@ def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
         left = 2.0 * np.linalg.norm(np.diff(np.array(values)[:, 1:3], axis=0), axis=1)
         cells = int(values[-2][0])
         bound = SHARE * 40 / cells
-        rows.append(_row(f"refined.{name.replace(', ', '.').replace(' ', '_')}", f"rolling, {name}: error of {cells} "
-                         "cells along each axis by mu N", float(left[-1]), bound, "as its documentation states",
-                         side="none"))  # fmt: skip
+        rows.append(
+            _row(
+                f"refined.{name.replace(', ', '.').replace(' ', '_')}",
+                f"rolling, {name}: error of {cells} cells along each axis by mu N",
+                float(left[-1]),
+                bound,
+                "as its documentation states",
+                side="none",
+            )
+        )
     total = np.array([np.diff(np.array(v)[:, 1:3], axis=0) for v in refined.values()])
     changes = np.linalg.norm(total, axis=2).mean(axis=0)
     order = float(np.log2(changes[0] / changes[-1]) / (len(changes) - 1))
-    return [*rows, within("contact_exact.order", SYSTEM, "order in the cells of the rolling forces, mean of the cases",
-                          order, "", 1.5, 0.6, "2 where all slips, 1 where much sticks", "none")]  # fmt: skip
+    return [
+        *rows,
+        within(
+            "contact_exact.order",
+            SYSTEM,
+            "order in the cells of the rolling forces, mean of the cases",
+            order,
+            "",
+            1.5,
+            0.6,
+            "2 where all slips, 1 where much sticks",
+            "none",
+        ),
+    ]
 
 
 def drawn_case(rng: np.random.Generator) -> tuple[Case, int]:
@@ -201,8 +269,15 @@ def _converged_row() -> Row:
             solve_rolling(hertzian(case.a, case.b, LOAD, cells), MU, *case.motion, case.pair)
         except RunFailed:
             failed += 1
-    return _row("converged", f"{DRAWN} contacts drawn at random, a/b 0.2 to 5, with spin, 60 to 120 cells along each "
-                "axis: how many the solver gave up", float(failed), 0.0, "none is asked for", side="none")  # fmt: skip
+    return _row(
+        "converged",
+        f"{DRAWN} contacts drawn at random, a/b 0.2 to 5, with spin, 60 to 120 cells along each "
+        "axis: how many the solver gave up",
+        float(failed),
+        0.0,
+        "none is asked for",
+        side="none",
+    )
 
 
 def _sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
@@ -215,9 +290,17 @@ def _sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
     table = list(csv.DictReader(line for line in lines if not line.startswith("#")))[:: 4 if quick else 1]
     found = [_beside(row, 20 if quick else 40) for row in table]
     force, moment = (max(part[i] for part in found) for i in (2, 3))
-    return found, [_row("sample", words, force, 0.01, "its own error and ours", side="native"),
-                   _row("sample.moment", words.replace("forces", "moments").replace("mu N", "mu N sqrt(ab)"), moment,
-                        0.01, "its own error and ours", side="native")]  # fmt: skip
+    return found, [
+        _row("sample", words, force, 0.01, "its own error and ours", side="native"),
+        _row(
+            "sample.moment",
+            words.replace("forces", "moments").replace("mu N", "mu N sqrt(ab)"),
+            moment,
+            0.01,
+            "its own error and ours",
+            side="native",
+        ),
+    ]
 
 
 def _beside(row: dict[str, str], cells: int) -> list[Any]:
@@ -225,8 +308,14 @@ def _beside(row: dict[str, str], cells: int) -> list[Any]:
     value = {name: float(text) for name, text in row.items() if name != "kind"}
     a, b, nu = value["a_mm"] / 1e3, value["b_mm"] / 1e3, value["nu"]
     body = Material(E=2e6 * value["G_MPa"] * (1 + nu), nu=nu)
-    found = solve_rolling(hertzian(a, b, value["FN_N"], cells), value["mu"], value["xi_x"], value["xi_y"],
-                          value["phi_rad_per_mm"] * 1e3, Pair(body, body))  # fmt: skip
+    found = solve_rolling(
+        hertzian(a, b, value["FN_N"], cells),
+        value["mu"],
+        value["xi_x"],
+        value["xi_y"],
+        value["phi_rad_per_mm"] * 1e3,
+        Pair(body, body),
+    )
     limit = value["mu"] * value["FN_N"]
     force = np.hypot(found.fx - value["Fx_N"], found.fy - value["Fy_N"]) / limit
     moment = abs(found.mz - value["Mz_Nmm"] / 1e3) / (limit * (a * b) ** 0.5)
@@ -236,15 +325,31 @@ def _beside(row: dict[str, str], cells: int) -> list[Any]:
 def tables(data: dict[str, Any]) -> list[Table]:
     """Forces over grids, and the sample."""
     grids = [f"{int(row[0])} cells" for row in next(iter(data["refined"].values()))]
-    rows = tuple((name, *(f"{100 * fx:z.2f}, {100 * fy:z.2f}" for _, fx, fy, _ in values))
-                 for name, values in data["refined"].items())  # fmt: skip
-    found = [Table("Refinement of the exact rolling problem", "Fx, Fy in % of mu N; cells along each axis.",
-                   ("case", *grids), rows)]  # fmt: skip
+    rows = tuple(
+        (name, *(f"{100 * fx:z.2f}, {100 * fy:z.2f}" for _, fx, fy, _ in values))
+        for name, values in data["refined"].items()
+    )
+    found = [
+        Table(
+            "Refinement of the exact rolling problem",
+            "Fx, Fy in % of mu N; cells along each axis.",
+            ("case", *grids),
+            rows,
+        )
+    ]
     if data["sample"]:
-        rows = tuple((f"{ratio:g}", kind, f"{100 * force:.2f}", f"{100 * moment:.2f}")
-                     for kind, ratio, force, moment in data["sample"])  # fmt: skip
-        found.append(Table("The exact theory beside CONTACT", "Differences in % of mu N and of mu N sqrt(ab).",
-                           ("a/b", "kind", "force", "moment"), rows))  # fmt: skip
+        rows = tuple(
+            (f"{ratio:g}", kind, f"{100 * force:.2f}", f"{100 * moment:.2f}")
+            for kind, ratio, force, moment in data["sample"]
+        )
+        found.append(
+            Table(
+                "The exact theory beside CONTACT",
+                "Differences in % of mu N and of mu N sqrt(ab).",
+                ("a/b", "kind", "force", "moment"),
+                rows,
+            )
+        )
     return found
 
 
@@ -271,5 +376,10 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     right.set_yticks([0.01, 0.1, 1], ["0.01", "0.1", "1"])
     right.set_title("Rolling forces settle with the cells")
     right.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return [("Traction of a rolling cylinder beside Carter's closed form, and how much the forces change where cells "
-             "are halved.", figure)]  # fmt: skip
+    return [
+        (
+            "Traction of a rolling cylinder beside Carter's closed form, and how much the forces change where cells "
+            "are halved.",
+            figure,
+        )
+    ]

@@ -25,8 +25,10 @@ NEAR_CIRCLE = tuple(1.0 - 10.0**-k for k in range(1, 16))
 RANGE = tuple(float(g) for g in 10.0 ** np.linspace(-6, 0, 49))
 """Ratios of axes: 1e-4 and a curvature ratio of 1e-4 are inside."""
 NAMES = {"long": "longer semi-axis", "short": "shorter semi-axis", "p0": "largest pressure"}
-WHY = ("K and E by the arithmetic-geometric mean in 60 decimal digits, which leaves 30 where K - E cancels: no digit "
-       "and no integral shared with the code")  # fmt: skip
+WHY = (
+    "K and E by the arithmetic-geometric mean in 60 decimal digits, which leaves 30 where K - E cancels: no digit "
+    "and no integral shared with the code"
+)
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -34,9 +36,19 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     the same in quick.
     """
     errors = _errors((*RANGE, *NEAR_CIRCLE))
-    rows = [at_most(f"contact_hertz.{name}", SYSTEM, f"{NAMES.get(name, name)}, axis ratios 1e-6 "
-                    "to 1e6: worst relative error", max(found), "", BOUND, WHY, "closed form")
-            for name, found in errors.items()]  # fmt: skip
+    rows = [
+        at_most(
+            f"contact_hertz.{name}",
+            SYSTEM,
+            f"{NAMES.get(name, name)}, axis ratios 1e-6 to 1e6: worst relative error",
+            max(found),
+            "",
+            BOUND,
+            WHY,
+            "closed form",
+        )
+        for name, found in errors.items()
+    ]
     return rows + _published() + _behaviour(), {"ratio": [*RANGE, *NEAR_CIRCLE], "errors": errors}
 
 
@@ -50,8 +62,15 @@ def ellipse(ratio: float) -> dict[str, Decimal]:
         else:
             scale = PRESSURE * g * g / (modulus * (1 - g * g) * SHORT)
             flat, steep = scale * (k - e), scale * (e / (g * g) - k)
-        return {"short": SHORT, "long": SHORT / g, "p0": PRESSURE, "approach": PRESSURE * SHORT * k / modulus,
-                "flat": flat, "steep": steep, "load": 2 * _pi() * PRESSURE * SHORT**2 / (3 * g)}  # fmt: skip
+        return {
+            "short": SHORT,
+            "long": SHORT / g,
+            "p0": PRESSURE,
+            "approach": PRESSURE * SHORT * k / modulus,
+            "flat": flat,
+            "steep": steep,
+            "load": 2 * _pi() * PRESSURE * SHORT**2 / (3 * g),
+        }
 
 
 def _complete(g: Decimal) -> tuple[Decimal, Decimal]:
@@ -76,14 +95,23 @@ def _pi() -> Decimal:
 def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
     """Worst relative error of every quantity at each ratio, along x and along y, by load and by approach."""
     truth = [ellipse(g) for g in ratios]
-    flat, steep, load, approach = (np.array([float(one[name]) for one in truth])
-                                   for name in ("flat", "steep", "load", "approach"))  # fmt: skip
-    found = [by_load(flat, steep, load, PAIR), by_approach(flat, steep, approach, PAIR),
-             _turned(by_load(steep, flat, load, PAIR)), _turned(by_approach(steep, flat, approach, PAIR))]  # fmt: skip
+    flat, steep, load, approach = (
+        np.array([float(one[name]) for one in truth]) for name in ("flat", "steep", "load", "approach")
+    )
+    found = [
+        by_load(flat, steep, load, PAIR),
+        by_approach(flat, steep, approach, PAIR),
+        _turned(by_load(steep, flat, load, PAIR)),
+        _turned(by_approach(steep, flat, approach, PAIR)),
+    ]
     named = {"a": "long", "b": "short", "p0": "p0", "approach": "approach", "load": "load"}
-    return {name: [max(float(abs(Decimal(float(getattr(one, field)[i])) / exact[name] - 1)) for one in found)
-                   for i, exact in enumerate(truth)]
-            for field, name in named.items()}  # fmt: skip
+    return {
+        name: [
+            max(float(abs(Decimal(float(getattr(one, field)[i])) / exact[name] - 1)) for one in found)
+            for i, exact in enumerate(truth)
+        ]
+        for field, name in named.items()
+    }
 
 
 def _turned(found: Hertz) -> Hertz:
@@ -96,13 +124,40 @@ def _published() -> list[Row]:
     found, eight = (by_load(1 / 0.92, 1 / 0.6, load, Pair()) for load in (1e5, 8e5))
     why = "CONTACT, half-space solved on cells of 0.25 mm, that is 1/29 of an axis"
     return [
-        within("contact_hertz.contact.p0", SYSTEM, "largest pressure of a wheel on a rail, 100 kN", float(found.p0),
-               "Pa", 1.22674e9, 1e6, why, "native"),
-        within("contact_hertz.contact.approach", SYSTEM, "approach of the same", float(found.approach), "m",
-               1.04996e-4, 1e-8, why, "native"),
-        within("contact_hertz.scaling", SYSTEM, "axes at eight times the load, by the axes", float(eight.a / found.a),
-               "", 2.0, 1e-14, "axes go with the cube root of the load", "closed form"),
-    ]  # fmt: skip
+        within(
+            "contact_hertz.contact.p0",
+            SYSTEM,
+            "largest pressure of a wheel on a rail, 100 kN",
+            float(found.p0),
+            "Pa",
+            1.22674e9,
+            1e6,
+            why,
+            "native",
+        ),
+        within(
+            "contact_hertz.contact.approach",
+            SYSTEM,
+            "approach of the same",
+            float(found.approach),
+            "m",
+            1.04996e-4,
+            1e-8,
+            why,
+            "native",
+        ),
+        within(
+            "contact_hertz.scaling",
+            SYSTEM,
+            "axes at eight times the load, by the axes",
+            float(eight.a / found.a),
+            "",
+            2.0,
+            1e-14,
+            "axes go with the cube root of the load",
+            "closed form",
+        ),
+    ]
 
 
 def _behaviour() -> list[Row]:
@@ -111,18 +166,32 @@ def _behaviour() -> list[Row]:
     exact = all(value == 0.0 for one in nothing for value in (one.a, one.b, one.p0, one.approach, one.load))
     why = "a silent number would be wrong"
     asked: dict[str, Callable[[], object]] = {
-        "flat": lambda: by_load(0.0, 1.0, LOAD, PAIR), "concave": lambda: by_load(1.0, -0.1, LOAD, PAIR),
+        "flat": lambda: by_load(0.0, 1.0, LOAD, PAIR),
+        "concave": lambda: by_load(1.0, -0.1, LOAD, PAIR),
         "not finite": lambda: by_load(1.0, np.nan, LOAD, PAIR),
         "radius in mm": lambda: by_load(1 / 920, 1 / 600, LOAD, PAIR),
         "modulus in MPa": lambda: Material(E=2.1e5, nu=0.28),
         "approach in mm": lambda: by_approach(1.0, 1.0, 0.1, PAIR),
         "shapes": lambda: by_load([1.0, 2.0], [1.0, 2.0, 3.0], LOAD, PAIR),
         "friction of steel on aluminium": PAIR.require_likeness,
-    }  # fmt: skip
-    rows = [behaves(f"contact_hertz.refused.{name.replace(' ', '_')}", SYSTEM, f"refused: {name}", _outcome(ask),
-                    "refused", why) for name, ask in asked.items()]  # fmt: skip
-    return [behaves("contact_hertz.nothing", SYSTEM, "no load, negative load, a gap", "zero" if exact else "not zero",
-                    "zero", "nothing touches: exactly zero, no number near it"), *rows]  # fmt: skip
+    }
+    rows = [
+        behaves(
+            f"contact_hertz.refused.{name.replace(' ', '_')}", SYSTEM, f"refused: {name}", _outcome(ask), "refused", why
+        )
+        for name, ask in asked.items()
+    ]
+    return [
+        behaves(
+            "contact_hertz.nothing",
+            SYSTEM,
+            "no load, negative load, a gap",
+            "zero" if exact else "not zero",
+            "zero",
+            "nothing touches: exactly zero, no number near it",
+        ),
+        *rows,
+    ]
 
 
 def _outcome(ask: Callable[[], object]) -> str:
@@ -137,11 +206,17 @@ def tables(data: dict[str, Any]) -> list[Table]:
     """Worst errors by range of the ratio of axes."""
     ratio = np.array(data["ratio"])
     ranges = {"1e-6 to 1e-4": (0.0, 1e-4), "1e-4 to 0.1": (1e-4, 0.1), "0.1 to 0.9": (0.1, 0.9), "0.9 to 1": (0.9, 1.0)}
-    rows = tuple((title, *(f"{np.array(errors)[(ratio > low) & (ratio <= high)].max():.1e}"
-                           for errors in data["errors"].values()))
-                 for title, (low, high) in ranges.items())  # fmt: skip
-    note = (f"Worst relative error against {DIGITS} digits, driven by load and by approach, the long axis along x and "
-            "along y.")  # fmt: skip
+    rows = tuple(
+        (
+            title,
+            *(f"{np.array(errors)[(ratio > low) & (ratio <= high)].max():.1e}" for errors in data["errors"].values()),
+        )
+        for title, (low, high) in ranges.items()
+    )
+    note = (
+        f"Worst relative error against {DIGITS} digits, driven by load and by approach, the long axis along x and "
+        "along y."
+    )
     return [Table("Hertz: relative error by the ratio of axes", note, ("axes", *data["errors"]), rows)]
 
 
@@ -162,6 +237,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     right.axhline(BOUND, color="black", linestyle=":", label="allowed")
     right.set(title="relative error against 60 digits", xlabel="short axis / long axis", ylim=(3e-18, 1e-9))
     right.legend(loc="center", ncols=3, fontsize=8)
-    figure.suptitle("Hertzian contact loses no digits from a thin line to the circle", x=0.01, ha="left",
-                    fontweight="bold")  # fmt: skip
+    figure.suptitle(
+        "Hertzian contact loses no digits from a thin line to the circle", x=0.01, ha="left", fontweight="bold"
+    )
     return [("Semi-axes of Hertz's ellipse and their error.", figure)]

@@ -24,8 +24,14 @@ from validation.timing import paired_ratio
 
 TITLE = "Stated errors of rolling contact"
 SYSTEM: System = "contact"
-REPEATED = ((1.0, "x", 0.5), (1.0, "spin", 1.2), (0.5, "x+y", 0.8), (2.0, "y+spin", 0.8), (5.0, "x-y+spin", 0.5),
-            (0.2, "y-spin", 1.2))  # fmt: skip
+REPEATED = (
+    (1.0, "x", 0.5),
+    (1.0, "spin", 1.2),
+    (0.5, "x+y", 0.8),
+    (2.0, "y+spin", 0.8),
+    (5.0, "x-y+spin", 0.5),
+    (0.2, "y-spin", 1.2),
+)
 """Cases of the set that are computed anew; a quick run takes the first two on coarser grids."""
 NETS = (7, 11, 21, 41)
 """Cells per strip whose stated errors are judged; a quick run takes 21 alone."""
@@ -39,8 +45,10 @@ MOMENTS = {"intermediate": (0.024, 0.06), "elliptic": (0.013, 0.045)}
 """Mean error of the moment by mu N sqrt(ab) that is asked for, and the error that 95 % are to keep to."""
 CONVERGED = 161
 """Cells that are taken for the truth about fewer."""
-SLENDER = ("reached for a/b 0.2 to 5 at every Poisson's ratio, not beyond: by mu N and the longer semi-axis the error "
-           "is alike on slender ellipses, and that semi-axis is up to 3.2 sqrt(ab)")
+SLENDER = (
+    "reached for a/b 0.2 to 5 at every Poisson's ratio, not beyond: by mu N and the longer semi-axis the error "
+    "is alike on slender ellipses, and that semi-axis is up to 3.2 sqrt(ab)"
+)
 """Why the moments of the wide contacts by the elliptic bound miss their aim."""
 ROWS, SEED = 100_000, 41
 
@@ -64,9 +72,18 @@ def _reference_rows(cases: list[Case], quick: bool) -> list[Row]:
     for key in REPEATED[:2] if quick else REPEATED:
         now = exact(known[key], (20,) if quick else (40,))
         found.append(float(np.linalg.norm(now.force - known[key].force)))
-    return [at_most("contact_price.reference", SYSTEM, f"exact forces computed anew against those kept, {len(found)} "
-                    "cases, largest difference by mu N", max(found), "", REFERENCE[quick],
-                    "what the cells leave uncertain after their first order is taken out", "none")]  # fmt: skip
+    return [
+        at_most(
+            "contact_price.reference",
+            SYSTEM,
+            f"exact forces computed anew against those kept, {len(found)} cases, largest difference by mu N",
+            max(found),
+            "",
+            REFERENCE[quick],
+            "what the cells leave uncertain after their first order is taken out",
+            "none",
+        )
+    ]
 
 
 def _band_rows(cases: list[Case], quick: bool) -> list[Row]:
@@ -81,10 +98,20 @@ def _band_rows(cases: list[Case], quick: bool) -> list[Row]:
             (drawn.of(against), "against.", "drawn with lateral creepage against spin", BEYOND),
         ):
             for what, kind, within in zip(("force", "moment"), ("band", "moment"), kept(name, some), strict=True):
-                rows.append(at_most(f"contact_price.{place}{kind}.{name.replace(' ', '-')}", SYSTEM, f"{name}: share "
-                                    f"of {some.error.size} contacts {which} beyond the band of error that is stated "
-                                    f"with the {what}", 1 - within, "", most, f"the band is meant to hold {SHARE:.0%}",
-                                    "native"))  # fmt: skip
+                rows.append(
+                    at_most(
+                        f"contact_price.{place}{kind}.{name.replace(' ', '-')}",
+                        SYSTEM,
+                        f"{name}: share "
+                        f"of {some.error.size} contacts {which} beyond the band of error that is stated "
+                        f"with the {what}",
+                        1 - within,
+                        "",
+                        most,
+                        f"the band is meant to hold {SHARE:.0%}",
+                        "native",
+                    )
+                )
     return rows
 
 
@@ -98,28 +125,50 @@ def _total_rows(cases: list[Case]) -> list[Row]:
         off.append((np.linalg.norm(found.force - limit * case.force), abs(found.mz - moment)))
         stated.append((error.total, error.moment + ROUNDING * limit))
     beyond = np.array(off) > np.array(stated)
-    return [at_most(f"contact_price.total.{what}.{nu:g}", SYSTEM, f"share of {np.count_nonzero(ratios == nu)} unseen "
-                    f"contacts of a/b 0.1 to 10 and Poisson's ratio {nu:g} whose {what} is off by more than is stated",
-                    float(beyond[ratios == nu, k].mean()), "", 1 - SHARE, "what users read: 95 % are covered", "native")
-            for k, what in enumerate(("force", "moment")) for nu in POISSON]  # fmt: skip
+    return [
+        at_most(
+            f"contact_price.total.{what}.{nu:g}",
+            SYSTEM,
+            f"share of {np.count_nonzero(ratios == nu)} unseen "
+            f"contacts of a/b 0.1 to 10 and Poisson's ratio {nu:g} whose {what} is off by more than is stated",
+            float(beyond[ratios == nu, k].mean()),
+            "",
+            1 - SHARE,
+            "what users read: 95 % are covered",
+            "native",
+        )
+        for k, what in enumerate(("force", "moment"))
+        for nu in POISSON
+    ]
 
 
 def _moment_rows(cases: list[Case], unseen: list[Case], wide: list[Case]) -> list[Row]:
     """Error of FASTSIM's moment against the exact theory."""
     rows = []
     range_of_set = [case for case in wide if RATIOS[0] <= case.a / case.b <= RATIOS[-1]]
-    sets = {"set": (cases, "the set"), "drawn": (unseen, "the drawn contacts"),
-            "less_wide": (range_of_set, "the wide contacts of a/b 0.2 to 5, Poisson's ratio 0 to 0.5"),
-            "wide": (wide, "the wide contacts, a/b 0.1 to 10, Poisson's ratio 0 to 0.5")}  # fmt: skip
+    sets = {
+        "set": (cases, "the set"),
+        "drawn": (unseen, "the drawn contacts"),
+        "less_wide": (range_of_set, "the wide contacts of a/b 0.2 to 5, Poisson's ratio 0 to 0.5"),
+        "wide": (wide, "the wide contacts, a/b 0.1 to 10, Poisson's ratio 0 to 0.5"),
+    }
     for (bound, (mean, most)), (place, (some, words)) in product(MOMENTS.items(), sets.items()):
         lever = np.array([max(c.a, c.b) / np.sqrt(c.a * c.b) for c in some])
         error = held(f"blended {bound}", some).moment_error * lever
         for what, value, allowed in (("mean", error.mean(), mean), ("95 %", np.quantile(error, 0.95), most)):
-            given = (f"contact_price.mz.{bound}.{place}.{what.split()[0]}", SYSTEM, f"{bound} bound, moment of "
-                     f"{len(some)} contacts: {words}; {what} of the error", float(value), "mu N sqrt(ab)",
-                     allowed)  # fmt: skip
-            rows.append(aim(*given, SLENDER) if (bound, place) == ("elliptic", "wide") else
-                        at_most(*given, "the exact theory, kept", "native"))  # fmt: skip
+            given = (
+                f"contact_price.mz.{bound}.{place}.{what.split()[0]}",
+                SYSTEM,
+                f"{bound} bound, moment of {len(some)} contacts: {words}; {what} of the error",
+                float(value),
+                "mu N sqrt(ab)",
+                allowed,
+            )
+            rows.append(
+                aim(*given, SLENDER)
+                if (bound, place) == ("elliptic", "wide")
+                else at_most(*given, "the exact theory, kept", "native")
+            )
     return rows
 
 
@@ -130,10 +179,20 @@ def _cell_rows(cases: list[Case], quick: bool) -> list[Row]:
         share = _beyond(some, cells, choices)
         name = ".".join([f"{cells}", *choices.values()])
         for what, value in zip(("force", "moment"), share, strict=True):
-            rows.append(at_most(f"contact_price.cells.{what}.{name}", SYSTEM, f"FASTSIM at {cells} cells"
-                                f"{''.join(f', {word}' for word in choices.values())}: share of {len(some)} contacts "
-                                f"whose error of the cells in the {what} is beyond the stated one", value, "",
-                                1 - SHARE, "what users read: 95 % are covered", "native"))  # fmt: skip
+            rows.append(
+                at_most(
+                    f"contact_price.cells.{what}.{name}",
+                    SYSTEM,
+                    f"FASTSIM at {cells} cells"
+                    f"{''.join(f', {word}' for word in choices.values())}: share of {len(some)} contacts "
+                    f"whose error of the cells in the {what} is beyond the stated one",
+                    value,
+                    "",
+                    1 - SHARE,
+                    "what users read: 95 % are covered",
+                    "native",
+                )
+            )
     return rows
 
 
@@ -158,8 +217,17 @@ def _program_rows(found: dict[str, Any]) -> list[Row]:
     why = "the paper's figure is of a computer and a Fortran program of 1983"
     what = "contact and forces by the program of 1983, by the time of the one of 1982"
     ratio, low, high = paired_ratio(t["1983"] + t["press"], t["1982"])
-    return [finding("contact_price.programs.time", SYSTEM, f"{what}, 95 % interval {low:.3g} to {high:.3g}", ratio,
-                    "times", "about 3", why)]  # fmt: skip
+    return [
+        finding(
+            "contact_price.programs.time",
+            SYSTEM,
+            f"{what}, 95 % interval {low:.3g} to {high:.3g}",
+            ratio,
+            "times",
+            "about 3",
+            why,
+        )
+    ]
 
 
 def _table_row(folder: Path) -> Row:
@@ -167,8 +235,14 @@ def _table_row(folder: Path) -> Row:
     rng = np.random.default_rng(SEED)
     low, high = np.array([2.0, 2.0, 1.0, 0.1, -0.5, -0.5, -1.0]), np.array([9.0, 9.0, 150.0, 0.5, 0.5, 0.5, 1.0])
     path, out = folder / "contact_cases.csv", folder / "contact_forces.csv"
-    np.savetxt(path, rng.uniform(low, high, (ROWS, 7)), fmt="%.8g", delimiter=",", comments="",
-               header="a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [%],spin [1/m]")  # fmt: skip
+    np.savetxt(
+        path,
+        rng.uniform(low, high, (ROWS, 7)),
+        fmt="%.8g",
+        delimiter=",",
+        comments="",
+        header="a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [%],spin [1/m]",
+    )
     start = time.perf_counter()
     found = answer(path, out, PAIR, Method())
     seconds = time.perf_counter() - start

@@ -29,8 +29,10 @@ LOAD = 1e4
 """Vertical load of a wheel (N): the benchmark has 20 kN on a wheelset."""
 CELLS = 40
 PAIR = Pair()
-BENCHMARK = ("Manchester contact benchmark, case A (Shackleton and Iwnicki, Vehicle Syst. Dyn. 46, 2008, 129-149), "
-             "S1002 on UIC 60 at 1:40, gauge 1435 mm, back to back 1360 mm, radius 460 mm")  # fmt: skip
+BENCHMARK = (
+    "Manchester contact benchmark, case A (Shackleton and Iwnicki, Vehicle Syst. Dyn. 46, 2008, 129-149), "
+    "S1002 on UIC 60 at 1:40, gauge 1435 mm, back to back 1360 mm, radius 460 mm"
+)
 TWO_PATCHES = {"from": -22.6, "to": -33.4, "peak": 1556.0}
 """Where the benchmark's contact on the right rail jumps at 5 mm (mm), and its peak pressure there (MPa)."""
 LABELS = {"no yaw": "no yaw", "yaw": "yaw of 2.4 mrad per mm of shift"}
@@ -53,9 +55,17 @@ def _at(shift: float, yaw: float, exact: bool) -> dict[str, Any]:
     touches = wheel_on_rail(s1002(), uic60(), lateral_shift=shift * 1e-3, yaw=yaw)
     pressed = press([touch.patch for touch in touches], PAIR, load=LOAD)
     loads = {id(part.patch): part.load for part in pressed.patches}
-    places = [{"rail": 1e3 * touch.rail_y, "wheel": 1e3 * touch.wheel_y, "ahead": 1e3 * touch.x, "gap": 1e6 * touch.gap,
-               "angle": float(np.degrees(-touch.angle)), "load": loads.get(id(touch.patch), 0.0)}
-              for touch in touches]  # fmt: skip
+    places = [
+        {
+            "rail": 1e3 * touch.rail_y,
+            "wheel": 1e3 * touch.wheel_y,
+            "ahead": 1e3 * touch.x,
+            "gap": 1e6 * touch.gap,
+            "angle": float(np.degrees(-touch.angle)),
+            "load": loads.get(id(touch.patch), 0.0),
+        }
+        for touch in touches
+    ]
     found = {"shift": shift, "yaw": yaw, "places": places, "area": 1e6 * pressed.area, "peak": pressed.peak / 1e6}
     heaviest = max(pressed.patches, key=lambda part: part.load)
     return found | {"exact": _exact_peak(heaviest.patch, heaviest.load, heaviest.box) if exact else None}
@@ -77,13 +87,25 @@ def _file_rows() -> list[Row]:
     folder = data_folder()
     if folder is None or not (folder / WHEEL_FILE).is_file():
         reason = "TWINRIG_DATA names no folder with the benchmark's profiles"
-        return [not_run(f"contact_profiles.{name}", SYSTEM, f"built-in {name} against the benchmark's file", reason)
-                for name in ("S1002", "UIC60")]  # fmt: skip
+        return [
+            not_run(f"contact_profiles.{name}", SYSTEM, f"built-in {name} against the benchmark's file", reason)
+            for name in ("S1002", "UIC60")
+        ]
     wheel, rail = read_profile(folder / WHEEL_FILE, "wheel"), read_profile(folder / RAIL_FILE, "rail")
     off = {"S1002": _wheel_off(wheel), "UIC60": _rail_off(rail)}
-    return [at_most(f"contact_profiles.{name}", SYSTEM, f"built-in {name}, largest distance from the benchmark's file",
-                    1e3 * value, "mm", 1e3 * NEAR, "the figure set for the built-in profiles", "published")
-            for name, value in off.items()]  # fmt: skip
+    return [
+        at_most(
+            f"contact_profiles.{name}",
+            SYSTEM,
+            f"built-in {name}, largest distance from the benchmark's file",
+            1e3 * value,
+            "mm",
+            1e3 * NEAR,
+            "the figure set for the built-in profiles",
+            "published",
+        )
+        for name, value in off.items()
+    ]
 
 
 def _wheel_off(wheel: Profile) -> float:
@@ -116,36 +138,104 @@ def _place_rows(cases: list[dict[str, Any]]) -> list[Row]:
     flange = min(case["shift"] for case in cases if _main(case)["angle"] > 45.0)
     at5 = _main(by[5.0])
     return [
-        within("contact_profiles.flange", SYSTEM, "shift from which the flange carries the wheel", flange, "mm", FLANGE,
-               0.25, f"{BENCHMARK}; half of its steps", "published"),
-        within("contact_profiles.jump_from", SYSTEM, "place of contact on the rail at 4.5 mm", _main(by[4.5])["rail"],
-               "mm", TWO_PATCHES["from"], 1.0, f"{BENCHMARK}; where the patch is before it jumps", "published"),
-        within("contact_profiles.jump_to", SYSTEM, "place of contact on the rail at 5 mm", at5["rail"], "mm",
-               TWO_PATCHES["to"], 1.0, f"{BENCHMARK}; a touching point here, the middle of a patch 4 mm wide there",
-               "published"),
-        within("contact_profiles.places", SYSTEM, "places closer than 0.2 mm at 5 mm", float(len(by[5.0]["places"])),
-               "", 2.0, 0.0, "both ends of the jump", "published"),
-    ]  # fmt: skip
+        within(
+            "contact_profiles.flange",
+            SYSTEM,
+            "shift from which the flange carries the wheel",
+            flange,
+            "mm",
+            FLANGE,
+            0.25,
+            f"{BENCHMARK}; half of its steps",
+            "published",
+        ),
+        within(
+            "contact_profiles.jump_from",
+            SYSTEM,
+            "place of contact on the rail at 4.5 mm",
+            _main(by[4.5])["rail"],
+            "mm",
+            TWO_PATCHES["from"],
+            1.0,
+            f"{BENCHMARK}; where the patch is before it jumps",
+            "published",
+        ),
+        within(
+            "contact_profiles.jump_to",
+            SYSTEM,
+            "place of contact on the rail at 5 mm",
+            at5["rail"],
+            "mm",
+            TWO_PATCHES["to"],
+            1.0,
+            f"{BENCHMARK}; a touching point here, the middle of a patch 4 mm wide there",
+            "published",
+        ),
+        within(
+            "contact_profiles.places",
+            SYSTEM,
+            "places closer than 0.2 mm at 5 mm",
+            float(len(by[5.0]["places"])),
+            "",
+            2.0,
+            0.0,
+            "both ends of the jump",
+            "published",
+        ),
+    ]
 
 
 def _benchmark_rows(cases: list[dict[str, Any]]) -> list[Row]:
     by = {case["shift"]: case for case in cases}
-    vertical = max(abs(sum(place["load"] * np.cos(np.radians(place["angle"])) for place in case["places"]) - LOAD)
-                   for case in cases)  # fmt: skip
+    vertical = max(
+        abs(sum(place["load"] * np.cos(np.radians(place["angle"])) for place in case["places"]) - LOAD)
+        for case in cases
+    )
     return [
-        at_most("contact_profiles.load", SYSTEM, "vertical sum of the patches' loads less the wheel's, at every shift",
-                float(vertical), "N", 1e-6, "patches share the load without loss", "none"),
-        finding("contact_profiles.peak", SYSTEM, "peak pressure at 5 mm, exact, of the patch that carries most",
-                by[5.0]["exact"], "MPa", TWO_PATCHES["peak"], BENCHMARK),
-        finding("contact_profiles.flange_peak", SYSTEM, "peak pressure at 6.5 mm, exact", by[FLANGE]["exact"], "MPa",
-                "about 2600", BENCHMARK),
-    ]  # fmt: skip
+        at_most(
+            "contact_profiles.load",
+            SYSTEM,
+            "vertical sum of the patches' loads less the wheel's, at every shift",
+            float(vertical),
+            "N",
+            1e-6,
+            "patches share the load without loss",
+            "none",
+        ),
+        finding(
+            "contact_profiles.peak",
+            SYSTEM,
+            "peak pressure at 5 mm, exact, of the patch that carries most",
+            by[5.0]["exact"],
+            "MPa",
+            TWO_PATCHES["peak"],
+            BENCHMARK,
+        ),
+        finding(
+            "contact_profiles.flange_peak",
+            SYSTEM,
+            "peak pressure at 6.5 mm, exact",
+            by[FLANGE]["exact"],
+            "MPa",
+            "about 2600",
+            BENCHMARK,
+        ),
+    ]
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Every shift: places, loads, pressures."""
-    heads = ("shift [mm]", "yaw [mrad]", "on the rail [mm]", "on the wheel [mm]", "ahead [mm]", "contact angle [deg]",
-             "load [kN]", "peak [MPa]", "exact peak [MPa]")  # fmt: skip
+    heads = (
+        "shift [mm]",
+        "yaw [mrad]",
+        "on the rail [mm]",
+        "on the wheel [mm]",
+        "ahead [mm]",
+        "contact angle [deg]",
+        "load [kN]",
+        "peak [MPa]",
+        "exact peak [MPa]",
+    )
     note = (
         f"{BENCHMARK}; {LOAD / 1e3:g} kN on the right wheel, vertical. A row for every place closer than 0.2 mm; y on "
         "the rail from its highest point, on the wheel from the taping line; pressures of the theory of 1983."
@@ -155,11 +245,20 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
     return [
-        (f"{case['shift']:g}", f"{1e3 * case['yaw']:g}", f"{place['rail']:.2f}", f"{place['wheel']:.2f}",
-         f"{place['ahead']:.2f}", f"{place['angle']:.1f}", f"{place['load'] / 1e3:.2f}", f"{case['peak']:.0f}",
-         f"{case['exact']:.0f}" if case["exact"] is not None else "-")
-        for case in cases for place in case["places"]
-    ]  # fmt: skip
+        (
+            f"{case['shift']:g}",
+            f"{1e3 * case['yaw']:g}",
+            f"{place['rail']:.2f}",
+            f"{place['wheel']:.2f}",
+            f"{place['ahead']:.2f}",
+            f"{place['angle']:.1f}",
+            f"{place['load'] / 1e3:.2f}",
+            f"{case['peak']:.0f}",
+            f"{case['exact']:.0f}" if case["exact"] is not None else "-",
+        )
+        for case in cases
+        for place in case["places"]
+    ]
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
@@ -176,6 +275,8 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         axis.plot(shift[load > 0], rail[load > 0], label=f"in contact, {LABELS[name]}", **style)
     axis.set(xlabel="lateral shift of the wheelset [mm]", ylabel="place of contact on the rail [mm]")
     axis.legend()
-    caption = ("Right wheel S1002 on UIC 60: the contact jumps to the gauge corner at 5 mm, and the flange touches "
-               "from 6.5 mm. Grey: closer than 0.2 mm, but not in contact.")  # fmt: skip
+    caption = (
+        "Right wheel S1002 on UIC 60: the contact jumps to the gauge corner at 5 mm, and the flange touches "
+        "from 6.5 mm. Grey: closer than 0.2 mm, but not in contact."
+    )
     return [(caption, figure)]

@@ -122,8 +122,10 @@ def _against_exact(shape: Shape) -> dict[str, Any]:
 def _approach_of(shape: Shape) -> dict[str, float]:
     """Errors of the approach with a net for each patch and with one for all, as shares."""
     exact = exact_normal(shape, FULL, shape.box or (0.0, 0.0, 0.0, 0.0)).approach
-    return {name: press(shape.distance, PAIR, load=shape.load, options=way).approach / exact - 1.0
-            for name, way in (("each", PLAIN), ("one", WAYS["elliptic, one net"]))}  # fmt: skip
+    return {
+        name: press(shape.distance, PAIR, load=shape.load, options=way).approach / exact - 1.0
+        for name, way in (("each", PLAIN), ("one", WAYS["elliptic, one net"]))
+    }
 
 
 def _placed() -> dict[str, dict[str, float]]:
@@ -182,22 +184,47 @@ def _hertz_rows(hertz: dict[str, dict[str, float]]) -> list[Row]:
     worst = {key: max(abs(case[key]) for case in hertz.values()) for key in ("approach", "paper")}
     why = "the figure set for the theory; the closed form is Hertz's"
     rows = [
-        at_most(f"contact_simplified.hertz.{key}", SYSTEM, f"largest error of the approach, B/A {HERTZ[0]:g} to "
-                f"{HERTZ[-1]:g}, {'pressure to the letter of the paper' if key == 'paper' else 'default'}",
-                100.0 * value, "%", 100.0 * APPROACH, why, "closed form")
+        at_most(
+            f"contact_simplified.hertz.{key}",
+            SYSTEM,
+            f"largest error of the approach, B/A {HERTZ[0]:g} to "
+            f"{HERTZ[-1]:g}, {'pressure to the letter of the paper' if key == 'paper' else 'default'}",
+            100.0 * value,
+            "%",
+            100.0 * APPROACH,
+            why,
+            "closed form",
+        )
         for key, value in worst.items()
-    ]  # fmt: skip
+    ]
     circle = hertz["1"]
-    rows += [at_most(f"contact_simplified.circle.{key}", SYSTEM, f"{key} of a circular contact",
-                     100.0 * abs(circle[key]), "%", 2.0, "with Hertz's profile the theory contains the circle "
-                     "but for its net", "closed form") for key in ("area", "peak")]  # fmt: skip
+    rows += [
+        at_most(
+            f"contact_simplified.circle.{key}",
+            SYSTEM,
+            f"{key} of a circular contact",
+            100.0 * abs(circle[key]),
+            "%",
+            2.0,
+            "with Hertz's profile the theory contains the circle but for its net",
+            "closed form",
+        )
+        for key in ("area", "peak")
+    ]
     return rows
 
 
 def _jump_row(jump: float) -> Row:
-    return at_most("contact_simplified.continuity", SYSTEM, "largest jump of N(a3), lopsided contact", jump, "N", JUMP,
-                   "every step of the sweep is bisected to neighbouring numbers; the figure set for the "
-                   "theory", "none")  # fmt: skip
+    return at_most(
+        "contact_simplified.continuity",
+        SYSTEM,
+        "largest jump of N(a3), lopsided contact",
+        jump,
+        "N",
+        JUMP,
+        "every step of the sweep is bisected to neighbouring numbers; the figure set for the theory",
+        "none",
+    )
 
 
 def _shape_rows(shapes: dict[str, dict[str, Any]]) -> list[Row]:
@@ -205,14 +232,44 @@ def _shape_rows(shapes: dict[str, dict[str, Any]]) -> list[Row]:
     for name, case in shapes.items():
         place = "contact_simplified." + "_".join(re.findall(r"\w+", name))
         best = case["ways"]["elliptic"]
-        rows.append(at_most(f"{place}.approach", SYSTEM, f"error of the approach, {name}",
-                            100.0 * abs(best["approach"]), "%", 100.0 * APPROACH, FIGURE, "native"))  # fmt: skip
+        rows.append(
+            at_most(
+                f"{place}.approach",
+                SYSTEM,
+                f"error of the approach, {name}",
+                100.0 * abs(best["approach"]),
+                "%",
+                100.0 * APPROACH,
+                FIGURE,
+                "native",
+            )
+        )
         for key, what in (("area", "area"), ("peak", "peak pressure")):
-            rows.append(finding(f"{place}.{key}", SYSTEM, f"error of the {what}, {name}", 100.0 * best[key], "%",
-                                0.0, ABOUT, "native"))  # fmt: skip
+            rows.append(
+                finding(
+                    f"{place}.{key}",
+                    SYSTEM,
+                    f"error of the {what}, {name}",
+                    100.0 * best[key],
+                    "%",
+                    0.0,
+                    ABOUT,
+                    "native",
+                )
+            )
         asked = f"{case['rolling']} of {case['asked']} creepages"
-        rows.append(finding(f"{place}.force", SYSTEM, f"mean error of the force, {name}, {asked}", best["force"],
-                            "% of mu N", 0.0, ABOUT, "native"))  # fmt: skip
+        rows.append(
+            finding(
+                f"{place}.force",
+                SYSTEM,
+                f"mean error of the force, {name}, {asked}",
+                best["force"],
+                "% of mu N",
+                0.0,
+                ABOUT,
+                "native",
+            )
+        )
     return rows
 
 
@@ -223,22 +280,45 @@ def _grown_rows(found: dict[str, dict[str, float]]) -> list[Row]:
     for place, what, chosen in kinds:
         errors = {name: abs(case["each"]) for name, case in found.items() if name.startswith("S1002") == chosen}
         worst = max(errors, key=errors.__getitem__)
-        rows.append(at_most(f"contact_simplified.{place}.approach", SYSTEM, f"error of the approach, {len(errors)} "
-                            f"{what}, worst: {worst}", 100.0 * errors[worst], "%", 100.0 * APPROACH, FIGURE,
-                            "native"))  # fmt: skip
+        rows.append(
+            at_most(
+                f"contact_simplified.{place}.approach",
+                SYSTEM,
+                f"error of the approach, {len(errors)} {what}, worst: {worst}",
+                100.0 * errors[worst],
+                "%",
+                100.0 * APPROACH,
+                FIGURE,
+                "native",
+            )
+        )
     return rows
 
 
 def _time_rows(times: dict[str, list[float]]) -> list[Row]:
     why = "the paper's program was written for one machine of 1983; compiled marches made FASTSIM alone much cheaper"
     return [
-        finding("contact_simplified.time.forces", SYSTEM, f"FASTSIM twice with the refit, {cost(times['roll'])}, "
-                f"by the 1982 program, {cost(times['1982'])}", _ratio(times, "roll", "1982"), "",
-                "about 3 with the contact, which contact_price compares", why),
-        finding("contact_simplified.time.exact", SYSTEM, "the exact normal problem at the same fineness, "
-                f"{cost(times['exact'])}, by this one, {cost(times['press'])}", _ratio(times, "exact", "press"),
-                "", "", "what the theory saves", "none"),
-    ]  # fmt: skip
+        finding(
+            "contact_simplified.time.forces",
+            SYSTEM,
+            f"FASTSIM twice with the refit, {cost(times['roll'])}, by the 1982 program, {cost(times['1982'])}",
+            _ratio(times, "roll", "1982"),
+            "",
+            "about 3 with the contact, which contact_price compares",
+            why,
+        ),
+        finding(
+            "contact_simplified.time.exact",
+            SYSTEM,
+            "the exact normal problem at the same fineness, "
+            f"{cost(times['exact'])}, by this one, {cost(times['press'])}",
+            _ratio(times, "exact", "press"),
+            "",
+            "",
+            "what the theory saves",
+            "none",
+        ),
+    ]
 
 
 def _ratio(times: dict[str, list[float]], one: str, other: str) -> float:
@@ -248,54 +328,77 @@ def _ratio(times: dict[str, list[float]], one: str, other: str) -> float:
 def tables(data: dict[str, Any]) -> list[Table]:
     """Hertz's ellipses; and in the full run every shape and way, and the size of the net."""
     signed = "{:+.2f}".format
-    hertz = tuple((ratio, *(signed(100.0 * case[key]) for key in ("approach", "area", "peak", "paper")))
-                  for ratio, case in data["hertz"].items())  # fmt: skip
+    hertz = tuple(
+        (ratio, *(signed(100.0 * case[key]) for key in ("approach", "area", "peak", "paper")))
+        for ratio, case in data["hertz"].items()
+    )
     heads: tuple[str, ...] = ("B/A", "approach [%]", "area [%]", "peak pressure [%]", "approach, paper [%]")
     found = [Table("Theory of 1983 on Hertz's ellipses", "Error by ratio of curvatures, 15 x 15 net.", heads, hertz)]
     if "shapes" not in data:
         return found
     rows = tuple(
-        (name, way, *(signed(100.0 * errors[key]) for key in ("approach", "area", "peak")), f"{errors['force']:.1f}",
-         f"{errors['force_max']:.1f}")
-        for name, case in data["shapes"].items() for way, errors in case["ways"].items()
-    )  # fmt: skip
+        (
+            name,
+            way,
+            *(signed(100.0 * errors[key]) for key in ("approach", "area", "peak")),
+            f"{errors['force']:.1f}",
+            f"{errors['force_max']:.1f}",
+        )
+        for name, case in data["shapes"].items()
+        for way, errors in case["ways"].items()
+    )
     note = (
         f"Errors against the exact contact on {FULL} x {FULL} cells. Forces: mean and largest over five kinds of "
         "creepage at 0.5 and 2 times the linear scale. Paper: pressure proportional to the depth, to the letter; "
         "elliptic: to its root, the default; gradient: least squares of the slopes; one net: one W for all patches."
     )
     heads = ("shape", "way", "approach [%]", "area [%]", "peak [%]", "force, mean [% mu N]", "force, max [% mu N]")
-    nets = tuple((net, *(signed(100.0 * case[key]) for key in ("approach", "area", "peak")))
-                 for net, case in data["nets"].items())  # fmt: skip
-    together = tuple((name, *("" if np.isnan(value) else signed(100.0 * value) for value in case.values()))
-                     for name, case in data["grown"].items())  # fmt: skip
+    nets = tuple(
+        (net, *(signed(100.0 * case[key]) for key in ("approach", "area", "peak")))
+        for net, case in data["nets"].items()
+    )
+    together = tuple(
+        (name, *("" if np.isnan(value) else signed(100.0 * value) for value in case.values()))
+        for name, case in data["grown"].items()
+    )
     return [
         *found,
         Table("Theory of 1983 against the exact contact", note + " " + _said(data["shapes"]), heads, rows),
-        Table("Size of the crude net", "Errors on an ellipse with B/A = 5. " + _settled(data["nets"]),
-              ("net", *heads[2:5]), nets),
-        Table("Approach where areas have grown together, and of wheels on rails", "Error by the theory of 1983. Least "
-              "squares with the displacement by all patches do for areas apart and grown together alike; one net for "
-              "all needs no valleys, but fails where they are apart.",
-              ("contact", "a net for each patch [%]", "one net for all [%]"), together),
-    ]  # fmt: skip
+        Table(
+            "Size of the crude net",
+            "Errors on an ellipse with B/A = 5. " + _settled(data["nets"]),
+            ("net", *heads[2:5]),
+            nets,
+        ),
+        Table(
+            "Approach where areas have grown together, and of wheels on rails",
+            "Error by the theory of 1983. Least "
+            "squares with the displacement by all patches do for areas apart and grown together alike; one net for "
+            "all needs no valleys, but fails where they are apart.",
+            ("contact", "a net for each patch [%]", "one net for all [%]"),
+            together,
+        ),
+    ]
 
 
 def _said(shapes: dict[str, dict[str, Any]]) -> str:
     """What the ways show, in figures: means over all shapes."""
+
     def mean(way: str, key: str) -> str:
         scale = 1.0 if key == "force" else 100.0
         return f"{scale * np.nanmean([abs(case['ways'][way][key]) for case in shapes.values()]):.1f} %"
 
     apart = shapes["two patches"]["ways"]
-    return (f"Mean errors over all shapes: Hertz's profile of the pressure instead of the paper's makes "
-            f"{mean('elliptic', 'area')} of {mean('paper', 'area')} in the area, {mean('elliptic', 'force')} of "
-            f"{mean('paper', 'force')} in the force and {mean('elliptic', 'peak')} of {mean('paper', 'peak')} in the "
-            "peak, which is nearer on ellipses and farther where there are several valleys. "
-            f"Fitting the gradient changes the force to {mean('elliptic, gradient', 'force')} and the approach from "
-            f"{mean('elliptic', 'approach')} to {mean('elliptic, gradient', 'approach')}. One W for two patches apart "
-            f"makes the approach wrong by {100.0 * apart['elliptic, one net']['approach']:+.0f} % instead of "
-            f"{100.0 * apart['elliptic']['approach']:+.1f} %.")  # fmt: skip
+    return (
+        f"Mean errors over all shapes: Hertz's profile of the pressure instead of the paper's makes "
+        f"{mean('elliptic', 'area')} of {mean('paper', 'area')} in the area, {mean('elliptic', 'force')} of "
+        f"{mean('paper', 'force')} in the force and {mean('elliptic', 'peak')} of {mean('paper', 'peak')} in the "
+        "peak, which is nearer on ellipses and farther where there are several valleys. "
+        f"Fitting the gradient changes the force to {mean('elliptic, gradient', 'force')} and the approach from "
+        f"{mean('elliptic', 'approach')} to {mean('elliptic, gradient', 'approach')}. One W for two patches apart "
+        f"makes the approach wrong by {100.0 * apart['elliptic, one net']['approach']:+.0f} % instead of "
+        f"{100.0 * apart['elliptic']['approach']:+.1f} %."
+    )
 
 
 def _settled(nets: dict[str, dict[str, float]]) -> str:
@@ -303,9 +406,11 @@ def _settled(nets: dict[str, dict[str, float]]) -> str:
     sizes = (next(iter(nets)), str(PLAIN.net), list(nets)[-1])
     first, used, last = (100.0 * abs(nets[net]["approach"]) for net in sizes)
     area, peak = (100.0 * nets[sizes[-1]][key] for key in ("area", "peak"))
-    return (f"The approach settles: off by {first:.2f} % with {sizes[0]} x {sizes[0]} meshes, {used:.2f} % with the "
-            f"{sizes[1]} x {sizes[1]} that are used, {last:.2f} % with {sizes[2]} x {sizes[2]}. Area and peak are off "
-            f"by {area:+.1f} and {peak:+.1f} % even there: that is the theory, not its net.")  # fmt: skip
+    return (
+        f"The approach settles: off by {first:.2f} % with {sizes[0]} x {sizes[0]} meshes, {used:.2f} % with the "
+        f"{sizes[1]} x {sizes[1]} that are used, {last:.2f} % with {sizes[2]} x {sizes[2]}. Area and peak are off "
+        f"by {area:+.1f} and {peak:+.1f} % even there: that is the theory, not its net."
+    )
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
@@ -317,8 +422,16 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     shapes = data["shapes"]
     figure, axes = plt.subplots(1, 4, figsize=(10.0, 4.2), sharey=True)
     place = np.arange(len(shapes))
-    for axis, (key, label) in zip(axes, {"approach": "approach [%]", "area": "area [%]", "peak": "peak pressure [%]",
-                                         "force": "mean force [% mu N]"}.items(), strict=True):  # fmt: skip
+    for axis, (key, label) in zip(
+        axes,
+        {
+            "approach": "approach [%]",
+            "area": "area [%]",
+            "peak": "peak pressure [%]",
+            "force": "mean force [% mu N]",
+        }.items(),
+        strict=True,
+    ):
         for way, mark in (("elliptic", "o"), ("paper", "x")):
             scale = 1.0 if key == "force" else 100.0
             axis.plot([scale * case["ways"][way][key] for case in shapes.values()], place, mark, label=way)
@@ -327,6 +440,8 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     axes[0].set_yticks(place, list(shapes))
     axes[0].invert_yaxis()
     axes[0].legend(loc="upper right")
-    caption = ("Errors of the theory of 1983 against the exact contact: with Hertz's profile of the pressure "
-               "(elliptic) area and forces are nearer than with the paper's, the peak on ellipses alone.")  # fmt: skip
+    caption = (
+        "Errors of the theory of 1983 against the exact contact: with Hertz's profile of the pressure "
+        "(elliptic) area and forces are nearer than with the paper's, the peak on ellipses alone."
+    )
     return [(caption, figure)]

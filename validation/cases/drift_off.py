@@ -83,8 +83,17 @@ def _combination(one: Combination, folder: Path, quick: bool) -> dict[str, Any]:
     median, low, high = quantile(np.array(measured), 0.5)
     inner = [quantile(np.array(measured), level)[0] for level in (0.25, 0.75)]
     said = one.source + (f" {one.size:g} N" if one.size else "") + ("" if one.interpolation == "linear" else ", held")
-    return {"name": one.name, "source": said, "rate": one.rate, "predicted": quantile(np.array(late), 0.5)[0],
-            "median": median, "low": low, "high": high, "quartiles": inner, "members": len(measured)}  # fmt: skip
+    return {
+        "name": one.name,
+        "source": said,
+        "rate": one.rate,
+        "predicted": quantile(np.array(late), 0.5)[0],
+        "median": median,
+        "low": low,
+        "high": high,
+        "quartiles": inner,
+        "members": len(measured),
+    }
 
 
 def _truth(one: Combination, folder: Path, road: dict[str, Any], step: float = STEP) -> Result:
@@ -107,8 +116,10 @@ def _noise(one: Combination, folder: Path, paths: int) -> tuple[list[float | Non
 def _between(one: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
     """Neighbouring speeds, or seeds, each predicted and run."""
     speed = one.road["speed"]
-    roads = [one.road | ({"seed": i} if one.road["source"] == "iso8608" else {"speed": speed * factor})
-             for i, factor in enumerate(SPEEDS)]  # fmt: skip
+    roads = [
+        one.road | ({"seed": i} if one.road["source"] == "iso8608" else {"speed": speed * factor})
+        for i, factor in enumerate(SPEEDS)
+    ]
     pairs = [_undisturbed(one, folder, road) for road in roads]
     return [predicted for predicted, _ in pairs], [measured for _, measured in pairs]
 
@@ -124,8 +135,10 @@ def _models(one: Combination, folder: Path, paths: int) -> tuple[list[float | No
     true = _truth(one, folder, one.road)
     assembly = assemble(force_scene(folder, step=STEP, duration=one.duration))
     others = [_random_model(assembly.parameters, i) for i in range(MODELS)]
-    return ([model(assembly, other).passes() for other in others],
-            [_drift_off(replace(assembly, parameters=other), true) for other in others])  # fmt: skip
+    return (
+        [model(assembly, other).passes() for other in others],
+        [_drift_off(replace(assembly, parameters=other), true) for other in others],
+    )
 
 
 def _random_model(p: Parameters, index: int) -> Parameters:
@@ -144,8 +157,10 @@ def _drift_off(assembly: Assembly, true: Result) -> float:
 def _row(found: dict[str, Any]) -> Row:
     key = f"drift_off.{found['source']}.{found['name']}.{found['rate']:g}Hz".replace(" ", "-").replace(",", "")
     scatter = "{:.1f} to {:.1f} s".format(*found["quartiles"])
-    what = (f"drift-off of {found['name']}, {found['source']}, {found['rate']:g} Hz: median of {found['members']} runs "
-            f"(half of them {scatter}) by the prediction {found['predicted']:.2f} s")
+    what = (
+        f"drift-off of {found['name']}, {found['source']}, {found['rate']:g} Hz: median of {found['members']} runs "
+        f"(half of them {scatter}) by the prediction {found['predicted']:.2f} s"
+    )
     why = f"10 % is asked; the median lies in {found['low']:.2f} to {found['high']:.2f} s at 95 %"
     return within(key, SYSTEM, what, found["median"] / found["predicted"], "", 1.0, 0.1, why, "closed form")
 
@@ -153,13 +168,30 @@ def _row(found: dict[str, Any]) -> Row:
 def tables(data: dict[str, Any]) -> list[Table]:
     """All combinations."""
     rows = tuple(
-        (one["name"], one["source"], f"{one['rate']:g}", f"{one['predicted']:.2f}", f"{one['median']:.2f}",
-         f"{one['low']:.2f} to {one['high']:.2f}", "{:.1f} to {:.1f}".format(*one["quartiles"]), str(one["members"]),
-         f"{one['median'] / one['predicted']:.3f}")
+        (
+            one["name"],
+            one["source"],
+            f"{one['rate']:g}",
+            f"{one['predicted']:.2f}",
+            f"{one['median']:.2f}",
+            f"{one['low']:.2f} to {one['high']:.2f}",
+            "{:.1f} to {:.1f}".format(*one["quartiles"]),
+            str(one["members"]),
+            f"{one['median'] / one['predicted']:.3f}",
+        )
         for one in data["combinations"]
-    )  # fmt: skip
-    heads = ("road", "source", "rate [Hz]", "predicted [s]", "median [s]", "its 95 % interval [s]", "quartiles [s]",
-             "runs", "by prediction")  # fmt: skip
+    )
+    heads = (
+        "road",
+        "source",
+        "rate [Hz]",
+        "predicted [s]",
+        "median [s]",
+        "its 95 % interval [s]",
+        "quartiles [s]",
+        "runs",
+        "by prediction",
+    )
     note = f"Drift-off: pitch {ANGLE} rad from the true one. The prediction of an ensemble is its median, too."
     return [Table("Drift-off, predicted and measured", note, heads, rows)]
 
@@ -176,8 +208,16 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         own = [one for one in data["combinations"] if one["source"].startswith(source)]
         if own:
             middle, quartiles = np.array([one["median"] for one in own]), np.array([one["quartiles"] for one in own]).T
-            axis.errorbar([one["predicted"] for one in own], middle, np.abs(quartiles - middle), fmt="o", color=colour,
-                          label=source, markersize=4, elinewidth=0.8)  # fmt: skip
+            axis.errorbar(
+                [one["predicted"] for one in own],
+                middle,
+                np.abs(quartiles - middle),
+                fmt="o",
+                color=colour,
+                label=source,
+                markersize=4,
+                elinewidth=0.8,
+            )
     axis.set(xlabel="predicted before the run [s]", ylabel="measured: median and quartiles [s]")
     axis.legend(loc="upper left")
     caption = "Time at which the pitch is 0.05 rad off, over roads, speeds, sampling rates and sources of error."

@@ -22,20 +22,62 @@ QUICK = (*ALONE, "run.duration=15")
 """Of the quick share: a quarter of a minute, in which undisturbed forces do not drift off."""
 
 FIGURES = (
-    ("undisturbed", "undisturbed", "drift-off", "drift-off of undisturbed forces", "s", "about 30 (Fig. 5, read off)",
-     "set by the interpolation of the samples, so by a rate that the paper does not give"),
-    ("noisy", "noisy 1", "drift-off", "drift-off of noisy forces, first sample", "s", "about 10",
-     "one sample of a random time"),
-    ("perturbed", "perturbed", "drift-off", "drift-off of the perturbed model", "s", "about 10",
-     "same perturbation, another road"),
-    ("moment.undisturbed", "guided, undisturbed", "moment max", "largest enforced moment, undisturbed forces", "N m",
-     "about 70", "the interpolation's error again: it falls as the square of the sampling period"),
-    ("moment.both", "guided, both", "moment max", "largest enforced moment, perturbed model and noisy forces", "N m",
-     "about 800", "mostly 5 % of the inertia term, by which the model's inertia is wrong"),
+    (
+        "undisturbed",
+        "undisturbed",
+        "drift-off",
+        "drift-off of undisturbed forces",
+        "s",
+        "about 30 (Fig. 5, read off)",
+        "set by the interpolation of the samples, so by a rate that the paper does not give",
+    ),
+    (
+        "noisy",
+        "noisy 1",
+        "drift-off",
+        "drift-off of noisy forces, first sample",
+        "s",
+        "about 10",
+        "one sample of a random time",
+    ),
+    (
+        "perturbed",
+        "perturbed",
+        "drift-off",
+        "drift-off of the perturbed model",
+        "s",
+        "about 10",
+        "same perturbation, another road",
+    ),
+    (
+        "moment.undisturbed",
+        "guided, undisturbed",
+        "moment max",
+        "largest enforced moment, undisturbed forces",
+        "N m",
+        "about 70",
+        "the interpolation's error again: it falls as the square of the sampling period",
+    ),
+    (
+        "moment.both",
+        "guided, both",
+        "moment max",
+        "largest enforced moment, perturbed model and noisy forces",
+        "N m",
+        "about 800",
+        "mostly 5 % of the inertia term, by which the model's inertia is wrong",
+    ),
     ("moment.rms", "guided, both", "moment rms", "the same, rms", "N m", "not given", "for comparison with other runs"),
-    ("inertia", "guided, both", "inertia max", "largest inertia term I beta''", "N m", "about 15,000 (print: 85)",
-     "|I beta''| <= b|f3| + a|f4| rules out 85 kN m, and 5 % of 15 kN m is the 800 N m"),
-)  # fmt: skip
+    (
+        "inertia",
+        "guided, both",
+        "inertia max",
+        "largest inertia term I beta''",
+        "N m",
+        "about 15,000 (print: 85)",
+        "|I beta''| <= b|f3| + a|f4| rules out 85 kN m, and 5 % of 15 kN m is the 800 N m",
+    ),
+)
 """Id, run, figure of that run, words, unit, what the paper has, why they may differ."""
 
 
@@ -43,28 +85,52 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for drift-off times, enforced moments, inertia term of the reference; quick: 15 s, one sampling rate."""
     scene = load(SCENE, QUICK if quick else ())
     found, rate = _run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
-    rows = [finding(f"drift.{name}", SYSTEM, f"{words}, {rate}", found[which][what], unit, paper, why)
-            for name, which, what, words, unit, paper, why in FIGURES if found[which][what] is not None]  # fmt: skip
+    rows = [
+        finding(f"drift.{name}", SYSTEM, f"{words}, {rate}", found[which][what], unit, paper, why)
+        for name, which, what, words, unit, paper, why in FIGURES
+        if found[which][what] is not None
+    ]
     lacking = found["guided, perturbed"]
-    rows.append(within("drift.moment.ratio", SYSTEM, "enforced moment by inertia term, perturbed model alone",
-                       lacking["moment max"] / lacking["inertia max"], "", 0.052, 0.003,
-                       "the model lacks 5 % of the inertia: A = -0.05 / 0.95 I beta'', plus what the start takes",
-                       "closed form"))  # fmt: skip
+    rows.append(
+        within(
+            "drift.moment.ratio",
+            SYSTEM,
+            "enforced moment by inertia term, perturbed model alone",
+            lacking["moment max"] / lacking["inertia max"],
+            "",
+            0.052,
+            0.003,
+            "the model lacks 5 % of the inertia: A = -0.05 / 0.95 I beta'', plus what the start takes",
+            "closed form",
+        )
+    )
     rates = {} if quick else {rate: _at_rate(rate) for rate in RATES}
     if rates:
-        rows.append(within("drift.moment.order", SYSTEM, "order in which the undisturbed moment falls with the period, "
-                           "1000 to 2000 Hz", _order(rates[1000.0]["moment max"], rates[2000.0]["moment max"]), "", 2.0,
-                           0.2, "linear interpolation errs by f'' T^2 / 8", "closed form"))  # fmt: skip
-    return rows, {"duration": scene.run.duration, "rows": list(found.values()),
-                  "rates": [[rate, *row.values()] for rate, row in rates.items()]}  # fmt: skip
+        rows.append(
+            within(
+                "drift.moment.order",
+                SYSTEM,
+                "order in which the undisturbed moment falls with the period, 1000 to 2000 Hz",
+                _order(rates[1000.0]["moment max"], rates[2000.0]["moment max"]),
+                "",
+                2.0,
+                0.2,
+                "linear interpolation errs by f'' T^2 / 8",
+                "closed form",
+            )
+        )
+    return rows, {
+        "duration": scene.run.duration,
+        "rows": list(found.values()),
+        "rates": [[rate, *row.values()] for rate, row in rates.items()],
+    }
 
 
 def _run(scene: Scene, names: Collection[str] = ()) -> dict[str, dict[str, Any]]:
     """Figures of the study's runs in the reference by name: of some, or of all."""
     with TemporaryDirectory() as folder:
         measured, _, scenes = followed(scene, Path(folder))
-        return {name: row("reference", name, measured, simulate(scenes[name], "reference"))
-                for name in names or scenes}  # fmt: skip
+        return {name: row("reference", name, measured, simulate(scenes[name], "reference")) for name in names or scenes}
 
 
 def _at_rate(rate: float) -> dict[str, float]:
@@ -83,10 +149,16 @@ def _order(coarse: float, fine: float) -> float:
 def tables(data: dict[str, Any]) -> list[Table]:
     """All runs of the reference, and what the sampling rate does to the undisturbed ones."""
     rows = tuple(
-        (row["run"], _cell(row["drift-off"], ".1f") or "never", f"{row['heave error']:.1e}",
-         _cell(row.get("moment rms"), ".1f"), _cell(row.get("moment max"), ".0f"), _cell(row.get("inertia max"), ".0f"))
+        (
+            row["run"],
+            _cell(row["drift-off"], ".1f") or "never",
+            f"{row['heave error']:.1e}",
+            _cell(row.get("moment rms"), ".1f"),
+            _cell(row.get("moment max"), ".0f"),
+            _cell(row.get("inertia max"), ".0f"),
+        )
         for row in data["rows"]
-    )  # fmt: skip
+    )
     heads = ("run", "drift-off [s]", "heave error [m]", "moment rms [N m]", "moment max [N m]", "I beta'' max [N m]")
     note = "A run has drifted off when its pitch is 0.05 rad wrong."
     found = [Table(f"The six runs, {data['duration']:g} s on the study road", note, heads, rows)]

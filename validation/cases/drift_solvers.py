@@ -29,14 +29,22 @@ ANGLE = 0.05
 RATE, DURATION = 50.0, 15.0
 """Sampling rate (Hz) of the runs by solver and their length (s): few samples, as adaptive solvers restart at each."""
 SOLVERS = (
-    ("reference", "RK4", 1e-3), ("reference", "RK4", 5e-4),
-    ("reference", "DOP853", 1e-6), ("reference", "DOP853", 1e-9),
-    ("reference", "LSODA", 1e-6), ("reference", "LSODA", 1e-9),
-    ("reference", "Radau", 1e-4), ("reference", "Radau", 1e-6),
-    ("exudyn", "RK44", 1e-3), ("exudyn", "RK44", 5e-4),
-    ("exudyn", "DOPRI5", 1e-5), ("exudyn", "DOPRI5", 1e-8),
-    ("exudyn", "GeneralizedAlpha", 5e-4), ("exudyn", "GeneralizedAlpha", 2.5e-4),
-    ("mujoco", "RK4", 1e-3), ("mujoco", "RK4", 5e-4),
+    ("reference", "RK4", 1e-3),
+    ("reference", "RK4", 5e-4),
+    ("reference", "DOP853", 1e-6),
+    ("reference", "DOP853", 1e-9),
+    ("reference", "LSODA", 1e-6),
+    ("reference", "LSODA", 1e-9),
+    ("reference", "Radau", 1e-4),
+    ("reference", "Radau", 1e-6),
+    ("exudyn", "RK44", 1e-3),
+    ("exudyn", "RK44", 5e-4),
+    ("exudyn", "DOPRI5", 1e-5),
+    ("exudyn", "DOPRI5", 1e-8),
+    ("exudyn", "GeneralizedAlpha", 5e-4),
+    ("exudyn", "GeneralizedAlpha", 2.5e-4),
+    ("mujoco", "RK4", 1e-3),
+    ("mujoco", "RK4", 5e-4),
 )
 """Steps (s) of fixed-step methods, relative tolerances of adaptive ones. LSODA is Adams' and the BDF methods.
 
@@ -88,13 +96,23 @@ def _solvers(folder: Path, solvers: Any) -> list[dict[str, Any]]:
     tight = solvers[1::2]
     fixed = tuple(one for one in tight if one[1] not in ADAPTIVE)
     inputs: tuple[tuple[str, str, dict[str, Any], Any], ...] = (
-        ("linear", "linear", {}, solvers), ("smooth", "smooth", {}, tight), ("noisy", "linear", noise, fixed),
+        ("linear", "linear", {}, solvers),
+        ("smooth", "smooth", {}, tight),
+        ("noisy", "linear", noise, fixed),
     )
     for name, rule, effects, chosen in inputs:
         scene = force_scene(folder, step=1e-3, duration=DURATION, interpolation=rule, effects=effects)
         assembly = assemble(scene)
-        found += [{"engine": engine, "method": method, "value": value, "input": name,
-                   **_drift(assembly, engine, method, value, true)} for engine, method, value in chosen]  # fmt: skip
+        found += [
+            {
+                "engine": engine,
+                "method": method,
+                "value": value,
+                "input": name,
+                **_drift(assembly, engine, method, value, true),
+            }
+            for engine, method, value in chosen
+        ]
     return found
 
 
@@ -113,14 +131,19 @@ def _smoothing(folder: Path) -> list[dict[str, Any]]:
     """Each way to treat one set of noise files: growth of the pitch's spread, and what the section forces lose."""
     true = _truth(folder, NOISY, NOISY_RATE)
     quiet = assemble(force_scene(folder, step=1e-3, duration=NOISY))
-    found = [_treated(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "reference", "RK4", 1e-3)
-             for cutoff in CUTOFFS]  # fmt: skip
-    return found + [_treated(f"not smoothed, order {order}", true, quiet, None, "exudyn", method, step)
-                    for method, order, step in SCHEMES]  # fmt: skip
+    found = [
+        _treated(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "reference", "RK4", 1e-3)
+        for cutoff in CUTOFFS
+    ]
+    return found + [
+        _treated(f"not smoothed, order {order}", true, quiet, None, "exudyn", method, step)
+        for method, order, step in SCHEMES
+    ]
 
 
-def _treated(name: str, true: Result, quiet: Assembly, cutoff: float | None, engine: str, method: str,
-             step: float) -> dict[str, Any]:  # fmt: skip
+def _treated(
+    name: str, true: Result, quiet: Assembly, cutoff: float | None, engine: str, method: str, step: float
+) -> dict[str, Any]:
     forces = quiet.input
     assert isinstance(forces, Sampled)
     settings = Settings(method, step, NOISY)
@@ -132,8 +155,13 @@ def _treated(name: str, true: Result, quiet: Assembly, cutoff: float | None, eng
         spread += (_run(engine, quiet, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]) ** 2
     spread, law = np.sqrt(spread / PATHS), _law(_low_pass(forces.values, cutoff), quiet)
     growth, expected = (float(np.log(one[1] / one[0]) / np.diff(WINDOW)[0]) for one in (spread, law))
-    return {"name": name, "law": expected, "growth": growth, "spread": float(spread[1]),
-            **_bias(clean[:: round(1e-3 / step)], true, quiet)}  # fmt: skip
+    return {
+        "name": name,
+        "law": expected,
+        "growth": growth,
+        "spread": float(spread[1]),
+        **_bias(clean[:: round(1e-3 / step)], true, quiet),
+    }
 
 
 def _white(path: int, count: int) -> np.ndarray:
@@ -142,8 +170,7 @@ def _white(path: int, count: int) -> np.ndarray:
     return normal(SEED, path, count, 2)
 
 
-def _run(engine: str, assembly: Assembly, values: np.ndarray, cutoff: float | None,
-         settings: Settings) -> np.ndarray:  # fmt: skip
+def _run(engine: str, assembly: Assembly, values: np.ndarray, cutoff: float | None, settings: Settings) -> np.ndarray:
     """States (n, 8) under these samples (n, 2), smoothed before the run."""
     forces = Sampled(_low_pass(values, cutoff), 1 / NOISY_RATE, held=False)
     return build(engine, replace(assembly, input=forces), settings).run().states
@@ -185,16 +212,36 @@ def _solver_rows(solvers: list[dict[str, Any]]) -> list[Row]:
         first = own[0]["drift-off"]
         for one in own[1:]:
             solver = f"{one['engine']} {one['method']} {one['value']:g}"
-            rows.append(within(f"drift_solvers.{name}.{solver.replace(' ', '.')}", SYSTEM, f"drift-off of the {name} "
-                               f"run by that of the first solver ({first:.2f} s), {solver}", one["drift-off"] / first,
-                               "", 1.0, LOOSE if one["value"] >= 1e-5 and one["method"] in ADAPTIVE else TIGHT,
-                               "the samples make the error, so accurate solvers agree; a loose tolerance adds to it",
-                               "native"))  # fmt: skip
+            rows.append(
+                within(
+                    f"drift_solvers.{name}.{solver.replace(' ', '.')}",
+                    SYSTEM,
+                    f"drift-off of the {name} run by that of the first solver ({first:.2f} s), {solver}",
+                    one["drift-off"] / first,
+                    "",
+                    1.0,
+                    LOOSE if one["value"] >= 1e-5 and one["method"] in ADAPTIVE else TIGHT,
+                    "the samples make the error, so accurate solvers agree; a loose tolerance adds to it",
+                    "native",
+                )
+            )
     smooth = [one["error"] for one in solvers if one["input"] == "smooth"]
     linear = solvers[0]["error"]
-    return [*rows, within("drift_solvers.interpolation", SYSTEM, "largest pitch error at the end by any accurate "
-                          "solver with samples joined by a spline, by that of the reference with straight lines",
-                          max(smooth) / linear, "", 0.0, 0.2, "interpolation is what drifts", "native")]
+    return [
+        *rows,
+        within(
+            "drift_solvers.interpolation",
+            SYSTEM,
+            "largest pitch error at the end by any accurate "
+            "solver with samples joined by a spline, by that of the reference with straight lines",
+            max(smooth) / linear,
+            "",
+            0.0,
+            0.2,
+            "interpolation is what drifts",
+            "native",
+        ),
+    ]
 
 
 def _smoothing_rows(smoothing: list[dict[str, Any]]) -> list[Row]:
@@ -203,34 +250,77 @@ def _smoothing_rows(smoothing: list[dict[str, Any]]) -> list[Row]:
     for one in smoothing:
         key = one["name"].replace(" ", "-").replace(",", "")
         rows += [
-            within(f"drift_solvers.growth.{key}", SYSTEM, f"growth of the pitch's spread from {WINDOW[0]:g} to "
-                   f"{WINDOW[1]:g} s, {one['name']}, by the closed law", one["growth"] / one["law"], "", 1.0, 0.1,
-                   f"the same {PATHS} noise files in all; their own chance is 3 %", "closed form"),
-            finding(f"drift_solvers.bias.{key}.f3z", SYSTEM, f"damage of the front section force, body z, "
-                    f"{one['name']}, no noise, by the truth's", one["damage f3z"], "", "1",
-                    "what smoothing takes away", "none"),
-            finding(f"drift_solvers.bias.{key}.f3x", SYSTEM, f"the same, body x, {one['name']}", one["damage f3x"], "",
-                    "1", "what smoothing takes away", "none"),
-        ]  # fmt: skip
+            within(
+                f"drift_solvers.growth.{key}",
+                SYSTEM,
+                f"growth of the pitch's spread from {WINDOW[0]:g} to {WINDOW[1]:g} s, {one['name']}, by the closed law",
+                one["growth"] / one["law"],
+                "",
+                1.0,
+                0.1,
+                f"the same {PATHS} noise files in all; their own chance is 3 %",
+                "closed form",
+            ),
+            finding(
+                f"drift_solvers.bias.{key}.f3z",
+                SYSTEM,
+                f"damage of the front section force, body z, {one['name']}, no noise, by the truth's",
+                one["damage f3z"],
+                "",
+                "1",
+                "what smoothing takes away",
+                "none",
+            ),
+            finding(
+                f"drift_solvers.bias.{key}.f3x",
+                SYSTEM,
+                f"the same, body x, {one['name']}",
+                one["damage f3x"],
+                "",
+                "1",
+                "what smoothing takes away",
+                "none",
+            ),
+        ]
     return rows
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Drift-off by solver, and what smoothing and schemes do."""
-    rows = tuple((one["input"], one["engine"], one["method"], f"{one['value']:g}", _when(one), f"{one['error']:.2e}")
-                 for one in data["solvers"])  # fmt: skip
-    note = (f"Study road at 20 m/s, {RATE:g} Hz, {DURATION:g} s. Value: step (s), or relative tolerance of an adaptive "
-            f"solver. Linear and smooth: undisturbed; noisy: {NOISE} N, linear.")  # fmt: skip
+    rows = tuple(
+        (one["input"], one["engine"], one["method"], f"{one['value']:g}", _when(one), f"{one['error']:.2e}")
+        for one in data["solvers"]
+    )
+    note = (
+        f"Study road at 20 m/s, {RATE:g} Hz, {DURATION:g} s. Value: step (s), or relative tolerance of an adaptive "
+        f"solver. Linear and smooth: undisturbed; noisy: {NOISE} N, linear."
+    )
     heads = ("input", "engine", "method", "value", "drift-off [s]", "pitch error at the end [rad]")
     found = [Table("Drift-off by solver and interpolation", note, heads, rows)]
     if data["smoothing"]:
-        lines = tuple((one["name"], f"{one['growth']:.3f}", f"{one['law']:.3f}", f"{one['spread']:.4f}",
-                       f"{one['damage f3z']:.3f}", f"{one['damage f3x']:.3f}")
-                      for one in data["smoothing"])  # fmt: skip
-        columns = ("treatment", "growth of the spread [1/s]", "by the law [1/s]", f"spread at {WINDOW[1]:g} s [rad]",
-                   "damage f3z by truth", "damage f3x by truth")  # fmt: skip
-        about = (f"{PATHS} noise files of {NOISE} N at {NOISY_RATE:g} Hz; damage without noise, first {SCORED:g} s, "
-                 "front section force in the chassis' frame.")  # fmt: skip
+        lines = tuple(
+            (
+                one["name"],
+                f"{one['growth']:.3f}",
+                f"{one['law']:.3f}",
+                f"{one['spread']:.4f}",
+                f"{one['damage f3z']:.3f}",
+                f"{one['damage f3x']:.3f}",
+            )
+            for one in data["smoothing"]
+        )
+        columns = (
+            "treatment",
+            "growth of the spread [1/s]",
+            "by the law [1/s]",
+            f"spread at {WINDOW[1]:g} s [rad]",
+            "damage f3z by truth",
+            "damage f3x by truth",
+        )
+        about = (
+            f"{PATHS} noise files of {NOISE} N at {NOISY_RATE:g} Hz; damage without noise, first {SCORED:g} s, "
+            "front section force in the chassis' frame."
+        )
         found.append(Table("Smoothing before the run, and schemes", about, columns, lines))
     return found
 

@@ -32,9 +32,11 @@ SELDOM = 4
 """Of how many rounds the unchecked run is in the first."""
 RIDES = {"reference": {True: 50, False: 500}, "exudyn": {True: 50, False: 300}, "mujoco": {True: 500, False: 1000}}
 """Steps of rides: one of Exudyn takes as long as eight of MuJoCo or of the reference's copies together."""
-WRITTEN = {"reference": "the same copies one after the other, equations written out",
-           "exudyn": "a car of its items whose path passes the same guard",
-           "mujoco": "a car of its XML with site actuators whose path passes the same guard"}  # fmt: skip
+WRITTEN = {
+    "reference": "the same copies one after the other, equations written out",
+    "exudyn": "a car of its items whose path passes the same guard",
+    "mujoco": "a car of its XML with site actuators whose path passes the same guard",
+}
 DEAREST = 1.03
 """Ratio of the time of a bare scene to that of a hand-built model."""
 SHORT = 500
@@ -49,9 +51,12 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         place = Path(name)
         write_files(place)
         ratios = {engine: _ratio(engine, place, STEPS[quick], ROUNDS[quick]) for engine in ("exudyn", "mujoco")}
-        price = [_price(effect, engine, place, PRICED[quick])
-                 for i, effect in enumerate(EFFECTS) for j, engine in enumerate(ENGINES)
-                 if not quick or i % len(ENGINES) == j]  # fmt: skip
+        price = [
+            _price(effect, engine, place, PRICED[quick])
+            for i, effect in enumerate(EFFECTS)
+            for j, engine in enumerate(ENGINES)
+            if not quick or i % len(ENGINES) == j
+        ]
     rows = [row for engine, ratio in ratios.items() for row in _machinery(engine, ratio, STEPS[quick])]
     rows += _wheelset(STEPS[quick] // 4, quick) + _rides(quick) + _contact(quick)
     rows += _cars(STEPS[quick] // 20, quick) + _stops(quick)
@@ -75,22 +80,42 @@ def _ratio(engine: str, folder: Path, steps: int, rounds: int) -> dict[str, Any]
     gap = float(np.abs(ours.run().states - theirs()).max())
     jobs = [ours.run, lambda: guard(engine, times, theirs(), own.run.duration), theirs]
     seconds = interleave(jobs, rounds, every=(1, 1, SELDOM), clock=time.process_time)
-    return {"ratio": paired_ratio(seconds[0], seconds[1]), "gap": gap,
-            "unchecked": paired_ratio(seconds[0, ::SELDOM], seconds[2, ::SELDOM])}
+    return {
+        "ratio": paired_ratio(seconds[0], seconds[1]),
+        "gap": gap,
+        "unchecked": paired_ratio(seconds[0, ::SELDOM], seconds[2, ::SELDOM]),
+    }
 
 
 def _machinery(engine: str, found: dict[str, Any], steps: int) -> list[Row]:
-    why = (f"interleaved runs of {steps:,} steps, seconds of the processor, median of paired ratios: what the "
-           "machinery costs where no effect is named")
+    why = (
+        f"interleaved runs of {steps:,} steps, seconds of the processor, median of paired ratios: what the "
+        "machinery costs where no effect is named"
+    )
     return [
-        at_most(f"effect_prices.same.{engine}", SYSTEM, f"{engine}: states of a bare scene against a hand-built model",
-                found["gap"], "m, rad, m/s, rad/s", 0.0, "the same items in the same order give the same numbers",
-                "native"),
-        slower(f"effect_prices.ratio.{engine}", f"{engine}: time of a bare scene by that of a hand-built model whose "
-               "result passes the same guard", found["ratio"], why),
-        slower(f"effect_prices.unchecked.{engine}", f"{engine}: time of a bare scene by that of a hand-built model "
-               "whose result nobody checks", found["unchecked"], why),
-    ]  # fmt: skip
+        at_most(
+            f"effect_prices.same.{engine}",
+            SYSTEM,
+            f"{engine}: states of a bare scene against a hand-built model",
+            found["gap"],
+            "m, rad, m/s, rad/s",
+            0.0,
+            "the same items in the same order give the same numbers",
+            "native",
+        ),
+        slower(
+            f"effect_prices.ratio.{engine}",
+            f"{engine}: time of a bare scene by that of a hand-built model whose result passes the same guard",
+            found["ratio"],
+            why,
+        ),
+        slower(
+            f"effect_prices.unchecked.{engine}",
+            f"{engine}: time of a bare scene by that of a hand-built model whose result nobody checks",
+            found["unchecked"],
+            why,
+        ),
+    ]
 
 
 def slower(row: str, what: str, ratio: tuple[float, float, float], why: str) -> Row:
@@ -103,12 +128,24 @@ def _wheelset(steps: int, quick: bool) -> list[Row]:
     """A free wheelset with linear creep on cones, against one that was written for that alone."""
     gap, ratio = ratio_of_wheelsets(steps, ROUNDS[quick])
     return [
-        at_most("effect_prices.same.wheelset", SYSTEM, "states of a bare wheelset, and its contact forces by their "
-                "load, against one written out for linear creep on cones alone", gap, "m, rad, m/s, rad/s", 1e-11,
-                "the same equations, sums in another order", "none"),
-        slower("effect_prices.ratio.wheelset", "time of a bare wheelset by that of the written one, whose path passes "
-               "the same checks", ratio, "what the kernel of all wheelsets costs where no effect is named"),
-    ]  # fmt: skip
+        at_most(
+            "effect_prices.same.wheelset",
+            SYSTEM,
+            "states of a bare wheelset, and its contact forces by their "
+            "load, against one written out for linear creep on cones alone",
+            gap,
+            "m, rad, m/s, rad/s",
+            1e-11,
+            "the same equations, sums in another order",
+            "none",
+        ),
+        slower(
+            "effect_prices.ratio.wheelset",
+            "time of a bare wheelset by that of the written one, whose path passes the same checks",
+            ratio,
+            "what the kernel of all wheelsets costs where no effect is named",
+        ),
+    ]
 
 
 def _rides(quick: bool) -> list[Row]:
@@ -121,13 +158,23 @@ def _rides(quick: bool) -> list[Row]:
     for engine, steps in RIDES.items():
         gap, ratio = ratio_of_rides(engine, steps[quick], 3 if quick else ROUNDS[quick])
         rows += [
-            at_most(f"effect_prices.same.ride.{engine}", SYSTEM, f"{engine}: states of a bare ride against those of "
-                    f"{WRITTEN[engine]}", gap, "m, rad, m/s, rad/s", 1e-11, "the same vehicle on the same road; forces "
-                    "are summed in another order", "none" if engine == "reference" else "native"),
-            slower(f"effect_prices.ratio.ride.{engine}", f"{engine}: time of a bare ride by that of "
-                   f"{WRITTEN[engine]}", ratio, "what the machinery of all vehicles in space costs where no effect is "
-                   "named"),
-        ]  # fmt: skip
+            at_most(
+                f"effect_prices.same.ride.{engine}",
+                SYSTEM,
+                f"{engine}: states of a bare ride against those of {WRITTEN[engine]}",
+                gap,
+                "m, rad, m/s, rad/s",
+                1e-11,
+                "the same vehicle on the same road; forces are summed in another order",
+                "none" if engine == "reference" else "native",
+            ),
+            slower(
+                f"effect_prices.ratio.ride.{engine}",
+                f"{engine}: time of a bare ride by that of {WRITTEN[engine]}",
+                ratio,
+                "what the machinery of all vehicles in space costs where no effect is named",
+            ),
+        ]
     return rows
 
 
@@ -139,13 +186,25 @@ def _cars(steps: int, quick: bool) -> list[Row]:
     """
     gap, ratio = ratio_of_cars(steps, ROUNDS[quick])
     return [
-        at_most("effect_prices.same.handling", SYSTEM, "MuJoCo: states of a bare car of a scene of handling against "
-                "those of one written for its springs, bars, mounts and brush tyres alone", gap, "m, rad, m/s, rad/s",
-                1e-11, "the same equations, sums in another order", "native"),
-        slower("effect_prices.ratio.handling", "MuJoCo: time of a bare car of a scene of handling by that of the "
-               "written one, whose path passes the same guard", ratio, "what walking through any vehicle's tree costs "
-               "where no effect is named"),
-    ]  # fmt: skip
+        at_most(
+            "effect_prices.same.handling",
+            SYSTEM,
+            "MuJoCo: states of a bare car of a scene of handling against "
+            "those of one written for its springs, bars, mounts and brush tyres alone",
+            gap,
+            "m, rad, m/s, rad/s",
+            1e-11,
+            "the same equations, sums in another order",
+            "native",
+        ),
+        slower(
+            "effect_prices.ratio.handling",
+            "MuJoCo: time of a bare car of a scene of handling by that of the "
+            "written one, whose path passes the same guard",
+            ratio,
+            "what walking through any vehicle's tree costs where no effect is named",
+        ),
+    ]
 
 
 def _stops(quick: bool) -> list[Row]:
@@ -156,12 +215,24 @@ def _stops(quick: bool) -> list[Row]:
     """
     gap, ratio = ratio_of_stops(3.0 if quick else 10.0, ROUNDS[quick])
     return [
-        at_most("effect_prices.same.braking", SYSTEM, "states, wheels, forces and brakes of a bare stop against those "
-                "of one written for a truck of fixed loads on one surface alone", gap, "m, rad, m/s, rad/s, shares",
-                1e-11, "the same equations, sums in another order", "none"),
-        slower("effect_prices.ratio.braking", "time of a bare stop by that of the written one", ratio, "what a step of "
-               "any braked vehicle in the plane costs where no effect is named"),
-    ]  # fmt: skip
+        at_most(
+            "effect_prices.same.braking",
+            SYSTEM,
+            "states, wheels, forces and brakes of a bare stop against those "
+            "of one written for a truck of fixed loads on one surface alone",
+            gap,
+            "m, rad, m/s, rad/s, shares",
+            1e-11,
+            "the same equations, sums in another order",
+            "none",
+        ),
+        slower(
+            "effect_prices.ratio.braking",
+            "time of a bare stop by that of the written one",
+            ratio,
+            "what a step of any braked vehicle in the plane costs where no effect is named",
+        ),
+    ]
 
 
 def _contact(quick: bool) -> list[Row]:
@@ -169,21 +240,37 @@ def _contact(quick: bool) -> list[Row]:
     ``fastsim.speed.plain``."""
     gap, ratio = ratio_of_contacts(ROUNDS[quick])
     return [
-        at_most("effect_prices.same.contact", SYSTEM, "forces of FASTSIM on a bare ellipse, by friction times load, "
-                "against one written out for that alone", gap, "", 1e-13, "the same cells, sums in another order",
-                "none"),
-        slower("effect_prices.ratio.contact", "time of a call of FASTSIM on a bare ellipse by that of the written one",
-               ratio, "what spin, other shapes, marches and friction cost where nothing asks for them"),
-    ]  # fmt: skip
+        at_most(
+            "effect_prices.same.contact",
+            SYSTEM,
+            "forces of FASTSIM on a bare ellipse, by friction times load, against one written out for that alone",
+            gap,
+            "",
+            1e-13,
+            "the same cells, sums in another order",
+            "none",
+        ),
+        slower(
+            "effect_prices.ratio.contact",
+            "time of a call of FASTSIM on a bare ellipse by that of the written one",
+            ratio,
+            "what spin, other shapes, marches and friction cost where nothing asks for them",
+        ),
+    ]
 
 
 def _price(effect: str, engine: str, folder: Path, rounds: int) -> dict[str, Any]:
     """One line of the price list."""
     seconds = interleave([_job(own, engine) for own in pair(effect, SHORT, folder)], rounds, 5e-3)
     added = (seconds[1] - seconds[0]) / SHORT * 1e6
-    return {"effect": effect, "engine": engine, "adds": changes(change(effect, engine, folder)) or "nothing",
-            "step": float(np.median(seconds[0])) / SHORT * 1e6, "us": describe(added),
-            "ratio": paired_ratio(seconds[1], seconds[0])}
+    return {
+        "effect": effect,
+        "engine": engine,
+        "adds": changes(change(effect, engine, folder)) or "nothing",
+        "step": float(np.median(seconds[0])) / SHORT * 1e6,
+        "us": describe(added),
+        "ratio": paired_ratio(seconds[1], seconds[0]),
+    }
 
 
 def _job(own: Scene, engine: str) -> Any:
@@ -195,17 +282,25 @@ def _job(own: Scene, engine: str) -> Any:
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """The price list of effects."""
-    note = ("Each effect is added to the scene without it: wheel_forces, road, pitch_spring and the sensors to the "
-            "bare vehicle, geometry to one of small angles, gyro_bias to one with a gyro, the others to one under "
-            "wheel forces. Counts are exact; "
-            "microseconds per step of 1 ms, channels included, are the median of paired differences with their median "
-            "deviation, the factor is the median of paired ratios with a 95 % interval. An effect that is not named "
-            "costs nothing.")
+    note = (
+        "Each effect is added to the scene without it: wheel_forces, road, pitch_spring and the sensors to the "
+        "bare vehicle, geometry to one of small angles, gyro_bias to one with a gyro, the others to one under "
+        "wheel forces. Counts are exact; "
+        "microseconds per step of 1 ms, channels included, are the median of paired differences with their median "
+        "deviation, the factor is the median of paired ratios with a 95 % interval. An effect that is not named "
+        "costs nothing."
+    )
     headings = ("effect", "engine", "adds", "without it, us per step", "adds, us per step", "factor")
     return [Table("Price list of effects", note, headings, tuple(_line(entry) for entry in data["price"]))]
 
 
 def _line(entry: dict[str, Any]) -> tuple[str, ...]:
     value, low, high = entry["ratio"]
-    return (entry["effect"], entry["engine"], entry["adds"], f"{entry['step']:.2f}",
-            f"{entry['us']['median']:+.2f} +/- {entry['us']['mad']:.2f}", f"{value:.2f} ({low:.2f} to {high:.2f})")
+    return (
+        entry["effect"],
+        entry["engine"],
+        entry["adds"],
+        f"{entry['step']:.2f}",
+        f"{entry['us']['median']:+.2f} +/- {entry['us']['mad']:.2f}",
+        f"{value:.2f} ({low:.2f} to {high:.2f})",
+    )

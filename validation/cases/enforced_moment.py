@@ -177,9 +177,7 @@ def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list
     """The paper's guided run on the study road: what each step leaves, relative to rms of moment and of I beta''."""
     measured = simulate(road_scene(step=PERIOD, duration=ROUGH + 0.1), "reference")
     write_forces(measured, folder, PERIOD)
-    scene = force_scene(
-        folder, step=PERIOD, duration=ROUGH, interpolation="smooth", override=PERTURBED, effects=GUIDE
-    )
+    scene = force_scene(folder, step=PERIOD, duration=ROUGH, interpolation="smooth", override=PERTURBED, effects=GUIDE)
     true = truth(scene)
     table: list[list[Any]] = []
     for engine, best in BEST.items():

@@ -76,25 +76,44 @@ def _quick(forces: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> li
     with ThreadPoolExecutor(2) as pool:
         two = run_paths(job, 12, executor=pool, block=3)
     engines, _ = _engines(scene, job.truth, times, found, 2, None)
-    return [_path_row(forces, 1.0, found), _same_row("workers", "12 paths by 1 and by 2 workers", found, two),
-            _interrupted_row(job, found, forces / "stopped"), *engines]  # fmt: skip
+    return [
+        _path_row(forces, 1.0, found),
+        _same_row("workers", "12 paths by 1 and by 2 workers", found, two),
+        _interrupted_row(job, found, forces / "stopped"),
+        *engines,
+    ]
 
 
 def _path_row(forces: Path, duration: float, found: Arrays) -> Row:
     """Path 7 is the scene that names it."""
     alone = simulate(_scene(forces, duration, path=7), "reference")
     worst = float(np.abs(alone.states[:: round(1.0 / STEP)] - found["states"][7]).max())
-    return within("ensemble.path", SYSTEM, "path 7 of the ensemble against the scene with path = 7, any state", worst,
-                  "m, rad, m/s, rad/s", 0.0, 0.0, "the same samples through the same march: the same bits",
-                  "shared kernel")  # fmt: skip
+    return within(
+        "ensemble.path",
+        SYSTEM,
+        "path 7 of the ensemble against the scene with path = 7, any state",
+        worst,
+        "m, rad, m/s, rad/s",
+        0.0,
+        0.0,
+        "the same samples through the same march: the same bits",
+        "shared kernel",
+    )
 
 
 def _same_row(id: str, what: str, one: Arrays, other: Arrays) -> Row:
     """Whether two ensembles are equal to the last bit."""
     count = len(other["drift_off"])
     equal = all(np.array_equal(one[name][:count], other[name], equal_nan=True) for name in one)
-    return behaves(f"ensemble.{id}", SYSTEM, what, SAME if equal else "different bits", SAME,
-                   "a sample belongs to seed, path and place alone", "shared kernel")  # fmt: skip
+    return behaves(
+        f"ensemble.{id}",
+        SYSTEM,
+        what,
+        SAME if equal else "different bits",
+        SAME,
+        "a sample belongs to seed, path and place alone",
+        "shared kernel",
+    )
 
 
 def _interrupted_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
@@ -105,8 +124,9 @@ def _interrupted_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
     try:
         run_paths(job, 12, blocks, block=3, progress=stop)
     except KeyboardInterrupt:
-        return _same_row("resumed", "12 paths, interrupted half-way and resumed", found,
-                         run_paths(job, 12, blocks, block=3))  # fmt: skip
+        return _same_row(
+            "resumed", "12 paths, interrupted half-way and resumed", found, run_paths(job, 12, blocks, block=3)
+        )
     raise AssertionError("the interrupt was lost")
 
 
@@ -122,8 +142,13 @@ def _killed_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
     again = run_paths(job, SOME, blocks, block=20)
     if not kept or len(kept) == SOME // 20 or any(path.stat().st_mtime_ns != when for path, when in kept.items()):
         raise AssertionError(f"not killed half-way, or computed again: {len(kept)} blocks were kept")
-    return _same_row("resumed", f"{SOME} paths, killed half-way and resumed: the kept blocks are not touched, the "
-                     "whole is compared with a run in one piece", found, again)  # fmt: skip
+    return _same_row(
+        "resumed",
+        f"{SOME} paths, killed half-way and resumed: the kept blocks are not touched, the "
+        "whole is compared with a run in one piece",
+        found,
+        again,
+    )
 
 
 def _slowly(job: NoisePaths, blocks: Path) -> None:
@@ -148,32 +173,87 @@ def _large(job: NoisePaths, many: int, blocks: Path) -> dict[str, Any]:
     busy = own.ru_utime + own.ru_stime + child.ru_utime + child.ru_stime
     kept = sum(values.nbytes for values in found.values()) / len(found["drift_off"])
     most = 1024 * (own.ru_maxrss + 2 * child.ru_maxrss)
-    return {"found": found, "seconds": seconds, "busy": busy, "kept": kept, "bytes": most,
-            "path-steps": len(found["drift_off"]) * job.settings.steps, "failed": int((found["failed"] >= 0).sum())}
+    return {
+        "found": found,
+        "seconds": seconds,
+        "busy": busy,
+        "kept": kept,
+        "bytes": most,
+        "path-steps": len(found["drift_off"]) * job.settings.steps,
+        "failed": int((found["failed"] >= 0).sum()),
+    }
 
 
 def _scale_rows(large: dict[str, Any]) -> list[Row]:
     what = f"{MANY:,} paths of {LONG:g} s at 1 kHz in the reference, 2 processes"
     return [
-        within("ensemble.scale.path-steps", SYSTEM, f"{what}: steps of all paths", float(large["path-steps"]), "",
-               MANY * LONG / STEP, 0.0, "a count", "none"),
-        within("ensemble.scale.failed", SYSTEM, f"{what}: paths that left all bounds", float(large["failed"]), "", 0.0,
-               0.0, "a tumbling vehicle stays finite", "none"),
-        aim("ensemble.scale.seconds", SYSTEM, f"{what}: start of the processes to the last path, once, with "
-            f"{50.0 * large['busy'] / large['seconds']:.0f} % of two cores", large["seconds"], "s", SECONDS,
-            "target on two free cores; what other programs take of them adds to it"),
-        aim("ensemble.scale.processor", SYSTEM, f"{what}: processor time of all processes by two cores, once",
-            large["busy"] / 2, "s", SECONDS, "what it takes on two free cores, whoever else uses them now"),
-        aim("ensemble.scale.memory", SYSTEM, f"{what}: largest memory of all processes together, once", large["bytes"],
-            "byte", MEMORY, "target; libraries included, of which a machine's own are a part"),
-        within("ensemble.scale.kept", SYSTEM, f"{what}: bytes of results, by paths", large["kept"], "byte",
-               STATE * (LONG + 1.0) + MARKS, 0.0, "a count: a state of eight numbers every second, and when it "
-               "drifts off or fails", "none"),
-    ]  # fmt: skip
+        within(
+            "ensemble.scale.path-steps",
+            SYSTEM,
+            f"{what}: steps of all paths",
+            float(large["path-steps"]),
+            "",
+            MANY * LONG / STEP,
+            0.0,
+            "a count",
+            "none",
+        ),
+        within(
+            "ensemble.scale.failed",
+            SYSTEM,
+            f"{what}: paths that left all bounds",
+            float(large["failed"]),
+            "",
+            0.0,
+            0.0,
+            "a tumbling vehicle stays finite",
+            "none",
+        ),
+        aim(
+            "ensemble.scale.seconds",
+            SYSTEM,
+            f"{what}: start of the processes to the last path, once, with "
+            f"{50.0 * large['busy'] / large['seconds']:.0f} % of two cores",
+            large["seconds"],
+            "s",
+            SECONDS,
+            "target on two free cores; what other programs take of them adds to it",
+        ),
+        aim(
+            "ensemble.scale.processor",
+            SYSTEM,
+            f"{what}: processor time of all processes by two cores, once",
+            large["busy"] / 2,
+            "s",
+            SECONDS,
+            "what it takes on two free cores, whoever else uses them now",
+        ),
+        aim(
+            "ensemble.scale.memory",
+            SYSTEM,
+            f"{what}: largest memory of all processes together, once",
+            large["bytes"],
+            "byte",
+            MEMORY,
+            "target; libraries included, of which a machine's own are a part",
+        ),
+        within(
+            "ensemble.scale.kept",
+            SYSTEM,
+            f"{what}: bytes of results, by paths",
+            large["kept"],
+            "byte",
+            STATE * (LONG + 1.0) + MARKS,
+            0.0,
+            "a count: a state of eight numbers every second, and when it drifts off or fails",
+            "none",
+        ),
+    ]
 
 
-def _engines(scene: Scene, truth: np.ndarray, times: np.ndarray, found: Arrays, count: int,
-             pool: Executor | None) -> tuple[list[Row], dict[str, float]]:  # fmt: skip
+def _engines(
+    scene: Scene, truth: np.ndarray, times: np.ndarray, found: Arrays, count: int, pool: Executor | None
+) -> tuple[list[Row], dict[str, float]]:
     """The first paths in both engines: rows of agreement, and seconds per path and step of each way."""
     exudyn = noise_paths(scene, times, truth, engine="exudyn")
     one, two = (mujoco_threads(scene, times, truth, threads=threads) for threads in (1, 2))
@@ -188,14 +268,35 @@ def _engines(scene: Scene, truth: np.ndarray, times: np.ndarray, found: Arrays, 
         paths = job()
         prices[way] = (time.perf_counter() - start) / (count * (len(truth) - 1))
         what = f"{count} of the reference's paths in {way}: any state before drift-off, by the largest"
-        rows.append(at_most(f"ensemble.engines.{_slug(way)}", SYSTEM, what, gap(found, paths, times), "", 1e-9,
-                            "the same tableau on the same samples: rounding, grown by the instability", "native"))
+        rows.append(
+            at_most(
+                f"ensemble.engines.{_slug(way)}",
+                SYSTEM,
+                what,
+                gap(found, paths, times),
+                "",
+                1e-9,
+                "the same tableau on the same samples: rounding, grown by the instability",
+                "native",
+            )
+        )
     return rows, prices
 
 
 def _price_rows(prices: dict[str, float]) -> list[Row]:
-    return [finding(f"ensemble.price.{_slug(way)}", SYSTEM, f"wall time by paths and steps, {way}, once", 1e9 * price,
-                    "ns", "", "seconds are reported", "none") for way, price in prices.items()]  # fmt: skip
+    return [
+        finding(
+            f"ensemble.price.{_slug(way)}",
+            SYSTEM,
+            f"wall time by paths and steps, {way}, once",
+            1e9 * price,
+            "ns",
+            "",
+            "seconds are reported",
+            "none",
+        )
+        for way, price in prices.items()
+    ]
 
 
 def _slug(way: str) -> str:
@@ -204,16 +305,26 @@ def _slug(way: str) -> str:
 
 def _half_step_row(forces: Path) -> Row:
     """Noise belongs to the samples: half the step changes nothing but the integrator's error."""
-    pitch = [run_paths(noise_paths(_scene(forces, 10.0, step=step), np.array([10.0])), 100)["states"][:, 0, 3]
-             for step in (STEP, STEP / 2)]  # fmt: skip
+    pitch = [
+        run_paths(noise_paths(_scene(forces, 10.0, step=step), np.array([10.0])), 100)["states"][:, 0, 3]
+        for step in (STEP, STEP / 2)
+    ]
     change = float(np.abs(pitch[0] - pitch[1]).max() / pitch[1].std())
-    return at_most("ensemble.half-step", SYSTEM, "100 paths, pitch at 10 s with steps of 1 and 0.5 ms: largest "
-                   "difference by the standard deviation", change, "", 1e-4,
-                   "the samples are the same, so only the integrator's error differs", "shared kernel")  # fmt: skip
+    return at_most(
+        "ensemble.half-step",
+        SYSTEM,
+        "100 paths, pitch at 10 s with steps of 1 and 0.5 ms: largest difference by the standard deviation",
+        change,
+        "",
+        1e-4,
+        "the samples are the same, so only the integrator's error differs",
+        "shared kernel",
+    )
 
 
-def _data(truth: np.ndarray, times: np.ndarray, found: Arrays, large: dict[str, Any],
-          prices: dict[str, float]) -> dict[str, Any]:  # fmt: skip
+def _data(
+    truth: np.ndarray, times: np.ndarray, found: Arrays, large: dict[str, Any], prices: dict[str, float]
+) -> dict[str, Any]:
     """What the tables and the figure show."""
     from studies.ensemble import percentiles
 
@@ -222,8 +333,16 @@ def _data(truth: np.ndarray, times: np.ndarray, found: Arrays, large: dict[str, 
     quantiles = [[level, *quantile(found["drift_off"], level)] for level in (0.05, 0.5, 0.95)]
     counts, edges = np.histogram(found["drift_off"], bins=np.arange(0.0, 31.0, 0.5))
     fan = percentiles(errors[:, 1:, 3])
-    return {"spreads": spreads, "quantiles": quantiles, "prices": prices, "large": large, "times": times[1:].tolist(),
-            "counts": counts.tolist(), "edges": edges.tolist(), "fan": fan.tolist()}  # fmt: skip
+    return {
+        "spreads": spreads,
+        "quantiles": quantiles,
+        "prices": prices,
+        "large": large,
+        "times": times[1:].tolist(),
+        "counts": counts.tolist(),
+        "edges": edges.tolist(),
+        "fan": fan.tolist(),
+    }
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
@@ -231,20 +350,37 @@ def tables(data: dict[str, Any]) -> list[Table]:
     if not data:
         return []
     paths = f"{MANY:,} paths of {LONG:g} s, noise {DEVIATION:g} N at 1 kHz on the study road"
-    spreads = tuple((f"{when:g}", f"{pitch:.4e} +- {e:.0e}", f"{heave:.4e} +- {o:.0e}")
-                    for when, pitch, e, heave, o in data["spreads"])
-    times = tuple((f"{100 * level:g} %", f"{value:.2f}", f"{low:.2f} to {high:.2f}")
-                  for level, value, low, high in data["quantiles"])
-    prices = tuple((way, f"{1e9 * price:,.0f}", f"{price * MANY * LONG / STEP / 60:,.1f}")
-                   for way, price in data["prices"].items())
+    spreads = tuple(
+        (f"{when:g}", f"{pitch:.4e} +- {e:.0e}", f"{heave:.4e} +- {o:.0e}")
+        for when, pitch, e, heave, o in data["spreads"]
+    )
+    times = tuple(
+        (f"{100 * level:g} %", f"{value:.2f}", f"{low:.2f} to {high:.2f}")
+        for level, value, low, high in data["quantiles"]
+    )
+    prices = tuple(
+        (way, f"{1e9 * price:,.0f}", f"{price * MANY * LONG / STEP / 60:,.1f}") for way, price in data["prices"].items()
+    )
     return [
-        Table("Spread of the paths", f"{paths}; standard deviation with its standard error.",
-              ("time [s]", "pitch [rad]", "heave [m]"), spreads),
-        Table("Drift-off times", "First time at which the pitch is 0.05 rad wrong; 95 % intervals by order statistics.",
-              ("quantile", "time [s]", "interval [s]"), times),
-        Table("Price of a path", f"Wall time on two cores, once; the last column is {MANY:,} paths of {LONG:g} s.",
-              ("way", "per path and step [ns]", "all of them [min]"), prices),
-    ]  # fmt: skip
+        Table(
+            "Spread of the paths",
+            f"{paths}; standard deviation with its standard error.",
+            ("time [s]", "pitch [rad]", "heave [m]"),
+            spreads,
+        ),
+        Table(
+            "Drift-off times",
+            "First time at which the pitch is 0.05 rad wrong; 95 % intervals by order statistics.",
+            ("quantile", "time [s]", "interval [s]"),
+            times,
+        ),
+        Table(
+            "Price of a path",
+            f"Wall time on two cores, once; the last column is {MANY:,} paths of {LONG:g} s.",
+            ("way", "per path and step [ns]", "all of them [min]"),
+            prices,
+        ),
+    ]
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:

@@ -26,9 +26,16 @@ SEED = 41
 RATIOS = (0.2, 0.5, 1.0, 2.0, 5.0)
 ELLIPSES = (0.1, *RATIOS, 10.0)
 """a/b of the ellipses that slide under spin."""
-KINDS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "spin": (0.0, 0.0, 1.0), "y+spin": (0.0, 0.7071, 0.7071),
-         "y-spin": (0.0, 0.7071, -0.7071), "y-spin 30": (0.0, 0.866, -0.5), "x+spin": (0.7071, 0.0, 0.7071),
-         "x-y+spin": (0.5774, -0.5774, 0.5774)}  # fmt: skip
+KINDS = {
+    "x": (1.0, 0.0, 0.0),
+    "y": (0.0, 1.0, 0.0),
+    "spin": (0.0, 0.0, 1.0),
+    "y+spin": (0.0, 0.7071, 0.7071),
+    "y-spin": (0.0, 0.7071, -0.7071),
+    "y-spin 30": (0.0, 0.866, -0.5),
+    "x+spin": (0.7071, 0.0, 0.7071),
+    "x-y+spin": (0.5774, -0.5774, 0.5774),
+}
 LEVELS = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
 SLIDING = (5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 50.0, 200.0)
 """Levels from where all begins to slide."""
@@ -40,8 +47,13 @@ CELLS = (11, 21, 41, 81)
 CONVERGED, FINE = 161, 321
 """Of the model beside the exact theory, and of what cells are measured by."""
 EXACT = (0.0, "exact in floating point")
-ALLOWED = {"finite": EXACT, "reversal": EXACT, "zero": EXACT, "similarity": EXACT,
-           "power coarse": (1e-5, "a slender strip that sticks to its end, in the last half cell")}  # fmt: skip
+ALLOWED = {
+    "finite": EXACT,
+    "reversal": EXACT,
+    "zero": EXACT,
+    "similarity": EXACT,
+    "power coarse": (1e-5, "a slender strip that sticks to its end, in the last half cell"),
+}
 WHY = "the same model with 321 cells per strip; a fifth of the model's own error"
 
 
@@ -68,8 +80,15 @@ def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
     scale = unit / np.stack([known.c11, known.c22, known.c23 * MEAN_AXIS], axis=1)
     xi_x, xi_y, spin = (part * scale).T
     a, b = MEAN_AXIS * np.sqrt(ratio), MEAN_AXIS / np.sqrt(ratio)
-    return {"a": a, "b": b, "load": np.full(len(a), LOAD), "mu": np.full(len(a), FRICTION), "xi_x": xi_x,
-            "xi_y": xi_y, "spin": spin}  # fmt: skip
+    return {
+        "a": a,
+        "b": b,
+        "load": np.full(len(a), LOAD),
+        "mu": np.full(len(a), FRICTION),
+        "xi_x": xi_x,
+        "xi_y": xi_y,
+        "spin": spin,
+    }
 
 
 def _vector(given: Contacts, **options: Any) -> np.ndarray:
@@ -90,15 +109,34 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
             data[f"{bound}, {march}"] = [[float(e.mean()), float(e.max())] for e in errors]
             if march == "plain":
                 continue
-            rows.append(at_most(f"fastsim.cells.{bound}", SYSTEM, f"largest error at 21 cells per strip, "
-                                f"{bound} bound, {len(truth)} cases", float(errors[1].max()), "mu N",
-                                0.004, WHY, "none"))  # fmt: skip
+            rows.append(
+                at_most(
+                    f"fastsim.cells.{bound}",
+                    SYSTEM,
+                    f"largest error at 21 cells per strip, {bound} bound, {len(truth)} cases",
+                    float(errors[1].max()),
+                    "mu N",
+                    0.004,
+                    WHY,
+                    "none",
+                )
+            )
             mean = np.array([np.sqrt(np.mean(e**2)) for e in errors])
             order = float(np.log(mean[0] / mean[-1]) / np.log(CELLS[-1] / CELLS[0]))
             if bound == "parabolic":
-                rows.append(at_most("fastsim.order", SYSTEM, "2 less the observed order, 11 to 81 cells per strip",
-                                    max(0.0, 2.0 - order), "", 0.2, "order 1.8 or more; root mean square over all "
-                                    "cases, because single ones jump as cells begin to slip", "none"))  # fmt: skip
+                rows.append(
+                    at_most(
+                        "fastsim.order",
+                        SYSTEM,
+                        "2 less the observed order, 11 to 81 cells per strip",
+                        max(0.0, 2.0 - order),
+                        "",
+                        0.2,
+                        "order 1.8 or more; root mean square over all "
+                        "cases, because single ones jump as cells begin to slip",
+                        "none",
+                    )
+                )
     return rows, {"cells": data}
 
 
@@ -110,18 +148,33 @@ def _invariants(batches: int, count: int, first: int) -> list[Row]:
         for name, value in worst(contacts(SEED, first + i, count), options, PAIR).items():
             name += " coarse" if name == "power" and options.get("cells", 21) < 20 else ""
             found[name] = max(found.get(name, 0.0), value)
-    what = {"finite": "results that are not finite", "bound": "|F| beyond mu N", "moment":
-            "moment beyond the sum of the traction's bound times the distance from the centre, by the longer semi-axis",
-            "limit": "power that friction takes beyond that of sliding all over, by creepage",
-            "reversal": "F(-creepage) + F",
-            "mirror": "mirrored in y", "power": "power that friction would give, by creepage", "power coarse":
-            "power that friction would give, by creepage, on 9 to 12 cells per strip",
-            "zero": "force without load or creepage",
-            "similarity": "eight times the load, twice the size", "stick": "share of stick outside 0 to 1"}  # fmt: skip
+    what = {
+        "finite": "results that are not finite",
+        "bound": "|F| beyond mu N",
+        "moment": "moment beyond the sum of the traction's bound times the distance from the centre, "
+        "by the longer semi-axis",
+        "limit": "power that friction takes beyond that of sliding all over, by creepage",
+        "reversal": "F(-creepage) + F",
+        "mirror": "mirrored in y",
+        "power": "power that friction would give, by creepage",
+        "power coarse": "power that friction would give, by creepage, on 9 to 12 cells per strip",
+        "zero": "force without load or creepage",
+        "similarity": "eight times the load, twice the size",
+        "stick": "share of stick outside 0 to 1",
+    }
     total = batches * count
-    return [at_most(f"fastsim.always.{name.replace(' ', '_')}", SYSTEM, f"{what[name]}, worst of {total:,} random "
-                    "contacts", value, "mu N", *ALLOWED.get(name, (ROUNDING, "rounding of some hundred sums")),
-                    "none") for name, value in found.items()]  # fmt: skip
+    return [
+        at_most(
+            f"fastsim.always.{name.replace(' ', '_')}",
+            SYSTEM,
+            f"{what[name]}, worst of {total:,} random contacts",
+            value,
+            "mu N",
+            *ALLOWED.get(name, (ROUNDING, "rounding of some hundred sums")),
+            "none",
+        )
+        for name, value in found.items()
+    ]
 
 
 def _limits() -> list[Row]:
@@ -140,14 +193,37 @@ def _limits() -> list[Row]:
     off = np.abs(np.angle(-(slid.fx + 1j * slid.fy) * np.exp(-1j * turn), deg=True))[slides].max()
     short = np.abs(np.hypot(slid.fx, slid.fy) / (FRICTION * LOAD) - 1.0)[slides].max()
     return [
-        at_most("fastsim.slope", SYSTEM, "forces at a millionth of the linear scale against the linear theory",
-                float(slope.max()), "of them", 0.004, "error of 21 cells: strips of finite width", "closed form"),
-        at_most("fastsim.sliding.direction", SYSTEM, f"angle from the force to minus the slip, all sliding, "
-                f"{slides.sum()} cases from where that begins", float(off), "deg", 0.3,
-                "one flexibility in full sliding makes it rounding; 0.3 asked for", "closed form"),
-        at_most("fastsim.sliding.size", SYSTEM, "force in full sliding less mu N", float(short), "mu N", ROUNDING,
-                "pressures of the cells sum up to the load", "closed form"),
-    ]  # fmt: skip
+        at_most(
+            "fastsim.slope",
+            SYSTEM,
+            "forces at a millionth of the linear scale against the linear theory",
+            float(slope.max()),
+            "of them",
+            0.004,
+            "error of 21 cells: strips of finite width",
+            "closed form",
+        ),
+        at_most(
+            "fastsim.sliding.direction",
+            SYSTEM,
+            f"angle from the force to minus the slip, all sliding, {slides.sum()} cases from where that begins",
+            float(off),
+            "deg",
+            0.3,
+            "one flexibility in full sliding makes it rounding; 0.3 asked for",
+            "closed form",
+        ),
+        at_most(
+            "fastsim.sliding.size",
+            SYSTEM,
+            "force in full sliding less mu N",
+            float(short),
+            "mu N",
+            ROUNDING,
+            "pressures of the cells sum up to the load",
+            "closed form",
+        ),
+    ]
 
 
 def _spun() -> list[Row]:
@@ -162,10 +238,29 @@ def _spun() -> list[Row]:
         beyond = float(np.max(np.abs(spun.mz) / most - 1.0))
         what = f"moment of sliding about the centre beyond that of Hertz's pressure, {bound} bound, a/b 0.1 to 10"
         name = f"fastsim.spun.{bound}"
-        rows.append(aim(name, SYSTEM, what, beyond, "of it", 0.0, "Hertz's own pressure on 21 cells, whose sum errs "
-                        "by their area; the friction on the cells is never exceeded") if bound == "elliptic" else
-                    at_most(name, SYSTEM, what, max(0.0, beyond), "of it", 0.0, "pressures of these bounds lie closer "
-                            "to the centre", "closed form"))  # fmt: skip
+        rows.append(
+            aim(
+                name,
+                SYSTEM,
+                what,
+                beyond,
+                "of it",
+                0.0,
+                "Hertz's own pressure on 21 cells, whose sum errs "
+                "by their area; the friction on the cells is never exceeded",
+            )
+            if bound == "elliptic"
+            else at_most(
+                name,
+                SYSTEM,
+                what,
+                max(0.0, beyond),
+                "of it",
+                0.0,
+                "pressures of these bounds lie closer to the centre",
+                "closed form",
+            )
+        )
     return rows
 
 
@@ -180,9 +275,18 @@ def _derivatives() -> list[Row]:
         ends = [_forces(_moved(given, name, sign * h)) for sign in (1.0, -1.0)]
         off.append(np.abs((ends[0] - ends[1]) / 2e-6 - own.slopes[..., k] * unit) / _units())
     share = np.quantile(np.max(off, axis=(0, 2)), 0.98)
-    return [at_most("fastsim.derivatives", SYSTEM, "derivatives to creepages, spin and load against differences, "
-                    f"98 % of {len(own.forces)} cases", float(share), "mu N, mu N c", 1e-7, "differences over 2e-6 of "
-                    "a scale err by 1e-9; where a cell begins to slip within them forces jump", "none")]  # fmt: skip
+    return [
+        at_most(
+            "fastsim.derivatives",
+            SYSTEM,
+            f"derivatives to creepages, spin and load against differences, 98 % of {len(own.forces)} cases",
+            float(share),
+            "mu N, mu N c",
+            1e-7,
+            "differences over 2e-6 of a scale err by 1e-9; where a cell begins to slip within them forces jump",
+            "none",
+        )
+    ]
 
 
 def _moved(given: Contacts, name: str, step: float) -> Contacts:
@@ -207,10 +311,19 @@ def _drawn() -> list[Row]:
     """Error of the model on contacts drawn at random, on which nothing was calibrated."""
     error = held("blended intermediate", read_drawn(JUDGED)).error
     why = "exact theory with its cells' first order taken out, kept; the target of the regular set"
-    return [at_most(f"fastsim.drawn.{name}", SYSTEM, f"{what} error of the model on {len(error)} contacts drawn at "
-                    "random", float(value), "mu N", most, why, "native")
-            for name, what, value, most in (("mean", "mean", error.mean(), 0.02),
-                                            ("max", "largest", error.max(), 0.09))]  # fmt: skip
+    return [
+        at_most(
+            f"fastsim.drawn.{name}",
+            SYSTEM,
+            f"{what} error of the model on {len(error)} contacts drawn at random",
+            float(value),
+            "mu N",
+            most,
+            why,
+            "native",
+        )
+        for name, what, value, most in (("mean", "mean", error.mean(), 0.02), ("max", "largest", error.max(), 0.09))
+    ]
 
 
 def _model() -> tuple[list[Row], list[list[Any]]]:
@@ -223,29 +336,47 @@ def _model() -> tuple[list[Row], list[list[Any]]]:
             table.append([bound, kind, *(float(value) for e in errors for value in (e.mean(), e.max()))])
     why = "exact theory with its cells' first order taken out, kept; the case of the price solves some of them anew"
     what = f"error of the model against the exact theory, {len(one.error)} contacts of five ellipses"
-    return [at_most("fastsim.model.mean", SYSTEM, f"mean {what}", table[0][2], "mu N", 0.02, why, "native"),
-            at_most("fastsim.model.max", SYSTEM, f"largest {what}", table[0][3], "mu N", 0.09, why,
-                    "native")], table  # fmt: skip
+    return [
+        at_most("fastsim.model.mean", SYSTEM, f"mean {what}", table[0][2], "mu N", 0.02, why, "native"),
+        at_most("fastsim.model.max", SYSTEM, f"largest {what}", table[0][3], "mu N", 0.09, why, "native"),
+    ], table
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Errors by cells, and in full those of the model and the price."""
-    rows = tuple((name, *(f"{100 * mean:.2g} / {100 * most:.2g}" for mean, most in values))
-                 for name, values in data["cells"].items())  # fmt: skip
-    found = [Table("FASTSIM: error of the cells", "Mean / largest error of the force in % of mu N against "
-                   f"{FINE} cells per strip, over all ellipses, kinds and levels of creepage.",
-                   ("bound, march", *(f"{n} cells" for n in CELLS)), rows)]  # fmt: skip
+    rows = tuple(
+        (name, *(f"{100 * mean:.2g} / {100 * most:.2g}" for mean, most in values))
+        for name, values in data["cells"].items()
+    )
+    found = [
+        Table(
+            "FASTSIM: error of the cells",
+            "Mean / largest error of the force in % of mu N against "
+            f"{FINE} cells per strip, over all ellipses, kinds and levels of creepage.",
+            ("bound, march", *(f"{n} cells" for n in CELLS)),
+            rows,
+        )
+    ]
     if "model" in data:
-        found.append(Table("FASTSIM: error of the model", "Converged, against the exact theory: force in % of mu N, "
-                           "moment in % of mu N and the longer semi-axis.",
-                           ("bound", "flexibilities", "mean", "largest", "moment, mean", "moment, largest"),
-                           tuple((*row[:2], *(f"{100 * v:.2f}" for v in row[2:]))
-                                                     for row in data["model"])))  # fmt: skip
+        found.append(
+            Table(
+                "FASTSIM: error of the model",
+                "Converged, against the exact theory: force in % of mu N, "
+                "moment in % of mu N and the longer semi-axis.",
+                ("bound", "flexibilities", "mean", "largest", "moment, mean", "moment, largest"),
+                tuple((*row[:2], *(f"{100 * v:.2f}" for v in row[2:])) for row in data["model"]),
+            )
+        )
     if "speed" in data:
-        found.append(Table("FASTSIM: price", "Beside the time that a root and a division per cell take on this "
-                           "machine, its lower bound: median of rounds with its 95 % interval.",
-                           ("what", "time", "by the bound"),
-                           tuple(tuple(row) for row in data["speed"])))  # fmt: skip
+        found.append(
+            Table(
+                "FASTSIM: price",
+                "Beside the time that a root and a division per cell take on this "
+                "machine, its lower bound: median of rounds with its 95 % interval.",
+                ("what", "time", "by the bound"),
+                tuple(tuple(row) for row in data["speed"]),
+            )
+        )
     return found
 
 
@@ -255,13 +386,21 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
 
     figure, axis = plt.subplots(figsize=(8.5, 4.0))
     for i, (name, values) in enumerate(data["cells"].items()):
-        axis.loglog(CELLS, [100 * most for _, most in values], "o-" if "second" in name else "s--", color=f"C{i // 2}",
-                    label=name)  # fmt: skip
+        axis.loglog(
+            CELLS,
+            [100 * most for _, most in values],
+            "o-" if "second" in name else "s--",
+            color=f"C{i // 2}",
+            label=name,
+        )
     axis.axhline(0.4, color="black", linestyle=":", label="0.4 % asked for at 21")
     axis.set_xticks(CELLS, [str(n) for n in CELLS])
     axis.minorticks_off()
-    axis.set(xlabel="cells per strip", ylabel="largest error of the force [% of mu N]",
-             title="FASTSIM: the second-order march needs a tenth of the cells")  # fmt: skip
+    axis.set(
+        xlabel="cells per strip",
+        ylabel="largest error of the force [% of mu N]",
+        title="FASTSIM: the second-order march needs a tenth of the cells",
+    )
     axis.set_yticks([0.01, 0.1, 0.4, 1, 10], ["0.01", "0.1", "0.4", "1", "10"])
     figure.legend(loc="outside right center")
     return [("Largest error of FASTSIM's force over its cells, three bounds and both marches.", figure)]

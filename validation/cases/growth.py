@@ -61,8 +61,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + _engine_rows(folder) + _step_rows(folder) + _linear_rows(folder), {"spread": spread, "roads": roads}
 
 
-def _measured(folder: Path, duration: float, road: dict[str, Any] | None = None,
-              parameters: str = "itwm_drift") -> Result:  # fmt: skip
+def _measured(
+    folder: Path, duration: float, road: dict[str, Any] | None = None, parameters: str = "itwm_drift"
+) -> Result:
     """The virtual measurement, its forces written at RATE."""
     source = {"source": "study", **(road or ROADS[STUDY])}
     true = simulate(road_scene(parameters, 1e-3, duration, source), "reference")
@@ -84,12 +85,17 @@ def _spread(true: Result, folder: Path, quick: bool) -> dict[str, Any]:
     carried = covariance(quiet, DEVIATION)
     alone = law.pitch_rate_of_forces(_samples(quiet).values, 1 / RATE, p)
     rates = {"run": true["pitch_rate"], "forces": alone}
-    found = {f"law, {name}": np.sqrt(law.pitch_variance(times, law.growth_until(rate, 1 / RATE, p)[at], q)).tolist()
-             for name, rate in rates.items()}  # fmt: skip
-    found |= {"time": times.tolist(), "covariance": carried.deviation("pitch")[at].tolist(),
-              "t^1.5": np.sqrt(law.pitch_variance(times, 0.0, q)).tolist(),
-              "heave law": np.sqrt(law.heave_variance(times, p, DEVIATION, 1 / RATE)).tolist(),
-              "heave covariance": carried.deviation("z3")[at].tolist()}  # fmt: skip
+    found = {
+        f"law, {name}": np.sqrt(law.pitch_variance(times, law.growth_until(rate, 1 / RATE, p)[at], q)).tolist()
+        for name, rate in rates.items()
+    }
+    found |= {
+        "time": times.tolist(),
+        "covariance": carried.deviation("pitch")[at].tolist(),
+        "t^1.5": np.sqrt(law.pitch_variance(times, 0.0, q)).tolist(),
+        "heave law": np.sqrt(law.heave_variance(times, p, DEVIATION, 1 / RATE)).tolist(),
+        "heave covariance": carried.deviation("z3")[at].tolist(),
+    }
     if not quick:
         job = noise_paths(_noisy(folder, LENGTH), times.astype(float), true["pitch"])
         off = run_paths(job, PATHS)["states"] - quiet_states(quiet)[at]
@@ -118,27 +124,33 @@ def _path(assembly: Assembly, start: np.ndarray, first: int, samples: int) -> Er
     return ErrorPath(replace(assembly, initial=start, input=forces), forces, 1, samples)
 
 
-def _growth(folder: Path, road: dict[str, Any], windows: int = WINDOWS,
-            parameters: str = "itwm_drift") -> dict[str, Any]:  # fmt: skip
+def _growth(
+    folder: Path, road: dict[str, Any], windows: int = WINDOWS, parameters: str = "itwm_drift"
+) -> dict[str, Any]:
     """Growth rates of one road: from the run, from the forces, by cut-off, and measured in windows in both frames."""
     true = _measured(folder, WINDOW * windows, road, parameters)
     assembly = assemble(force_scene(folder, parameters, 1e-3, WINDOW * windows))
     p, rate = assembly.parameters, true["pitch_rate"]
     alone = law.pitch_rate_of_forces(_samples(assembly).values, 1 / RATE, p)
     starts = np.rint(np.arange(windows) * WINDOW * RATE).astype(int)
-    paths = {mode: [_path(replace(assembly, mode=mode), true.states[i], i, round(WINDOW * RATE)) for i in starts]
-               for mode in ("force", "force-body")}  # fmt: skip
+    paths = {
+        mode: [_path(replace(assembly, mode=mode), true.states[i], i, round(WINDOW * RATE)) for i in starts]
+        for mode in ("force", "force-body")
+    }
     measured = {mode: np.array([measured_growth(path) for path in own]).T for mode, own in paths.items()}
     rigid = law.rigid_pitch(p)
     return {
-        "run": law.growth_rate(rate, 1 / RATE, p), "forces": law.growth_rate(alone, 1 / RATE, p),
+        "run": law.growth_rate(rate, 1 / RATE, p),
+        "forces": law.growth_rate(alone, 1 / RATE, p),
         "cut-offs": [law.growth_rate(rate, 1 / RATE, p, law.CUTOFF * factor) for factor in (0.5, 2.0)],
-        "measured": float(measured["force"][0].mean()), "scatter": float(measured["force"][0].std(ddof=1)),
-        "body": float(measured["force-body"][0].mean()), "body error": float(measured["force-body"][1].max()),
+        "measured": float(measured["force"][0].mean()),
+        "scatter": float(measured["force"][0].std(ddof=1)),
+        "body": float(measured["force-body"][0].mean()),
+        "body error": float(measured["force-body"][1].max()),
         "swing": float(np.mean([swing(path) for path in paths["force-body"]])),
         "coupling": rigid.coupling,
         "swing law": law.growth_rate(rate, 1 / RATE, p) * float(np.sqrt(rigid.carried / rigid.inertia)),
-    }  # fmt: skip
+    }
 
 
 def _spread_rows(spread: dict[str, Any]) -> list[Row]:
@@ -146,21 +158,63 @@ def _spread_rows(spread: dict[str, Any]) -> list[Row]:
     seen = "pitch" if "pitch" in spread else "covariance"
     by = f"Monte Carlo of {PATHS} paths" if seen == "pitch" else "covariance along the path"
     why = "5 % is asked; " + ("1.3 % is chance" if seen == "pitch" else "no chance in it")
-    rows = [within(f"growth.spread.pitch.{t}s", SYSTEM, f"standard deviation of the pitch at {t} s, {by}, by the "
-                   "closed law", found / expected, "", 1.0, 0.05, why, "closed form")
-            for t, found, expected in zip(spread["time"], spread[seen], spread["law, run"], strict=True)]  # fmt: skip
+    rows = [
+        within(
+            f"growth.spread.pitch.{t}s",
+            SYSTEM,
+            f"standard deviation of the pitch at {t} s, {by}, by the closed law",
+            found / expected,
+            "",
+            1.0,
+            0.05,
+            why,
+            "closed form",
+        )
+        for t, found, expected in zip(spread["time"], spread[seen], spread["law, run"], strict=True)
+    ]
     miss = spread[seen][-1] / spread["t^1.5"][-1]
-    rows.append(within("growth.spread.linear", SYSTEM, f"the same at {spread['time'][-1]} s by t^1.5, the law without "
-                       "growth", miss, "", 4.0, 0.5, "what the paper's law leaves out", "closed form"))  # fmt: skip
+    rows.append(
+        within(
+            "growth.spread.linear",
+            SYSTEM,
+            f"the same at {spread['time'][-1]} s by t^1.5, the law without growth",
+            miss,
+            "",
+            4.0,
+            0.5,
+            "what the paper's law leaves out",
+            "closed form",
+        )
+    )
     heave = np.array(spread["heave" if "heave" in spread else "heave covariance"]) / spread["heave law"]
-    rows.append(within("growth.spread.heave", SYSTEM, "standard deviation of the heave by t^1.5, 1 to 10 s, worst",
-                       float(heave[np.abs(heave - 1).argmax()]), "", 1.0, 0.05,
-                       "momentum alone moves the heave; 3.3 times the chance of 1.3 %", "closed form"))  # fmt: skip
+    rows.append(
+        within(
+            "growth.spread.heave",
+            SYSTEM,
+            "standard deviation of the heave by t^1.5, 1 to 10 s, worst",
+            float(heave[np.abs(heave - 1).argmax()]),
+            "",
+            1.0,
+            0.05,
+            "momentum alone moves the heave; 3.3 times the chance of 1.3 %",
+            "closed form",
+        )
+    )
     alone = np.array(spread["covariance"]) / spread["law, forces"]
-    return [*rows, within("growth.spread.forces", SYSTEM, "covariance along the path by the closed law from the wheel "
-                          "forces alone, 1 to 10 s, worst", float(alone[np.abs(alone - 1).argmax()]), "", 1.0, 0.08,
-                          "rigid struts make the rate 1 % too small: 4 % at 10 s, beside the law's own",
-                          "closed form")]  # fmt: skip
+    return [
+        *rows,
+        within(
+            "growth.spread.forces",
+            SYSTEM,
+            "covariance along the path by the closed law from the wheel forces alone, 1 to 10 s, worst",
+            float(alone[np.abs(alone - 1).argmax()]),
+            "",
+            1.0,
+            0.08,
+            "rigid struts make the rate 1 % too small: 4 % at 10 s, beside the law's own",
+            "closed form",
+        ),
+    ]
 
 
 def _growth_rows(roads: dict[str, Any]) -> list[Row]:
@@ -168,20 +222,54 @@ def _growth_rows(roads: dict[str, Any]) -> list[Row]:
     for name, road in roads.items():
         key = name.replace(" ", "-").replace(",", "")
         rows += [
-            within(f"growth.rate.{key}", SYSTEM, f"growth rate along the true path, {name}, by the rms of the fast "
-                   "pitch rate", road["measured"] / road["run"], "", 1.0, 0.03, LAW, "closed form"),
-            within(f"growth.forces.{key}", SYSTEM, f"growth rate from the wheel forces alone, {name}, by the same",
-                   road["forces"] / road["run"], "", 1.0, 0.03, "struts that give way are left out: 1 %",
-                   "closed form"),
+            within(
+                f"growth.rate.{key}",
+                SYSTEM,
+                f"growth rate along the true path, {name}, by the rms of the fast pitch rate",
+                road["measured"] / road["run"],
+                "",
+                1.0,
+                0.03,
+                LAW,
+                "closed form",
+            ),
+            within(
+                f"growth.forces.{key}",
+                SYSTEM,
+                f"growth rate from the wheel forces alone, {name}, by the same",
+                road["forces"] / road["run"],
+                "",
+                1.0,
+                0.03,
+                "struts that give way are left out: 1 %",
+                "closed form",
+            ),
             _body_row(f"growth.body.{key}", f"growth rate with body-fixed forces, {name}", road),
-            finding(f"growth.swing.{key}", SYSTEM, f"frequency of that swing, {name}", road["swing"], "rad/s",
-                    f"{road['swing law']:.3g}", "sqrt(J / (I + J)) times the rms of the fast pitch rate",
-                    "closed form"),
-        ]  # fmt: skip
+            finding(
+                f"growth.swing.{key}",
+                SYSTEM,
+                f"frequency of that swing, {name}",
+                road["swing"],
+                "rad/s",
+                f"{road['swing law']:.3g}",
+                "sqrt(J / (I + J)) times the rms of the fast pitch rate",
+                "closed form",
+            ),
+        ]
     worst = max(abs(rate / road["run"] - 1) for road in roads.values() for rate in road["cut-offs"])
-    return [*rows, at_most("growth.cut-off", SYSTEM, f"change of the growth rate by half or twice the cut-off of "
-                           f"{law.CUTOFF} Hz, largest", worst, "", 0.05, "the choice must not matter",
-                           "none")]  # fmt: skip
+    return [
+        *rows,
+        at_most(
+            "growth.cut-off",
+            SYSTEM,
+            f"change of the growth rate by half or twice the cut-off of {law.CUTOFF} Hz, largest",
+            worst,
+            "",
+            0.05,
+            "the choice must not matter",
+            "none",
+        ),
+    ]
 
 
 def _body_row(key: str, what: str, road: dict[str, Any]) -> Row:
@@ -193,8 +281,17 @@ def _body_row(key: str, what: str, road: dict[str, Any]) -> Row:
     if road["coupling"] != 0.0:
         why = "its wheels' weight leaves a moment that changes with the pitch of the hills: a true, small growth"
         return finding(key, SYSTEM, what, road["body"], "1/s", "small", why, "none")
-    return within(key, SYSTEM, what, road["body"], "1/s", 0.0, road["body error"],
-                  "zero within its error; the wheels' inertia makes a slow swing of it", "closed form")
+    return within(
+        key,
+        SYSTEM,
+        what,
+        road["body"],
+        "1/s",
+        0.0,
+        road["body error"],
+        "zero within its error; the wheels' inertia makes a slow swing of it",
+        "closed form",
+    )
 
 
 def _twin_rows(folder: Path) -> list[Row]:
@@ -205,8 +302,19 @@ def _twin_rows(folder: Path) -> list[Row]:
     q = law.rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
     expected = np.sqrt(float(law.pitch_variance(5.0, law.growth_until(true["pitch_rate"], 1 / RATE, p)[at], q)))
     found = covariance(assembly, DEVIATION).deviation("pitch")[at]
-    return [within("growth.twin", SYSTEM, "asymmetric twin: covariance along the path at 5 s by the closed law",
-                   float(found / expected), "", 1.0, 0.05, "as for the published vehicle", "closed form")]  # fmt: skip
+    return [
+        within(
+            "growth.twin",
+            SYSTEM,
+            "asymmetric twin: covariance along the path at 5 s by the closed law",
+            float(found / expected),
+            "",
+            1.0,
+            0.05,
+            "as for the published vehicle",
+            "closed form",
+        )
+    ]
 
 
 def _engine_rows(folder: Path) -> list[Row]:
@@ -218,20 +326,42 @@ def _engine_rows(folder: Path) -> list[Row]:
     before = slice(0, int(off.argmax()) if off.any() else len(off))
     size = float(np.abs(base.states[before]).max())
     gaps = {engine: float(np.abs(run.states[before] - base.states[before]).max()) for engine, run in runs.items()}
-    return [at_most(f"growth.engines.{engine}", SYSTEM, f"{engine} and the reference on the same noise file before "
-                    f"drift-off at {base.times[before.stop - 1]:.2f} s, by the largest state", gap / size, "", 1e-9,
-                    "the same method; only rounding grows", "native")
-            for engine, gap in gaps.items() if engine != "reference"]  # fmt: skip
+    return [
+        at_most(
+            f"growth.engines.{engine}",
+            SYSTEM,
+            f"{engine} and the reference on the same noise file before "
+            f"drift-off at {base.times[before.stop - 1]:.2f} s, by the largest state",
+            gap / size,
+            "",
+            1e-9,
+            "the same method; only rounding grows",
+            "native",
+        )
+        for engine, gap in gaps.items()
+        if engine != "reference"
+    ]
 
 
 def _step_rows(folder: Path) -> list[Row]:
     """Half the step, the same noise: the difference by the spread."""
-    runs = {step: np.array([simulate(_noisy(folder, LENGTH, step, path), "reference").states[-1] for path in range(20)])
-            for step in (5e-4, 2.5e-4)}  # fmt: skip
+    runs = {
+        step: np.array([simulate(_noisy(folder, LENGTH, step, path), "reference").states[-1] for path in range(20)])
+        for step in (5e-4, 2.5e-4)
+    }
     gap = float(np.abs(runs[5e-4][:, 3] - runs[2.5e-4][:, 3]).max() / runs[5e-4][:, 3].std())
-    return [at_most("growth.step", SYSTEM, "pitch at 10 s by steps of 0.5 and 0.25 ms on the same noise, 20 paths, "
-                    "largest difference by their spread", gap, "", 1e-4, "noise belongs to the samples",
-                    "closed form")]  # fmt: skip
+    return [
+        at_most(
+            "growth.step",
+            SYSTEM,
+            "pitch at 10 s by steps of 0.5 and 0.25 ms on the same noise, 20 paths, largest difference by their spread",
+            gap,
+            "",
+            1e-4,
+            "noise belongs to the samples",
+            "closed form",
+        )
+    ]
 
 
 def _linear_rows(folder: Path) -> list[Row]:
@@ -241,8 +371,18 @@ def _linear_rows(folder: Path) -> list[Row]:
     start = dict(zip(("z1", "z2", "z3", "pitch"), true.states[0, :4].tolist(), strict=True))
     run = simulate(_linear(force_scene(folder, step=1e-3, duration=60.0, override=PAPER), start), "reference")
     off = float(np.abs(run["pitch"] - true["pitch"]).max())
-    return [at_most("growth.linear", SYSTEM, "largest pitch error of the perturbed model, linearised, in 60 s", off,
-                    "rad", 0.05, "drift needs the cosine: with it this run drifts off after 12 s", "none")]
+    return [
+        at_most(
+            "growth.linear",
+            SYSTEM,
+            "largest pitch error of the perturbed model, linearised, in 60 s",
+            off,
+            "rad",
+            0.05,
+            "drift needs the cosine: with it this run drifts off after 12 s",
+            "none",
+        )
+    ]
 
 
 def _linear(scene: Scene, start: dict[str, float]) -> Scene:
@@ -254,16 +394,29 @@ def _linear(scene: Scene, start: dict[str, float]) -> Scene:
 def tables(data: dict[str, Any]) -> list[Table]:
     """Spread over time, and growth rates by road."""
     spread = data["spread"]
-    names = [name for name in ("pitch", "covariance", "law, run", "law, forces", "t^1.5", "heave", "heave law")
-             if name in spread]  # fmt: skip
+    names = [
+        name
+        for name in ("pitch", "covariance", "law, run", "law, forces", "t^1.5", "heave", "heave law")
+        if name in spread
+    ]
     rows = tuple((str(t), *(f"{spread[name][i]:.4g}" for name in names)) for i, t in enumerate(spread["time"]))
-    note = (f"White noise of {DEVIATION} N at {RATE:g} Hz on the study road at 20 m/s. Law, run: with the growth rate "
-            "of the true run; law, forces: from the wheel forces alone.")
+    note = (
+        f"White noise of {DEVIATION} N at {RATE:g} Hz on the study road at 20 m/s. Law, run: with the growth rate "
+        "of the true run; law, forces: from the wheel forces alone."
+    )
     heads = ("time [s]", *(f"{name} [{'m' if 'heave' in name else 'rad'}]" for name in names))
     keys = ("run", "forces", "measured", "scatter", "body", "swing", "swing law")
     rates = tuple((name, *(f"{road[key]:.4f}" for key in keys)) for name, road in data["roads"].items())
-    columns = ("road or vehicle", "law, run [1/s]", "law, forces [1/s]", "measured [1/s]", "scatter [1/s]",
-               "body-fixed [1/s]", "its swing [rad/s]", "swing law [rad/s]")  # fmt: skip
+    columns = (
+        "road or vehicle",
+        "law, run [1/s]",
+        "law, forces [1/s]",
+        "measured [1/s]",
+        "scatter [1/s]",
+        "body-fixed [1/s]",
+        "its swing [rad/s]",
+        "swing law [rad/s]",
+    )
     about = f"Measured by two tangent columns along the true path in {WINDOWS} windows of {WINDOW} s."
     return [Table("Spread of the noise", note, heads, rows), Table("Growth of a tilt error", about, columns, rates)]
 
@@ -274,8 +427,12 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
 
     spread = data["spread"]
     figure, axis = plt.subplots(figsize=(7.0, 3.6))
-    marks = {"pitch": ("ok", f"Monte Carlo, {PATHS} paths"), "covariance": ("x", "covariance along the true path"),
-             "law, run": ("-", "closed law, rate from the run"), "t^1.5": ("--", "no growth, t^1.5")}  # fmt: skip
+    marks = {
+        "pitch": ("ok", f"Monte Carlo, {PATHS} paths"),
+        "covariance": ("x", "covariance along the true path"),
+        "law, run": ("-", "closed law, rate from the run"),
+        "t^1.5": ("--", "no growth, t^1.5"),
+    }
     for name, (style, label) in marks.items():
         if name in spread:
             axis.loglog(spread["time"], spread[name], style, label=label, markersize=4)

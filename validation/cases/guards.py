@@ -139,18 +139,39 @@ def _outside_rows() -> list[Row]:
     silent, right = wrong_engines.passed(), wrong_engines.passed((wrong_engines.Right,))
     names = ", ".join(kind.__name__ for kind in wrong_engines.WRONG)
     return [
-        at_most("guards.outside.silent", SYSTEM, f"wrong integrators from outside the tree that run without a word, of "
-                f"{names}", len(silent), "", 0.0, "every such run is held against the reference", "native"),
-        behaves("guards.outside.right", SYSTEM, "a right integrator from outside the tree, in the same comparison",
-                "answered" if right else "raised", "answered", "a check that refuses everything is no check"),
-    ]  # fmt: skip
+        at_most(
+            "guards.outside.silent",
+            SYSTEM,
+            f"wrong integrators from outside the tree that run without a word, of {names}",
+            len(silent),
+            "",
+            0.0,
+            "every such run is held against the reference",
+            "native",
+        ),
+        behaves(
+            "guards.outside.right",
+            SYSTEM,
+            "a right integrator from outside the tree, in the same comparison",
+            "answered" if right else "raised",
+            "answered",
+            "a check that refuses everything is no check",
+        ),
+    ]
 
 
 def _disk_row(folder: Path) -> Row:
     """Files that a full disk leaves half written."""
-    return at_most("guards.full_disk", SYSTEM, f"moments, of {full_disk.MOMENTS}, at which a full disk leaves a file "
-                   "that is not whole, or goes unnoticed", full_disk.damage(folder), "", 0.0,
-                   "files are written whole or not at all", "none")  # fmt: skip
+    return at_most(
+        "guards.full_disk",
+        SYSTEM,
+        f"moments, of {full_disk.MOMENTS}, at which a full disk leaves a file that is not whole, or goes unnoticed",
+        full_disk.damage(folder),
+        "",
+        0.0,
+        "files are written whole or not at all",
+        "none",
+    )
 
 
 def _unstable_rows(engine: str, endings: dict[str, Any], quick: bool) -> list[Row]:

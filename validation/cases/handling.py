@@ -46,11 +46,17 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Tyre, engines and mirror image; in the full run also turns, stops, slopes, energy, planted faults, price."""
     duration = 0.3 if quick else 1.0
     drives = {engine: driven(engine, lane_change(), SPEED, duration) for engine in ("mujoco", "exudyn")}
-    rows = [_engines_row(drives), *_tyre_rows(), _power_row(drives["mujoco"]), _mirror_row(duration),
-            _threads_row()]  # fmt: skip
+    rows = [_engines_row(drives), *_tyre_rows(), _power_row(drives["mujoco"]), _mirror_row(duration), _threads_row()]
     if not quick:
-        rows += [*_turn_rows(), *_stop_rows(), *_transfer_rows(), _slope_row(), *_energy_rows(), *_fault_rows(),
-                 _price_row()]  # fmt: skip
+        rows += [
+            *_turn_rows(),
+            *_stop_rows(),
+            *_transfer_rows(),
+            _slope_row(),
+            *_energy_rows(),
+            *_fault_rows(),
+            _price_row(),
+        ]
     return rows, {}
 
 
@@ -70,10 +76,16 @@ def _gap(one: Drive, other: Drive) -> float:
 
 
 def _engines_row(drives: dict[str, Drive]) -> Row:
-    return at_most("handling.engines", SYSTEM, "lane change on a rough road: positions and rates of the two engines",
-                   _gap(drives["mujoco"], drives["exudyn"]), "m, rad, m/s, rad/s", 1e-10,
-                   "the same tableau, step and forces around two engines' own trees: rounding alone",
-                   "shared kernel")  # fmt: skip
+    return at_most(
+        "handling.engines",
+        SYSTEM,
+        "lane change on a rough road: positions and rates of the two engines",
+        _gap(drives["mujoco"], drives["exudyn"]),
+        "m, rad, m/s, rad/s",
+        1e-10,
+        "the same tableau, step and forces around two engines' own trees: rounding alone",
+        "shared kernel",
+    )
 
 
 def cornering(handling: Handling, i: int, slip: float = 1e-7) -> float:
@@ -100,24 +112,46 @@ def locked_error() -> float:
 
 def _tyre_rows() -> list[Row]:
     return [
-        at_most("handling.cornering", SYSTEM, "cornering stiffness at small slip, by the ride vehicle's, less 1",
-                _cornering_error(Handling(R19)), "", 1e-3, "the bristles are those of the ride vehicle's tyres",
-                "closed form"),
-        at_most("handling.locked", SYSTEM, "force on a wheel that does not turn, beside mu N against its sliding, by "
-                "mu N", locked_error(), "", 1e-9, "all bristles slide one way", "closed form"),
-    ]  # fmt: skip
+        at_most(
+            "handling.cornering",
+            SYSTEM,
+            "cornering stiffness at small slip, by the ride vehicle's, less 1",
+            _cornering_error(Handling(R19)),
+            "",
+            1e-3,
+            "the bristles are those of the ride vehicle's tyres",
+            "closed form",
+        ),
+        at_most(
+            "handling.locked",
+            SYSTEM,
+            "force on a wheel that does not turn, beside mu N against its sliding, by mu N",
+            locked_error(),
+            "",
+            1e-9,
+            "all bristles slide one way",
+            "closed form",
+        ),
+    ]
 
 
 def _power_row(drive: Drive) -> Row:
-    return behaves("handling.power", SYSTEM, "power of each tyre's contact at every step of the lane change",
-                   "never positive" if drive.tyres[:, :, at.POWER].max() <= 0.0 else "positive", "never positive",
-                   "friction takes energy out")  # fmt: skip
+    return behaves(
+        "handling.power",
+        SYSTEM,
+        "power of each tyre's contact at every step of the lane change",
+        "never positive" if drive.tyres[:, :, at.POWER].max() <= 0.0 else "positive",
+        "never positive",
+        "friction takes energy out",
+    )
 
 
 def mirror_gap(handling: Handling, duration: float) -> float:
     """Largest difference between a step of steering to the left and the mirror image of one to the right."""
-    left, right = (driven("mujoco", handling.changed(controls=Controls(steer=((0.0, 0.0), (0.2, side * 0.06)))), SPEED,
-                          duration) for side in (1.0, -1.0))  # fmt: skip
+    left, right = (
+        driven("mujoco", handling.changed(controls=Controls(steer=((0.0, 0.0), (0.2, side * 0.06)))), SPEED, duration)
+        for side in (1.0, -1.0)
+    )
     places = handling.vehicle.coordinates()
     swap = [places.index((_other(name), freedom)) for name, freedom in places]
     sign = np.array([-1.0 if freedom in ("y", "rx", "rz") else 1.0 for _, freedom in places])
@@ -134,9 +168,16 @@ def _other(name: str) -> str:
 
 def _mirror_row(duration: float) -> Row:
     inclined = Handling(R19, Tyres(inclination=-0.02))
-    return at_most("handling.mirror", SYSTEM, "step steer to the left beside the mirror image of one to the right, "
-                   "with inclined wheels", mirror_gap(inclined, duration), "m, rad", 1e-10, "a symmetric vehicle",
-                   "none")  # fmt: skip
+    return at_most(
+        "handling.mirror",
+        SYSTEM,
+        "step steer to the left beside the mirror image of one to the right, with inclined wheels",
+        mirror_gap(inclined, duration),
+        "m, rad",
+        1e-10,
+        "a symmetric vehicle",
+        "none",
+    )
 
 
 def turn_error(change: Callable[[np.ndarray], None] | None = None, speed: float = 20.0) -> float:
@@ -152,12 +193,26 @@ def turn_error(change: Callable[[np.ndarray], None] | None = None, speed: float 
 def _turn_rows() -> list[Row]:
     found = steady_turn(Handling(NO_DRAG), 20.0)
     return [
-        at_most("handling.turn", SYSTEM, "yaw gain of a steady turn of small slip at 20 m/s, by the single-track "
-                "vehicle's, less 1", turn_error(), "", 1e-3, "linear tyres, with trail and turning slip",
-                "closed form"),
-        finding("handling.understeer", SYSTEM, "its understeer gradient", found.understeer, "s^2/m",
-                "positive: understeering", "closed form at the static loads"),
-    ]  # fmt: skip
+        at_most(
+            "handling.turn",
+            SYSTEM,
+            "yaw gain of a steady turn of small slip at 20 m/s, by the single-track vehicle's, less 1",
+            turn_error(),
+            "",
+            1e-3,
+            "linear tyres, with trail and turning slip",
+            "closed form",
+        ),
+        finding(
+            "handling.understeer",
+            SYSTEM,
+            "its understeer gradient",
+            found.understeer,
+            "s^2/m",
+            "positive: understeering",
+            "closed form at the static loads",
+        ),
+    ]
 
 
 def _stop_rows() -> list[Row]:
@@ -168,13 +223,27 @@ def _stop_rows() -> list[Row]:
     left = drive.tyres[:, :, at.FX] + mu * drive.tyres[:, :, at.PRESS]
     stopped = friction_distance(speed, mu) - friction_distance(ahead[-1], mu)
     return [
-        at_most("handling.slide", SYSTEM, "braking force of four locked wheels beside mu N, by mu N",
-                float(np.abs(left / (mu * drive.tyres[:, :, at.PRESS])).max()), "", 1e-9, "at every step of a stop",
-                "closed form"),
-        at_most("handling.stop", SYSTEM, "way of a stop with locked wheels from 15 m/s, by (v0^2 - v^2) / (2 mu g), "
-                "less 1", float(drive.path[-1, 0] / stopped - 1.0), "", 1e-2,
-                "wheel loads swing about the weight when the body dives", "closed form"),
-    ]  # fmt: skip
+        at_most(
+            "handling.slide",
+            SYSTEM,
+            "braking force of four locked wheels beside mu N, by mu N",
+            float(np.abs(left / (mu * drive.tyres[:, :, at.PRESS])).max()),
+            "",
+            1e-9,
+            "at every step of a stop",
+            "closed form",
+        ),
+        at_most(
+            "handling.stop",
+            SYSTEM,
+            "way of a stop with locked wheels from 15 m/s, by (v0^2 - v^2) / (2 mu g), less 1",
+            float(drive.path[-1, 0] / stopped - 1.0),
+            "",
+            1e-2,
+            "wheel loads swing about the weight when the body dives",
+            "closed form",
+        ),
+    ]
 
 
 def _transfer_rows() -> list[Row]:
@@ -184,13 +253,28 @@ def _transfer_rows() -> list[Row]:
         braking = braked_error(driven("mujoco", sliding(vehicle, GENTLE), 10.0, 2.0), GENTLE)
         turn = turning_error(driven("mujoco", turning(vehicle, 2e-3), SPEED, 3.0))
         rows += [
-            at_most(f"handling.transfer.{name}", SYSTEM, f"load transfer of the {name} between its axles, wheels "
-                    f"locked at mu = {GENTLE:g}, by m_total a h / L and weight that leans, less 1", braking, "", 5e-3,
-                    "first order in the pitch angle; 2 s of settling", "closed form"),
-            at_most(f"handling.transfer_aside.{name}", SYSTEM, f"the same of the {name} between its sides in a steady "
-                    "turn of 0.4 m/s^2, by m_total a h / t", turn, "", 1e-3, "first order in the roll angle",
-                    "closed form"),
-        ]  # fmt: skip
+            at_most(
+                f"handling.transfer.{name}",
+                SYSTEM,
+                f"load transfer of the {name} between its axles, wheels "
+                f"locked at mu = {GENTLE:g}, by m_total a h / L and weight that leans, less 1",
+                braking,
+                "",
+                5e-3,
+                "first order in the pitch angle; 2 s of settling",
+                "closed form",
+            ),
+            at_most(
+                f"handling.transfer_aside.{name}",
+                SYSTEM,
+                f"the same of the {name} between its sides in a steady turn of 0.4 m/s^2, by m_total a h / t",
+                turn,
+                "",
+                1e-3,
+                "first order in the roll angle",
+                "closed form",
+            ),
+        ]
     return rows
 
 
@@ -199,9 +283,16 @@ def _slope_row() -> Row:
     drive = driven("mujoco", handling, 0.0, 2.0, 1e-4)
     last = slice(-2000, None)
     drift = float(np.abs(drive.tyres[last, :, at.SLIP_X].mean(axis=0)).max())
-    return at_most("handling.slope", SYSTEM, f"drift of locked wheels at rest on a slope of {SLOPE:g} rad",
-                   1e3 * drift, "mm/s", 1.0, "bristles that do not roll are dampers, relative to 0.1 m/s",
-                   "none")  # fmt: skip
+    return at_most(
+        "handling.slope",
+        SYSTEM,
+        f"drift of locked wheels at rest on a slope of {SLOPE:g} rad",
+        1e3 * drift,
+        "mm/s",
+        1.0,
+        "bristles that do not roll are dampers, relative to 0.1 m/s",
+        "none",
+    )
 
 
 def _energy_rows() -> list[Row]:
@@ -213,13 +304,27 @@ def _energy_rows() -> list[Row]:
     whole = energy(drive)[0]
     order = np.log2(gaps["held", 1e-3] / gaps["held", 5e-4])
     return [
-        at_most("handling.ledger", SYSTEM, "energy of the lane change that nothing accounts for, by all of it",
-                gaps["sliding", 1e-3] / whole, "", 1e-7, "springs, dampers, tyres, drag and steering are summed up by "
-                "Simpson's rule; bristles that begin to slide limit its order", "closed form"),
-        behaves("handling.ledger_order", SYSTEM, "its order in the step where friction holds the bristles and no wheel "
-                "lifts", "at least 3.5" if order >= 3.5 else f"{order:.2f}", "at least 3.5", "that of Runge and Kutta "
-                "is 4", "closed form"),
-    ]  # fmt: skip
+        at_most(
+            "handling.ledger",
+            SYSTEM,
+            "energy of the lane change that nothing accounts for, by all of it",
+            gaps["sliding", 1e-3] / whole,
+            "",
+            1e-7,
+            "springs, dampers, tyres, drag and steering are summed up by "
+            "Simpson's rule; bristles that begin to slide limit its order",
+            "closed form",
+        ),
+        behaves(
+            "handling.ledger_order",
+            SYSTEM,
+            "its order in the step where friction holds the bristles and no wheel lifts",
+            "at least 3.5" if order >= 3.5 else f"{order:.2f}",
+            "at least 3.5",
+            "that of Runge and Kutta is 4",
+            "closed form",
+        ),
+    ]
 
 
 def _tyre(numbers: np.ndarray, i: int) -> np.ndarray:
@@ -250,11 +355,21 @@ def _fault_rows() -> list[Row]:
         "bristles of front and rear swapped, by the steady turn": abs(turn_error(_swap_axles)) > 1e-3,
         "one wheel steered the other way, by the steady turn": abs(turn_error(_turn_wrong)) > 1e-3,
         "friction of one tyre 1e-6 off in one engine, by the engines": _gap(
-            driven("mujoco", rough, SPEED, 1.0), driven("exudyn", lane_change(), SPEED, 1.0)) > 1e-10,
-    }  # fmt: skip
-    return [behaves(f"handling.fault{i}", SYSTEM, f"planted: {name}", "caught" if caught else "missed", "caught",
-                    "a check that cannot fail shows nothing")
-            for i, (name, caught) in enumerate(found.items())]  # fmt: skip
+            driven("mujoco", rough, SPEED, 1.0), driven("exudyn", lane_change(), SPEED, 1.0)
+        )
+        > 1e-10,
+    }
+    return [
+        behaves(
+            f"handling.fault{i}",
+            SYSTEM,
+            f"planted: {name}",
+            "caught" if caught else "missed",
+            "caught",
+            "a check that cannot fail shows nothing",
+        )
+        for i, (name, caught) in enumerate(found.items())
+    ]
 
 
 def _price_row() -> Row:
@@ -265,9 +380,16 @@ def _price_row() -> Row:
     timed = [*jobs, lambda: _repeat_tyres(4 * steps)]
     full, none, kernel = interleave(timed, ROUNDS, 0.001, clock=time.process_time)
     ratio, low, high = median(full / (none + kernel) - 1.0)
-    return aim("handling.price", SYSTEM, "step of MuJoCo with four tyres (22 x 21 cells), by a step without them "
-               f"and what the kernel takes alone, less 1, 95 % interval {low:.3g} to {high:.3g}", ratio, "", 0.3,
-               "seconds of the processor, median of interleaved rounds")  # fmt: skip
+    return aim(
+        "handling.price",
+        SYSTEM,
+        "step of MuJoCo with four tyres (22 x 21 cells), by a step without them "
+        f"and what the kernel takes alone, less 1, 95 % interval {low:.3g} to {high:.3g}",
+        ratio,
+        "",
+        0.3,
+        "seconds of the processor, median of interleaved rounds",
+    )
 
 
 def _threads_row() -> Row:
@@ -279,9 +401,15 @@ def _threads_row() -> Row:
     with installed(own.law):
         serial, both = (Marcher(own.model, threads).run(starts, 50) for threads in (1, 2))
     said = "identical" if serial.tobytes() == both.tobytes() else f"{np.abs(serial - both).max():.1e} apart"
-    return behaves("handling.threads", SYSTEM, "three lane changes marched by MuJoCo in two threads beside one, to the "
-                   "last bit", said, "identical", "the callback writes nothing but its own run's forces",
-                   "none")  # fmt: skip
+    return behaves(
+        "handling.threads",
+        SYSTEM,
+        "three lane changes marched by MuJoCo in two threads beside one, to the last bit",
+        said,
+        "identical",
+        "the callback writes nothing but its own run's forces",
+        "none",
+    )
 
 
 def _march(handling: Handling, steps: int) -> Callable[[], Any]:

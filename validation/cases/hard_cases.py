@@ -38,13 +38,38 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     share = f"{len(data)} of {len(known)}" if quick else f"all {len(known)}"
     good = sum(all(o["word"] != "SILENT" for o in entry["outcomes"].values()) for entry in data)
     rows += [
-        at_most("hard.silent", SYSTEM, f"silent wrong answers in {share} cases, {_judged(data)} outcomes", silent,
-                "", 0.0, "a finite wrong answer without a word is never accepted", "none"),
-        within("hard.passed", SYSTEM, "hard cases that every implementation answers right, refuses or says it failed",
-               good, "cases", len(data), 0, f"every one; {share} were run", "none"),
-        at_most("hard.count", SYSTEM, "by how much fewer than 80 there are, all measurement files counted as one",
-                max(0, LEAST - counted - 1), "cases", 0.0, f"{counted} cases without measurement files", "none"),
-    ]  # fmt: skip
+        at_most(
+            "hard.silent",
+            SYSTEM,
+            f"silent wrong answers in {share} cases, {_judged(data)} outcomes",
+            silent,
+            "",
+            0.0,
+            "a finite wrong answer without a word is never accepted",
+            "none",
+        ),
+        within(
+            "hard.passed",
+            SYSTEM,
+            "hard cases that every implementation answers right, refuses or says it failed",
+            good,
+            "cases",
+            len(data),
+            0,
+            f"every one; {share} were run",
+            "none",
+        ),
+        at_most(
+            "hard.count",
+            SYSTEM,
+            "by how much fewer than 80 there are, all measurement files counted as one",
+            max(0, LEAST - counted - 1),
+            "cases",
+            0.0,
+            f"{counted} cases without measurement files",
+            "none",
+        ),
+    ]
     return rows, {"cases": data, "known": [(family, case.name) for family, case in known]}
 
 
@@ -90,12 +115,18 @@ def _catalogue(data: dict[str, Any]) -> Table:
     """Which cases stand for each number of the catalogue."""
     words = {name: ["in full"] for _, name in data["known"]}
     words |= {entry["name"]: sorted({o["word"] for o in entry["outcomes"].values()}) for entry in data["cases"]}
-    rows = tuple((str(number), what, "; ".join(f"{name} ({', '.join(words.get(name, ['missing']))})" for name in names))
-                 for number, (what, names) in COVERED.items())  # fmt: skip
+    rows = tuple(
+        (str(number), what, "; ".join(f"{name} ({', '.join(words.get(name, ['missing']))})" for name in names))
+        for number, (what, names) in COVERED.items()
+    )
     more = len(beyond(list(words)))
-    return Table("The catalogue of hard cases", f"Classes of failures known from practice and literature, with the "
-                 f"cases here that stand for each and their outcomes; {more} further cases belong to none of them.",
-                 ("number", "class of failures", "cases"), rows)  # fmt: skip
+    return Table(
+        "The catalogue of hard cases",
+        f"Classes of failures known from practice and literature, with the "
+        f"cases here that stand for each and their outcomes; {more} further cases belong to none of them.",
+        ("number", "class of failures", "cases"),
+        rows,
+    )
 
 
 def _counts(data: dict[str, Any]) -> Table:
@@ -104,10 +135,16 @@ def _counts(data: dict[str, Any]) -> Table:
     groups = {name: [entry for entry in data["cases"] if entry["family"] == name] for name in known}
     groups["all"] = data["cases"]
     known["all"] = len(data["known"])
-    rows = tuple((name.replace("_", " "), f"{len(own)} of {known[name]}", *(str(_count(own, word)) for word in WORDS))
-                 for name, own in groups.items())  # fmt: skip
-    return Table("Hard cases by family", "Outcomes are counted per implementation; a case in which no engine has a "
-                 "part is judged once.", ("family", "cases run", *WORDS), rows)  # fmt: skip
+    rows = tuple(
+        (name.replace("_", " "), f"{len(own)} of {known[name]}", *(str(_count(own, word)) for word in WORDS))
+        for name, own in groups.items()
+    )
+    return Table(
+        "Hard cases by family",
+        "Outcomes are counted per implementation; a case in which no engine has a part is judged once.",
+        ("family", "cases run", *WORDS),
+        rows,
+    )
 
 
 def _count(entries: list[dict[str, Any]], word: str) -> int:
@@ -117,11 +154,15 @@ def _count(entries: list[dict[str, Any]], word: str) -> int:
 def _all(entries: list[dict[str, Any]]) -> Table:
     """Every case: what is hard, what it is checked against, and what each implementation makes of it."""
     rows = tuple(
-        (entry["name"], entry["hard"], f"{entry['check']}{_allowed(entry)}",
-         *(_cell(entry["outcomes"][name]) if name in entry["outcomes"] else "as left" for name in IMPLEMENTATIONS),
-         entry["naive"])
+        (
+            entry["name"],
+            entry["hard"],
+            f"{entry['check']}{_allowed(entry)}",
+            *(_cell(entry["outcomes"][name]) if name in entry["outcomes"] else "as left" for name in IMPLEMENTATIONS),
+            entry["naive"],
+        )
         for entry in entries
-    )  # fmt: skip
+    )
     note = (
         "Each implementation is right (its error is beside the word), refuses before the run, or raises after it. "
         "SILENT would be a finite wrong answer without a word. The last column is what a build without the guard "

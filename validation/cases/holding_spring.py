@@ -99,9 +99,17 @@ def _ends(one: Setting, measured: Measured, engine: str) -> list[Row]:
     for factor, expected in ((0.6, "fails"), (1.2, "holds")):
         off = _error(one, factor * measured.law, measured, engine)
         key = f"holding_spring.{expected}.{engine}.{one.damping:g}{'.disturbed' if one.disturbed else ''}"
-        rows.append(behaves(key, SYSTEM, f"{factor} of the predicted {measured.law:.1f} N m/rad, {one}, {engine}",
-                            "holds" if off <= HELD else "fails", expected,
-                            f"largest pitch error {off:.3f} rad in {DURATION:g} s, {HELD} allowed", "closed form"))
+        rows.append(
+            behaves(
+                key,
+                SYSTEM,
+                f"{factor} of the predicted {measured.law:.1f} N m/rad, {one}, {engine}",
+                "holds" if off <= HELD else "fails",
+                expected,
+                f"largest pitch error {off:.3f} rad in {DURATION:g} s, {HELD} allowed",
+                "closed form",
+            )
+        )
     return rows
 
 
@@ -125,8 +133,10 @@ def _found_row(index: int, name: str, stiffness: float, law: float) -> Row:
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Stiffness found in each setting."""
-    rows = tuple((name, "none below 1.3 of the law" if math.isnan(found) else f"{found:.1f}", f"{data['law']:.1f}")
-                 for name, found in data["found"])  # fmt: skip
+    rows = tuple(
+        (name, "none below 1.3 of the law" if math.isnan(found) else f"{found:.1f}", f"{data['law']:.1f}")
+        for name, found in data["found"]
+    )
     heads = ("setting", "smallest found [N m/rad]", "predicted [N m/rad]")
     note = f"Study road at 20 m/s, {DURATION:g} s; held is a pitch error of at most {HELD} rad."
     return [Table("Smallest holding stiffness", note, heads, rows)] if rows else []

@@ -30,17 +30,27 @@ SEED, FORCE_NOISE, WALK = 31, 31.0, np.deg2rad(0.2)
 SMOOTH = 5.0
 """Bandwidth (Hz) of the pitch that such a gyro gives."""
 HAND: dict[str, dict[str, Any]] = {
-    "index 1": {}, "index 1, Baumgarte": {"alpha": ALPHA}, "index 1, projection": {"projected": True},
-}  # fmt: skip
+    "index 1": {},
+    "index 1, Baumgarte": {"alpha": ALPHA},
+    "index 1, projection": {"projected": True},
+}
 EXUDYN = {"index 2": "TrapezoidalIndex2", "index 3": "GeneralizedAlpha"}
 LACKING = (
-    ("exudyn.1", "Exudyn at index 1", "has no formulation on the level of accelerations; its explicit solvers leave "
-     "constraints out without a word, which the adapter refuses"),
+    (
+        "exudyn.1",
+        "Exudyn at index 1",
+        "has no formulation on the level of accelerations; its explicit solvers leave "
+        "constraints out without a word, which the adapter refuses",
+    ),
     ("exudyn.baumgarte", "Exudyn with Baumgarte's stabilisation", "has none: its index 3 needs none"),
     ("exudyn.projection", "Exudyn with projection", "has none between steps"),
-    ("mujoco", "MuJoCo at index 3, 2 or 1", "has no hard constraints: an equality is a spring and a damper on the "
-     "level of accelerations, so the adapter leaves the pitch out of the coordinates"),
-)  # fmt: skip
+    (
+        "mujoco",
+        "MuJoCo at index 3, 2 or 1",
+        "has no hard constraints: an equality is a spring and a damper on the "
+        "level of accelerations, so the adapter leaves the pitch out of the coordinates",
+    ),
+)
 """Id, words, why it is not there (Exudyn 1.13, MuJoCo 4)."""
 
 
@@ -68,12 +78,18 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         gaps, laws = _gaps(files), _laws(files)
         walked = _walked(files)
         loose = _loose(_drive(Path(name), 1.0 if quick else 12.0))
-    rows = [*_gap_rows(gaps, laws, files.duration), *_noise_rows(walked, loose),
-            *(not_run(f"index_reduction.{id}", SYSTEM, words, why) for id, words, why in LACKING)]  # fmt: skip
+    rows = [
+        *_gap_rows(gaps, laws, files.duration),
+        *_noise_rows(walked, loose),
+        *(not_run(f"index_reduction.{id}", SYSTEM, words, why) for id, words, why in LACKING),
+    ]
     times = STEP * np.arange(len(next(iter(gaps.values()))))
-    return rows, {"times": times.tolist(), "gaps": {name: gap.tolist() for name, gap in gaps.items()},
-                  "walked": {name: error.tolist() for name, error in walked.items()},
-                  "loose": {name: error[::10].tolist() for name, error in loose.items()}}  # fmt: skip
+    return rows, {
+        "times": times.tolist(),
+        "gaps": {name: gap.tolist() for name, gap in gaps.items()},
+        "walked": {name: error.tolist() for name, error in walked.items()},
+        "loose": {name: error[::10].tolist() for name, error in loose.items()},
+    }
 
 
 def _drive(folder: Path, duration: float) -> Files:
@@ -90,8 +106,10 @@ def _paths(assembly: Assembly, duration: float) -> dict[str, np.ndarray]:
     found = {name: IndexOne(assembly, **values).run(STEP, duration) for name, values in HAND.items()}
     for name, integrator in EXUDYN.items():
         found[name] = AsItComes(assembly, Settings(integrator, STEP, duration, spectral_radius=0.6)).run().states
-    found |= {f"eliminated, {engine}": build(engine, assembly, Settings("RK4", STEP, duration)).run().states
-              for engine in ("reference", "mujoco")}  # fmt: skip
+    found |= {
+        f"eliminated, {engine}": build(engine, assembly, Settings("RK4", STEP, duration)).run().states
+        for engine in ("reference", "mujoco")
+    }
     return {name: states[:, 3] for name, states in found.items()}
 
 
@@ -113,10 +131,16 @@ def _walked(files: Files) -> dict[str, np.ndarray]:
 def _loose(files: Files) -> dict[str, np.ndarray]:
     """Pitch minus true pitch (n,) under noisy forces and no guidance, by the solvers of both engines."""
     own = assemble(files.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
-    solvers = {"Exudyn's solver of index 2": ("exudyn", "TrapezoidalIndex2"),
-               "Exudyn's solver of index 3": ("exudyn", "GeneralizedAlpha"), "Runge-Kutta": ("reference", "RK4")}
-    return {name: build(engine, own, Settings(integrator, STEP, files.duration, spectral_radius=0.6)).run().states[:, 3]
-            - files.pitch for name, (engine, integrator) in solvers.items()}  # fmt: skip
+    solvers = {
+        "Exudyn's solver of index 2": ("exudyn", "TrapezoidalIndex2"),
+        "Exudyn's solver of index 3": ("exudyn", "GeneralizedAlpha"),
+        "Runge-Kutta": ("reference", "RK4"),
+    }
+    return {
+        name: build(engine, own, Settings(integrator, STEP, files.duration, spectral_radius=0.6)).run().states[:, 3]
+        - files.pitch
+        for name, (engine, integrator) in solvers.items()
+    }
 
 
 def _laws(files: Files) -> dict[str, tuple[np.ndarray, str]]:
@@ -125,23 +149,59 @@ def _laws(files: Files) -> dict[str, tuple[np.ndarray, str]]:
     return {
         "index 1": (gap_law(times, OFF, RATE_OFF), "g'' = 0 keeps both errors: g = g(0) + g'(0) t"),
         "index 1, Baumgarte": (gap_law(times, OFF, RATE_OFF, ALPHA), "g'' + 2 alpha g' + alpha^2 g = 0"),
-        "index 2": (np.append(OFF, OFF + STEP / 2 * RATE_OFF + _quadrature(files)[1:]),
-                    "g' = 0 keeps the error of the angle, and adds that of the trapezoidal rule over the rate"),
-    }  # fmt: skip
+        "index 2": (
+            np.append(OFF, OFF + STEP / 2 * RATE_OFF + _quadrature(files)[1:]),
+            "g' = 0 keeps the error of the angle, and adds that of the trapezoidal rule over the rate",
+        ),
+    }
 
 
 def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str]], duration: float) -> list[Row]:
     start = f"from a start off by {OFF:g} rad and {RATE_OFF:g} rad/s"
-    rows = [at_most(f"index_reduction.law.{_id(name)}", SYSTEM, f"{name}: gap {start} against its law",
-                    float(np.abs(gaps[name] - law).max() / OFF), "of the start's", 1e-3, why, "closed form")
-            for name, (law, why) in laws.items()]  # fmt: skip
-    none = {"index 1, projection": "each step ends on the constraint", "index 3": "the angle itself is the constraint",
-            "eliminated, reference": "the pitch is no unknown", "eliminated, mujoco": "the pitch is no unknown"}
-    rows += [at_most(f"index_reduction.none.{_id(name)}", SYSTEM, f"{name}: gap after the first step, {start}",
-                     float(np.abs(gaps[name][1:]).max()), "rad", 1e-12, why, "closed form")
-             for name, why in none.items()]  # fmt: skip
-    rows.append(finding("index_reduction.gain", SYSTEM, f"index 1: gap after {duration:g} s by that of the start",
-                        float(gaps["index 1"][-1] / OFF), "", 1 + RATE_OFF / OFF * duration, "it never stops", "none"))
+    rows = [
+        at_most(
+            f"index_reduction.law.{_id(name)}",
+            SYSTEM,
+            f"{name}: gap {start} against its law",
+            float(np.abs(gaps[name] - law).max() / OFF),
+            "of the start's",
+            1e-3,
+            why,
+            "closed form",
+        )
+        for name, (law, why) in laws.items()
+    ]
+    none = {
+        "index 1, projection": "each step ends on the constraint",
+        "index 3": "the angle itself is the constraint",
+        "eliminated, reference": "the pitch is no unknown",
+        "eliminated, mujoco": "the pitch is no unknown",
+    }
+    rows += [
+        at_most(
+            f"index_reduction.none.{_id(name)}",
+            SYSTEM,
+            f"{name}: gap after the first step, {start}",
+            float(np.abs(gaps[name][1:]).max()),
+            "rad",
+            1e-12,
+            why,
+            "closed form",
+        )
+        for name, why in none.items()
+    ]
+    rows.append(
+        finding(
+            "index_reduction.gain",
+            SYSTEM,
+            f"index 1: gap after {duration:g} s by that of the start",
+            float(gaps["index 1"][-1] / OFF),
+            "",
+            1 + RATE_OFF / OFF * duration,
+            "it never stops",
+            "none",
+        )
+    )
     return [*rows, _index_two_refused()]
 
 
@@ -169,8 +229,14 @@ def _index_two_refused() -> Row:
         found = "refused" if "useNewmark" in str(error) else str(error)
     else:
         found = "answered"
-    return behaves("index_reduction.exudyn.alpha_2", SYSTEM, "Exudyn's generalised-alpha with its flag for index 2",
-                   found, "refused", "index 2 is there with the trapezoidal rule alone")  # fmt: skip
+    return behaves(
+        "index_reduction.exudyn.alpha_2",
+        SYSTEM,
+        "Exudyn's generalised-alpha with its flag for index 2",
+        found,
+        "refused",
+        "index 2 is there with the trapezoidal rule alone",
+    )
 
 
 def _noise_rows(walked: dict[str, np.ndarray], loose: dict[str, np.ndarray]) -> list[Row]:
@@ -182,11 +248,31 @@ def _noise_rows(walked: dict[str, np.ndarray], loose: dict[str, np.ndarray]) -> 
     for id, words, errors in (("walk", guided, walked), ("force", free, loose)):
         paths = np.array(list(errors.values()))
         size = float(np.sqrt(np.mean(paths[-1] ** 2)))
-        rows.append(finding(f"index_reduction.{id}.size", SYSTEM, f"{words}: rms error of the pitch", size, "rad",
-                            "not zero", "noise, integrated once or twice: the data itself drifts", "none"))
+        rows.append(
+            finding(
+                f"index_reduction.{id}.size",
+                SYSTEM,
+                f"{words}: rms error of the pitch",
+                size,
+                "rad",
+                "not zero",
+                "noise, integrated once or twice: the data itself drifts",
+                "none",
+            )
+        )
         apart = float(np.ptp(paths, axis=0).max()) / size
-        rows.append(at_most(f"index_reduction.{id}", SYSTEM, f"{words}: largest difference of the error between "
-                            f"{len(paths)} formulations, by its rms", apart, "", 0.05, why, "native"))
+        rows.append(
+            at_most(
+                f"index_reduction.{id}",
+                SYSTEM,
+                f"{words}: largest difference of the error between {len(paths)} formulations, by its rms",
+                apart,
+                "",
+                0.05,
+                why,
+                "native",
+            )
+        )
     return rows
 
 
@@ -202,8 +288,12 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     for name, gap in data["gaps"].items():
         if max(map(abs, gap[1:])) > 1e-12:
             left.semilogy(data["times"], [abs(value) for value in gap], label=name)
-    left.set(xlabel="time [s]", ylabel="|pitch - prescribed pitch| [rad]", ylim=(1e-9, None),
-             title=f"Start off by {OFF:g} rad and {RATE_OFF:g} rad/s")  # fmt: skip
+    left.set(
+        xlabel="time [s]",
+        ylabel="|pitch - prescribed pitch| [rad]",
+        ylim=(1e-9, None),
+        title=f"Start off by {OFF:g} rad and {RATE_OFF:g} rad/s",
+    )
     left.legend(title="projection, index 3, eliminated: 0", title_fontsize="small", fontsize="small")
     for i, (name, error) in enumerate(data["loose"].items()):
         right.plot([10 * STEP * j for j in range(len(error))], error, label=name, linewidth=4 - 1.5 * i)
@@ -211,5 +301,10 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     right.legend(fontsize="small")
     for axis in (left, right):
         axis.locator_params(axis="x", nbins=5)  # runs of the quick report are short, their times have many digits
-    return [("Drift by index reduction is the constraint's own and can be cured; drift by noise is the data's, and "
-             "no formulation and no solver sees it.", figure)]
+    return [
+        (
+            "Drift by index reduction is the constraint's own and can be cured; drift by noise is the data's, and "
+            "no formulation and no solver sees it.",
+            figure,
+        )
+    ]

@@ -59,12 +59,16 @@ def _consistency_rows(folder: Path, count: int, duration: float, filters: tuple[
         {name: np.concatenate([one[j] for one in some]) for name, some in found.items()} for j in (0, 1)
     )
     each, every = f"{count} runs, once a second", f"{count} runs, all innovations"
-    rows = [_band_row("nees", "normalised error squared of 6 states", errors["right"], 6, each),
-            _band_row("nis", "normalised innovation squared", surprises["right"], 1, every),
-            *_named_rows([one[2] for one in found["right"]])]
+    rows = [
+        _band_row("nees", "normalised error squared of 6 states", errors["right"], 6, each),
+        _band_row("nis", "normalised innovation squared", surprises["right"], 1, every),
+        *_named_rows([one[2] for one in found["right"]]),
+    ]
     if "Q" in filters:
-        rows += [_outside_row("wrong-q", "NEES", "force noise", errors["Q"], 6),
-                 _outside_row("wrong-r", "NIS", "measurement noise", surprises["R"], 1)]
+        rows += [
+            _outside_row("wrong-q", "NEES", "force noise", errors["Q"], 6),
+            _outside_row("wrong-r", "NIS", "measurement noise", surprises["R"], 1),
+        ]
     return rows
 
 
@@ -77,15 +81,36 @@ def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
     count = len(innovations)
     alarms = sum(not consistency(one, ("pitch",)).consistent for one in innovations)
     planted: dict[str, Callable[[np.ndarray], np.ndarray]] = {
-        "larger by a quarter": lambda w: 1.25 * w, f"with a mean of {BIAS:g} deviations": lambda w: w + BIAS,
+        "larger by a quarter": lambda w: 1.25 * w,
+        f"with a mean of {BIAS:g} deviations": lambda w: w + BIAS,
         f"correlated by {SLUGGISH:g}": lambda w: np.vstack([w[:1], w[1:] + SLUGGISH * w[:-1]]),
-    }  # fmt: skip
-    rows = [at_most("kalman.alarms", SYSTEM, "right filters called inconsistent", alarms, "", 1,
-                    f"of {count} runs; stated level {ALARMS:g} of all runs", "closed form")]
+    }
+    rows = [
+        at_most(
+            "kalman.alarms",
+            SYSTEM,
+            "right filters called inconsistent",
+            alarms,
+            "",
+            1,
+            f"of {count} runs; stated level {ALARMS:g} of all runs",
+            "closed form",
+        )
+    ]
     for words, plant in planted.items():
         silent = sum(consistency(plant(one), ("pitch",)).consistent for one in innovations)
-        rows.append(at_most(f"kalman.named.{words.split()[0]}", SYSTEM, f"filters whose innovations are {words}, not "
-                            "named", silent, "", 0, f"of {count} runs", "closed form"))  # fmt: skip
+        rows.append(
+            at_most(
+                f"kalman.named.{words.split()[0]}",
+                SYSTEM,
+                f"filters whose innovations are {words}, not named",
+                silent,
+                "",
+                0,
+                f"of {count} runs",
+                "closed form",
+            )
+        )
     return rows
 
 
@@ -93,9 +118,15 @@ def _outside_row(name: str, words: str, noise: str, values: np.ndarray, freedom:
     """A filter that is told a wrong variance must be found out."""
     low, high = _band(freedom * len(values))
     mean = float(values.mean()) / freedom
-    return behaves(f"kalman.{name}", SYSTEM, f"{words} of a filter that is told 4 times the variance of the {noise}",
-                   "inside" if low <= mean <= high else "outside", "outside",
-                   f"mean per degree of freedom {mean:.3f}, band {low:.3f} to {high:.3f}", "closed form")  # fmt: skip
+    return behaves(
+        f"kalman.{name}",
+        SYSTEM,
+        f"{words} of a filter that is told 4 times the variance of the {noise}",
+        "inside" if low <= mean <= high else "outside",
+        "outside",
+        f"mean per degree of freedom {mean:.3f}, band {low:.3f} to {high:.3f}",
+        "closed form",
+    )
 
 
 def _band(freedom: int) -> tuple[float, float]:
@@ -107,10 +138,21 @@ def _band(freedom: int) -> tuple[float, float]:
 def _band_row(name: str, words: str, values: np.ndarray, freedom: int, sample: str) -> Row:
     low, high = _band(freedom * len(values))
     mean = float(values.mean()) / freedom
-    why = (f"{100 * LEVEL:g} % band {low:.3f} to {high:.3f} of chi-square with {freedom * len(values)} degrees of "
-           f"freedom: {sample}")  # fmt: skip
-    return within(f"kalman.{name}", SYSTEM, f"{words}, mean per degree of freedom, no model error", mean, "",
-                  (low + high) / 2, (high - low) / 2, why, "closed form")  # fmt: skip
+    why = (
+        f"{100 * LEVEL:g} % band {low:.3f} to {high:.3f} of chi-square with {freedom * len(values)} degrees of "
+        f"freedom: {sample}"
+    )
+    return within(
+        f"kalman.{name}",
+        SYSTEM,
+        f"{words}, mean per degree of freedom, no model error",
+        mean,
+        "",
+        (low + high) / 2,
+        (high - low) / 2,
+        why,
+        "closed form",
+    )
 
 
 def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None, sensors: tuple[str, ...]) -> list[Row]:
@@ -121,18 +163,39 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
         held = f"{LOST:.0%} of the samples lost" + (f", none from {outage[0]:g} to {outage[1]:g} s" if outage else "")
         id, words = f"kalman.gaps.{name.replace(' ', '-')}", "largest pitch error by its stated deviation"
         why = f"Gaussian: 5 deviations are left once in 1.7 million; deviation up to {found['deviation']:.2g} rad"
-        rows.append(at_most(id, SYSTEM, f"{words}, {name}, {held}", found["error by deviation"], "", 5.0, why,
-                            "closed form"))
-        rows.append(at_most(f"{id}.count", SYSTEM, f"cells without a number that were not counted, {name}",
-                            found["miscounted"], "", 0.0, f"{found['missed']:.0f} were written", "closed form"))
+        rows.append(
+            at_most(id, SYSTEM, f"{words}, {name}, {held}", found["error by deviation"], "", 5.0, why, "closed form")
+        )
+        rows.append(
+            at_most(
+                f"{id}.count",
+                SYSTEM,
+                f"cells without a number that were not counted, {name}",
+                found["miscounted"],
+                "",
+                0.0,
+                f"{found['missed']:.0f} were written",
+                "closed form",
+            )
+        )
     return rows
 
 
 def _short_rows(folder: Path) -> list[Row]:
     found = runs.stabilised(folder, 3.0, SEED, ENGINES[:1])["reference"]
     why = "until the inertia is learnt, 5 % of the fast pitch are missing"
-    return [at_most("kalman.short", SYSTEM, "largest pitch error of a stabilised run of 3 s, wrong model and noise",
-                    found["pitch"], "rad", 5e-3, why, "none")]
+    return [
+        at_most(
+            "kalman.short",
+            SYSTEM,
+            "largest pitch error of a stabilised run of 3 s, wrong model and noise",
+            found["pitch"],
+            "rad",
+            5e-3,
+            why,
+            "none",
+        )
+    ]
 
 
 def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
@@ -147,9 +210,19 @@ def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
     for i in range(12):
         who, what = ("estimate", "run")[i // 6], names[i % 6]
         why = f"{LOOP_RUNS} runs of {LOOP:g} s; spread {spread[i]:.1%} from the loop's own autocorrelation, times 3.29"
-        rows.append(within(f"kalman.covariance.{who}.{i % 6}", SYSTEM,
-                           f"variance of the {who}'s error in {what}: filter and run by discrete Lyapunov equation",
-                           squares[i] / covariance[i, i], "", 1.0, 3.29 * spread[i], why, "closed form"))  # fmt: skip
+        rows.append(
+            within(
+                f"kalman.covariance.{who}.{i % 6}",
+                SYSTEM,
+                f"variance of the {who}'s error in {what}: filter and run by discrete Lyapunov equation",
+                squares[i] / covariance[i, i],
+                "",
+                1.0,
+                3.29 * spread[i],
+                why,
+                "closed form",
+            )
+        )
         table.append([float(np.sqrt(covariance[i, i])), float(np.sqrt(squares[i]))])
     return rows, table
 
@@ -158,14 +231,40 @@ def _gyro_rows(found: dict[str, float]) -> list[Row]:
     words = "pitch deviation that a gyro of 0.1 rad/s at 1 kHz alone leaves after 600 s"
     why = "the instability makes the pitch visible in its rate; lambda from the true run is good to 5 %"
     return [
-        within("kalman.gyro", SYSTEM, f"{words}, by the averaged Riccati equation", found["stated"] / found["law"], "",
-               1.0, 0.1, why, "closed form"),
-        within("kalman.gyro.error", SYSTEM, "its actual error, rms from 100 s on, by the stated deviation",
-               found["error"] / found["stated"], "", 1.0, 0.2, "the error's slow pole is lambda, so 500 s hold some "
-               "T lambda = 195 independent squares: 3.29 / sqrt(2 195) = 17 %", "closed form"),
-        finding("kalman.gyro.level", SYSTEM, "the same about a level vehicle, A(0): a random walk", found["walk"],
-                "rad", found["stated"], "nothing in A(0) shows the pitch", "closed form"),
-    ]  # fmt: skip
+        within(
+            "kalman.gyro",
+            SYSTEM,
+            f"{words}, by the averaged Riccati equation",
+            found["stated"] / found["law"],
+            "",
+            1.0,
+            0.1,
+            why,
+            "closed form",
+        ),
+        within(
+            "kalman.gyro.error",
+            SYSTEM,
+            "its actual error, rms from 100 s on, by the stated deviation",
+            found["error"] / found["stated"],
+            "",
+            1.0,
+            0.2,
+            "the error's slow pole is lambda, so 500 s hold some "
+            "T lambda = 195 independent squares: 3.29 / sqrt(2 195) = 17 %",
+            "closed form",
+        ),
+        finding(
+            "kalman.gyro.level",
+            SYSTEM,
+            "the same about a level vehicle, A(0): a random walk",
+            found["walk"],
+            "rad",
+            found["stated"],
+            "nothing in A(0) shows the pitch",
+            "closed form",
+        ),
+    ]
 
 
 def _damage_rows(damage: list[dict[str, dict[str, float]]]) -> list[Row]:
@@ -173,11 +272,16 @@ def _damage_rows(damage: list[dict[str, dict[str, float]]]) -> list[Row]:
     for engine in ENGINES:
         for name in CHANNELS:
             ratios = np.array([one[engine][name] for one in damage])
-            why = (f"wrong model, noise of 0.2 %, 0.1 degree white; {len(ratios)} noise samples, standard deviation "
-                   f"{ratios.std(ddof=1):.2%}, from {ratios.min():.4f} to {ratios.max():.4f}")  # fmt: skip
+            why = (
+                f"wrong model, noise of 0.2 %, 0.1 degree white; {len(ratios)} noise samples, standard deviation "
+                f"{ratios.std(ddof=1):.2%}, from {ratios.min():.4f} to {ratios.max():.4f}"
+            )
             words = f"mean pseudo-damage of {name} by the true one, {engine}"
-            rows.append(within(f"kalman.damage.{name}.{engine}", SYSTEM, words, float(ratios.mean()), "", 1.0, 0.02,
-                               why, "native"))
+            rows.append(
+                within(
+                    f"kalman.damage.{name}.{engine}", SYSTEM, words, float(ratios.mean()), "", 1.0, 0.02, why, "native"
+                )
+            )
     return rows
 
 
@@ -190,16 +294,47 @@ def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str
         ("pull", "artificial moment without what the inertia lacks, wrong model", own, "pull"),
     ):
         for band, range_ in (("", "all frequencies"), (", band", "up to 15 Hz")):
-            rows.append(at_most(f"kalman.moment.{name}{band.replace(', ', '.')}", SYSTEM,
-                                f"{words}, rms by that of I beta'', {range_}", max(one[key + band] for one in some), "",
-                                0.02, "largest of all samples; 0.4 % were seen when the settings were chosen", "none"))
+            rows.append(
+                at_most(
+                    f"kalman.moment.{name}{band.replace(', ', '.')}",
+                    SYSTEM,
+                    f"{words}, rms by that of I beta'', {range_}",
+                    max(one[key + band] for one in some),
+                    "",
+                    0.02,
+                    "largest of all samples; 0.4 % were seen when the settings were chosen",
+                    "none",
+                )
+            )
     total = float(np.mean([one["all, band"] for one in own]))
-    rows.append(within("kalman.moment.wrong", SYSTEM, "all artificial moments, wrong model, up to 15 Hz", total, "",
-                       0.05, 0.005, "the model lacks 5 % of the inertia", "closed form"))  # fmt: skip
+    rows.append(
+        within(
+            "kalman.moment.wrong",
+            SYSTEM,
+            "all artificial moments, wrong model, up to 15 Hz",
+            total,
+            "",
+            0.05,
+            0.005,
+            "the model lacks 5 % of the inertia",
+            "closed form",
+        )
+    )
     inertia = [one["inertia"] for one in own]
     why = f"I is 5 % too small; samples spread by {np.std(inertia):.1e}"
-    rows.append(within("kalman.inertia", SYSTEM, "share by which 1/I is estimated above the model's, mean",
-                       float(np.mean(inertia)), "", -0.05, 3e-3, why, "closed form"))  # fmt: skip
+    rows.append(
+        within(
+            "kalman.inertia",
+            SYSTEM,
+            "share by which 1/I is estimated above the model's, mean",
+            float(np.mean(inertia)),
+            "",
+            -0.05,
+            3e-3,
+            why,
+            "closed form",
+        )
+    )
     return rows
 
 
@@ -209,16 +344,37 @@ def tables(data: dict[str, Any]) -> list[Table]:
         return []
     keys = (*CHANNELS, "pull", "all, band", "pitch")
     rows = tuple(
-        (engine, *(f"{np.mean([one[engine][key] for one in data['damage']]):.4f} +- "
-                   f"{np.std([one[engine][key] for one in data['damage']], ddof=1):.4f}" for key in keys))
+        (
+            engine,
+            *(
+                f"{np.mean([one[engine][key] for one in data['damage']]):.4f} +- "
+                f"{np.std([one[engine][key] for one in data['damage']], ddof=1):.4f}"
+                for key in keys
+            ),
+        )
         for engine in ENGINES
-    )  # fmt: skip
-    note = (f"Mean and standard deviation over {len(data['damage'])} noise samples of {DURATION:g} s: damage by the "
-            "true one, moments by I beta'' (rms), largest pitch error in rad.")  # fmt: skip
-    heads = ("engine", *(f"D({name})" for name in CHANNELS), "moment that draws", "all moments, to 15 Hz",
-             "pitch error")  # fmt: skip
-    loop = tuple((("estimate", "run")[i // 6], str(i % 6), f"{law:.3e}", f"{found:.3e}")
-                 for i, (law, found) in enumerate(data["deviations"]))  # fmt: skip
-    return [Table("Stabilised runs, wrong model and noisy forces", note, heads, rows),
-            Table("Errors of the linearised loop", "States: z1 - z3, z2 - z3, pitch, and their rates; SI.",
-                  ("error of", "state", "Lyapunov", "Monte Carlo"), loop)]  # fmt: skip
+    )
+    note = (
+        f"Mean and standard deviation over {len(data['damage'])} noise samples of {DURATION:g} s: damage by the "
+        "true one, moments by I beta'' (rms), largest pitch error in rad."
+    )
+    heads = (
+        "engine",
+        *(f"D({name})" for name in CHANNELS),
+        "moment that draws",
+        "all moments, to 15 Hz",
+        "pitch error",
+    )
+    loop = tuple(
+        (("estimate", "run")[i // 6], str(i % 6), f"{law:.3e}", f"{found:.3e}")
+        for i, (law, found) in enumerate(data["deviations"])
+    )
+    return [
+        Table("Stabilised runs, wrong model and noisy forces", note, heads, rows),
+        Table(
+            "Errors of the linearised loop",
+            "States: z1 - z3, z2 - z3, pitch, and their rates; SI.",
+            ("error of", "state", "Lyapunov", "Monte Carlo"),
+            loop,
+        ),
+    ]

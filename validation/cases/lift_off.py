@@ -49,14 +49,24 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return [*rows, *_pulls(quick), *_in_space(quick), *([] if quick else _above_a_cut())], {}
 
 
-def scene(parameters: str = VEHICLES[-1], geometry: str = "exact", duration: float = 1.0, step: float = STEP,
-          road: bool = False, override: dict[str, float] | None = None) -> Scene:  # fmt: skip
+def scene(
+    parameters: str = VEHICLES[-1],
+    geometry: str = "exact",
+    duration: float = 1.0,
+    step: float = STEP,
+    road: bool = False,
+    override: dict[str, float] | None = None,
+) -> Scene:
     """The half car on tyres that only push: on the study road from rest, or dropped on a flat one."""
-    return build_scene({
-        "title": TITLE, "vehicle": {"parameters": parameters, "geometry": geometry, "override": override or {}},
-        "run": {"duration": duration, "step": step}, "start": {} if road else START,
-        "effects": {"lift_off": {}, **({"road": STUDY_ROAD} if road else {})},
-    })  # fmt: skip
+    return build_scene(
+        {
+            "title": TITLE,
+            "vehicle": {"parameters": parameters, "geometry": geometry, "override": override or {}},
+            "run": {"duration": duration, "step": step},
+            "start": {} if road else START,
+            "effects": {"lift_off": {}, **({"road": STUDY_ROAD} if road else {})},
+        }
+    )
 
 
 def _accelerations(parameters: str) -> list[Row]:
@@ -68,9 +78,18 @@ def _accelerations(parameters: str) -> list[Row]:
         for engine in ENGINES:
             error = checks.acceleration_gap(checks.engine(engine), assembly, settings_of(own, engine))
             what = "acceleration at 100 random states, wheels in the air and hit among them"
-            rows.append(at_most(f"lift_off.audit.{engine}.{parameters}.{geometry}", SYSTEM, f"{what}, {engine} against "
-                                f"the written equations, {parameters}, {geometry} geometry", error, "of the largest",
-                                1e-12, "a dozen products of doubles; the law stands in each by itself", "native"))
+            rows.append(
+                at_most(
+                    f"lift_off.audit.{engine}.{parameters}.{geometry}",
+                    SYSTEM,
+                    f"{what}, {engine} against the written equations, {parameters}, {geometry} geometry",
+                    error,
+                    "of the largest",
+                    1e-12,
+                    "a dozen products of doubles; the law stands in each by itself",
+                    "native",
+                )
+            )
     return rows
 
 
@@ -78,13 +97,34 @@ def _paths(parameters: str, duration: float) -> list[Row]:
     """Whole paths on the study road at the same step; the least load of any of them."""
     own = scene(parameters, duration=duration, step=5e-4, road=True)
     runs = {engine: simulate(own, engine) for engine in ALL}
-    rows = [at_most(f"lift_off.path.{engine}.{parameters}", SYSTEM, f"states over {duration:g} s of the study road, "
-                    f"{engine} against reference, {parameters}", gap(runs[engine], runs["reference"]), STATES, 1e-11,
-                    f"{ROUNDING}; each landing makes the difference some times as large", "native")
-            for engine in ENGINES]  # fmt: skip
+    rows = [
+        at_most(
+            f"lift_off.path.{engine}.{parameters}",
+            SYSTEM,
+            f"states over {duration:g} s of the study road, {engine} against reference, {parameters}",
+            gap(runs[engine], runs["reference"]),
+            STATES,
+            1e-11,
+            f"{ROUNDING}; each landing makes the difference some times as large",
+            "native",
+        )
+        for engine in ENGINES
+    ]
     least = min(_loads(run).min() for run in runs.values())
-    return [*rows, within(f"lift_off.least.{parameters}", SYSTEM, f"least wheel load of these runs, {parameters}",
-                          float(least), "N", 0.0, 0.0, "wheels leave the road, and no tyre pulls", "none")]  # fmt: skip
+    return [
+        *rows,
+        within(
+            f"lift_off.least.{parameters}",
+            SYSTEM,
+            f"least wheel load of these runs, {parameters}",
+            float(least),
+            "N",
+            0.0,
+            0.0,
+            "wheels leave the road, and no tyre pulls",
+            "none",
+        ),
+    ]
 
 
 def _loads(run: Result) -> np.ndarray:
@@ -102,9 +142,19 @@ def _exact(duration: float) -> list[Row]:
         for engine in ALL:
             error = float(np.abs(simulate(own, engine).states - exact).max())
             name = f"lift_off.exact.{engine}.{'stiff' if override else 'own'}"
-            rows.append(at_most(name, SYSTEM, f"vehicle dropped from 0.3 m, tyre dampers {what}: states beside matrix "
-                                f"exponentials between the switches, {engine} at 0.1 ms", error, STATES, 2e-4,
-                                "a corner within a step costs its square, at every landing", "closed form"))
+            rows.append(
+                at_most(
+                    name,
+                    SYSTEM,
+                    f"vehicle dropped from 0.3 m, tyre dampers {what}: states beside matrix "
+                    f"exponentials between the switches, {engine} at 0.1 ms",
+                    error,
+                    STATES,
+                    2e-4,
+                    "a corner within a step costs its square, at every landing",
+                    "closed form",
+                )
+            )
     return rows
 
 
@@ -113,8 +163,12 @@ def _order(halvings: int) -> Row:
     own = scene(geometry="linear")
     steps, coarse = 1e-3 / 2.0 ** np.arange(halvings), 1e-3
     exact = Bounces(assemble(own), coarse).path(assemble(own).initial, round(1.0 / coarse))
-    errors = [float(np.abs(simulate(own, "reference", Settings("RK4", step, 1.0)).states[:: round(coarse / step)]
-                           - exact).max()) for step in steps]  # fmt: skip
+    errors = [
+        float(
+            np.abs(simulate(own, "reference", Settings("RK4", step, 1.0)).states[:: round(coarse / step)] - exact).max()
+        )
+        for step in steps
+    ]
     slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
     what = f"observed order of RK4 through landings, {halvings - 1} halvings of 1 ms"
     why = "the force has corners: 2 on the average, 4 between them"
@@ -129,15 +183,33 @@ def _energy(duration: float) -> list[Row]:
         states = simulate(own, engine).states
         found = energy(assemble(own), states)
         size = found[0] - energy(assemble(own), np.zeros((1, 8)))[0]  # by its fall to the road
-        rows.append(at_most(f"lift_off.energy.{engine}", SYSTEM, "change of energy of a bouncing vehicle without "
-                            f"dampers, {duration:g} s, {engine}", float(np.abs(found - found[0]).max() / size),
-                            "of the fall's", 1e-4, "the error of the step", "closed form"))
+        rows.append(
+            at_most(
+                f"lift_off.energy.{engine}",
+                SYSTEM,
+                f"change of energy of a bouncing vehicle without dampers, {duration:g} s, {engine}",
+                float(np.abs(found - found[0]).max() / size),
+                "of the fall's",
+                1e-4,
+                "the error of the step",
+                "closed form",
+            )
+        )
         damped = scene(duration=duration, override=UNDAMPED | {"d1": 2e3, "d2": 500.0})
         found = energy(assemble(damped), simulate(damped, engine).states)
         gain = float((found - np.minimum.accumulate(found)).max() / size)
-        rows.append(at_most(f"lift_off.gain.{engine}", SYSTEM, "the same with dampers in the tyres alone: gain of "
-                            f"energy, {engine}", gain, "of the fall's", 1e-4,
-                            "the damper takes energy and never gives any", "closed form"))
+        rows.append(
+            at_most(
+                f"lift_off.gain.{engine}",
+                SYSTEM,
+                f"the same with dampers in the tyres alone: gain of energy, {engine}",
+                gain,
+                "of the fall's",
+                1e-4,
+                "the damper takes energy and never gives any",
+                "closed form",
+            )
+        )
     return rows
 
 
@@ -149,19 +221,51 @@ def _pulls(quick: bool) -> list[Row]:
     rms = [float(np.sqrt(np.mean((_loads(run) - loads.mean(axis=1)[:, None]) ** 2))) for run in (linear, lifting)]
     what = f"the paper's vehicle and tyre on the study road, {own.run.duration:g} s"
     return [
-        finding("lift_off.pull", SYSTEM, f"{what}: largest pull on the road", float(-loads.min()), "N", 0.0,
-                "a tyre pushes; the paper's is linear", "none"),
-        finding("lift_off.share", SYSTEM, "the same: share of time in which one or the other wheel pulls",
-                100.0 * float((loads < 0.0).any(axis=0).mean()), "%", 0.0, "a tyre pushes", "none"),
-        finding("lift_off.rms", SYSTEM, "rms of the dynamic wheel loads with tyres that lift, by that of linear ones",
-                rms[1] / rms[0], "", 1.0, "what the linear tyre costs", "none"),
-    ]  # fmt: skip
+        finding(
+            "lift_off.pull",
+            SYSTEM,
+            f"{what}: largest pull on the road",
+            float(-loads.min()),
+            "N",
+            0.0,
+            "a tyre pushes; the paper's is linear",
+            "none",
+        ),
+        finding(
+            "lift_off.share",
+            SYSTEM,
+            "the same: share of time in which one or the other wheel pulls",
+            100.0 * float((loads < 0.0).any(axis=0).mean()),
+            "%",
+            0.0,
+            "a tyre pushes",
+            "none",
+        ),
+        finding(
+            "lift_off.rms",
+            SYSTEM,
+            "rms of the dynamic wheel loads with tyres that lift, by that of linear ones",
+            rms[1] / rms[0],
+            "",
+            1.0,
+            "what the linear tyre costs",
+            "none",
+        ),
+    ]
 
 
 def _in_space(quick: bool) -> list[Row]:
     """R19-ride where its tyres lift: accelerations beside the written ones, and both engines on a random road."""
-    own = build_ride({"title": TITLE, "system": "ride", "vehicle": {"file": "r19_ride", "operating_point": "loaded"},
-                      "road": {"level": 3e-4}, "speeds": {"values": [SPEED]}, "effects": {"lift_off": {}}})  # fmt: skip
+    own = build_ride(
+        {
+            "title": TITLE,
+            "system": "ride",
+            "vehicle": {"file": "r19_ride", "operating_point": "loaded"},
+            "road": {"level": 3e-4},
+            "speeds": {"values": [SPEED]},
+            "effects": {"lift_off": {}},
+        }
+    )
     car, random, worst = vehicle_of(own), np.random.default_rng(SEED), dict.fromkeys(ENGINES, 0.0)
     damped = replace(car, tyres=tuple(replace(tyre, damping=300.0 + i) for i, tyre in enumerate(car.tyres)))
     written, n, w = SpatialReference(damped), len(car.coordinates()), len(car.tyres)
@@ -177,12 +281,30 @@ def _in_space(quick: bool) -> list[Row]:
     one, two = (ridden(engine, car, path, 1.0 if quick else 10.0, seed=SEED, every=20).run for engine in ENGINES)
     apart = max(np.abs(one.positions - two.positions).max(), np.abs(one.rates - two.rates).max())
     return [
-        *(at_most(f"lift_off.space.{engine}", "ride", f"R19-ride, tyres in the air, pressed and hit: accelerations, "
-                  f"{engine} against the written ones", worst[engine], "of the largest", 1e-12,
-                  "each has the law in its code", "native") for engine in ENGINES),
-        at_most("lift_off.ride", "ride", "R19-ride on 20 times the paper's road: states, exudyn against mujoco",
-                float(apart), STATES, 1e-10, ROUNDING, "native"),
-    ]  # fmt: skip
+        *(
+            at_most(
+                f"lift_off.space.{engine}",
+                "ride",
+                f"R19-ride, tyres in the air, pressed and hit: accelerations, {engine} against the written ones",
+                worst[engine],
+                "of the largest",
+                1e-12,
+                "each has the law in its code",
+                "native",
+            )
+            for engine in ENGINES
+        ),
+        at_most(
+            "lift_off.ride",
+            "ride",
+            "R19-ride on 20 times the paper's road: states, exudyn against mujoco",
+            float(apart),
+            STATES,
+            1e-10,
+            ROUNDING,
+            "native",
+        ),
+    ]
 
 
 def _above_a_cut() -> list[Row]:
@@ -194,8 +316,25 @@ def _above_a_cut() -> list[Row]:
     apart = max(float(np.abs(runs[engine].states - runs["reference"].states).max()) for engine in ENGINES)
     loads = runs["reference"].wrenches[:, :, 2]
     return [
-        at_most("lift_off.hubs", "drift", f"R19-free on a class E road, {duration:g} s: states of exudyn and mujoco "
-                "against the reference", apart, STATES, 1e-10, "one law, three mass matrices", "shared kernel"),
-        within("lift_off.hubs.least", "drift", "the same: least force of the road on a hub", float(loads.min()), "N",
-               0.0, 0.0, "wheels leave the road, and no tyre pulls", "none"),
-    ]  # fmt: skip
+        at_most(
+            "lift_off.hubs",
+            "drift",
+            f"R19-free on a class E road, {duration:g} s: states of exudyn and mujoco against the reference",
+            apart,
+            STATES,
+            1e-10,
+            "one law, three mass matrices",
+            "shared kernel",
+        ),
+        within(
+            "lift_off.hubs.least",
+            "drift",
+            "the same: least force of the road on a hub",
+            float(loads.min()),
+            "N",
+            0.0,
+            0.0,
+            "wheels leave the road, and no tyre pulls",
+            "none",
+        ),
+    ]

@@ -34,15 +34,31 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     placed, each = _timed(rolling, BENCHMARK_YAW, published[:, 0])
     rows = [row for wheel in WHEELS for row in _published_rows(wheel, placed, published)]
     two = still.at(5e-3)
-    rows.append(within("manchester.two_patches", SYSTEM, "patches on the right wheel at 5 mm, case A-1",
-                       float(len(two.right)), "", 2.0, 0.0, "the gauge corner takes over from the head",
-                       "published"))  # fmt: skip
+    rows.append(
+        within(
+            "manchester.two_patches",
+            SYSTEM,
+            "patches on the right wheel at 5 mm, case A-1",
+            float(len(two.right)),
+            "",
+            2.0,
+            0.0,
+            "the gauge corner takes over from the head",
+            "published",
+        )
+    )
     data: dict[str, Any] = {"A-2": [_told(one) for one in placed], "published": published.tolist()}
     if not quick:
         static, each_still = _timed(still, 0.0, CONTACT[::2, 0])
         data["A-1"] = [_told(one) for one in static]
-        rows += [*_static_rows(still, static), *_split_rows(rolling, placed[10]), *_file_rows(rolling, placed),
-                 _load_row(static), _axle_row(placed[0]), *_price_rows({"A-1": each_still, "A-2": each})]  # fmt: skip
+        rows += [
+            *_static_rows(still, static),
+            *_split_rows(rolling, placed[10]),
+            *_file_rows(rolling, placed),
+            _load_row(static),
+            _axle_row(placed[0]),
+            *_price_rows({"A-1": each_still, "A-2": each}),
+        ]
     return rows, data
 
 
@@ -59,46 +75,126 @@ def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> 
     off = np.abs(own - theirs)
     force = 100.0 * off / theirs
     rows = [
-        at_most(f"manchester.places.{wheel}", SYSTEM, f"mean place of contact of the {wheel} wheel, largest difference",
-                float(off[:, 0].max()), "mm", PLACE, PUBLISHED, "published"),
-        at_most(f"manchester.forces.{wheel}", SYSTEM, f"normal force of the {wheel} wheel, largest difference",
-                float(force[:, 1].max()), "%", FORCE, PUBLISHED, "published"),
-        finding(f"manchester.peaks.{wheel}", SYSTEM, f"largest pressure of the {wheel} wheel, largest difference",
-                float(force[:, 2].max()), "%", 0.0, "CONTACT's cells of 0.2 mm; a flange's patch has four of them"),
-    ]  # fmt: skip
+        at_most(
+            f"manchester.places.{wheel}",
+            SYSTEM,
+            f"mean place of contact of the {wheel} wheel, largest difference",
+            float(off[:, 0].max()),
+            "mm",
+            PLACE,
+            PUBLISHED,
+            "published",
+        ),
+        at_most(
+            f"manchester.forces.{wheel}",
+            SYSTEM,
+            f"normal force of the {wheel} wheel, largest difference",
+            float(force[:, 1].max()),
+            "%",
+            FORCE,
+            PUBLISHED,
+            "published",
+        ),
+        finding(
+            f"manchester.peaks.{wheel}",
+            SYSTEM,
+            f"largest pressure of the {wheel} wheel, largest difference",
+            float(force[:, 2].max()),
+            "%",
+            0.0,
+            "CONTACT's cells of 0.2 mm; a flange's patch has four of them",
+        ),
+    ]
     roll = np.abs(np.array([1e3 * one.roll for one in placed]) - published[:, 1])
-    return rows if wheel == "left" else [*rows, finding(
-        "manchester.roll", SYSTEM, "roll, largest difference", float(roll.max()), "mrad", 0.0,
-        "CONTACT's input, which another code found; on the flange its wheels do not stand equally low")]  # fmt: skip
+    return (
+        rows
+        if wheel == "left"
+        else [
+            *rows,
+            finding(
+                "manchester.roll",
+                SYSTEM,
+                "roll, largest difference",
+                float(roll.max()),
+                "mrad",
+                0.0,
+                "CONTACT's input, which another code found; on the flange its wheels do not stand equally low",
+            ),
+        ]
+    )
 
 
 def _static_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
     """Touching places by search, and the mirror image."""
     off = np.array([gap for one in placed for gap in _searched_off(contact, one)])
     one, two = contact.at(4e-3, 3e-3), contact.at(-4e-3, -3e-3)
-    mirror = max(abs(a / b - 1.0) for wheels in ((one.right, two.left), (one.left, two.right))
-                 for x, y in zip(*wheels, strict=True) for a, b in ((x.y, y.y), (x.normal, y.normal)))  # fmt: skip
+    mirror = max(
+        abs(a / b - 1.0)
+        for wheels in ((one.right, two.left), (one.left, two.right))
+        for x, y in zip(*wheels, strict=True)
+        for a, b in ((x.y, y.y), (x.normal, y.normal))
+    )
     why = "search over points of the wheel's surface, straight between points of both profiles"
     return [
-        at_most("manchester.search.rail", SYSTEM, "first touch on the rail, case A-1, largest difference",
-                float(off[:, 0].max()), "mm", PLACE, f"{why}; the bound asked for", "closed form"),
-        at_most("manchester.search.wheel", SYSTEM, "first touch on the wheel, case A-1, largest difference",
-                float(off[:, 1].max()), "mm", PLACE, f"{why}; the bound asked for", "closed form"),
-        at_most("manchester.search.angle", SYSTEM, "angle there, largest difference", float(off[:, 2].max()), "rad",
-                0.02, f"{why}, as far as an angle changes in 0.3 mm of the gauge corner", "closed form"),
-        at_most("manchester.mirror", SYSTEM, "shifted and turned the other way, wheels exchanged",
-                mirror, "", 1e-9, "the track is symmetric", "none"),
-    ]  # fmt: skip
+        at_most(
+            "manchester.search.rail",
+            SYSTEM,
+            "first touch on the rail, case A-1, largest difference",
+            float(off[:, 0].max()),
+            "mm",
+            PLACE,
+            f"{why}; the bound asked for",
+            "closed form",
+        ),
+        at_most(
+            "manchester.search.wheel",
+            SYSTEM,
+            "first touch on the wheel, case A-1, largest difference",
+            float(off[:, 1].max()),
+            "mm",
+            PLACE,
+            f"{why}; the bound asked for",
+            "closed form",
+        ),
+        at_most(
+            "manchester.search.angle",
+            SYSTEM,
+            "angle there, largest difference",
+            float(off[:, 2].max()),
+            "rad",
+            0.02,
+            f"{why}, as far as an angle changes in 0.3 mm of the gauge corner",
+            "closed form",
+        ),
+        at_most(
+            "manchester.mirror",
+            SYSTEM,
+            "shifted and turned the other way, wheels exchanged",
+            mirror,
+            "",
+            1e-9,
+            "the track is symmetric",
+            "none",
+        ),
+    ]
 
 
 def _axle_row(placed: Placed) -> Row:
     """The wheelset turns freely: in the middle of the track each wheel's reported forces have no moment about it."""
-    moments = [sum(p.fx * p.rolling_radius - p.mz * np.sin(p.angle) for p in wheel)
-               for wheel in (placed.right, placed.left)]  # fmt: skip
+    moments = [
+        sum(p.fx * p.rolling_radius - p.mz * np.sin(p.angle) for p in wheel) for wheel in (placed.right, placed.left)
+    ]
     most = BENCHMARK_FRICTION * BENCHMARK_LOAD * placed.right[0].rolling_radius
-    return at_most("manchester.axle", SYSTEM, "moment of a wheel's creep forces about the axle, no shift, case A-2",
-                   float(np.abs(moments).max() / most), "mu N R", 1e-3, "patches that have grown together lean by some "
-                   "mrad, which leaves a part of their levers out", "closed form")  # fmt: skip
+    return at_most(
+        "manchester.axle",
+        SYSTEM,
+        "moment of a wheel's creep forces about the axle, no shift, case A-2",
+        float(np.abs(moments).max() / most),
+        "mu N R",
+        1e-3,
+        "patches that have grown together lean by some mrad, which leaves a part of their levers out",
+        "closed form",
+    )
 
 
 def _searched_off(contact: Contact, placed: Placed) -> list[tuple[float, float, float]]:
@@ -115,23 +211,59 @@ def _split_rows(contact: Contact, placed: Placed) -> list[Row]:
     own = [place.normal for place in placed.right]
     total = sum(own)
     alone, (mean, _, plane) = apart(contact, placed), on_one_plane(contact, placed)
-    far = {name: 100.0 * max(abs(a - b) for a, b in zip(own, other, strict=True)) / total
-           for name, other in (("apart", alone), ("one plane", plane))}  # fmt: skip
+    far = {
+        name: 100.0 * max(abs(a - b) for a, b in zip(own, other, strict=True)) / total
+        for name, other in (("apart", alone), ("one plane", plane))
+    }
     return [
-        at_most("manchester.split.apart", SYSTEM, "shares of two patches at 5 mm, by the wheel's force", far["apart"],
-                "%", FORCE, "each on a half-space of its own that the other's resultant sinks", "closed form"),
-        at_most("manchester.split.plane", SYSTEM, "shares of two patches at 5 mm on one plane", far["one plane"], "%",
-                FORCE, "exact theory on CONTACT's plane, lowered as the wheel is", "native"),
-        finding("manchester.split.mean", SYSTEM, "mean place at 5 mm on CONTACT's own plane", mean, "mm",
-                float(CONTACT[10, 2]), "CONTACT lays more on the smaller patch; 4 um of shift do the same"),
-    ]  # fmt: skip
+        at_most(
+            "manchester.split.apart",
+            SYSTEM,
+            "shares of two patches at 5 mm, by the wheel's force",
+            far["apart"],
+            "%",
+            FORCE,
+            "each on a half-space of its own that the other's resultant sinks",
+            "closed form",
+        ),
+        at_most(
+            "manchester.split.plane",
+            SYSTEM,
+            "shares of two patches at 5 mm on one plane",
+            far["one plane"],
+            "%",
+            FORCE,
+            "exact theory on CONTACT's plane, lowered as the wheel is",
+            "native",
+        ),
+        finding(
+            "manchester.split.mean",
+            SYSTEM,
+            "mean place at 5 mm on CONTACT's own plane",
+            mean,
+            "mm",
+            float(CONTACT[10, 2]),
+            "CONTACT lays more on the smaller patch; 4 um of shift do the same",
+        ),
+    ]
 
 
 def _load_row(static: list[Placed]) -> Row:
-    off = max(abs(sum(place.vertical for place in wheel) / BENCHMARK_LOAD - 1.0)
-              for one in static for wheel in (one.right, one.left))  # fmt: skip
-    return at_most("manchester.load", SYSTEM, "vertical sum of a wheel's normal forces less its load, case A-1", off,
-                   "", 1e-5, "patches share the load to the precision of the shares", "none")  # fmt: skip
+    off = max(
+        abs(sum(place.vertical for place in wheel) / BENCHMARK_LOAD - 1.0)
+        for one in static
+        for wheel in (one.right, one.left)
+    )
+    return at_most(
+        "manchester.load",
+        SYSTEM,
+        "vertical sum of a wheel's normal forces less its load, case A-1",
+        off,
+        "",
+        1e-5,
+        "patches share the load to the precision of the shares",
+        "none",
+    )
 
 
 def _file_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
@@ -148,34 +280,75 @@ def _file_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
     chosen = [(one, other.at(one.shift, one.yaw)) for one in placed if round(1e3 * one.shift, 6) in FILES]
     pairs = [(sums(one, wheel), sums(theirs, wheel)) for one, theirs in chosen for wheel in WHEELS]
     off = [(abs(a[0] - b[0]), 100.0 * abs(a[1] / b[1] - 1.0)) for a, b in pairs]
-    return [at_most(f"manchester.files.{name}", SYSTEM, f"{name}: {words}, largest difference",
-                    max(one[k] for one in off), unit, bound, "the bound asked for", "published")
-            for name, (unit, bound, k) in names.items()]  # fmt: skip
+    return [
+        at_most(
+            f"manchester.files.{name}",
+            SYSTEM,
+            f"{name}: {words}, largest difference",
+            max(one[k] for one in off),
+            unit,
+            bound,
+            "the bound asked for",
+            "published",
+        )
+        for name, (unit, bound, k) in names.items()
+    ]
 
 
 def _price_rows(each: dict[str, float]) -> list[Row]:
     why = "geometry, roll, exact normal contact; rolling also the speed of spin"
-    return [finding(f"manchester.price.{name}", SYSTEM, f"processor time of one position, both wheels, case {name}, "
-                    "all of them once", seconds, "s", "-", why) for name, seconds in each.items()]  # fmt: skip
+    return [
+        finding(
+            f"manchester.price.{name}",
+            SYSTEM,
+            f"processor time of one position, both wheels, case {name}, all of them once",
+            seconds,
+            "s",
+            "-",
+            why,
+        )
+        for name, seconds in each.items()
+    ]
 
 
 def _told(placed: Placed) -> dict[str, Any]:
     """Shift (mm), and of each patch place, place on the wheel (mm), angle (deg), force (kN) and peak (MPa)."""
     return {"shift": 1e3 * placed.shift} | {
-        wheel: [[1e3 * p.y, 1e3 * p.wheel_centre, float(np.degrees(-p.centre_angle)), p.normal / 1e3, p.peak / 1e6]
-                for p in getattr(placed, wheel)] for wheel in WHEELS
-    }  # fmt: skip
+        wheel: [
+            [1e3 * p.y, 1e3 * p.wheel_centre, float(np.degrees(-p.centre_angle)), p.normal / 1e3, p.peak / 1e6]
+            for p in getattr(placed, wheel)
+        ]
+        for wheel in WHEELS
+    }
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Every patch of every position."""
-    heads = ("shift [mm]", "wheel", "in the track [mm]", "on the wheel [mm]", "angle [deg]", "normal force [kN]",
-             "largest pressure [MPa]")  # fmt: skip
+    heads = (
+        "shift [mm]",
+        "wheel",
+        "in the track [mm]",
+        "on the wheel [mm]",
+        "angle [deg]",
+        "normal force [kN]",
+        "largest pressure [MPa]",
+    )
     note = "A row for each patch, at its centre of pressure; 10 kN on each wheel, S1002 on UIC 60 at 1:40."
-    return [Table(f"Manchester benchmark, case {name}", note, heads, tuple(
-        (f"{one['shift']:g}", wheel, *(f"{value:.3f}" for value in patch[:4]), f"{patch[4]:.0f}")
-        for one in data[name] for wheel in WHEELS for patch in one[wheel]))
-        for name in ("A-1", "A-2") if name in data]  # fmt: skip
+    return [
+        Table(
+            f"Manchester benchmark, case {name}",
+            note,
+            heads,
+            tuple(
+                (f"{one['shift']:g}", wheel, *(f"{value:.3f}" for value in patch[:4]), f"{patch[4]:.0f}")
+                for one in data[name]
+                for wheel in WHEELS
+                for patch in one[wheel]
+            ),
+        )
+        for name in ("A-1", "A-2")
+        if name in data
+    ]
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
@@ -185,8 +358,15 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     published = np.array(data["published"])
     figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.4))
     for axis, value, column, scale in ((axes[0], 0, 2, 1.0), (axes[1], 3, 3, 1e-3)):
-        axis.plot(published[:, 0], scale * published[:, column], "s", markersize=8, markerfacecolor="none",
-                  color="0.4", label="CONTACT, all patches together")  # fmt: skip
+        axis.plot(
+            published[:, 0],
+            scale * published[:, column],
+            "s",
+            markersize=8,
+            markerfacecolor="none",
+            color="0.4",
+            label="CONTACT, all patches together",
+        )
         points = [(one["shift"], patch[value]) for one in data["A-2"] for patch in one["right"]]
         axis.plot(*np.array(points).T, "o", markersize=4, color="#0072b2", label="every patch here")
         axis.set_xlabel("displacement of the wheelset [mm]")

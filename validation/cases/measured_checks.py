@@ -71,8 +71,9 @@ def _exchanged(*pairs: tuple[str, str]) -> Samples:
 
     def change(found: VirtualMeasurement, samples: np.ndarray) -> np.ndarray:
         for one, two in pairs:
-            own, other = (_columns(found, *(f"{hub}_{c}" for c in ("fx", "fy", "fz", "mx", "my", "mz")))
-                          for hub in (one, two))  # fmt: skip
+            own, other = (
+                _columns(found, *(f"{hub}_{c}" for c in ("fx", "fy", "fz", "mx", "my", "mz"))) for hub in (one, two)
+            )
             samples[:, own + other] = samples[:, other + own]
         return samples
 
@@ -139,11 +140,18 @@ QUICK = (
 )
 FULL = (
     Planted("3 ms late, one hub", "shift", "all channels of rr", 3e-3, "s", {"delay": {"rr": 3e-3}}),
-    Planted("3 ms early, one force", "shift", "rl_fz", -3e-3, "s",
-            {"delay": dict.fromkeys(NOISE, 3e-3) | {"rl_fz": 0.0}}),
+    Planted(
+        "3 ms early, one force", "shift", "rl_fz", -3e-3, "s", {"delay": dict.fromkeys(NOISE, 3e-3) | {"rl_fz": 0.0}}
+    ),
     Planted("3 ms late, one accelerometer", "shift", "all channels of shelf", 3e-3, "s", {"delay": {"shelf": 3e-3}}),
-    Planted("3 ms late, all inertial channels", "shift", "all inertial", 3e-3, "s",
-            {"delay": {"acceleration": 3e-3, "angular rate": 3e-3, "angle": 3e-3}}),
+    Planted(
+        "3 ms late, all inertial channels",
+        "shift",
+        "all inertial",
+        3e-3,
+        "s",
+        {"delay": {"acceleration": 3e-3, "angular rate": 3e-3, "angle": 3e-3}},
+    ),
     Planted("40 ms late, one force", "shift", "fr_fz", 4e-2, "s", {"delay": {"fr_fz": 4e-2}}),
     Planted("2 % too much, front wheel", "gain", "fl_fz", 2.0, "%", {"gain": {"fl_fz": 0.02}}),
     Planted("2 % too little, rear wheel", "gain", "rr_fz", -2.0, "%", {"gain": {"rr_fz": -0.02}}),
@@ -161,29 +169,50 @@ FULL = (
     Planted("sign of an accelerometer", "sign", "tower_ay", -1.0, "1", {}, _times(-1.0, "tower_ay")),
     Planted("front and rear left wheel swapped", "swapped", "fl with rl", 1.0, "", {}, _exchanged(("fl", "rl"))),
     Planted("wheels swapped across", "swapped", "fl with rr", 1.0, "", {}, _exchanged(("fl", "rr"))),
-    Planted("sides swapped, both axles", "swapped", "fl with fr and rl with rr", 1.0, "", {},
-            _exchanged(("fl", "fr"), ("rl", "rr"))),
-    Planted("moments about the contact patch, all wheels", "lever", "fl and fr and rl and rr", -0.3, "m", {},
-            referred(-0.3, "fl", "fr", "rl", "rr")),
+    Planted(
+        "sides swapped, both axles",
+        "swapped",
+        "fl with fr and rl with rr",
+        1.0,
+        "",
+        {},
+        _exchanged(("fl", "fr"), ("rl", "rr")),
+    ),
+    Planted(
+        "moments about the contact patch, all wheels",
+        "lever",
+        "fl and fr and rl and rr",
+        -0.3,
+        "m",
+        {},
+        referred(-0.3, "fl", "fr", "rl", "rr"),
+    ),
     Planted("moments about the contact patch, one wheel", "lever", "rr", -0.34, "m", {}, referred(-0.34, "rr")),
-    Planted("moments referred to the hub twice, one axle", "lever", "fl and fr", 0.3, "m", {},
-            referred(0.3, "fl", "fr")),
+    Planted(
+        "moments referred to the hub twice, one axle", "lever", "fl and fr", 0.3, "m", {}, referred(0.3, "fl", "fr")
+    ),
     Planted("clipped, 0.5 % of samples", "clipped", "fl_fz", 0.5, "%", {}, _clipped("fl_fz", 0.005)),
     Planted("value held for 0.3 s", "clipped", "rl_mx", 0.3, "s", {}, _held("rl_mx", 4.0, 0.3)),
     Planted("value held for 0.06 s", "clipped", "fl_fz", 0.06, "s", {}, _held("fl_fz", 4.0, 0.06)),
     Planted("spike of one sample", "spikes", "rl_my", 2e3, "N m", {}, _spiked("rl_my", 4.0, 2e3)),
     Planted("dead channel", "clipped", "rl_mx", 15.0, "s", {}, _times(0.0, "rl_mx")),
     Planted("noise four times as stated", "noise", "rr_fy", 32.0, "N", {"noise": {"rr_fy": 32.0}}),
-)  # fmt: skip
+)
 
 
 @cache
-def measurement(vehicle: str = "r19_free", road: Ride = ("C", 1, 20.0, 15.0),
-                rate: float = 500.0) -> VirtualMeasurement:  # fmt: skip
+def measurement(
+    vehicle: str = "r19_free", road: Ride = ("C", 1, 20.0, 15.0), rate: float = 500.0
+) -> VirtualMeasurement:
     """A car on a road: class, seed, speed and length; it and the four accelerometers are read at a rate (Hz)."""
     kind, seed, speed, duration = road
-    own = VirtualTable(road=Road(iso8608=kind, seed=seed, speed=speed), duration=duration, step=2e-3,
-                       sampling_rate=rate, accelerometers=SENSORS)  # fmt: skip
+    own = VirtualTable(
+        road=Road(iso8608=kind, seed=seed, speed=speed),
+        duration=duration,
+        step=2e-3,
+        sampling_rate=rate,
+        accelerometers=SENSORS,
+    )
     return virtual_measurement(_vehicle(vehicle), own, "mujoco")
 
 
@@ -192,8 +221,13 @@ def _vehicle(name: str) -> CutVehicle:
     whole = load_vehicle("r19_free")
     body, *others = whole.bodies
     loaded = replace(whole, bodies=(replace(body, mass=body.mass + 80), *others))
-    made = {"r19_free": whole, "twin": twin(), "loaded": loaded, "stiff": _sprung(whole, 1.2, 1.0),
-            "worn": _sprung(whole, 1.0, 0.7)}  # fmt: skip
+    made = {
+        "r19_free": whole,
+        "twin": twin(),
+        "loaded": loaded,
+        "stiff": _sprung(whole, 1.2, 1.0),
+        "worn": _sprung(whole, 1.0, 0.7),
+    }
     return cut(made[name], "body")
 
 
@@ -228,8 +262,15 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows.append(_quiet("quick", [findings(found, found.samples(Faults(noise=NOISE), SEED), folder)]))
     if quick:
         return rows, {"said": said}
-    return [*rows, *_clean(folder), *_strangers(folder), *_together(found, folder),
-            _spread(found, folder), _clocks(found, folder), *_moving_car(folder)], {"said": said}
+    return [
+        *rows,
+        *_clean(folder),
+        *_strangers(folder),
+        *_together(found, folder),
+        _spread(found, folder),
+        _clocks(found, folder),
+        *_moving_car(folder),
+    ], {"said": said}
 
 
 def _rows(fault: Planted, own: tuple[Finding, ...]) -> list[Row]:
@@ -238,21 +279,50 @@ def _rows(fault: Planted, own: tuple[Finding, ...]) -> list[Row]:
     named = [one for one in own if one.check == fault.check and fault.place in one.place]
     others = [one for one in own if one.check != fault.check]
     word = "named" if named and not others else f"{[one.check for one in own]}"
-    rows = [behaves(f"{key}.named", SYSTEM, f"{fault.name}: the finding", word, "named", f"'{fault.check}' at "
-                    f"{fault.place or 'the vehicle'}, and nothing else")]  # fmt: skip
+    rows = [
+        behaves(
+            f"{key}.named",
+            SYSTEM,
+            f"{fault.name}: the finding",
+            word,
+            "named",
+            f"'{fault.check}' at {fault.place or 'the vehicle'}, and nothing else",
+        )
+    ]
     if fault.check == "swapped":
         return rows
     size = named[0].size if named and named[0].size is not None else float("nan")
-    return [*rows, within(f"{key}.size", SYSTEM, f"{fault.name}: its size", size, fault.unit, fault.size,
-                          SHARE * abs(fault.size), "what was planted, 20 %", "closed form")]  # fmt: skip
+    return [
+        *rows,
+        within(
+            f"{key}.size",
+            SYSTEM,
+            f"{fault.name}: its size",
+            size,
+            fault.unit,
+            fault.size,
+            SHARE * abs(fault.size),
+            "what was planted, 20 %",
+            "closed form",
+        ),
+    ]
 
 
 def _quiet(name: str, found: list[tuple[Finding, ...]]) -> Row:
     """No error and no doubt in clean recordings."""
     alarms = [one.text for own in found for one in own]
     why = "; ".join(alarms) or "noise as stated, nothing planted"
-    return within(f"measured_checks.clean.{name}", SYSTEM, f"errors and doubts in {len(found)} clean recordings",
-                  len(alarms), "", 0, 0, why, "closed form")  # fmt: skip
+    return within(
+        f"measured_checks.clean.{name}",
+        SYSTEM,
+        f"errors and doubts in {len(found)} clean recordings",
+        len(alarms),
+        "",
+        0,
+        0,
+        why,
+        "closed form",
+    )
 
 
 def _clean(folder: Path) -> list[Row]:
@@ -276,11 +346,30 @@ def _strangers(folder: Path) -> list[Row]:
     errors = [one.text for one in others if one.weight == "error"]
     why = "; ".join(errors) or "doubts are allowed, errors would stop a good recording"
     return [
-        within("measured_checks.loaded", SYSTEM, "80 kg more on board than in the file: excess of weight", value,
-               "%", 100 * 80 / (r19().loads.sum() / GRAVITY), SHARE * 6.6, "what was loaded, 20 %", "closed form"),
-        within("measured_checks.strangers", SYSTEM, "errors named where the car is 80 kg heavier, has springs 20 % "
-               "stiffer or dampers 30 % weaker than its file", len(errors), "", 0, 0, why, "closed form"),
-    ]  # fmt: skip
+        within(
+            "measured_checks.loaded",
+            SYSTEM,
+            "80 kg more on board than in the file: excess of weight",
+            value,
+            "%",
+            100 * 80 / (r19().loads.sum() / GRAVITY),
+            SHARE * 6.6,
+            "what was loaded, 20 %",
+            "closed form",
+        ),
+        within(
+            "measured_checks.strangers",
+            SYSTEM,
+            "errors named where the car is 80 kg heavier, has springs 20 % "
+            "stiffer or dampers 30 % weaker than its file",
+            len(errors),
+            "",
+            0,
+            0,
+            why,
+            "closed form",
+        ),
+    ]
 
 
 def _by_the_file(name: str, folder: Path) -> tuple[Finding, ...]:
@@ -296,11 +385,26 @@ def _together(found: VirtualMeasurement, folder: Path) -> list[Row]:
     own = {one.check: one for one in findings(found, samples, folder)}
     late = own["shift"].size if "shift" in own else None
     return [
-        behaves("measured_checks.together.named", SYSTEM, "wheels swapped, kN for N, 3 ms late at once: the findings",
-                ", ".join(sorted(own)), "shift, swapped, unit", "each at its place"),
-        within("measured_checks.together.size", SYSTEM, "the same: delay", float("nan") if late is None else late, "s",
-               3e-3, SHARE * 3e-3, "what was planted, 20 %", "closed form"),
-    ]  # fmt: skip
+        behaves(
+            "measured_checks.together.named",
+            SYSTEM,
+            "wheels swapped, kN for N, 3 ms late at once: the findings",
+            ", ".join(sorted(own)),
+            "shift, swapped, unit",
+            "each at its place",
+        ),
+        within(
+            "measured_checks.together.size",
+            SYSTEM,
+            "the same: delay",
+            float("nan") if late is None else late,
+            "s",
+            3e-3,
+            SHARE * 3e-3,
+            "what was planted, 20 %",
+            "closed form",
+        ),
+    ]
 
 
 def _spread(found: VirtualMeasurement, folder: Path) -> Row:
@@ -308,8 +412,17 @@ def _spread(found: VirtualMeasurement, folder: Path) -> Row:
     named = [planted(QUICK[0], found, folder, seed) for seed in range(SAMPLES)]
     sizes = [own[0].size for own in named if own and own[0].size is not None]
     value = 1e3 * float(np.mean(sizes)) if len(sizes) == SAMPLES else float("nan")
-    return within("measured_checks.spread", SYSTEM, f"3 ms late, one force: mean over {SAMPLES} samples of noise",
-                  value, "ms", 3.0, 0.15, "5 %: the response is linear, the vehicle is not", "closed form")  # fmt: skip
+    return within(
+        "measured_checks.spread",
+        SYSTEM,
+        f"3 ms late, one force: mean over {SAMPLES} samples of noise",
+        value,
+        "ms",
+        3.0,
+        0.15,
+        "5 %: the response is linear, the vehicle is not",
+        "closed form",
+    )
 
 
 def drifting(found: VirtualMeasurement, fast: float, folder: Path) -> tuple[Finding, ...]:
@@ -326,8 +439,17 @@ def _clocks(found: VirtualMeasurement, folder: Path) -> Row:
     """Drift between the clocks of two files."""
     named = [one.size for one in drifting(found, 5e-4, folder) if one.check == "drift"]
     value = 1e6 * named[0] if named and named[0] is not None else float("nan")
-    return within("measured_checks.clocks", SYSTEM, "drift between the clocks of two files", value, "1e-6", 500.0,
-                  SHARE * 500.0, "what was planted, 20 %", "closed form")  # fmt: skip
+    return within(
+        "measured_checks.clocks",
+        SYSTEM,
+        "drift between the clocks of two files",
+        value,
+        "1e-6",
+        500.0,
+        SHARE * 500.0,
+        "what was planted, 20 %",
+        "closed form",
+    )
 
 
 def _moving_car(folder: Path) -> list[Row]:
@@ -339,22 +461,51 @@ def _moving_car(folder: Path) -> list[Row]:
     degrees, down = own.copy(), own.copy()
     degrees[:, 4] *= 180 / np.pi
     down[:, :6] *= np.tile(measured_car.TURNED, 2)
-    found = {name: check(measured_car.recording(values, folder / f"{name}.columns"), None)
-             for name, values in (("clean", own), ("degrees", degrees), ("down", down))}  # fmt: skip
+    found = {
+        name: check(measured_car.recording(values, folder / f"{name}.columns"), None)
+        for name, values in (("clean", own), ("degrees", degrees), ("down", down))
+    }
     errors = {name: {one.place: one for one in ones if one.weight == "error"} for name, ones in found.items()}
     pitch = next(one for one in found["clean"] if one.check == "turning" and "pitch" in one.place)
     turned = errors["degrees"].get("q and pitch")
     return [
-        behaves("measured_checks.car.errors", SYSTEM, "moving car, accelerometers, gyros and pose: errors named",
-                ", ".join(errors["clean"]) or "none", "none", "signs and units are right"),
-        behaves("measured_checks.car.down", SYSTEM, "the same with axes right and down, taken for left and up: named",
-                ", ".join(sorted(errors["down"])), "az, q and pitch", "gravity and the turning of the pose tell"),
-        within("measured_checks.car.degrees", SYSTEM, "the same with degrees for radians in pitch: size", float("nan")
-               if turned is None or turned.size is None else turned.size, "1", 180 / np.pi, SHARE * 180 / np.pi,
-               "what was planted, 20 %", "closed form"),
-        finding("measured_checks.car.ratio", SYSTEM, "the same: pitch rate of the gyro by that of the camera's pose",
-                pitch.size or float("nan"), "1", 1.0, "a telephone beside a camera at 20 Hz"),
-    ]  # fmt: skip
+        behaves(
+            "measured_checks.car.errors",
+            SYSTEM,
+            "moving car, accelerometers, gyros and pose: errors named",
+            ", ".join(errors["clean"]) or "none",
+            "none",
+            "signs and units are right",
+        ),
+        behaves(
+            "measured_checks.car.down",
+            SYSTEM,
+            "the same with axes right and down, taken for left and up: named",
+            ", ".join(sorted(errors["down"])),
+            "az, q and pitch",
+            "gravity and the turning of the pose tell",
+        ),
+        within(
+            "measured_checks.car.degrees",
+            SYSTEM,
+            "the same with degrees for radians in pitch: size",
+            float("nan") if turned is None or turned.size is None else turned.size,
+            "1",
+            180 / np.pi,
+            SHARE * 180 / np.pi,
+            "what was planted, 20 %",
+            "closed form",
+        ),
+        finding(
+            "measured_checks.car.ratio",
+            SYSTEM,
+            "the same: pitch rate of the gyro by that of the camera's pose",
+            pitch.size or float("nan"),
+            "1",
+            1.0,
+            "a telephone beside a camera at 20 Hz",
+        ),
+    ]
 
 
 def tables(data: dict[str, Any]) -> list[Table]:

@@ -34,7 +34,7 @@ START = datetime(2026, 11, 21, 8, 0, 0, 123456, tzinfo=timezone(timedelta(hours=
 COMMENT = "Prüfgelände, Runde 3 <nass>\nFahrer & Beifahrer"
 NAMES = ("Kraft vorn links, Fz", "Größe µ", "a [x]")
 UNITS = ("kN", "°", "m/s^2")
-COMMENTS = ("Rad 1: \"neu\"", "", "zweite Zeile\nfolgt")
+COMMENTS = ('Rad 1: "neu"', "", "zweite Zeile\nfolgt")
 COUNT, PERIOD, LENGTH = 5000, 1e-3, 1234
 """Samples, s between them, samples of a block that is read."""
 
@@ -67,7 +67,7 @@ def kept(source: Source) -> dict[str, bool]:
         "comments": tuple(one.comment for one in source.channels) == COMMENTS and source.comment == COMMENT,
         "start": source.start == START,
         "quiet": source.noticed == (),
-    }  # fmt: skip
+    }
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -83,8 +83,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         rows += resolution(Path(name))
         rows += forms(Path(name))
         if not quick:
-            rows += [row for extension in (".mf4", ".rsp", ".tdms")
-                     for row in memory(Path(name) / f"long{extension}", extension)]  # fmt: skip
+            rows += [
+                row
+                for extension in (".mf4", ".rsp", ".tdms")
+                for row in memory(Path(name) / f"long{extension}", extension)
+            ]
     return rows, {"formats": lines}
 
 
@@ -104,30 +107,77 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
     lost = ", ".join(what for what, good in kept(source).items() if not good)
     key, why = f"measured_formats.{extension[1:]}", "what the format can hold; every bit where it is 0"
     return [
-        at_most(f"{key}.values", SYSTEM, f"{form}: values there and back, by block", error, "of the value",
-                RESOLUTION[extension], why, "closed form"),
-        at_most(f"{key}.times", SYSTEM, f"{form}: times there and back", off, "s", 1e-12,
-                "a thousand millionth of a period; CSV writes times with 15 digits", "closed form"),
-        behaves(f"{key}.texts", SYSTEM, f"{form}: names with umlauts, units, comments of two lines, start",
-                f"lost: {lost}" if lost else "kept", "kept", "a file without them cannot be mapped by anybody else"),
-        at_most(f"{key}.library", SYSTEM, f"{form}: values as {library} reads the file", own, "of the value",
-                RESOLUTION[extension], f"{why}; names and units are compared, too", "native"),
-    ], {"format": form, "library": library, "size": path.stat().st_size, "values": error, "times": off, "own": own,
-        "rate": COUNT * len(NAMES) / seconds}  # fmt: skip
+        at_most(
+            f"{key}.values",
+            SYSTEM,
+            f"{form}: values there and back, by block",
+            error,
+            "of the value",
+            RESOLUTION[extension],
+            why,
+            "closed form",
+        ),
+        at_most(
+            f"{key}.times",
+            SYSTEM,
+            f"{form}: times there and back",
+            off,
+            "s",
+            1e-12,
+            "a thousand millionth of a period; CSV writes times with 15 digits",
+            "closed form",
+        ),
+        behaves(
+            f"{key}.texts",
+            SYSTEM,
+            f"{form}: names with umlauts, units, comments of two lines, start",
+            f"lost: {lost}" if lost else "kept",
+            "kept",
+            "a file without them cannot be mapped by anybody else",
+        ),
+        at_most(
+            f"{key}.library",
+            SYSTEM,
+            f"{form}: values as {library} reads the file",
+            own,
+            "of the value",
+            RESOLUTION[extension],
+            f"{why}; names and units are compared, too",
+            "native",
+        ),
+    ], {
+        "format": form,
+        "library": library,
+        "size": path.stat().st_size,
+        "values": error,
+        "times": off,
+        "own": own,
+        "rate": COUNT * len(NAMES) / seconds,
+    }
 
 
 def two_rates(path: Path, extension: str) -> Row:
     """Two groups of different rates in one file."""
     values = {("fast",): (1e-3, np.arange(4000.0)), ("slow",): (2e-2, np.arange(200.0) ** 2)}
-    write(path, [Group(names, ("N",), ("",), period, len(own), [own[:, None]])
-                 for names, (period, own) in values.items()])  # fmt: skip
+    write(
+        path, [Group(names, ("N",), ("",), period, len(own), [own[:, None]]) for names, (period, own) in values.items()]
+    )
     found = read(open_source(path))
-    errors = [np.abs(found[name][k] - truth).max() for (name,), (period, own) in values.items()
-              for k, truth in ((0, period * np.arange(len(own))), (1, own))]  # fmt: skip
-    return at_most(f"measured_formats.{extension[1:]}.rates", SYSTEM,
-    f"{FORMATS[extension]}: two groups of 1 kHz and 50 Hz, "
-                   "times and values there and back", max(errors), "s or N", 1e-12, "each group has a clock of its own",
-                   "closed form")  # fmt: skip
+    errors = [
+        np.abs(found[name][k] - truth).max()
+        for (name,), (period, own) in values.items()
+        for k, truth in ((0, period * np.arange(len(own))), (1, own))
+    ]
+    return at_most(
+        f"measured_formats.{extension[1:]}.rates",
+        SYSTEM,
+        f"{FORMATS[extension]}: two groups of 1 kHz and 50 Hz, times and values there and back",
+        max(errors),
+        "s or N",
+        1e-12,
+        "each group has a clock of its own",
+        "closed form",
+    )
 
 
 def forms(folder: Path) -> list[Row]:
@@ -141,14 +191,35 @@ def forms(folder: Path) -> list[Row]:
     why = "all of them are hard cases of their own"
     bits = f"{why}; half a bit of a time of 0.4 s, and less than the last bit of any force"
     return [
-        at_most("measured_formats.forms.values", SYSTEM, f"{len(read)} forms of CSV and of names of files: times and "
-                "values beside those of the plain file", max(errors), "s or N", 1e-16, bits, "closed form"),
-        at_most("measured_formats.forms.silent", SYSTEM, f"{len(files) - len(read)} forms with two meanings and files "
-                "of other kinds: read without a word", silent, "files", 0.0, f"{why}; each refusal says what to do",
-                "none"),
-        behaves("measured_formats.forms.crashes", SYSTEM, f"{len(files)} such files: errors that are no refusal, or "
-                "that say too little", ", ".join(crashed) or "none", "none", why),
-    ]  # fmt: skip
+        at_most(
+            "measured_formats.forms.values",
+            SYSTEM,
+            f"{len(read)} forms of CSV and of names of files: times and values beside those of the plain file",
+            max(errors),
+            "s or N",
+            1e-16,
+            bits,
+            "closed form",
+        ),
+        at_most(
+            "measured_formats.forms.silent",
+            SYSTEM,
+            f"{len(files) - len(read)} forms with two meanings and files of other kinds: read without a word",
+            silent,
+            "files",
+            0.0,
+            f"{why}; each refusal says what to do",
+            "none",
+        ),
+        behaves(
+            "measured_formats.forms.crashes",
+            SYSTEM,
+            f"{len(files)} such files: errors that are no refusal, or that say too little",
+            ", ".join(crashed) or "none",
+            "none",
+            why,
+        ),
+    ]
 
 
 def _ended(odd: Odd, folder: Path) -> float | str | None:
@@ -178,12 +249,27 @@ def resolution(folder: Path) -> list[Row]:
     errors = [abs(pseudo_damage(own[:4500]) / pseudo_damage(load[:4500]) - 1.0) for own in (floating, whole)]
     why = "slope 5, of the smooth road before a pothole that sets the scale of the whole numbers"
     return [
-        at_most("measured_formats.rsp.damage", SYSTEM, "RPC III as it is written, 32-bit floating point: damage",
-        errors[0],
-                "relative", 1e-5, why, "closed form"),
-        finding("measured_formats.rsp.whole", SYSTEM, "RPC III with 16-bit whole numbers instead: damage", errors[1],
-                "relative", "not written; read where others have", why, "closed form"),
-    ]  # fmt: skip
+        at_most(
+            "measured_formats.rsp.damage",
+            SYSTEM,
+            "RPC III as it is written, 32-bit floating point: damage",
+            errors[0],
+            "relative",
+            1e-5,
+            why,
+            "closed form",
+        ),
+        finding(
+            "measured_formats.rsp.whole",
+            SYSTEM,
+            "RPC III with 16-bit whole numbers instead: damage",
+            errors[1],
+            "relative",
+            "not written; read where others have",
+            why,
+            "closed form",
+        ),
+    ]
 
 
 STATUS = Path("/proc/self/status")
@@ -208,18 +294,47 @@ def memory(path: Path, extension: str) -> list[Row]:
     found, peak = (int(word) for word in out.split())
     size = path.stat().st_size / 1e6
     path.unlink()
-    return [within(f"{key}.samples", SYSTEM, f"{form}: samples of five minutes read by block", found, "", count, 0,
-                   "a count: none is lost between blocks", "none"),
-            aim(key, SYSTEM, f"{form}: peak memory of a process that reads 60 channels of {size:.0f} MB by block, once",
-                peak / 1e3, "MB", 350.0, "libraries included; blocks of 29 MB, the same for a file of an hour")]
+    return [
+        within(
+            f"{key}.samples",
+            SYSTEM,
+            f"{form}: samples of five minutes read by block",
+            found,
+            "",
+            count,
+            0,
+            "a count: none is lost between blocks",
+            "none",
+        ),
+        aim(
+            key,
+            SYSTEM,
+            f"{form}: peak memory of a process that reads 60 channels of {size:.0f} MB by block, once",
+            peak / 1e3,
+            "MB",
+            350.0,
+            "libraries included; blocks of 29 MB, the same for a file of an hour",
+        ),
+    ]
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """What each format keeps."""
-    note = (f"{COUNT:,} samples of three channels, values from 1e-6 to 1e3, written and read by block. Errors of "
-            "values are by the size of each value; the format's own library opens the same file. CSV and RPC III "
-            "have one sampling rate, MDF 4 and TDMS one per group.")
-    rows = tuple((one["format"], f"{one['values']:.1e}", f"{one['times']:.1e}", f"{one['library']}: {one['own']:.1e}",
-                  f"{one['size'] / 1e3:.0f}", f"{one['rate'] / 1e6:.1f}") for one in data["formats"])  # fmt: skip
+    note = (
+        f"{COUNT:,} samples of three channels, values from 1e-6 to 1e3, written and read by block. Errors of "
+        "values are by the size of each value; the format's own library opens the same file. CSV and RPC III "
+        "have one sampling rate, MDF 4 and TDMS one per group."
+    )
+    rows = tuple(
+        (
+            one["format"],
+            f"{one['values']:.1e}",
+            f"{one['times']:.1e}",
+            f"{one['library']}: {one['own']:.1e}",
+            f"{one['size'] / 1e3:.0f}",
+            f"{one['rate'] / 1e6:.1f}",
+        )
+        for one in data["formats"]
+    )
     headings = ("format", "values", "times, s", "own library", "kB", "million values per s, there and back, once")
     return [Table(TITLE, note, headings, rows)]

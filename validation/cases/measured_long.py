@@ -38,8 +38,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return [*rows, _blocks(folder, "mujoco", "kalman", 0.3)], {}
     lasting = {"mujoco": 0.5, "exudyn": 0.25, "reference": 0.2}
-    rows += [_blocks(folder, engine, method, seconds) for engine, seconds in lasting.items()
-             for method in ("none", "kalman", "prescribed")]  # fmt: skip
+    rows += [
+        _blocks(folder, engine, method, seconds)
+        for engine, seconds in lasting.items()
+        for method in ("none", "kalman", "prescribed")
+    ]
     return [*rows, _killed(folder), *_memory(folder), *_handed_on(folder)], {}
 
 
@@ -53,9 +56,19 @@ def _guides(quick: bool) -> list[Row]:
         q, v = _anywhere(car, seed)
         found, other = _transmitted(sections, numbers, q, v), mujoco_guides(car, q, v, wrenches)
         worst = max(worst, float(np.abs(found - other).max() / np.abs(other).max()))
-    rows = [at_most("measured_long.guides_mujoco", SYSTEM, "forces and moments that guides transmit, of a car without "
-                    "symmetry that turns, beside MuJoCo's force and torque sensors, relative", worst, "1", 1e-11,
-                    "Newton and Euler along the run; the sensors know nothing of the kernel", "native")]  # fmt: skip
+    rows = [
+        at_most(
+            "measured_long.guides_mujoco",
+            SYSTEM,
+            "forces and moments that guides transmit, of a car without "
+            "symmetry that turns, beside MuJoCo's force and torque sensors, relative",
+            worst,
+            "1",
+            1e-11,
+            "Newton and Euler along the run; the sensors know nothing of the kernel",
+            "native",
+        )
+    ]
     if quick:
         return rows
     q, v = _anywhere(car, 0)
@@ -63,15 +76,30 @@ def _guides(quick: bool) -> list[Row]:
         q[i] = 0.0 if body == "engine" and freedom.startswith("r") else q[i]
     found, other = _transmitted(sections, numbers, q, 0 * v), exudyn_guides(car, q, wrenches)
     off = float(np.abs(found - other).max() / np.abs(other).max())
-    return [*rows, at_most("measured_long.guides_exudyn", SYSTEM, "the same at rest beside the constraints of free "
-                           "bodies in Exudyn, relative", off, "1", 1e-5,
-                           "positions rounded to 1e-16 m over the square of a step of 3e-5 s", "native")]  # fmt: skip
+    return [
+        *rows,
+        at_most(
+            "measured_long.guides_exudyn",
+            SYSTEM,
+            "the same at rest beside the constraints of free bodies in Exudyn, relative",
+            off,
+            "1",
+            1e-5,
+            "positions rounded to 1e-16 m over the square of a step of 3e-5 s",
+            "native",
+        ),
+    ]
 
 
 def _transmitted(sections: Sections, numbers: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Forces and moments (guides, 6); components along which a body slides are nought."""
-    values = dict(zip((answer.name for answer in sections.answers),
-                      sections.read(numbers, np.concatenate((q, v))[None], 2)[0], strict=True))  # fmt: skip
+    values = dict(
+        zip(
+            (answer.name for answer in sections.answers),
+            sections.read(numbers, np.concatenate((q, v))[None], 2)[0],
+            strict=True,
+        )
+    )
     axes = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
     return np.array([[values.get(f"{name} guide {axis}", 0.0) for axis in axes] for name in guided(sections.vehicle)])
 
@@ -86,15 +114,36 @@ def _counting() -> list[Row]:
     spans, _, counts = cycles(sine[np.r_[0, 16:6400:32, 6400]])
     pairs = range_pairs(spans, counts, np.array([0.5, 1.5])).tolist()
     return [
-        behaves("measured_long.astm", SYSTEM, "rainflow counts of the example of ASTM E1049-85", str(found),
-                str(COUNTED), "the standard's own table", "published"),
-        within("measured_long.sine_damage", SYSTEM, "pseudo-damage, slope 5, of 100 periods of a sine of amplitude 1",
-               counted.damage[5.0], "1", 99.5 * 2**5 + 2 * 0.5, 1e-9, "199 half cycles of 2 and two of 1 at the ends",
-               "closed form"),
-        behaves("measured_long.levels", SYSTEM, "level crossings of the sine at -1.1, -0.5, 0.5, 1.1, and range "
-                "pairs of at least 0.5 and 1.5", f"{levels} {pairs}", "[0, 100, 100, 0] [100.5, 99.5]",
-                "a hundred rises; 199 halves of range 2 and two of range 1", "closed form"),
-    ]  # fmt: skip
+        behaves(
+            "measured_long.astm",
+            SYSTEM,
+            "rainflow counts of the example of ASTM E1049-85",
+            str(found),
+            str(COUNTED),
+            "the standard's own table",
+            "published",
+        ),
+        within(
+            "measured_long.sine_damage",
+            SYSTEM,
+            "pseudo-damage, slope 5, of 100 periods of a sine of amplitude 1",
+            counted.damage[5.0],
+            "1",
+            99.5 * 2**5 + 2 * 0.5,
+            1e-9,
+            "199 half cycles of 2 and two of 1 at the ends",
+            "closed form",
+        ),
+        behaves(
+            "measured_long.levels",
+            SYSTEM,
+            "level crossings of the sine at -1.1, -0.5, 0.5, 1.1, and range pairs of at least 0.5 and 1.5",
+            f"{levels} {pairs}",
+            "[0, 100, 100, 0] [100.5, 99.5]",
+            "a hundred rises; 199 halves of range 2 and two of range 1",
+            "closed form",
+        ),
+    ]
 
 
 def _blocks(folder: Path, engine: str, method: str, seconds: float) -> Row:
@@ -108,9 +157,17 @@ def _blocks(folder: Path, engine: str, method: str, seconds: float) -> Row:
         run(own, place / name, block=block)
         bits.append(np.frombuffer(answers_of(place, name), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
-    return at_most(f"measured_long.blocks_{engine}_{method}", SYSTEM, f"answers in {engine}, stabiliser {method}, of "
-                   f"which bits change when {seconds:g} s are run in blocks of 0.073 s", changed, "1", 0.0,
-                   "state, filter and inputs go from block to block as they are", "closed form")  # fmt: skip
+    return at_most(
+        f"measured_long.blocks_{engine}_{method}",
+        SYSTEM,
+        f"answers in {engine}, stabiliser {method}, of "
+        f"which bits change when {seconds:g} s are run in blocks of 0.073 s",
+        changed,
+        "1",
+        0.0,
+        "state, filter and inputs go from block to block as they are",
+        "closed form",
+    )
 
 
 def _killed(folder: Path) -> Row:
@@ -126,28 +183,58 @@ def _killed(folder: Path) -> Row:
             run(own, place / "run")
         bits.append(np.frombuffer(answers_of(place), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
-    return at_most("measured_long.killed", SYSTEM, f"answers of which bits change when a run of {seconds:g} s in "
-                   f"blocks of 0.25 s is killed twice at moments drawn from seed {SEED}, and goes on", changed, "1",
-                   0.0, "a checkpoint is written whole or not at all", "closed form")  # fmt: skip
+    return at_most(
+        "measured_long.killed",
+        SYSTEM,
+        f"answers of which bits change when a run of {seconds:g} s in "
+        f"blocks of 0.25 s is killed twice at moments drawn from seed {SEED}, and goes on",
+        changed,
+        "1",
+        0.0,
+        "a checkpoint is written whole or not at all",
+        "closed form",
+    )
 
 
 def _memory(folder: Path) -> list[Row]:
     """Memory that a longer recording takes, and what an hour of it would; how fast it goes."""
     run_of(folder, LONG, REPEATED)
-    command = [sys.executable, "-m", "validation.measured.long_recording", str(folder), str(LONG), str(REPEATED),
-               str(LONG / 10), "2e-3"]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "validation.measured.long_recording",
+        str(folder),
+        str(LONG),
+        str(REPEATED),
+        str(LONG / 10),
+        "2e-3",
+    ]
     told = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
     lines = np.array([line.split() for line in told], float)  # of every block: seconds, memory, processor
     half, last = lines[len(lines) // 2], lines[-1]
     growth = (last[1] - half[1]) / (last[0] - half[0])
     return [
-        aim("measured_long.memory", SYSTEM, f"memory for 60 channels at 1 kHz, once: the largest over {LONG:g} s in "
-            "ten blocks, and an hour of its growth over the second half", float(last[1] + growth * 3600.0), "B", 2e9,
-            "only a block is in memory"),
-        aim("measured_long.speed", SYSTEM, "seconds of recording per second of processor, once, MuJoCo, step 2 ms, all "
-            "sections", float((last[0] - lines[1, 0]) / (last[2] - lines[1, 2])), "1", 1.0, "how long an hour takes",
-            "at least"),
-    ]  # fmt: skip
+        aim(
+            "measured_long.memory",
+            SYSTEM,
+            f"memory for 60 channels at 1 kHz, once: the largest over {LONG:g} s in "
+            "ten blocks, and an hour of its growth over the second half",
+            float(last[1] + growth * 3600.0),
+            "B",
+            2e9,
+            "only a block is in memory",
+        ),
+        aim(
+            "measured_long.speed",
+            SYSTEM,
+            "seconds of recording per second of processor, once, MuJoCo, step 2 ms, all sections",
+            float((last[0] - lines[1, 0]) / (last[2] - lines[1, 2])),
+            "1",
+            1.0,
+            "how long an hour takes",
+            "at least",
+        ),
+    ]
 
 
 def _handed_on(folder: Path) -> list[Row]:
@@ -169,14 +256,35 @@ def _handed_on(folder: Path) -> list[Row]:
     compared = [compare(own.recording, found, *pair) for pair in checks(own)]
     force = next(each for each in compared if each.signal.name == "front left_force")
     return [
-        at_most("measured_long.handed_on", SYSTEM, "section forces written as CSV, MDF, RPC III and TDMS and read "
-                "back, relative", worst, "1", 2.0**-24, "RPC III keeps singles, the others every bit", "native"),
-        behaves("measured_long.handed_on_names", SYSTEM, "names, units and comments of these", str(kept), "True",
-                "they say axes and signs"),
-        at_most("measured_long.check_channel", SYSTEM, "part of the variance of a measured spring force that the "
-                "stabilised run does not give", 1.0 - force.explained, "1", 0.01,
-                "noise of 8 N on 100 N, and what the filter adds", "native"),
-    ]  # fmt: skip
+        at_most(
+            "measured_long.handed_on",
+            SYSTEM,
+            "section forces written as CSV, MDF, RPC III and TDMS and read back, relative",
+            worst,
+            "1",
+            2.0**-24,
+            "RPC III keeps singles, the others every bit",
+            "native",
+        ),
+        behaves(
+            "measured_long.handed_on_names",
+            SYSTEM,
+            "names, units and comments of these",
+            str(kept),
+            "True",
+            "they say axes and signs",
+        ),
+        at_most(
+            "measured_long.check_channel",
+            SYSTEM,
+            "part of the variance of a measured spring force that the stabilised run does not give",
+            1.0 - force.explained,
+            "1",
+            0.01,
+            "noise of 8 N on 100 N, and what the filter adds",
+            "native",
+        ),
+    ]
 
 
 def tables(data: dict[str, Any]) -> list[Table]:

@@ -95,16 +95,27 @@ def own_vehicle(folder: Path) -> str:
 def measured(proof: Proof, folder: Path, duration: float) -> VirtualMeasurement:
     """The vehicle on its road, its faults left to each sample."""
     vehicle = cut(load_vehicle(proof.vehicle, folder), "body")
-    own = read(VirtualTable, {"duration": duration, "sampling_rate": RATE, "frame": proof.frame,
-                              "sections": ["front left"]}, "")  # fmt: skip
+    own = read(
+        VirtualTable,
+        {"duration": duration, "sampling_rate": RATE, "frame": proof.frame, "sections": ["front left"]},
+        "",
+    )
     return virtual_measurement(vehicle, own, "mujoco")
 
 
 def faults(bits: int) -> Faults:
     """All that is planted."""
     silent = {"rate": 0.1, "length": 0.02, "channels": ["force", "moment"]}
-    return read(Faults, {"noise": NOISE, "delay": dict.fromkeys(("angle", "angular rate"), LATE),
-                         "quantisation": {"bits": bits}, "dropouts": silent}, "")  # fmt: skip
+    return read(
+        Faults,
+        {
+            "noise": NOISE,
+            "delay": dict.fromkeys(("angle", "angular rate"), LATE),
+            "quantisation": {"bits": bits},
+            "dropouts": silent,
+        },
+        "",
+    )
 
 
 def recorded(found: VirtualMeasurement, samples: np.ndarray, vehicle: str, form: str, folder: Path) -> Recording:
@@ -127,8 +138,14 @@ def recorded(found: VirtualMeasurement, samples: np.ndarray, vehicle: str, form:
 def _group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> Group:
     factors = np.array([signal.factor for signal in signals])
     blocks = (samples[i : i + BLOCK] / factors for i in range(0, len(samples), BLOCK))
-    return Group(tuple(s.channel for s in signals), tuple(s.unit for s in signals), ("",) * len(signals), period,
-                 len(samples), blocks)  # fmt: skip
+    return Group(
+        tuple(s.channel for s in signals),
+        tuple(s.unit for s in signals),
+        ("",) * len(signals),
+        period,
+        len(samples),
+        blocks,
+    )
 
 
 def held(recording: Recording, vehicle: CutVehicle, hold: Hold, folder: Path, engine: str = "mujoco") -> Outcome:
@@ -155,8 +172,10 @@ def _proved(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, 
                 damage = errors(held(recording, true.vehicle, proof.hold, place / "run"), true).damage
                 known.append((values, damage))
             ratios[form].append(damage)
-    means = {form: {name: float(np.mean([own[name] for own in found])) for name in found[0]}
-             for form, found in ratios.items()}  # fmt: skip
+    means = {
+        form: {name: float(np.mean([own[name] for own in found])) for name in found[0]}
+        for form, found in ratios.items()
+    }
     rows = [row for form in proof.formats for row in _rows(proof, form, off[form], means[form])]
     first = recorded(true, true.samples(planted, SEED), proof.vehicle, "csv", folder / "beside")
     return [*rows, *_beside(proof, first, true, folder)], means
@@ -186,14 +205,29 @@ def _rows(proof: Proof, form: str, off: float, means: dict[str, float]) -> list[
     worst = max(means, key=lambda name: abs(means[name] - 1))
     what = f"{proof.name}, frame {proof.frame!r}, {proof.bits} bit, through {form}"
     return [
-        at_most(f"measured_virtual.values_{proof.name}_{form}", SYSTEM, f"change of hub channels by file, map and "
-                f"clock, by their largest value; {what}", off, "1", 2**-23 if form == "rsp" else 1e-12,
-                "RPC III holds single precision, the others every bit; units cost a rounding", "native"),
-        within(f"measured_virtual.damage_{proof.name}_{form}", SYSTEM, f"damage (slope 5) of {worst}, the farthest "
-               f"from the truth of {len(means)} springs, mounts and bars, mean of {SAMPLES} samples of noise; {what}",
-               means[worst], "1", 1.0, DAMAGE, "demanded; body-frame section forces of the run held by the filter",
-               "none"),
-    ]  # fmt: skip
+        at_most(
+            f"measured_virtual.values_{proof.name}_{form}",
+            SYSTEM,
+            f"change of hub channels by file, map and clock, by their largest value; {what}",
+            off,
+            "1",
+            2**-23 if form == "rsp" else 1e-12,
+            "RPC III holds single precision, the others every bit; units cost a rounding",
+            "native",
+        ),
+        within(
+            f"measured_virtual.damage_{proof.name}_{form}",
+            SYSTEM,
+            f"damage (slope 5) of {worst}, the farthest "
+            f"from the truth of {len(means)} springs, mounts and bars, mean of {SAMPLES} samples of noise; {what}",
+            means[worst],
+            "1",
+            1.0,
+            DAMAGE,
+            "demanded; body-frame section forces of the run held by the filter",
+            "none",
+        ),
+    ]
 
 
 def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Path) -> list[Row]:
@@ -205,13 +239,26 @@ def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Pa
     held_run = runs[ENGINES[-1]]
     blind = judge(held_run, true.vehicle, proof.hold, first.period)
     rows = [
-        at_most(f"measured_virtual.engines_{proof.name}", SYSTEM, f"answers of Exudyn and MuJoCo apart, by the largest "
-                f"of each; {proof.name}, held, {first.duration:g} s", apart, "1", 1e-6, "same tableau, same step",
-                "shared kernel"),
-        behaves(f"measured_virtual.verdict_{proof.name}", SYSTEM, f"verdict of the held run by itself; {proof.name}",
-                blind.word, "accepted", f"{blind.reason}; beside the truth, 5 % for each damage of this one "
-                f"sample of noise: {judge_beside_truth(held_run, true, proof.hold).word}"),
-    ]  # fmt: skip
+        at_most(
+            f"measured_virtual.engines_{proof.name}",
+            SYSTEM,
+            f"answers of Exudyn and MuJoCo apart, by the largest of each; {proof.name}, held, {first.duration:g} s",
+            apart,
+            "1",
+            1e-6,
+            "same tableau, same step",
+            "shared kernel",
+        ),
+        behaves(
+            f"measured_virtual.verdict_{proof.name}",
+            SYSTEM,
+            f"verdict of the held run by itself; {proof.name}",
+            blind.word,
+            "accepted",
+            f"{blind.reason}; beside the truth, 5 % for each damage of this one "
+            f"sample of noise: {judge_beside_truth(held_run, true, proof.hold).word}",
+        ),
+    ]
     level = Level(NOISE["force"], NOISE["moment"])
     until = drift(true.vehicle, level, first.period, first.duration, proof.frame).trusted
     try:
@@ -220,9 +267,18 @@ def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Pa
         assert isinstance(error.partial, Outcome)
         run = error.partial
     said = judge(run, true.vehicle, free, first.period, trusted=until)
-    rows.append(finding(f"measured_virtual.free_{proof.name}", SYSTEM, f"the same forces on the free vehicle, frame "
-                        f"{proof.frame!r}: its run ends after (s); verdict: {said.word}, {said.reason}",
-                        (run.done - 1) * run.period, "s", first.duration, "stated"))  # fmt: skip
+    rows.append(
+        finding(
+            f"measured_virtual.free_{proof.name}",
+            SYSTEM,
+            f"the same forces on the free vehicle, frame "
+            f"{proof.frame!r}: its run ends after (s); verdict: {said.word}, {said.reason}",
+            (run.done - 1) * run.period,
+            "s",
+            first.duration,
+            "stated",
+        )
+    )
     return rows
 
 
@@ -231,18 +287,31 @@ def _trusted() -> list[Row]:
     vehicle, rows = cut(load_vehicle("r19_free"), "body"), list[Row]()
     bias = np.zeros(6 * len(vehicle.hubs))
     bias[2] = 3.0
-    cases = (("noise", "inertial", 3.0, Level(8.0, 1.0)), ("bias", "hub", 5.0, Level(20.0, 4.0, bias)),
-             ("tilt", "inertial", 1.6, Level(8.0, 1.0, tilt=(0.004, 0.0))))  # fmt: skip
+    cases = (
+        ("noise", "inertial", 3.0, Level(8.0, 1.0)),
+        ("bias", "hub", 5.0, Level(20.0, 4.0, bias)),
+        ("tilt", "inertial", 1.6, Level(8.0, 1.0, tilt=(0.004, 0.0))),
+    )
     for name, frame, duration, level in cases:
         own = read(VirtualTable, {"duration": duration, "step": 2e-3, "sampling_rate": RATE, "frame": frame}, "")
         true = virtual_measurement(vehicle, own, "mujoco")
         predicted = drift(vehicle, level, 1 / RATE, duration, frame).passes()
         assert predicted is not None
         found = float(np.median([_drift_off(vehicle, true, level, path) for path in range(COPIES)]))
-        rows.append(within(f"measured_virtual.trust_{name}", SYSTEM, f"median time at which roll or pitch is off by "
-                           f"0.05 rad, {COPIES} free runs on a rough road, by the predicted one ({name}, {frame!r})",
-                           found / predicted, "1", 1.0, 0.2, "demanded; the median of 16 has a deviation of 3 to 10 %",
-                           "closed form"))  # fmt: skip
+        rows.append(
+            within(
+                f"measured_virtual.trust_{name}",
+                SYSTEM,
+                f"median time at which roll or pitch is off by "
+                f"0.05 rad, {COPIES} free runs on a rough road, by the predicted one ({name}, {frame!r})",
+                found / predicted,
+                "1",
+                1.0,
+                0.2,
+                "demanded; the median of 16 has a deviation of 3 to 10 %",
+                "closed form",
+            )
+        )
     return rows
 
 
@@ -270,23 +339,52 @@ def _moving(folder: Path) -> list[Row]:
     """
     path, what = moving_car.find(), "telephone and camera of a moving car, two files on one clock:"
     if path is None:
-        return [not_run("measured_virtual.moving_gyro", SYSTEM, f"{what} gyro by the camera's angles",
-                        f"TWINRIG_DATA does not lead to {moving_car.FILE}")]  # fmt: skip
+        return [
+            not_run(
+                "measured_virtual.moving_gyro",
+                SYSTEM,
+                f"{what} gyro by the camera's angles",
+                f"TWINRIG_DATA does not lead to {moving_car.FILE}",
+            )
+        ]
     recording = _of_the_road(path, cut(load_vehicle("r19_free"), "body"), folder)
     said = check_recording(recording, None, {"phone": Place("body", (0.0, 0.0, 1.0))}, {})
     ratio = next((f.size for f in said if f.check == "turning" and "pitch_rate" in f.place), None)
     shift = next((f.size for f in said if f.check == "shift" and "roll_rate" in f.place), None)
     up = [recording.samples(recording.find("acceleration", "phone", axis)[0]).mean() for axis in "xyz"]
     return [
-        within("measured_virtual.moving_gyro", SYSTEM, f"{what} pitch rate of the gyro by the derivative of the "
-               "camera's angle, as the check finds it", ratio or 0.0, "1", 1.0, 0.1,
-               "two devices, each as it was mounted", "none"),
-        finding("measured_virtual.moving_shift", SYSTEM, f"{what} time by which the gyro's roll rate is late against "
-                "the camera, as the check finds it", shift or 0.0, "s", "", "two clocks"),
-        within("measured_virtual.moving_gravity", SYSTEM, f"{what} mean of the accelerations",
-               float(np.linalg.norm(up)), "m/s^2", 9.81, 0.2,
-               "a telephone's accelerometers are off by one or two per cent", "none"),
-    ]  # fmt: skip
+        within(
+            "measured_virtual.moving_gyro",
+            SYSTEM,
+            f"{what} pitch rate of the gyro by the derivative of the camera's angle, as the check finds it",
+            ratio or 0.0,
+            "1",
+            1.0,
+            0.1,
+            "two devices, each as it was mounted",
+            "none",
+        ),
+        finding(
+            "measured_virtual.moving_shift",
+            SYSTEM,
+            f"{what} time by which the gyro's roll rate is late against the camera, as the check finds it",
+            shift or 0.0,
+            "s",
+            "",
+            "two clocks",
+        ),
+        within(
+            "measured_virtual.moving_gravity",
+            SYSTEM,
+            f"{what} mean of the accelerations",
+            float(np.linalg.norm(up)),
+            "m/s^2",
+            9.81,
+            0.2,
+            "a telephone's accelerometers are off by one or two per cent",
+            "none",
+        ),
+    ]
 
 
 def _of_the_road(path: Path, vehicle: CutVehicle, folder: Path) -> Recording:
@@ -322,19 +420,36 @@ def _moving_scene(vehicle: CutVehicle) -> str:
     """Signs: y and z of the telephone point the other way."""
 
     def entry(channel: str, what: str, at: str, component: str, frame: str, sign: int) -> str:
-        return (f'  {{ channel = "{channel}", quantity = "{what}", at = "{at}", component = "{component}", '
-                f'frame = "{frame}", sign = {sign} }},')  # fmt: skip
+        return (
+            f'  {{ channel = "{channel}", quantity = "{what}", at = "{at}", component = "{component}", '
+            f'frame = "{frame}", sign = {sign} }},'
+        )
 
     hubs = [entry(f"{hub}_fz", "force", hub, "z", "hub", 1) for hub in vehicle.hubs]
     camera = [entry(axis, "angle", "phone", axis, "inertial", sign) for axis, sign in (("roll", 1), ("pitch", -1))]
-    phone = [entry(f"{axis}_rate", "angular rate", "phone", axis, "body", sign)
-             for axis, sign in (("roll", 1), ("pitch", -1), ("yaw", -1))]  # fmt: skip
-    phone += [entry(f"a{axis}", "acceleration", "phone", axis, "body", sign)
-              for axis, sign in zip("xyz", (1, -1, -1), strict=True)]  # fmt: skip
-    files = [f'[[files]]\nfile = "{name}.csv"\nchannels = [\n' + "\n".join(lines) + "\n]"
-             for name, lines in (("hubs", hubs), ("camera", camera), ("phone", phone))]  # fmt: skip
-    head = ['title = "moving car"', 'system = "measured"', "[vehicle]", 'file = "r19_free"', "[stabilise]",
-            'method = "none"', "[sensors.phone]", 'body = "body"', "position = [0.0, 0.0, 1.0]"]
+    phone = [
+        entry(f"{axis}_rate", "angular rate", "phone", axis, "body", sign)
+        for axis, sign in (("roll", 1), ("pitch", -1), ("yaw", -1))
+    ]
+    phone += [
+        entry(f"a{axis}", "acceleration", "phone", axis, "body", sign)
+        for axis, sign in zip("xyz", (1, -1, -1), strict=True)
+    ]
+    files = [
+        f'[[files]]\nfile = "{name}.csv"\nchannels = [\n' + "\n".join(lines) + "\n]"
+        for name, lines in (("hubs", hubs), ("camera", camera), ("phone", phone))
+    ]
+    head = [
+        'title = "moving car"',
+        'system = "measured"',
+        "[vehicle]",
+        'file = "r19_free"',
+        "[stabilise]",
+        'method = "none"',
+        "[sensors.phone]",
+        'body = "body"',
+        "position = [0.0, 0.0, 1.0]",
+    ]
     return "\n".join([*head, *files, ""])
 
 
@@ -350,14 +465,38 @@ def _quick(folder: Path) -> list[Row]:
     law = rigid(true.vehicle).angle_variance(np.tile([8.0] * 3 + [1.0] * 3, 4), true.period, np.array([10.0]))
     deviations = drift(true.vehicle, level, true.period, 10.0, "hub").deviations[-1]
     return [
-        at_most("measured_virtual.values", SYSTEM, "change of hub channels by a CSV file, map and clock, by their "
-                "largest value", _changed(recording, true, samples), "1", 1e-12, "units cost a rounding", "native"),
-        within("measured_virtual.damage", SYSTEM, "damage (slope 5) of the front left spring, 0.6 s of a rough road, "
-               "by the true one", found.damage["front left"], "1", 1.0, 0.1, "one sample of noise", "none"),
-        at_most("measured_virtual.law", SYSTEM, "deviation of roll, pitch and heading after 10 s of noise beside "
-                "q t^3/3", float(np.abs(deviations / np.sqrt(law[0]) - 1).max()), "1", 1e-4,
-                "no growth in the frame of the hubs", "closed form"),
-    ]  # fmt: skip
+        at_most(
+            "measured_virtual.values",
+            SYSTEM,
+            "change of hub channels by a CSV file, map and clock, by their largest value",
+            _changed(recording, true, samples),
+            "1",
+            1e-12,
+            "units cost a rounding",
+            "native",
+        ),
+        within(
+            "measured_virtual.damage",
+            SYSTEM,
+            "damage (slope 5) of the front left spring, 0.6 s of a rough road, by the true one",
+            found.damage["front left"],
+            "1",
+            1.0,
+            0.1,
+            "one sample of noise",
+            "none",
+        ),
+        at_most(
+            "measured_virtual.law",
+            SYSTEM,
+            "deviation of roll, pitch and heading after 10 s of noise beside q t^3/3",
+            float(np.abs(deviations / np.sqrt(law[0]) - 1).max()),
+            "1",
+            1e-4,
+            "no growth in the frame of the hubs",
+            "closed form",
+        ),
+    ]
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
@@ -366,7 +505,12 @@ def tables(data: dict[str, Any]) -> list[Table]:
     for name, means in data.items():
         elements = next(iter(means.values()))
         rows = tuple((element, *(f"{own[element]:.4f}" for own in means.values())) for element in elements)
-        found.append(Table(f"Damage by the true one, {name}, mean of {SAMPLES} samples of noise",
-                           "Section forces in the chassis' axes, slope 5, held by the filter.",
-                           ("element", *means), rows))  # fmt: skip
+        found.append(
+            Table(
+                f"Damage by the true one, {name}, mean of {SAMPLES} samples of noise",
+                "Section forces in the chassis' axes, slope 5, held by the filter.",
+                ("element", *means),
+                rows,
+            )
+        )
     return found

@@ -38,8 +38,13 @@ HEIGHTS = {1.0: 0.69, 0.3: 1.9, 0.1: 5.8, 0.03: 18.9}
 NOISE = 0.3
 """m/s^2 on each sample of the drift rows."""
 PERIOD = 0.01
-RIGID = {"front left": (1.1, -0.6, 0.2), "front right": (1.1, 0.6, 0.2), "rear left": (-0.9, -0.6, 0.2),
-         "rear right": (-0.9, 0.6, 0.2), "roof": (0.1, 0.0, -0.9)}  # fmt: skip
+RIGID = {
+    "front left": (1.1, -0.6, 0.2),
+    "front right": (1.1, 0.6, 0.2),
+    "rear left": (-0.9, -0.6, 0.2),
+    "rear right": (-0.9, 0.6, 0.2),
+    "roof": (0.1, 0.0, -0.9),
+}
 BRACKET = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}
 
 
@@ -65,13 +70,37 @@ def _exact(name: str) -> list[Row]:
     what = f"{name} sensors{', formula for a plane' if array.planar else ''}"
     why = "rounding of readings of 20 m/s^2; nothing is integrated"
     return [
-        at_most(f"{key}.alpha", SYSTEM, f"angular acceleration from clean readings, {what}", alpha, "rad/s^2", BOUND,
-                why, "closed form"),
-        at_most(f"{key}.rates", SYSTEM, f"rates up to sign from the symmetric part, squares, {what}",
-                float(np.abs(squares).max()), "rad^2/s^2", BOUND, why, "closed form"),
-        at_most(f"{key}.consistency", SYSTEM, f"share of the readings that no rigid body explains, {what}",
-                quality(array, clean).share, "", BOUND, why, "closed form"),
-    ]  # fmt: skip
+        at_most(
+            f"{key}.alpha",
+            SYSTEM,
+            f"angular acceleration from clean readings, {what}",
+            alpha,
+            "rad/s^2",
+            BOUND,
+            why,
+            "closed form",
+        ),
+        at_most(
+            f"{key}.rates",
+            SYSTEM,
+            f"rates up to sign from the symmetric part, squares, {what}",
+            float(np.abs(squares).max()),
+            "rad^2/s^2",
+            BOUND,
+            why,
+            "closed form",
+        ),
+        at_most(
+            f"{key}.consistency",
+            SYSTEM,
+            f"share of the readings that no rigid body explains, {what}",
+            quality(array, clean).share,
+            "",
+            BOUND,
+            why,
+            "closed form",
+        ),
+    ]
 
 
 def _plain() -> Row:
@@ -81,20 +110,37 @@ def _plain() -> Row:
     m = np.swapaxes(relative, 1, 2) @ np.linalg.pinv((floor - floor.mean(axis=0)).T)
     plain = 0.5 * (m[:, 2, 1] - m[:, 1, 2])
     half = 0.5 * (PATH.alpha[:, 0] + PATH.rates[:, 1] * PATH.rates[:, 2])
-    return at_most("motion.plain", SYSTEM, "eq. (18) as printed, sensors in a plane: roll acceleration against (alpha1 "
-                   "+ w2 w3) / 2", float(np.abs(plain - half).max()), "rad/s^2", BOUND,
-                   "half of the true value plus a bias, without a word: this is why planes are detected", "closed form")
+    return at_most(
+        "motion.plain",
+        SYSTEM,
+        "eq. (18) as printed, sensors in a plane: roll acceleration against (alpha1 + w2 w3) / 2",
+        float(np.abs(plain - half).max()),
+        "rad/s^2",
+        BOUND,
+        "half of the true value plus a bias, without a word: this is why planes are detected",
+        "closed form",
+    )
 
 
 def _order() -> Row:
     """Order of the whole chain, readings to position, in the sampling period."""
     array = sensor_array(ARRAYS["5 in a tilted plane"])
     clean = readings(array.positions)
-    errors = [float(np.abs(motion(array, clean[::n], n * PATH.period, PATH.start).position - PATH.position[::n]).max())
-              for n in (40, 20)]  # fmt: skip
-    return within("motion.order", SYSTEM, "order of the recovered position in the sampling period, 40 and 20 ms",
-                  float(np.log2(errors[0] / errors[1])), "", 4.0, 0.4,
-                  "cubics through four neighbours and a fourth-order step of the quaternion", "closed form")
+    errors = [
+        float(np.abs(motion(array, clean[::n], n * PATH.period, PATH.start).position - PATH.position[::n]).max())
+        for n in (40, 20)
+    ]
+    return within(
+        "motion.order",
+        SYSTEM,
+        "order of the recovered position in the sampling period, 40 and 20 ms",
+        float(np.log2(errors[0] / errors[1])),
+        "",
+        4.0,
+        0.4,
+        "cubics through four neighbours and a fourth-order step of the quaternion",
+        "closed form",
+    )
 
 
 def _tilt() -> Row:
@@ -103,9 +149,16 @@ def _tilt() -> Row:
     level = tuple(from_cardan(0.0, tilt, 0.0).tolist())
     found = -motion(array, still, 1e-3, Start(orientation=level)).position[:, 0]
     law = tilt_displacement(tilt, 1e-3 * np.arange(count))
-    return at_most("motion.tilt", SYSTEM, f"false displacement of a tilt error of 1 mrad after 10 s, {law[-1]:.4f} m, "
-                   "against g sin(tilt) t^2 / 2", float(np.abs(found - law).max() / law[-1]), "", 1e-10,
-                   "a constant is integrated exactly", "closed form")
+    return at_most(
+        "motion.tilt",
+        SYSTEM,
+        f"false displacement of a tilt error of 1 mrad after 10 s, {law[-1]:.4f} m, against g sin(tilt) t^2 / 2",
+        float(np.abs(found - law).max() / law[-1]),
+        "",
+        1e-10,
+        "a constant is integrated exactly",
+        "closed form",
+    )
 
 
 def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
@@ -120,16 +173,34 @@ def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
             axis = int(np.argmax(array.gains()))
             law, found = float(array.gains()[axis] ** 2), float(np.mean(alpha[:, axis] ** 2))
             key = f"motion.gain.{formula}.{height:g}"
-            rows.append(mean_square(key, SYSTEM, f"variance of the {('roll', 'pitch', 'yaw')[axis]} acceleration per "
-                        f"unit variance of the readings, fifth sensor {height:g} m up, {formula} formula", found, law,
-                        count, "1/m^2", f"{count:,} samples; gain {law**0.5:.3g} 1/m"))  # fmt: skip
+            rows.append(
+                mean_square(
+                    key,
+                    SYSTEM,
+                    f"variance of the {('roll', 'pitch', 'yaw')[axis]} acceleration per "
+                    f"unit variance of the readings, fifth sensor {height:g} m up, {formula} formula",
+                    found,
+                    law,
+                    count,
+                    "1/m^2",
+                    f"{count:,} samples; gain {law**0.5:.3g} 1/m",
+                )
+            )
             line += [law**0.5, found**0.5]
         if height in HEIGHTS:
-            rows.append(within(f"motion.known_gain.{height:g}", SYSTEM, "largest noise gain, fifth sensor "
-                               f"{height:g} m up, plain formula", line[1], "1/m", HEIGHTS[height],
-                               0.04 * HEIGHTS[height], "figures relative to the last sensor; relative to the mean up "
-                               "to 3 % less",
-                               "published"))  # fmt: skip
+            rows.append(
+                within(
+                    f"motion.known_gain.{height:g}",
+                    SYSTEM,
+                    f"largest noise gain, fifth sensor {height:g} m up, plain formula",
+                    line[1],
+                    "1/m",
+                    HEIGHTS[height],
+                    0.04 * HEIGHTS[height],
+                    "figures relative to the last sensor; relative to the mean up to 3 % less",
+                    "published",
+                )
+            )
         lines.append(line)
     return lines, rows
 
@@ -137,10 +208,17 @@ def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
 def _engine(engine: str, duration: float) -> list[Row]:
     """Five rigid sensors and a loose one on each engine's own run over the study road."""
     sensors = {name: dict(zip("xyz", place, strict=True)) for name, place in RIGID.items()} | {"battery": BRACKET}
-    scene = build_scene({"title": TITLE, "run": {"duration": duration, "step": 1e-3},
-                         "effects": {"road": {"source": "study", "speed": 20.0},
-                                     "gyro": {"sampling_rate": 1000.0, "deviation": 0.0},
-                                     "accelerometers": {"sampling_rate": 1000.0, "sensors": sensors}}})  # fmt: skip
+    scene = build_scene(
+        {
+            "title": TITLE,
+            "run": {"duration": duration, "step": 1e-3},
+            "effects": {
+                "road": {"source": "study", "speed": 20.0},
+                "gyro": {"sampling_rate": 1000.0, "deviation": 0.0},
+                "accelerometers": {"sampling_rate": 1000.0, "sensors": sensors},
+            },
+        }
+    )
     assembly = assemble(scene)
     model = build(engine, assembly, settings_of(scene, engine))
     run = model.run()
@@ -156,34 +234,69 @@ def _engine(engine: str, duration: float) -> list[Row]:
     return [
         *_follows("accelerometers", engine, array, felt[:, :5], run.states, None),
         *_follows("gyro", engine, array, felt[:, :5], run.states, turning),
-        at_most(f"motion.pitch_acceleration.{engine}", SYSTEM, "pitch acceleration from the readings of "
-                f"{engine}'s run against the paper's equations at its states, by the largest",
-                float(np.abs(found - true).max() / np.abs(true).max()), "", BOUND,
-                "the engine's acceleration beside eq. (38), as in the build audit",
-                "shared kernel" if engine == "reference" else "native"),
-        behaves(f"motion.bracket.{engine}", SYSTEM, f"six sensors, one on a bracket of 30 Hz, {engine}: "
-                f"{100 * loose.share:.2g} % fits no rigid body", f"loose: {loose.suspect}" if not loose.rigid else
-                "rigid", "loose: battery", "more than 5 % is a loose mount; the one without which it passes is named",
-                "closed form"),
-        at_most(f"motion.rigid.{engine}", SYSTEM, f"share that no rigid body explains, the five rigid mounts, {engine}",
-                rigid.share, "", BOUND, "rounding: far below the 5 % at which a mount is called loose", "closed form"),
-    ]  # fmt: skip
+        at_most(
+            f"motion.pitch_acceleration.{engine}",
+            SYSTEM,
+            "pitch acceleration from the readings of "
+            f"{engine}'s run against the paper's equations at its states, by the largest",
+            float(np.abs(found - true).max() / np.abs(true).max()),
+            "",
+            BOUND,
+            "the engine's acceleration beside eq. (38), as in the build audit",
+            "shared kernel" if engine == "reference" else "native",
+        ),
+        behaves(
+            f"motion.bracket.{engine}",
+            SYSTEM,
+            f"six sensors, one on a bracket of 30 Hz, {engine}: {100 * loose.share:.2g} % fits no rigid body",
+            f"loose: {loose.suspect}" if not loose.rigid else "rigid",
+            "loose: battery",
+            "more than 5 % is a loose mount; the one without which it passes is named",
+            "closed form",
+        ),
+        at_most(
+            f"motion.rigid.{engine}",
+            SYSTEM,
+            f"share that no rigid body explains, the five rigid mounts, {engine}",
+            rigid.share,
+            "",
+            BOUND,
+            "rounding: far below the 5 % at which a mount is called loose",
+            "closed form",
+        ),
+    ]
 
 
-def _follows(way: str, engine: str, array: SensorArray, felt: np.ndarray, states: np.ndarray,
-             rates: np.ndarray | None) -> list[Row]:  # fmt: skip
+def _follows(
+    way: str, engine: str, array: SensorArray, felt: np.ndarray, states: np.ndarray, rates: np.ndarray | None
+) -> list[Row]:
     """Pitch and heave recovered from a run's clean readings, with or without its gyro, against its states (n, 8)."""
     first = states[0].tolist()
-    start = Start((0.0, first[7], 0.0), tuple(from_cardan(0.0, first[3], 0.0).tolist()), (0.0, 0.0, first[6]),
-                  (0.0, 0.0, first[2]))  # fmt: skip
+    start = Start(
+        (0.0, first[7], 0.0),
+        tuple(from_cardan(0.0, first[3], 0.0).tolist()),
+        (0.0, 0.0, first[6]),
+        (0.0, 0.0, first[2]),
+    )
     found = motion(array, felt, 1e-3, start, rates=rates)
-    errors = (("pitch", found.angles()[:, 1] - states[:, 3], "rad", 1e-6),
-              ("heave", found.position[:, 2] - states[:, 2], "m", 1e-5))  # fmt: skip
+    errors = (
+        ("pitch", found.angles()[:, 1] - states[:, 3], "rad", 1e-6),
+        ("heave", found.position[:, 2] - states[:, 2], "m", 1e-5),
+    )
     words = "accelerometers alone" if rates is None else "accelerometers and a gyro"
-    return [at_most(f"motion.recovered.{way}.{what}.{engine}", SYSTEM, f"{what} recovered from {words}, {engine}, "
-                    f"{len(states) / 1e3:.0f} s at 1 kHz without noise", float(np.abs(error).max()), unit, bound,
-                    "cubics through samples of 1 ms, across wheel modes of 700 1/s", "closed form")
-            for what, error, unit, bound in errors]  # fmt: skip
+    return [
+        at_most(
+            f"motion.recovered.{way}.{what}.{engine}",
+            SYSTEM,
+            f"{what} recovered from {words}, {engine}, {len(states) / 1e3:.0f} s at 1 kHz without noise",
+            float(np.abs(error).max()),
+            unit,
+            bound,
+            "cubics through samples of 1 ms, across wheel modes of 700 1/s",
+            "closed form",
+        )
+        for what, error, unit, bound in errors
+    ]
 
 
 def _pitch_acceleration(assembly: Any, scene: Any, run: Any) -> np.ndarray:
@@ -212,13 +325,24 @@ def _walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
     errors = np.array([integrate_rates(spin(array, _noise(path, count)), PERIOD, np.zeros(3)) for path in range(paths)])
     last = errors[:, -1] / array.gains()
     law = NOISE**2 * PERIOD * (count - 1) * PERIOD
-    row = mean_square("motion.walk", SYSTEM, "rate error of integration alone after 60 s, mean square by its gain",
-                      float(np.mean(last**2)), law, 3 * paths, "m^2/s^2",
-                      f"{paths} paths of {NOISE:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period time")
+    row = mean_square(
+        "motion.walk",
+        SYSTEM,
+        "rate error of integration alone after 60 s, mean square by its gain",
+        float(np.mean(last**2)),
+        law,
+        3 * paths,
+        "m^2/s^2",
+        f"{paths} paths of {NOISE:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period time",
+    )
     curve = np.sqrt(np.mean(errors**2, axis=(0, 2)))
-    return [row], {"time": (PERIOD * np.arange(count))[::25].tolist(), "integrated": curve[::25].tolist(),
-                   "law": (NOISE * float(np.sqrt(np.mean(array.gains() ** 2)))
-                           * np.sqrt(PERIOD**2 * np.arange(count)))[::25].tolist()}  # fmt: skip
+    return [row], {
+        "time": (PERIOD * np.arange(count))[::25].tolist(),
+        "integrated": curve[::25].tolist(),
+        "law": (NOISE * float(np.sqrt(np.mean(array.gains() ** 2))) * np.sqrt(PERIOD**2 * np.arange(count)))[
+            ::25
+        ].tolist(),
+    }
 
 
 def _held(curves: dict[str, Any], quick: bool) -> list[Row]:
@@ -233,29 +357,58 @@ def _held(curves: dict[str, Any], quick: bool) -> list[Row]:
     late, early = (float(np.sqrt(np.mean(part))) for part in (squares[-count // 3 :], squares[count // 6 : count // 3]))
     why = f"{paths} paths of {PERIOD * (count - 1):g} s, {NOISE:g} m/s^2 at 100 Hz; filterpy's extended Kalman filter"
     rows = [
-        at_most("motion.held", SYSTEM, "rate error with the symmetric part as a measurement, rms of the last third, by "
-                "that of integration alone at the end", late / walked, "", 0.8 if quick else 0.2, why, "closed form"),
-        within("motion.held.stated", SYSTEM, "the same by the standard deviation that the filter states",
-               late / float(np.sqrt(np.mean(stated[-count // 3 :] ** 2))), "", 1.0,
-               0.5 if quick else 0.2, f"{why}; it neglects that the readings are used twice", "closed form"),
-    ]  # fmt: skip
+        at_most(
+            "motion.held",
+            SYSTEM,
+            "rate error with the symmetric part as a measurement, rms of the last third, by "
+            "that of integration alone at the end",
+            late / walked,
+            "",
+            0.8 if quick else 0.2,
+            why,
+            "closed form",
+        ),
+        within(
+            "motion.held.stated",
+            SYSTEM,
+            "the same by the standard deviation that the filter states",
+            late / float(np.sqrt(np.mean(stated[-count // 3 :] ** 2))),
+            "",
+            1.0,
+            0.5 if quick else 0.2,
+            f"{why}; it neglects that the readings are used twice",
+            "closed form",
+        ),
+    ]
     if quick:  # too short to tell growth from settling
         return rows
-    grown = within("motion.held.growth", SYSTEM, "rms of the last third by that of the second sixth", late / early, "",
-                   1.0, 0.2, f"{why}; integration alone would grow by 1.8", "closed form")  # fmt: skip
+    grown = within(
+        "motion.held.growth",
+        SYSTEM,
+        "rms of the last third by that of the second sixth",
+        late / early,
+        "",
+        1.0,
+        0.2,
+        f"{why}; integration alone would grow by 1.8",
+        "closed form",
+    )
     return [*rows, grown]
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """What a flat arrangement costs."""
     rows = tuple(
-        (f"{line[0]:g}", *(f"{value:.3g}" for value in line[1:])) if len(line) == 5
+        (f"{line[0]:g}", *(f"{value:.3g}" for value in line[1:]))
+        if len(line) == 5
         else (f"{line[0]:g}", "half and a bias", "", *(f"{value:.3g}" for value in line[1:]))
         for line in data["gains"]
-    )  # fmt: skip
-    note = ("Four sensors at the corners of a floor of 2 m by 1.2 m, a fifth above its middle: standard deviation of "
-            "the worse of roll and pitch acceleration per unit of the readings' (1/m), by law and by Monte Carlo. The "
-            "formula for a plane is exact at every height; below a flatness of 0.1 it is taken, and said to be.")
+    )
+    note = (
+        "Four sensors at the corners of a floor of 2 m by 1.2 m, a fifth above its middle: standard deviation of "
+        "the worse of roll and pitch acceleration per unit of the readings' (1/m), by law and by Monte Carlo. The "
+        "formula for a plane is exact at every height; below a flatness of 0.1 it is taken, and said to be."
+    )
     heads = ("height [m]", "plain formula", "Monte Carlo", "formula for a plane", "Monte Carlo")
     return [Table("What sensors in nearly one plane cost", note, heads, rows)]
 
@@ -275,8 +428,12 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     left.set_title("noise of the angular acceleration by that of the readings [1/m]")
     left.set_xlabel("height of the fifth sensor above the plane of the others [m]")
     curves = data["curves"]
-    names_ = {"integrated": "integration alone", "law": "its law, sqrt(t)", "held": "with the symmetric part",
-              "stated": "what the filter states"}  # fmt: skip
+    names_ = {
+        "integrated": "integration alone",
+        "law": "its law, sqrt(t)",
+        "held": "with the symmetric part",
+        "stated": "what the filter states",
+    }
     for key, style in (("integrated", "C0-"), ("law", "k--"), ("held", "C1-"), ("stated", "C7--")):
         right.plot(curves["time"][: len(curves[key])], curves[key], style, label=names_[key], linewidth=1)
     right.set_title("error of the angular velocity, rms [rad/s]")

@@ -38,8 +38,14 @@ QUICK_STEPS, QUICK_DURATION = STEPS[1:3], 0.5
 WHY = "halvings inside the asymptotic range; the band leaves room for the next term of the error"
 
 
-def errors(engine: str, integrator: str, options: dict[str, float], truth: np.ndarray, duration: float,
-           steps: tuple[float, ...]) -> list[float]:  # fmt: skip
+def errors(
+    engine: str,
+    integrator: str,
+    options: dict[str, float],
+    truth: np.ndarray,
+    duration: float,
+    steps: tuple[float, ...],
+) -> list[float]:
     """Largest state error at each step over a duration (s), on the common grid."""
     found = []
     for step in steps:
@@ -86,6 +92,8 @@ def tables(data: dict[str, Any]) -> list[Table]:
     """Largest state error by step."""
     heads = ("engine", "integrator", *(f"{1e3 * step:g} ms" for step in data["steps"]))
     rows = tuple((engine, name, *(f"{value:.2e}" for value in found)) for engine, name, *found in data["table"])
-    note = (f"Largest error of any state (m, rad, m/s, rad/s) over the first {data['duration']:g} s. Equal rows are "
-            "the same method.")  # fmt: skip
+    note = (
+        f"Largest error of any state (m, rad, m/s, rad/s) over the first {data['duration']:g} s. Equal rows are "
+        "the same method."
+    )
     return [Table(TITLE, note, heads, rows)]

@@ -13,8 +13,17 @@ from validation.faults.planting import CLEAN, DESCRIPTION, EQUATIONS
 from validation.rows import Row, Table, at_most
 
 TITLE = "Planted faults: what each check sees"
-CAMPAIGNS = (contact.CAMPAIGN, ride.CAMPAIGN, wheelset.CAMPAIGN, tyres.CAMPAIGN, hubs.CAMPAIGN, braking.CAMPAIGN,
-             measuring.CAMPAIGN, choosing.CAMPAIGN, advice.CAMPAIGN)  # fmt: skip
+CAMPAIGNS = (
+    contact.CAMPAIGN,
+    ride.CAMPAIGN,
+    wheelset.CAMPAIGN,
+    tyres.CAMPAIGN,
+    hubs.CAMPAIGN,
+    braking.CAMPAIGN,
+    measuring.CAMPAIGN,
+    choosing.CAMPAIGN,
+    advice.CAMPAIGN,
+)
 FEW = (DESCRIPTION[0], EQUATIONS[0])
 EVERY, LEAST = 16, 40
 """Quick share of the campaigns; faults that there must be in all."""
@@ -30,8 +39,16 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def _enough(data: dict[str, Any]) -> Row:
     caught = sum(line[3] != "none" for line in _lines(data))
-    return at_most("planted.count", SYSTEM, f"by how many fewer than {LEAST} faults of all systems are caught",
-                   max(0, LEAST - caught), "faults", 0, f"{caught} of {len(_lines(data))} are", "native")  # fmt: skip
+    return at_most(
+        "planted.count",
+        SYSTEM,
+        f"by how many fewer than {LEAST} faults of all systems are caught",
+        max(0, LEAST - caught),
+        "faults",
+        0,
+        f"{caught} of {len(_lines(data))} are",
+        "native",
+    )
 
 
 def _lines(data: dict[str, Any]) -> list[tuple[str, ...]]:
@@ -43,8 +60,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
     """All faults in one table, then each system's with sizes and what its checks are."""
     lines = _lines(data)
     systems = len({line[0] for line in lines})
-    note = (f"{len(lines)} faults in {systems} systems, one at a time. Each check in the last column, had it been the "
-            "only one, would have let the fault pass.")  # fmt: skip
+    note = (
+        f"{len(lines)} faults in {systems} systems, one at a time. Each check in the last column, had it been the "
+        "only one, would have let the fault pass."
+    )
     headings = ("system", "planted in", "fault", "caught by", "would have been missed by")
     whole = Table("Planted faults of all systems", note, headings, tuple(lines))
     return [whole, *pitch_plane.tables(data["pitch-plane"]), *(own.table(data[own.id]) for own in CAMPAIGNS)]

@@ -24,21 +24,46 @@ TIME = 10.0
 BOUND = 1e-10
 
 Matrix = list[list[Decimal]]
-WHY = ("the linear equation of the covariance itself, stepped by squaring its matrix in 60 decimal digits: no sum, no "
-       "integral and no digit shared with the closed form")  # fmt: skip
+WHY = (
+    "the linear equation of the covariance itself, stepped by squaring its matrix in 60 decimal digits: no sum, no "
+    "integral and no digit shared with the closed form"
+)
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for both covariances against many digits, for their difference, and for Monte Carlo; quick: 2000 paths."""
-    exact = {"continuous": [_continuous_error(x) for x in DAMPED],
-             **{f"{n} steps": [_discrete_error(x, n) for x in DAMPED] for n in LENGTHS}}  # fmt: skip
-    rows = [at_most(f"point_mass.{name.replace(' ', '_')}.{x:g}", SYSTEM,
-                    f"covariance, {name}, damping times time {x:g}: worst relative error", error, "", BOUND, WHY,
-                    "closed form")
-            for name, errors in exact.items() for x, error in zip(DAMPED, errors, strict=True)]  # fmt: skip
+    exact = {
+        "continuous": [_continuous_error(x) for x in DAMPED],
+        **{f"{n} steps": [_discrete_error(x, n) for x in DAMPED] for n in LENGTHS},
+    }
+    rows = [
+        at_most(
+            f"point_mass.{name.replace(' ', '_')}.{x:g}",
+            SYSTEM,
+            f"covariance, {name}, damping times time {x:g}: worst relative error",
+            error,
+            "",
+            BOUND,
+            WHY,
+            "closed form",
+        )
+        for name, errors in exact.items()
+        for x, error in zip(DAMPED, errors, strict=True)
+    ]
     differences = [[n, *(_difference(x, n) for x in (0.0, 1.0, 10.0))] for n in (10, 100, 1000, 10_000, 100_000)]
-    rows.append(within("point_mass.order", SYSTEM, "discrete by continuous variance of position, no damping, n = 1000",
-                       1 - differences[2][1], "", 7.4888 / 7.5, 1e-5, "1 - 3/(2n): 7.4888 against 7.5", "closed form"))
+    rows.append(
+        within(
+            "point_mass.order",
+            SYSTEM,
+            "discrete by continuous variance of position, no damping, n = 1000",
+            1 - differences[2][1],
+            "",
+            7.4888 / 7.5,
+            1e-5,
+            "1 - 3/(2n): 7.4888 against 7.5",
+            "closed form",
+        )
+    )
     for x in (0.0, 3.0):
         rows += _monte_carlo(x, 2000 if quick else 10_000)
     return rows, {"errors": exact, "differences": differences}
@@ -56,8 +81,10 @@ def _power(matrix: Matrix, n: int) -> Matrix:
 
 
 def _times(a: Matrix, b: Matrix) -> Matrix:
-    return [[sum((x * y for x, y in zip(row, column, strict=True)), Decimal(0)) for column in zip(*b, strict=True)]
-            for row in a]  # fmt: skip
+    return [
+        [sum((x * y for x, y in zip(row, column, strict=True)), Decimal(0)) for column in zip(*b, strict=True)]
+        for row in a
+    ]
 
 
 def _exponential(matrix: Matrix) -> Matrix:
@@ -76,8 +103,12 @@ def _continuous_error(damped: float) -> float:
     with localcontext(prec=DIGITS):
         e, t = Decimal(eta), Decimal(TIME)
         gain = Decimal(DEVIATION) ** 2 * Decimal(STEP) / Decimal(MASS) ** 2
-        rates: Matrix = [[Decimal(0), 2 * t, Decimal(0), Decimal(0)], [Decimal(0), -e * t, t, Decimal(0)],
-                         [Decimal(0), Decimal(0), -2 * e * t, gain * t], [Decimal(0)] * 4]  # fmt: skip
+        rates: Matrix = [
+            [Decimal(0), 2 * t, Decimal(0), Decimal(0)],
+            [Decimal(0), -e * t, t, Decimal(0)],
+            [Decimal(0), Decimal(0), -2 * e * t, gain * t],
+            [Decimal(0)] * 4,
+        ]
         truth = [row[3] for row in _exponential(rates)]
         return _worst(continuous(TIME, DEVIATION, STEP, MASS, eta), truth)
 
@@ -89,15 +120,21 @@ def _discrete_error(damped: float, steps: int) -> float:
     with localcontext(prec=DIGITS):
         d = Decimal(step)
         r, kick = 1 - Decimal(eta) * d, (Decimal(DEVIATION) * d / Decimal(MASS)) ** 2
-        recursion: Matrix = [[Decimal(1), 2 * d, d * d, Decimal(0)], [Decimal(0), r, d * r, Decimal(0)],
-                             [Decimal(0), Decimal(0), r * r, kick], [Decimal(0)] * 3 + [Decimal(1)]]  # fmt: skip
+        recursion: Matrix = [
+            [Decimal(1), 2 * d, d * d, Decimal(0)],
+            [Decimal(0), r, d * r, Decimal(0)],
+            [Decimal(0), Decimal(0), r * r, kick],
+            [Decimal(0)] * 3 + [Decimal(1)],
+        ]
         truth = [row[3] for row in _power(recursion, steps)]
         return _worst(discrete(steps, DEVIATION, step, MASS, eta), truth)
 
 
 def _worst(found: np.ndarray, truth: Sequence[Decimal]) -> float:
-    return max(float(abs(Decimal(float(value)) / true - 1))
-               for value, true in zip(found[[0, 0, 1], [0, 1, 1]], truth, strict=False))  # fmt: skip
+    return max(
+        float(abs(Decimal(float(value)) / true - 1))
+        for value, true in zip(found[[0, 0, 1], [0, 1, 1]], truth, strict=False)
+    )
 
 
 def _difference(damped: float, steps: int) -> float:
@@ -115,18 +152,36 @@ def _monte_carlo(damped: float, count: int) -> list[Row]:
     distance = float(np.mean(np.sum(found * np.linalg.solve(law, found.T).T, axis=1))) / 2
     why = f"{count:,} paths of {steps} explicit Euler steps, seed {SEED}"
     return [
-        mean_square(f"point_mass.position.{damped:g}", SYSTEM, f"variance of position, damping times time {damped:g}, "
-                    "by Monte Carlo", float(np.mean(found[:, 0] ** 2)), float(law[0, 0]), count, "m^2", why),
-        mean_square(f"point_mass.joint.{damped:g}", SYSTEM, f"whole covariance, damping times time {damped:g}, by "
-                    "Monte Carlo: half the mean squared distance", distance, 1.0, 2 * count, "", why),
-    ]  # fmt: skip
+        mean_square(
+            f"point_mass.position.{damped:g}",
+            SYSTEM,
+            f"variance of position, damping times time {damped:g}, by Monte Carlo",
+            float(np.mean(found[:, 0] ** 2)),
+            float(law[0, 0]),
+            count,
+            "m^2",
+            why,
+        ),
+        mean_square(
+            f"point_mass.joint.{damped:g}",
+            SYSTEM,
+            f"whole covariance, damping times time {damped:g}, by Monte Carlo: half the mean squared distance",
+            distance,
+            1.0,
+            2 * count,
+            "",
+            why,
+        ),
+    ]
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Relative errors of both covariances."""
     rows = tuple((name, *(f"{error:.1e}" for error in errors)) for name, errors in data["errors"].items())
-    note = (f"Worst entry of the covariance against {DIGITS} digits, over damping times time. Ten steps cannot be "
-            "stable at 100: there the damping is that of 1.9 per step.")
+    note = (
+        f"Worst entry of the covariance against {DIGITS} digits, over damping times time. Ten steps cannot be "
+        "stable at 100: there the damping is that of 1.9 per step."
+    )
     return [Table("Relative error of the covariances", note, ("", *(f"{x:g}" for x in DAMPED)), rows)]
 
 
@@ -150,7 +205,9 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     axes[1].loglog(steps, 1.5 / steps, color="black", linestyle=":", label="3 / (2n)")
     axes[1].set(title="Euler scheme against the limit, relative", xlabel="steps n")
     axes[1].legend()
-    figure.suptitle("A point mass under white force noise: 32 N at 1 kHz on 780 kg", x=0.01, ha="left",
-                    fontweight="bold")  # fmt: skip
-    return [("Error of a point mass's position over time, continuous and in Euler steps; the two differ by O(1/n).",
-             figure)]
+    figure.suptitle(
+        "A point mass under white force noise: 32 N at 1 kHz on 780 kg", x=0.01, ha="left", fontweight="bold"
+    )
+    return [
+        ("Error of a point mass's position over time, continuous and in Euler steps; the two differ by O(1/n).", figure)
+    ]

@@ -35,13 +35,21 @@ from validation.rows import Row, System, Table, aim, at_most, behaves, not_run, 
 
 TITLE = "What accuracy costs"
 SYSTEM: System = "cost"
-PROBLEMS: tuple[Callable[[bool], Problem], ...] = (road_excited.problem, force_excited.problem,
-                                                   partial(wheelset.problem, speed=20.0),
-                                                   braking_stop.problem, inertial_unit.problem)  # fmt: skip
-FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (noisy_forces.problem, prescribed_pitch.problem,
-                                                    free_vehicle.problem, partial(wheelset.problem, speed=5.0),
-                                                    partial(wheelset.problem, speed=1.0),
-                                                    contact_alone.problem)  # fmt: skip
+PROBLEMS: tuple[Callable[[bool], Problem], ...] = (
+    road_excited.problem,
+    force_excited.problem,
+    partial(wheelset.problem, speed=20.0),
+    braking_stop.problem,
+    inertial_unit.problem,
+)
+FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (
+    noisy_forces.problem,
+    prescribed_pitch.problem,
+    free_vehicle.problem,
+    partial(wheelset.problem, speed=5.0),
+    partial(wheelset.problem, speed=1.0),
+    contact_alone.problem,
+)
 """Problems that a quick run leaves out; it has those of PROBLEMS."""
 ROUNDS = {True: 1, False: 15}
 """Interleaved rounds of timing, by ``quick``, of settings whose seconds decide something."""
@@ -73,8 +81,11 @@ def _beside(quick: bool) -> tuple[list[Row], dict[str, Any]]:
     """What is not a problem of the runner: ride, the parts of a step, force calls, claims about speed."""
     road = assemble(road_excited.scene())
     rows, found = ride.measure(quick, ROUNDS[quick], LEAST[True])
-    data = {"ride": found, "split": [] if quick else split.measure(ROUNDS[quick], LEAST[quick]),
-            **_speeds(road, 2 * ROUNDS[quick], 2 * LEAST[quick])}  # fmt: skip
+    data = {
+        "ride": found,
+        "split": [] if quick else split.measure(ROUNDS[quick], LEAST[quick]),
+        **_speeds(road, 2 * ROUNDS[quick], 2 * LEAST[quick]),
+    }
     settings = dict.fromkeys(_at_1_ms(one) for one in road_excited.settings(quick) if one.method != "DVERK6")
     return rows + split.rows(data["split"]) + _counts([*settings], road) + _speed_rows(data), data
 
@@ -114,12 +125,30 @@ def _road_rows(saved: dict[str, Any]) -> list[Row]:
         "rk4": ("exudyn RK44 = mujoco RK4 = reference RK4", "the same tableau at the same step"),
         "implicit": ("mujoco implicit = mujoco implicitfast", "they differ in Coriolis terms, which are absent here"),
     }
-    rows = [behaves(f"price.road.coincide.{name}", SYSTEM, "curves that agree to 1 % at every common setting",
-                    next((one for one in found if one == group), "; ".join(found)), group, why, "native")
-            for name, (group, why) in expected.items()]  # fmt: skip
+    rows = [
+        behaves(
+            f"price.road.coincide.{name}",
+            SYSTEM,
+            "curves that agree to 1 % at every common setting",
+            next((one for one in found if one == group), "; ".join(found)),
+            group,
+            why,
+            "native",
+        )
+        for name, (group, why) in expected.items()
+    ]
     missing = [p for p in points if p.setting.method == "DVERK6"]
-    return rows + [behaves("price.road.status.DVERK6", SYSTEM, "Exudyn DVERK6", p.status, "refused",
-                           "Exudyn names the method but has not implemented it") for p in missing]  # fmt: skip
+    return rows + [
+        behaves(
+            "price.road.status.DVERK6",
+            SYSTEM,
+            "Exudyn DVERK6",
+            p.status,
+            "refused",
+            "Exudyn names the method but has not implemented it",
+        )
+        for p in missing
+    ]
 
 
 def _at_1_ms(one: Setting) -> Setting:
@@ -131,13 +160,26 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
     """What the adapters say about their force calls against calls counted from outside."""
     rows = []
     for engine, how in (("exudyn", "calls of one load"), ("mujoco", "MuJoCo's own timers")):
-        pairs = [counted(engine, assembly, road_excited.settings_of(one, COUNTED)) for one in settings
-                 if one.engine == engine]  # fmt: skip
+        pairs = [
+            counted(engine, assembly, road_excited.settings_of(one, COUNTED))
+            for one in settings
+            if one.engine == engine
+        ]
         worst = max(abs(outside - said) for outside, said in pairs)
         what = f"force calls counted from outside ({how}) against those reported, {len(pairs)} runs, largest difference"
-        rows.append(within(f"price.road.counts.{engine}", SYSTEM, what, worst, "calls", 0, 0,
-                           "exact; the one evaluation before the first step of methods that start from accelerations "
-                           "is left out", "native"))  # fmt: skip
+        rows.append(
+            within(
+                f"price.road.counts.{engine}",
+                SYSTEM,
+                what,
+                worst,
+                "calls",
+                0,
+                0,
+                "exact; the one evaluation before the first step of methods that start from accelerations is left out",
+                "native",
+            )
+        )
     return rows
 
 
@@ -146,14 +188,32 @@ def _speed_rows(data: dict[str, Any]) -> list[Row]:
     why = "a target about seconds, which are reported and never gated"
     gap = data["callback"]["RK4"]["gap"]
     what = "MuJoCo RK4: every force in one compiled callback against native springs"
-    rows = [at_most("price.callback.gap", SYSTEM, what, gap,
-                    "m, rad, m/s, rad/s", 1e-12, "the same forces at the same stages, written twice", "native")]
+    rows = [
+        at_most(
+            "price.callback.gap",
+            SYSTEM,
+            what,
+            gap,
+            "m, rad, m/s, rad/s",
+            1e-12,
+            "the same forces at the same stages, written twice",
+            "native",
+        )
+    ]
     for integrator, found in data["callback"].items():
         for key, words in CALLBACKS.items():
             ratio, low, high = found[key]
-            rows.append(aim(f"price.callback.{integrator}.{key.replace(' ', '-')}", SYSTEM,
-                            f"MuJoCo {integrator}, {words}: paired seconds, 95 % interval {low:.3f} to {high:.3f}",
-                            ratio, "times", 1.2, why))  # fmt: skip
+            rows.append(
+                aim(
+                    f"price.callback.{integrator}.{key.replace(' ', '-')}",
+                    SYSTEM,
+                    f"MuJoCo {integrator}, {words}: paired seconds, 95 % interval {low:.3f} to {high:.3f}",
+                    ratio,
+                    "times",
+                    1.2,
+                    why,
+                )
+            )
     return rows + [_real_time(key, data["real time"][key], why) for key in ("with table", "without table")]
 
 
@@ -162,25 +222,45 @@ def _real_time(key: str, found: tuple[float, float, float] | None, why: str) -> 
     if found is None:
         return not_run(name, SYSTEM, f"reference RK4 at 1 ms, {what}", "other work of the machine hid the difference")
     factor, low, high = found
-    return aim(name, SYSTEM, f"reference RK4 at 1 ms, {what}, 95 % interval {low:,.0f} to {high:,.0f}", factor,
-               "times real time", 1000.0, why, "at least")  # fmt: skip
+    return aim(
+        name,
+        SYSTEM,
+        f"reference RK4 at 1 ms, {what}, 95 % interval {low:,.0f} to {high:,.0f}",
+        factor,
+        "times real time",
+        1000.0,
+        why,
+        "at least",
+    )
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Cheapest settings, losses, curves, failures and the parts of a step of every problem; the routes of ride."""
-    found = [table for one in data["problems"]
-             for table in (*cost_tables(one["problem"], [cost.point(saved) for saved in one["points"]]),
-                           *split.table(data["split"], one["problem"]["key"]))]  # fmt: skip
+    found = [
+        table
+        for one in data["problems"]
+        for table in (
+            *cost_tables(one["problem"], [cost.point(saved) for saved in one["points"]]),
+            *split.table(data["split"], one["problem"]["key"]),
+        )
+    ]
     return [*found, ride.table(data["ride"])]
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """A work-precision figure per problem, and one of the routes of ride."""
-    return [*((_caption(one["problem"]), draw_figure(one["problem"], [cost.point(saved) for saved in one["points"]]))
-              for one in data["problems"]), ride.draw(data["ride"])]  # fmt: skip
+    return [
+        *(
+            (_caption(one["problem"]), draw_figure(one["problem"], [cost.point(saved) for saved in one["points"]]))
+            for one in data["problems"]
+        ),
+        ride.draw(data["ride"]),
+    ]
 
 
 def _caption(problem: dict[str, Any]) -> str:
-    return (f"{problem['title']}: error over work and over seconds. Reference: {problem['reference']}. "
-            "Colour is the engine, marker the method, line its order (solid from 4 up, dashed 2, dotted 1). "
-            f"{problem['note']}")  # fmt: skip
+    return (
+        f"{problem['title']}: error over work and over seconds. Reference: {problem['reference']}. "
+        "Colour is the engine, marker the method, line its order (solid from 4 up, dashed 2, dotted 1). "
+        f"{problem['note']}"
+    )

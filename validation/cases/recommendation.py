@@ -43,8 +43,12 @@ def _shared(folder: Path) -> list[Judged]:
     """The same by as many processes as there are processors, two at most; long ones first."""
     context = get_context("spawn")  # an engine's threads do not survive a fork
     with ProcessPoolExecutor(min(2, os.cpu_count() or 1), mp_context=context) as pool:
-        return [one.result() for one in [pool.submit(judged, system, n, folder)
-                                         for system in reversed(SCENES) for n in range(SCENES[system])]]  # fmt: skip
+        return [
+            one.result()
+            for one in [
+                pool.submit(judged, system, n, folder) for system in reversed(SCENES) for n in range(SCENES[system])
+            ]
+        ]
 
 
 def judged(system: str, number: int, folder: Path, engines: tuple[str, ...] = ENGINES) -> Judged:
@@ -52,8 +56,11 @@ def judged(system: str, number: int, folder: Path, engines: tuple[str, ...] = EN
     refused: list[str] = []
     for n in range(number, number + (SPARE + 1) * STRIDE, STRIDE):
         try:
-            own = (judge(drawn(n, folder), engines) if system == "pitch-plane" else
-                   unseen_systems.judge(unseen_systems.drawn(system, n)))  # fmt: skip
+            own = (
+                judge(drawn(n, folder), engines)
+                if system == "pitch-plane"
+                else unseen_systems.judge(unseen_systems.drawn(system, n))
+            )
         except (InputError, RunFailed) as error:
             refused.append(f"{system} {n}: {error}")
         else:
@@ -68,22 +75,69 @@ def _rows(found: list[list[Verdict]], refused: list[str]) -> list[Row]:
     factors = [one.factor for one in every]
     scenes, why = f"{len(found)} scenes drawn at random", "judged by another solver than the search's, DOP853"
     return [
-        within("recommendation.met", SYSTEM, f"share of {scenes} in which every recommended setting holds its "
-               f"tolerance ({len(every)} settings)", held / len(found), "", 1.0, 1.0 - MET, why, "closed form"),
-        at_most("recommendation.predicted", SYSTEM, "predicted by true error, or its inverse: largest of all",
-                max(factors, default=float("inf")), "times", FACTOR,
-                f"{why}; errors below what is known of the truth count as that", "closed form"),
-        at_most("recommendation.refused", SYSTEM, f"scenes that were refused with a reason, and drawn anew, beside "
-                f"{scenes}", len(refused), "scenes", (1.0 - MET) * len(found),
-                "; ".join(refused) or "none was: every one got a recommendation", "none"),
-        finding("recommendation.factor", SYSTEM, "the same, 95 of 100", float(np.quantile(factors, 0.95)), "times",
-                "1", why, "closed form"),
-        at_most("recommendation.slower", SYSTEM, "settings recommended by force calls that take more of them than the "
-                "engine's default that meets the tolerance", _slower(every, "calls"), "settings", 0.0, "exact", "none"),
-        aim("recommendation.slower.seconds", SYSTEM, "settings recommended by seconds that take more of them than the "
-            "engine's default that meets the tolerance", _slower(every, "seconds"), "settings", 0.0, "seconds of the "
-            "processor, where the 95 % interval of the ratio lies above 1.05 in two contests more, of 9 and 25 rounds"),
-    ]  # fmt: skip
+        within(
+            "recommendation.met",
+            SYSTEM,
+            f"share of {scenes} in which every recommended setting holds its tolerance ({len(every)} settings)",
+            held / len(found),
+            "",
+            1.0,
+            1.0 - MET,
+            why,
+            "closed form",
+        ),
+        at_most(
+            "recommendation.predicted",
+            SYSTEM,
+            "predicted by true error, or its inverse: largest of all",
+            max(factors, default=float("inf")),
+            "times",
+            FACTOR,
+            f"{why}; errors below what is known of the truth count as that",
+            "closed form",
+        ),
+        at_most(
+            "recommendation.refused",
+            SYSTEM,
+            f"scenes that were refused with a reason, and drawn anew, beside {scenes}",
+            len(refused),
+            "scenes",
+            (1.0 - MET) * len(found),
+            "; ".join(refused) or "none was: every one got a recommendation",
+            "none",
+        ),
+        finding(
+            "recommendation.factor",
+            SYSTEM,
+            "the same, 95 of 100",
+            float(np.quantile(factors, 0.95)),
+            "times",
+            "1",
+            why,
+            "closed form",
+        ),
+        at_most(
+            "recommendation.slower",
+            SYSTEM,
+            "settings recommended by force calls that take more of them than the "
+            "engine's default that meets the tolerance",
+            _slower(every, "calls"),
+            "settings",
+            0.0,
+            "exact",
+            "none",
+        ),
+        aim(
+            "recommendation.slower.seconds",
+            SYSTEM,
+            "settings recommended by seconds that take more of them than the engine's default that meets the tolerance",
+            _slower(every, "seconds"),
+            "settings",
+            0.0,
+            "seconds of the "
+            "processor, where the 95 % interval of the ratio lies above 1.05 in two contests more, of 9 and 25 rounds",
+        ),
+    ]
 
 
 def _slower(every: list[Verdict], kind: str) -> int:
@@ -97,11 +151,20 @@ def tables(data: dict[str, Any]) -> list[Table]:
         if not own:
             continue
         one = own[0]
-        rows.append((one["title"], f"{one['tolerance']:.2g}", f"{one['curve']}, {one['label']}",
-                     f"{one['predicted']:.3g}", f"{one['true']:.3g}",
-                     str(sum(v["true"] <= v["tolerance"] for v in own)) + f" of {len(own)}"))  # fmt: skip
-    note = ("The setting that is recommended by seconds over all engines; the last column counts those of each engine "
-            "and of force calls too.")  # fmt: skip
+        rows.append(
+            (
+                one["title"],
+                f"{one['tolerance']:.2g}",
+                f"{one['curve']}, {one['label']}",
+                f"{one['predicted']:.3g}",
+                f"{one['true']:.3g}",
+                str(sum(v["true"] <= v["tolerance"] for v in own)) + f" of {len(own)}",
+            )
+        )
+    note = (
+        "The setting that is recommended by seconds over all engines; the last column counts those of each engine "
+        "and of force calls too."
+    )
     heads = ("scene", "tolerance", "recommended", "predicted error", "true error", "held")
     return [Table("Recommendations for scenes drawn at random", note, heads, tuple(rows))]
 
@@ -114,14 +177,29 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     every = [one for own in data["verdicts"] for one in own]
     for engine in dict.fromkeys(one["curve"].split()[0] for one in every):
         own = [one for one in every if one["curve"].startswith(engine)]
-        ax.plot([one["true"] / one["tolerance"] for one in own], [one["predicted"] / one["tolerance"] for one in own],
-                "o", color=COLOURS.get(engine, "grey"), markersize=4, alpha=0.6, label=engine)  # fmt: skip
+        ax.plot(
+            [one["true"] / one["tolerance"] for one in own],
+            [one["predicted"] / one["tolerance"] for one in own],
+            "o",
+            color=COLOURS.get(engine, "grey"),
+            markersize=4,
+            alpha=0.6,
+            label=engine,
+        )
     span = np.array([1e-6, 10.0])
     ax.plot(span, span, color="#333333", linewidth=0.8)
-    ax.fill_between(span, span / FACTOR, span * FACTOR, color="#bbbbbb", alpha=0.4, linewidth=0,
-                    label=f"within a factor {FACTOR:g}")  # fmt: skip
+    ax.fill_between(
+        span, span / FACTOR, span * FACTOR, color="#bbbbbb", alpha=0.4, linewidth=0, label=f"within a factor {FACTOR:g}"
+    )
     ax.axvline(1.0, color="#aa0000", linewidth=1.0, label="tolerance")
-    ax.set(xscale="log", yscale="log", xlabel="true error by tolerance", ylabel="predicted error by tolerance",
-           xlim=span, ylim=span, title=f"Recommended for {len(data['verdicts'])} scenes never seen")  # fmt: skip
+    ax.set(
+        xscale="log",
+        yscale="log",
+        xlabel="true error by tolerance",
+        ylabel="predicted error by tolerance",
+        xlim=span,
+        ylim=span,
+        title=f"Recommended for {len(data['verdicts'])} scenes never seen",
+    )
     ax.legend(loc="upper left", fontsize=9)
     return [("Errors of recommended settings: predicted by the search, and true by another solver.", figure)]

@@ -46,8 +46,15 @@ LEAST = 1e-20
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All but the engines' own linearisations in quick; there, of the vehicles, two at one speed."""
     routes = [_by_quadrature(*job) for job in _jobs(quick)]
-    rows = [*_closed_rows(), *_route_rows(routes), *_limit_rows(), *_weighting_rows(), *_white_rows(), *_free_rows(),
-            _unstable_row()]  # fmt: skip
+    rows = [
+        *_closed_rows(),
+        *_route_rows(routes),
+        *_limit_rows(),
+        *_weighting_rows(),
+        *_white_rows(),
+        *_free_rows(),
+        _unstable_row(),
+    ]
     engines = () if quick else ("exudyn", "mujoco")
     rows += [_engine_row(engine) for engine in engines]
     speeds = SPEEDS[::20] if quick else SPEEDS
@@ -122,13 +129,25 @@ def _closed_rows() -> list[Row]:
     for corner in (0.0, 1e-6, 1e-3, 0.3, 3.0):
         found = stationary(excited(corners([(0.0, CORNER)]), _walk((0.0,), corner), 20.0)).variance
         q, w = 20.0 * INTENSITY, 20.0 * corner
-        pairs = {"acceleration": (found[0], CORNER.body_acceleration(q, w)),
-                 "travel": (found[1], CORNER.suspension_travel(q, w))}  # fmt: skip
+        pairs = {
+            "acceleration": (found[0], CORNER.body_acceleration(q, w)),
+            "travel": (found[1], CORNER.suspension_travel(q, w)),
+        }
         pairs |= {"deflection": (found[2], CORNER.tyre_deflection(q))} if corner == 0.0 else {}
         worst |= {key: max(worst[key], abs(a / b - 1)) for key, (a, b) in pairs.items()}
-    rows = [at_most(f"ride_covariance.quarter.{key}", SYSTEM, f"quarter car, variance of the {key}, corners of the "
-                    "road from 0 to 3 rad/m", value, "", 1e-10, "asked; the sums have no cancellation", "closed form")
-            for key, value in worst.items()]  # fmt: skip
+    rows = [
+        at_most(
+            f"ride_covariance.quarter.{key}",
+            SYSTEM,
+            f"quarter car, variance of the {key}, corners of the road from 0 to 3 rad/m",
+            value,
+            "",
+            1e-10,
+            "asked; the sums have no cancellation",
+            "closed form",
+        )
+        for key, value in worst.items()
+    ]
     a, b = 1.2, 1.5
     front, rear, inertia = split_half_car(CORNER, a, b)
     vehicle = corners([(a, front), (-b, rear)], np.diag([front.m_s + rear.m_s, inertia]))
@@ -144,10 +163,18 @@ def _route_rows(routes: list[dict[str, Any]]) -> list[Row]:
     for name in dict.fromkeys(route["vehicle"] for route in routes):
         own = [route for route in routes if route["vehicle"] == name]
         what = f"standard deviations of {name}, {sum(route['values'] for route in own)} values, five cases"
-        rows.append(at_most(f"ride_covariance.quadrature.{name.replace(', ', '-').replace(' ', '-')}", SYSTEM,
-                            f"{what}: against quadrature of spectra by dynamic stiffness",
-                            max(route["worst"] for route in own), "", 1e-6,
-                            "asked; both routes claim better than 1e-9", "native"))  # fmt: skip
+        rows.append(
+            at_most(
+                f"ride_covariance.quadrature.{name.replace(', ', '-').replace(' ', '-')}",
+                SYSTEM,
+                f"{what}: against quadrature of spectra by dynamic stiffness",
+                max(route["worst"] for route in own),
+                "",
+                1e-6,
+                "asked; both routes claim better than 1e-9",
+                "native",
+            )
+        )
     return rows
 
 
@@ -161,12 +188,28 @@ def _limit_rows() -> list[Row]:
     late = stationary(replace(one, delays=(0.0, 1e6, 2e6))).deviation
     apart = stationary(replace(one, independent=True)).deviation
     return [
-        at_most("ride_covariance.delay.zero", SYSTEM, "three axles at delay 0 against one input, worst output",
-                _worst(at_once, joined), "", 0.0, "exact: they are the same equation", "closed form"),
-        at_most("ride_covariance.delay.long", SYSTEM, "delays of 1e6 s against independent axles, worst output",
-                _worst(late, apart), "", 1e-14, "exact but for rounding: the response has died out", "closed form"),
+        at_most(
+            "ride_covariance.delay.zero",
+            SYSTEM,
+            "three axles at delay 0 against one input, worst output",
+            _worst(at_once, joined),
+            "",
+            0.0,
+            "exact: they are the same equation",
+            "closed form",
+        ),
+        at_most(
+            "ride_covariance.delay.long",
+            SYSTEM,
+            "delays of 1e6 s against independent axles, worst output",
+            _worst(late, apart),
+            "",
+            1e-14,
+            "exact but for rounding: the response has died out",
+            "closed form",
+        ),
         _inputs_row(),
-    ]  # fmt: skip
+    ]
 
 
 def _inputs_row() -> Row:
@@ -179,8 +222,16 @@ def _inputs_row() -> Row:
         H = np.hstack([np.zeros((len(vehicle.wheels), states)), *_cases(vehicle, road)[number].heights])
         found, wanted = H @ stationary(system).P @ H.T, input_covariance(road, vehicle.wheels, *case)
         worst = max(worst, float(np.abs(found - wanted).max() / np.abs(wanted).max()))
-    return at_most("ride_covariance.inputs", SYSTEM, "covariances of the heights under six wheels in five cases", worst,
-                   "", 1e-12, "exact but for rounding", "closed form")  # fmt: skip
+    return at_most(
+        "ride_covariance.inputs",
+        SYSTEM,
+        "covariances of the heights under six wheels in five cases",
+        worst,
+        "",
+        1e-12,
+        "exact but for rounding",
+        "closed form",
+    )
 
 
 def _weighting_rows() -> list[Row]:
@@ -190,10 +241,18 @@ def _weighting_rows() -> list[Row]:
         found = stationary(weighted(excited(vehicle, road, 20.0), {"left occupant": name})).deviation[-1]
         other = quadrature(vehicle, road, 20.0, {"left occupant": WEIGHTINGS[name].response})
         at = [output.name for output in vehicle.outputs].index("left occupant")
-        rows.append(at_most(f"ride_covariance.weighting.{name}", SYSTEM, f"{name} of a seat as states behind the "
-                            "vehicle, against its frequency response in the quadrature",
-                            found / other.variance[at] ** 0.5 - 1, "", 1e-8,
-                            "asked of the cascade; as one polynomial it is 2e-4 off", "native"))  # fmt: skip
+        rows.append(
+            at_most(
+                f"ride_covariance.weighting.{name}",
+                SYSTEM,
+                f"{name} of a seat as states behind the vehicle, against its frequency response in the quadrature",
+                found / other.variance[at] ** 0.5 - 1,
+                "",
+                1e-8,
+                "asked of the cascade; as one polynomial it is 2e-4 off",
+                "native",
+            )
+        )
     return rows
 
 
@@ -202,14 +261,34 @@ def _white_rows() -> list[Row]:
     vehicle = corners([(0.0, CORNER)], tyre_damping=100.0)
     found = stationary(excited(vehicle, _walk((0.0,), 0.3), 20.0))
     other = quadrature(vehicle, _walk((0.0,), 0.3), 20.0)
-    rows = [behaves(f"ride_covariance.white.{name}", SYSTEM, f"tyre damping under a road of first order: {what}",
-                    found.status[i], expected, found.reason[i])
-            for name, what, i, expected in (("body", "body acceleration", 0, "finite"),
-                                            ("load", "wheel load", 4, "infinite"),
-                                            ("wheel", "wheel acceleration", 5, "infinite"))]  # fmt: skip
-    return [*rows, at_most("ride_covariance.white.value", SYSTEM, "the outputs that stay finite, against quadrature",
-                           _worst(found.variance[:4], other.variance[:4]), "", 1e-10, "both routes at their best",
-                           "native")]  # fmt: skip
+    rows = [
+        behaves(
+            f"ride_covariance.white.{name}",
+            SYSTEM,
+            f"tyre damping under a road of first order: {what}",
+            found.status[i],
+            expected,
+            found.reason[i],
+        )
+        for name, what, i, expected in (
+            ("body", "body acceleration", 0, "finite"),
+            ("load", "wheel load", 4, "infinite"),
+            ("wheel", "wheel acceleration", 5, "infinite"),
+        )
+    ]
+    return [
+        *rows,
+        at_most(
+            "ride_covariance.white.value",
+            SYSTEM,
+            "the outputs that stay finite, against quadrature",
+            _worst(found.variance[:4], other.variance[:4]),
+            "",
+            1e-10,
+            "both routes at their best",
+            "native",
+        ),
+    ]
 
 
 def _free_rows() -> list[Row]:
@@ -228,27 +307,70 @@ def _free_rows() -> list[Row]:
     others = {status for i, status in enumerate(walking.status) if i != side}
     after = float(np.sqrt(walking.rate[side] * 100.0 ** walking.power[side]))
     return [
-        within("ride_covariance.free.zeros", SYSTEM, "zero eigenvalues that are found in R19-free", split.zeros, "", 3,
-               0, "place along and across, heading", "closed form"),
-        behaves("ride_covariance.free.status", SYSTEM, "all outputs of R19-free", " and ".join(set(found.status)),
-                FINITE, found.reason[0]),
-        behaves("ride_covariance.free.slycot", SYSTEM, "R19-free where slycot seems installed, bit by bit",
-                "same" if same else "different", "same", "the method is named; its routines would raise here"),
-        behaves("ride_covariance.free.steered", SYSTEM, "front roll steer 0.05: lateral position",
-                walking.status[side] if others == {FINITE} else "others too", "diffusing", walking.reason[side]),
-        within("ride_covariance.free.walk", SYSTEM, "its standard deviation after 100 s", after, "m", 7.0, 0.5,
-               "known to one digit, from the same law worked out beforehand", "closed form"),
+        within(
+            "ride_covariance.free.zeros",
+            SYSTEM,
+            "zero eigenvalues that are found in R19-free",
+            split.zeros,
+            "",
+            3,
+            0,
+            "place along and across, heading",
+            "closed form",
+        ),
+        behaves(
+            "ride_covariance.free.status",
+            SYSTEM,
+            "all outputs of R19-free",
+            " and ".join(set(found.status)),
+            FINITE,
+            found.reason[0],
+        ),
+        behaves(
+            "ride_covariance.free.slycot",
+            SYSTEM,
+            "R19-free where slycot seems installed, bit by bit",
+            "same" if same else "different",
+            "same",
+            "the method is named; its routines would raise here",
+        ),
+        behaves(
+            "ride_covariance.free.steered",
+            SYSTEM,
+            "front roll steer 0.05: lateral position",
+            walking.status[side] if others == {FINITE} else "others too",
+            "diffusing",
+            walking.reason[side],
+        ),
+        within(
+            "ride_covariance.free.walk",
+            SYSTEM,
+            "its standard deviation after 100 s",
+            after,
+            "m",
+            7.0,
+            0.5,
+            "known to one digit, from the same law worked out beforehand",
+            "closed form",
+        ),
         _walk_row(turning, road, float(walking.rate[side]), side),
-    ]  # fmt: skip
+    ]
 
 
 def _walk_row(vehicle: LinearVehicle, road: Excitation, rate: float, side: int) -> Row:
     """A place that grows as c t per unit of noise has the density c^2 / (2 pi w^4) at low frequencies."""
     omega = np.array([1e-3])
     density = spectra(vehicle, road, 20.0, omega)[0, side]
-    return at_most("ride_covariance.free.rate", SYSTEM, "growth of its variance, rate t^3, against 2 pi w^4 / 3 times "
-                   "its density at 0.001 rad/s", rate / (2 * np.pi * omega[0] ** 4 * density / 3) - 1, "", 1e-4,
-                   "the next term is smaller by the square of frequency over the slowest pole", "native")  # fmt: skip
+    return at_most(
+        "ride_covariance.free.rate",
+        SYSTEM,
+        "growth of its variance, rate t^3, against 2 pi w^4 / 3 times its density at 0.001 rad/s",
+        rate / (2 * np.pi * omega[0] ** 4 * density / 3) - 1,
+        "",
+        1e-4,
+        "the next term is smaller by the square of frequency over the slowest pole",
+        "native",
+    )
 
 
 def _with_slycot(system: DelayedSystem) -> np.ndarray:
@@ -269,10 +391,17 @@ def _unstable_row() -> Row:
         stationary(excited(corners([(0.0, replace(CORNER, c=-5.0))]), _walk((0.0,), 0.3), 20.0))
     except Unstable as error:
         said = "refused" if "swings at 11.8" in str(error) and "grows" in str(error) else "refused without its mode"
-        return behaves("ride_covariance.unstable", SYSTEM, "a quarter car with a damper of -5 N s/m", said, "refused",
-                       str(error))  # fmt: skip
-    return behaves("ride_covariance.unstable", SYSTEM, "a quarter car with a damper of -5 N s/m", "answered", "refused",
-                   "it swings up")  # fmt: skip
+        return behaves(
+            "ride_covariance.unstable", SYSTEM, "a quarter car with a damper of -5 N s/m", said, "refused", str(error)
+        )
+    return behaves(
+        "ride_covariance.unstable",
+        SYSTEM,
+        "a quarter car with a damper of -5 N s/m",
+        "answered",
+        "refused",
+        "it swings up",
+    )
 
 
 def _engine_row(engine: str) -> Row:
@@ -287,9 +416,17 @@ def _engine_row(engine: str) -> Row:
             found, other = stationary(excited(linear, road, speed)), quadrature(analytic, road, speed)
             told = _told(found)
             worst = max(worst, _worst(found.deviation[told], np.sqrt(other.variance[told])))
-    return at_most(f"ride_covariance.engine.{engine}", SYSTEM, "standard deviations from the linearisation of "
-                   f"{engine}, three asymmetric twins, five cases, against quadrature of the analytic vehicles", worst,
-                   "", 1e-6, "asked", "native")  # fmt: skip
+    return at_most(
+        f"ride_covariance.engine.{engine}",
+        SYSTEM,
+        "standard deviations from the linearisation of "
+        f"{engine}, three asymmetric twins, five cases, against quadrature of the analytic vehicles",
+        worst,
+        "",
+        1e-6,
+        "asked",
+        "native",
+    )
 
 
 def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
@@ -305,18 +442,41 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
     slow = sweep(linear, roads, speeds[some], FILTERS, fast=False)
     told = slow.variance > LEAST * slow.variance.max()
     rows = [
-        at_most("ride_covariance.fast.equal", SYSTEM, "fast route against the direct one, with three weighted seats, "
-                "variance, worst of all outputs", _worst(quick.variance[:, some][told], slow.variance[told]), "",
-                1e-10, "asked", "none"),
-        behaves("ride_covariance.fast.taken", SYSTEM, "points of the sweep that had to go the direct way",
-                str(sum(quick.direct.values())), "0", "its eigenvectors are well apart"),
-        aim("ride_covariance.fast.time", SYSTEM, f"five cases times {len(speeds)} speeds with ISO weighting, from "
-            f"the linear vehicle of {source}, one core, once", seconds, "s", 2.0,
-            "asked for 60 speeds; it counts this process's seconds and not other load"),
-    ]  # fmt: skip
-    return rows, {"speeds": speeds.tolist(), "cases": list(quick.cases), "seat": "left occupant Wk",
-                  **{name: [quick.of(case, name).tolist() for case in quick.cases]
-                     for name in (*ALONG, "left occupant Wk")}}  # fmt: skip
+        at_most(
+            "ride_covariance.fast.equal",
+            SYSTEM,
+            "fast route against the direct one, with three weighted seats, variance, worst of all outputs",
+            _worst(quick.variance[:, some][told], slow.variance[told]),
+            "",
+            1e-10,
+            "asked",
+            "none",
+        ),
+        behaves(
+            "ride_covariance.fast.taken",
+            SYSTEM,
+            "points of the sweep that had to go the direct way",
+            str(sum(quick.direct.values())),
+            "0",
+            "its eigenvectors are well apart",
+        ),
+        aim(
+            "ride_covariance.fast.time",
+            SYSTEM,
+            f"five cases times {len(speeds)} speeds with ISO weighting, from "
+            f"the linear vehicle of {source}, one core, once",
+            seconds,
+            "s",
+            2.0,
+            "asked for 60 speeds; it counts this process's seconds and not other load",
+        ),
+    ]
+    return rows, {
+        "speeds": speeds.tolist(),
+        "cases": list(quick.cases),
+        "seat": "left occupant Wk",
+        **{name: [quick.of(case, name).tolist() for case in quick.cases] for name in (*ALONG, "left occupant Wk")},
+    }
 
 
 ALONG = ("body front", "body centre", "body rear")
@@ -324,10 +484,20 @@ ALONG = ("body front", "body centre", "body rear")
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Agreement of the two routes beside what each claims of itself."""
-    rows = tuple((route["vehicle"], f"{route['speed']:.3g}", str(route["values"]), f"{route['worst']:.1e}",
-                  *(f"{error:.1e}" for error in route["errors"])) for route in data["routes"])  # fmt: skip
-    note = ("Largest relative difference of standard deviations over all outputs in the five cases of correlation; the "
-            "last two columns are what each route says of its own variances, at its worst output.")  # fmt: skip
+    rows = tuple(
+        (
+            route["vehicle"],
+            f"{route['speed']:.3g}",
+            str(route["values"]),
+            f"{route['worst']:.1e}",
+            *(f"{error:.1e}" for error in route["errors"]),
+        )
+        for route in data["routes"]
+    )
+    note = (
+        "Largest relative difference of standard deviations over all outputs in the five cases of correlation; the "
+        "last two columns are what each route says of its own variances, at its worst output."
+    )
     headings = ("vehicle", "speed [m/s]", "values", "difference", "covariance says", "quadrature says")
     return [Table("Covariance against frequency quadrature", note, headings, rows)]
 

@@ -26,14 +26,33 @@ ENGINES = ("exudyn", "mujoco")
 SPEED, GRAVITY = 20.0, 9.81
 SEED = 20261121
 STATES, STEP = 100, 1e-3
-SHARES = (("quarter_car", "r19_ride"), ("quarter_car", "seven_freedoms", "r19_ride", "r19_free", "three_axle_truck",
-                                        "spatial twin"))  # fmt: skip
+SHARES = (
+    ("quarter_car", "r19_ride"),
+    ("quarter_car", "seven_freedoms", "r19_ride", "r19_free", "three_axle_truck", "spatial twin"),
+)
 """Vehicles of the full report behind those of the quick one."""
 BOUNDS = {"exudyn": 1e-12, "mujoco": 1e-9}
 FREQUENCIES = (
-    1.357622, 1.47076, 2.152076, 2.738235, 2.89083, 5.917883, 6.426765, 9.707712, 10.419969, 10.434258, 11.280234,
-    11.401383, 11.656264, 12.007752, 12.667486, 15.478222, 15.487798, 15.526984, 15.535278,
-)  # fmt: skip
+    1.357622,
+    1.47076,
+    2.152076,
+    2.738235,
+    2.89083,
+    5.917883,
+    6.426765,
+    9.707712,
+    10.419969,
+    10.434258,
+    11.280234,
+    11.401383,
+    11.656264,
+    12.007752,
+    12.667486,
+    15.478222,
+    15.487798,
+    15.526984,
+    15.535278,
+)
 """|lambda| / 2 pi (Hz) of R19-ride, given with its data."""
 DIGRESSIVE = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-1500.0, -400.0, 0.0, 700.0, 2500.0))
 BUMP_STOPS = Curve((-0.2, -0.05, 0.05, 0.2), (-8000.0, 0.0, 0.0, 8000.0))
@@ -65,8 +84,10 @@ def of_name(name: str, gravity: float = 0.0) -> SpatialVehicle:
 
 def curved(vehicle: SpatialVehicle) -> SpatialVehicle:
     """Digressive and asymmetric dampers, bump stops and dry friction in the first four springs."""
-    bent = [replace(spring, damping=0.0, rate_force=DIGRESSIVE, travel_force=BUMP_STOPS, friction=FRICTION)
-            for spring in vehicle.springs[:4]]  # fmt: skip
+    bent = [
+        replace(spring, damping=0.0, rate_force=DIGRESSIVE, travel_force=BUMP_STOPS, friction=FRICTION)
+        for spring in vehicle.springs[:4]
+    ]
     return replace(vehicle, springs=(*bent, *vehicle.springs[4:]))
 
 
@@ -98,19 +119,37 @@ def _matrices(name: str, gravity: float) -> list[Row]:
 
 def _linearised(vehicle: SpatialVehicle, name: str, loaded: str, bounds: dict[str, float]) -> list[Row]:
     expected = linearise(vehicle, SPEED)
-    return [at_most(f"ride_engines.matrices.{name}.{loaded}.{engine}", SYSTEM,
-                    f"M, D, K, road columns and outputs of {name}, {loaded}, {engine} against analytic",
-                    difference(build(engine, vehicle, speed=SPEED).linearise(), expected), "relative",
-                    bounds[engine], BY_DIFFERENCES, "native") for engine in ENGINES]  # fmt: skip
+    return [
+        at_most(
+            f"ride_engines.matrices.{name}.{loaded}.{engine}",
+            SYSTEM,
+            f"M, D, K, road columns and outputs of {name}, {loaded}, {engine} against analytic",
+            difference(build(engine, vehicle, speed=SPEED).linearise(), expected),
+            "relative",
+            bounds[engine],
+            BY_DIFFERENCES,
+            "native",
+        )
+        for engine in ENGINES
+    ]
 
 
 def _frequencies() -> list[Row]:
     rows = []
     for engine in ENGINES:
         found = np.abs(poles(build(engine, of_name("r19_ride")).linearise()))[::2] / (2 * np.pi)
-        rows.append(at_most(f"ride_engines.frequencies.{engine}", SYSTEM, f"19 eigenfrequencies of R19-ride, {engine}",
-                            float(np.abs(found / FREQUENCIES - 1).max()), "relative", 1e-5,
-                            "six decimals of the expected ones are known", "published"))  # fmt: skip
+        rows.append(
+            at_most(
+                f"ride_engines.frequencies.{engine}",
+                SYSTEM,
+                f"19 eigenfrequencies of R19-ride, {engine}",
+                float(np.abs(found / FREQUENCIES - 1).max()),
+                "relative",
+                1e-5,
+                "six decimals of the expected ones are known",
+                "published",
+            )
+        )
     return rows
 
 
@@ -125,9 +164,19 @@ def _states(name: str) -> list[Row]:
         pairs = ((exudyn, mujoco), (exudyn, reference), (mujoco, reference))
         worst = np.maximum(worst, [relative(*pair) for pair in pairs])
     names = ("exudyn against mujoco", "exudyn against equations", "mujoco against equations")
-    return [at_most(f"ride_engines.states.{name}.{what}", SYSTEM,
-                    f"accelerations of {name} at {STATES} random states, {what}", float(value), "relative", 1e-12, SAME,
-                    "native") for what, value in zip(names, worst, strict=True)]  # fmt: skip
+    return [
+        at_most(
+            f"ride_engines.states.{name}.{what}",
+            SYSTEM,
+            f"accelerations of {name} at {STATES} random states, {what}",
+            float(value),
+            "relative",
+            1e-12,
+            SAME,
+            "native",
+        )
+        for what, value in zip(names, worst, strict=True)
+    ]
 
 
 def _settings(engine: str, duration: float = 1.0) -> Settings:
@@ -147,11 +196,22 @@ def _path() -> tuple[list[Row], list[list[str]]]:
             start = time.process_time()
             runs[engine] = model.run(*random_state(vehicle, STATES)[:2])
             price.append([engine, what, f"{1e3 * (time.process_time() - start):.0f}", str(model.plan()["callbacks"])])
-        gap = max(np.abs(getattr(runs["exudyn"], part) - getattr(runs["mujoco"], part)).max()
-                  for part in ("positions", "rates"))  # fmt: skip
-        rows.append(at_most(f"ride_engines.path.{what}", SYSTEM,
-                            f"states of R19-ride over 1 s, {what} springs, RK4 at 1 ms, exudyn against mujoco",
-                            float(gap), "m, rad, m/s, rad/s", 1e-12, SAME, "native"))  # fmt: skip
+        gap = max(
+            np.abs(getattr(runs["exudyn"], part) - getattr(runs["mujoco"], part)).max()
+            for part in ("positions", "rates")
+        )
+        rows.append(
+            at_most(
+                f"ride_engines.path.{what}",
+                SYSTEM,
+                f"states of R19-ride over 1 s, {what} springs, RK4 at 1 ms, exudyn against mujoco",
+                float(gap),
+                "m, rad, m/s, rad/s",
+                1e-12,
+                SAME,
+                "native",
+            )
+        )
     return rows, price
 
 
@@ -162,12 +222,31 @@ def _at_rest() -> list[Row]:
     zero = np.zeros(len(vehicle.coordinates()))
     for engine in ENGINES:
         model = build(engine, vehicle, _settings(engine))
-        rows.append(at_most(f"ride_engines.rest.{engine}", SYSTEM, f"acceleration in the design position, {engine}",
-                            float(np.abs(model.acceleration(zero, zero)).max()), "m/s^2, rad/s^2", 1e-10,
-                            "preloads hold the weights to rounding", "none"))  # fmt: skip
+        rows.append(
+            at_most(
+                f"ride_engines.rest.{engine}",
+                SYSTEM,
+                f"acceleration in the design position, {engine}",
+                float(np.abs(model.acceleration(zero, zero)).max()),
+                "m/s^2, rad/s^2",
+                1e-10,
+                "preloads hold the weights to rounding",
+                "none",
+            )
+        )
         mean = np.abs(model.run(zero, zero).positions.mean(axis=0)).max()
-        rows.append(at_most(f"ride_engines.mean.{engine}", SYSTEM, f"mean position over 1 s from there, {engine}",
-                            float(mean), "m, rad", 1e-10, "nothing moves it", "none"))  # fmt: skip
+        rows.append(
+            at_most(
+                f"ride_engines.mean.{engine}",
+                SYSTEM,
+                f"mean position over 1 s from there, {engine}",
+                float(mean),
+                "m, rad",
+                1e-10,
+                "nothing moves it",
+                "none",
+            )
+        )
     return rows
 
 
@@ -177,12 +256,21 @@ def _shift() -> list[Row]:
     for name in SHARES[1]:
         analytic = shift(*(linearise(of_name(name, gravity), SPEED) for gravity in (0.0, GRAVITY)))
         for engine in ENGINES:
-            found = shift(*(build(engine, of_name(name, gravity), speed=SPEED).linearise()
-                            for gravity in (0.0, GRAVITY)))  # fmt: skip
-            rows.append(finding(f"ride_engines.shift.{name}.{engine}", SYSTEM,
-                                f"largest shift of an eigenvalue of {name} from unloaded to loaded, {engine}",
-                                float(np.abs(found).max()), "1/s", float(np.abs(analytic).max()),
-                                "expected: the same from the analytic matrices", "native"))  # fmt: skip
+            found = shift(
+                *(build(engine, of_name(name, gravity), speed=SPEED).linearise() for gravity in (0.0, GRAVITY))
+            )
+            rows.append(
+                finding(
+                    f"ride_engines.shift.{name}.{engine}",
+                    SYSTEM,
+                    f"largest shift of an eigenvalue of {name} from unloaded to loaded, {engine}",
+                    float(np.abs(found).max()),
+                    "1/s",
+                    float(np.abs(analytic).max()),
+                    "expected: the same from the analytic matrices",
+                    "native",
+                )
+            )
     return rows
 
 
@@ -190,15 +278,25 @@ def _without_curves() -> list[Row]:
     """A vehicle without curves has no curve code; with them one function per spring that bends."""
     plain, bent = (build("exudyn", vehicle).plan() for vehicle in (of_name("r19_ride"), curved(of_name("r19_ride"))))
     counts = f"{plain['curves']} curves, {bent['callbacks'] - plain['callbacks']} functions more with curves"
-    return [behaves("ride_engines.curves", SYSTEM, "curve code of R19-ride, counted", counts,
-                    "0 curves, 4 functions more with curves", "four springs are bent")]  # fmt: skip
+    return [
+        behaves(
+            "ride_engines.curves",
+            SYSTEM,
+            "curve code of R19-ride, counted",
+            counts,
+            "0 curves, 4 functions more with curves",
+            "four springs are bent",
+        )
+    ]
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """What a simulated second costs."""
     if not data["price"]:
         return []
-    note = ("CPU milliseconds, once, per simulated second of R19-ride, RK4 at 1 ms on a random road, and functions "
-            "called back.")
+    note = (
+        "CPU milliseconds, once, per simulated second of R19-ride, RK4 at 1 ms on a random road, and functions "
+        "called back."
+    )
     heads = ("engine", "springs", "ms per s", "callbacks")
     return [Table("R19-ride in time", note, heads, tuple(tuple(row) for row in data["price"]))]

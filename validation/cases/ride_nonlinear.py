@@ -86,20 +86,47 @@ def _gains() -> list[Row]:
         dry = max(dry, abs(of_friction(1.0, 1.0, ratio) / gain - 1.0))
     coulomb = of_friction(1.0, 1e-6, 1.0) / np.sqrt(2.0 / np.pi) - 1.0
     return [
-        at_most("ride_nonlinear.gains.curves", SYSTEM, "mean force and gain of damper and stops, closed form against "
-                "the defining integrals, at 6 motions, relative", worst, "", 1e-9, "error functions", "closed form"),
-        at_most("ride_nonlinear.gains.friction", SYSTEM, "gain of dry friction, likewise, rates 0.1 to 100 times that "
-                "of friction, relative", dry, "", 1e-9, "the trapezoidal rule converges geometrically", "closed form"),
-        at_most("ride_nonlinear.gains.coulomb", SYSTEM, "the same against friction (2 / pi)^(1/2) / deviation, which "
-                "Coulomb's law has", abs(float(coulomb)), "", 1e-9, "rates 1e6 times that of friction", "closed form"),
-    ]  # fmt: skip
+        at_most(
+            "ride_nonlinear.gains.curves",
+            SYSTEM,
+            "mean force and gain of damper and stops, closed form against "
+            "the defining integrals, at 6 motions, relative",
+            worst,
+            "",
+            1e-9,
+            "error functions",
+            "closed form",
+        ),
+        at_most(
+            "ride_nonlinear.gains.friction",
+            SYSTEM,
+            "gain of dry friction, likewise, rates 0.1 to 100 times that of friction, relative",
+            dry,
+            "",
+            1e-9,
+            "the trapezoidal rule converges geometrically",
+            "closed form",
+        ),
+        at_most(
+            "ride_nonlinear.gains.coulomb",
+            SYSTEM,
+            "the same against friction (2 / pi)^(1/2) / deviation, which Coulomb's law has",
+            abs(float(coulomb)),
+            "",
+            1e-9,
+            "rates 1e6 times that of friction",
+            "closed form",
+        ),
+    ]
 
 
 def expected(law: Any, cuts: Any) -> float:
     """Mean of law(x) over the standard normal x, cut where the law has corners."""
     edges = np.unique(np.clip([-12.0, *cuts, 12.0], -12.0, 12.0))
-    found = [quad(lambda x: law(x) * np.exp(-x * x / 2), a, b, epsabs=0.0, epsrel=1e-12, limit=200)[0]
-             for a, b in pairwise(edges)]  # fmt: skip
+    found = [
+        quad(lambda x: law(x) * np.exp(-x * x / 2), a, b, epsabs=0.0, epsrel=1e-12, limit=200)[0]
+        for a, b in pairwise(edges)
+    ]
     return float(sum(found)) / np.sqrt(2 * np.pi)
 
 
@@ -108,17 +135,42 @@ def _fixed_point() -> list[Row]:
     vehicle, road = ride(NONLINEAR, 4.0)
     one, other = (statistically_linear(vehicle, road, SPEED, scale) for scale in (1.0, 10.0))
     unloaded = statistically_linear(replace(vehicle, gravity=0.0), road, SPEED)
-    apart = [float(np.abs(each.covariance.deviation / one.covariance.deviation - 1.0).max())
-             for each in (other, unloaded)]  # fmt: skip
+    apart = [
+        float(np.abs(each.covariance.deviation / one.covariance.deviation - 1.0).max()) for each in (other, unloaded)
+    ]
     return [
-        at_most("ride_nonlinear.fixed_point", SYSTEM, f"{len(one.changes)} iterations, each change at most "
-                f"{one.contraction:.2g} of the last: distance of the gains to the fixed point, relative",
-                one.distance, "", 1e-11, "last change * c / (1 - c), Banach's bound", "none"),
-        at_most("ride_nonlinear.start", SYSTEM, "standard deviations from first gains of a tenfold motion, relative",
-                apart[0], "", 1e-10, "one fixed point, whatever the start", "none"),
-        at_most("ride_nonlinear.gravity", SYSTEM, "standard deviations without gravity, relative", apart[1], "",
-                1e-10, "preloads hold the weights, and nothing turns", "none"),
-    ]  # fmt: skip
+        at_most(
+            "ride_nonlinear.fixed_point",
+            SYSTEM,
+            f"{len(one.changes)} iterations, each change at most "
+            f"{one.contraction:.2g} of the last: distance of the gains to the fixed point, relative",
+            one.distance,
+            "",
+            1e-11,
+            "last change * c / (1 - c), Banach's bound",
+            "none",
+        ),
+        at_most(
+            "ride_nonlinear.start",
+            SYSTEM,
+            "standard deviations from first gains of a tenfold motion, relative",
+            apart[0],
+            "",
+            1e-10,
+            "one fixed point, whatever the start",
+            "none",
+        ),
+        at_most(
+            "ride_nonlinear.gravity",
+            SYSTEM,
+            "standard deviations without gravity, relative",
+            apart[1],
+            "",
+            1e-10,
+            "preloads hold the weights, and nothing turns",
+            "none",
+        ),
+    ]
 
 
 def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
@@ -130,20 +182,38 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
     for i, name in enumerate(copies.names):
         error = float(found.covariance.deviation[i] / copies.deviation[i] - 1.0)
         spread = float(copies.error[i] / copies.variance[i] / 2.0)
-        cells.append(f"{100 * error:+.1f} ± {100 * spread:.1f} % ({100 * found.left_out[i]:.1f} %, "
-                     f"{copies.kurtosis[i]:.1f})")  # fmt: skip
-        rows.append(at_most(f"ride_nonlinear.level.{level:g}.{name}", SYSTEM, f"{level:g} times the paper's road: "
-                            f"deviation of {name} beside {len(copies.moments[0])} copies, {copies.duration:.0f} s",
-                            abs(error), "", promised(found.left_out[i]) + 4.0 * spread,
-                            f"left out {100 * found.left_out[i]:.2g} % of the variance: what its sentence promises, "
-                            "and 4 standard errors", "none"))  # fmt: skip
+        cells.append(
+            f"{100 * error:+.1f} ± {100 * spread:.1f} % ({100 * found.left_out[i]:.1f} %, {copies.kurtosis[i]:.1f})"
+        )
+        rows.append(
+            at_most(
+                f"ride_nonlinear.level.{level:g}.{name}",
+                SYSTEM,
+                f"{level:g} times the paper's road: "
+                f"deviation of {name} beside {len(copies.moments[0])} copies, {copies.duration:.0f} s",
+                abs(error),
+                "",
+                promised(found.left_out[i]) + 4.0 * spread,
+                f"left out {100 * found.left_out[i]:.2g} % of the variance: what its sentence promises, "
+                "and 4 standard errors",
+                "none",
+            )
+        )
     travel = copies.names.index("travel front left")
     size = float(copies.deviation[travel])
     shift = float(found.mean[travel] - copies.mean[travel]) / size
-    rows.append(at_most(f"ride_nonlinear.mean.{level:g}", SYSTEM, "the same: mean travel, "
-                        f"{1e3 * found.mean[travel]:.2f} mm, beside the copies', by its deviation", abs(shift), "",
-                        promised(found.left_out[travel]) + 4.0 * float(copies.mean_error[travel]) / size,
-                        "as above: the damper pulls the body down", "none"))  # fmt: skip
+    rows.append(
+        at_most(
+            f"ride_nonlinear.mean.{level:g}",
+            SYSTEM,
+            f"the same: mean travel, {1e3 * found.mean[travel]:.2f} mm, beside the copies', by its deviation",
+            abs(shift),
+            "",
+            promised(found.left_out[travel]) + 4.0 * float(copies.mean_error[travel]) / size,
+            "as above: the damper pulls the body down",
+            "none",
+        )
+    )
     return rows, cells
 
 
@@ -152,9 +222,16 @@ def _linear_copies() -> Row:
     vehicle, road = ride("quarter_car")
     exact = stationary(excited(linearise(vehicle), road, SPEED))
     copies = copies_in_time(vehicle, road, SPEED, LASTING[1], copies=COPIES[1], seed=SEED)
-    return at_most("ride_nonlinear.linear", SYSTEM, f"quarter_car, {COPIES[1]} copies in time: variances against the "
-                   "covariance, largest |z| of 3", float(np.abs(copies.z(exact.deviation)).max()), "", 4.0,
-                   "of 3 normal values one beyond 4 in 5000 times", "none")  # fmt: skip
+    return at_most(
+        "ride_nonlinear.linear",
+        SYSTEM,
+        f"quarter_car, {COPIES[1]} copies in time: variances against the covariance, largest |z| of 3",
+        float(np.abs(copies.z(exact.deviation)).max()),
+        "",
+        4.0,
+        "of 3 normal values one beyond 4 in 5000 times",
+        "none",
+    )
 
 
 def _alone() -> list[Row]:
@@ -175,11 +252,19 @@ def _alone() -> list[Row]:
         error = np.abs(found.covariance.deviation / copies.deviation - 1.0)
         kept = [promised(share) for share in found.left_out] + 4.0 * copies.error / copies.variance / 2.0
         worst = int((error / kept).argmax())
-        rows.append(at_most(f"ride_nonlinear.alone.{name.split()[0]}", SYSTEM, f"{name} alone on {level:g} times the "
-                            f"paper's road: deviation of {copies.names[worst]}, which keeps its promise worst",
-                            float(error[worst]), "", float(kept[worst]),
-                            f"left out {100 * found.left_out[worst]:.2g} %: the promise, and 4 standard errors",
-                            "none"))  # fmt: skip
+        rows.append(
+            at_most(
+                f"ride_nonlinear.alone.{name.split()[0]}",
+                SYSTEM,
+                f"{name} alone on {level:g} times the "
+                f"paper's road: deviation of {copies.names[worst]}, which keeps its promise worst",
+                float(error[worst]),
+                "",
+                float(kept[worst]),
+                f"left out {100 * found.left_out[worst]:.2g} %: the promise, and 4 standard errors",
+                "none",
+            )
+        )
     return rows
 
 
@@ -187,8 +272,12 @@ def _bent_in_engines(quick: bool) -> list[Row]:
     """The nonlinear quarter car under gravity in both engines; its mean travel where the damper pulls it."""
     vehicle, excitation_ = ride(NONLINEAR)
     road = road_path(excitation_, SPEED, NONLINEAR_STEP)
-    runs = {engine: ridden(engine, vehicle, road, NONLINEAR_DRIVEN[not quick], seed=SEED, skipped=SKIPPED * (not quick),
-                           every=5) for engine in ENGINES}  # fmt: skip
+    runs = {
+        engine: ridden(
+            engine, vehicle, road, NONLINEAR_DRIVEN[not quick], seed=SEED, skipped=SKIPPED * (not quick), every=5
+        )
+        for engine in ENGINES
+    }
     rows = [_apart("bent", f"{NONLINEAR} under gravity, {NONLINEAR_DRIVEN[not quick]:g} s", runs)]
     if quick:
         return rows
@@ -198,22 +287,47 @@ def _bent_in_engines(quick: bool) -> list[Row]:
     error, _ = standard_errors(found.vehicle, excitation_, SPEED, NONLINEAR_DRIVEN[1] - SKIPPED)
     for engine, run in runs.items():
         shift = abs(run.outputs[:, travel].mean() - found.mean[travel]) / size[travel]
-        rows.append(at_most(f"ride_nonlinear.mean.{engine}", SYSTEM, f"the same in {engine}: mean travel, predicted "
-                            f"{1e3 * found.mean[travel]:.2f} mm, by its deviation", float(shift), "",
-                            promised(left[travel]) + 4.0 * float(error[travel] / size[travel]),
-                            "what its sentence promises, and 4 standard errors", "none"))  # fmt: skip
+        rows.append(
+            at_most(
+                f"ride_nonlinear.mean.{engine}",
+                SYSTEM,
+                f"the same in {engine}: mean travel, predicted {1e3 * found.mean[travel]:.2f} mm, by its deviation",
+                float(shift),
+                "",
+                promised(left[travel]) + 4.0 * float(error[travel] / size[travel]),
+                "what its sentence promises, and 4 standard errors",
+                "none",
+            )
+        )
         mean = abs(run.outputs[:, force].mean()) / error[force]
-        rows.append(at_most(f"ride_nonlinear.load.{engine}", SYSTEM, "the same: mean of the dynamic tyre force, "
-                            "|z|", float(mean), "", 4.0, "the tyre bears the weight, however the damper pulls",
-                            "none"))  # fmt: skip
+        rows.append(
+            at_most(
+                f"ride_nonlinear.load.{engine}",
+                SYSTEM,
+                "the same: mean of the dynamic tyre force, |z|",
+                float(mean),
+                "",
+                4.0,
+                "the tyre bears the weight, however the damper pulls",
+                "none",
+            )
+        )
     return rows
 
 
 def _apart(id: str, what: str, runs: dict[str, Ride]) -> Row:
     one, other = (runs[engine].run for engine in ENGINES)
     gap = max(np.abs(one.positions - other.positions).max(), np.abs(one.rates - other.rates).max())
-    return at_most(f"ride_nonlinear.path.{id}", SYSTEM, f"{what} on one random road: exudyn against mujoco, all states",
-                   float(gap), "m, rad, m/s, rad/s", 1e-12, SAME, "native")  # fmt: skip
+    return at_most(
+        f"ride_nonlinear.path.{id}",
+        SYSTEM,
+        f"{what} on one random road: exudyn against mujoco, all states",
+        float(gap),
+        "m, rad, m/s, rad/s",
+        1e-12,
+        SAME,
+        "native",
+    )
 
 
 def _linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
@@ -230,13 +344,28 @@ def _linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
         square = ((run.outputs**2).mean(axis=0) - exact.variance) / errors[1]
         share = float(np.median(errors[1] / exact.variance / 2.0))
         rows += [
-            at_most(f"ride_nonlinear.variance.{engine}", SYSTEM, f"r19_ride in {engine}, {DRIVEN - SKIPPED:g} s: "
-                    f"variances of 16 outputs against the covariance (deviations to {100 * share:.1f} %), largest |z|",
-                    float(np.abs(square).max()), "", 4.0, "standard errors by the densities: samples of a path know "
-                    "of each other", "none"),
-            at_most(f"ride_nonlinear.zero.{engine}", SYSTEM, "the same: means about the equilibrium, largest |z| of 16",
-                    float(np.abs(mean).max()), "", 4.0, "the road has no mean, and gravity is carried", "none"),
-        ]  # fmt: skip
+            at_most(
+                f"ride_nonlinear.variance.{engine}",
+                SYSTEM,
+                f"r19_ride in {engine}, {DRIVEN - SKIPPED:g} s: "
+                f"variances of 16 outputs against the covariance (deviations to {100 * share:.1f} %), largest |z|",
+                float(np.abs(square).max()),
+                "",
+                4.0,
+                "standard errors by the densities: samples of a path know of each other",
+                "none",
+            ),
+            at_most(
+                f"ride_nonlinear.zero.{engine}",
+                SYSTEM,
+                "the same: means about the equilibrium, largest |z| of 16",
+                float(np.abs(mean).max()),
+                "",
+                4.0,
+                "the road has no mean, and gravity is carried",
+                "none",
+            ),
+        ]
     return rows, _spectra(runs, linear, excitation_)
 
 
@@ -251,16 +380,20 @@ def _spectra(runs: dict[str, Ride], linear: LinearVehicle, excitation_: Excitati
     for engine, run in runs.items():
         f, density = welch(run.outputs, 1.0 / run.interval, nperseg=round(4.0 / run.interval), axis=0)
         keep = (f > 0.4) & (f <= frequency[-1])  # below, leakage of the windows
-        shown[engine] = {"frequency": f[keep].tolist(),
-                         **{name: density[keep, names.index(name)].tolist() for name in SHOWN}}  # fmt: skip
+        shown[engine] = {
+            "frequency": f[keep].tolist(),
+            **{name: density[keep, names.index(name)].tolist() for name in SHOWN},
+        }
     return shown
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """What statistical linearisation is worth."""
     names = [output.name for output in ride(NONLINEAR)[0].outputs]
-    note = ("Error of each standard deviation beside Monte Carlo; in brackets what was left out of the variance, and "
-            "the kurtosis, 3 for a Gaussian output. The road's level by that of the paper.")  # fmt: skip
+    note = (
+        "Error of each standard deviation beside Monte Carlo; in brackets what was left out of the variance, and "
+        "the kurtosis, 3 for a Gaussian output. The road's level by that of the paper."
+    )
     return [Table("Statistical linearisation", note, ("level", *names), tuple(tuple(row) for row in data["levels"]))]
 
 
@@ -276,8 +409,14 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     for axis, name, unit in zip(axes.ravel(), SHOWN, units, strict=True):
         for engine, width, style in zip(ENGINES, (2.2, 1.0), ("-", "--"), strict=True):
             own = shown[engine]
-            axis.loglog(own["frequency"], own[name], style, color=COLOURS[engine], linewidth=width,
-                        label=f"{LABELS[engine]}, {DRIVEN - SKIPPED:g} s in time")  # fmt: skip
+            axis.loglog(
+                own["frequency"],
+                own[name],
+                style,
+                color=COLOURS[engine],
+                linewidth=width,
+                label=f"{LABELS[engine]}, {DRIVEN - SKIPPED:g} s in time",
+            )
         axis.loglog(shown["frequency"], shown["own"][name], "k", linewidth=1.2, label="of the covariance")
         top = max(shown["own"][name])
         axis.set(title=name.capitalize(), ylabel=f"one-sided density [{unit}]", ylim=(1e-5 * top, 5 * top))
@@ -285,6 +424,8 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         axis.set_xlabel("frequency [Hz]")
     axes[0, 0].legend(fontsize=8)
     figure.suptitle(f"R19-ride at {SPEED:g} m/s: one path through both engines, over the spectra of its covariance")
-    caption = ("Spectra of one path of 19 freedoms on the paper's road through both engines, gravity on, by Welch's "
-               "method; black, what the covariance's own linear vehicle and road say.")  # fmt: skip
+    caption = (
+        "Spectra of one path of 19 freedoms on the paper's road through both engines, gravity on, by Welch's "
+        "method; black, what the covariance's own linear vehicle and road say."
+    )
     return [(caption, figure)]

@@ -25,19 +25,42 @@ from validation.rows import Row, System, Table, at_most, finding
 TITLE = "Ride: roads under two tracks"
 SYSTEM: System = "ride"
 WHEELS = (
-    Wheel("front left", 1.2, 0.7, 0), Wheel("front right", 1.2, -0.6, 0), Wheel("middle left", -1.4, 0.65, 1),
-    Wheel("middle right", -1.4, -0.75, 1), Wheel("rear left", -2.7, 0.9, 2), Wheel("rear right", -2.7, -0.9, 2),
-)  # fmt: skip
+    Wheel("front left", 1.2, 0.7, 0),
+    Wheel("front right", 1.2, -0.6, 0),
+    Wheel("middle left", -1.4, 0.65, 1),
+    Wheel("middle right", -1.4, -0.75, 1),
+    Wheel("rear left", -2.7, 0.9, 2),
+    Wheel("rear right", -2.7, -0.9, 2),
+)
 """Three axles, none like another and none symmetric."""
 SPEED = 20.0
 BAND = (1e-4, 500.0)
 """rad/m, of the frequency route."""
 STANDARD = (
-    (0.5, 418, 853), (0.63, 459, 944), (0.8, 477, 992), (1.0, 482, 1011), (1.25, 484, 1008), (1.6, 494, 968),
-    (2.0, 531, 890), (2.5, 631, 776), (3.15, 804, 642), (4.0, 967, 512), (5.0, 1039, 409), (6.3, 1054, 323),
-    (8.0, 1036, 253), (10.0, 988, 212), (12.5, 902, 161), (16.0, 768, 125), (20.0, 636, 100), (25.0, 513, 80.0),
-    (31.5, 405, 63.2), (40.0, 314, 49.4), (50.0, 246, 38.8), (63.0, 186, 29.5), (80.0, 132, 21.1),
-)  # fmt: skip
+    (0.5, 418, 853),
+    (0.63, 459, 944),
+    (0.8, 477, 992),
+    (1.0, 482, 1011),
+    (1.25, 484, 1008),
+    (1.6, 494, 968),
+    (2.0, 531, 890),
+    (2.5, 631, 776),
+    (3.15, 804, 642),
+    (4.0, 967, 512),
+    (5.0, 1039, 409),
+    (6.3, 1054, 323),
+    (8.0, 1036, 253),
+    (10.0, 988, 212),
+    (12.5, 902, 161),
+    (16.0, 768, 125),
+    (20.0, 636, 100),
+    (25.0, 513, 80.0),
+    (31.5, 405, 63.2),
+    (40.0, 314, 49.4),
+    (50.0, 246, 38.8),
+    (63.0, 186, 29.5),
+    (80.0, 132, 21.1),
+)
 """ISO 2631-1:1997, Table 3, from two copies of it in print: Hz, 1000 Wk, 1000 Wd. The standard itself was not read."""
 MISPRINT = 10.0
 """Hz at which the table's Wd, 212, is not that of its own parameters, 202."""
@@ -61,16 +84,37 @@ def _paper_rows() -> list[Row]:
     formula = (1.5**2 - 0.3**2) / (0.3**2 + 1.5**2 + 2.0 * k**2)
     found = road.coherency(k, HALF_TRACK, -HALF_TRACK)
     return [
-        at_most("ride_road.level", SYSTEM, "track spectrum at 10,000 rad/m, times Omega^2, against S0",
-                spectrum / LEVEL - 1.0, "", 1e-7, "two-sided; corners matter by (1.5 / 10,000)^2 / 2 = 1e-8",
-                "closed form"),
-        at_most("ride_road.variance", SYSTEM, "variance of a track against the integral of its spectrum",
-                closed / variance - 1.0, "", 1e-9, "the closed form (S0 pi / 2)(1/O1 + 1/O2) by quadrature",
-                "closed form"),
-        at_most("ride_road.coherency", SYSTEM, "coherency at 0, 1 and 16 rad/m against (O2^2 - O1^2)/(O1^2 + O2^2 + "
-                "2 Omega^2)", float(np.abs(found - formula).max()), "", 1e-15, "equal shares at short waves",
-                "closed form"),
-    ]  # fmt: skip
+        at_most(
+            "ride_road.level",
+            SYSTEM,
+            "track spectrum at 10,000 rad/m, times Omega^2, against S0",
+            spectrum / LEVEL - 1.0,
+            "",
+            1e-7,
+            "two-sided; corners matter by (1.5 / 10,000)^2 / 2 = 1e-8",
+            "closed form",
+        ),
+        at_most(
+            "ride_road.variance",
+            SYSTEM,
+            "variance of a track against the integral of its spectrum",
+            closed / variance - 1.0,
+            "",
+            1e-9,
+            "the closed form (S0 pi / 2)(1/O1 + 1/O2) by quadrature",
+            "closed form",
+        ),
+        at_most(
+            "ride_road.coherency",
+            SYSTEM,
+            "coherency at 0, 1 and 16 rad/m against (O2^2 - O1^2)/(O1^2 + O2^2 + 2 Omega^2)",
+            float(np.abs(found - formula).max()),
+            "",
+            1e-15,
+            "equal shares at short waves",
+            "closed form",
+        ),
+    ]
 
 
 def _input_rows() -> list[Row]:
@@ -84,10 +128,19 @@ def _input_rows() -> list[Row]:
             worst[order] = max(worst[order], float(np.abs(by_noise - by_output).max() / np.abs(by_output).max()))
     why = "the Lyapunov equation of six wheels with delays, against the autocovariance of the filter at the distance"
     return [
-        at_most(f"ride_road.inputs.{order}", SYSTEM, f"five input covariances, three axles, filters of {order} order: "
-                "filter of delayed noise against delayed output", error, "", 1e-13, why, "closed form")
+        at_most(
+            f"ride_road.inputs.{order}",
+            SYSTEM,
+            f"five input covariances, three axles, filters of {order} order: "
+            "filter of delayed noise against delayed output",
+            error,
+            "",
+            1e-13,
+            why,
+            "closed form",
+        )
         for order, error in worst.items()
-    ] + [_limit_row()]  # fmt: skip
+    ] + [_limit_row()]
 
 
 def heights_covariance(road: Excitation, speed: float = SPEED) -> np.ndarray:
@@ -112,12 +165,21 @@ def _limit_row() -> Row:
     pairs = []
     for length, front_rear in ((0.0, "equal"), (200.0, "uncorrelated")):
         wheels = tuple(Wheel(w.name, -length * w.axle, w.y, w.axle) for w in WHEELS)
-        delayed, limit = (heights_covariance(excitation(road, wheels, "modelled", how)) for how in
-                          ("delayed", front_rear))  # fmt: skip
+        delayed, limit = (
+            heights_covariance(excitation(road, wheels, "modelled", how)) for how in ("delayed", front_rear)
+        )
         pairs.append(float(np.abs(delayed - limit).max() / np.abs(limit).max()))
     why = "no distance: one input; 200 m: independent but for exp(-0.3 times 200) = 9e-27"
-    return at_most("ride_road.limits", SYSTEM, "input covariance of axles in one place and 200 m apart, against equal "
-                   "and uncorrelated axles", max(pairs), "", 1e-14, why, "closed form")  # fmt: skip
+    return at_most(
+        "ride_road.limits",
+        SYSTEM,
+        "input covariance of axles in one place and 200 m apart, against equal and uncorrelated axles",
+        max(pairs),
+        "",
+        1e-14,
+        why,
+        "closed form",
+    )
 
 
 def _isotropic_rows() -> list[Row]:
@@ -129,14 +191,29 @@ def _isotropic_rows() -> list[Row]:
     across = np.array([_by_surface_density(part, float(each), apart) for each in k])
     hankel = part.density(k, apart)
     return [
-        at_most("ride_road.isotropic.fourier", SYSTEM, "cross density of an isotropic road: Bessel function against "
-                "the Fourier integral of R(sqrt(x^2 + d^2))", float(np.abs(along / closed - 1.0).max()), "", 1e-11,
-                "quadrature to 1e-12 of the variance, over a density that falls", "closed form"),
-        at_most("ride_road.isotropic.hankel", SYSTEM, "the same for waviness 2.6: Bessel function of order 1.3 against "
-                "the integral over the two-dimensional density", float(np.abs(across / hankel - 1.0).max()), "", 1e-9,
-                "quadrature to 1e-12 of the density on the track", "closed form"),
+        at_most(
+            "ride_road.isotropic.fourier",
+            SYSTEM,
+            "cross density of an isotropic road: Bessel function against the Fourier integral of R(sqrt(x^2 + d^2))",
+            float(np.abs(along / closed - 1.0).max()),
+            "",
+            1e-11,
+            "quadrature to 1e-12 of the variance, over a density that falls",
+            "closed form",
+        ),
+        at_most(
+            "ride_road.isotropic.hankel",
+            SYSTEM,
+            "the same for waviness 2.6: Bessel function of order 1.3 against "
+            "the integral over the two-dimensional density",
+            float(np.abs(across / hankel - 1.0).max()),
+            "",
+            1e-9,
+            "quadrature to 1e-12 of the density on the track",
+            "closed form",
+        ),
         *_route_rows(road),
-    ]  # fmt: skip
+    ]
 
 
 def _by_surface_density(part: Part, k: float, apart: float) -> float:
@@ -144,10 +221,19 @@ def _by_surface_density(part: Part, k: float, apart: float) -> float:
     w = part.waviness
     height = part.level * math.gamma((w + 1.0) / 2.0) / (math.sqrt(math.pi) * math.gamma(w / 2.0))
     track = float(part.density(np.array(k), 0.0))
-    return 2.0 * track * quad(
-        lambda across: height * (part.corner**2 + k**2 + across**2) ** (-(w + 1.0) / 2.0) / track, 0.0, math.inf,
-        weight="cos", wvar=apart, epsabs=1e-12, limlst=500,
-    )[0]  # fmt: skip
+    return (
+        2.0
+        * track
+        * quad(
+            lambda across: height * (part.corner**2 + k**2 + across**2) ** (-(w + 1.0) / 2.0) / track,
+            0.0,
+            math.inf,
+            weight="cos",
+            wvar=apart,
+            epsabs=1e-12,
+            limlst=500,
+        )[0]
+    )
 
 
 def _route_rows(road: TwoTrackRoad) -> list[Row]:

@@ -85,19 +85,47 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
     stopped, fine = (varying_speed(vehicle, road, stops, instants=often, reach=reach) for reach in (REACH, REACH / 2))
     step = np.abs(stopped.at(often) ** 2 - fine.at(often) ** 2) / stopped.deviation.max(axis=0) ** 2
     return [
-        at_most(f"ride_varying_speed.settled.{name}", SYSTEM, f"{name}, long after a change from 10 to 20 m/s: "
-                "all outputs against the Lyapunov equation", float(np.abs(settled[-1] / exact - 1.0).max()), "", 1e-10,
-                "the stationary limit, relative", "closed form"),
-        at_most(f"ride_varying_speed.even.{name}", SYSTEM, f"{name}, at 20 m/s all the time: likewise, worst instant",
-                float(np.abs(even / exact - 1.0).max()), "", 1e-10, "nothing may drift", "closed form"),
-        at_most(f"ride_varying_speed.road.{name}", SYSTEM, f"{name}, through 0, 30 and 0 m/s, standing included: "
-                "variance of the road under each wheel, worst instant",
-                float(np.abs((stopped.height / stopped.height[0]) ** 2 - 1.0).max()), "", 1e-10,
-                "the road does not know how fast it is driven over; relative", "closed form"),
-        at_most(f"ride_varying_speed.step.{name}", SYSTEM, f"{name}, the same drive at half the step: change of all "
-                "variances, by their largest value", float(step.max()), "", 1e-9,
-                "ten times what was seen", "none"),
-    ]  # fmt: skip
+        at_most(
+            f"ride_varying_speed.settled.{name}",
+            SYSTEM,
+            f"{name}, long after a change from 10 to 20 m/s: all outputs against the Lyapunov equation",
+            float(np.abs(settled[-1] / exact - 1.0).max()),
+            "",
+            1e-10,
+            "the stationary limit, relative",
+            "closed form",
+        ),
+        at_most(
+            f"ride_varying_speed.even.{name}",
+            SYSTEM,
+            f"{name}, at 20 m/s all the time: likewise, worst instant",
+            float(np.abs(even / exact - 1.0).max()),
+            "",
+            1e-10,
+            "nothing may drift",
+            "closed form",
+        ),
+        at_most(
+            f"ride_varying_speed.road.{name}",
+            SYSTEM,
+            f"{name}, through 0, 30 and 0 m/s, standing included: variance of the road under each wheel, worst instant",
+            float(np.abs((stopped.height / stopped.height[0]) ** 2 - 1.0).max()),
+            "",
+            1e-10,
+            "the road does not know how fast it is driven over; relative",
+            "closed form",
+        ),
+        at_most(
+            f"ride_varying_speed.step.{name}",
+            SYSTEM,
+            f"{name}, the same drive at half the step: change of all variances, by their largest value",
+            float(step.max()),
+            "",
+            1e-9,
+            "ten times what was seen",
+            "none",
+        ),
+    ]
 
 
 def _adjoint() -> Row:
@@ -105,9 +133,16 @@ def _adjoint() -> Row:
     vehicle, road = ride("half_car")
     found = varying_speed(vehicle, road, STOP_AND_GO)
     exact = by_adjoint(vehicle, road, STOP_AND_GO, "body rear")
-    return at_most("ride_varying_speed.adjoint", SYSTEM, "half_car, a stop within its wheelbase and off again: body "
-                   "rear against the adjoint, relative", abs(float(found.of("body rear")[-1]) / exact - 1.0), "", 1e-8,
-                   "the adjoint's solver is good to 1e-10", "closed form")  # fmt: skip
+    return at_most(
+        "ride_varying_speed.adjoint",
+        SYSTEM,
+        "half_car, a stop within its wheelbase and off again: body rear against the adjoint, relative",
+        abs(float(found.of("body rear")[-1]) / exact - 1.0),
+        "",
+        1e-8,
+        "the adjoint's solver is good to 1e-10",
+        "closed form",
+    )
 
 
 def _damped() -> Row:
@@ -116,9 +151,14 @@ def _damped() -> Row:
     force, moving = found.of("tyre force front left"), found.speed > 0.0
     said = "infinite" if np.isinf(force[moving]).all() else "finite"
     said += ", finite" if np.isfinite(force[~moving]).all() else ", infinite"
-    return behaves("ride_varying_speed.damped", SYSTEM, "half_car with tyre damping: variance of the tyre force while "
-                   "driving, and at standstill", said, "infinite, finite",
-                   "white noise of the road's rate, which standstill turns off")  # fmt: skip
+    return behaves(
+        "ride_varying_speed.damped",
+        SYSTEM,
+        "half_car with tyre damping: variance of the tyre force while driving, and at standstill",
+        said,
+        "infinite, finite",
+        "white noise of the road's rate, which standstill turns off",
+    )
 
 
 def _drive(profile: SpeedProfile) -> dict[str, Any]:
@@ -131,14 +171,17 @@ def _drive(profile: SpeedProfile) -> dict[str, Any]:
     columns = [found.names.index(point) for point in POINTS]
     near = np.abs(found.time[:, None] - often).argmin(axis=0)
     return {
-        "time": found.time[near].tolist(), "speed": found.speed[near].tolist(),
+        "time": found.time[near].tolist(),
+        "speed": found.speed[near].tolist(),
         "deviation": found.deviation[near][:, columns].tolist(),
         "quasi": quasi_stationary(vehicle, road, found.speed[near])[:, columns].tolist(),
-        "instants": copies.time.tolist(), "copies": np.sqrt(copies.variance[:, columns]).tolist(),
+        "instants": copies.time.tolist(),
+        "copies": np.sqrt(copies.variance[:, columns]).tolist(),
         "error": (copies.error / 2.0 / np.sqrt(copies.variance))[:, columns].tolist(),
         "z": copies.z(found.at(copies.time))[:, columns].tolist(),
-        "all": float(np.abs(copies.z(found.at(copies.time))).max()), "seconds": [fast, slow],
-    }  # fmt: skip
+        "all": float(np.abs(copies.z(found.at(copies.time))).max()),
+        "seconds": [fast, slow],
+    }
 
 
 def _copies(name: str, found: dict[str, Any]) -> list[Row]:
@@ -146,15 +189,37 @@ def _copies(name: str, found: dict[str, Any]) -> list[Row]:
     quasi, true = np.array(found["quasi"]), np.array(found["deviation"])
     off = np.abs(quasi / true - 1.0)
     return [
-        at_most(f"ride_varying_speed.copies.{name}", SYSTEM, f"r19_ride {name}: Monte Carlo of {COPIES} copies at 3 "
-                "instants in 3 points of the body, largest |z|", float(np.abs(found["z"]).max()), "", 4.0,
-                "of 9 normal values one beyond 4 in 1800 times", "none"),
-        finding(f"ride_varying_speed.outputs.{name}", SYSTEM, f"r19_ride {name}: the same for all 16 outputs, largest "
-                "|z| of 48", found["all"], "", "below 4", "wheel loads and travels follow the same law", "none"),
-        finding(f"ride_varying_speed.quasi.{name}", SYSTEM, f"r19_ride {name}: largest error of the quasi-stationary "
-                "standard deviation in 3 points", float(off.max()), "", {"accelerating": 0.017, "braking": 0.15}[name],
-                "beside what a prototype sampled; the largest over all instants", "none"),
-    ]  # fmt: skip
+        at_most(
+            f"ride_varying_speed.copies.{name}",
+            SYSTEM,
+            f"r19_ride {name}: Monte Carlo of {COPIES} copies at 3 instants in 3 points of the body, largest |z|",
+            float(np.abs(found["z"]).max()),
+            "",
+            4.0,
+            "of 9 normal values one beyond 4 in 1800 times",
+            "none",
+        ),
+        finding(
+            f"ride_varying_speed.outputs.{name}",
+            SYSTEM,
+            f"r19_ride {name}: the same for all 16 outputs, largest |z| of 48",
+            found["all"],
+            "",
+            "below 4",
+            "wheel loads and travels follow the same law",
+            "none",
+        ),
+        finding(
+            f"ride_varying_speed.quasi.{name}",
+            SYSTEM,
+            f"r19_ride {name}: largest error of the quasi-stationary standard deviation in 3 points",
+            float(off.max()),
+            "",
+            {"accelerating": 0.017, "braking": 0.15}[name],
+            "beside what a prototype sampled; the largest over all instants",
+            "none",
+        ),
+    ]
 
 
 def _constant() -> list[Row]:
@@ -167,17 +232,48 @@ def _constant() -> list[Row]:
     z = copies.z(exact.deviation[None])[0]
     error = float((copies.error[0] / 2.0 / copies.variance[0])[columns].max())
     return [
-        at_most("ride_varying_speed.constant", SYSTEM, f"r19_ride at 20 m/s, {STEADY_COPIES} copies of {LASTING:g} s: "
-                "largest |z| in 3 points of the body", float(np.abs(z[columns]).max()), "", 4.0,
-                "of 3 normal values one beyond 4 in 5000 times", "none"),
-        finding("ride_varying_speed.constant.outputs", SYSTEM, "the same for all 16 outputs", float(np.abs(z).max()),
-                "", "below 4", "as above", "none"),
-        finding("ride_varying_speed.constant.error", SYSTEM, "the same: standard error of these standard deviations, "
-                "relative", error, "", "falls as 1 / sqrt(copies x length)", "what its time buys", "none"),
-        finding("ride_varying_speed.cost", SYSTEM, "the same: processor seconds of Monte Carlo for a standard error of "
-                "1e-3, by those of the covariance, which is exact, each once", slow * (error / 1e-3) ** 2 / fast, "",
-                "hundreds", "every further digit costs Monte Carlo a hundredfold, the covariance nothing", "none"),
-    ]  # fmt: skip
+        at_most(
+            "ride_varying_speed.constant",
+            SYSTEM,
+            f"r19_ride at 20 m/s, {STEADY_COPIES} copies of {LASTING:g} s: largest |z| in 3 points of the body",
+            float(np.abs(z[columns]).max()),
+            "",
+            4.0,
+            "of 3 normal values one beyond 4 in 5000 times",
+            "none",
+        ),
+        finding(
+            "ride_varying_speed.constant.outputs",
+            SYSTEM,
+            "the same for all 16 outputs",
+            float(np.abs(z).max()),
+            "",
+            "below 4",
+            "as above",
+            "none",
+        ),
+        finding(
+            "ride_varying_speed.constant.error",
+            SYSTEM,
+            "the same: standard error of these standard deviations, relative",
+            error,
+            "",
+            "falls as 1 / sqrt(copies x length)",
+            "what its time buys",
+            "none",
+        ),
+        finding(
+            "ride_varying_speed.cost",
+            SYSTEM,
+            "the same: processor seconds of Monte Carlo for a standard error of "
+            "1e-3, by those of the covariance, which is exact, each once",
+            slow * (error / 1e-3) ** 2 / fast,
+            "",
+            "hundreds",
+            "every further digit costs Monte Carlo a hundredfold, the covariance nothing",
+            "none",
+        ),
+    ]
 
 
 def _timed(run: Callable[[], Any]) -> tuple[Any, float]:
@@ -198,9 +294,15 @@ def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, 
     slowest = -np.linalg.eigvals(at_speed(vehicle, road, float(profile.speeds[0])).A).real.max()
     pieces, cuts = {}, [profile.times[0] - 10.0 / slowest, *profile.times]
     for start, stop in reversed(list(pairwise(cuts))):
-        back = solve_ivp(lambda t, x: -(steady @ x + profile.speed(t) * (per_speed @ x)), (stop, start), seen,
-                         method="DOP853", rtol=1e-10, atol=1e-11 * np.abs(one.C[row]).max(),
-                         dense_output=True)  # fmt: skip
+        back = solve_ivp(
+            lambda t, x: -(steady @ x + profile.speed(t) * (per_speed @ x)),
+            (stop, start),
+            seen,
+            method="DOP853",
+            rtol=1e-10,
+            atol=1e-11 * np.abs(one.C[row]).max(),
+            dense_output=True,
+        )
         pieces[start, stop], seen = back.sol, back.y[:, -1]
     places, weights = _path_points(profile, cuts, road.lengths)
     response = np.zeros((len(places), one.B[0].shape[1]))
@@ -250,13 +352,22 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
             colour = line.get_color()
             axis.plot(found["time"], [row[column] for row in found["quasi"]], "--", color=colour, linewidth=1.0)
             spread = [2.0 * row[column] for row in found["error"]]
-            axis.errorbar(found["instants"], [row[column] for row in found["copies"]], spread, fmt="o", color=colour,
-                          markersize=3, capsize=2)  # fmt: skip
+            axis.errorbar(
+                found["instants"],
+                [row[column] for row in found["copies"]],
+                spread,
+                fmt="o",
+                color=colour,
+                markersize=3,
+                capsize=2,
+            )
         axis.set(title=f"{name}, {found['speed'][0]:.0f} to {found['speed'][-1]:.0f} m/s", xlabel="time [s]")
     axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s$^2$]")
     axes[0].plot([], [], "k--", linewidth=1.0, label="quasi-stationary")
     axes[0].plot([], [], "ko", markersize=3, label=f"{COPIES} copies, 2 standard errors")
     axes[0].legend(fontsize=8)
-    caption = ("Standard deviation of the body's vertical acceleration (19 freedoms, the paper's road) while the speed "
-               "varies; dashed as if the momentary speed had always been driven.")  # fmt: skip
+    caption = (
+        "Standard deviation of the body's vertical acceleration (19 freedoms, the paper's road) while the speed "
+        "varies; dashed as if the momentary speed had always been driven."
+    )
     return [(caption, figure)]

@@ -38,12 +38,16 @@ BAD = ("free", "spring 300 N m/rad", "spring 10000 N m/rad", "10000 beyond 0.05 
 """Known to be right, and known to be wrong, on both roads."""
 
 PROTOTYPE = {
-    "free": (5.9, 0.755, 5e5), "exact pitch prescribed": (0.0, 1.004, 1.007),
-    "measured pitch to 15 Hz": (0.002, 1.035, 1.024), "spring 50 N m/rad": (0.98, 0.349, 2.7e5),
-    "spring 100 N m/rad": (0.067, 0.994, 1.59), "spring 300 N m/rad": (0.071, 0.997, 0.47),
-    "spring 10000 N m/rad": (0.087, 1.013, 0.14), "spring 100000 N m/rad": (0.122, 1.073, 0.05),
+    "free": (5.9, 0.755, 5e5),
+    "exact pitch prescribed": (0.0, 1.004, 1.007),
+    "measured pitch to 15 Hz": (0.002, 1.035, 1.024),
+    "spring 50 N m/rad": (0.98, 0.349, 2.7e5),
+    "spring 100 N m/rad": (0.067, 0.994, 1.59),
+    "spring 300 N m/rad": (0.071, 0.997, 0.47),
+    "spring 10000 N m/rad": (0.087, 1.013, 0.14),
+    "spring 100000 N m/rad": (0.122, 1.073, 0.05),
     "Kalman filter": (0.0018, 0.994, 0.985),
-}  # fmt: skip
+}
 """Largest pitch error (rad), damage ratio of f3z and of f3x that an earlier prototype measured, with other noise."""
 
 
@@ -70,14 +74,36 @@ def _conventions() -> list[Row]:
     repeated = {name: _closed(load) / pseudo_damage(load) - 1 for name, load in (("walk", walk), ("white", white))}
     why = "the residue closed by repeating the load, instead of counted as half cycles: the convention must be stated"
     return [
-        at_most("score.damage.turning-points", SYSTEM, f"damage of a random walk of {SAMPLES:,} samples from its "
-                "turning points alone against all samples, relative", abs(pseudo_damage(walk) / whole - 1), "", 1e-12,
-                "rainflow reads turning points only; the sum is in another order", "native"),
-        finding("score.damage.convention.walk", SYSTEM, "damage of a random walk with its residue closed, difference",
-                repeated["walk"], "", "0.34 between two libraries", why),
-        finding("score.damage.convention.white", SYSTEM, "the same for white noise", repeated["white"], "",
-                "0.001 between two libraries", why),
-    ]  # fmt: skip
+        at_most(
+            "score.damage.turning-points",
+            SYSTEM,
+            f"damage of a random walk of {SAMPLES:,} samples from its "
+            "turning points alone against all samples, relative",
+            abs(pseudo_damage(walk) / whole - 1),
+            "",
+            1e-12,
+            "rainflow reads turning points only; the sum is in another order",
+            "native",
+        ),
+        finding(
+            "score.damage.convention.walk",
+            SYSTEM,
+            "damage of a random walk with its residue closed, difference",
+            repeated["walk"],
+            "",
+            "0.34 between two libraries",
+            why,
+        ),
+        finding(
+            "score.damage.convention.white",
+            SYSTEM,
+            "the same for white noise",
+            repeated["white"],
+            "",
+            "0.001 between two libraries",
+            why,
+        ),
+    ]
 
 
 def _closed(load: np.ndarray) -> float:
@@ -94,13 +120,29 @@ def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
     rows = []
     for engine, (drift, worst) in found.items():
         rows += [
-            within(f"score.heave.drift.{engine}", SYSTEM, f"{engine}: heave error of a run that sinks at {SINKING} m/s",
-                   drift, "m", SINKING * duration, 1e-6, "a large drift, on purpose", "closed form"),
-            at_most(f"score.heave.damage.{engine}", SYSTEM, f"{engine}: its damage ratios, worst |ratio - 1|",
-                    worst, "", 1e-9, "the equations feel neither place nor common speed: a heave drift leaves all four "
-                    "section forces alone, up to rounding of heights of 10 m that the pitch's growth carries on",
-                    "closed form"),
-        ]  # fmt: skip
+            within(
+                f"score.heave.drift.{engine}",
+                SYSTEM,
+                f"{engine}: heave error of a run that sinks at {SINKING} m/s",
+                drift,
+                "m",
+                SINKING * duration,
+                1e-6,
+                "a large drift, on purpose",
+                "closed form",
+            ),
+            at_most(
+                f"score.heave.damage.{engine}",
+                SYSTEM,
+                f"{engine}: its damage ratios, worst |ratio - 1|",
+                worst,
+                "",
+                1e-9,
+                "the equations feel neither place nor common speed: a heave drift leaves all four "
+                "section forces alone, up to rounding of heights of 10 m that the pitch's growth carries on",
+                "closed form",
+            ),
+        ]
     return rows
 
 
@@ -125,10 +167,19 @@ def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
     for engine in engines:
         for name, word in (("exact pitch prescribed", "accepted"), ("spring 300 N m/rad", "rejected")):
             row = bench.row(name, bench.methods[name], bench.simulate(engine, bench.methods[name]))
-            rows.append(behaves(f"score.grade.{name.split()[0]}.{engine}", SYSTEM, f"{engine}: {name}, 5 s up to a "
-                                "grade of 0.1 rad", row["verdict"], word, f"damage of f3x x {row['damage f3x']:.3g}, "
-                                f"pitch wrong by {row['pitch error max [rad]']:.2g} rad: what keeps it near zero "
-                                "is wrong on a grade", "closed form"))  # fmt: skip
+            rows.append(
+                behaves(
+                    f"score.grade.{name.split()[0]}.{engine}",
+                    SYSTEM,
+                    f"{engine}: {name}, 5 s up to a grade of 0.1 rad",
+                    row["verdict"],
+                    word,
+                    f"damage of f3x x {row['damage f3x']:.3g}, "
+                    f"pitch wrong by {row['pitch error max [rad]']:.2g} rad: what keeps it near zero "
+                    "is wrong on a grade",
+                    "closed form",
+                )
+            )
     return rows
 
 
@@ -148,16 +199,43 @@ def _verdicts(found: list[dict[str, Any]]) -> list[Row]:
         place = f"{row['engine']}, {row['road']}: {name}"
         if name in GOOD or name in BAD:
             wanted = "accepted" if name in GOOD else "rejected"
-            rows.append(behaves(f"score.verdict.{_id(row)}", SYSTEM, f"{place}, by damage", word, wanted,
-                                row["reason"], "closed form"))  # fmt: skip
+            rows.append(
+                behaves(
+                    f"score.verdict.{_id(row)}",
+                    SYSTEM,
+                    f"{place}, by damage",
+                    word,
+                    wanted,
+                    row["reason"],
+                    "closed form",
+                )
+            )
         if name in BAD:
             found_alone = "accepted" if alone == "accepted" else "not accepted"
-            rows.append(behaves(f"score.without-truth.{_id(row)}", SYSTEM, f"{place}, without the truth", found_alone,
-                                "not accepted", row["reason without truth"], "none"))  # fmt: skip
+            rows.append(
+                behaves(
+                    f"score.without-truth.{_id(row)}",
+                    SYSTEM,
+                    f"{place}, without the truth",
+                    found_alone,
+                    "not accepted",
+                    row["reason without truth"],
+                    "none",
+                )
+            )
         elif word != "accepted" and alone == "accepted":
-            rows.append(finding(f"score.unseen.{_id(row)}", SYSTEM, f"{place}, damage ratio of f3x where the run "
-                                "itself shows nothing", row["damage f3x"], "", word,
-                                "what an engineer without the truth cannot know", "none"))  # fmt: skip
+            rows.append(
+                finding(
+                    f"score.unseen.{_id(row)}",
+                    SYSTEM,
+                    f"{place}, damage ratio of f3x where the run itself shows nothing",
+                    row["damage f3x"],
+                    "",
+                    word,
+                    "what an engineer without the truth cannot know",
+                    "none",
+                )
+            )
     return rows
 
 
@@ -167,11 +245,23 @@ def _id(row: dict[str, Any]) -> str:
 
 def _blind(found: list[dict[str, Any]]) -> list[Row]:
     """The vertical force of a run that has tumbled."""
-    return [within(f"score.vertical.{row['road']}.{row['engine']}", SYSTEM, f"{row['engine']}, {row['road']}: damage "
-                   f"ratio of the vertical f3 of a free run, pitch {row['pitch error max [rad]']:.1f} rad wrong",
-                   row["vertical damage f3"], "", 1.0, 0.1, "f3 = f1 - m1 g + m1 z1'' at every pitch: whoever scores "
-                   "by it calls a tumbling run good; here it is shown, never judged by", "closed form")
-            for row in found if row["method"] == "free"]  # fmt: skip
+    return [
+        within(
+            f"score.vertical.{row['road']}.{row['engine']}",
+            SYSTEM,
+            f"{row['engine']}, {row['road']}: damage "
+            f"ratio of the vertical f3 of a free run, pitch {row['pitch error max [rad]']:.1f} rad wrong",
+            row["vertical damage f3"],
+            "",
+            1.0,
+            0.1,
+            "f3 = f1 - m1 g + m1 z1'' at every pitch: whoever scores "
+            "by it calls a tumbling run good; here it is shown, never judged by",
+            "closed form",
+        )
+        for row in found
+        if row["method"] == "free"
+    ]
 
 
 def _long(folder: Path) -> list[dict[str, Any]]:
@@ -195,12 +285,25 @@ def _beside(long: list[dict[str, Any]]) -> list[Row]:
         pitch, upright, along = PROTOTYPE[row["method"]]
         name = row["method"].replace(" ", "-").replace("/", "-")
         why = "the same road, model and levels of noise; other noise samples, and here the filter estimates the inertia"
-        shown = (("pitch", "pitch error max [rad]", "largest pitch error", "rad", pitch),
-                 ("f3z", "damage f3z", "damage ratio of f3z", "", upright),
-                 ("f3x", "damage f3x", "damage ratio of f3x", "", along))  # fmt: skip
-        rows += [finding(f"score.prototype.{name}.{short}", SYSTEM, f"{row['method']}, 60 s: {words}", row[key], unit,
-                         f"{wanted:g} (prototype)", why, "none")
-                 for short, key, words, unit, wanted in shown if row[key] is not None]  # fmt: skip
+        shown = (
+            ("pitch", "pitch error max [rad]", "largest pitch error", "rad", pitch),
+            ("f3z", "damage f3z", "damage ratio of f3z", "", upright),
+            ("f3x", "damage f3x", "damage ratio of f3x", "", along),
+        )
+        rows += [
+            finding(
+                f"score.prototype.{name}.{short}",
+                SYSTEM,
+                f"{row['method']}, 60 s: {words}",
+                row[key],
+                unit,
+                f"{wanted:g} (prototype)",
+                why,
+                "none",
+            )
+            for short, key, words, unit, wanted in shown
+            if row[key] is not None
+        ]
     return rows
 
 
@@ -210,25 +313,43 @@ def tables(data: dict[str, Any]) -> list[Table]:
     shown = {"Stabilisers compared": data["study"], "Stabilisers over 60 s at 1 kHz": data["prototype"]}
     for title, rows in shown.items():
         if rows:
-            note = ("Damage ratios of the section forces in the chassis' frame; a tumbled run has none. The vertical "
-                    "f3 is shown because it is blind. The last two columns: the verdict by damage, and that of an "
-                    "engineer who has no true run.")  # fmt: skip
+            note = (
+                "Damage ratios of the section forces in the chassis' frame; a tumbled run has none. The vertical "
+                "f3 is shown because it is blind. The last two columns: the verdict by damage, and that of an "
+                "engineer who has no true run."
+            )
             found.append(Table(title, note, HEADINGS, tuple(_cells(row) for row in rows)))
     return found
 
 
-HEADINGS = ("engine", "road", "method", *CHANNELS, "vertical f3", "pitch error [rad]", "moment rms [N m]",
-            "share to 15 Hz", "by damage", "without truth")  # fmt: skip
+HEADINGS = (
+    "engine",
+    "road",
+    "method",
+    *CHANNELS,
+    "vertical f3",
+    "pitch error [rad]",
+    "moment rms [N m]",
+    "share to 15 Hz",
+    "by damage",
+    "without truth",
+)
 
 
 def _cells(row: dict[str, Any]) -> tuple[str, ...]:
     ratios = (row[f"damage {channel}"] for channel in CHANNELS)
     return (
-        row.get("engine", "reference"), row.get("road", "road"), row["method"],
-        *("" if ratio is None else f"{ratio:.3g}" for ratio in ratios), f"{row['vertical damage f3']:.3f}",
-        f"{row['pitch error max [rad]']:.2g}", f"{row['moment rms [N m]']:.0f}", f"{row['moment share to 15 Hz']:.1%}",
-        row["verdict"], row["without truth"],
-    )  # fmt: skip
+        row.get("engine", "reference"),
+        row.get("road", "road"),
+        row["method"],
+        *("" if ratio is None else f"{ratio:.3g}" for ratio in ratios),
+        f"{row['vertical damage f3']:.3f}",
+        f"{row['pitch error max [rad]']:.2g}",
+        f"{row['moment rms [N m]']:.0f}",
+        f"{row['moment share to 15 Hz']:.1%}",
+        row["verdict"],
+        row["without truth"],
+    )
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:

@@ -66,8 +66,15 @@ def _compare(what: str, scenes: list[Scene]) -> list[Row]:
     truths = [simulate(scene, "reference") for scene in scenes]
     steps = ", ".join(f"{1e3 * scene.run.step:g}" for scene in scenes)
     return [
-        at_most(f"twin.{engine}.{what}", SYSTEM, f"states, {engine} against reference, RK4 at {steps} ms, {what}",
-                max(gap(simulate(scene, engine), truth) for scene, truth in zip(scenes, truths, strict=True)),
-                "m, rad, m/s, rad/s", BOUND, WHY, "native")
+        at_most(
+            f"twin.{engine}.{what}",
+            SYSTEM,
+            f"states, {engine} against reference, RK4 at {steps} ms, {what}",
+            max(gap(simulate(scene, engine), truth) for scene, truth in zip(scenes, truths, strict=True)),
+            "m, rad, m/s, rad/s",
+            BOUND,
+            WHY,
+            "native",
+        )
         for engine in ("exudyn", "mujoco")
-    ]  # fmt: skip
+    ]

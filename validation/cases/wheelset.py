@@ -27,11 +27,24 @@ SYSTEM: System = "rolling-vehicle"
 SEED = 2026
 DRAWN = 6
 """Wheelsets with parameters at random, beside the chosen one, one unstable at every speed and one at none."""
-RANGES = {"mass": (800.0, 2000.0), "spin_inertia": (50.0, 200.0), "yaw_inertia": (500.0, 1500.0),
-          "radius": (0.35, 0.55), "half_gauge": (0.7, 0.8), "conicity": (0.02, 0.3), "head_radius": (0.15, 0.4),
-          "load": (6e4, 2e5), "half_spacing": (0.8, 1.2), "stiffness_x": (1e5, 3e6), "stiffness_y": (1e5, 3e6),
-          "stiffness_z": (3e5, 2e6), "damping_x": (5e2, 1e4), "damping_y": (5e2, 1e4), "damping_z": (1e3, 2e4),
-          "friction": (0.1, 0.5)}  # fmt: skip
+RANGES = {
+    "mass": (800.0, 2000.0),
+    "spin_inertia": (50.0, 200.0),
+    "yaw_inertia": (500.0, 1500.0),
+    "radius": (0.35, 0.55),
+    "half_gauge": (0.7, 0.8),
+    "conicity": (0.02, 0.3),
+    "head_radius": (0.15, 0.4),
+    "load": (6e4, 2e5),
+    "half_spacing": (0.8, 1.2),
+    "stiffness_x": (1e5, 3e6),
+    "stiffness_y": (1e5, 3e6),
+    "stiffness_z": (3e5, 2e6),
+    "damping_x": (5e2, 1e4),
+    "damping_y": (5e2, 1e4),
+    "damping_z": (1e3, 2e4),
+    "friction": (0.1, 0.5),
+}
 STIFF = CHOSEN.changed(stiffness_x=1e8, stiffness_y=1e8, damping_x=1e5, damping_y=1e5)
 HEAVY = free(CHOSEN).changed(mass=1e4, yaw_inertia=3e4)
 """So heavy without suspension that the weight's own stiffness does not hold it even at 1 m/s."""
@@ -61,8 +74,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows += [_order_row(), *_energy_rows()]
     if not quick:
         rows += [_none_row("heavy", HEAVY, "unstable"), _none_row("stiff", STIFF, "stable"), *_fault_rows()]
-    return rows, {"critical": speeds, "cycles": {name: {engine: _numbers(one) for engine, one in own.items()}
-                                                 for name, own in cycles.items()}}  # fmt: skip
+    return rows, {
+        "critical": speeds,
+        "cycles": {name: {engine: _numbers(one) for engine, one in own.items()} for name, own in cycles.items()},
+    }
 
 
 def drawn() -> dict[str, Wheelset]:
@@ -114,14 +129,37 @@ def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
         edges.append(abs(wavelength(Equations, edge) / plain - 1.0))
     count = f"of {len(wheelsets)} wheelsets without suspension at 0.2 m/s"
     return [
-        at_most("wheelset.wave.closed", SYSTEM, f"wavelength {count}: eigenvalues of all motions by the closed form",
-                max(closed), "", 1e-3, "cones on round heads without slip; inertia and spin creepage are what is left",
-                "closed form"),
-        at_most("wheelset.wave.klingel", SYSTEM, f"wavelength {count} on rails that are edges: by Klingel's formula",
-                max(edges), "", 1e-3, "2 pi sqrt(r b / c), for which rails have no radius", "closed form"),
-        at_most("wheelset.wave.engines", SYSTEM, f"wavelength {count}: three implementations", max(among), "", 1e-6,
-                "each linearises its own equations of motion around the same contact forces", "shared kernel"),
-    ]  # fmt: skip
+        at_most(
+            "wheelset.wave.closed",
+            SYSTEM,
+            f"wavelength {count}: eigenvalues of all motions by the closed form",
+            max(closed),
+            "",
+            1e-3,
+            "cones on round heads without slip; inertia and spin creepage are what is left",
+            "closed form",
+        ),
+        at_most(
+            "wheelset.wave.klingel",
+            SYSTEM,
+            f"wavelength {count} on rails that are edges: by Klingel's formula",
+            max(edges),
+            "",
+            1e-3,
+            "2 pi sqrt(r b / c), for which rails have no radius",
+            "closed form",
+        ),
+        at_most(
+            "wheelset.wave.engines",
+            SYSTEM,
+            f"wavelength {count}: three implementations",
+            max(among),
+            "",
+            1e-6,
+            "each linearises its own equations of motion around the same contact forces",
+            "shared kernel",
+        ),
+    ]
 
 
 def _critical_rows(speeds: dict[str, dict[str, float | None]]) -> list[Row]:
@@ -129,14 +167,31 @@ def _critical_rows(speeds: dict[str, dict[str, float | None]]) -> list[Row]:
     there = {name: {engine: v for engine, v in own.items() if v is not None} for name, own in speeds.items()}
     agreed = all(len(own) in (0, len(IMPLEMENTATIONS)) for own in there.values())
     having = [own for own in there.values() if len(own) == len(IMPLEMENTATIONS)]
-    why = ("each linearises its own equations of motion around the same contact forces, and looks for itself: at all "
-           "speeds for the chosen wheelset, for drawn ones near the first's and below")
+    why = (
+        "each linearises its own equations of motion around the same contact forces, and looks for itself: at all "
+        "speeds for the chosen wheelset, for drawn ones near the first's and below"
+    )
     return [
-        at_most("wheelset.critical.engines", SYSTEM, f"critical speed of {len(having)} wheelsets: three "
-                "implementations", max(map(_spread, having)), "", 1e-6, why, "shared kernel"),
-        behaves("wheelset.critical.agreed", SYSTEM, f"which of {len(there)} wheelsets have a critical speed",
-                "agreed" if agreed else "different", "agreed", why, "shared kernel"),
-    ]  # fmt: skip
+        at_most(
+            "wheelset.critical.engines",
+            SYSTEM,
+            f"critical speed of {len(having)} wheelsets: three implementations",
+            max(map(_spread, having)),
+            "",
+            1e-6,
+            why,
+            "shared kernel",
+        ),
+        behaves(
+            "wheelset.critical.agreed",
+            SYSTEM,
+            f"which of {len(there)} wheelsets have a critical speed",
+            "agreed" if agreed else "different",
+            "agreed",
+            why,
+            "shared kernel",
+        ),
+    ]
 
 
 def _none_row(name: str, wheelset: Wheelset, expected: str) -> Row:
@@ -147,8 +202,14 @@ def _none_row(name: str, wheelset: Wheelset, expected: str) -> Row:
             said.add(f"{critical_speed(wheelset, partial(growth, implementation(engine))):.3g} m/s")
         except NoCriticalSpeed as error:
             said.add("unstable" if error.unstable else "stable")
-    return behaves(f"wheelset.critical.{name}", SYSTEM, f"a {name} wheelset at all speeds, in three implementations",
-                   " or ".join(sorted(said)), expected, "nothing holds it, or more than creep forces can drive")
+    return behaves(
+        f"wheelset.critical.{name}",
+        SYSTEM,
+        f"a {name} wheelset at all speeds, in three implementations",
+        " or ".join(sorted(said)),
+        expected,
+        "nothing holds it, or more than creep forces can drive",
+    )
 
 
 def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
@@ -161,10 +222,18 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
             written, built = (implementation(name)(one, 60.0, cells=11) for name in ("reference", engine))
             states = written.rest + LIVELY * draw.normal(size=(20, eq.STATES))
             worst = max(worst, *(_apart(built.rates(state), written.rates(state)) for state in states))
-        rows.append(at_most(f"wheelset.accelerations.{engine}", SYSTEM, "rates of 20 random states of "
-                            f"{len(wheelsets)} wheelsets with FASTSIM, by the largest", worst, "", 1e-10,
-                            "the engine's own equations of motion around the same contact forces",
-                            "shared kernel"))  # fmt: skip
+        rows.append(
+            at_most(
+                f"wheelset.accelerations.{engine}",
+                SYSTEM,
+                f"rates of 20 random states of {len(wheelsets)} wheelsets with FASTSIM, by the largest",
+                worst,
+                "",
+                1e-10,
+                "the engine's own equations of motion around the same contact forces",
+                "shared kernel",
+            )
+        )
     return rows
 
 
@@ -198,12 +267,31 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> li
     of = f"states of {len(wheelsets)} wheelsets over 1 s with FASTSIM ({cells} cells), RK4 at the same step"
     why = "the same method and contact forces; what differs is rounding"
     return [
-        *(at_most(f"wheelset.path.{engine}", SYSTEM, f"{of}: {engine} by the equations (m, rad, s)", gaps[engine], "",
-                  1e-10, why, "shared kernel") for engine in ENGINES),
+        *(
+            at_most(
+                f"wheelset.path.{engine}",
+                SYSTEM,
+                f"{of}: {engine} by the equations (m, rad, s)",
+                gaps[engine],
+                "",
+                1e-10,
+                why,
+                "shared kernel",
+            )
+            for engine in ENGINES
+        ),
         at_most("wheelset.path.between", SYSTEM, f"{of}: both engines", between, "", 1e-10, why, "shared kernel"),
-        at_most("wheelset.power", SYSTEM, f"times that a creep force has a power above zero, of {steps:,} at every "
-                "step of these paths", positive, "", 0, "friction takes energy and never gives any", "none"),
-    ]  # fmt: skip
+        at_most(
+            "wheelset.power",
+            SYSTEM,
+            f"times that a creep force has a power above zero, of {steps:,} at every step of these paths",
+            positive,
+            "",
+            0,
+            "friction takes energy and never gives any",
+            "none",
+        ),
+    ]
 
 
 def _step(equations: Equations) -> float:
@@ -226,8 +314,7 @@ def _cycles(wheelsets: dict[str, Wheelset], speeds: Speeds, engines: tuple[str, 
         first = attained(equations, step=_step(equations))
         if first is None:
             continue
-        found[name] = {engine: _own(first, implementation(engine)(one, speed, "fastsim", 11))
-                       for engine in engines}  # fmt: skip
+        found[name] = {engine: _own(first, implementation(engine)(one, speed, "fastsim", 11)) for engine in engines}
     return found
 
 
@@ -249,11 +336,27 @@ def _cycle_rows(cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
         apart = max((max(v for v, _ in own) - min(v for v, _ in own)) / max(e for _, e in own) for own in every)
         of = f"{value} of the limit cycle of {len(cycles)} wheelsets above the critical speed"
         rows += [
-            at_most(f"wheelset.cycle.{value}.error", SYSTEM, f"{of}: change by halving the step, relative", errors, "",
-                    1e-2, "Newton's method closes the orbit at either step", "none"),
-            at_most(f"wheelset.cycle.{value}", SYSTEM, f"{of}: {count} implementations, by the error of the step",
-                    apart, "", 1.0, "each closes its own orbit, from a guess that is 1 % off", "shared kernel"),
-        ]  # fmt: skip
+            at_most(
+                f"wheelset.cycle.{value}.error",
+                SYSTEM,
+                f"{of}: change by halving the step, relative",
+                errors,
+                "",
+                1e-2,
+                "Newton's method closes the orbit at either step",
+                "none",
+            ),
+            at_most(
+                f"wheelset.cycle.{value}",
+                SYSTEM,
+                f"{of}: {count} implementations, by the error of the step",
+                apart,
+                "",
+                1.0,
+                "each closes its own orbit, from a guess that is 1 % off",
+                "shared kernel",
+            ),
+        ]
     return rows
 
 
@@ -263,8 +366,17 @@ def _order_row() -> Row:
     start = equations.displaced(5e-3)
     ends = [equations.run(start, 0.1, step).states[-1] for step in (1.25e-4, 6.25e-5, 3.125e-5)]
     first, second = np.abs(ends[0] - ends[1])[eq.YAW], np.abs(ends[1] - ends[2])[eq.YAW]
-    return within("wheelset.order", SYSTEM, "observed order of RK4 in the yaw after 0.1 s, linear creep",
-                  float(np.log2(first / second)), "", 4.0, 0.2, "the order of the method", "closed form")  # fmt: skip
+    return within(
+        "wheelset.order",
+        SYSTEM,
+        "observed order of RK4 in the yaw after 0.1 s, linear creep",
+        float(np.log2(first / second)),
+        "",
+        4.0,
+        0.2,
+        "the order of the method",
+        "closed form",
+    )
 
 
 def _energy_rows() -> list[Row]:
@@ -274,12 +386,28 @@ def _energy_rows() -> list[Row]:
         equations = Equations(CHOSEN, 60.0, law, 11)  # type: ignore[arg-type]
         left = [_open(equations, step) for step in (STEP, STEP / 2.0, STEP / 4.0)]
         rows += [
-            at_most(f"wheelset.energy.{law}", SYSTEM, f"energy that the ledger of a path of 0.1 s with {named} leaves "
-                    "open, by what creep takes", left[-1], "", 1e-8, "steps of 0.125 ms; works by the stages of RK4",
-                    "none"),
-            within(f"wheelset.energy.{law}.order", SYSTEM, f"order at which that falls with the step, {named}",
-                   float(np.log2(left[0] / left[1])), "", 4.0, 0.2, "that of the integrator", "none"),
-        ]  # fmt: skip
+            at_most(
+                f"wheelset.energy.{law}",
+                SYSTEM,
+                f"energy that the ledger of a path of 0.1 s with {named} leaves open, by what creep takes",
+                left[-1],
+                "",
+                1e-8,
+                "steps of 0.125 ms; works by the stages of RK4",
+                "none",
+            ),
+            within(
+                f"wheelset.energy.{law}.order",
+                SYSTEM,
+                f"order at which that falls with the step, {named}",
+                float(np.log2(left[0] / left[1])),
+                "",
+                4.0,
+                0.2,
+                "that of the integrator",
+                "none",
+            ),
+        ]
     return rows
 
 
@@ -308,24 +436,52 @@ def _fault_rows() -> list[Row]:
     softer = CHOSEN.changed(stiffness_x=0.99 * CHOSEN.stiffness_x)
     speeds = [critical_speed(one, partial(growth, Equations)) for one in (CHOSEN, softer)]
     seen = {"sign of the spin": right < 1e-10 < spin, "1 % of a stiffness": abs(speeds[1] / speeds[0] - 1.0) > 1e-6}
-    return [behaves(f"wheelset.fault.{name.split()[-1]}", SYSTEM, f"planted in one implementation: {name}",
-                    "seen" if found else "unseen", "seen", "beyond the bounds of the rows above")
-            for name, found in seen.items()]  # fmt: skip
+    return [
+        behaves(
+            f"wheelset.fault.{name.split()[-1]}",
+            SYSTEM,
+            f"planted in one implementation: {name}",
+            "seen" if found else "unseen",
+            "seen",
+            "beyond the bounds of the rows above",
+        )
+        for name, found in seen.items()
+    ]
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Critical speeds and limit cycles."""
     heads = ("wheelset", *IMPLEMENTATIONS)
-    speeds = tuple((name, *("none" if v is None else f"{v:.9g}" for v in own.values()))
-                   for name, own in data["critical"].items())  # fmt: skip
-    cycles = tuple((name, engine, f"{o['speed']:.4g}", f"{1e3 * o['amplitude']:.7f}", f"{1e3 * o['error']:.0e}",
-                    f"{o['frequency']:.8f}", f"{o['frequency_error']:.0e}")
-                   for name, own in data["cycles"].items() for engine, o in own.items())  # fmt: skip
-    return [Table("Critical speed of wheelsets", "In m/s, with linear creep; parameters drawn at random but for the "
-                  "chosen ones.", heads, speeds),
-            Table("Limit cycles of wheelsets", "With FASTSIM, 11 cells; errors are what halving the step changes.",
-                  ("wheelset", "implementation", "speed [m/s]", "amplitude [mm]", "error", "frequency [Hz]", "error"),
-                  cycles)]  # fmt: skip
+    speeds = tuple(
+        (name, *("none" if v is None else f"{v:.9g}" for v in own.values())) for name, own in data["critical"].items()
+    )
+    cycles = tuple(
+        (
+            name,
+            engine,
+            f"{o['speed']:.4g}",
+            f"{1e3 * o['amplitude']:.7f}",
+            f"{1e3 * o['error']:.0e}",
+            f"{o['frequency']:.8f}",
+            f"{o['frequency_error']:.0e}",
+        )
+        for name, own in data["cycles"].items()
+        for engine, o in own.items()
+    )
+    return [
+        Table(
+            "Critical speed of wheelsets",
+            "In m/s, with linear creep; parameters drawn at random but for the chosen ones.",
+            heads,
+            speeds,
+        ),
+        Table(
+            "Limit cycles of wheelsets",
+            "With FASTSIM, 11 cells; errors are what halving the step changes.",
+            ("wheelset", "implementation", "speed [m/s]", "amplitude [mm]", "error", "frequency [Hz]", "error"),
+            cycles,
+        ),
+    ]
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:

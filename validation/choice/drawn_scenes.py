@@ -37,9 +37,15 @@ SEED = 2210
 
 def _pitch_plane(draw: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
     """A half car on a road, with a pitch spring of any strength and a gyro; half of them start off their rest."""
-    road = [{"source": "study", "speed": float(draw.uniform(8.0, 30.0))},
-            {"source": "iso8608", "road_class": str(draw.choice(list("ABCD"))), "speed": float(draw.uniform(8.0, 30.0)),
-             "seed": int(draw.integers(1000))}][int(draw.integers(2))]  # fmt: skip
+    road = [
+        {"source": "study", "speed": float(draw.uniform(8.0, 30.0))},
+        {
+            "source": "iso8608",
+            "road_class": str(draw.choice(list("ABCD"))),
+            "speed": float(draw.uniform(8.0, 30.0)),
+            "seed": int(draw.integers(1000)),
+        },
+    ][int(draw.integers(2))]
     effects: dict[str, Any] = {"road": road}
     if draw.random() < 0.7:
         stiffness = float(10.0 ** draw.uniform(0.5, 4.5))
@@ -58,10 +64,17 @@ def _wheelset(draw: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...
     own = {"stiffness_x": 2e5, "damping_x": 1e3, "damping_y": 1e3}
     displacement = float(10.0 ** draw.uniform(-4.0, -2.2))
     asked = draw.choice(["y", "yaw", "rms y", "max fy", "rms power", "rms fx"], 2, replace=False)
-    return {"wheelset": {"override": {name: own[name] * factor for name, factor in factors.items()}},
-            "contact": {"law": "fastsim"}, "speeds": {"values": [10.0]},
-            "run": {"duration": 0.24, "step": float(draw.choice([1e-4, 2e-4])), "displacement": displacement,
-                    "speeds": [float(draw.uniform(5.0, 60.0))]}}, tuple(map(str, asked))  # fmt: skip
+    return {
+        "wheelset": {"override": {name: own[name] * factor for name, factor in factors.items()}},
+        "contact": {"law": "fastsim"},
+        "speeds": {"values": [10.0]},
+        "run": {
+            "duration": 0.24,
+            "step": float(draw.choice([1e-4, 2e-4])),
+            "displacement": displacement,
+            "speeds": [float(draw.uniform(5.0, 60.0))],
+        },
+    }, tuple(map(str, asked))
 
 
 def _braking(draw: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -69,14 +82,19 @@ def _braking(draw: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]
     push_out = float(draw.uniform(0.05, 0.8))
     table: dict[str, Any] = {
         "road": {"stretches": [{"left": str(draw.choice(["dry", "wet", "snow", "ice"]))}]},
-        "brakes": {"supply": float(draw.uniform(3.0, 7.0)),
-                   "front": {"gradient": float(draw.uniform(1000.0, 2000.0)), "push_out": push_out,
-                             "release": push_out * float(draw.uniform(0.5, 1.0))},
-                   "rear": {"gradient": float(draw.uniform(800.0, 1600.0)), "push_out": float(draw.uniform(0.0, 0.3))}},
+        "brakes": {
+            "supply": float(draw.uniform(3.0, 7.0)),
+            "front": {
+                "gradient": float(draw.uniform(1000.0, 2000.0)),
+                "push_out": push_out,
+                "release": push_out * float(draw.uniform(0.5, 1.0)),
+            },
+            "rear": {"gradient": float(draw.uniform(800.0, 1600.0)), "push_out": float(draw.uniform(0.0, 0.3))},
+        },
         "controller": {"kind": str(draw.choice(["none", "slip_bang_bang", "slip_pi"]))},
         "procedures": {"straight": {"kind": "straight", "speed": float(draw.uniform(5.0, 9.0))}},
         "run": {"duration": 12.0, "substeps": 8},
-    }  # fmt: skip
+    }
     if draw.random() < 0.7:
         table["load_transfer"] = {"front": float(draw.uniform(0.2, 0.4))}
     if draw.random() < 0.7:

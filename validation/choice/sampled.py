@@ -111,9 +111,11 @@ class _Steps:
         begin, middle = 1 + z + z**2 / 2 + z**3 / 4, 4 + 2 * z + z**2 / 2
         mean = begin + middle + 1
         ends, between = np.eye(m) / h, self._rate / 6
-        return [h / 6 * (begin * force - mean * (noise @ (ends + between))),
-                h / 6 * (middle * force - mean * (noise @ (4 * between))),
-                h / 6 * (force + mean * (noise @ (ends - between)))]  # fmt: skip
+        return [
+            h / 6 * (begin * force - mean * (noise @ (ends + between))),
+            h / 6 * (middle * force - mean * (noise @ (4 * between))),
+            h / 6 * (force + mean * (noise @ (ends - between))),
+        ]
 
     def _driven(self, axle: int, late: float) -> np.ndarray:
         """A step's forces (n, m) by the filters ``late`` seconds after the step begins, in the axle's own time."""
@@ -134,18 +136,28 @@ class _Steps:
     def _now(self, axle: int) -> np.ndarray:
         """x of an axle by the filters that it meets at that time (n, m)."""
         kept, given = expm(self._rate.T * self.step), self._driven(axle, self.step)
-        return np.array([np.linalg.solve((np.eye(len(kept)) - grown * kept).T, row)
-                         for grown, row in zip(self._grown, given, strict=True)])  # fmt: skip
+        return np.array(
+            [
+                np.linalg.solve((np.eye(len(kept)) - grown * kept).T, row)
+                for grown, row in zip(self._grown, given, strict=True)
+            ]
+        )
 
     def _motions(self, i: int, j: int) -> np.ndarray:
         """x of axle i by x of axle j (n, n)."""
         given = self._grown[:, None] * self._before(i, j)
         given += (self._grown[:, None] * self._before(j, i)).conj().T
-        given += sum(B @ self._driven(j, share * self.step + self._late(j, i)).conj().T
-                     for B, share in zip(self._moved(i), SHARES, strict=True))  # fmt: skip
+        given += sum(
+            B @ self._driven(j, share * self.step + self._late(j, i)).conj().T
+            for B, share in zip(self._moved(i), SHARES, strict=True)
+        )
         return np.asarray(given / (1 - self._grown[:, None] * self._grown.conj()))
 
     def _before(self, i: int, j: int) -> np.ndarray:
         """x of axle i at a step's begin by the forces of axle j in that step (n, n)."""
-        return np.asarray(sum(self._with_road(i, self._late(i, j) + share * self.step) @ B.conj().T
-                              for B, share in zip(self._moved(j), SHARES, strict=True)))  # fmt: skip
+        return np.asarray(
+            sum(
+                self._with_road(i, self._late(i, j) + share * self.step) @ B.conj().T
+                for B, share in zip(self._moved(j), SHARES, strict=True)
+            )
+        )

@@ -27,8 +27,9 @@ SHARE, NEAR, FEW = 0.95, 0.96, 12
 contacts that tell no quantile."""
 ROUNDING = 1e-9
 """Of a moment that is zero by symmetry."""
-FASTSIM = [f"{kind} {bound}" for kind in ("blended", "one", "three")
-           for bound in ("intermediate", "parabolic", "elliptic")]  # fmt: skip
+FASTSIM = [
+    f"{kind} {bound}" for kind in ("blended", "one", "three") for bound in ("intermediate", "parabolic", "elliptic")
+]
 
 
 @dataclass(frozen=True)
@@ -102,23 +103,26 @@ def held(name: str, cases: list[Case], cells: int = CELLS) -> Held:
     axes, motions = _arrays(cases)
     exact = np.array([(*c.force, c.mz * np.sqrt(c.a * c.b) / max(c.a, c.b)) for c in cases])
     off, share = found - exact, spin_share(axes[0], axes[1], motions, nu)
-    return Held(found[:, :2], found[:, 2], np.linalg.norm(off[:, :2], axis=1), np.abs(off[:, 2]), share,
-                groups(cases))  # fmt: skip
+    return Held(found[:, :2], found[:, 2], np.linalg.norm(off[:, :2], axis=1), np.abs(off[:, 2]), share, groups(cases))
 
 
 def kept(name: str, one: Held) -> tuple[float, float]:
     """Parts of the contacts whose errors of force and moment lie within what ``models.contact.accuracy`` states."""
     moment = moment_band(name, one.used_with_moment, one.spinning)
-    return (float(np.mean(one.error <= band(name, one.used, one.spinning))),
-            float(np.mean(one.moment_error <= moment + ROUNDING)))  # fmt: skip
+    return (
+        float(np.mean(one.error <= band(name, one.used, one.spinning))),
+        float(np.mean(one.moment_error <= moment + ROUNDING)),
+    )
 
 
 def measured(error: np.ndarray, used: np.ndarray, one: Held) -> tuple[tuple[float, ...], ...]:
     """Quantiles of the error at each knot, without spin and with it, of the group with the largest."""
     ends = (0.0, *KNOTS, 1.1)
     within = [(used >= low) & (used <= high) for low, high in zip(ends, ends[2:], strict=False)]
-    return tuple(tuple(_largest(error, rows & some, one.group) for some in within)
-                 for rows in (one.spinning < 0.5, one.spinning >= 0.5))  # fmt: skip
+    return tuple(
+        tuple(_largest(error, rows & some, one.group) for some in within)
+        for rows in (one.spinning < 0.5, one.spinning >= 0.5)
+    )
 
 
 def _largest(error: np.ndarray, rows: np.ndarray, group: np.ndarray) -> float:

@@ -7,8 +7,16 @@ from matplotlib.figure import Figure
 
 from studies.figures import plt
 
-LAWS = ("no contact", "empty callback", "linear theory", "FASTSIM, 7 cells", "FASTSIM, 11 cells", "FASTSIM, 21 cells",
-        "FASTSIM, 41 cells", "non-Hertzian")  # fmt: skip
+LAWS = (
+    "no contact",
+    "empty callback",
+    "linear theory",
+    "FASTSIM, 7 cells",
+    "FASTSIM, 11 cells",
+    "FASTSIM, 21 cells",
+    "FASTSIM, 41 cells",
+    "non-Hertzian",
+)
 NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
 BRIDGES = {"native": "native", "jitted": "jitted, from Python", "plain": "plain Python"}
 PARTS = (("own", "engine", "0.75"), ("kernel", "kernel", "C0"), ("over", "bridge", "C3"))
@@ -25,13 +33,18 @@ def figure(points: list[dict[str, Any]]) -> Figure:
     best = [p for p in some if p["bridge"] in ("empty", _main(p["engine"]))]
     _laws(left, some)
     _shares(middle, [(f"{NAMES[p['engine']]}, {p['law']}", p) for p in best if p["wheels"] == WHEELS])
-    _shares(right, [(f"{NAMES[p['engine']]}, {p['wheels']} wheel{'s' * (p['wheels'] > 1)}", p)
-                    for p in best if p["main"]])  # fmt: skip
+    _shares(
+        right, [(f"{NAMES[p['engine']]}, {p['wheels']} wheel{'s' * (p['wheels'] > 1)}", p) for p in best if p["main"]]
+    )
     middle.set_title(f"shares by law, {WHEELS} wheels")
     right.set_title("shares by wheels, FASTSIM, 21 cells")
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, fontsize="small")
-    drawing.suptitle("A contact kernel inside an engine: what a step costs and what it is made of",
-                     x=0.01, ha="left", fontweight="bold")  # fmt: skip
+    drawing.suptitle(
+        "A contact kernel inside an engine: what a step costs and what it is made of",
+        x=0.01,
+        ha="left",
+        fontweight="bold",
+    )
     return drawing
 
 
@@ -51,8 +64,14 @@ def _laws(axis: Any, points: list[dict[str, Any]]) -> None:
         others = [p for p in own if p["bridge"] not in ("none", "empty", _main(engine))]
         for mark, bridge in zip("sD^", dict.fromkeys(p["bridge"] for p in others), strict=False):
             x, y = np.array([(LAWS.index(p["law"]), 1e6 * p["step"]) for p in others if p["bridge"] == bridge]).T
-            axis.semilogy(x, y, mark, color=COLOURS[engine], mfc="white",
-                          label=f"{NAMES[engine]}, {BRIDGES.get(bridge, bridge)}, {WHEELS} wheels")  # fmt: skip
+            axis.semilogy(
+                x,
+                y,
+                mark,
+                color=COLOURS[engine],
+                mfc="white",
+                label=f"{NAMES[engine]}, {BRIDGES.get(bridge, bridge)}, {WHEELS} wheels",
+            )
     axis.set_xticks(range(len(LAWS)), LAWS, rotation=35, ha="right")
     axis.set(ylabel="time per step [us]", title="one call per step")
     axis.grid(True, axis="y", alpha=0.3)

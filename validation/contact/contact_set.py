@@ -22,8 +22,14 @@ from models.contact.work_precision import Case, ellipse_cases, exact
 
 RATIOS = (0.2, 0.5, 1.0, 2.0, 5.0)
 LEVELS = (0.05, 0.2, 0.5, 0.8, 1.2, 2.0, 4.0, 10.0)
-KINDS = {**work_precision.KINDS, **{f"y{sign}spin {angle}": (0.0, cos(radians(angle)), float(f"{sign}1") *
-         sin(radians(angle))) for angle in (15, 30) for sign in "+-"}}  # fmt: skip
+KINDS = {
+    **work_precision.KINDS,
+    **{
+        f"y{sign}spin {angle}": (0.0, cos(radians(angle)), float(f"{sign}1") * sin(radians(angle)))
+        for angle in (15, 30)
+        for sign in "+-"
+    },
+}
 """Parts of the creepages; lateral creepage with and against spin, where theories differ most, by angles in degrees."""
 SIZE, LOAD, FRICTION, PAIR = 5e-3, 8e4, 0.3, Pair()
 """sqrt(ab) in m, N, coefficient of friction and materials with which the set is computed."""
@@ -42,15 +48,15 @@ ANSWERS = ("fx", "fy", "mz", "error")
 
 def cases() -> list[Case]:
     """All contacts of the set, without their forces."""
-    return [case for ratio in RATIOS
-            for case in ellipse_cases(*_axes(ratio), LOAD, FRICTION, PAIR, LEVELS, KINDS)]  # fmt: skip
+    return [case for ratio in RATIOS for case in ellipse_cases(*_axes(ratio), LOAD, FRICTION, PAIR, LEVELS, KINDS)]
 
 
 def drawn(part: int) -> list[Case]:
     """A part of the drawn contacts, without their forces: every direction of the scaled creepages is as likely."""
     rng = np.random.default_rng((SEED, part))
-    ratios, levels = (np.exp(rng.uniform(np.log(low), np.log(high), DRAWN)).tolist()
-                      for low, high in ((RATIOS[0], RATIOS[-1]), RANGE))  # fmt: skip
+    ratios, levels = (
+        np.exp(rng.uniform(np.log(low), np.log(high), DRAWN)).tolist() for low, high in ((RATIOS[0], RATIOS[-1]), RANGE)
+    )
     return [
         Case(*_axes(ratio), LOAD, FRICTION, PAIR, f"drawn {part}", (x, y, spin), level)
         for ratio, level, (x, y, spin) in zip(ratios, levels, rng.normal(size=(DRAWN, 3)).tolist(), strict=True)
@@ -65,14 +71,17 @@ def wide(part: int) -> list[Case]:
 
 def _wide(stream: int, count: int) -> list[Case]:
     rng = np.random.default_rng((SEED, stream))
-    ratios, levels = (np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist()
-                      for low, high in (WIDE_RATIOS, WIDE_RANGE))  # fmt: skip
+    ratios, levels = (
+        np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist() for low, high in (WIDE_RATIOS, WIDE_RANGE)
+    )
     directions, present = rng.normal(size=(count, 3)), rng.uniform(size=(count, 3)) >= ABSENT
     present[~present.any(axis=1)] = True
     bodies = cycle([Material(E=PAIR.one.E, nu=nu) for nu in POISSON])
     parts = (directions * present).tolist()
-    return [Case(*_axes(ratio), LOAD, FRICTION, Pair(body, body), "wide", (x, y, spin), level)
-            for ratio, level, (x, y, spin), body in zip(ratios, levels, parts, bodies, strict=False)]  # fmt: skip
+    return [
+        Case(*_axes(ratio), LOAD, FRICTION, Pair(body, body), "wide", (x, y, spin), level)
+        for ratio, level, (x, y, spin), body in zip(ratios, levels, parts, bodies, strict=False)
+    ]
 
 
 def _axes(ratio: float) -> tuple[float, float]:

@@ -21,8 +21,13 @@ CURVATURE = 1.0 / 0.92
 """A of a wheel of 0.46 m radius (1/m)."""
 LEVELS = (0.5, 2.0)
 """Creepages by the linear scale mu N / (4 G c^2), c the radius of a circle of the exact area."""
-KINDS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "spin": (0.0, 0.0, 1.0), "y + spin": (0.0, 1.0, 0.6),
-         "y - spin": (0.0, -1.0, 0.6)}  # fmt: skip
+KINDS = {
+    "x": (1.0, 0.0, 0.0),
+    "y": (0.0, 1.0, 0.0),
+    "spin": (0.0, 0.0, 1.0),
+    "y + spin": (0.0, 1.0, 0.6),
+    "y - spin": (0.0, -1.0, 0.6),
+}
 
 
 Box = tuple[float, float, float, float]
@@ -50,8 +55,13 @@ def _hertz(name: str, ratio: float, x: float, y: float) -> Shape:
 
 def _well(name: str, ridge: float, load: float, half: float = 3e-3, tilt: float = 0.0) -> Shape:
     """Two grooves ``half`` (m) to each side of the middle, a ridge (m) between, one of them ``tilt`` (m) higher."""
-    return _over(name, lambda u, v: CURVATURE * u**2 + ridge * ((v / half) ** 2 - 1.0) ** 2
-                 + tilt * (v / half + 1.0) / 2.0, load, 0.0135, 2.2 * half + 9e-4)  # fmt: skip
+    return _over(
+        name,
+        lambda u, v: CURVATURE * u**2 + ridge * ((v / half) ** 2 - 1.0) ** 2 + tilt * (v / half + 1.0) / 2.0,
+        load,
+        0.0135,
+        2.2 * half + 9e-4,
+    )
 
 
 def formulas() -> list[Shape]:
@@ -63,29 +73,67 @@ def formulas() -> list[Shape]:
         _hertz("ellipse, B/A = 1/5", 0.2, 0.0078, 0.0235),
         _over("quartic in y", lambda u, v: CURVATURE * u**2 + 2e4 * v**4, 5e4, 0.0078, 0.0078),
         _over("egg", lambda u, v: CURVATURE * u**2 + np.where(v > 0, 3.0, 0.7) * v**2, 5e4, 0.0072, 0.0088),
-        _over("two patches", lambda u, v: CURVATURE * u**2 + np.minimum(1.7 * (v - apart) ** 2,
-              1.7 * (v + apart) ** 2 + 5e-6), 2e4, 0.0058, 0.0138),
+        _over(
+            "two patches",
+            lambda u, v: CURVATURE * u**2 + np.minimum(1.7 * (v - apart) ** 2, 1.7 * (v + apart) ** 2 + 5e-6),
+            2e4,
+            0.0058,
+            0.0138,
+        ),
         _well("two grooves, apart", 1e-5, 1e4),
         _well("two grooves, grown together", 1e-5, 1e5),
-    ]  # fmt: skip
+    ]
 
 
 def grown() -> list[Shape]:
     """Areas that have grown together, by ridges and distances of many sizes; the last along x and three at once."""
-    wells = ((2, 3, 100, 0), (5, 2, 50, 0), (10, 3, 30, 0), (10, 3, 200, 0), (20, 3, 100, 0), (20, 4, 100, 0),
-             (10, 3, 100, 4), (20, 4, 120, 10), (30, 5, 150, 0), (8, 2.5, 50, -3), (3, 4, 40, 0),
-             (10, 5, 80, 5))  # fmt: skip
-    found = [_well(f"grooves {2 * half:g} mm apart, ridge {ridge:g} um, one {tilt:g} um higher, {load:g} kN",
-                   1e-6 * ridge, 1e3 * load, 1e-3 * half, 1e-6 * tilt)
-             for ridge, half, load, tilt in wells]  # fmt: skip
+    wells = (
+        (2, 3, 100, 0),
+        (5, 2, 50, 0),
+        (10, 3, 30, 0),
+        (10, 3, 200, 0),
+        (20, 3, 100, 0),
+        (20, 4, 100, 0),
+        (10, 3, 100, 4),
+        (20, 4, 120, 10),
+        (30, 5, 150, 0),
+        (8, 2.5, 50, -3),
+        (3, 4, 40, 0),
+        (10, 5, 80, 5),
+    )
+    found = [
+        _well(
+            f"grooves {2 * half:g} mm apart, ridge {ridge:g} um, one {tilt:g} um higher, {load:g} kN",
+            1e-6 * ridge,
+            1e3 * load,
+            1e-3 * half,
+            1e-6 * tilt,
+        )
+        for ridge, half, load, tilt in wells
+    ]
     return [
         *found,
-        _over("two arcs that meet in an edge", lambda u, v: CURVATURE * u**2 + 1.7 * (np.abs(v) - 3e-3) ** 2, 6e4,
-              0.012, 0.012),
+        _over(
+            "two arcs that meet in an edge",
+            lambda u, v: CURVATURE * u**2 + 1.7 * (np.abs(v) - 3e-3) ** 2,
+            6e4,
+            0.012,
+            0.012,
+        ),
         _over("two grooves along x", lambda u, v: 4.0 * v**2 + 6e-6 * ((u / 4e-3) ** 2 - 1.0) ** 2, 4e4, 0.011, 7.5e-3),
-        _over("three grooves", lambda u, v: CURVATURE * u**2 + 4e-6 * (1.0 + np.cos(np.pi * (v / 2.5e-3 + 1.0)))
-              + np.maximum(np.abs(v) - 5e-3, 0.0) ** 2 + 0.15 * v**2, 8e4, 0.0135, 0.0115),
-    ]  # fmt: skip
+        _over(
+            "three grooves",
+            lambda u, v: (
+                CURVATURE * u**2
+                + 4e-6 * (1.0 + np.cos(np.pi * (v / 2.5e-3 + 1.0)))
+                + np.maximum(np.abs(v) - 5e-3, 0.0) ** 2
+                + 0.15 * v**2
+            ),
+            8e4,
+            0.0135,
+            0.0115,
+        ),
+    ]
 
 
 def profiles() -> list[Shape]:

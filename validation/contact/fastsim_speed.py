@@ -29,32 +29,76 @@ def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], l
     lanes[: 3 * LANES] = draw.normal(0.0, 0.3, 3 * LANES)
     cells, values = grid(CELLS, CELLS + 1, "intermediate").cells, draw.uniform(1.0, 2.0, CELLS * LANES)
     creep = tuple(draw.normal(0.0, 2e-3, CONTACTS) for _ in range(2))
-    many: dict[str, Any] = {"a": axis, "b": axis, "load": load, "mu": mu, "xi_x": creep[0], "xi_y": creep[1],
-            "spin": draw.normal(0.0, 0.3, CONTACTS), "pair": pair}  # fmt: skip
+    many: dict[str, Any] = {
+        "a": axis,
+        "b": axis,
+        "load": load,
+        "mu": mu,
+        "xi_x": creep[0],
+        "xi_y": creep[1],
+        "spin": draw.normal(0.0, 0.3, CONTACTS),
+        "pair": pair,
+    }
     calls = {n: Ellipse(1.0, pair, cells=n) for n in (12, CELLS)}
     jobs: dict[str, tuple[Callable[[], Any], float]] = {
         "bound": (lambda: _bound(values, REPEATS), REPEATS * CELLS * LANES),
         "plain": (lambda: _plain(lanes, cells, REPEATS), REPEATS * CELLS * LANES),
         "second": (lambda: _second(lanes, cells, REPEATS), REPEATS * CELLS * LANES),
         **{f"call {n}": (partial(_call, e, (axis, load, mu, 1e-3, 5e-4, 0.2)), REPEATS) for n, e in calls.items()},
-        **{f"many {march}": (partial(fastsim, **many, march=march), CONTACTS * CELLS * (CELLS + 1))
-           for march in ("plain", "second-order")},
-    }  # fmt: skip
+        **{
+            f"many {march}": (partial(fastsim, **many, march=march), CONTACTS * CELLS * (CELLS + 1))
+            for march in ("plain", "second-order")
+        },
+    }
     took = _timed(jobs)
     ratio = {name: paired_ratio(own, took["bound"]) for name, own in took.items()}
     calls_took = {n: median(1e6 * took[f"call {n}"]) for n in calls}
     rows = [
-        aim("fastsim.speed.plain", SYSTEM, f"plain march per cell, by a root and a division{_between(ratio['plain'])}",
-            ratio["plain"][0], "", 1.8, WHY),
-        aim("fastsim.speed.second", SYSTEM, "second-order march per cell, by a root and a division"
-            f"{_between(ratio['second'])}", ratio["second"][0], "", 4.0, WHY),
-        aim("fastsim.speed.call.1", SYSTEM, "one call from Python, 12 cells per strip (0.8 % of mu N)"
-            f"{_between(calls_took[12])}", calls_took[12][0], "us", 5.0, WHY),
-        aim("fastsim.speed.call.04", SYSTEM, "one call from Python, 21 cells per strip (0.4 % of mu N)"
-            f"{_between(calls_took[CELLS])}", calls_took[CELLS][0], "us", 10.0, WHY),
-    ]  # fmt: skip
-    table = [[name, f"{spelled(own, 1e6)} us" if "call" in name else f"{spelled(own, 1e9)} ns per cell",
-              "" if "call" in name else f"{ratio[name][0]:.2f}"] for name, own in took.items()]  # fmt: skip
+        aim(
+            "fastsim.speed.plain",
+            SYSTEM,
+            f"plain march per cell, by a root and a division{_between(ratio['plain'])}",
+            ratio["plain"][0],
+            "",
+            1.8,
+            WHY,
+        ),
+        aim(
+            "fastsim.speed.second",
+            SYSTEM,
+            f"second-order march per cell, by a root and a division{_between(ratio['second'])}",
+            ratio["second"][0],
+            "",
+            4.0,
+            WHY,
+        ),
+        aim(
+            "fastsim.speed.call.1",
+            SYSTEM,
+            f"one call from Python, 12 cells per strip (0.8 % of mu N){_between(calls_took[12])}",
+            calls_took[12][0],
+            "us",
+            5.0,
+            WHY,
+        ),
+        aim(
+            "fastsim.speed.call.04",
+            SYSTEM,
+            f"one call from Python, 21 cells per strip (0.4 % of mu N){_between(calls_took[CELLS])}",
+            calls_took[CELLS][0],
+            "us",
+            10.0,
+            WHY,
+        ),
+    ]
+    table = [
+        [
+            name,
+            f"{spelled(own, 1e6)} us" if "call" in name else f"{spelled(own, 1e9)} ns per cell",
+            "" if "call" in name else f"{ratio[name][0]:.2f}",
+        ]
+        for name, own in took.items()
+    ]
     return rows, table
 
 

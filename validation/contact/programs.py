@@ -29,8 +29,11 @@ def compare(cases: list[Case]) -> dict[str, Any]:
     normal = [_normal(case, pressed[case.a, case.b]) for case in {(c.a, c.b): c for c in cases}.values()]
     case = cases[len(cases) // 2]
     both = pressed[case.a, case.b]
-    jobs = {"1982": lambda: fastsim(case.a, case.b, case.load, case.friction, *case.motion, case.pair, **OLD),
-            "press": lambda: _pressed(case), "1983": lambda: roll(both, case.friction, *case.motion)}  # fmt: skip
+    jobs = {
+        "1982": lambda: fastsim(case.a, case.b, case.load, case.friction, *case.motion, case.pair, **OLD),
+        "press": lambda: _pressed(case),
+        "1983": lambda: roll(both, case.friction, *case.motion),
+    }
     seconds = dict(zip(jobs, interleave(list(jobs.values()), ROUNDS).tolist(), strict=True))
     return {"errors": errors, "normal": normal, "seconds": seconds}
 
@@ -48,14 +51,19 @@ def _pressed(case: Case) -> NormalContact:
 def _normal(case: Case, found: NormalContact) -> dict[str, float]:
     """Relative errors of approach, area and largest pressure."""
     hertz = by_axes(case.a, case.b, case.pair, load=case.load)
-    return {"approach": found.approach / float(hertz.approach) - 1, "area": found.area / (np.pi * case.a * case.b) - 1,
-            "peak": found.peak / float(hertz.p0) - 1}  # fmt: skip
+    return {
+        "approach": found.approach / float(hertz.approach) - 1,
+        "area": found.area / (np.pi * case.a * case.b) - 1,
+        "peak": found.peak / float(hertz.p0) - 1,
+    }
 
 
 def table(found: dict[str, Any]) -> Table:
     """The paper's comparison with figures in it."""
-    error = {name: f"mean {100 * np.mean(e):.1f}, largest {100 * max(e):.0f} % of mu N"
-             for name, e in found["errors"].items()}  # fmt: skip
+    error = {
+        name: f"mean {100 * np.mean(e):.1f}, largest {100 * max(e):.0f} % of mu N"
+        for name, e in found["errors"].items()
+    }
     normal = {key: _span([one[key] for one in found["normal"]]) for key in ("approach", "area", "peak")}
     t = {name: np.array(own) for name, own in found["seconds"].items()}
     both = t["1983"] + t["press"]
@@ -68,12 +76,19 @@ def table(found: dict[str, Any]) -> Table:
         ("accuracy in the paper", "roughly the same", "roughly the same"),
         ("accuracy, measured", error["1982"], error["1983"]),
         ("time in the paper", "1", "about 3"),
-        ("time, measured", f"1 ({cost(t['1982'])})", f"{np.median(both / t['1982']):.0f} ({cost(both)}); forces "
-         f"alone {np.median(t['1983'] / t['1982']):.0f}"),
-    )  # fmt: skip
-    return Table("The programs of 1982 and 1983", "Kalker's own comparison (1983) with measured figures; both to the "
-                 f"letter, {CELLS} strips and cells, times of one call from Python: median and range of rounds.",
-                 ("", "1982", "1983"), rows)
+        (
+            "time, measured",
+            f"1 ({cost(t['1982'])})",
+            f"{np.median(both / t['1982']):.0f} ({cost(both)}); forces alone {np.median(t['1983'] / t['1982']):.0f}",
+        ),
+    )
+    return Table(
+        "The programs of 1982 and 1983",
+        "Kalker's own comparison (1983) with measured figures; both to the "
+        f"letter, {CELLS} strips and cells, times of one call from Python: median and range of rounds.",
+        ("", "1982", "1983"),
+        rows,
+    )
 
 
 def _span(values: list[float]) -> str:

@@ -76,18 +76,37 @@ def rows(quick: bool) -> tuple[list[Row], list[Run]]:
         done += [run for speed in SPEEDS[1:] for run in runs(speed, STEPS[speed])]
     explicit = done[0]
     implicit = [next(run for run in done if run.method == method) for method in METHODS]
-    found = [at_most(f"contact_bridges.low-speed.{run.method}", SYSTEM, f"Exudyn at 1 m/s, {run.method} with slopes: "
-                     f"error after {DURATION:g} s in steps of {1e3 * run.step:.2g} ms ({run.calls} force calls; RK44 "
-                     f"needs {explicit.calls})", run.error, "of what is left", 1e-3, f"{MORE} times the explicit limit "
-                     "and of second order: a twentieth of the suspension's shortest period", "closed form")
-             for run in implicit]  # fmt: skip
+    found = [
+        at_most(
+            f"contact_bridges.low-speed.{run.method}",
+            SYSTEM,
+            f"Exudyn at 1 m/s, {run.method} with slopes: "
+            f"error after {DURATION:g} s in steps of {1e3 * run.step:.2g} ms ({run.calls} force calls; RK44 "
+            f"needs {explicit.calls})",
+            run.error,
+            "of what is left",
+            1e-3,
+            f"{MORE} times the explicit limit and of second order: a twentieth of the suspension's shortest period",
+            "closed form",
+        )
+        for run in implicit
+    ]
     tried = {"slopes by differences": (0.1, "GeneralizedAlpha", 200, False), "explicit": (0.1, "RK44", 200, True)}
     expected = {"slopes by differences": "raised", "explicit": "refused"}
     why = "the slopes of sliding let Newton's method leap from slip to slip; an explicit step is beyond its limit"
     for name, how in tried.items():
         what = f"Exudyn at 0.1 m/s in steps of 1 ms, {how[1]}, {name}"
-        found.append(behaves(f"contact_bridges.low-speed.{name.replace(' ', '-')}", SYSTEM, what, _said(*how),
-                             expected[name], why, "none"))  # fmt: skip
+        found.append(
+            behaves(
+                f"contact_bridges.low-speed.{name.replace(' ', '-')}",
+                SYSTEM,
+                what,
+                _said(*how),
+                expected[name],
+                why,
+                "none",
+            )
+        )
     return found, done
 
 
@@ -103,9 +122,24 @@ def _said(speed: float, method: str, steps: int, with_slopes: bool) -> str:
 
 def table(saved: list[dict[str, Any]]) -> Table:
     """Every run."""
-    lines = tuple((f"{run['speed']:g}", run["method"], f"{1e3 * run['step']:.3g}", str(run["steps"]), str(run["calls"]),
-                   f"{run['error']:.1e}") for run in saved)  # fmt: skip
-    note = (f"One wheel pulled aside by 0.1 mm and let go, {DURATION:g} s; error of its place by the largest "
-            "displacement left, against RK44 at half its step. Implicit methods with the linear theory's slopes.")
-    return Table("Steps and force calls at low speed in Exudyn", note,
-                 ("speed [m/s]", "method", "step [ms]", "steps", "force calls", "error"), lines)  # fmt: skip
+    lines = tuple(
+        (
+            f"{run['speed']:g}",
+            run["method"],
+            f"{1e3 * run['step']:.3g}",
+            str(run["steps"]),
+            str(run["calls"]),
+            f"{run['error']:.1e}",
+        )
+        for run in saved
+    )
+    note = (
+        f"One wheel pulled aside by 0.1 mm and let go, {DURATION:g} s; error of its place by the largest "
+        "displacement left, against RK44 at half its step. Implicit methods with the linear theory's slopes."
+    )
+    return Table(
+        "Steps and force calls at low speed in Exudyn",
+        note,
+        ("speed [m/s]", "method", "step [ms]", "steps", "force calls", "error"),
+        lines,
+    )

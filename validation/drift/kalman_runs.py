@@ -58,14 +58,19 @@ def force_deviation(true: Result) -> float:
     return FRACTION * float(max(np.abs(true["f1"]).max(), np.abs(true["f2"]).max()))
 
 
-def driven(folder: Path, duration: float, effects: dict[str, Any], *, wrong: bool = False,
-           geometry: str = "exact") -> Scene:  # fmt: skip
+def driven(
+    folder: Path, duration: float, effects: dict[str, Any], *, wrong: bool = False, geometry: str = "exact"
+) -> Scene:
     """The vehicle under the forces in the folder, steps of 1 ms."""
     plain = build_scene({"title": "kalman", "run": {"duration": duration, "step": 1e-3}}).vehicle_parameters()
     override = {name: getattr(plain, name) * factor for name, factor in WRONG.items()} if wrong else {}
     forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}}
-    table = {"title": "kalman", "vehicle": {"override": override, "geometry": geometry},
-             "run": {"duration": duration, "step": 1e-3}, "effects": forces | effects}  # fmt: skip
+    table = {
+        "title": "kalman",
+        "vehicle": {"override": override, "geometry": geometry},
+        "run": {"duration": duration, "step": 1e-3},
+        "effects": forces | effects,
+    }
     return build_scene(table, "", folder)
 
 
@@ -208,8 +213,9 @@ def spread_of_mean_square(step: np.ndarray, covariance: np.ndarray, count: int) 
     return np.sqrt(2.0 * total / count)
 
 
-def stabilised(folder: Path, duration: float, seed: int, engines: tuple[str, ...],
-               wrong: bool = True) -> dict[str, dict[str, float]]:  # fmt: skip
+def stabilised(
+    folder: Path, duration: float, seed: int, engines: tuple[str, ...], wrong: bool = True
+) -> dict[str, dict[str, float]]:
     """Damage ratios, shares of the artificial moment and pitch error of the stabilised runs of one noise sample."""
     true = measured(folder, duration, 1e-3)
     seen = true["pitch"] + ANGLE * normal(seed, 0, len(true.times), 1, source=PITCH_SENSOR)[:, 0]
@@ -228,7 +234,8 @@ def _scored(true: Result, run: Result) -> dict[str, float]:
     wanted, had = (section_forces(one["f3"], one["f4"], one["pitch"]) for one in (true, run))
     found = {name: damage_ratio(had[name], wanted[name]) for name in CHANNELS}
     term = build_scene({"title": "", "run": {"duration": 1.0}}).vehicle_parameters().I * np.gradient(
-        true["pitch_rate"], true.times)  # fmt: skip
+        true["pitch_rate"], true.times
+    )
     moments = {"pull": run["kalman_moment"], "all": run["kalman_moment"] + run["inertia_moment"]}
     low = butter(4, BAND, fs=1 / float(true.times[1]), output="sos")
     for name, moment in moments.items():
@@ -265,12 +272,22 @@ def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
     model, see = np.array([[0.0, 1.0], [growth**2, 0.0]]), np.array([[0.0, 1.0]])
     law = control.care(model.T, see.T, np.diag([0.0, push]), np.array([[gyro**2 * COARSE]]))[0]
     wrong = found.states[len(clean) // 6 :, PITCH] - clean[len(clean) // 6 :, 3]
-    return {"stated": float(sure[-1]), "law": float(np.sqrt(law[0, 0])), "error": rms(wrong),
-            "walk": float(GYRO * np.sqrt(1e-3 * duration))}  # fmt: skip
+    return {
+        "stated": float(sure[-1]),
+        "law": float(np.sqrt(law[0, 0])),
+        "error": rms(wrong),
+        "walk": float(GYRO * np.sqrt(1e-3 * duration)),
+    }
 
 
-def with_gaps(folder: Path, duration: float, seed: int, columns: tuple[int, ...], random_gaps: float,
-              outage: tuple[float, float] | None) -> dict[str, float]:  # fmt: skip
+def with_gaps(
+    folder: Path,
+    duration: float,
+    seed: int,
+    columns: tuple[int, ...],
+    random_gaps: float,
+    outage: tuple[float, float] | None,
+) -> dict[str, float]:
     """A stabilised run on a file with holes: its worst error by the deviation that the filter states, and counts."""
     true = measured(folder, duration, COARSE)
     deviations = {PITCH: at_period(ANGLE, COARSE), RATE: at_period(GYRO, COARSE)}
@@ -291,8 +308,11 @@ def with_gaps(folder: Path, duration: float, seed: int, columns: tuple[int, ...]
     every = round(COARSE / 1e-3)
     wrong = run["pitch_estimate"][::every] - clean[:, 3]
     sure = run["pitch_deviation"][::every]
-    return {"error by deviation": float(np.abs(wrong[1:] / sure[1:]).max()), "error": float(np.abs(wrong).max()),
-            "run's error": float(np.abs(run["pitch"][::every] - clean[:, 3]).max()), "deviation": float(sure.max()),
-            "miscounted": float(abs(run["kalman_missed"][-1] - lost.sum() * len(columns))),
-            "missed": float(run["kalman_missed"][-1])}  # fmt: skip
-
+    return {
+        "error by deviation": float(np.abs(wrong[1:] / sure[1:]).max()),
+        "error": float(np.abs(wrong).max()),
+        "run's error": float(np.abs(run["pitch"][::every] - clean[:, 3]).max()),
+        "deviation": float(sure.max()),
+        "miscounted": float(abs(run["kalman_missed"][-1] - lost.sum() * len(columns))),
+        "missed": float(run["kalman_missed"][-1]),
+    }

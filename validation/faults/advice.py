@@ -22,9 +22,10 @@ from validation.price.problems import Setting
 
 STEPS = tuple(0.2 / n for n in (1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40, 64, 100, 160, 250))
 STAGES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
-    "Euler": ((0.0,), (1.0,)), "midpoint": ((0.0, 0.5), (0.0, 1.0)),
+    "Euler": ((0.0,), (1.0,)),
+    "midpoint": ((0.0, 0.5), (0.0, 1.0)),
     "RK4": ((0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
-}  # fmt: skip
+}
 """Places of stages within a step, each from the one before, and weights."""
 LOOSE, TIGHT = 0.03, 6e-7
 """Tolerances: the first is met most cheaply by the default method as it comes, the second by another one."""
@@ -50,16 +51,19 @@ CLOCK = _Clock()
 
 @dataclass(frozen=True)
 class Swing:
-    """See ``validation.price.own_scene.OwnScene``. The error has grown by the end of the run, beyond what is searched.
-    """
+    """See ``validation.price.own_scene.OwnScene``. The error has grown by the end, beyond what is searched."""
 
     title, quantity, unit, cell, note, counted = "y' = y cos t", "y", "", 0.0, "", "force calls"
     whole, first = 8.0, 2.0
 
     def ladders(self) -> list[Ladder]:
         """Methods of one engine; the default is of order 2; one of them breaks down on the way."""
-        return [Ladder("mujoco", "RK4", STEPS, 4), Ladder("mujoco", "midpoint", STEPS, 2, default=STEPS[0]),
-                Ladder("mujoco", "Euler", STEPS, 1), Ladder("mujoco", "broken", STEPS, 1)]  # fmt: skip
+        return [
+            Ladder("mujoco", "RK4", STEPS, 4),
+            Ladder("mujoco", "midpoint", STEPS, 2, default=STEPS[0]),
+            Ladder("mujoco", "Euler", STEPS, 1),
+            Ladder("mujoco", "broken", STEPS, 1),
+        ]
 
     def reference(self) -> Ladder:
         """RK4, whose first rung is known to no better than some of the settings tried."""
@@ -110,8 +114,12 @@ def _error(setting: Setting) -> float:
 def _least(tolerance: float) -> int:
     """Fewest calls with which any setting holds the tolerance: all are run."""
     own = Swing()
-    return min(own.solve(setting, own.whole)[2] for ladder in own.ladders() for setting in
-               map(ladder.setting, range(len(STEPS))) if _error(setting) <= tolerance)  # fmt: skip
+    return min(
+        own.solve(setting, own.whole)[2]
+        for ladder in own.ladders()
+        for setting in map(ladder.setting, range(len(STEPS)))
+        if _error(setting) <= tolerance
+    )
 
 
 def _found(tolerance: float) -> Recommendation:
@@ -124,8 +132,13 @@ def _found(tolerance: float) -> Recommendation:
 
 def _worst(size: Callable[[Choice, float], float], kind: str = "", asked: tuple[float, ...] = (TIGHT,)) -> float:
     """Largest size of the winners by a cost, for each tolerance asked for; infinite where there is no winner."""
-    return max(max((size(choice, tolerance) for (_, by), choice in _found(tolerance).winners.items()
-                    if by.startswith(kind)), default=math.inf) for tolerance in asked)  # fmt: skip
+    return max(
+        max(
+            (size(choice, tolerance) for (_, by), choice in _found(tolerance).winners.items() if by.startswith(kind)),
+            default=math.inf,
+        )
+        for tolerance in asked
+    )
 
 
 def _held(choice: Choice, tolerance: float) -> float:
@@ -143,12 +156,19 @@ def _dear(choice: Choice, tolerance: float) -> float:
 CHECKS = {
     "held": Check("true error by the tolerance", "", 1.0, lambda: _worst(_held)),
     "told": Check("logarithm of predicted by true error", "", 0.1, lambda: _worst(_told, "", (LOOSE, TIGHT))),
-    "calls": Check("force calls beyond the fewest that hold the tolerance", "", 1e-12,
-                   lambda: _worst(_dear, "calls", (LOOSE, TIGHT))),
-    "seconds": Check("the same of the setting recommended by seconds, where a call costs the same in all", "",
-                     recommendation.SLOWER - 1.0,
-                     lambda: _worst(_dear, "seconds")),
-}  # fmt: skip
+    "calls": Check(
+        "force calls beyond the fewest that hold the tolerance",
+        "",
+        1e-12,
+        lambda: _worst(_dear, "calls", (LOOSE, TIGHT)),
+    ),
+    "seconds": Check(
+        "the same of the setting recommended by seconds, where a call costs the same in all",
+        "",
+        recommendation.SLOWER - 1.0,
+        lambda: _worst(_dear, "seconds"),
+    ),
+}
 
 
 def _in(name: str, change: Callable[[Any], Any], module: str = "recommendation") -> Patch:
@@ -157,9 +177,11 @@ def _in(name: str, change: Callable[[Any], Any], module: str = "recommendation")
 
 def _tenth(real: Any) -> Any:
     """Errors of the winners by ten."""
+
     def told(*own: Any) -> Any:
         known, timed, winners = real(*own)
         return known, timed, {key: replace(one, error=one.error / 10.0) for key, one in winners.items()}
+
     return told
 
 
@@ -189,16 +211,25 @@ FAULTS = (
     Fault("predicted error a tenth of what was measured", "recommendation", _in("_resolved", _tenth)),
     Fault("the most accurate setting wins, not the cheapest", "recommendation", _in("_cheapest", lambda _: _by_error)),
     Fault("the dearest setting wins", "recommendation", _in("_cheapest", lambda _: _dearest)),
-    Fault("the engine's default dropped from the race", "recommendation",
-          _in("_timed", lambda real: lambda search: [one for one in real(search) if not one.tried.setting.default])),
+    Fault(
+        "the engine's default dropped from the race",
+        "recommendation",
+        _in("_timed", lambda real: lambda search: [one for one in real(search) if not one.tried.setting.default]),
+    ),
     Fault("the default kept whatever it costs", "recommendation", _in("_slower", lambda _: lambda one, best: False)),
-    Fault("judged over the part that is searched alone", "recommendation",
-          _in("_confirmed", lambda _: lambda search, timed, winners: (search.truth, timed, winners))),
+    Fault(
+        "judged over the part that is searched alone",
+        "recommendation",
+        _in("_confirmed", lambda _: lambda search, timed, winners: (search.truth, timed, winners)),
+    ),
     Fault("mean difference for the largest", "truth", _in("Truth.error", lambda _: _mean, "truth")),
     Fault("what is no number left out of the error", "truth", _in("Truth.error", lambda _: _numbers_alone, "truth")),
     Fault("the reference's first step taken for the truth", "truth", _in("_settled", lambda _: _first_rung, "truth")),
-    Fault("a tolerance three times too wide", "search",
-          _in("Search.held", lambda _: property(lambda self: 3.0 * self.tolerance), "search")),
+    Fault(
+        "a tolerance three times too wide",
+        "search",
+        _in("Search.held", lambda _: property(lambda self: 3.0 * self.tolerance), "search"),
+    ),
 )
 
 CAMPAIGN = Campaign("planted.advice", "the recommendation of a setting", "cost", CHECKS, FAULTS)

@@ -32,10 +32,14 @@ ROUNDING = 1e-12
 
 def bench_scene(parameters: str, duration: float) -> Scene:
     """The vehicle on the study road at 20 m/s."""
-    return build_scene({
-        "title": "bench", "vehicle": {"parameters": parameters}, "run": {"duration": duration, "step": STEP},
-        "effects": {"road": {"source": "study", "speed": 20.0}},
-    })  # fmt: skip
+    return build_scene(
+        {
+            "title": "bench",
+            "vehicle": {"parameters": parameters},
+            "run": {"duration": duration, "step": STEP},
+            "effects": {"road": {"source": "study", "speed": 20.0}},
+        }
+    )
 
 
 @dataclass(eq=False)
@@ -151,14 +155,15 @@ def _momentum(bench: Bench, engine: str, make: Make) -> float:
 def _enforced(situation: str) -> Callable[[Bench, str, Make], float]:
     """How far enforced moment and force are from the eliminated form."""
     return lambda bench, engine, make: checks.enforced_gap(
-        make, getattr(bench, situation),
-        replace(bench.settings(engine), integrator=CONSTRAINED[engine], step=STEP / 2))  # fmt: skip
+        make, getattr(bench, situation), replace(bench.settings(engine), integrator=CONSTRAINED[engine], step=STEP / 2)
+    )
 
 
 def _twin(situation: str) -> Callable[[Bench, str, Make], float]:
     """Largest difference of the path to the reference's."""
     return lambda bench, engine, make: checks.state_gap(
-        checks.run(make, getattr(bench, situation), bench.settings(engine)), bench.path(situation))  # fmt: skip
+        checks.run(make, getattr(bench, situation), bench.settings(engine)), bench.path(situation)
+    )
 
 
 def _rounding(engine: str) -> float:
@@ -170,21 +175,45 @@ CHECKS: dict[str, Check] = {
     "road twin": Check("path on the road", "SI", _rounding, "same tableau, same step: rounding", _twin("road")),
     "linear twin": Check("path under linear forces", "SI", _rounding, "the same", _twin("linear")),
     "held twin": Check("path under held forces", "SI", _rounding, "the same", _twin("held")),
-    "stabilised twin": Check("path with an added moment and a dead band", "SI", _rounding, "the same",
-                             _twin("stabilised")),
-    "order": Check("observed order against the declared one", "", lambda engine: 0.15,
-                   "the stiff wheels still bend it by 0.06 at these steps", _order),
-    "equilibrium": Check("drift off the static equilibrium", "SI", _rounding, "the closed form is exact",
-                         lambda bench, engine, make: checks.equilibrium_gap(make, bench.flat, bench.settings(engine))),
-    "momentum": Check("vertical momentum against impulse", "of weight times time", _rounding,
-                      "Runge-Kutta integrates such forces exactly", _momentum),
-    "moment": Check("enforced moment against the eliminated form", "of its rms",
-                    lambda engine: 1e-4 if engine == "exudyn" else ROUNDING,
-                    "generalised-alpha at 0.5 ms leaves 4e-5; MuJoCo's inverse dynamics is exact",
-                    _enforced("guided")),
-    "rails": Check("enforced force and moment against the eliminated form", "of their rms",
-                   lambda engine: 1e-4 if engine == "exudyn" else ROUNDING, "the same", _enforced("on_rails")),
-}  # fmt: skip
+    "stabilised twin": Check(
+        "path with an added moment and a dead band", "SI", _rounding, "the same", _twin("stabilised")
+    ),
+    "order": Check(
+        "observed order against the declared one",
+        "",
+        lambda engine: 0.15,
+        "the stiff wheels still bend it by 0.06 at these steps",
+        _order,
+    ),
+    "equilibrium": Check(
+        "drift off the static equilibrium",
+        "SI",
+        _rounding,
+        "the closed form is exact",
+        lambda bench, engine, make: checks.equilibrium_gap(make, bench.flat, bench.settings(engine)),
+    ),
+    "momentum": Check(
+        "vertical momentum against impulse",
+        "of weight times time",
+        _rounding,
+        "Runge-Kutta integrates such forces exactly",
+        _momentum,
+    ),
+    "moment": Check(
+        "enforced moment against the eliminated form",
+        "of its rms",
+        lambda engine: 1e-4 if engine == "exudyn" else ROUNDING,
+        "generalised-alpha at 0.5 ms leaves 4e-5; MuJoCo's inverse dynamics is exact",
+        _enforced("guided"),
+    ),
+    "rails": Check(
+        "enforced force and moment against the eliminated form",
+        "of their rms",
+        lambda engine: 1e-4 if engine == "exudyn" else ROUNDING,
+        "the same",
+        _enforced("on_rails"),
+    ),
+}
 """What every fault is put to, in the order of the table."""
 
 

@@ -37,8 +37,20 @@ def _first_step(own: Any, steer: float = 0.0, speed: float = 10.0) -> tuple[np.n
     if steer:
         turning[:] = speed / plane.radius
     level = 0.0 if steer else 1e5
-    advance(state, turning, np.full((2, 4), level), STEP, angles, 10.0, plane, np.zeros(4, dtype=np.int64), own,
-            tables.packed, np.zeros(3), report)  # fmt: skip
+    advance(
+        state,
+        turning,
+        np.full((2, 4), level),
+        STEP,
+        angles,
+        10.0,
+        plane,
+        np.zeros(4, dtype=np.int64),
+        own,
+        tables.packed,
+        np.zeros(3),
+        report,
+    )
     return state, report, plane
 
 
@@ -52,8 +64,9 @@ def _light() -> float:
 @cache
 def _way() -> float:
     """The exact way (m)."""
-    return stops.exact(stops.Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35), stops.met("dry")[0],
-                       _LEVEL, 11.11)  # fmt: skip
+    return stops.exact(
+        stops.Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35), stops.met("dry")[0], _LEVEL, 11.11
+    )
 
 
 _LEVEL = stops.steady(stops.FRONT, stops.met("dry")[0], 0.004)[1]
@@ -166,8 +179,12 @@ def _literal(real: Any) -> Any:
 def _tables(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     from dataclasses import replace
 
-    return attribute("models.braking.tyre_table:stacked", lambda real: lambda tables: (
-        lambda found: replace(found, mu_x=np.ascontiguousarray(change(found.mu_x))))(real(tables)))  # fmt: skip
+    return attribute(
+        "models.braking.tyre_table:stacked",
+        lambda real: (
+            lambda tables: (lambda found: replace(found, mu_x=np.ascontiguousarray(change(found.mu_x))))(real(tables))
+        ),
+    )
 
 
 def _mirrored(real: Any) -> Any:
@@ -196,19 +213,23 @@ FAULTS = (
     Fault("left and right swapped", "vehicle", _truck(place=lambda p: p * np.array([1.0, -1.0]))),
     Fault("track halved", "vehicle", _truck(place=lambda p: p * np.array([1.0, 0.5]))),
     Fault("yaw inertia 1 % too large", "vehicle", _truck(inertias=lambda own: 1.01 * own)),
-    Fault("height of the centre of mass 1 % too large", "vehicle",
-          _truck(by_x=lambda own: 1.01 * own, by_y=lambda own: 1.01 * own)),
+    Fault(
+        "height of the centre of mass 1 % too large",
+        "vehicle",
+        _truck(by_x=lambda own: 1.01 * own, by_y=lambda own: 1.01 * own),
+    ),
     Fault("spin inertia 1 % too large", "wheel", _spin(1.01)),
     Fault("slip angle with the other sign", "tyre", attribute("validation.faults.braking:advance", _mirrored)),
     Fault("conversion with a bit less", "port", attribute("models.braking.port.sensors:Channels", _one_bit_less)),
     Fault("front and rear swapped", "vehicle", _truck(place=lambda p: p * np.array([-1.0, 1.0]))),
     Fault("hysteresis without a width", "brake", _brakes(lambda own: own._replace(release=own.push_out))),
-    Fault("hysteresis reversed", "brake",
-          _brakes(lambda own: own._replace(release=own.push_out, push_out=own.release))),
+    Fault(
+        "hysteresis reversed", "brake", _brakes(lambda own: own._replace(release=own.push_out, push_out=own.release))
+    ),
     Fault("push-out pressure ignored", "brake", _brakes(lambda own: own._replace(push_out=0.0 * own.push_out))),
     Fault("falling pressure by the rising gradient", "brake", _brakes(lambda own: own._replace(falling=own.rising))),
     Fault("friction read one node late", "tyre", _tables(lambda mu: np.roll(mu, 1, axis=3) * (mu > 0.0))),
     Fault("friction 1 % too large", "tyre", _tables(lambda mu: 1.01 * mu)),
-)  # fmt: skip
+)
 
 CAMPAIGN = Campaign("planted.braking", "braking", "anti-lock", CHECKS, FAULTS)

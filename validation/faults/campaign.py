@@ -73,32 +73,71 @@ class Campaign:
         clean, *found = records
         single = [f"{record['fault']} ({seen(record)[0]})" for record in found if len(seen(record)) == 1]
         return [
-            within(f"{self.id}.caught", SYSTEM, f"faults planted in {self.what} that a check catches",
-                   sum(bool(seen(record)) for record in found), "faults", len(found), 0,
-                   f"every one of them makes it wrong; {len(found)} of {len(self.faults)} were planted", "native"),
-            within(f"{self.id}.false_alarms", SYSTEM, f"alarms of the checks of {self.what} without a fault",
-                   len(seen(clean)), "alarms", 0, 0, "a check that cries without a fault is no check", "native"),
-            finding(f"{self.id}.single", SYSTEM, f"faults planted in {self.what} that one check alone catches",
-                    len(single), "faults", "few",
-                    "what would pass if that check were dropped: " + (", ".join(single) or "none"), "native"),
-        ]  # fmt: skip
+            within(
+                f"{self.id}.caught",
+                SYSTEM,
+                f"faults planted in {self.what} that a check catches",
+                sum(bool(seen(record)) for record in found),
+                "faults",
+                len(found),
+                0,
+                f"every one of them makes it wrong; {len(found)} of {len(self.faults)} were planted",
+                "native",
+            ),
+            within(
+                f"{self.id}.false_alarms",
+                SYSTEM,
+                f"alarms of the checks of {self.what} without a fault",
+                len(seen(clean)),
+                "alarms",
+                0,
+                0,
+                "a check that cries without a fault is no check",
+                "native",
+            ),
+            finding(
+                f"{self.id}.single",
+                SYSTEM,
+                f"faults planted in {self.what} that one check alone catches",
+                len(single),
+                "faults",
+                "few",
+                "what would pass if that check were dropped: " + (", ".join(single) or "none"),
+                "native",
+            ),
+        ]
 
     def table(self, records: list[Record]) -> Table:
         """Every fault with what sees it."""
-        lines = tuple((record["fault"], record["place"], self._sizes(record),
-                       ", ".join(name for name in self.checks if name not in seen(record)))
-                      for record in records[1:])  # fmt: skip
+        lines = tuple(
+            (
+                record["fault"],
+                record["place"],
+                self._sizes(record),
+                ", ".join(name for name in self.checks if name not in seen(record)),
+            )
+            for record in records[1:]
+        )
         checks = (f"{name}: {check.title} (allowed {check.tolerance:g})" for name, check in self.checks.items())
-        return Table(f"Faults of {self.what}, one at a time", f"Sizes as each check takes them: {'; '.join(checks)}.",
-                     ("fault", "planted in", "caught by", "not seen by"), lines)  # fmt: skip
+        return Table(
+            f"Faults of {self.what}, one at a time",
+            f"Sizes as each check takes them: {'; '.join(checks)}.",
+            ("fault", "planted in", "caught by", "not seen by"),
+            lines,
+        )
 
     def lines(self, records: list[Record]) -> list[tuple[str, ...]]:
         """Of every fault: system, what it is in, fault, checks that see it, checks that had missed it."""
         return [
-            (self.system, self.what, record["fault"], ", ".join(seen(record)) or "none",
-             ", ".join(name for name in self.checks if name not in seen(record)))
+            (
+                self.system,
+                self.what,
+                record["fault"],
+                ", ".join(seen(record)) or "none",
+                ", ".join(name for name in self.checks if name not in seen(record)),
+            )
             for record in records[1:]
-        ]  # fmt: skip
+        ]
 
     def _sizes(self, record: Record) -> str:
         return ", ".join(f"{name} {record['ratios'][name] * self.checks[name].tolerance:.1g}" for name in seen(record))

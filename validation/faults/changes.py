@@ -220,5 +220,7 @@ def late(periods: float, step: float = 1e-3) -> Change:
 
 def road(**factors: float) -> Change:
     """Numbers of the road signal (speed, wheelbase) times a factor."""
-    return driven(("road",), lambda signal: replace(
-        signal, **{name: factor * getattr(signal, name) for name, factor in factors.items()}))  # fmt: skip
+    return driven(
+        ("road",),
+        lambda signal: replace(signal, **{name: factor * getattr(signal, name) for name, factor in factors.items()}),
+    )

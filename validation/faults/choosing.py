@@ -147,25 +147,49 @@ def _reported(change: Callable[[Chooser, frozenset[str], int], np.ndarray]) -> C
 
 LINEAR, RUNS = "models.ride.choice", "models.choice"
 FAULTS = (
-    Fault("sign of the predicted change", "screen of linear scenes",
-          attribute(f"{LINEAR}.screen:Screen.predicted", _other_sign)),
-    Fault("predictions reported as confirmed", "choice of linear scenes",
-          attribute(f"{LINEAR}.choose:Chooser.confirm", lambda real: lambda own, chosen: own.predicted(chosen))),
-    Fault("confirmed against itself", "choice of linear scenes",
-          attribute(f"{LINEAR}.choose:Chooser.confirm", lambda real: lambda own, chosen: 0.0 * own.full[0])),
-    Fault("tolerance ignored", "choice of linear scenes",
-          attribute(f"{LINEAR}.choose:Chooser.__init__", _any_tolerance)),
-    Fault("parameters that are off taken as they stand", "choice of linear scenes",
-          attribute(f"{LINEAR}.choose:Chooser.off", lambda real: lambda own, chosen: own.between(chosen))),
-    Fault("predictions reported as confirmed", "choice by runs",
-          attribute(f"{RUNS}.choose:Chooser.confirm", _reported(lambda own, chosen, times: own.told(chosen, times)))),
-    Fault("confirmed against itself", "choice by runs",
-          attribute(f"{RUNS}.choose:Chooser.confirm", _reported(lambda own, *_: np.zeros(len(own.whole.quantities))))),
+    Fault(
+        "sign of the predicted change",
+        "screen of linear scenes",
+        attribute(f"{LINEAR}.screen:Screen.predicted", _other_sign),
+    ),
+    Fault(
+        "predictions reported as confirmed",
+        "choice of linear scenes",
+        attribute(f"{LINEAR}.choose:Chooser.confirm", lambda real: lambda own, chosen: own.predicted(chosen)),
+    ),
+    Fault(
+        "confirmed against itself",
+        "choice of linear scenes",
+        attribute(f"{LINEAR}.choose:Chooser.confirm", lambda real: lambda own, chosen: 0.0 * own.full[0]),
+    ),
+    Fault(
+        "tolerance ignored", "choice of linear scenes", attribute(f"{LINEAR}.choose:Chooser.__init__", _any_tolerance)
+    ),
+    Fault(
+        "parameters that are off taken as they stand",
+        "choice of linear scenes",
+        attribute(f"{LINEAR}.choose:Chooser.off", lambda real: lambda own, chosen: own.between(chosen)),
+    ),
+    Fault(
+        "predictions reported as confirmed",
+        "choice by runs",
+        attribute(f"{RUNS}.choose:Chooser.confirm", _reported(lambda own, chosen, times: own.told(chosen, times))),
+    ),
+    Fault(
+        "confirmed against itself",
+        "choice by runs",
+        attribute(f"{RUNS}.choose:Chooser.confirm", _reported(lambda own, *_: np.zeros(len(own.whole.quantities)))),
+    ),
     Fault("tolerance ignored", "choice by runs", attribute(f"{RUNS}.choose:Chooser.__init__", _any_tolerance)),
-    Fault("the least change of all quantities taken for each", "screen by runs",
-          attribute(f"{RUNS}.screen:Screen.shares",
-                    lambda real: lambda own, change: np.full(len(own.quantities), real(own, change).min()))),
-)  # fmt: skip
+    Fault(
+        "the least change of all quantities taken for each",
+        "screen by runs",
+        attribute(
+            f"{RUNS}.screen:Screen.shares",
+            lambda real: lambda own, change: np.full(len(own.quantities), real(own, change).min()),
+        ),
+    ),
+)
 
 
 CAMPAIGN = Campaign("planted.choice", "the choice of effects", "effects", CHECKS, FAULTS)

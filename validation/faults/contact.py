@@ -140,22 +140,46 @@ def _exchanged(one: int, other: int) -> Patch:
 
 
 FAULTS = (
-    Fault("one body's modulus for the pair's", "Hertz",
-          attribute("models.contact.hertz:by_load", lambda real: lambda a, b, load, pair: real(a, b, load / 2, pair))),
-    Fault("diameter for radius", "Hertz",
-          attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *own: real(a / 2, b / 2, *own))),
-    Fault("curvatures exchanged", "Hertz",
-          attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *own: real(b, a, *own))),
-    Fault("axes not squared up: p0 of a cylinder", "Hertz",
-          attribute("models.contact.hertz:by_load",
-                    lambda real: lambda *own: replace(real(*own), p0=2.0 / 3.0 * 4.0 / np.pi * real(*own).p0))),
-    Fault("sides of a cell exchanged", "normal problem",
-          attribute("models.contact.normal_problem:influence",
-                    lambda real: lambda x, y, dx, dy, pair: real(x, y, dy, dx, pair))),
-    Fault("influence of one body alone", "normal problem",
-          attribute("models.contact.normal_problem:influence", lambda real: lambda *own: 0.5 * real(*own))),
-    Fault("whole first step at the leading edge", "FASTSIM",
-          attribute("models.contact.fastsim:MARCHES", lambda real: {**real, "second-order": PLAIN})),
+    Fault(
+        "one body's modulus for the pair's",
+        "Hertz",
+        attribute("models.contact.hertz:by_load", lambda real: lambda a, b, load, pair: real(a, b, load / 2, pair)),
+    ),
+    Fault(
+        "diameter for radius",
+        "Hertz",
+        attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *own: real(a / 2, b / 2, *own)),
+    ),
+    Fault(
+        "curvatures exchanged",
+        "Hertz",
+        attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *own: real(b, a, *own)),
+    ),
+    Fault(
+        "axes not squared up: p0 of a cylinder",
+        "Hertz",
+        attribute(
+            "models.contact.hertz:by_load",
+            lambda real: lambda *own: replace(real(*own), p0=2.0 / 3.0 * 4.0 / np.pi * real(*own).p0),
+        ),
+    ),
+    Fault(
+        "sides of a cell exchanged",
+        "normal problem",
+        attribute(
+            "models.contact.normal_problem:influence", lambda real: lambda x, y, dx, dy, pair: real(x, y, dy, dx, pair)
+        ),
+    ),
+    Fault(
+        "influence of one body alone",
+        "normal problem",
+        attribute("models.contact.normal_problem:influence", lambda real: lambda *own: 0.5 * real(*own)),
+    ),
+    Fault(
+        "whole first step at the leading edge",
+        "FASTSIM",
+        attribute("models.contact.fastsim:MARCHES", lambda real: {**real, "second-order": PLAIN}),
+    ),
     Fault("sign of the spin", "FASTSIM", _times(6, -1.0)),
     Fault("creepages exchanged", "FASTSIM", _exchanged(4, 5)),
     Fault("semi-axes exchanged", "FASTSIM", _exchanged(0, 1)),
@@ -163,13 +187,24 @@ FAULTS = (
     Fault("flexibility of spin 10 % off", "FASTSIM", _times(9, 1.1)),
     Fault("friction 1 % off", "FASTSIM", _times(3, 1.01)),
     Fault("bound of the cylinder", "FASTSIM", _times(2, 0.9)),
-    Fault("gradient taken downstream", "exact theory",
-          attribute("models.contact.rolling_problem:rigid_slip", lambda real: lambda *own: -real(*own))),
-    Fault("gradient of half the length", "exact theory",
-          attribute("models.contact.rolling_problem:UPSTREAM", lambda real: tuple(2.0 * own for own in real))),
-    Fault("sign of the spin", "exact theory",
-          attribute("models.contact.rolling_problem:rigid_slip",
-                    lambda real: lambda x, y, xi_x, xi_y, spin: real(x, y, xi_x, xi_y, -spin))),
-)  # fmt: skip
+    Fault(
+        "gradient taken downstream",
+        "exact theory",
+        attribute("models.contact.rolling_problem:rigid_slip", lambda real: lambda *own: -real(*own)),
+    ),
+    Fault(
+        "gradient of half the length",
+        "exact theory",
+        attribute("models.contact.rolling_problem:UPSTREAM", lambda real: tuple(2.0 * own for own in real)),
+    ),
+    Fault(
+        "sign of the spin",
+        "exact theory",
+        attribute(
+            "models.contact.rolling_problem:rigid_slip",
+            lambda real: lambda x, y, xi_x, xi_y, spin: real(x, y, xi_x, xi_y, -spin),
+        ),
+    ),
+)
 
 CAMPAIGN = Campaign("planted.contact", "contact", "contact", CHECKS, FAULTS)

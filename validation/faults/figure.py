@@ -14,8 +14,13 @@ DECADES = 12
 BLUES = LinearSegmentedColormap.from_list("seen", ("#d6e6f4", "#6aaed6", "#08488e"))
 
 
-def fault_map(faults: Sequence[str], checks: Sequence[str], ratios: dict[str, list[list[float]]],
-              titles: dict[str, str], hidden: Sequence[bool]) -> Figure:  # fmt: skip
+def fault_map(
+    faults: Sequence[str],
+    checks: Sequence[str],
+    ratios: dict[str, list[list[float]]],
+    titles: dict[str, str],
+    hidden: Sequence[bool],
+) -> Figure:
     """Cells of log10(size over tolerance) by vehicle; white where a check does not see the fault.
 
     ratios : by vehicle, rows of faults and columns of checks; hidden : faults that the second vehicle hides.

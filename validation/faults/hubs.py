@@ -96,8 +96,11 @@ FAULTS = (
     Fault("forces read along axes of the road", "input", read(frame="inertial")),
     Fault("y turned round", "input", read(lambda parts: parts * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0]))),
     Fault("moments left out", "input", read(lambda parts: parts * np.repeat([1.0, 0.0], 3))),
-    Fault("one force 1 % off", "input", read(lambda parts: parts * np.r_[1.01, np.ones(parts[0].size - 1)].reshape(
-        parts[0].shape))),
-)  # fmt: skip
+    Fault(
+        "one force 1 % off",
+        "input",
+        read(lambda parts: parts * np.r_[1.01, np.ones(parts[0].size - 1)].reshape(parts[0].shape)),
+    ),
+)
 
 CAMPAIGN = Campaign("planted.hubs", "hub forces", "rolling-vehicle", CHECKS, FAULTS)

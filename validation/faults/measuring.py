@@ -22,14 +22,22 @@ LOAD = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
 PRINTED = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
 PLACES = {"a": (1.2, 0.3, 0.1), "b": (-0.9, 0.5, 0.4), "c": (0.2, -0.8, -0.3), "d": (0.1, 0.2, 0.9)}
 PERIOD, COUNT = 5e-3, 400
-UNITS = {("kN", "force"): 1e3, ("deg/s", "angular rate"): np.pi / 180, ("g", "acceleration"): 9.80665,
-         ("mm", "travel"): 1e-3, ("N m", "moment"): 1.0}  # fmt: skip
+UNITS = {
+    ("kN", "force"): 1e3,
+    ("deg/s", "angular rate"): np.pi / 180,
+    ("g", "acceleration"): 9.80665,
+    ("mm", "travel"): 1e-3,
+    ("N m", "moment"): 1.0,
+}
 
 
 def _streams() -> float:
     """Largest correlation of streams of two paths and two sources, in standard errors."""
-    own = [noise.normal(3, path, noise.BLOCK, 1, source=source)[:, 0]
-           for path in (0, 1) for source in (noise.FORCES, noise.GYRO)]  # fmt: skip
+    own = [
+        noise.normal(3, path, noise.BLOCK, 1, source=source)[:, 0]
+        for path in (0, 1)
+        for source in (noise.FORCES, noise.GYRO)
+    ]
     return max(abs(float(one @ two)) / noise.BLOCK**0.5 for one, two in combinations(own, 2))
 
 
@@ -47,8 +55,10 @@ def _again() -> float:
 
 def _damage() -> float:
     """Damage of the standard's load at slopes 1 and 5 by its printed cycles."""
-    return max(abs(damage.pseudo_damage(LOAD, slope) / sum(n * size**slope for size, n in PRINTED.items()) - 1.0)
-               for slope in (1.0, 5.0))  # fmt: skip
+    return max(
+        abs(damage.pseudo_damage(LOAD, slope) / sum(n * size**slope for size, n in PRINTED.items()) - 1.0)
+        for slope in (1.0, 5.0)
+    )
 
 
 def _pairs() -> float:
@@ -64,8 +74,10 @@ def _crossings() -> float:
 
 def _units() -> float:
     """Factors of units."""
-    return max(abs(units.conversion(unit, quantity, "", "") / wanted - 1.0)  # type: ignore[arg-type]
-               for (unit, quantity), wanted in UNITS.items())  # fmt: skip
+    return max(
+        abs(units.conversion(unit, quantity, "", "") / wanted - 1.0)  # type: ignore[arg-type]
+        for (unit, quantity), wanted in UNITS.items()
+    )
 
 
 def _clock() -> float:
@@ -87,8 +99,9 @@ def _gap() -> float:
 
 def _sections() -> float:
     """An upward force on a body that stands on its tail, and one with its nose 30 degrees up: along the body."""
-    found = section_forces.section_forces(np.array([100.0, 200.0]), np.array([50.0, 0.0]),
-                                          np.array([np.pi / 2, np.pi / 6]))  # fmt: skip
+    found = section_forces.section_forces(
+        np.array([100.0, 200.0]), np.array([50.0, 0.0]), np.array([np.pi / 2, np.pi / 6])
+    )
     have = np.concatenate([found[name] for name in section_forces.CHANNELS])
     return off(have, np.array([100.0, 100.0, 0.0, 200.0 * 3**0.5 / 2, 50.0, 0.0, 0.0, 0.0]))
 
@@ -152,20 +165,28 @@ CHECKS = {
 
 def _normal(change: Callable[..., tuple[int, ...]]) -> Patch:
     """Blocks of noise drawn for another (seed, path, block, channels, source)."""
-    return attribute("models.noise:normal_block",
-                     lambda real: lambda seed, path, block, channels, source=0, **rows: real(
-                         *change(seed, path, block, channels, source), **rows))  # fmt: skip
+    return attribute(
+        "models.noise:normal_block",
+        lambda real: (
+            lambda seed, path, block, channels, source=0, **rows: real(
+                *change(seed, path, block, channels, source), **rows
+            )
+        ),
+    )
 
 
 def _onto(late: float = 0.0, change: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Patch:
-    return attribute("models.measured.resampling:onto",
-                     lambda real: lambda times, values, period, grid: change(
-                         real(times + late * period, values, period, grid)))  # fmt: skip
+    return attribute(
+        "models.measured.resampling:onto",
+        lambda real: lambda times, values, period, grid: change(real(times + late * period, values, period, grid)),
+    )
 
 
 def _factor(name: str, factor: float) -> Patch:
-    return attribute("models.measured.units:conversion",
-                     lambda real: lambda unit, *own: real(unit, *own) * (factor if unit == name else 1.0))  # fmt: skip
+    return attribute(
+        "models.measured.units:conversion",
+        lambda real: lambda unit, *own: real(unit, *own) * (factor if unit == name else 1.0),
+    )
 
 
 def _counted(change: Callable[[Any], Any]) -> Patch:
@@ -175,8 +196,10 @@ def _counted(change: Callable[[Any], Any]) -> Patch:
 
 def _read(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     """Readings (n, 4, 3) of all sensors changed before motion is made of them."""
-    return attribute("models.sensors.rigid_body_motion:spin",
-                     lambda real: lambda array, own: real(array, change(own) if own.shape[1] == len(PLACES) else own))
+    return attribute(
+        "models.sensors.rigid_body_motion:spin",
+        lambda real: lambda array, own: real(array, change(own) if own.shape[1] == len(PLACES) else own),
+    )
 
 
 def _second_scaled(read: np.ndarray) -> np.ndarray:
@@ -190,48 +213,81 @@ def _every_way(real: Any) -> Any:
 FAULTS = (
     Fault("paths share one stream", "noise", _normal(lambda s, p, b, c, o: (s, 0, b, c, o))),
     Fault("gyro and forces share one stream", "noise", _normal(lambda s, p, b, c, o: (s, p, b, c, 0))),
-    Fault("deviation for variance", "noise",
-          attribute("models.noise:normal_block", lambda real: lambda *own, **rows: real(*own, **rows) * 2.0**0.5)),
-    Fault("stream begins anew at every call", "noise",
-          attribute("models.noise:normal",
-                    lambda real: lambda s, p, n, c, first=0, source=0: real(s, p, n, c, source=source))),
+    Fault(
+        "deviation for variance",
+        "noise",
+        attribute("models.noise:normal_block", lambda real: lambda *own, **rows: real(*own, **rows) * 2.0**0.5),
+    ),
+    Fault(
+        "stream begins anew at every call",
+        "noise",
+        attribute(
+            "models.noise:normal", lambda real: lambda s, p, n, c, first=0, source=0: real(s, p, n, c, source=source)
+        ),
+    ),
     Fault("residue counted as whole cycles", "counting", _counted(lambda own: (own[0], own[1], np.ceil(own[2])))),
     Fault("residue lost", "counting", _counted(lambda own: (own[0], own[1], np.floor(own[2])))),
     Fault("amplitude for range", "counting", _counted(lambda own: (own[0] / 2.0, own[1], own[2]))),
-    Fault("pairs beyond a range, not from it on", "counting",
-          attribute("models.measured.counting:range_pairs",
-                    lambda real: lambda spans, counts, ranges: real(spans, counts, ranges * (1.0 + 1e-9)))),
-    Fault("levels crossed either way", "counting",
-          attribute("models.measured.counting:level_crossings", _every_way)),
+    Fault(
+        "pairs beyond a range, not from it on",
+        "counting",
+        attribute(
+            "models.measured.counting:range_pairs",
+            lambda real: lambda spans, counts, ranges: real(spans, counts, ranges * (1.0 + 1e-9)),
+        ),
+    ),
+    Fault("levels crossed either way", "counting", attribute("models.measured.counting:level_crossings", _every_way)),
     Fault("kN taken for N", "units", _factor("kN", 1e-3)),
     Fault("degrees taken for rad", "units", _factor("deg/s", 180.0 / np.pi)),
     Fault("g of 9.81 m/s^2", "units", _factor("g", 9.81 / 9.80665)),
     Fault("sign of one channel", "units", _factor("mm", -1.0)),
     Fault("a sample late", "clock", _onto(1.0)),
     Fault("half a sample late", "clock", _onto(0.5)),
-    Fault("gaps bridged", "clock",
-          attribute("models.measured.resampling:_unknown", lambda real: lambda times, *own: np.zeros(7, dtype=bool)
-                    if len(times) < 100 else real(times, *own))),
-    Fault("section forces in the inertial frame", "sections",
-          attribute("models.section_forces:section_forces",
-                    lambda real: lambda f3, f4, pitch: real(f3, f4, 0.0 * pitch))),
-    Fault("body turned the other way", "sections",
-          attribute("models.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, -pitch))),
-    Fault("front and rear sections exchanged", "sections",
-          attribute("models.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f4, f3, pitch))),
-    Fault("gravity turned round", "motion",
-          attribute("models.sensors.rigid_body_motion:motion",
-                    lambda real: lambda *own: real(*own, gravity=-9.81))),
+    Fault(
+        "gaps bridged",
+        "clock",
+        attribute(
+            "models.measured.resampling:_unknown",
+            lambda real: lambda times, *own: np.zeros(7, dtype=bool) if len(times) < 100 else real(times, *own),
+        ),
+    ),
+    Fault(
+        "section forces in the inertial frame",
+        "sections",
+        attribute("models.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, 0.0 * pitch)),
+    ),
+    Fault(
+        "body turned the other way",
+        "sections",
+        attribute("models.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, -pitch)),
+    ),
+    Fault(
+        "front and rear sections exchanged",
+        "sections",
+        attribute("models.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f4, f3, pitch)),
+    ),
+    Fault(
+        "gravity turned round",
+        "motion",
+        attribute("models.sensors.rigid_body_motion:motion", lambda real: lambda *own: real(*own, gravity=-9.81)),
+    ),
     Fault("readings of two sensors exchanged", "motion", _read(lambda read: read[:, [1, 0, 2, 3]])),
     Fault("one sensor 1 % off", "motion", _read(_second_scaled)),
-    Fault("lever of the sensors left out", "motion",
-          attribute("models.sensors.rigid_body_motion:reference_acceleration",
-                    lambda real: lambda a, r, o, alpha, w, down: real(a, r, o, 0.0 * alpha, 0.0 * w, down))),
-    Fault("two-sided density for one-sided", "road",
-          attribute("models.road.iso8608:SIDES", lambda real: {**real, "one-sided": 2.0})),
-    Fault("class D for C", "road",
-          attribute("models.road.iso8608:CLASSES", lambda real: {**real, "C": real["D"]})),
-)  # fmt: skip
+    Fault(
+        "lever of the sensors left out",
+        "motion",
+        attribute(
+            "models.sensors.rigid_body_motion:reference_acceleration",
+            lambda real: lambda a, r, o, alpha, w, down: real(a, r, o, 0.0 * alpha, 0.0 * w, down),
+        ),
+    ),
+    Fault(
+        "two-sided density for one-sided",
+        "road",
+        attribute("models.road.iso8608:SIDES", lambda real: {**real, "one-sided": 2.0}),
+    ),
+    Fault("class D for C", "road", attribute("models.road.iso8608:CLASSES", lambda real: {**real, "C": real["D"]})),
+)
 
 WHAT = "noise, sensors, units, clocks, counting and roads"
 CAMPAIGN = Campaign("planted.measuring", WHAT, "measured", CHECKS, FAULTS)

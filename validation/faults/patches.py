@@ -147,7 +147,7 @@ def rewritten(**functions: Callable[[], Any]) -> Patch:
         changes = {
             reference: {"_FIXED": {}, "_SINGLE": {}, "njit": lambda **options: lambda function: function},
             equations: {name: function() for name, function in functions.items()},
-        }  # fmt: skip
+        }
         return lambda: _patched(changes)
 
     return prepare

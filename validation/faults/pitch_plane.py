@@ -12,13 +12,19 @@ from validation.rows import Row, Table, finding, within
 TWIN, SYMMETRIC = "asymmetric_twin", "itwm_drift"
 DURATION = 0.1
 """s of every run: what is planted shows at once."""
-HIDDEN = ("a and b swapped", "front and rear suspension swapped", "front and rear tyre swapped",
-          "front and rear wheel mass swapped", "chassis row of eq. (39) with the other sign")  # fmt: skip
+HIDDEN = (
+    "a and b swapped",
+    "front and rear suspension swapped",
+    "front and rear tyre swapped",
+    "front and rear wheel mass swapped",
+    "chassis row of eq. (39) with the other sign",
+)
 """What a vehicle with equal halves cannot show: exchanges of the halves, and terms in k3 b - k4 a."""
 
 
-def measure(faults: Sequence[Fault] = FAULTS, clean: Sequence[Fault] = CLEAN,
-            vehicles: Sequence[str] = (TWIN, SYMMETRIC)) -> dict[str, Any]:  # fmt: skip
+def measure(
+    faults: Sequence[Fault] = FAULTS, clean: Sequence[Fault] = CLEAN, vehicles: Sequence[str] = (TWIN, SYMMETRIC)
+) -> dict[str, Any]:
     """Records of engines without a fault and with each of some, on some vehicles, under every check."""
     benches = [Bench(name, DURATION) for name in vehicles]
     return {name: [_record(fault, benches) for fault in own] for name, own in (("clean", clean), ("faults", faults))}
@@ -69,19 +75,49 @@ def caught(record: dict[str, Any], vehicle: str = TWIN) -> bool:
 def rows(data: dict[str, Any]) -> list[Row]:
     """Caught, false alarms, hidden by symmetry where both vehicles ran, and what one check alone catches."""
     clean, found = data["clean"], data["faults"]
-    alarms = sum(ratio is None or ratio > 1 for record in clean for vehicle in record["ratios"].values()
-                 for ratios in vehicle.values() for ratio in ratios.values())  # fmt: skip
+    alarms = sum(
+        ratio is None or ratio > 1
+        for record in clean
+        for vehicle in record["ratios"].values()
+        for ratios in vehicle.values()
+        for ratio in ratios.values()
+    )
     single = [record for record in found if sum(seen(record, name) for name in CHECKS) == 1]
     return [
-        within("planted.caught", SYSTEM, "planted faults that a check catches, asymmetric vehicle",
-               sum(map(caught, found)), "faults", len(found), 0,
-               f"every one of them is a wrong model; {len(found)} of {len(FAULTS)} were planted", "native"),
-        within("planted.false_alarms", SYSTEM, "alarms without a fault, all checks, vehicles and implementations",
-               alarms, "alarms", 0, 0, "a check that cries without a fault is no check", "native"),
+        within(
+            "planted.caught",
+            SYSTEM,
+            "planted faults that a check catches, asymmetric vehicle",
+            sum(map(caught, found)),
+            "faults",
+            len(found),
+            0,
+            f"every one of them is a wrong model; {len(found)} of {len(FAULTS)} were planted",
+            "native",
+        ),
+        within(
+            "planted.false_alarms",
+            SYSTEM,
+            "alarms without a fault, all checks, vehicles and implementations",
+            alarms,
+            "alarms",
+            0,
+            0,
+            "a check that cries without a fault is no check",
+            "native",
+        ),
         *([_hidden(found)] if _both(data) else []),
-        finding("planted.single", SYSTEM, "planted faults that one check alone catches", len(single), "faults",
-                "few", "what would pass if that check were dropped: " + _listed(single), "native"),
-    ]  # fmt: skip
+        finding(
+            "planted.single",
+            SYSTEM,
+            "planted faults that one check alone catches",
+            len(single),
+            "faults",
+            "few",
+            "what would pass if that check were dropped: " + _listed(single),
+            "native",
+        ),
+    ]
 
 
 def _both(data: dict[str, Any]) -> bool:
@@ -92,15 +128,31 @@ def _both(data: dict[str, Any]) -> bool:
 def _hidden(found: list[dict[str, Any]]) -> Row:
     missed = [record for record in found if not caught(record, SYMMETRIC)]
     why = "exchanges of front and rear, and terms in k3 b - k4 a: equal halves cannot show them"
-    return within("planted.hidden", SYSTEM, "planted faults that the symmetric vehicle of the paper hides", len(missed),
-                  "faults", len(HIDDEN), 0, why, "native")  # fmt: skip
+    return within(
+        "planted.hidden",
+        SYSTEM,
+        "planted faults that the symmetric vehicle of the paper hides",
+        len(missed),
+        "faults",
+        len(HIDDEN),
+        0,
+        why,
+        "native",
+    )
 
 
 def lines(data: dict[str, Any]) -> list[tuple[str, ...]]:
     """Of every fault: system, what it is in, fault, checks that see it, checks that had missed it."""
-    return [("pitch-plane", f"{record['place']} of the vehicle", record["fault"],
-             ", ".join(name for name in CHECKS if seen(record, name)) or "none",
-             ", ".join(name for name in CHECKS if not seen(record, name))) for record in data["faults"]]  # fmt: skip
+    return [
+        (
+            "pitch-plane",
+            f"{record['place']} of the vehicle",
+            record["fault"],
+            ", ".join(name for name in CHECKS if seen(record, name)) or "none",
+            ", ".join(name for name in CHECKS if not seen(record, name)),
+        )
+        for record in data["faults"]
+    ]
 
 
 def _listed(records: list[dict[str, Any]]) -> str:
@@ -117,12 +169,25 @@ def tables(data: dict[str, Any]) -> list[Table]:
 def _check_table(data: dict[str, Any]) -> Table:
     lines = []
     for name, check in CHECKS.items():
-        worst = max(ratio or 0.0 for record in data["clean"] for vehicle in record["ratios"]
-                    for ratio in _of(record, name, vehicle))  # fmt: skip
+        worst = max(
+            ratio or 0.0
+            for record in data["clean"]
+            for vehicle in record["ratios"]
+            for ratio in _of(record, name, vehicle)
+        )
         catches = sum(seen(record, name) for record in data["faults"])
         limits = sorted({check.tolerance(engine) for engine in ("exudyn", "mujoco")})
-        lines.append((name, check.title, " / ".join(f"{limit:g}" for limit in limits), check.unit, check.why,
-                      f"{worst:.2g}", f"{catches} of {len(data['faults'])}"))
+        lines.append(
+            (
+                name,
+                check.title,
+                " / ".join(f"{limit:g}" for limit in limits),
+                check.unit,
+                check.why,
+                f"{worst:.2g}",
+                f"{catches} of {len(data['faults'])}",
+            )
+        )
     headings = ("check", "compares", "tolerance", "unit", "because", "worst without a fault", "faults seen")
     note = "Worst without a fault is size over tolerance: below 1 is quiet."
     return Table("The checks", note, headings, tuple(lines))
@@ -130,22 +195,33 @@ def _check_table(data: dict[str, Any]) -> Table:
 
 def _fault_table(data: dict[str, Any]) -> Table:
     lines = tuple(
-        (record["fault"], f"{record['place']} ({', '.join(record['engines'])})",
-         ", ".join(f"{name} {_size(record, name)}" for name in CHECKS if seen(record, name)),
-         ", ".join(name for name in CHECKS if not seen(record, name)) or "-",
-         "not run" if not _both(data) else "no" if caught(record, SYMMETRIC) else "yes")
+        (
+            record["fault"],
+            f"{record['place']} ({', '.join(record['engines'])})",
+            ", ".join(f"{name} {_size(record, name)}" for name in CHECKS if seen(record, name)),
+            ", ".join(name for name in CHECKS if not seen(record, name)) or "-",
+            "not run" if not _both(data) else "no" if caught(record, SYMMETRIC) else "yes",
+        )
         for record in data["faults"]
-    )  # fmt: skip
-    note = ("Sizes on the asymmetric vehicle, in the unit of the check, the smaller one where a fault was planted in "
-            "two engines. Each check in the fourth column, had it been the only one, would have let the fault pass.")
-    return Table("Every fault, one at a time", note,
-                 ("fault", "planted in", "caught by", "not seen by", "symmetric vehicle hides it"), lines)
+    )
+    note = (
+        "Sizes on the asymmetric vehicle, in the unit of the check, the smaller one where a fault was planted in "
+        "two engines. Each check in the fourth column, had it been the only one, would have let the fault pass."
+    )
+    return Table(
+        "Every fault, one at a time",
+        note,
+        ("fault", "planted in", "caught by", "not seen by", "symmetric vehicle hides it"),
+        lines,
+    )
 
 
 def _size(record: dict[str, Any], name: str) -> str:
     """The smaller size among the engines, from its ratio to the tolerance."""
-    sizes = [math.inf if ratios[name] is None else ratios[name] * CHECKS[name].tolerance(engine)
-             for engine, ratios in record["ratios"][TWIN].items()]  # fmt: skip
+    sizes = [
+        math.inf if ratios[name] is None else ratios[name] * CHECKS[name].tolerance(engine)
+        for engine, ratios in record["ratios"][TWIN].items()
+    ]
     least = min(sizes)
     return "refused" if least == math.inf else f"{least:.0e}" if least < 0.01 else f"{least:.2g}"
 
@@ -161,6 +237,8 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     depth = {vehicle: [[least(record, name, vehicle) for name in CHECKS] for record in records] for vehicle in vehicles}
     marks = [not caught(record, SYMMETRIC) for record in records]
     figure = fault_map([record["fault"] for record in records], tuple(CHECKS), depth, vehicles, marks)
-    caption = ("Decades between what a check finds and its tolerance; white: not seen. Left the asymmetric twin, right "
-               f"the paper's vehicle, whose equal halves hide {sum(marks)} faults from every check (marked).")
+    caption = (
+        "Decades between what a check finds and its tolerance; white: not seen. Left the asymmetric twin, right "
+        f"the paper's vehicle, whose equal halves hide {sum(marks)} faults from every check (marked)."
+    )
     return [(caption, figure)]

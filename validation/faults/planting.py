@@ -112,36 +112,64 @@ INPUT = (
     Fault("wheel forces with the other sign", BOTH, change.channels(FORCES, change.times({0: -1.0, 1: -1.0}))),
     Fault("front wheel force at both wheels", BOTH, change.channels(FORCES, change.front_twice)),
     Fault("wheel forces along the chassis, not vertical", BOTH, change.body_fixed),
-    Fault("prescribed pitch in degrees", BOTH, change.channels(
-        ("pitch",), change.times(dict.fromkeys((2, 3, 4), 180 / math.pi)))),
+    Fault(
+        "prescribed pitch in degrees",
+        BOTH,
+        change.channels(("pitch",), change.times(dict.fromkeys((2, 3, 4), 180 / math.pi))),
+    ),
     Fault("rate of the prescribed pitch missing", MUJOCO, change.channels(("pitch",), change.times({3: 0.0}))),
     Fault("rate of the prescribed heave missing", MUJOCO, change.channels(("heave-pitch",), change.times({4: 0.0}))),
-    Fault("prescribed heave upward", BOTH, change.channels(
-        ("heave-pitch",), change.times(dict.fromkeys((2, 4, 6), -1.0)))),
+    Fault(
+        "prescribed heave upward", BOTH, change.channels(("heave-pitch",), change.times(dict.fromkeys((2, 4, 6), -1.0)))
+    ),
     Fault("added moment with the other sign", BOTH, change.moment(0.0, change.times({0: -1.0}))),
     Fault("added moment half a sample late", BOTH, change.moment(0.5)),
     Fault("Euler where Runge-Kutta was asked for", BOTH, settings=_euler),
-)  # fmt: skip
+)
 """In the input or the settings that an engine is run with."""
 
 ADAPTER = (
-    Fault("held sample of the step's end", EXUDYN,
-          inside=attribute("models.engines.exudyn:Clock.advance", patches.index_of_the_end)),
-    Fault("time cut off instead of rounded", EXUDYN,
-          inside=attribute("models.engines.exudyn:Clock.reader", patches.truncated_time)),
-    Fault("constraint starts without its acceleration", EXUDYN,
-          inside=attribute("models.engines.exudyn:ExudynModel._consistent_start", patches.reset_accelerations)),
-    Fault("enforced moment with the other sign", EXUDYN,
-          inside=attribute("models.engines.exudyn:ExudynModel._enforced", patches.negative)),
-    Fault("gravity missing on one wheel", MUJOCO,
-          inside=attribute("models.engines.mujoco:_spec", patches.weightless_wheel)),
-    Fault("strut measured along the rotating body", MUJOCO,
-          inside=attribute("models.engines.mujoco:_suspension", patches.turning_reference)),
-    Fault("chassis row of eq. (39) with the other sign", MUJOCO,
-          inside=attribute("models.engines.mujoco:_guidance", patches.misprinted_row)),
-    Fault("callback never installed", MUJOCO,
-          inside=attribute("models.engines.mujoco_callback:installed", patches.not_installed)),
-)  # fmt: skip
+    Fault(
+        "held sample of the step's end",
+        EXUDYN,
+        inside=attribute("models.engines.exudyn:Clock.advance", patches.index_of_the_end),
+    ),
+    Fault(
+        "time cut off instead of rounded",
+        EXUDYN,
+        inside=attribute("models.engines.exudyn:Clock.reader", patches.truncated_time),
+    ),
+    Fault(
+        "constraint starts without its acceleration",
+        EXUDYN,
+        inside=attribute("models.engines.exudyn:ExudynModel._consistent_start", patches.reset_accelerations),
+    ),
+    Fault(
+        "enforced moment with the other sign",
+        EXUDYN,
+        inside=attribute("models.engines.exudyn:ExudynModel._enforced", patches.negative),
+    ),
+    Fault(
+        "gravity missing on one wheel",
+        MUJOCO,
+        inside=attribute("models.engines.mujoco:_spec", patches.weightless_wheel),
+    ),
+    Fault(
+        "strut measured along the rotating body",
+        MUJOCO,
+        inside=attribute("models.engines.mujoco:_suspension", patches.turning_reference),
+    ),
+    Fault(
+        "chassis row of eq. (39) with the other sign",
+        MUJOCO,
+        inside=attribute("models.engines.mujoco:_guidance", patches.misprinted_row),
+    ),
+    Fault(
+        "callback never installed",
+        MUJOCO,
+        inside=attribute("models.engines.mujoco_callback:installed", patches.not_installed),
+    ),
+)
 """In the code of an engine's adapter."""
 
 EQUATIONS = (

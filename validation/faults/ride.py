@@ -230,30 +230,50 @@ def _lossy(real: Any) -> Any:
 
 
 FAULTS = (
-    Fault("rear axle ahead of the front one", "covariance",
-          attribute("models.ride.covariance:hits", _reversed)),
-    Fault("cross terms of the axles missing", "covariance",
-          attribute("models.ride.covariance:_responses",
-                    lambda real: lambda A, B, delays, independent: [np.zeros_like(b) for b in B])),
-    Fault("noise without the root of the speed", "road",
-          _excited(lambda own, v: replace(own, B=tuple(b / v**0.5 for b in own.B)))),
-    Fault("noise with the speed, not its root", "road",
-          _excited(lambda own, v: replace(own, B=tuple(b * v**0.5 for b in own.B)))),
-    Fault("delay by the speed in km/h", "road",
-          _excited(lambda own, v: replace(own, delays=tuple(tau / 3.6 for tau in own.delays)))),
+    Fault("rear axle ahead of the front one", "covariance", attribute("models.ride.covariance:hits", _reversed)),
+    Fault(
+        "cross terms of the axles missing",
+        "covariance",
+        attribute(
+            "models.ride.covariance:_responses",
+            lambda real: lambda A, B, delays, independent: [np.zeros_like(b) for b in B],
+        ),
+    ),
+    Fault(
+        "noise without the root of the speed",
+        "road",
+        _excited(lambda own, v: replace(own, B=tuple(b / v**0.5 for b in own.B))),
+    ),
+    Fault(
+        "noise with the speed, not its root",
+        "road",
+        _excited(lambda own, v: replace(own, B=tuple(b * v**0.5 for b in own.B))),
+    ),
+    Fault(
+        "delay by the speed in km/h",
+        "road",
+        _excited(lambda own, v: replace(own, delays=tuple(tau / 3.6 for tau in own.delays))),
+    ),
     Fault("rear wheels on the front track", "road", attribute("models.road.two_track:_row", _on_front_track)),
-    Fault("one-sided level taken for two-sided", "road",
-          attribute("models.road.two_track:road_of_level",
-                    lambda real: lambda y, level=two_track.LEVEL, **own: real(y, 2.0 * level, **own))),
+    Fault(
+        "one-sided level taken for two-sided",
+        "road",
+        attribute(
+            "models.road.two_track:road_of_level",
+            lambda real: lambda y, level=two_track.LEVEL, **own: real(y, 2.0 * level, **own),
+        ),
+    ),
     Fault("a and b swapped", "vehicle", _vehicle(_mirrored)),
     Fault("sign of the products of inertia", "vehicle", _vehicle(_other_products)),
     Fault("sign of the anti-roll bar", "vehicle", attribute("models.vehicles.spatial_linear:_twist", _other_twist)),
-    Fault("tyre stiffness per axle for per wheel", "vehicle",
-          _vehicle(lambda own: replace(own, tyres=tuple(replace(t, stiffness=2 * t.stiffness) for t in own.tyres)))),
+    Fault(
+        "tyre stiffness per axle for per wheel",
+        "vehicle",
+        _vehicle(lambda own: replace(own, tyres=tuple(replace(t, stiffness=2 * t.stiffness) for t in own.tyres))),
+    ),
     Fault("Wk: upward step turned round", "weighting", attribute("validation.faults.ride:WEIGHTINGS", _wrong_wk)),
-    Fault("Wk: a section hears too little", "weighting",
-          attribute("models.ride.weighting:Weighting.matrices", _lossy)),
-)  # fmt: skip
+    Fault("Wk: a section hears too little", "weighting", attribute("models.ride.weighting:Weighting.matrices", _lossy)),
+)
 
 
 CAMPAIGN = Campaign("planted.ride", "ride", "ride", CHECKS, FAULTS)

@@ -20,8 +20,11 @@ def turning(steer: float = 0.05) -> tuple[Handling, np.ndarray, np.ndarray]:
     own = Handling(load_vehicle("r19_free"), controls=Controls(steer=((0.0, steer),)))
     q, v = own.straight(25.0)
     places, part = own.vehicle.coordinates(), np.sign(steer)
-    for name, freedom, move, rate in (("carrier", "y", 0.1, 0.4), ("carrier", "rz", 0.02, 0.3),
-                                      ("sway", "rx", 0.01, 0.05)):  # fmt: skip
+    for name, freedom, move, rate in (
+        ("carrier", "y", 0.1, 0.4),
+        ("carrier", "rz", 0.02, 0.3),
+        ("sway", "rx", 0.01, 0.05),
+    ):
         k = places.index((name, freedom))
         q[k], v[k] = part * move, part * rate
     q[places.index(("sway", "z"))], v[places.index(("sway", "z"))] = -5e-3, 0.1
@@ -61,8 +64,10 @@ def _balance() -> float:
     """Change of the energy along the motion, less the powers."""
     own, q, v = turning()
     a, (report, ledger) = build("mujoco", own).acceleration(0.0, q, v), _read(own, q, v)
-    ends = [_bodies(own, here, rate) + _read(own, here, rate)[1][at.POTENTIAL]
-            for here, rate in ((q + part * v, v + part * a) for part in (1e-5, -1e-5))]  # fmt: skip
+    ends = [
+        _bodies(own, here, rate) + _read(own, here, rate)[1][at.POTENTIAL]
+        for here, rate in ((q + part * v, v + part * a) for part in (1e-5, -1e-5))
+    ]
     power = ledger[at.DISSIPATED] + ledger[at.TORQUE_POWER] + ledger[at.STEER_POWER] + report[:, at.POWER].sum()
     return float(abs((ends[0] - ends[1]) / 2e-5 - power) / np.abs(report[:, at.POWER]).max())
 

@@ -22,10 +22,12 @@ from validation.faults.campaign import Campaign, Check, Fault, off
 from validation.faults.patches import Context, Patch, attribute, with_globals
 
 Law = Literal["linear", "fastsim"]
-STATES = np.array([
-    [3e-3, 4e-5, -1e-4, 4e-3, 0.0, 0.02, 0.01, 0.2, 0.3, 0.5],
-    [-4e-3, 2e-5, 2e-4, 1e-2, 0.0, -0.05, 0.0, 0.1, -0.4, 2.0],
-])  # fmt: skip
+STATES = np.array(
+    [
+        [3e-3, 4e-5, -1e-4, 4e-3, 0.0, 0.02, 0.01, 0.2, 0.3, 0.5],
+        [-4e-3, 2e-5, 2e-4, 1e-2, 0.0, -0.05, 0.0, 0.1, -0.4, 2.0],
+    ]
+)
 """Moved from rest (m, rad, m/s, rad/s): the second one slides all over."""
 MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
 SPEED, SLIDING = 60.0, 1

@@ -15,30 +15,43 @@ from validation.hard_cases import setups
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
 
 PERIOD, NOISE = 1e-3, 0.1
-FLOOR = {"fl": (1.1, -0.6, 0.2), "fr": (1.1, 0.6, 0.2), "rl": (-0.9, -0.6, 0.2), "rr": (-0.9, 0.6, 0.2),
-         "mid": (0.1, 0.0, 0.2)}  # fmt: skip
+FLOOR = {
+    "fl": (1.1, -0.6, 0.2),
+    "fr": (1.1, 0.6, 0.2),
+    "rl": (-0.9, -0.6, 0.2),
+    "rr": (-0.9, 0.6, 0.2),
+    "mid": (0.1, 0.0, 0.2),
+}
 RAISED = FLOOR | {"mid": (0.1, 0.0, 0.17)}
 ROOFED = FLOOR | {"mid": (0.1, 0.0, -0.8)}
 BRACKET = {"battery": {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}}
 REFUSED: dict[str, Any] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 
 
-def _read(engine: str, places: dict[str, Any], extra: dict[str, Any] | None = None, noise: float = 0.0,
-          initial: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+def _read(
+    engine: str,
+    places: dict[str, Any],
+    extra: dict[str, Any] | None = None,
+    noise: float = 0.0,
+    initial: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Readings (n, sensors, 3), states (n, 8) and pitch accelerations (n,) of 0.3 s.
 
     After a kick on a flat road, or in free fall from an initial state.
     """
     sensors = {name: dict(zip("xyz", place, strict=True)) for name, place in places.items()} | (extra or {})
     start = setups.vehicle().initial + np.array([0, 0, 0, 0, 0, 0, 0.5, 1.5])
-    base = setups.vehicle(initial=start if initial is None else initial, effects={
-        "accelerometers": {"sampling_rate": 1 / PERIOD, "sensors": sensors, "deviation": noise}})  # fmt: skip
+    base = setups.vehicle(
+        initial=start if initial is None else initial,
+        effects={"accelerometers": {"sampling_rate": 1 / PERIOD, "sensors": sensors, "deviation": noise}},
+    )
     assembly = base if initial is None else setups.driven(base, Sampled(np.zeros((400, 2)), PERIOD, held=True))
     model = build(engine, assembly, setups.settings(engine, PERIOD, 0.3))
     run = model.run()
     channels = outputs(assembly, run, model)
-    felt = np.stack([np.column_stack([channels[f"a{axis}{i + 1}"][2] for axis in "xyz"])
-                     for i in range(len(sensors))], axis=1)  # fmt: skip
+    felt = np.stack(
+        [np.column_stack([channels[f"a{axis}{i + 1}"][2] for axis in "xyz"]) for i in range(len(sensors))], axis=1
+    )
     true = np.array([model.acceleration(t, y)[3] for t, y in zip(run.times, run.states, strict=True)])
     return felt, run.states, true
 

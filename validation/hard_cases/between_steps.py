@@ -60,8 +60,10 @@ def handled(**manoeuvre: Any) -> Callable[[str, Path], float]:
         if implementation == "reference":
             raise InputError("", "engine", implementation, "handling is marched by engines")
         own, of = scene.manoeuvres["hard"], scene.handling("hard")
-        ends = [driven(implementation, of, own.speed, own.duration, step).run.positions[-1]
-                for step in (scene.run.step, scene.run.step / 4.0)]
+        ends = [
+            driven(implementation, of, own.speed, own.duration, step).run.positions[-1]
+            for step in (scene.run.step, scene.run.step / 4.0)
+        ]
         return float(np.abs(ends[1] - ends[0]).max())
 
     return error
@@ -117,46 +119,121 @@ NOBODY = np.array([1.0, 0.0, 0.0, 0.0])
 REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
 CASES = (
-    *(Case(name, hard, "fails, and says when", "", 0.0, "exact", wheelset(**own), RAISED) for name, hard, own in (
-        ("suspension of 1e9 N/m on rails", "ten steps for a swing, which dies of them", {"stiffness_y": 1e9}),
-        ("suspension of 1e9 N/m, yawed", "ten steps for a swing, which dies of them",
-         {"yaw": 0.01, "stiffness_x": 1e9}),
-        ("flange of 1e12 N/m", "hit and left within a step", {"speed": 90.0, "flange_stiffness": 1e12}),
-    )),
-    Case("flange of 1e8 N/m", "hit within few steps", "a quarter of the step", "m, rad", 1e-6, "error of the step",
-         wheelset(speed=90.0, flange_stiffness=1e8)),
-    Case("brake of 100 kN m", "its friction turns round within every step", "fails, and says when", "", 0.0, "exact",
-         handled(brake=[[0.0, 0.0], [0.05, 1e5]]), HANDLED | dict.fromkeys(("exudyn", "mujoco"), "raised")),
-    Case("driver who steers within 1 ms", "to and fro from step to step", "fails, and says when", "", 0.0, "exact",
-         handled(steer=[[0.001 * i, 0.02 * (i % 2)] for i in range(1, 200)]),
-         HANDLED | dict.fromkeys(("exudyn", "mujoco"), "raised")),
-    Case("road at 300 m/s", "a wave in two steps", "a quarter of the step", "m, rad", 1e-4, "error of the step",
-         handled(speed=300.0, rough=True), HANDLED),
-    Case("levels in any order", "crossings are counted between sorted ones", "one by one", "", 0.0, "exact", crossings,
-         once=True),
-    Case("seeds beyond 2^63", "whole numbers become doubles", "a stream for each", "", 0.0, "exact", far_seeds,
-         once=True),
-    Case("low-pass of one period", "most of what it reads lies beyond the ends", "keeps a straight line", "of its rise",
-         0.02, "0.7 % found", line_through_a_low_pass, naive=slow_naive, once=True),
-    *(Case(name, hard, "refused", "", 0.0, "exact", asked(answer), REFUSED, once=True) for name, hard, answer in (
-        ("driver who steers within 0.5 ms", "steps of 1 ms see no change, or a constant one",
-         lambda: car(steer=[[0.0005 * i, 0.02 * (i % 2)] for i in range(1, 200)])),
-        ("rough road at 1000 m/s", "a step passes two waves", lambda: car(speed=1000.0, rough=True)),
-        ("hub forces of a road at 500 m/s", "a step passes two waves", short_waves),
-        ("braking in steps of 0.1 s", "stops 3 % short", lambda: braking_scene(run={"sample": 0.1, "substeps": 1})),
-        ("controller with a share that is no number", "would spread to every pressure",
-         lambda: CONTROLLERS["slip_pi"](4, mix=float("nan"), period=5.5e-3)),
-        ("low-pass slower than its record", "what is beyond the ends is all that is left",
-         lambda: smoothed(np.linspace(0.0, 1.0, 2001)[:, None], 1e-3, 0.01, "", "bandwidth")),
-        ("body that turns 4 rad from sample to sample", "nobody can tell the way it went",
-         lambda: integrate(SPUN, 1e-2, NOBODY)),
-        ("body that turns from an orientation of length 2", "its matrix would be four times a rotation",
-         lambda: integrate(0.1 * SPUN, 1e-2, 2.0 * NOBODY)),
-        ("seed of -1", "the stream of 2^64 - 1 would answer", lambda: normal(-1, 0, 1, 1)),
-        ("seed of 1.7", "the stream of 1 would answer", lambda: normal(1.7, 0, 1, 1)),  # type: ignore[arg-type]
-        ("level that is no number", "all counts behind it would shift",
-         lambda: level_crossings(LINE[:, 0], np.array([0.5, np.nan, 2.5]))),
-        ("samples with a period of -0.1 s", "time would run backwards", lambda: sampled(LINE, -0.1, "linear")),
-        ("three samples, smooth", "a cubic needs four", lambda: sampled(LINE[:3], 0.1, "smooth")),
-    )),
-)  # fmt: skip
+    *(
+        Case(name, hard, "fails, and says when", "", 0.0, "exact", wheelset(**own), RAISED)
+        for name, hard, own in (
+            ("suspension of 1e9 N/m on rails", "ten steps for a swing, which dies of them", {"stiffness_y": 1e9}),
+            (
+                "suspension of 1e9 N/m, yawed",
+                "ten steps for a swing, which dies of them",
+                {"yaw": 0.01, "stiffness_x": 1e9},
+            ),
+            ("flange of 1e12 N/m", "hit and left within a step", {"speed": 90.0, "flange_stiffness": 1e12}),
+        )
+    ),
+    Case(
+        "flange of 1e8 N/m",
+        "hit within few steps",
+        "a quarter of the step",
+        "m, rad",
+        1e-6,
+        "error of the step",
+        wheelset(speed=90.0, flange_stiffness=1e8),
+    ),
+    Case(
+        "brake of 100 kN m",
+        "its friction turns round within every step",
+        "fails, and says when",
+        "",
+        0.0,
+        "exact",
+        handled(brake=[[0.0, 0.0], [0.05, 1e5]]),
+        HANDLED | dict.fromkeys(("exudyn", "mujoco"), "raised"),
+    ),
+    Case(
+        "driver who steers within 1 ms",
+        "to and fro from step to step",
+        "fails, and says when",
+        "",
+        0.0,
+        "exact",
+        handled(steer=[[0.001 * i, 0.02 * (i % 2)] for i in range(1, 200)]),
+        HANDLED | dict.fromkeys(("exudyn", "mujoco"), "raised"),
+    ),
+    Case(
+        "road at 300 m/s",
+        "a wave in two steps",
+        "a quarter of the step",
+        "m, rad",
+        1e-4,
+        "error of the step",
+        handled(speed=300.0, rough=True),
+        HANDLED,
+    ),
+    Case(
+        "levels in any order",
+        "crossings are counted between sorted ones",
+        "one by one",
+        "",
+        0.0,
+        "exact",
+        crossings,
+        once=True,
+    ),
+    Case(
+        "seeds beyond 2^63", "whole numbers become doubles", "a stream for each", "", 0.0, "exact", far_seeds, once=True
+    ),
+    Case(
+        "low-pass of one period",
+        "most of what it reads lies beyond the ends",
+        "keeps a straight line",
+        "of its rise",
+        0.02,
+        "0.7 % found",
+        line_through_a_low_pass,
+        naive=slow_naive,
+        once=True,
+    ),
+    *(
+        Case(name, hard, "refused", "", 0.0, "exact", asked(answer), REFUSED, once=True)
+        for name, hard, answer in (
+            (
+                "driver who steers within 0.5 ms",
+                "steps of 1 ms see no change, or a constant one",
+                lambda: car(steer=[[0.0005 * i, 0.02 * (i % 2)] for i in range(1, 200)]),
+            ),
+            ("rough road at 1000 m/s", "a step passes two waves", lambda: car(speed=1000.0, rough=True)),
+            ("hub forces of a road at 500 m/s", "a step passes two waves", short_waves),
+            ("braking in steps of 0.1 s", "stops 3 % short", lambda: braking_scene(run={"sample": 0.1, "substeps": 1})),
+            (
+                "controller with a share that is no number",
+                "would spread to every pressure",
+                lambda: CONTROLLERS["slip_pi"](4, mix=float("nan"), period=5.5e-3),
+            ),
+            (
+                "low-pass slower than its record",
+                "what is beyond the ends is all that is left",
+                lambda: smoothed(np.linspace(0.0, 1.0, 2001)[:, None], 1e-3, 0.01, "", "bandwidth"),
+            ),
+            (
+                "body that turns 4 rad from sample to sample",
+                "nobody can tell the way it went",
+                lambda: integrate(SPUN, 1e-2, NOBODY),
+            ),
+            (
+                "body that turns from an orientation of length 2",
+                "its matrix would be four times a rotation",
+                lambda: integrate(0.1 * SPUN, 1e-2, 2.0 * NOBODY),
+            ),
+            ("seed of -1", "the stream of 2^64 - 1 would answer", lambda: normal(-1, 0, 1, 1)),
+            ("seed of 1.7", "the stream of 1 would answer", lambda: normal(1.7, 0, 1, 1)),  # type: ignore[arg-type]
+            (
+                "level that is no number",
+                "all counts behind it would shift",
+                lambda: level_crossings(LINE[:, 0], np.array([0.5, np.nan, 2.5])),
+            ),
+            ("samples with a period of -0.1 s", "time would run backwards", lambda: sampled(LINE, -0.1, "linear")),
+            ("three samples, smooth", "a cubic needs four", lambda: sampled(LINE[:3], 0.1, "smooth")),
+        )
+    ),
+)

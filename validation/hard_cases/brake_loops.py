@@ -42,10 +42,24 @@ def loops(implementation: str, folder: Path) -> float:
 
 
 CASES = (
-    Case("loop of a brake in odd steps", "corners of the loop lie within steps",
-         "the same torque at every turn of the pressure in 1, 7 or 50 steps", "N m", 1e-9, "rounding of kN m", ways,
-         once=True),
-    Case("small loops of a brake", "hysteresis passed in the wrong sense gives energy",
-         "no loop between random pressures has a negative area or torque", "N m bar", 1e-9, "rounding of kN m bar",
-         loops, once=True),
-)  # fmt: skip
+    Case(
+        "loop of a brake in odd steps",
+        "corners of the loop lie within steps",
+        "the same torque at every turn of the pressure in 1, 7 or 50 steps",
+        "N m",
+        1e-9,
+        "rounding of kN m",
+        ways,
+        once=True,
+    ),
+    Case(
+        "small loops of a brake",
+        "hysteresis passed in the wrong sense gives energy",
+        "no loop between random pressures has a negative area or torque",
+        "N m bar",
+        1e-9,
+        "rounding of kN m bar",
+        loops,
+        once=True,
+    ),
+)

@@ -41,18 +41,38 @@ def bent(*points: tuple[float, float]) -> TyreTable:
     """Friction of these (slip, mu) at every load and slip angle, and none across."""
     slips, mu = np.array(points).T
     along = np.tile(mu, (2, 1, 1))
-    return TyreTable(np.array([0.0, 1.5]), slips, np.array([LOAD]), along, np.ones((2, slips.size)),
-                     np.zeros((2, 1)))  # fmt: skip
+    return TyreTable(np.array([0.0, 1.5]), slips, np.array([LOAD]), along, np.ones((2, slips.size)), np.zeros((2, 1)))
 
 
-def motion(implementation: str, plane: Plane, tyres: Tables, own: Road, torques: np.ndarray, step: float,
-           state: np.ndarray, turning: np.ndarray, steer: float = 0.0) -> bool:  # fmt: skip
+def motion(
+    implementation: str,
+    plane: Plane,
+    tyres: Tables,
+    own: Road,
+    torques: np.ndarray,
+    step: float,
+    state: np.ndarray,
+    turning: np.ndarray,
+    steer: float = 0.0,
+) -> bool:
     """Move state (2, 2 + U) and turning (W,) under torques (n + 1, W); whether it came to rest."""
     go = advance if implementation == "reference" else Carried(implementation, plane).advance
     angles = np.where(plane.place[:, 0] > 0.0, steer, 0.0)
     rates, report = np.zeros(state.shape[1]), np.zeros((plane.wheels, REPORTED))
-    status, used = go(state, turning, torques, step, angles, 10.0, plane, np.zeros(plane.wheels, dtype=np.int64), own,
-                      tyres.packed, rates, report)  # fmt: skip
+    status, used = go(
+        state,
+        turning,
+        torques,
+        step,
+        angles,
+        10.0,
+        plane,
+        np.zeros(plane.wheels, dtype=np.int64),
+        own,
+        tyres.packed,
+        rates,
+        report,
+    )
     if status in ENDS:
         raise RunFailed(implementation, ending(status, plane, state, rates, report), used)
     if not (np.isfinite(state).all() and np.isfinite(turning).all()):
@@ -67,8 +87,16 @@ def start(plane: Plane, speed: float = SPEED) -> tuple[np.ndarray, np.ndarray]:
     return state, speed / plane.radius
 
 
-def stopping(implementation: str, tyre: TyreTable, level: float, *, step: float = STEP, turning: float | None = None,
-             own: Road = EVEN, more: tuple[TyreTable, ...] = ()) -> float:  # fmt: skip
+def stopping(
+    implementation: str,
+    tyre: TyreTable,
+    level: float,
+    *,
+    step: float = STEP,
+    turning: float | None = None,
+    own: Road = EVEN,
+    more: tuple[TyreTable, ...] = (),
+) -> float:
     """Way (m) to a stop that is one exactly, under a torque (N m); infinite without it."""
     state, spin = start(ONE.plane)
     if turning is not None:
@@ -108,8 +136,12 @@ def beyond_the_peak(implementation: str, folder: Path) -> float:
 def at_the_peak(implementation: str, folder: Path) -> float:
     """The torque of the peak itself: way outside those of the peak and of sliding, by the first."""
     force = LOAD * 0.8
-    way = stopping(implementation, bent((0.0, 0.0), (0.1, 0.8), (1.0, 0.6)), ONE.steady_torque(0.1, force),
-                   turning=0.9 * SPEED / ONE.radius)  # fmt: skip
+    way = stopping(
+        implementation,
+        bent((0.0, 0.0), (0.1, 0.8), (1.0, 0.6)),
+        ONE.steady_torque(0.1, force),
+        turning=0.9 * SPEED / ONE.radius,
+    )
     least = ONE.mass * SPEED**2 / (2.0 * force)
     return max(1.0 - way / least, way / (least * 0.8 / 0.6) - 1.0, 0.0)
 
@@ -133,8 +165,16 @@ def frictions(implementation: str, folder: Path) -> float:
     found = []
     for mu in (1e-6, 1e-3, 0.1, 1.5):
         state, _ = start(ONE.plane)
-        motion(implementation, ONE.plane, stacked([bent((0.0, 0.0), (1.0, mu))]), EVEN, np.full((41, 1), 1e6), 5e-3,
-               state, np.zeros(1))  # fmt: skip
+        motion(
+            implementation,
+            ONE.plane,
+            stacked([bent((0.0, 0.0), (1.0, mu))]),
+            EVEN,
+            np.full((41, 1), 1e6),
+            5e-3,
+            state,
+            np.zeros(1),
+        )
         found.append(abs((SPEED - state[1, 0]) / (mu * GRAVITY * 0.2) - 1.0))
     return float(max(found))
 
@@ -260,8 +300,15 @@ def slope_changes(implementation: str, folder: Path) -> float:
     """From dry on to wet within a step of 20 ms, lightly braked: way against that of the same force, relative."""
     force = LOAD * float(np.interp(0.004, DRY.slips, DRY.mu_x[0, 0]))
     own = road([Stretch(0.0, 0, 0), Stretch(5.03, 1, 1)])
-    way = stopping(implementation, DRY, ONE.steady_torque(0.004, force), step=2e-2, turning=0.996 * SPEED / ONE.radius,
-                   own=own, more=(surface("wet"),))  # fmt: skip
+    way = stopping(
+        implementation,
+        DRY,
+        ONE.steady_torque(0.004, force),
+        step=2e-2,
+        turning=0.996 * SPEED / ONE.radius,
+        own=own,
+        more=(surface("wet"),),
+    )
     return abs(way / (ONE.mass * SPEED**2 / (2.0 * force)) - 1.0)
 
 
@@ -279,9 +326,16 @@ def braking_scene(**tables: Any) -> BrakingScene:
 
 def at_the_edge_of_locking(implementation: str, folder: Path) -> float:
     """A J-turn on dry road, stopped under full brakes: speeds that are left (m/s, rad/s)."""
-    scene = build({"title": "hard", "system": "braking", "load_transfer": {"front": 0.3}, "brakes": {"supply": 5.0},
-                   "road": {"stretches": [{"left": "dry"}]},
-                   "procedures": {"stop": {"kind": "j_turn", "speed": 15.0, "steer": 0.02}}})  # fmt: skip
+    scene = build(
+        {
+            "title": "hard",
+            "system": "braking",
+            "load_transfer": {"front": 0.3},
+            "brakes": {"supply": 5.0},
+            "road": {"stretches": [{"left": "dry"}]},
+            "procedures": {"stop": {"kind": "j_turn", "speed": 15.0, "steer": 0.02}},
+        }
+    )
     path = drive(scene, "stop", implementation)
     return float(np.abs(path.states[-1, 1]).max() + np.abs(path.turning[-1]).max()) if path.stands else np.inf
 
@@ -353,75 +407,260 @@ LINE = bent((0.0, 0.0), (1.0, 0.9))
 REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
 CASES = (
-    Case("light braking to a stop", "slip has the speed in its denominator, which ends at 0", "m v^2 / (2 F)", "", 1e-7,
-         "the step in which it stops", steady(DRY, 0.02)),
-    Case("light braking to a stop, 20 ms", "50 time constants of the wheel in a step", "m v^2 / (2 F)", "", 1e-6,
-         "the step in which it stops", steady(DRY, 0.004, 2e-2)),
-    Case("table of a single cell", "slip 0 and 1 are its only nodes", "m v^2 / (2 F)", "", 1e-6,
-         "the step in which it stops", steady(LINE, 0.5)),
-    Case("slip that settles on a node", "the slope of friction jumps there", "m v^2 / (2 F)", "", 1e-6,
-         "the step in which it stops", steady(bent((0.0, 0.0), (0.05, 0.5), (0.2, 0.8), (1.0, 0.6)), 0.05)),
-    Case("from rolling, 20 ms", "the wheel slows down within two steps", "the exact way", "", 5e-4, "asked for",
-         from_rolling(DRY, 0.05, 2e-2)),
-    Case("torque just above the peak", "falls off along falling friction, slowly at first", "the exact way", "", 5e-4,
-         "asked for", beyond_the_peak),
-    Case("torque exactly at the peak", "no slip beyond it is stable", "between the ways of peak and sliding", "", 1e-6,
-         "the step in which it stops", at_the_peak),
-    Case("locked from the start", "the rate of slip is 0 / 0 at the end", "v^2 / (2 mu g)", "", 1e-9, "asked for",
-         locked),
-    Case("friction changes under a locked wheel", "within a step", "its closed form", "", 1e-4,
-         "the step of the change takes its share of the way", changing),
-    Case("friction from 1e-6 to 1.5, locked", "bounded by next to nothing", "mu g t", "", 1e-6,
-         "rounding of the speed", frictions),
+    Case(
+        "light braking to a stop",
+        "slip has the speed in its denominator, which ends at 0",
+        "m v^2 / (2 F)",
+        "",
+        1e-7,
+        "the step in which it stops",
+        steady(DRY, 0.02),
+    ),
+    Case(
+        "light braking to a stop, 20 ms",
+        "50 time constants of the wheel in a step",
+        "m v^2 / (2 F)",
+        "",
+        1e-6,
+        "the step in which it stops",
+        steady(DRY, 0.004, 2e-2),
+    ),
+    Case(
+        "table of a single cell",
+        "slip 0 and 1 are its only nodes",
+        "m v^2 / (2 F)",
+        "",
+        1e-6,
+        "the step in which it stops",
+        steady(LINE, 0.5),
+    ),
+    Case(
+        "slip that settles on a node",
+        "the slope of friction jumps there",
+        "m v^2 / (2 F)",
+        "",
+        1e-6,
+        "the step in which it stops",
+        steady(bent((0.0, 0.0), (0.05, 0.5), (0.2, 0.8), (1.0, 0.6)), 0.05),
+    ),
+    Case(
+        "from rolling, 20 ms",
+        "the wheel slows down within two steps",
+        "the exact way",
+        "",
+        5e-4,
+        "asked for",
+        from_rolling(DRY, 0.05, 2e-2),
+    ),
+    Case(
+        "torque just above the peak",
+        "falls off along falling friction, slowly at first",
+        "the exact way",
+        "",
+        5e-4,
+        "asked for",
+        beyond_the_peak,
+    ),
+    Case(
+        "torque exactly at the peak",
+        "no slip beyond it is stable",
+        "between the ways of peak and sliding",
+        "",
+        1e-6,
+        "the step in which it stops",
+        at_the_peak,
+    ),
+    Case(
+        "locked from the start", "the rate of slip is 0 / 0 at the end", "v^2 / (2 mu g)", "", 1e-9, "asked for", locked
+    ),
+    Case(
+        "friction changes under a locked wheel",
+        "within a step",
+        "its closed form",
+        "",
+        1e-4,
+        "the step of the change takes its share of the way",
+        changing,
+    ),
+    Case(
+        "friction from 1e-6 to 1.5, locked",
+        "bounded by next to nothing",
+        "mu g t",
+        "",
+        1e-6,
+        "rounding of the speed",
+        frictions,
+    ),
     Case("standstill under brakes", "friction would push it back", "does not move", "m, m/s", 0.0, "exact", at_rest),
     Case("wheel thrown backwards", "slip above 1", "rolls", "", 1e-6, "25 time constants", backwards),
-    Case("brake lets go on a step's end", "locked until then, by an explicit state", "rolls", "", 1e-6,
-         "60 time constants once it grips", released),
-    Case("truck sliding sideways, locked", "slip angles of 58 degrees", "gains no energy", "", 1e-12, "rounding",
-         energy_grows(SIDEWAYS, 2e4)),
-    Case("truck spinning on ice", "wheels go forwards and backwards", "gains no energy", "", 1e-12, "rounding",
-         energy_grows(SPINNING, 2e4)),
+    Case(
+        "brake lets go on a step's end",
+        "locked until then, by an explicit state",
+        "rolls",
+        "",
+        1e-6,
+        "60 time constants once it grips",
+        released,
+    ),
+    Case(
+        "truck sliding sideways, locked",
+        "slip angles of 58 degrees",
+        "gains no energy",
+        "",
+        1e-12,
+        "rounding",
+        energy_grows(SIDEWAYS, 2e4),
+    ),
+    Case(
+        "truck spinning on ice",
+        "wheels go forwards and backwards",
+        "gains no energy",
+        "",
+        1e-12,
+        "rounding",
+        energy_grows(SPINNING, 2e4),
+    ),
     Case("truck on even friction", "rounding left and right", "does not yaw", "m, rad, rad/s", 0.0, "exact", even),
-    Case("truck on split friction in a mirror", "sides exchanged", "mirror image", "m, rad", 1e-12, "rounding",
-         mirrored),
-    Case("train that jackknifes, locked", "the drawbar folded under it", "gains no energy", "", 1e-12, "rounding",
-         jackknifed),
-    Case("tyres that lag, at standstill", "the tyre is a spring there", "stays at rest", "m, m/s", 0.0, "exact",
-         lagging_at_rest, {"exudyn": "refused", "mujoco": "refused"}),
+    Case(
+        "truck on split friction in a mirror", "sides exchanged", "mirror image", "m, rad", 1e-12, "rounding", mirrored
+    ),
+    Case(
+        "train that jackknifes, locked",
+        "the drawbar folded under it",
+        "gains no energy",
+        "",
+        1e-12,
+        "rounding",
+        jackknifed,
+    ),
+    Case(
+        "tyres that lag, at standstill",
+        "the tyre is a spring there",
+        "stays at rest",
+        "m, m/s",
+        0.0,
+        "exact",
+        lagging_at_rest,
+        {"exudyn": "refused", "mujoco": "refused"},
+    ),
     Case("wheel exactly on the line", "of split friction", "as on the left surface", "m", 0.0, "exact", on_the_line),
-    Case("no friction on one side", "wheels without any force", "mu g t / 2", "", 1e-4, "it has begun to yaw",
-         no_friction_on_one_side),
-    Case("slope of friction changes within a step", "from dry on to wet, 20 ms", "m v^2 / (2 F)", "", 1e-4,
-         "the wheel takes up another slip", slope_changes),
+    Case(
+        "no friction on one side",
+        "wheels without any force",
+        "mu g t / 2",
+        "",
+        1e-4,
+        "it has begun to yaw",
+        no_friction_on_one_side,
+    ),
+    Case(
+        "slope of friction changes within a step",
+        "from dry on to wet, 20 ms",
+        "m v^2 / (2 F)",
+        "",
+        1e-4,
+        "the wheel takes up another slip",
+        slope_changes,
+    ),
     Case("valves open for ever", "all wheels lock", "comes to rest", "m/s, rad/s", 0.0, "exact", all_open),
-    Case("pressure below push-out", "hysteresis would pull it below 0", "no torque", "N m", 0.0, "exact",
-         below_push_out),
-    Case("slow wheel at the edge of locking", "a little less load, and it stands within the step", "comes to rest",
-         "m/s, rad/s", 0.0, "exact", at_the_edge_of_locking),
-    Case("one wheel of four lifted", "the plane's loads follow its accelerations", "statics of three wheels", "N, N m",
-         1e-9, "rounding", one_wheel_lifted, once=True),
-    Case("truck that rolls over", "both wheels of a side bear nothing", "fails, and says when", "", 0.0, "exact",
-         turned_over, RAISED),
-    Case("299 bar of a supply of 6", "more than there is", "fails, and says when", "", 0.0, "exact",
-         beyond_the_supply, RAISED),
-    Case("truck that lifts its rear wheels", "the plane has no lift-off", "fails, and says when", "", 0.0, "exact",
-         lifting, RAISED),
-    Case("controller answers not a number", "would spread to every state", "fails, and says when", "", 0.0, "exact",
-         answers(pressures=np.array([1.0, np.nan, 1.0, 1.0])), RAISED),
-    Case("controller answers for three wheels", "of four", "fails, and says when", "", 0.0, "exact",
-         answers(valves=np.ones(3, dtype=np.int64)), RAISED),
-    Case("controller answers nothing", "neither valves nor pressures", "fails, and says when", "", 0.0, "exact",
-         answers(), RAISED),
-    *(Case(name, "a number from senseless input", "refused", "", 0.0, "exact", refused(run), REFUSED)
-      for name, run in (
-          ("torque that drives the wheel", lambda: braked(ONE, stacked([DRY]), EVEN, np.full(3, -1.0), STEP, SPEED)),
-          ("table that ends before it locks", lambda: bent((0.0, 0.0), (0.9, 0.8))),
-          ("table with friction at no slip", lambda: bent((0.0, 0.1), (1.0, 0.8))),
-          ("stretches shorter than a step", lambda: check_way(road([Stretch(0.0, 0, 0), Stretch(1.0, 1, 1),
-                                                                    Stretch(1.01, 0, 0)]), 0.1)),
-          ("brake that lets go too early", slippery_brake),
-          ("vehicle lighter than its wheels", lambda: truck(PAPER.model_copy(update={"mass": 100.0}))),
-          ("roll shares that do not add up", lambda: truck(PAPER.model_copy(
-              update={"front": PAPER.front.model_copy(update={"roll_share": 0.5})}))),
-      )),
-)  # fmt: skip
+    Case(
+        "pressure below push-out", "hysteresis would pull it below 0", "no torque", "N m", 0.0, "exact", below_push_out
+    ),
+    Case(
+        "slow wheel at the edge of locking",
+        "a little less load, and it stands within the step",
+        "comes to rest",
+        "m/s, rad/s",
+        0.0,
+        "exact",
+        at_the_edge_of_locking,
+    ),
+    Case(
+        "one wheel of four lifted",
+        "the plane's loads follow its accelerations",
+        "statics of three wheels",
+        "N, N m",
+        1e-9,
+        "rounding",
+        one_wheel_lifted,
+        once=True,
+    ),
+    Case(
+        "truck that rolls over",
+        "both wheels of a side bear nothing",
+        "fails, and says when",
+        "",
+        0.0,
+        "exact",
+        turned_over,
+        RAISED,
+    ),
+    Case(
+        "299 bar of a supply of 6",
+        "more than there is",
+        "fails, and says when",
+        "",
+        0.0,
+        "exact",
+        beyond_the_supply,
+        RAISED,
+    ),
+    Case(
+        "truck that lifts its rear wheels",
+        "the plane has no lift-off",
+        "fails, and says when",
+        "",
+        0.0,
+        "exact",
+        lifting,
+        RAISED,
+    ),
+    Case(
+        "controller answers not a number",
+        "would spread to every state",
+        "fails, and says when",
+        "",
+        0.0,
+        "exact",
+        answers(pressures=np.array([1.0, np.nan, 1.0, 1.0])),
+        RAISED,
+    ),
+    Case(
+        "controller answers for three wheels",
+        "of four",
+        "fails, and says when",
+        "",
+        0.0,
+        "exact",
+        answers(valves=np.ones(3, dtype=np.int64)),
+        RAISED,
+    ),
+    Case(
+        "controller answers nothing",
+        "neither valves nor pressures",
+        "fails, and says when",
+        "",
+        0.0,
+        "exact",
+        answers(),
+        RAISED,
+    ),
+    *(
+        Case(name, "a number from senseless input", "refused", "", 0.0, "exact", refused(run), REFUSED)
+        for name, run in (
+            ("torque that drives the wheel", lambda: braked(ONE, stacked([DRY]), EVEN, np.full(3, -1.0), STEP, SPEED)),
+            ("table that ends before it locks", lambda: bent((0.0, 0.0), (0.9, 0.8))),
+            ("table with friction at no slip", lambda: bent((0.0, 0.1), (1.0, 0.8))),
+            (
+                "stretches shorter than a step",
+                lambda: check_way(road([Stretch(0.0, 0, 0), Stretch(1.0, 1, 1), Stretch(1.01, 0, 0)]), 0.1),
+            ),
+            ("brake that lets go too early", slippery_brake),
+            ("vehicle lighter than its wheels", lambda: truck(PAPER.model_copy(update={"mass": 100.0}))),
+            (
+                "roll shares that do not add up",
+                lambda: truck(PAPER.model_copy(update={"front": PAPER.front.model_copy(update={"roll_share": 0.5})})),
+            ),
+        )
+    ),
+)

@@ -57,12 +57,22 @@ def van_loan_naive(folder: Path) -> str:
         for length in (PERIOD, 20 * PERIOD):
             noise = van_loan_discretization(first_order(linear), pushes, length)[1]
             found.append(float(np.linalg.eigvalsh(0.5 * (noise + noise.T)).min() / np.abs(noise).max()))
-    return (f"filterpy's van Loan gives a covariance with a negative eigenvalue of {found[0]:.0e} of its size over "
-            f"{PERIOD:g} s and {found[1]:.0e} over {20 * PERIOD:g} s, without a word")
+    return (
+        f"filterpy's van Loan gives a covariance with a negative eigenvalue of {found[0]:.0e} of its size over "
+        f"{PERIOD:g} s and {found[1]:.0e} over {20 * PERIOD:g} s, without a word"
+    )
 
 
 CASES = (
-    Case("covariance beside a stiff pole", "noise held over 50 ms, 35 times the decay time of a pole at -697 1/s: a "
-         "block exponential overflows", "each sample alone, squared and summed", "", 1e-9,
-         "the same sum in another order, rounding aside", held_noise, naive=van_loan_naive, against="native"),
-)  # fmt: skip
+    Case(
+        "covariance beside a stiff pole",
+        "noise held over 50 ms, 35 times the decay time of a pole at -697 1/s: a block exponential overflows",
+        "each sample alone, squared and summed",
+        "",
+        1e-9,
+        "the same sum in another order, rounding aside",
+        held_noise,
+        naive=van_loan_naive,
+        against="native",
+    ),
+)

@@ -64,8 +64,10 @@ def tumbled_naive(folder: Path) -> str:
     """What its vertical forces say."""
     scene = follow(folder, measured(), tilt=TILT)
     own, wrong = figures(simulate(scene, "reference"), measured(), scene)
-    return (f"at a pitch of {own.pitch_max:.1f} rad its vertical f3 does {wrong.vertical_damage['f3']:.3f} times the "
-            f"true damage, its f3 along the chassis {wrong.damage['f3x']:.0e} times")  # fmt: skip
+    return (
+        f"at a pitch of {own.pitch_max:.1f} rad its vertical f3 does {wrong.vertical_damage['f3']:.3f} times the "
+        f"true damage, its f3 along the chassis {wrong.damage['f3x']:.0e} times"
+    )
 
 
 SPRING = {"pitch_spring": {"stiffness": SOFT, "damping": 250.0}}
@@ -81,8 +83,10 @@ def soft_naive(folder: Path) -> str:
     """What the run itself shows."""
     scene = follow(folder, measured(), SPRING, TILT)
     own, wrong = figures(simulate(scene, "reference"), measured(), scene)
-    return (f"its artificial moment is {own.moment_share_band:.1%} of I pitch'' and its vertical f3 does "
-            f"{wrong.vertical_damage['f3']:.3f} times the true damage; its pitch is {wrong.pitch_max:.2f} rad wrong")
+    return (
+        f"its artificial moment is {own.moment_share_band:.1%} of I pitch'' and its vertical f3 does "
+        f"{wrong.vertical_damage['f3']:.3f} times the true damage; its pitch is {wrong.pitch_max:.2f} rad wrong"
+    )
 
 
 def graded(engine: str, folder: Path) -> float:
@@ -95,8 +99,10 @@ def graded_naive(folder: Path) -> str:
     """What the run itself shows."""
     scene = follow(folder, measured(0.1), FIRM)
     own, wrong = figures(simulate(scene, "reference"), measured(0.1), scene)
-    return (f"its artificial moment is {own.moment_share_band:.1%} of I pitch''; its pitch is {wrong.pitch_max:.2f} "
-            f"rad wrong, f3 along the chassis does {wrong.damage['f3x']:.2f} times the true damage")  # fmt: skip
+    return (
+        f"its artificial moment is {own.moment_share_band:.1%} of I pitch''; its pitch is {wrong.pitch_max:.2f} "
+        f"rad wrong, f3 along the chassis does {wrong.damage['f3x']:.2f} times the true damage"
+    )
 
 
 @cache
@@ -188,30 +194,119 @@ def before_drift_naive(folder: Path) -> str:
 REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 
 CASES = (
-    Case("drifted run scored by its vertical forces", "the vertical force is the same at every pitch",
-         "rejected with the truth and without it", "wrong verdicts", 0.0, "a word is right or wrong", tumbled,
-         naive=tumbled_naive),
-    Case("spring below the smallest that holds", "it is a stabiliser, and the vehicle drifts all the same",
-         "rejected", "wrong verdicts", 0.0, "a word is right or wrong", soft, naive=soft_naive),
-    Case("spring on a grade", "keeping the pitch near zero is wrong there, and no figure of the run shows it",
-         "rejected with the truth; without it never accepted", "wrong verdicts", 0.0, "a word is right or wrong",
-         graded, naive=graded_naive),
-    Case("load with a value that is not a number", "rainflow compares, and every comparison with it is false",
-         "refused", "N^5", 0.0, "no damage is right", broken_load, REFUSED, broken_load_naive),
-    Case("load without a sample", "no cycle, but no measurement either", "refused", "N^5", 0.0, "no damage is right",
-         empty_load, REFUSED),
-    Case("load beyond all numbers", "inf / inf is not a number, and a table shows it as a ratio", "refused", "", 0.0,
-         "there is no answer", huge_load, REFUSED, once=True),
-    Case("Woehler exponent that is no number", "1 to any power is 1", "refused", "", 0.0, "there is no answer",
-         no_slope, REFUSED, once=True),
-    Case("drift-off by noise of negative intensity", "a root is found where none has a meaning", "refused", "", 0.0,
-         "there is no answer", no_intensity, REFUSED, once=True),
-    Case("true load that never varies", "its damage is 0, by which the ratio would divide", "refused", "", 0.0,
-         "no ratio is right", constant_truth, REFUSED),
-    Case("load of a single rise", "two turning points make half a cycle", "half of range^5", "N^5", 0.0,
-         "exact in doubles", two_points, naive=two_points_naive),
-    Case("engines compared up to the drift-off", "errors grow without bound, rounding among them: beyond the drift-off "
-         "a difference says nothing of an engine", "another implementation, same noise file", "of the largest state",
-         1e-9, "rounding of 1e-15 to 1e-13 that grows by less than 100", before_drift, naive=before_drift_naive,
-         against="native"),
-)  # fmt: skip
+    Case(
+        "drifted run scored by its vertical forces",
+        "the vertical force is the same at every pitch",
+        "rejected with the truth and without it",
+        "wrong verdicts",
+        0.0,
+        "a word is right or wrong",
+        tumbled,
+        naive=tumbled_naive,
+    ),
+    Case(
+        "spring below the smallest that holds",
+        "it is a stabiliser, and the vehicle drifts all the same",
+        "rejected",
+        "wrong verdicts",
+        0.0,
+        "a word is right or wrong",
+        soft,
+        naive=soft_naive,
+    ),
+    Case(
+        "spring on a grade",
+        "keeping the pitch near zero is wrong there, and no figure of the run shows it",
+        "rejected with the truth; without it never accepted",
+        "wrong verdicts",
+        0.0,
+        "a word is right or wrong",
+        graded,
+        naive=graded_naive,
+    ),
+    Case(
+        "load with a value that is not a number",
+        "rainflow compares, and every comparison with it is false",
+        "refused",
+        "N^5",
+        0.0,
+        "no damage is right",
+        broken_load,
+        REFUSED,
+        broken_load_naive,
+    ),
+    Case(
+        "load without a sample",
+        "no cycle, but no measurement either",
+        "refused",
+        "N^5",
+        0.0,
+        "no damage is right",
+        empty_load,
+        REFUSED,
+    ),
+    Case(
+        "load beyond all numbers",
+        "inf / inf is not a number, and a table shows it as a ratio",
+        "refused",
+        "",
+        0.0,
+        "there is no answer",
+        huge_load,
+        REFUSED,
+        once=True,
+    ),
+    Case(
+        "Woehler exponent that is no number",
+        "1 to any power is 1",
+        "refused",
+        "",
+        0.0,
+        "there is no answer",
+        no_slope,
+        REFUSED,
+        once=True,
+    ),
+    Case(
+        "drift-off by noise of negative intensity",
+        "a root is found where none has a meaning",
+        "refused",
+        "",
+        0.0,
+        "there is no answer",
+        no_intensity,
+        REFUSED,
+        once=True,
+    ),
+    Case(
+        "true load that never varies",
+        "its damage is 0, by which the ratio would divide",
+        "refused",
+        "",
+        0.0,
+        "no ratio is right",
+        constant_truth,
+        REFUSED,
+    ),
+    Case(
+        "load of a single rise",
+        "two turning points make half a cycle",
+        "half of range^5",
+        "N^5",
+        0.0,
+        "exact in doubles",
+        two_points,
+        naive=two_points_naive,
+    ),
+    Case(
+        "engines compared up to the drift-off",
+        "errors grow without bound, rounding among them: beyond the drift-off a difference says nothing of an engine",
+        "another implementation, same noise file",
+        "of the largest state",
+        1e-9,
+        "rounding of 1e-15 to 1e-13 that grows by less than 100",
+        before_drift,
+        naive=before_drift_naive,
+        against="native",
+    ),
+)

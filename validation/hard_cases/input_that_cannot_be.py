@@ -44,10 +44,13 @@ DOUBTED: dict[str, Change] = {
     "front wheel force that never changes": lambda f: np.column_stack([np.full(len(f), LOADS[0]), f[:, 1]]),
 }
 QUERIED: dict[str, dict[str, float]] = {
-    "chassis in tonnes": {"m3": 1.35}, "wheelbase in mm": {"a": 1300.0, "b": 800.0}, "springs in N/mm":
-    {"k3": 90.0, "k4": 120.0}, "tyre in N/mm": {"k1": 190.0}, "dampers in N s/mm": {"d3": 9.0, "d4": 12.0},
+    "chassis in tonnes": {"m3": 1.35},
+    "wheelbase in mm": {"a": 1300.0, "b": 800.0},
+    "springs in N/mm": {"k3": 90.0, "k4": 120.0},
+    "tyre in N/mm": {"k1": 190.0},
+    "dampers in N s/mm": {"d3": 9.0, "d4": 12.0},
     "pitch inertia in t m^2": {"I": 0.54},
-}  # fmt: skip
+}
 
 
 @cache
@@ -60,8 +63,9 @@ def true() -> np.ndarray:
 
 def words(change: Change) -> list[str]:
     """Errors and doubts about the forces, changed; InputError where there is an error."""
-    front, rear = (Signal(axle, "forces.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0)
-                   for axle in ("front", "rear"))  # fmt: skip
+    front, rear = (
+        Signal(axle, "forces.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0) for axle in ("front", "rear")
+    )
     forces = np.ascontiguousarray(change(true()))
     found = check(AxleForces(forces, PERIOD, TWIN, ((front,), (rear,)), DURATION, IN_FILE))
     errors = [each.text for each in found if each.weight == "error"]
@@ -80,16 +84,31 @@ def _vehicle(change: dict[str, float], _: str, folder: Path) -> float:
 
 def _case(name: str, error: Callable[[str, Path], float], wanted: Word, said: str) -> Case:
     expected: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, wanted) if wanted != "right" else {}
-    return Case(name, "engines run it without a word", said, "unnamed", 0.0, "it is named or it is not", error,
-                expected, once=True)  # fmt: skip
+    return Case(
+        name,
+        "engines run it without a word",
+        said,
+        "unnamed",
+        0.0,
+        "it is named or it is not",
+        error,
+        expected,
+        once=True,
+    )
 
 
 CASES = (
-    *(_case(name, partial(_forces, change, True), "refused", "refused before the run, with what is wrong")
-      for name, change in REFUSED.items()),
-    *(_case(name, partial(_forces, change, True), "right", "one doubt before the run, with the fall or turn to come")
-      for name, change in DOUBTED.items()),
+    *(
+        _case(name, partial(_forces, change, True), "refused", "refused before the run, with what is wrong")
+        for name, change in REFUSED.items()
+    ),
+    *(
+        _case(name, partial(_forces, change, True), "right", "one doubt before the run, with the fall or turn to come")
+        for name, change in DOUBTED.items()
+    ),
     _case("true wheel forces", partial(_forces, lambda f: f, False), "right", "nothing is said"),
-    *(_case(name, partial(_vehicle, change), "right", "queried, with the value and what is usual")
-      for name, change in QUERIED.items()),
-)  # fmt: skip
+    *(
+        _case(name, partial(_vehicle, change), "right", "queried, with the value and what is usual")
+        for name, change in QUERIED.items()
+    ),
+)

@@ -41,13 +41,20 @@ def _drawn(engine: str, folder: Path, lost: slice, turn: float = 0.0, **own: Any
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", seen)}, PERIOD)
     p, start = base.parameters, base.initial.copy()
     start[[0, 1, 3]] += turn * np.array([-p.b, p.a, 1.0])
-    scene = build({
-        "title": "kalman", "run": {"duration": DURATION, "step": 1e-3},
-        "start": {"z1": start[0], "z2": start[1], "pitch": start[3]},
-        "effects": {"wheel_forces": {"file": "forces.csv", "interpolation": "linear"},
-                    "force_noise": {"deviation": FORCE, "seed": 7},
-                    "kalman_filter": {"file": "pitch.csv", "force_deviation": FORCE, "pitch_deviation": ANGLE, **own}},
-    }, "kalman", folder)  # fmt: skip
+    scene = build(
+        {
+            "title": "kalman",
+            "run": {"duration": DURATION, "step": 1e-3},
+            "start": {"z1": start[0], "z2": start[1], "pitch": start[3]},
+            "effects": {
+                "wheel_forces": {"file": "forces.csv", "interpolation": "linear"},
+                "force_noise": {"deviation": FORCE, "seed": 7},
+                "kalman_filter": {"file": "pitch.csv", "force_deviation": FORCE, "pitch_deviation": ANGLE, **own},
+            },
+        },
+        "kalman",
+        folder,
+    )
     run = simulate(scene, engine)
     ended = PERIOD * (lost.stop or 0)
     late = (run.times < ended) | (run.times > ended + 1.0)  # the moment takes a while to draw the vehicle back
@@ -78,8 +85,9 @@ def sure(engine: str, folder: Path) -> float:
     base = setups.vehicle()
     forces = setups.static_forces(base, count + 1, PERIOD, held=False)
     own = setups.driven(base, forces)
-    own = replace(own, scene=own.scene.model_copy(update={"run": own.scene.run.model_copy(
-        update={"duration": count * PERIOD})}))  # fmt: skip
+    own = replace(
+        own, scene=own.scene.model_copy(update={"run": own.scene.run.model_copy(update={"duration": count * PERIOD})})
+    )
     seen = base.initial[3] + exact * normal(7, 0, count + 1, 1, source=PITCH_SENSOR)
     found = estimate(own, Measurement(seen, PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0)
     P = found.errors()
@@ -122,23 +130,62 @@ def stiff_naive(folder: Path) -> str:
     a, b, wanted = _exact()
     noise = van_loan_discretization(a, b * np.sqrt(SLOW), SLOW)[1]
     times, least = noise[2, 2] / (wanted @ wanted.T)[2, 2], np.linalg.eigvalsh((noise + noise.T) / 2).min()
-    return (f"filterpy's van_loan_discretization gives a pitch variance {times:.1e} times the right one, and an "
-            f"eigenvalue of {least:.1e}, unwarned")  # fmt: skip
+    return (
+        f"filterpy's van_loan_discretization gives a pitch variance {times:.1e} times the right one, and an "
+        f"eigenvalue of {least:.1e}, unwarned"
+    )
 
 
 CASES = (
-    Case("pitch measurement with an outage", "3.5 s without a number, during which the vehicle drifts freely",
-         "the true pitch, by the deviation that the filter states", "deviations", 5.0,
-         "Gaussian: 5 deviations are left once in 1.7 million", outage, {}, outage_naive),
-    Case("filter from a wrong start", "vehicle and filter begin 0.2 rad from where the true one is",
-         "the true pitch after 1 s, by the deviation that the filter states", "deviations", 5.0,
-         "Gaussian: 5 deviations are left once in 1.7 million", wrong_start),
-    Case("filter told of angles to a billionth", "R = 1e-18 beside P = 1: subtracted covariances lose all digits",
-         "the true pitch by the stated deviation, eigenvalues of the scaled covariance above -1e-6", "deviations", 5.0,
-         "Gaussian: 5 deviations are left once in 1.7 million", sure, once=True),
-    Case("pitch measurement without a number", "a column of NaN", "refused", "", 0.0, "there is nothing to follow",
-         nothing, dict.fromkeys(("reference", "exudyn", "mujoco"), "refused")),
-    Case("process noise of a stiff vehicle", "forces at 10 Hz, a pole of -697 1/s",
-         "the response to a held force by the matrix exponential", "of its norm", 1e-6,
-         "Runge-Kutta in substeps of 1 ms; the fast modes have settled", stiff, {}, stiff_naive),
-)  # fmt: skip
+    Case(
+        "pitch measurement with an outage",
+        "3.5 s without a number, during which the vehicle drifts freely",
+        "the true pitch, by the deviation that the filter states",
+        "deviations",
+        5.0,
+        "Gaussian: 5 deviations are left once in 1.7 million",
+        outage,
+        {},
+        outage_naive,
+    ),
+    Case(
+        "filter from a wrong start",
+        "vehicle and filter begin 0.2 rad from where the true one is",
+        "the true pitch after 1 s, by the deviation that the filter states",
+        "deviations",
+        5.0,
+        "Gaussian: 5 deviations are left once in 1.7 million",
+        wrong_start,
+    ),
+    Case(
+        "filter told of angles to a billionth",
+        "R = 1e-18 beside P = 1: subtracted covariances lose all digits",
+        "the true pitch by the stated deviation, eigenvalues of the scaled covariance above -1e-6",
+        "deviations",
+        5.0,
+        "Gaussian: 5 deviations are left once in 1.7 million",
+        sure,
+        once=True,
+    ),
+    Case(
+        "pitch measurement without a number",
+        "a column of NaN",
+        "refused",
+        "",
+        0.0,
+        "there is nothing to follow",
+        nothing,
+        dict.fromkeys(("reference", "exudyn", "mujoco"), "refused"),
+    ),
+    Case(
+        "process noise of a stiff vehicle",
+        "forces at 10 Hz, a pole of -697 1/s",
+        "the response to a held force by the matrix exponential",
+        "of its norm",
+        1e-6,
+        "Runge-Kutta in substeps of 1 ms; the fast modes have settled",
+        stiff,
+        {},
+        stiff_naive,
+    ),
+)

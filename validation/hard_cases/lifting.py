@@ -84,9 +84,18 @@ def thrown_up(engine: str, folder: Path) -> float:
 
 def on_road(scene: dict[str, Any], folder: Path, step: float, duration: float) -> Assembly:
     """The half car without symmetry on a road of a scene."""
-    return assemble(build_scene({
-        "title": "hard case", "vehicle": {"parameters": TWIN}, "run": {"duration": duration, "step": step},
-        "effects": {"road": scene, "lift_off": {}}}, "", folder))  # fmt: skip
+    return assemble(
+        build_scene(
+            {
+                "title": "hard case",
+                "vehicle": {"parameters": TWIN},
+                "run": {"duration": duration, "step": step},
+                "effects": {"road": scene, "lift_off": {}},
+            },
+            "",
+            folder,
+        )
+    )
 
 
 def beside_tight(engine: str, assembly: Assembly, step: float, duration: float) -> float:
@@ -123,8 +132,9 @@ def in_space(engine: str, folder: Path) -> float:
     ones, by the largest; of the written ones themselves, that of its centre of mass to gravity."""
     car = replace(load_vehicle("r19_ride"), gravity=9.81).with_tyres(pushes_only=True)
     n = len(car.coordinates())
-    start = np.array([0.5 if freedom == "z" and car.body(name).parent is None else 0.0
-                      for name, freedom in car.coordinates()])  # fmt: skip
+    start = np.array(
+        [0.5 if freedom == "z" and car.body(name).parent is None else 0.0 for name, freedom in car.coordinates()]
+    )
     written = SpatialReference(car)
     if engine == "reference":
         fall, motion = written.acceleration(start, np.zeros(n)), Kinematics(car)
@@ -172,26 +182,85 @@ EXACT: tuple[tuple[str, str, float, Error], ...] = (
     ("both wheels in the air", "no tyre holds anything", 1e-4, exactly()),
     ("fall from five metres", "lands at 15 m/s, many times the tyres' depth at rest", 1e-3, exactly(start=HIGH)),
     ("tyres without damping", "every landing is thrown back", 1e-4, exactly(d1=0.0, d2=0.0)),
-    ("tyre dampers of 5 kN s/m", "would pull before the spring lets go, and jump where it lands", 1e-4,
-     exactly(d1=5e3, d2=5e3)),
+    (
+        "tyre dampers of 5 kN s/m",
+        "would pull before the spring lets go, and jump where it lands",
+        1e-4,
+        exactly(d1=5e3, d2=5e3),
+    ),
     ("tyres of 20 kN/mm", "a landing lasts 3 ms", 2e-3, exactly(5e-5, k1=2e7, k2=2e7)),
     ("thrown up in the first step", "the tyres let go at once", 1e-5, thrown_up),
 )
 CASES = (
-    *(Case(name, hard, PATH, STATES, tolerance, THROWN, error, naive=linear_naive if error is EXACT[0][3] else None)
-      for name, hard, tolerance, error in EXACT),
-    Case("bounce without any damper", "every error of a landing stays", "gains no energy", "of the motion", 1e-4,
-         THROWN, gained(**UNDAMPED)),
-    Case("tyres of 20 kN/mm, step of 2 ms", "stable on the road, but a landing has two steps", "fails, and says when",
-         "", 0.0, "exact", exactly(2e-3, k1=2e7, k2=2e7), RAISED, hard_naive),
-    Case("at rest at the switch", "no gravity: the load is zero, and every rounding switches", "stays at rest", STATES,
-         1e-15, "exact", at_the_switch),
-    Case("kerb with corners", "the road's rate jumps, and the wheels leave it", "tight tolerance", STATES, 2e-2,
-         "a jump of the rate within a step costs the step itself", step_in_road, against="native"),
-    Case("bumps in a file of few samples", "the spline between samples throws the wheels", "tight tolerance", STATES,
-         1e-4, THROWN, coarse_road, against="native"),
-    Case("car dropped in space", "four wheels in the air, pushed down by their springs", "written accelerations along "
-         "the path", "of the largest", 1e-11, "the order of additions, large forces on light wheels", in_space),
-    Case("wheels in the air above a cut", "a transducer feels nothing of the road", "no force, no moment", "N", 1e-9,
-         "the law has a zero there", above_a_cut),
-)  # fmt: skip
+    *(
+        Case(name, hard, PATH, STATES, tolerance, THROWN, error, naive=linear_naive if error is EXACT[0][3] else None)
+        for name, hard, tolerance, error in EXACT
+    ),
+    Case(
+        "bounce without any damper",
+        "every error of a landing stays",
+        "gains no energy",
+        "of the motion",
+        1e-4,
+        THROWN,
+        gained(**UNDAMPED),
+    ),
+    Case(
+        "tyres of 20 kN/mm, step of 2 ms",
+        "stable on the road, but a landing has two steps",
+        "fails, and says when",
+        "",
+        0.0,
+        "exact",
+        exactly(2e-3, k1=2e7, k2=2e7),
+        RAISED,
+        hard_naive,
+    ),
+    Case(
+        "at rest at the switch",
+        "no gravity: the load is zero, and every rounding switches",
+        "stays at rest",
+        STATES,
+        1e-15,
+        "exact",
+        at_the_switch,
+    ),
+    Case(
+        "kerb with corners",
+        "the road's rate jumps, and the wheels leave it",
+        "tight tolerance",
+        STATES,
+        2e-2,
+        "a jump of the rate within a step costs the step itself",
+        step_in_road,
+        against="native",
+    ),
+    Case(
+        "bumps in a file of few samples",
+        "the spline between samples throws the wheels",
+        "tight tolerance",
+        STATES,
+        1e-4,
+        THROWN,
+        coarse_road,
+        against="native",
+    ),
+    Case(
+        "car dropped in space",
+        "four wheels in the air, pushed down by their springs",
+        "written accelerations along the path",
+        "of the largest",
+        1e-11,
+        "the order of additions, large forces on light wheels",
+        in_space,
+    ),
+    Case(
+        "wheels in the air above a cut",
+        "a transducer feels nothing of the road",
+        "no force, no moment",
+        "N",
+        1e-9,
+        "the law has a zero there",
+        above_a_cut,
+    ),
+)

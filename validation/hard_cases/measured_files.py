@@ -40,19 +40,27 @@ def cut_segment(folder: Path) -> str:
     return f"npTDMS hands over channels of {' and '.join(map(str, lengths))} samples"
 
 
-NAIVE = {"CSV cut within a number": cut_number, "MDF 4 with invalid samples": invalid_samples,
-         "TDMS cut in its samples": cut_segment}  # fmt: skip
+NAIVE = {
+    "CSV cut within a number": cut_number,
+    "MDF 4 with invalid samples": invalid_samples,
+    "TDMS cut in its samples": cut_segment,
+}
 
 
 def of_file(odd: Odd) -> Case:
     """The hard case of one file."""
     return Case(
-        name=odd.name, hard=odd.hard, check=CHECKS[odd.wanted], unit="s or N", tolerance=TOLERANCE,
+        name=odd.name,
+        hard=odd.hard,
+        check=CHECKS[odd.wanted],
+        unit="s or N",
+        tolerance=TOLERANCE,
         why="values have bits that every format keeps; CSV writes times with 15 digits",
         error=lambda _, folder: odd.error(folder / "odd"),
         expected=dict.fromkeys(IMPLEMENTATIONS, "refused") if odd.wanted == "refused" else {},
-        naive=NAIVE.get(odd.name), once=True,
-    )  # fmt: skip
+        naive=NAIVE.get(odd.name),
+        once=True,
+    )
 
 
 def _silent(sweep: Sweep, _: str, folder: Path) -> float:
@@ -65,9 +73,12 @@ def of_sweep(sweep: Sweep) -> Case:
         name=f"{sweep.extension} cut off at {sweep.cuts} places",
         hard="a library reads what is left, or what is not there",
         check="every cut is refused, or what is left is right and the cut named",
-        unit="silent cuts", tolerance=0.0, why="no file that was cut off may be used without a word",
-        error=partial(_silent, sweep), once=True,
-    )  # fmt: skip
+        unit="silent cuts",
+        tolerance=0.0,
+        why="no file that was cut off may be used without a word",
+        error=partial(_silent, sweep),
+        once=True,
+    )
 
 
 CASES = (

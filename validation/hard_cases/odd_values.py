@@ -55,9 +55,15 @@ def _copies(corner: float) -> Any:
 
 
 def _bent(corner: float) -> tuple[SpatialVehicle, Excitation]:
-    scene = build({"title": "hard", "system": "ride", "vehicle": {"file": "quarter_car_nonlinear"},
-                   "road": {"level": 6.4e-5, "corner_mean": corner, "corner_roll": corner},
-                   "speeds": {"start": 5.0, "stop": 6.0}})  # fmt: skip
+    scene = build(
+        {
+            "title": "hard",
+            "system": "ride",
+            "vehicle": {"file": "quarter_car_nonlinear"},
+            "road": {"level": 6.4e-5, "corner_mean": corner, "corner_roll": corner},
+            "speeds": {"start": 5.0, "stop": 6.0},
+        }
+    )
     vehicle = vehicle_of(scene)
     return vehicle, excitation_of(scene, wheels(vehicle))
 
@@ -69,8 +75,10 @@ def slender(a: float, b: float) -> Callable[[str, Path], float]:
         pair = Pair()
         hertz, motion = by_axes(a, b, pair, load=1e5), (0.0, 1e-3, 0.5)
         choices: dict[str, Any] = {"flexibilities": "blended", "bound": "intermediate", "march": "second-order"}
-        (fast, told), (exact, rest) = (rolled(theory, motion, CELLS) for theory in (
-            Fastsim(hertz, FRICTION, pair, **choices), ExactOnEllipse(hertz, FRICTION, pair)))  # fmt: skip
+        (fast, told), (exact, rest) = (
+            rolled(theory, motion, CELLS)
+            for theory in (Fastsim(hertz, FRICTION, pair, **choices), ExactOnEllipse(hertz, FRICTION, pair))
+        )
         force, moment = float(np.linalg.norm(fast.force - exact.force)), abs(fast.mz - exact.mz)
         return max(force / (told.total + rest.cells), moment / (told.moment + rest.moment_cells))
 
@@ -88,8 +96,10 @@ def sure(implementation: str, folder: Path) -> float:
     """A filter of tilts told of angles and rates to 1e-12, forces to 1 and to 8 N: its deviations, by those told."""
     vehicle, angles = cut(load_vehicle("r19_free"), "body"), Angles(np.zeros((5000, 4)), 2e-3)
     forces = HubForces(np.zeros((5000, 6 * len(vehicle.hubs))), 2e-3, "hub")
-    found = [estimate(vehicle, forces, angles, np.full(forces.samples.shape[1], noise), (1e-12, 1e-12), 10.0)
-             for noise in (1.0, 8.0)]  # fmt: skip
+    found = [
+        estimate(vehicle, forces, angles, np.full(forces.samples.shape[1], noise), (1e-12, 1e-12), 10.0)
+        for noise in (1.0, 8.0)
+    ]
     return max(float(np.nan_to_num(each.deviations / 1e-12, nan=np.inf).max()) for each in found)
 
 
@@ -119,27 +129,78 @@ MASKED = np.ma.array([0.0, 100.0, 0.0, 1.0, 0.0], mask=np.arange(5) == 1)
 SKEW = np.array([[1.0, 2.0], [0.0, 1.0]])
 STABLE = np.array([[0.0, 1.0], [-4.0, -0.5]])
 CASES = (
-    Case("road that begins 10 m up", "vehicles let go at 0 fall onto it and ring for long",
-         "as on one without its long waves", "relative", 0.02, "waves of 60 m at 0.1 Hz", far_below, once=True),
-    Case("narrow contact", "an ellipse 20 times as wide as long: FASTSIM's moment is two and a half times too large",
-         "within its stated error of the exact theory", "of it", 1.0, "exact", slender(5e-4, 1e-2), once=True),
-    Case("drift-off time under tiny noise", "squares of angles underflow", "the same by scaling", "relative", 1e-12,
-         "rounding", tiny_noise, once=True),
-    Case("filter of tilts told of them to 1e-12", "subtracted covariances leave less than nothing",
-         "surer than each value, never less", "of the deviations told", 1.0 + 1e-9, "rounding", sure, once=True),
-    Case("saved result with a flipped bit", "every number of it is plausible", "refused", "", 0.0, "exact", flipped,
-         REFUSED, once=True),
-    *(Case(name, hard, "refused", "", 0.0, "exact", asked(answer), REFUSED, once=True) for name, hard, answer in (
-        ("profile with a spike", "a spline swings about it", spiked),
-        ("profile rounded to 0.1 mm", "the half beyond the first step back would be lost", rounded),
-        ("masked samples", "would be counted", lambda: pseudo_damage(MASKED)),
-        ("load below 0 under a wheel", "its factor would be negative", lambda: dynamic_load_factor(100.0, -4000.0)),
-        ("limit below 0", "a share of time above 1", lambda: share_beyond(1.0, -1.0)),
-        ("deviation of two values", "its error would be 0", lambda: deviation(np.array([1.0, 2.0]))),
-        ("quantile of what is no number", "would be sorted to the end", lambda: quantile(np.array([1.0, np.nan]), 0.5)),
-        ("covariance of what grows", "Lyapunov's equation has an answer, which is none",
-         lambda: lyapunov(-STABLE, np.eye(2))),
-        ("right side that is askew", "another one would be solved", lambda: lyapunov(STABLE, SKEW)),
-        ("point mass of nothing", "divided by", lambda: discrete(10, 1.0, 1e-3, 0.0)),
-    )),
-)  # fmt: skip
+    Case(
+        "road that begins 10 m up",
+        "vehicles let go at 0 fall onto it and ring for long",
+        "as on one without its long waves",
+        "relative",
+        0.02,
+        "waves of 60 m at 0.1 Hz",
+        far_below,
+        once=True,
+    ),
+    Case(
+        "narrow contact",
+        "an ellipse 20 times as wide as long: FASTSIM's moment is two and a half times too large",
+        "within its stated error of the exact theory",
+        "of it",
+        1.0,
+        "exact",
+        slender(5e-4, 1e-2),
+        once=True,
+    ),
+    Case(
+        "drift-off time under tiny noise",
+        "squares of angles underflow",
+        "the same by scaling",
+        "relative",
+        1e-12,
+        "rounding",
+        tiny_noise,
+        once=True,
+    ),
+    Case(
+        "filter of tilts told of them to 1e-12",
+        "subtracted covariances leave less than nothing",
+        "surer than each value, never less",
+        "of the deviations told",
+        1.0 + 1e-9,
+        "rounding",
+        sure,
+        once=True,
+    ),
+    Case(
+        "saved result with a flipped bit",
+        "every number of it is plausible",
+        "refused",
+        "",
+        0.0,
+        "exact",
+        flipped,
+        REFUSED,
+        once=True,
+    ),
+    *(
+        Case(name, hard, "refused", "", 0.0, "exact", asked(answer), REFUSED, once=True)
+        for name, hard, answer in (
+            ("profile with a spike", "a spline swings about it", spiked),
+            ("profile rounded to 0.1 mm", "the half beyond the first step back would be lost", rounded),
+            ("masked samples", "would be counted", lambda: pseudo_damage(MASKED)),
+            ("load below 0 under a wheel", "its factor would be negative", lambda: dynamic_load_factor(100.0, -4000.0)),
+            ("limit below 0", "a share of time above 1", lambda: share_beyond(1.0, -1.0)),
+            ("deviation of two values", "its error would be 0", lambda: deviation(np.array([1.0, 2.0]))),
+            (
+                "quantile of what is no number",
+                "would be sorted to the end",
+                lambda: quantile(np.array([1.0, np.nan]), 0.5),
+            ),
+            (
+                "covariance of what grows",
+                "Lyapunov's equation has an answer, which is none",
+                lambda: lyapunov(-STABLE, np.eye(2)),
+            ),
+            ("right side that is askew", "another one would be solved", lambda: lyapunov(STABLE, SKEW)),
+            ("point mass of nothing", "divided by", lambda: discrete(10, 1.0, 1e-3, 0.0)),
+        )
+    ),
+)

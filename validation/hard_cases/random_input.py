@@ -52,8 +52,12 @@ def asked_again(engine: str, folder: Path) -> float:
 
 def streams(implementation: str, folder: Path) -> float:
     """Largest correlation of any two streams, in standard errors of none, by what so many pairs allow."""
-    own = [normal(seed, path, BLOCK, 1, source=source)[:, 0]
-           for seed in (0, 1) for path in (0, 1) for source in (FORCES, GYRO, ROAD)]  # fmt: skip
+    own = [
+        normal(seed, path, BLOCK, 1, source=source)[:, 0]
+        for seed in (0, 1)
+        for path in (0, 1)
+        for source in (FORCES, GYRO, ROAD)
+    ]
     own += [normal(0, 0, BLOCK, 1, first=BLOCK)[:, 0], *normal(5, 0, BLOCK, 2).T]
     worst = max(abs(float(one @ two)) / BLOCK**0.5 for one, two in combinations(own, 2))
     return worst / 4.75  # one pair of 105 beyond 4.75 errors once in 5000
@@ -62,8 +66,7 @@ def streams(implementation: str, folder: Path) -> float:
 def pieces(implementation: str, folder: Path) -> float:
     """A stream in pieces of odd lengths, last ones first, against the whole."""
     whole, edges = normal(9, 4, 3 * BLOCK, 3), [0, 1, BLOCK - 1, BLOCK, BLOCK + 7, 2 * BLOCK + 1, 3 * BLOCK]
-    parts = [normal(9, 4, end - start, 3, first=start)
-             for start, end in reversed(list(pairwise(edges)))]  # fmt: skip
+    parts = [normal(9, 4, end - start, 3, first=start) for start, end in reversed(list(pairwise(edges)))]
     return float(np.abs(np.concatenate(parts[::-1]) - whole).max())
 
 
@@ -122,8 +125,10 @@ def attitude_naive(folder: Path) -> str:
     """Length of a quaternion that explicit Euler makes."""
     turns = WALK / RATE**0.5 * np.stack([normal(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
     q = euler_quaternions(turns, np.array([1.0, 0.0, 0.0, 0.0]))
-    return (f"explicit Euler's quaternion has a mean square of {float((q**2).sum(axis=-1).mean()):.3f} "
-            f"({euler_mean_square(WALK, 3, 1.0 / RATE, SAMPLES):.3f} by its law): its matrix is no rotation")
+    return (
+        f"explicit Euler's quaternion has a mean square of {float((q**2).sum(axis=-1).mean()):.3f} "
+        f"({euler_mean_square(WALK, 3, 1.0 / RATE, SAMPLES):.3f} by its law): its matrix is no rotation"
+    )
 
 
 def no_growth(implementation: str, folder: Path) -> float:
@@ -162,26 +167,89 @@ def indefinite(implementation: str, folder: Path) -> float:
 
 
 CASES = (
-    Case("accelerations asked again", "noise drawn inside a callback changes from one stage to the next",
-         "the same time and state, the same bits", "m/s^2", 0.0, "a function has no memory", asked_again),
-    Case("streams of noise", "one seed for forces, gyro and road, two for two runs, one path for front and rear",
-         "no correlation of any two of 15", "of 4.75 standard errors", 1.0, "once in 5000 by chance, fixed seeds",
-         streams, against="none", once=True),
-    Case("stream in pieces", "blocks may be asked for in any order by any worker", "the whole, bit by bit", "", 0.0,
-         "the same numbers", pieces, against="none", once=True),
-    Case("shape filter at any step", "explicit Euler has 1 / (1 - a h / 2) of the variance",
-         "q / (2 corner) at half steps of 0.001 to 30 corner lengths", "standard errors", BEYOND + 0.6,
-         "once in a thousand by chance in five lengths, fixed seed", any_step, naive=any_step_naive, once=True),
-    Case("delay between steps", "the wheelbase is no whole number of steps",
-         "the rear axle meets the front one's heights, its wheelbase later", "of the wheelbase", 1e-3,
-         "the tolerance of the cells of the path", odd_delay, naive=odd_delay_naive, once=True),
-    Case("white noise on a gyro", "Ito and Stratonovich differ, and a quaternion grows",
-         "E[tr E] = 3 exp(-s^2 t) on a turning body", "standard errors", BEYOND, "once in a thousand, fixed seed",
-         attitude, naive=attitude_naive, once=True),
-    Case("growth law at no growth", "sinh x - x loses all digits where the exponent 3/2 begins",
-         "60 digits, for 2 lambda t from 0 to 600", "relative", 1e-12, "rounding of sinh x - x at x = 0.1 is 6e-14",
-         no_growth, naive=no_growth_naive, once=True),
-    Case("delayed axle in Lyapunov's equation", "its right side is indefinite: roots of it do not exist",
-         "the covariance is positive semidefinite at 2 to 60 m/s", "of the largest eigenvalue", 1e-12,
-         "rounding; scaled by the states' own deviations", indefinite, against="none"),
-)  # fmt: skip
+    Case(
+        "accelerations asked again",
+        "noise drawn inside a callback changes from one stage to the next",
+        "the same time and state, the same bits",
+        "m/s^2",
+        0.0,
+        "a function has no memory",
+        asked_again,
+    ),
+    Case(
+        "streams of noise",
+        "one seed for forces, gyro and road, two for two runs, one path for front and rear",
+        "no correlation of any two of 15",
+        "of 4.75 standard errors",
+        1.0,
+        "once in 5000 by chance, fixed seeds",
+        streams,
+        against="none",
+        once=True,
+    ),
+    Case(
+        "stream in pieces",
+        "blocks may be asked for in any order by any worker",
+        "the whole, bit by bit",
+        "",
+        0.0,
+        "the same numbers",
+        pieces,
+        against="none",
+        once=True,
+    ),
+    Case(
+        "shape filter at any step",
+        "explicit Euler has 1 / (1 - a h / 2) of the variance",
+        "q / (2 corner) at half steps of 0.001 to 30 corner lengths",
+        "standard errors",
+        BEYOND + 0.6,
+        "once in a thousand by chance in five lengths, fixed seed",
+        any_step,
+        naive=any_step_naive,
+        once=True,
+    ),
+    Case(
+        "delay between steps",
+        "the wheelbase is no whole number of steps",
+        "the rear axle meets the front one's heights, its wheelbase later",
+        "of the wheelbase",
+        1e-3,
+        "the tolerance of the cells of the path",
+        odd_delay,
+        naive=odd_delay_naive,
+        once=True,
+    ),
+    Case(
+        "white noise on a gyro",
+        "Ito and Stratonovich differ, and a quaternion grows",
+        "E[tr E] = 3 exp(-s^2 t) on a turning body",
+        "standard errors",
+        BEYOND,
+        "once in a thousand, fixed seed",
+        attitude,
+        naive=attitude_naive,
+        once=True,
+    ),
+    Case(
+        "growth law at no growth",
+        "sinh x - x loses all digits where the exponent 3/2 begins",
+        "60 digits, for 2 lambda t from 0 to 600",
+        "relative",
+        1e-12,
+        "rounding of sinh x - x at x = 0.1 is 6e-14",
+        no_growth,
+        naive=no_growth_naive,
+        once=True,
+    ),
+    Case(
+        "delayed axle in Lyapunov's equation",
+        "its right side is indefinite: roots of it do not exist",
+        "the covariance is positive semidefinite at 2 to 60 m/s",
+        "of the largest eigenvalue",
+        1e-12,
+        "rounding; scaled by the states' own deviations",
+        indefinite,
+        against="none",
+    ),
+)

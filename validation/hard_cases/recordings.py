@@ -26,8 +26,9 @@ def _found(folder: Path, change: bench.Samples | None = None, **faults: Any) -> 
     return bench.findings(own, change(own, samples) if change else samples, folder)
 
 
-def spoilt(check: str, place: str, size: float | None, change: bench.Samples | None = None,
-           **faults: Any) -> Callable[[str, Path], float]:  # fmt: skip
+def spoilt(
+    check: str, place: str, size: float | None, change: bench.Samples | None = None, **faults: Any
+) -> Callable[[str, Path], float]:
     """A case of one fault: ``check`` must speak first, and of no other place than ``place``."""
 
     def error(implementation: str, folder: Path) -> float:
@@ -45,27 +46,73 @@ def clean(implementation: str, folder: Path) -> float:
 
 
 CASES = (
-    Case("clean recording", "a check that always cries is no check", "no error, no doubt", "findings", 0.0,
-         "noise as stated, nothing planted", clean, once=True),
-    *(Case(name, hard, check, "of its size", SIZE, "what was planted, 20 %", error, once=True)
-      for name, hard, check, error in (
-          ("wheel force in kN read as N", "a vehicle that flies off, or a plausible bias", "unit named at its channel",
-           spoilt("unit", "fl_fz", 1e-3, bench._times(1e-3, "fl_fz"))),
-          ("wheel force with the other sign", "its mean is that of another load", "sign named at its channel",
-           spoilt("sign", "rr_fz", -1.0, bench._times(-1.0, "rr_fz"))),
-          ("clipped wheel force", "the worst loads are missing, the mean hardly changes", "clipping, 3 % of samples",
-           spoilt("clipped", "fl_fz", 3.0, bench._clipped("fl_fz", 0.03))),
-          ("spike of one sample", "its damage is that of the whole recording; the mean hardly changes", "its height",
-           spoilt("spikes", "fl_fz", 5e3, bench._spiked("fl_fz", 2.0, 5e3))),
-          ("value held for 0.06 s", "shorter than a gap that is bridged: a straight line at any height",
-           "length and place", spoilt("clipped", "fl_fz", 0.06, bench._held("fl_fz", 2.0, 0.06))),
-          ("dead channel", "a constant is a valid number", "named as dead",
-           spoilt("clipped", "fr_fz", None, bench._times(0.0, "fr_fz", add=3e3))),
-          ("front wheels exchanged", "loads are alike left and right", "the sides named",
-           spoilt("swapped", "fl with fr", None, bench._exchanged(("fl", "fr")))),
-          ("one channel 3 ms late", "a phantom moment of pitch", "the delay and its channel",
-           spoilt("shift", "fl_fz", 3e-3, delay={"fl_fz": 3e-3})),
-          ("gap of half a second", "interpolated it is a road without roughness", "length and place",
-           spoilt("gaps", "rr_fz", 0.5, bench._lost("rr_fz", 3.0, 0.5))),
-      )),
-)  # fmt: skip
+    Case(
+        "clean recording",
+        "a check that always cries is no check",
+        "no error, no doubt",
+        "findings",
+        0.0,
+        "noise as stated, nothing planted",
+        clean,
+        once=True,
+    ),
+    *(
+        Case(name, hard, check, "of its size", SIZE, "what was planted, 20 %", error, once=True)
+        for name, hard, check, error in (
+            (
+                "wheel force in kN read as N",
+                "a vehicle that flies off, or a plausible bias",
+                "unit named at its channel",
+                spoilt("unit", "fl_fz", 1e-3, bench._times(1e-3, "fl_fz")),
+            ),
+            (
+                "wheel force with the other sign",
+                "its mean is that of another load",
+                "sign named at its channel",
+                spoilt("sign", "rr_fz", -1.0, bench._times(-1.0, "rr_fz")),
+            ),
+            (
+                "clipped wheel force",
+                "the worst loads are missing, the mean hardly changes",
+                "clipping, 3 % of samples",
+                spoilt("clipped", "fl_fz", 3.0, bench._clipped("fl_fz", 0.03)),
+            ),
+            (
+                "spike of one sample",
+                "its damage is that of the whole recording; the mean hardly changes",
+                "its height",
+                spoilt("spikes", "fl_fz", 5e3, bench._spiked("fl_fz", 2.0, 5e3)),
+            ),
+            (
+                "value held for 0.06 s",
+                "shorter than a gap that is bridged: a straight line at any height",
+                "length and place",
+                spoilt("clipped", "fl_fz", 0.06, bench._held("fl_fz", 2.0, 0.06)),
+            ),
+            (
+                "dead channel",
+                "a constant is a valid number",
+                "named as dead",
+                spoilt("clipped", "fr_fz", None, bench._times(0.0, "fr_fz", add=3e3)),
+            ),
+            (
+                "front wheels exchanged",
+                "loads are alike left and right",
+                "the sides named",
+                spoilt("swapped", "fl with fr", None, bench._exchanged(("fl", "fr"))),
+            ),
+            (
+                "one channel 3 ms late",
+                "a phantom moment of pitch",
+                "the delay and its channel",
+                spoilt("shift", "fl_fz", 3e-3, delay={"fl_fz": 3e-3}),
+            ),
+            (
+                "gap of half a second",
+                "interpolated it is a road without roughness",
+                "length and place",
+                spoilt("gaps", "rr_fz", 0.5, bench._lost("rr_fz", 3.0, 0.5)),
+            ),
+        )
+    ),
+)

@@ -55,16 +55,21 @@ def quarter(m_s: float, m_u: float, k: float, c: float, k_t: float, c_t: float =
     own = replace(load_vehicle("quarter_car"), name="quarter")
     bodies = tuple(replace(body, mass=m) for body, m in zip(own.bodies, (m_s, m_u), strict=True))
     springs = (replace(own.springs[0], stiffness=k, damping=c),)
-    return replace(own, bodies=bodies, springs=springs,
-                   tyres=(replace(own.tyres[0], stiffness=k_t, damping=c_t),))  # fmt: skip
+    return replace(own, bodies=bodies, springs=springs, tyres=(replace(own.tyres[0], stiffness=k_t, damping=c_t),))
 
 
 def single(mass: float, stiffness: float, damping: float) -> SpatialVehicle:
     """A body on a tyre, held by a damper to the ground; outputs: its acceleration and its height."""
     outputs = tuple(PointOutput(kind, kind, "body", BODY, (0.0, 0.0, 1.0)) for kind in ("acceleration", "displacement"))
     damper = SpringDamper("damper", "body", None, BODY, BODY, (0.0, 0.0, 1.0), 0.0, damping)
-    return SpatialVehicle("single", (Body("body", mass, BODY, ("z",)),), (damper,),
-                          (Tyre("tyre", "body", BODY, 0, stiffness),), (0.0,), outputs=outputs)  # fmt: skip
+    return SpatialVehicle(
+        "single",
+        (Body("body", mass, BODY, ("z",)),),
+        (damper,),
+        (Tyre("tyre", "body", BODY, 0, stiffness),),
+        (0.0,),
+        outputs=outputs,
+    )
 
 
 def own_road(vehicle: LinearVehicle, **words: str) -> Excitation:
@@ -234,8 +239,9 @@ def mirrored(implementation: str, folder: Path) -> float:
     own = load_vehicle("seven_freedoms")
     found = []
     for side in (1.0, -1.0):
-        springs = tuple(replace(s, stiffness=s.stiffness * (2.0 if side * s.point_one[1] > 0 else 1.0))
-                        for s in own.springs)  # fmt: skip
+        springs = tuple(
+            replace(s, stiffness=s.stiffness * (2.0 if side * s.point_one[1] > 0 else 1.0)) for s in own.springs
+        )
         vehicle = linear(replace(own, springs=springs), implementation)
         rows = [o.name == "body centre" or "angular" in o.kind for o in vehicle.outputs]
         found.append(_answer(vehicle)[rows])
@@ -300,53 +306,180 @@ def _unconnected(table: dict[str, Any]) -> None:
 REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 CLOSED, ROUNDED = "closed form", "rounding, and that of an engine's differences"
 CASES = (
-    Case("tyre damping on a road of first order", "the road's rate is white noise: a force without a variance",
-         "body by quadrature; tyre force called infinite", "", 1e-9, ROUNDED, damped_tyre, naive=damped_tyre_naive),
-    Case("road that walks at random", "its height has no variance, the vehicle's motion has one", CLOSED, "", 1e-10,
-         ROUNDED, closed_form(corner=0.0)),
-    Case("road that next to walks at random", "a corner of 1e-9 rad/m", CLOSED, "", 1e-6,
-         "counts as none: 2e-8 1/s beside 3 1/s", closed_form(corner=1e-9)),
-    Case("car that is free on the road", "three zero eigenvalues, two of them a Jordan pair",
-         "exact covariance after an hour", "", 1e-6, "rounding, doubled twenty times", free),
-    Case("roll steer on a free car", "its heading diffuses, its place sideways goes with t^3",
-         "exact covariance after 1 and 2 hours", "", 1e-3, "what is left of its first seconds", drifting),
-    Case("no damping at all", "an undamped motion under white noise: Lyapunov's equation has no solution",
-         "growth by S(w) / 2 w^2", "", 1e-9, ROUNDED, undamped(0.3)),
-    Case("no damping, road that next to walks", "undamped beside a pole at -2e-8 1/s", "growth by S(w) / 2 w^2", "",
-         1e-9, ROUNDED, undamped(1e-9)),
-    Case("next to no damping", "a damper of 0.1 mN s/m: ratio 2e-8", CLOSED, "", 1e-6, "asked for",
-         closed_form(c=1e-4)),
-    Case("threefold eigenvalue", "critical damping at the road's own corner: eigenvectors are parallel",
-         CLOSED, "", 1e-9, ROUNDED, triple, naive=triple_naive),
-    Case("stiffness ratio of 1e9", "a tyre of 2e13 N/m on a spring of 2e4 N/m", CLOSED, "", 1e-6, "asked for",
-         closed_form(k_t=2e13)),
-    Case("wheel of a milligram", "a rate of 1.5e9 1/s beside one of 1 1/s", CLOSED, "", 1e-6, "asked for",
-         closed_form(m_u=1e-6)),
-    Case("speeds of 1 mm/s and 300 m/s", "the road's rates lie five decades apart", CLOSED, "", 1e-10, ROUNDED,
-         closed_form(speeds=(1e-3, 300.0))),
-    Case("weighting at 1 mm/s", "eight states with rates of 600 1/s behind a road of 3e-4 1/s", "quadrature", "", 1e-9,
-         ROUNDED, slow_weighting),
+    Case(
+        "tyre damping on a road of first order",
+        "the road's rate is white noise: a force without a variance",
+        "body by quadrature; tyre force called infinite",
+        "",
+        1e-9,
+        ROUNDED,
+        damped_tyre,
+        naive=damped_tyre_naive,
+    ),
+    Case(
+        "road that walks at random",
+        "its height has no variance, the vehicle's motion has one",
+        CLOSED,
+        "",
+        1e-10,
+        ROUNDED,
+        closed_form(corner=0.0),
+    ),
+    Case(
+        "road that next to walks at random",
+        "a corner of 1e-9 rad/m",
+        CLOSED,
+        "",
+        1e-6,
+        "counts as none: 2e-8 1/s beside 3 1/s",
+        closed_form(corner=1e-9),
+    ),
+    Case(
+        "car that is free on the road",
+        "three zero eigenvalues, two of them a Jordan pair",
+        "exact covariance after an hour",
+        "",
+        1e-6,
+        "rounding, doubled twenty times",
+        free,
+    ),
+    Case(
+        "roll steer on a free car",
+        "its heading diffuses, its place sideways goes with t^3",
+        "exact covariance after 1 and 2 hours",
+        "",
+        1e-3,
+        "what is left of its first seconds",
+        drifting,
+    ),
+    Case(
+        "no damping at all",
+        "an undamped motion under white noise: Lyapunov's equation has no solution",
+        "growth by S(w) / 2 w^2",
+        "",
+        1e-9,
+        ROUNDED,
+        undamped(0.3),
+    ),
+    Case(
+        "no damping, road that next to walks",
+        "undamped beside a pole at -2e-8 1/s",
+        "growth by S(w) / 2 w^2",
+        "",
+        1e-9,
+        ROUNDED,
+        undamped(1e-9),
+    ),
+    Case(
+        "next to no damping", "a damper of 0.1 mN s/m: ratio 2e-8", CLOSED, "", 1e-6, "asked for", closed_form(c=1e-4)
+    ),
+    Case(
+        "threefold eigenvalue",
+        "critical damping at the road's own corner: eigenvectors are parallel",
+        CLOSED,
+        "",
+        1e-9,
+        ROUNDED,
+        triple,
+        naive=triple_naive,
+    ),
+    Case(
+        "stiffness ratio of 1e9",
+        "a tyre of 2e13 N/m on a spring of 2e4 N/m",
+        CLOSED,
+        "",
+        1e-6,
+        "asked for",
+        closed_form(k_t=2e13),
+    ),
+    Case(
+        "wheel of a milligram",
+        "a rate of 1.5e9 1/s beside one of 1 1/s",
+        CLOSED,
+        "",
+        1e-6,
+        "asked for",
+        closed_form(m_u=1e-6),
+    ),
+    Case(
+        "speeds of 1 mm/s and 300 m/s",
+        "the road's rates lie five decades apart",
+        CLOSED,
+        "",
+        1e-10,
+        ROUNDED,
+        closed_form(speeds=(1e-3, 300.0)),
+    ),
+    Case(
+        "weighting at 1 mm/s",
+        "eight states with rates of 600 1/s behind a road of 3e-4 1/s",
+        "quadrature",
+        "",
+        1e-9,
+        ROUNDED,
+        slow_weighting,
+    ),
     Case("delay of hours", "e^(A tau) underflows", "independent axles", "", 1e-12, "rounding", crawling),
     Case("two axles at one place", "a delay of nothing", "one input", "", 0.0, "exact", same_place),
-    Case("left springs twice the right ones", "roll and heave are coupled", "its mirror image", "", 1e-10, ROUNDED,
-         mirrored),
-    Case("drive from stop to stop", "path stands still while time goes on", "the road's own variance", "", 1e-10,
-         "rounding", standstill),
-    Case("damper of the wrong sign", "integrals over frequencies stay finite", "growth rate", "", 0.0, "exact",
-         unstable, REFUSED),
-    Case("top-heavy body under gravity", "stable unloaded, toppling loaded", "growth rate", "", 0.0, "exact",
-         toppling, REFUSED),
+    Case(
+        "left springs twice the right ones",
+        "roll and heave are coupled",
+        "its mirror image",
+        "",
+        1e-10,
+        ROUNDED,
+        mirrored,
+    ),
+    Case(
+        "drive from stop to stop",
+        "path stands still while time goes on",
+        "the road's own variance",
+        "",
+        1e-10,
+        "rounding",
+        standstill,
+    ),
+    Case(
+        "damper of the wrong sign",
+        "integrals over frequencies stay finite",
+        "growth rate",
+        "",
+        0.0,
+        "exact",
+        unstable,
+        REFUSED,
+    ),
+    Case(
+        "top-heavy body under gravity",
+        "stable unloaded, toppling loaded",
+        "growth rate",
+        "",
+        0.0,
+        "exact",
+        toppling,
+        REFUSED,
+    ),
     Case("no speed", "0, below 0, not a number", "refused by name", "", 0.0, "exact", no_speed, REFUSED),
-    *(Case(name, "a number from a singular or senseless matrix", f"refused at {place}", "", 0.0, "exact",
-           bad(change, place), REFUSED)
-      for name, place, change in (
-          ("negative mass", "bodies[rl].mass", lambda t: t["bodies"][2].update(mass=-1.0)),
-          ("mass of zero", "bodies[rl].mass", lambda t: t["bodies"][2].update(mass=0.0)),
-          ("missing mass", "bodies[rl].mass", lambda t: t["bodies"][2].pop("mass")),
-          ("body without inertia", "bodies[body].inertia", lambda t: t["bodies"][0].pop("inertia")),
-          ("unconnected body", "bodies[box]", _unconnected),
-          ("output on an unknown body", "outputs[body rear].body", lambda t: t["outputs"][2].update(body="bdoy")),
-          ("axle behind axle", "axles[rear].x", lambda t: t["axles"][1].update(x=2.0)),
-          ("negative damper in a file", "springs[rear left].damping", lambda t: t["springs"][1].update(damping=-1.0)),
-      )),
-)  # fmt: skip
+    *(
+        Case(
+            name,
+            "a number from a singular or senseless matrix",
+            f"refused at {place}",
+            "",
+            0.0,
+            "exact",
+            bad(change, place),
+            REFUSED,
+        )
+        for name, place, change in (
+            ("negative mass", "bodies[rl].mass", lambda t: t["bodies"][2].update(mass=-1.0)),
+            ("mass of zero", "bodies[rl].mass", lambda t: t["bodies"][2].update(mass=0.0)),
+            ("missing mass", "bodies[rl].mass", lambda t: t["bodies"][2].pop("mass")),
+            ("body without inertia", "bodies[body].inertia", lambda t: t["bodies"][0].pop("inertia")),
+            ("unconnected body", "bodies[box]", _unconnected),
+            ("output on an unknown body", "outputs[body rear].body", lambda t: t["outputs"][2].update(body="bdoy")),
+            ("axle behind axle", "axles[rear].x", lambda t: t["axles"][1].update(x=2.0)),
+            ("negative damper in a file", "springs[rear left].damping", lambda t: t["springs"][1].update(damping=-1.0)),
+        )
+    ),
+)

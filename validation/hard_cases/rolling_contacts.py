@@ -191,21 +191,61 @@ RIG: tuple[tuple[str, str, Error], ...] = (
     ("rig with a load of a micronewton", "patches of micrometres", partial(bounded, load=1e-6)),
 )
 CASES = (
-    *(Case(name, hard, "|F| <= mu N, no power; at rest, too", "mu N", 1e-8, "rounding of the approach", error)
-      for name, hard, error in RIG),
-    Case("rig that reverses", "leading edges become trailing ones", "forces do not jump", "mu N", 1e-5,
-         "slope times 2e-9 m/s", jumps),
-    Case("rig that only spins", "no creepage", "no force along the rail, some across", "mu N", 1e-9, "rounding",
-         spinning),
-    Case("rig at 0.1 m/s in steps of 1 ms", "friction damps at 1e5 1/s", "refused, or Newton's method says it failed",
-         "", 0.0, "exact", too_long, {"reference": "refused", "mujoco": "refused", "exudyn": "raised"}),
-    Case("contact that jumps to another patch", "loads come and go within steps", "energy is accounted for",
-         "of creep's", 1e-3, "error of the step", jumping),
-    Case("car off a ramp", "wheels lift off and land", "energy is accounted for", "of it", 1e-6, "error of the step",
-         leaping),
-    Case("car parked on a slope", "creepage by no speed", "creeps by less than 1 mm/s", "m/s", 1e-3, "asked for",
-         parked),
+    *(
+        Case(name, hard, "|F| <= mu N, no power; at rest, too", "mu N", 1e-8, "rounding of the approach", error)
+        for name, hard, error in RIG
+    ),
+    Case(
+        "rig that reverses",
+        "leading edges become trailing ones",
+        "forces do not jump",
+        "mu N",
+        1e-5,
+        "slope times 2e-9 m/s",
+        jumps,
+    ),
+    Case(
+        "rig that only spins", "no creepage", "no force along the rail, some across", "mu N", 1e-9, "rounding", spinning
+    ),
+    Case(
+        "rig at 0.1 m/s in steps of 1 ms",
+        "friction damps at 1e5 1/s",
+        "refused, or Newton's method says it failed",
+        "",
+        0.0,
+        "exact",
+        too_long,
+        {"reference": "refused", "mujoco": "refused", "exudyn": "raised"},
+    ),
+    Case(
+        "contact that jumps to another patch",
+        "loads come and go within steps",
+        "energy is accounted for",
+        "of creep's",
+        1e-3,
+        "error of the step",
+        jumping,
+    ),
+    Case(
+        "car off a ramp",
+        "wheels lift off and land",
+        "energy is accounted for",
+        "of it",
+        1e-6,
+        "error of the step",
+        leaping,
+    ),
+    Case(
+        "car parked on a slope", "creepage by no speed", "creeps by less than 1 mm/s", "m/s", 1e-3, "asked for", parked
+    ),
     Case("car with locked wheels", "all bristles slide", "mu N against the sliding", "mu N", 1e-9, "rounding", locked),
-    Case("car that rolls back", "tyres' speed passes 0", "energy is accounted for", "of it", 1e-6,
-         "error of the step", back),
-)  # fmt: skip
+    Case(
+        "car that rolls back",
+        "tyres' speed passes 0",
+        "energy is accounted for",
+        "of it",
+        1e-6,
+        "error of the step",
+        back,
+    ),
+)

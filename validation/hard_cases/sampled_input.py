@@ -200,6 +200,7 @@ def uneven(engine: str, folder: Path) -> float:
 REFUSED: dict[str, Word] = {"reference": "refused", "exudyn": "refused", "mujoco": "refused"}
 RAISED: dict[str, Word] = {"reference": "raised", "exudyn": "raised", "mujoco": "raised"}
 
+
 @cache
 def _bump() -> RoadUnderWheels:
     """A bump 50 mm high and 0.3 m long after 200 m of flat road, at 20 m/s."""
@@ -221,8 +222,14 @@ def bump_naive(folder: Path) -> str:
     """scipy's LSODA as it comes."""
     assembly = setups.vehicle().with_input("road", _bump())
     model = build("reference", assembly, setups.settings("reference", 5e-4, 10.5))
-    solution = solve_ivp(lambda t, y: np.concatenate((y[4:], model.acceleration(t, y))), (0.0, 10.5),
-                         assembly.initial, "LSODA", rtol=1e-6, atol=1e-9)  # fmt: skip
+    solution = solve_ivp(
+        lambda t, y: np.concatenate((y[4:], model.acceleration(t, y))),
+        (0.0, 10.5),
+        assembly.initial,
+        "LSODA",
+        rtol=1e-6,
+        atol=1e-9,
+    )
     return f"LSODA ends 'successfully' after {len(solution.t) - 1} steps with a pitch of {largest_pitch(solution.y)}"
 
 

@@ -19,13 +19,22 @@ IMPLICIT = {"reference": "Radau", "exudyn": "GeneralizedAlpha", "mujoco": "discr
 CONSTRAINED = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
 
 
-def vehicle(parameters: str = "itwm_drift", geometry: str = "exact", initial: np.ndarray | None = None,
-            effects: dict[str, Any] | None = None, **override: float) -> Assembly:  # fmt: skip
+def vehicle(
+    parameters: str = "itwm_drift",
+    geometry: str = "exact",
+    initial: np.ndarray | None = None,
+    effects: dict[str, Any] | None = None,
+    **override: float,
+) -> Assembly:
     """The vehicle at rest on the flat road, or in the state (8,) that is given."""
-    scene = build_scene({
-        "title": "hard case", "vehicle": {"parameters": parameters, "geometry": geometry, "override": override},
-        "run": {"duration": 1.0}, "effects": effects or {},
-    })  # fmt: skip
+    scene = build_scene(
+        {
+            "title": "hard case",
+            "vehicle": {"parameters": parameters, "geometry": geometry, "override": override},
+            "run": {"duration": 1.0},
+            "effects": effects or {},
+        }
+    )
     assembly = assemble(scene)
     return assembly if initial is None else replace(assembly, initial=np.array(initial, dtype=float))
 
@@ -47,8 +56,9 @@ def smooth_pitch(angles: np.ndarray, period: float) -> Smooth:
     return Smooth(angles[:, None], period, derivatives=2, degree=5)
 
 
-def static_forces(base: Assembly, count: int, period: float, held: bool = True, noise: float = 0.0,
-                  seed: int = 1) -> Sampled:  # fmt: skip
+def static_forces(
+    base: Assembly, count: int, period: float, held: bool = True, noise: float = 0.0, seed: int = 1
+) -> Sampled:
     """Wheel forces (N) that carry the vehicle, with independent noise of a standard deviation (N) per sample."""
     p, z = base.parameters, base.initial
     carried = np.array([p.k1 * z[0], p.k2 * z[1]])
@@ -60,14 +70,16 @@ def settings(engine: str, step: float, duration: float, integrator: str = "", **
     return Settings(integrator or RECOMMENDED[engine], step, duration, **other)
 
 
-def run(engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "",
-        **other: float) -> Trajectory:  # fmt: skip
+def run(
+    engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **other: float
+) -> Trajectory:
     """A run as a user gets it: refused where it must be."""
     return build(engine, assembly, settings(engine, step, duration, integrator, **other)).run()
 
 
-def unchecked(engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "",
-              **other: float) -> Trajectory:  # fmt: skip
+def unchecked(
+    engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **other: float
+) -> Trajectory:
     """The same past the checks before a run, so that only the guard after it stands."""
     own = settings(engine, step, duration, integrator, **other)
     return build_unchecked(engine, assembly, own).run()

@@ -56,13 +56,21 @@ def kink_naive(folder: Path) -> str:
 
 
 def _limit_stop(built: exudyn_engine.Build, spring: PitchSpring) -> None:
-    ground = built.mbs.AddMarker(items.MarkerNodeCoordinate(
-        nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0))
+    ground = built.mbs.AddMarker(
+        items.MarkerNodeCoordinate(nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0)
+    )
     state = built.mbs.AddNode(items.NodeGenericData(initialCoordinates=[0, 0, 0], numberOfDataCoordinates=3))
-    built.mbs.AddObject(items.CoordinateSpringDamperExt(
-        markerNumbers=[ground, built.places[spring.body, "pitch"]], nodeNumber=state, useLimitStops=True,
-        limitStopsUpper=spring.dead_band, limitStopsLower=-spring.dead_band, limitStopsStiffness=spring.stiffness,
-        limitStopsDamping=spring.damping))  # fmt: skip
+    built.mbs.AddObject(
+        items.CoordinateSpringDamperExt(
+            markerNumbers=[ground, built.places[spring.body, "pitch"]],
+            nodeNumber=state,
+            useLimitStops=True,
+            limitStopsUpper=spring.dead_band,
+            limitStopsLower=-spring.dead_band,
+            limitStopsStiffness=spring.stiffness,
+            limitStopsDamping=spring.damping,
+        )
+    )
 
 
 def never_left(engine: str, folder: Path) -> float:
@@ -160,8 +168,10 @@ def measured_pitch(folder: Path, **values: float) -> Assembly:
     noise = np.deg2rad(0.1) * np.random.default_rng(8).standard_normal(len(t))
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", 0.05 * np.sin(6.0 * t) + noise)}, STEP)
     write_time_series(folder / "forces.csv", {"front": ("N", 3.8e3 + 0 * t), "rear": ("N", 3.8e3 + 0 * t)}, STEP)
-    effects = {"wheel_forces": {"file": "forces.csv", "interpolation": "linear"},
-               "prescribed_pitch": {"file": "pitch.csv", **values}}  # fmt: skip
+    effects = {
+        "wheel_forces": {"file": "forces.csv", "interpolation": "linear"},
+        "prescribed_pitch": {"file": "pitch.csv", **values},
+    }
     return assemble(build_scene({"title": "hard case", "run": {"duration": 1.0}, "effects": effects}, "", folder))
 
 
@@ -201,34 +211,115 @@ def _refusing(effects: dict[str, Any]) -> Callable[[str, Path], float]:
 
 
 CASES = (
-    Case("edge of a dead band", "the spring's law has a kink that a step does not stop at", "order 8, tolerance 1e-12",
-         "rad", 5e-7, "three crossings; what a step across an edge leaves falls as h^2 to h^3, from 2.3e-7 here",
-         kink, {}, kink_naive, against="native"),
-    Case("dead band that is never left", "the law is asked at every stage and must give nothing",
-         "the same vehicle without the spring", "SI", 0.0, "nothing added is nothing", never_left),
-    Case("added moment beside held forces", "forces stay over a step while the moment moves on",
-         "order 8, tolerance 1e-12, restarted at each sample", "rad", 1e-7, "RK4's own error at 1 ms",
-         moving_moment, {}, moving_moment_naive, against="native"),
-    Case("added moment sampled off the steps", "its corners lie within the steps", "refused", "", 0.0,
-         "a corner within a step costs Runge-Kutta its order", moment_off_the_grid, EVERYWHERE, against="none"),
-    Case("5 % of the chassis missing", "the motion is prescribed: no state shows it", "dm (g - z3'')",
-         "of that force", 1e-3, "generalised-alpha's start rings for 20 of 2,000 rows", missing_mass, {},
-         missing_mass_naive),
-    Case("noise of 1e-6 on prescribed heave and pitch", "its second derivatives are noise of kN and kN m",
-         "at most 3 m s sqrt(6) / dt^2", "m s sqrt(6) / dt^2", 3.0,
-         "the finite-difference value; the spline's own gain is below 3", rough_rails, {"exudyn": "raised"},
-         against="native"),
-    Case("measured pitch, smoothed", "noise of 0.1 degrees at 1 kHz is 1e6 N m",
-         "pitch eliminated, an eighth of the step", "of its rms", 1e-3,
-         "second order at 5 Hz and 1 ms: (2 pi f h)^2 / 12 = 8e-5, and the start's rest", smoothed, {}, smoothed_naive,
-         against="native"),
-    Case("bandwidth above half the sampling rate", "there is no such motion in the file", "refused", "", 0.0,
-         "the filter does not exist", beyond_nyquist, EVERYWHERE, against="none"),
-    Case("high-pass stiffer than the step", "a corner of 1 kHz is a pole that Runge-Kutta at 1 ms cannot follow",
-         "refused", "", 0.0, "an error would grow", _refusing({"high_pass": {"cut_off": 1000.0}}), EVERYWHERE,
-         against="none"),
-    Case("spring beside a prescribed pitch", "one of the two would do nothing", "refused", "", 0.0,
-         "a scene that says two things", _refusing({"pitch_spring": {"stiffness": 1e3},
-                                                    "prescribed_pitch": {"file": "pitch.csv"}}), EVERYWHERE,
-         against="none"),
-)  # fmt: skip
+    Case(
+        "edge of a dead band",
+        "the spring's law has a kink that a step does not stop at",
+        "order 8, tolerance 1e-12",
+        "rad",
+        5e-7,
+        "three crossings; what a step across an edge leaves falls as h^2 to h^3, from 2.3e-7 here",
+        kink,
+        {},
+        kink_naive,
+        against="native",
+    ),
+    Case(
+        "dead band that is never left",
+        "the law is asked at every stage and must give nothing",
+        "the same vehicle without the spring",
+        "SI",
+        0.0,
+        "nothing added is nothing",
+        never_left,
+    ),
+    Case(
+        "added moment beside held forces",
+        "forces stay over a step while the moment moves on",
+        "order 8, tolerance 1e-12, restarted at each sample",
+        "rad",
+        1e-7,
+        "RK4's own error at 1 ms",
+        moving_moment,
+        {},
+        moving_moment_naive,
+        against="native",
+    ),
+    Case(
+        "added moment sampled off the steps",
+        "its corners lie within the steps",
+        "refused",
+        "",
+        0.0,
+        "a corner within a step costs Runge-Kutta its order",
+        moment_off_the_grid,
+        EVERYWHERE,
+        against="none",
+    ),
+    Case(
+        "5 % of the chassis missing",
+        "the motion is prescribed: no state shows it",
+        "dm (g - z3'')",
+        "of that force",
+        1e-3,
+        "generalised-alpha's start rings for 20 of 2,000 rows",
+        missing_mass,
+        {},
+        missing_mass_naive,
+    ),
+    Case(
+        "noise of 1e-6 on prescribed heave and pitch",
+        "its second derivatives are noise of kN and kN m",
+        "at most 3 m s sqrt(6) / dt^2",
+        "m s sqrt(6) / dt^2",
+        3.0,
+        "the finite-difference value; the spline's own gain is below 3",
+        rough_rails,
+        {"exudyn": "raised"},
+        against="native",
+    ),
+    Case(
+        "measured pitch, smoothed",
+        "noise of 0.1 degrees at 1 kHz is 1e6 N m",
+        "pitch eliminated, an eighth of the step",
+        "of its rms",
+        1e-3,
+        "second order at 5 Hz and 1 ms: (2 pi f h)^2 / 12 = 8e-5, and the start's rest",
+        smoothed,
+        {},
+        smoothed_naive,
+        against="native",
+    ),
+    Case(
+        "bandwidth above half the sampling rate",
+        "there is no such motion in the file",
+        "refused",
+        "",
+        0.0,
+        "the filter does not exist",
+        beyond_nyquist,
+        EVERYWHERE,
+        against="none",
+    ),
+    Case(
+        "high-pass stiffer than the step",
+        "a corner of 1 kHz is a pole that Runge-Kutta at 1 ms cannot follow",
+        "refused",
+        "",
+        0.0,
+        "an error would grow",
+        _refusing({"high_pass": {"cut_off": 1000.0}}),
+        EVERYWHERE,
+        against="none",
+    ),
+    Case(
+        "spring beside a prescribed pitch",
+        "one of the two would do nothing",
+        "refused",
+        "",
+        0.0,
+        "a scene that says two things",
+        _refusing({"pitch_spring": {"stiffness": 1e3}, "prescribed_pitch": {"file": "pitch.csv"}}),
+        EVERYWHERE,
+        against="none",
+    ),
+)

@@ -22,8 +22,12 @@ from validation.cases.hub_forces import r19
 
 PERIOD, SEAM, BLOCK = 1e-3, 1000, 60_000
 """s; samples over which a repetition fades into the next; samples made at once."""
-PLACES = {"acc fl": (1.2, 0.6, 0.6), "acc fr": (1.2, -0.6, 0.6), "acc rear": (-1.3, 0.0, 0.6),
-          "acc roof": (0.0, 0.0, 1.4)}  # fmt: skip
+PLACES = {
+    "acc fl": (1.2, 0.6, 0.6),
+    "acc fr": (1.2, -0.6, 0.6),
+    "acc rear": (-1.3, 0.0, 0.6),
+    "acc roof": (0.0, 0.0, 1.4),
+}
 NOISE = {"force": 8.0, "moment": 1.0, "angle": 1.75e-3, "angular rate": 5e-3, "acceleration": 0.01, "travel": 1e-5}
 """Standard deviations on every sample, SI."""
 SEED = 81
@@ -34,8 +38,12 @@ def pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndarray]:
     """Signals and their true samples (n, 60), one repetition and its seam."""
     car = r19()
     names = [element.name for element in car.elements]
-    table = VirtualTable(duration=seconds, accelerometers={name: list(place) for name, place in PLACES.items()},
-                         travels=names[:10], sections=names[:9])  # fmt: skip
+    table = VirtualTable(
+        duration=seconds,
+        accelerometers={name: list(place) for name, place in PLACES.items()},
+        travels=names[:10],
+        sections=names[:9],
+    )
     found = virtual_measurement(car, table, "mujoco")
     assert len(found.signals) == 60
     return found.signals, found.samples(Faults(), 1)
@@ -71,8 +79,14 @@ def sections() -> Sections:
     return Sections(r19(), points=tuple(Point(name, "body", place) for name, place in PLACES.items()))
 
 
-def run_of(folder: Path, seconds: float, repeated: float = 20.0, engine: str = "mujoco",
-           hold: Hold | None = None, step: float | None = None) -> SectionRun:  # fmt: skip
+def run_of(
+    folder: Path,
+    seconds: float,
+    repeated: float = 20.0,
+    engine: str = "mujoco",
+    hold: Hold | None = None,
+    step: float | None = None,
+) -> SectionRun:
     """A run of a recording in this folder, which is made unless it is there."""
     path, (signals, _) = folder / "recording.f64", pattern(repeated)
     if path.with_suffix(".json").is_file():
@@ -95,8 +109,15 @@ def killed(folder: Path, seconds: float, repeated: float, block: float, times: i
     Moments are drawn from the ``lasting`` s after the first line of progress.
     """
     rng, kills, runs = np.random.default_rng(SEED), 0, 0
-    command = [sys.executable, "-m", "validation.measured.long_recording", str(folder), str(seconds), str(repeated),
-               str(block)]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "validation.measured.long_recording",
+        str(folder),
+        str(seconds),
+        str(repeated),
+        str(block),
+    ]
     while True:
         runs += 1
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:

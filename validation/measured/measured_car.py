@@ -11,10 +11,15 @@ from models.sensors.rotations import matrix
 from validation.measured import recording as car
 
 CHANNELS: tuple[tuple[str, Quantity, str], ...] = (
-    ("ax", "acceleration", "x"), ("ay", "acceleration", "y"), ("az", "acceleration", "z"),
-    ("p", "angular rate", "roll"), ("q", "angular rate", "pitch"), ("r", "angular rate", "yaw"),
-    ("roll", "angle", "roll"), ("pitch", "angle", "pitch"),
-)  # fmt: skip
+    ("ax", "acceleration", "x"),
+    ("ay", "acceleration", "y"),
+    ("az", "acceleration", "z"),
+    ("p", "angular rate", "roll"),
+    ("q", "angular rate", "pitch"),
+    ("r", "angular rate", "yaw"),
+    ("roll", "angle", "roll"),
+    ("pitch", "angle", "pitch"),
+)
 TURNED = np.array([1.0, -1.0, -1.0])
 """The telephone's x forward, y right, z down into x forward, y left, z up."""
 
@@ -38,6 +43,7 @@ def recording(values: np.ndarray, path: Path) -> Recording:
     """Samples (n, channels) as a recording; its columns lie at ``path``."""
     own = Columns(path, tuple(name for name, *_ in CHANNELS), len(values))
     own.write(0, values)
-    signals = tuple(Signal(name, "", name, what, "body", component, "body", 1, "", 1.0)
-                    for name, what, component in CHANNELS)  # fmt: skip
+    signals = tuple(
+        Signal(name, "", name, what, "body", component, "body", 1, "", 1.0) for name, what, component in CHANNELS
+    )
     return Recording(signals, own, car.PERIOD)

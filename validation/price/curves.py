@@ -57,8 +57,14 @@ class Reach:
     how: Literal["interpolated", "tried", "coarsest", "extrapolated"]
 
 
-def reach(values: Sequence[float], errors: Sequence[float], costs: Sequence[float], target: float,
-          order: int = 0, extrapolate: bool = False) -> Reach | None:  # fmt: skip
+def reach(
+    values: Sequence[float],
+    errors: Sequence[float],
+    costs: Sequence[float],
+    target: float,
+    order: int = 0,
+    extrapolate: bool = False,
+) -> Reach | None:
     """Cost at which a curve meets ``target`` and stays below it.
 
     Points are taken from coarse to fine by ``values``. With the declared ``order`` of a fixed-step method the

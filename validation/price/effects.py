@@ -95,10 +95,19 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
         except (InputError, RunFailed) as error:
             whys[name] = getattr(error, "why", "") or getattr(error, "allowed", "") or str(error)
     micros = _turns(runs)
-    prices = [_price(variants, name, base, first.get(name), micros.get(name), micros[""], whys.get(name, ""))
-              for name in names]  # fmt: skip
-    return PriceList(scene.title, engine, system.steps(short), system.steps(all_of_it.scene), base.counts,
-                     spread(micros[""]), tuple(prices))  # fmt: skip
+    prices = [
+        _price(variants, name, base, first.get(name), micros.get(name), micros[""], whys.get(name, ""))
+        for name in names
+    ]
+    return PriceList(
+        scene.title,
+        engine,
+        system.steps(short),
+        system.steps(all_of_it.scene),
+        base.counts,
+        spread(micros[""]),
+        tuple(prices),
+    )
 
 
 def _turns(runs: dict[str, Callable[[], Answer]]) -> dict[str, np.ndarray]:
@@ -120,8 +129,15 @@ def spread(values: np.ndarray) -> tuple[float, float]:
     return told["median"], told["mad"]
 
 
-def _price(variants: Variants, name: str, base: Answer, other: Answer | None, took: np.ndarray | None, own: np.ndarray,
-           why: str) -> Price:  # fmt: skip
+def _price(
+    variants: Variants,
+    name: str,
+    base: Answer,
+    other: Answer | None,
+    took: np.ndarray | None,
+    own: np.ndarray,
+    why: str,
+) -> Price:
     there, says = name in variants.effects, variants.says(name)
     if other is None or took is None:
         return Price(name, there, says, why)
@@ -129,8 +145,17 @@ def _price(variants: Variants, name: str, base: Answer, other: Answer | None, to
     slow, fast = (own, took) if there else (took, own)
     seconds = np.maximum(slow, 1e-9), np.maximum(fast, 1e-9)
     gone = tuple(key for key in after.quantities if key not in before.quantities)
-    return Price(name, there, says, "", (before.counts, after.counts), spread(slow - fast), paired_ratio(*seconds),
-                 _changes(base, other), gone)  # fmt: skip
+    return Price(
+        name,
+        there,
+        says,
+        "",
+        (before.counts, after.counts),
+        spread(slow - fast),
+        paired_ratio(*seconds),
+        _changes(base, other),
+        gone,
+    )
 
 
 def _changes(base: Answer, other: Answer) -> tuple[Changed, ...]:

@@ -38,8 +38,15 @@ def price_list_of_ride(scene: Any) -> PriceList:
     says = listing(scene.system)
     prices = [_price(whole, effect.name, effect.says, rests[effect.name], micros) for effect in effects]
     prices += [_price(whole, name, says[name], more[name], micros, there=False) for name in more]
-    return PriceList(f"{scene.title} (at {whole.speed:g} m/s)", "closed form", STEPS, STEPS, _counts(whole.full),
-                     spread(micros[""]), tuple(prices))  # fmt: skip
+    return PriceList(
+        f"{scene.title} (at {whole.speed:g} m/s)",
+        "closed form",
+        STEPS,
+        STEPS,
+        _counts(whole.full),
+        spread(micros[""]),
+        tuple(prices),
+    )
 
 
 def _rest(whole: Whole, effect: Effect) -> Reduced | str:
@@ -91,16 +98,25 @@ def _timed(A: np.ndarray) -> float:
     return 1e6 * (time.process_time() - begun) / STEPS
 
 
-def _price(whole: Whole, name: str, says: str, other: Reduced | str, micros: dict[str, np.ndarray],
-           there: bool = True) -> Price:  # fmt: skip
+def _price(
+    whole: Whole, name: str, says: str, other: Reduced | str, micros: dict[str, np.ndarray], there: bool = True
+) -> Price:
     """Of an effect that is ``there``, by the scene without it, or of one more, by the scene with it."""
     if isinstance(other, str):
         return Price(name, there, says, other)
     without_it, with_it = ((other, micros[name]), (whole.full, micros[""]))[:: 1 if there else -1]
     gone = tuple(key for key in with_it[0].system.names if key not in without_it[0].system.names)
-    return Price(name, there, says, "", (_counts(without_it[0]), _counts(with_it[0])),
-                 spread(with_it[1] - without_it[1]), paired_ratio(with_it[1].tolist(), without_it[1].tolist()),
-                 _changes(whole, other), gone)  # fmt: skip
+    return Price(
+        name,
+        there,
+        says,
+        "",
+        (_counts(without_it[0]), _counts(with_it[0])),
+        spread(with_it[1] - without_it[1]),
+        paired_ratio(with_it[1].tolist(), without_it[1].tolist()),
+        _changes(whole, other),
+        gone,
+    )
 
 
 def _changes(whole: Whole, rest: Reduced) -> tuple[Changed, ...]:
@@ -114,6 +130,9 @@ def _changes(whole: Whole, rest: Reduced) -> tuple[Changed, ...]:
     except InputError:
         return ()
     rows = zip(names, units, full, left, strict=True)
-    found = [Changed(name, unit, float(abs(b - a)), float(abs(b / a - 1.0)))
-             for name, unit, a, b in rows if np.isfinite(a) and a > 0.0]  # fmt: skip
+    found = [
+        Changed(name, unit, float(abs(b - a)), float(abs(b / a - 1.0)))
+        for name, unit, a, b in rows
+        if np.isfinite(a) and a > 0.0
+    ]
     return tuple(sorted(found, key=lambda one: -one.relative))

@@ -19,13 +19,17 @@ def lines(found: PriceList, quantities: list[str]) -> list[str]:
     """What the scene costs, then every effect with what it costs and changes."""
     counts = ", ".join(f"{value:,} {name}" for name, value in found.counts.items())
     part = "" if found.each >= found.whole else f", {found.each:,} of {found.whole:,} steps priced"
-    return [found.title,
-            f"  {found.engine}, {counts}{part}; {_micros(found.micros)} a step, CPU, median and its deviation",
-            "", "  effects of the scene: what each adds to it, and what leaving it out changes",
-            *(line for one in found.prices if one.there for line in _price(one, quantities)),
-            *_absent(found, quantities),
-            "", "  changes: rms of the difference, largest of all cases; in ( ) by the quantity's own deviation"
-            + ("; +- what chance may add, of so few samples" if _by_chance(found) else "")]  # fmt: skip
+    return [
+        found.title,
+        f"  {found.engine}, {counts}{part}; {_micros(found.micros)} a step, CPU, median and its deviation",
+        "",
+        "  effects of the scene: what each adds to it, and what leaving it out changes",
+        *(line for one in found.prices if one.there for line in _price(one, quantities)),
+        *_absent(found, quantities),
+        "",
+        "  changes: rms of the difference, largest of all cases; in ( ) by the quantity's own deviation"
+        + ("; +- what chance may add, of so few samples" if _by_chance(found) else ""),
+    ]
 
 
 def _by_chance(found: PriceList) -> bool:

@@ -60,8 +60,13 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
     figure.text(0.011, 0.98 - 0.026 * (1 + title.count("\n")), same, va="top", fontsize=9, color="#333333")
     handles = _legend(points, styles)
     longest = max(len(str(handle.get_label())) for handle in handles[: len(styles)])
-    figure.legend(handles=handles, loc="outside lower center", ncols=5 if longest <= LONGEST else 4, fontsize=8.5,
-                  handlelength=3.2)  # fmt: skip
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=5 if longest <= LONGEST else 4,
+        fontsize=8.5,
+        handlelength=3.2,
+    )
     return figure
 
 
@@ -73,8 +78,12 @@ def _styles(points: list[Point]) -> dict[str, dict[str, Any]]:
         colour = _colour(one.engine, points)
         used = {style["marker"] for style in found.values() if style["color"] == colour}
         marker = SHARED.get(one.method) or next((m for m in MARKERS if m not in used), ".")
-        found[one.curve] = {"color": colour, "marker": marker, "linestyle": STYLES.get(one.order, "-"),
-                            "markersize": SIZES.get(one.engine, 5)}  # fmt: skip
+        found[one.curve] = {
+            "color": colour,
+            "marker": marker,
+            "linestyle": STYLES.get(one.order, "-"),
+            "markersize": SIZES.get(one.engine, 5),
+        }
     return found
 
 
@@ -100,8 +109,9 @@ def _curve(ax: Axes, problem: dict[str, Any], own: list[Point], kind: str, style
         alike[place[1] < floor, kind == "seconds" and p.changed is None].append(place)
     for (hollow, once), some in alike.items():
         look = {**style, "linestyle": "none", "markersize": style["markersize"] * (ONCE if once else 1.0)}
-        ax.plot(*zip(*some, strict=True), **look, markerfacecolor="white" if hollow else style["color"],
-                markeredgewidth=0.9)  # fmt: skip
+        ax.plot(
+            *zip(*some, strict=True), **look, markerfacecolor="white" if hollow else style["color"], markeredgewidth=0.9
+        )
 
 
 def _floor(ax: Axes, problem: dict[str, Any]) -> None:
@@ -110,16 +120,31 @@ def _floor(ax: Axes, problem: dict[str, Any]) -> None:
     unit = problem["units"][quantity_of(problem)]
     ax.axhspan(1e-30, own, color="#bbbbbb", alpha=0.6, zorder=0, linewidth=0)
     ax.axhspan(own, curves.HOLLOW * own, color="#bbbbbb", alpha=0.25, zorder=0, linewidth=0)
-    ax.text(0.015, 0.012, f"reference known to {own:.1g} {unit} (dark);\nbelow ten times that: hollow",
-            transform=ax.transAxes, ha="left", va="bottom", fontsize=8, color="#555555")  # fmt: skip
+    ax.text(
+        0.015,
+        0.012,
+        f"reference known to {own:.1g} {unit} (dark);\nbelow ten times that: hollow",
+        transform=ax.transAxes,
+        ha="left",
+        va="bottom",
+        fontsize=8,
+        color="#555555",
+    )
 
 
 def _front(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> None:
     """The settings that no other one beats, as a broad pale line behind the curves."""
     quantity = quantity_of(problem)
     front = cost.front(points, quantity, problem["uncertainty"][quantity], kind)
-    ax.plot([p.cost(kind) for p in front], [p.errors[quantity] for p in front], color="#f0c808", linewidth=9,
-            alpha=0.45, solid_capstyle="round", zorder=1)  # fmt: skip
+    ax.plot(
+        [p.cost(kind) for p in front],
+        [p.errors[quantity] for p in front],
+        color="#f0c808",
+        linewidth=9,
+        alpha=0.45,
+        solid_capstyle="round",
+        zorder=1,
+    )
 
 
 def _defaults(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> None:
@@ -129,13 +154,22 @@ def _defaults(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str)
     taken = _drawn(ax)
     for owner, p in found:
         place = (p.cost(kind), p.errors[quantity])
-        ax.plot(*place, "o", markersize=15, markerfacecolor="none", markeredgecolor="#111111", markeredgewidth=1.4,
-                zorder=5)  # fmt: skip
+        ax.plot(
+            *place, "o", markersize=15, markerfacecolor="none", markeredgecolor="#111111", markeredgewidth=1.4, zorder=5
+        )
         corner = _emptiest(taken, _within(ax, [place])[0])
         taken = np.vstack([taken, corner + LABEL * np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]])])
-        ax.annotate(f"{owner} default:\n{p.setting.method},\n{p.setting.label()}", place, fontsize=8.5,
-                    xytext=(float(corner[0]), float(corner[1])), textcoords="axes fraction", ha="left", va="center",
-                    zorder=6, arrowprops={"arrowstyle": "-", "color": "#111111", "linewidth": 0.7, "shrinkB": 7})
+        ax.annotate(
+            f"{owner} default:\n{p.setting.method},\n{p.setting.label()}",
+            place,
+            fontsize=8.5,
+            xytext=(float(corner[0]), float(corner[1])),
+            textcoords="axes fraction",
+            ha="left",
+            va="center",
+            zorder=6,
+            arrowprops={"arrowstyle": "-", "color": "#111111", "linewidth": 0.7, "shrinkB": 7},
+        )
 
 
 LABEL = np.array([0.27, 0.09])
@@ -198,8 +232,11 @@ def _who(failed: list[Point], status: str) -> str:
     unstable = [p for p in own if not p.setting.adaptive]
     what = "beyond stability, steps" if status == "refused" else "settings"
     parts = [f"{what}: {len(unstable)} (crosses)"] if unstable else []
-    parts += [f"{p.setting.method} ({'not implemented' if 'not implemented' in p.reason else 'see table'})"
-              for p in own if p.setting.adaptive]  # fmt: skip
+    parts += [
+        f"{p.setting.method} ({'not implemented' if 'not implemented' in p.reason else 'see table'})"
+        for p in own
+        if p.setting.adaptive
+    ]
     return ", ".join(parts)
 
 

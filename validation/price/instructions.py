@@ -27,10 +27,18 @@ from validation.scenes import road_scene
 
 SYSTEM: System = "cost"
 METHODS = {
-    "exudyn": ("GeneralizedAlpha", "TrapezoidalIndex2", "RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler",
-               "VelocityVerlet"),
+    "exudyn": (
+        "GeneralizedAlpha",
+        "TrapezoidalIndex2",
+        "RK44",
+        "RK67",
+        "RK33",
+        "ExplicitMidpoint",
+        "ExplicitEuler",
+        "VelocityVerlet",
+    ),
     "mujoco": ("Euler", "implicit", "implicitfast", "discrete", "RK4"),
-}  # fmt: skip
+}
 STEPS = (40, 120)
 """Steps of the runs that are differenced."""
 BOUND = 1e-6
@@ -48,10 +56,20 @@ def measure(folder: Path) -> tuple[list[Row], dict[str, Any]]:
     except (subprocess.SubprocessError, OSError) as error:
         return [not_run(ID, SYSTEM, WHAT, f"valgrind failed: {str(error).splitlines()[0][:120]}")], {}
     off = np.abs(again / first - 1.0).max(axis=1)
-    rows = [at_most(f"{ID}.{engine}", SYSTEM, f"{WHAT}: largest difference of a run in {LABELS[engine]}",
-                    float(own.max()), "relative", BOUND, "the same instructions in the same order: seed of hashes and "
-                    "number of threads are set, and no clock's reading is printed while they are counted", "none")
-            for engine, own in zip(METHODS, np.split(off, [len(METHODS["exudyn"])]), strict=True)]  # fmt: skip
+    rows = [
+        at_most(
+            f"{ID}.{engine}",
+            SYSTEM,
+            f"{WHAT}: largest difference of a run in {LABELS[engine]}",
+            float(own.max()),
+            "relative",
+            BOUND,
+            "the same instructions in the same order: seed of hashes and "
+            "number of threads are set, and no clock's reading is printed while they are counted",
+            "none",
+        )
+        for engine, own in zip(METHODS, np.split(off, [len(METHODS["exudyn"])]), strict=True)
+    ]
     per_step = np.diff(first, axis=1)[:, 0] / (STEPS[1] - STEPS[0])
     curves = [f"{engine} {method}" for engine, methods in METHODS.items() for method in methods]
     return rows, dict(zip(curves, per_step.tolist(), strict=True))
@@ -62,15 +80,31 @@ def _counted(folder: Path) -> np.ndarray:
     folder.mkdir()
     vehicle = assemble(road_scene()).vehicle
     mass, damping, stiffness, *_ = linearised(vehicle)
-    given = {"masses": np.diag(mass).tolist(), "damping": damping.tolist(), "stiffness": stiffness.tolist(),
-             "methods": METHODS, "steps": STEPS}  # fmt: skip
+    given = {
+        "masses": np.diag(mass).tolist(),
+        "damping": damping.tolist(),
+        "stiffness": stiffness.tolist(),
+        "methods": METHODS,
+        "steps": STEPS,
+    }
     settled = {**os.environ, "PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
-    command = ["valgrind", "--tool=callgrind", "--instr-atstart=no", f"--dump-before={instructions_run.MARK}",
-               f"--callgrind-out-file={folder}/count.%p", sys.executable, instructions_run.__file__, json.dumps(given)]
+    command = [
+        "valgrind",
+        "--tool=callgrind",
+        "--instr-atstart=no",
+        f"--dump-before={instructions_run.MARK}",
+        f"--callgrind-out-file={folder}/count.%p",
+        sys.executable,
+        instructions_run.__file__,
+        json.dumps(given),
+    ]
     subprocess.run(command, env=settled, check=True, capture_output=True, timeout=PATIENCE)
     marches = sum(map(len, METHODS.values())) * len(STEPS)
-    found = {path: [_total(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
-             for path in folder.glob("count.*") if path.with_name(f"{path.name}.{marches + 1}").exists()}
+    found = {
+        path: [_total(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
+        for path in folder.glob("count.*")
+        if path.with_name(f"{path.name}.{marches + 1}").exists()
+    }
     shutil.rmtree(folder)
     return np.array([*found.values()], float).reshape(2, -1, len(STEPS))
 
@@ -85,7 +119,9 @@ def _total(dump: Path) -> int:
 def table(per_step: dict[str, float]) -> Table:
     """Instructions per step."""
     rows = tuple((named(curve), f"{count / 1e3:,.1f}") for curve, count in per_step.items())
-    note = (f"Linear pitch-plane vehicle, steps of {1e3 * instructions_run.STEP:g} ms, all forces from one Python "
-            "function, which they include: the engine, the way into Python and a law there. The start of a run is "
-            "differenced out.")  # fmt: skip
+    note = (
+        f"Linear pitch-plane vehicle, steps of {1e3 * instructions_run.STEP:g} ms, all forces from one Python "
+        "function, which they include: the engine, the way into Python and a law there. The start of a run is "
+        "differenced out."
+    )
     return Table("Instructions per step", note, ("method", "thousand instructions a step"), rows)

@@ -39,9 +39,14 @@ def exudyn_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
     exu.config.printToConsole = False
     container = exu.SystemContainer()
     mbs: Any = container.AddSystem()
-    node = mbs.AddNode(items.NodeGenericODE2(
-        numberOfODE2Coordinates=4, referenceCoordinates=[0.0] * 4, initialCoordinates=[1e-3] * 4,
-        initialCoordinates_t=[0.0] * 4))  # fmt: skip
+    node = mbs.AddNode(
+        items.NodeGenericODE2(
+            numberOfODE2Coordinates=4,
+            referenceCoordinates=[0.0] * 4,
+            initialCoordinates=[1e-3] * 4,
+            initialCoordinates_t=[0.0] * 4,
+        )
+    )
     user: Any = lambda mbs, t, item, q, v: law(q, v)  # noqa: E731
     mbs.AddObject(items.ObjectGenericODE2(nodeNumbers=[node], massMatrix=np.diag(masses), forceUserFunction=user))
     mbs.Assemble()
@@ -62,11 +67,14 @@ def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
     """Likewise, in MuJoCo's own loop."""
     import mujoco
 
-    bodies = "".join(f'<body><joint type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="{mass!r}" '
-                     'diaginertia="1 1 1"/></body>' for mass in masses)  # fmt: skip
+    bodies = "".join(
+        f'<body><joint type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="{mass!r}" diaginertia="1 1 1"/></body>'
+        for mass in masses
+    )
     model = mujoco.MjModel.from_xml_string(
         f'<mujoco><option timestep="{STEP}" gravity="0 0 0"><flag contact="disable" constraint="disable"/></option>'
-        f"<worldbody>{bodies}</worldbody></mujoco>")  # fmt: skip
+        f"<worldbody>{bodies}</worldbody></mujoco>"
+    )
     data = mujoco.MjData(model)
 
     def passive(model: Any, data: Any) -> None:
@@ -84,8 +92,11 @@ def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
 def main(given: dict[str, Any]) -> None:
     """Every march once for warmth, then all of them in two copies of the process."""
     law = law_of(given["damping"], given["stiffness"])
-    marches = [march for engine, make in (("exudyn", exudyn_marches), ("mujoco", mujoco_marches))
-               for march in make(given["masses"], law, given["methods"][engine])]  # fmt: skip
+    marches = [
+        march
+        for engine, make in (("exudyn", exudyn_marches), ("mujoco", mujoco_marches))
+        for march in make(given["masses"], law, given["methods"][engine])
+    ]
     gc.disable()
     for march in marches:
         march(given["steps"][0])
@@ -96,8 +107,9 @@ def main(given: dict[str, Any]) -> None:
 
 def begin() -> None:
     """Have valgrind count from here on: what it does not count, it runs several times as fast."""
-    asking = subprocess.Popen(["vgdb", f"--pid={os.getpid()}", "instrumentation", "on"], stdout=subprocess.DEVNULL,
-                              stderr=subprocess.DEVNULL)  # fmt: skip
+    asking = subprocess.Popen(
+        ["vgdb", f"--pid={os.getpid()}", "instrumentation", "on"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     while asking.poll() is None:  # valgrind hears of it only between instructions of a program that runs
         pass
     if asking.returncode != 0:

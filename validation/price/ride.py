@@ -71,8 +71,10 @@ class Ride:
     def errors(self, found: np.ndarray) -> dict[str, float]:
         """Largest relative error of the standard deviations (p,) by kind of output."""
         off = np.abs(found / self.truth - 1.0)
-        return {name: float(max(e for e, o in zip(off, self.vehicle.outputs, strict=True) if o.kind == kind))
-                for name, kind in KINDS.items()}  # fmt: skip
+        return {
+            name: float(max(e for e, o in zip(off, self.vehicle.outputs, strict=True) if o.kind == kind))
+            for name, kind in KINDS.items()
+        }
 
 
 def problem() -> Ride:
@@ -146,8 +148,14 @@ def _swept(ride: Ride, speeds: int) -> Point:
 def _copies(ride: Ride, copies: int, lasting: float) -> Point:
     found = at_constant_speed(ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED)
     errors = ride.errors(np.sqrt(found.variance[0]))
-    return Point(f"Monte Carlo, {lasting:g} s each", "copies", copies, errors, 0.0,
-                 float(np.abs(found.z(ride.truth[None])).max()))  # fmt: skip
+    return Point(
+        f"Monte Carlo, {lasting:g} s each",
+        "copies",
+        copies,
+        errors,
+        0.0,
+        float(np.abs(found.z(ride.truth[None])).max()),
+    )
 
 
 def judged(ride: Ride, points: list[Point]) -> list[Row]:
@@ -155,33 +163,92 @@ def judged(ride: Ride, points: list[Point]) -> list[Row]:
     by_name = {p.name.split(",")[0]: p for p in points}
     exact = [by_name["Lyapunov"], by_name["sweep"]]
     grids = [p for p in points if p.name.startswith("logarithmic")]
-    rows = [at_most(f"price.ride.error.{p.name.split(',')[0]}", SYSTEM, f"R19-ride at {SPEED:g} m/s, {p.name}: largest "
-                    "error of a standard deviation of accelerations and tyre forces", max(p.errors.values()),
-                    "relative", 1e-9, f"quadrature knows its variances to {ride.uncertainty:.0e}",
-                    "closed form") for p in exact]  # fmt: skip
-    rows += [within("price.ride.counts.solves", SYSTEM, "Lyapunov equations solved for one road at one speed",
-                    exact[0].count, "solves", 2, 0, "the first solution and one correction", "none"),
-             within("price.ride.counts.decompositions", SYSTEM, "eigenvectors made for all points of the sweep",
-                    exact[1].count, "decompositions", 4, 0,
-                    "the vehicle; the filters of two tracks as modelled or alike, and of two apart; "
-                    "no weighting, which is empty", "none")]  # fmt: skip
+    rows = [
+        at_most(
+            f"price.ride.error.{p.name.split(',')[0]}",
+            SYSTEM,
+            f"R19-ride at {SPEED:g} m/s, {p.name}: largest "
+            "error of a standard deviation of accelerations and tyre forces",
+            max(p.errors.values()),
+            "relative",
+            1e-9,
+            f"quadrature knows its variances to {ride.uncertainty:.0e}",
+            "closed form",
+        )
+        for p in exact
+    ]
+    rows += [
+        within(
+            "price.ride.counts.solves",
+            SYSTEM,
+            "Lyapunov equations solved for one road at one speed",
+            exact[0].count,
+            "solves",
+            2,
+            0,
+            "the first solution and one correction",
+            "none",
+        ),
+        within(
+            "price.ride.counts.decompositions",
+            SYSTEM,
+            "eigenvectors made for all points of the sweep",
+            exact[1].count,
+            "decompositions",
+            4,
+            0,
+            "the vehicle; the filters of two tracks as modelled or alike, and of two apart; "
+            "no weighting, which is empty",
+            "none",
+        ),
+    ]
     falls = [a.errors[kind] / b.errors[kind] for kind in KINDS for a, b in pairwise(grids)]
-    rows.append(within("price.ride.grids", SYSTEM, "grids of ten times the frequencies whose error is not smaller",
-                       sum(ratio <= 1.0 for ratio in falls), "", 0, 0, "they converge", "none"))  # fmt: skip
-    rows += [finding(f"price.ride.copies.{p.count}", SYSTEM, f"{p.name}, {p.count} copies: largest error of a standard "
-                     f"deviation, one draw, |z| up to {p.z:.1f}", max(p.errors.values()), "relative",
-                     "one over the root of copies times seconds", "statistics of few copies: the judged ones are in "
-                     "the case of varying speed", "none") for p in points if p.unit == "copies"]  # fmt: skip
+    rows.append(
+        within(
+            "price.ride.grids",
+            SYSTEM,
+            "grids of ten times the frequencies whose error is not smaller",
+            sum(ratio <= 1.0 for ratio in falls),
+            "",
+            0,
+            0,
+            "they converge",
+            "none",
+        )
+    )
+    rows += [
+        finding(
+            f"price.ride.copies.{p.count}",
+            SYSTEM,
+            f"{p.name}, {p.count} copies: largest error of a standard deviation, one draw, |z| up to {p.z:.1f}",
+            max(p.errors.values()),
+            "relative",
+            "one over the root of copies times seconds",
+            "statistics of few copies: the judged ones are in the case of varying speed",
+            "none",
+        )
+        for p in points
+        if p.unit == "copies"
+    ]
     return rows
 
 
 def table(data: dict[str, Any]) -> Table:
     """Every route with its errors, counts and seconds."""
-    lines = tuple((p["name"], f"{p['count']:,} {p['unit']}", *(f"{p['errors'][kind]:.1e}" for kind in KINDS),
-                   f"{1e3 * p['seconds']:.3g}") for p in data["points"])  # fmt: skip
-    note = ("Largest relative error of a standard deviation over all outputs of the kind. Part of a grid's error in "
-            "the tyre forces is what lies beyond its last frequency, which some users do not want. Monte Carlo is one "
-            "draw. Milliseconds are those of one run on this machine, and wander.")  # fmt: skip
+    lines = tuple(
+        (
+            p["name"],
+            f"{p['count']:,} {p['unit']}",
+            *(f"{p['errors'][kind]:.1e}" for kind in KINDS),
+            f"{1e3 * p['seconds']:.3g}",
+        )
+        for p in data["points"]
+    )
+    note = (
+        "Largest relative error of a standard deviation over all outputs of the kind. Part of a grid's error in "
+        "the tyre forces is what lies beyond its last frequency, which some users do not want. Monte Carlo is one "
+        "draw. Milliseconds are those of one run on this machine, and wander."
+    )
     return Table(f"Standard deviations of R19-ride at {SPEED:g} m/s", note, ("route", "count", *KINDS, "ms"), lines)
 
 

@@ -21,8 +21,13 @@ PROMISE = 1.25
 
 def rows_of(problem: Problem, points: list[Point], quick: bool) -> list[Row]:
     """All rows of one problem; the width of the sweep is asked of the full run only."""
-    rows = [_reference(problem), *_orders(problem, points), _silent(problem, points), _counts(problem, points),
-            _repeat(problem, points)]  # fmt: skip
+    rows = [
+        _reference(problem),
+        *_orders(problem, points),
+        _silent(problem, points),
+        _counts(problem, points),
+        _repeat(problem, points),
+    ]
     rows += [_promises(problem, points)] if quick else [_promises(problem, points), _sweep(problem, points)]
     return rows + _losses(problem, points)
 
@@ -36,11 +41,17 @@ def _reference(problem: Problem) -> Row:
     """The reference must know more than the finest tolerance asks."""
     quantity, unit = _quantity(problem)
     share = getattr(problem, "sure", SURE)
-    return at_most(f"price.{problem.key}.reference", SYSTEM,
-                   f"uncertainty of the reference ({problem.reference}), {quantity}", problem.uncertainty[quantity],
-                   unit, share * min(problem.tolerances), "what the reference states of itself or solvers of different "
-                   f"families differ by; {share:g} of the finest tolerance, so that curves stand clear",
-                   "closed form")  # fmt: skip
+    return at_most(
+        f"price.{problem.key}.reference",
+        SYSTEM,
+        f"uncertainty of the reference ({problem.reference}), {quantity}",
+        problem.uncertainty[quantity],
+        unit,
+        share * min(problem.tolerances),
+        "what the reference states of itself or solvers of different "
+        f"families differ by; {share:g} of the finest tolerance, so that curves stand clear",
+        "closed form",
+    )
 
 
 def _orders(problem: Problem, points: list[Point]) -> list[Row]:
@@ -53,9 +64,20 @@ def _orders(problem: Problem, points: list[Point]) -> list[Row]:
                 continue
             name = f"price.{problem.key}.order.{quantity}.{curve}".replace(" ", "-")
             what = f"observed order of the largest {quantity} error, {named(curve)}"
-            rows.append(within(name, SYSTEM, what, found, "", setting.order, BANDS[setting.order],
-                               "slope on the three finest steps that stand clear of the reference; the next power of "
-                               "the step still shows in it", "closed form"))  # fmt: skip
+            rows.append(
+                within(
+                    name,
+                    SYSTEM,
+                    what,
+                    found,
+                    "",
+                    setting.order,
+                    BANDS[setting.order],
+                    "slope on the three finest steps that stand clear of the reference; the next power of "
+                    "the step still shows in it",
+                    "closed form",
+                )
+            )
     return rows
 
 
@@ -63,22 +85,34 @@ def _silent(problem: Problem, points: list[Point]) -> Row:
     """No wrong answer without a word."""
     silent = [f"{p.setting.curve} {p.setting.label()}" for p in points if p.status == "SILENT"]
     unit = _quantity(problem)[1]
-    return _none_of(f"price.{problem.key}.silent", f"wrong answers without a word, of {len(points)} settings", silent,
-                    f"an error that is not finite, or beyond {problem.bound:.3g} {unit}, must come with an exception")
+    return _none_of(
+        f"price.{problem.key}.silent",
+        f"wrong answers without a word, of {len(points)} settings",
+        silent,
+        f"an error that is not finite, or beyond {problem.bound:.3g} {unit}, must come with an exception",
+    )
 
 
 def _counts(problem: Problem, points: list[Point]) -> Row:
     """What adapters say about steps and force calls."""
-    return _none_of(f"price.{problem.key}.counts.said", "settings whose force calls are not stages times steps",
-                    cost.miscounted(points, problem.duration), "exact: stages from the methods' tableaux")
+    return _none_of(
+        f"price.{problem.key}.counts.said",
+        "settings whose force calls are not stages times steps",
+        cost.miscounted(points, problem.duration),
+        "exact: stages from the methods' tableaux",
+    )
 
 
 def _repeat(problem: Problem, points: list[Point]) -> Row:
     """A run that is repeated counts the same and errs by the same."""
     changed = [f"{p.setting.curve} {p.setting.label()}" for p in points if p.changed]
     again = sum(p.changed is not None for p in points)
-    return _none_of(f"price.{problem.key}.counts.repeat", "settings that count or err otherwise in the last round, of "
-                    f"{again} that have rounds", changed, "exact: all counts, and errors to the last digit")
+    return _none_of(
+        f"price.{problem.key}.counts.repeat",
+        f"settings that count or err otherwise in the last round, of {again} that have rounds",
+        changed,
+        "exact: all counts, and errors to the last digit",
+    )
 
 
 def _none_of(name: str, what: str, found: list[str], why: str) -> Row:
@@ -97,8 +131,17 @@ def _promises(problem: Problem, points: list[Point]) -> Row:
             found = cost.attempt(problem, _runnable(problem, points, *best))
             worst = max(worst, found.errors.get(quantity, float("inf")) / target)
     what = "error of the table's cheapest settings by their tolerance, each of them run, largest"
-    return within(f"price.{problem.key}.cheapest", SYSTEM, what, worst, "", 0.0, PROMISE, "interpolated between two "
-                  "settings tried: a quarter is how far a curve may bend between them", "closed form")  # fmt: skip
+    return within(
+        f"price.{problem.key}.cheapest",
+        SYSTEM,
+        what,
+        worst,
+        "",
+        0.0,
+        PROMISE,
+        "interpolated between two settings tried: a quarter is how far a curve may bend between them",
+        "closed form",
+    )
 
 
 def _runnable(problem: Problem, points: list[Point], curve: str, one: Reach) -> Setting:
@@ -122,22 +165,29 @@ def _sweep(problem: Problem, points: list[Point]) -> Row:
         low = 0 < (own[0].setting.order or own[0].setting.nominal) < 4
         if len(own) < 6 or not (wide or whole or settled or low):
             short.append(curve)
-    what = ("methods with fewer than 6 settings that answered, or from order 4 up with fewer than 4 decades of them or "
-            "of error although coarser settings answer, or the finest tolerance is not met and the error still falls")
+    what = (
+        "methods with fewer than 6 settings that answered, or from order 4 up with fewer than 4 decades of them or "
+        "of error although coarser settings answer, or the finest tolerance is not met and the error still falls"
+    )
     return _none_of(f"price.{problem.key}.sweep", what, short, "what the study was asked to cover")
 
 
 def _losses(problem: Problem, points: list[Point]) -> list[Row]:
     """What each default loses at the middle tolerance."""
     target = cost.middle(problem.tolerances)
-    return [row for owner, p in cost.defaults(points).items() if p.status == "ok"
-            for among, words in ((p.setting.engine, f"{owner}'s own cheapest"), ("", "the cheapest of all"))
-            for kind in cost.costs(points)
-            for row in _loss(problem, points, owner, p, target, among, words, kind)]  # fmt: skip
+    return [
+        row
+        for owner, p in cost.defaults(points).items()
+        if p.status == "ok"
+        for among, words in ((p.setting.engine, f"{owner}'s own cheapest"), ("", "the cheapest of all"))
+        for kind in cost.costs(points)
+        for row in _loss(problem, points, owner, p, target, among, words, kind)
+    ]
 
 
-def _loss(problem: Problem, points: list[Point], owner: str, p: Point, target: float, among: str, words: str,
-          kind: str) -> list[Row]:  # fmt: skip
+def _loss(
+    problem: Problem, points: list[Point], owner: str, p: Point, target: float, among: str, words: str, kind: str
+) -> list[Row]:
     quantity, unit = _quantity(problem)
     one = cost.loss(points, quantity, target, kind, p.setting.curve, among)
     if one is None:

@@ -142,11 +142,18 @@ def racing(problem: Problem, points: list[Point]) -> list[Point]:
     chosen = [p for p in usual if p.status == "ok"] + [p for p in best if p.cost("seconds") <= SLOW]
     for target in problem.tolerances:
         met, all_of = (reaches(points, quantity, target, "seconds", extrapolate) for extrapolate in (False, True))
-        near = {curve: one for engine in ("", *RIVALS, *(p.setting.engine for p in usual))
-                for curve, one in _near(met, engine).items()}  # fmt: skip
+        near = {
+            curve: one
+            for engine in ("", *RIVALS, *(p.setting.engine for p in usual))
+            for curve, one in _near(met, engine).items()
+        }
         near |= {p.setting.curve: all_of[p.setting.curve] for p in usual if p.setting.curve in all_of}
-        chosen += [p for curve, one in near.items() for p in resting(own[curve], one)
-                   if target == middle(problem.tolerances) or p.cost("seconds") <= LONG]  # fmt: skip
+        chosen += [
+            p
+            for curve, one in near.items()
+            for p in resting(own[curve], one)
+            if target == middle(problem.tolerances) or p.cost("seconds") <= LONG
+        ]
     return list({p.setting: p for p in chosen}.values())
 
 
@@ -158,8 +165,11 @@ def middle(tolerances: Sequence[float]) -> float:
 def _near(found: dict[str, curves.Reach], among: str) -> dict[str, curves.Reach]:
     """The cheapest curve among those of one engine, or of all, and those that take little longer."""
     best = cheapest(found, among)
-    return {curve: one for curve, one in found.items()
-            if best and curve.startswith(among) and one.cost <= NEAR * best[1].cost}  # fmt: skip
+    return {
+        curve: one
+        for curve, one in found.items()
+        if best and curve.startswith(among) and one.cost <= NEAR * best[1].cost
+    }
 
 
 def resting(own: list[Point], one: curves.Reach) -> list[Point]:
@@ -183,8 +193,11 @@ def _timed(problem: Problem, points: list[Point], rounds: int, least: float) -> 
     apart = -(-rounds // FEWEST) if rounds >= FEWEST else rounds
     every = [apart if one > SLOW else 1 for one in lasted]
     found = interleave(jobs, rounds, least, lasted=lasted, every=every, clock=CLOCK)
-    return {p.setting: replace(p, seconds=tuple(own[np.isfinite(own)].tolist()), changed=_changed(problem, p, last[i]))
-            for i, (p, own) in enumerate(zip(points, found, strict=True)) if i in last}  # fmt: skip
+    return {
+        p.setting: replace(p, seconds=tuple(own[np.isfinite(own)].tolist()), changed=_changed(problem, p, last[i]))
+        for i, (p, own) in enumerate(zip(points, found, strict=True))
+        if i in last
+    }
 
 
 def _changed(problem: Problem, p: Point, again: Any) -> bool:
@@ -212,14 +225,16 @@ def orders(points: list[Point], quantity: str, uncertainty: float) -> dict[str, 
 
 def same(points: list[Point], quantity: str, uncertainty: float) -> list[tuple[str, ...]]:
     """Groups of curves that coincide, judged on the points that stand clear of the reference's uncertainty."""
-    clear = {curve: {p.setting.value: p.errors[quantity] for p in own
-                     if p.errors[quantity] >= curves.HOLLOW * uncertainty}
-             for curve, own in by_curve(points).items()}  # fmt: skip
+    clear = {
+        curve: {p.setting.value: p.errors[quantity] for p in own if p.errors[quantity] >= curves.HOLLOW * uncertainty}
+        for curve, own in by_curve(points).items()
+    }
     return curves.coinciding(clear)
 
 
-def reaches(points: list[Point], quantity: str, target: float, kind: str,
-            extrapolate: bool = False) -> dict[str, curves.Reach]:  # fmt: skip
+def reaches(
+    points: list[Point], quantity: str, target: float, kind: str, extrapolate: bool = False
+) -> dict[str, curves.Reach]:
     """What each curve needs to meet ``target``, in one of ``costs``; curves that do not are left out."""
     found = {}
     for curve, own in by_curve(points).items():
@@ -229,8 +244,9 @@ def reaches(points: list[Point], quantity: str, target: float, kind: str,
     return found
 
 
-def _reach(own: list[Point], quantity: str, target: float, costs: Sequence[float],
-           extrapolate: bool = False) -> curves.Reach | None:  # fmt: skip
+def _reach(
+    own: list[Point], quantity: str, target: float, costs: Sequence[float], extrapolate: bool = False
+) -> curves.Reach | None:
     """``curves.reach`` on the points of one curve."""
     values, errors = [p.setting.value for p in own], [p.errors[quantity] for p in own]
     order = 0 if own[0].setting.adaptive else own[0].setting.order

@@ -50,5 +50,8 @@ def real_time(driven: Assembly, duration: float, rounds: int, least: float) -> d
     model = build("reference", driven, Settings("RK4", STEP, duration))
     run, table = interleave([model.run, lambda: signal.sample(0.0, STEP / 2, 2 * steps + 1)], rounds, least)
     known = (run > table).all()  # else the machine's other work is larger than what is told
-    return {"with table": median(duration / run), "without table": median(duration / (run - table)) if known else None,
-            "seconds": describe(run)}  # fmt: skip
+    return {
+        "with table": median(duration / run),
+        "without table": median(duration / (run - table)) if known else None,
+        "seconds": describe(run),
+    }

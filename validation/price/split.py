@@ -81,8 +81,12 @@ ZEROS = [0.0] * 4
 
 def marches() -> dict[tuple[str, str], list[Callable[[], Any]]]:
     """The three runs by problem and engine."""
-    return {("road", "exudyn"): _road_exudyn(), ("road", "mujoco"): _road_mujoco(),
-            ("wheel-20", "exudyn"): _wheel_exudyn(), ("wheel-20", "mujoco"): _wheel_mujoco()}  # fmt: skip
+    return {
+        ("road", "exudyn"): _road_exudyn(),
+        ("road", "mujoco"): _road_mujoco(),
+        ("wheel-20", "exudyn"): _wheel_exudyn(),
+        ("wheel-20", "mujoco"): _wheel_mujoco(),
+    }
 
 
 def _road_exudyn() -> list[Callable[[], Any]]:
@@ -96,8 +100,9 @@ def _road_exudyn() -> list[Callable[[], Any]]:
         y[:4], y[4:] = positions, rates
         return (scale * derivative(y, road, p)[4:]).tolist()
 
-    return [partial(exudyn_marches(masses, one, [METHODS["exudyn"]])[0], STEPS["road"]) for one in
-            (nothing, handed(), of)]  # fmt: skip
+    return [
+        partial(exudyn_marches(masses, one, [METHODS["exudyn"]])[0], STEPS["road"]) for one in (nothing, handed(), of)
+    ]
 
 
 def _road_mujoco() -> list[Callable[[], Any]]:
@@ -108,15 +113,19 @@ def _road_mujoco() -> list[Callable[[], Any]]:
 
 def _wheel_exudyn() -> list[Callable[[], Any]]:
     wheels, steps, step = _wheels()
-    return [partial(Rolling(wheels, of).run, *wheels.state(), steps, step, METHODS["exudyn"])
-            for of in (nothing, handed(), Forces(wheels).of)]  # fmt: skip
+    return [
+        partial(Rolling(wheels, of).run, *wheels.state(), steps, step, METHODS["exudyn"])
+        for of in (nothing, handed(), Forces(wheels).of)
+    ]
 
 
 def _wheel_mujoco() -> list[Callable[[], Any]]:
     wheels, steps, step = _wheels()
     marcher, start = Marcher(model(wheels, step, METHODS["mujoco"])), np.concatenate(wheels.state())[None]
-    return [partial(_within, one, partial(marcher.run, start, steps))
-            for one in (empty_law(), native_law(damper), native_law(forces))]  # fmt: skip
+    return [
+        partial(_within, one, partial(marcher.run, start, steps))
+        for one in (empty_law(), native_law(damper), native_law(forces))
+    ]
 
 
 def _wheels() -> tuple[Wheels, int, float]:
@@ -132,8 +141,10 @@ def measure(rounds: int, least: float) -> list[dict[str, Any]]:
     """Seconds of the three runs in every round, by problem and engine."""
     found = marches()
     seconds = interleave([job for jobs in found.values() for job in jobs], rounds, least)
-    return [{"problem": problem, "engine": engine, "seconds": dict(zip(RUNS, own.tolist(), strict=True))}
-            for (problem, engine), own in zip(found, seconds.reshape(len(found), 3, -1), strict=True)]  # fmt: skip
+    return [
+        {"problem": problem, "engine": engine, "seconds": dict(zip(RUNS, own.tolist(), strict=True))}
+        for (problem, engine), own in zip(found, seconds.reshape(len(found), 3, -1), strict=True)
+    ]
 
 
 def parts(saved: dict[str, Any]) -> np.ndarray:
@@ -154,9 +165,18 @@ def rows(data: list[dict[str, Any]]) -> list[Row]:
     for one in data:
         middle, low, high = share(one)
         what = f"{LABELS[one['engine']]} {METHODS[one['engine']]}, {one['problem']}: the bridge's share of a step"
-        found.append(finding(f"price.{one['problem']}.split.{one['engine']}", SYSTEM, what, middle, "%",
-                             f"95 % interval {low:.0f} to {high:.0f}", "seconds are reported and never gated",
-                             "none"))  # fmt: skip
+        found.append(
+            finding(
+                f"price.{one['problem']}.split.{one['engine']}",
+                SYSTEM,
+                what,
+                middle,
+                "%",
+                f"95 % interval {low:.0f} to {high:.0f}",
+                "seconds are reported and never gated",
+                "none",
+            )
+        )
     return found
 
 
@@ -165,11 +185,19 @@ def table(data: list[dict[str, Any]], problem: str) -> list[Table]:
     lines = []
     for one in (one for one in data if one["problem"] == problem):
         method, (_, low, high) = METHODS[one["engine"]], share(one)
-        lines.append((f"{LABELS[one['engine']]} {method}", str(STAGES[method]),
-                      *(f"{value:.2f}" for value in parts(one)), f"{low:.0f} to {high:.0f}"))
-    note = (f"Microseconds a step, median of all rounds, over {STEPS.get(problem, 0):,} steps; all forces in one "
-            "callback, compiled in MuJoCo, from Python in Exudyn. Engine: with an empty callback; bridge: what one "
-            "costs that is handed the state and hands back a damper's forces; kernel: what the real forces cost beyond "
-            "that.")  # fmt: skip
+        lines.append(
+            (
+                f"{LABELS[one['engine']]} {method}",
+                str(STAGES[method]),
+                *(f"{value:.2f}" for value in parts(one)),
+                f"{low:.0f} to {high:.0f}",
+            )
+        )
+    note = (
+        f"Microseconds a step, median of all rounds, over {STEPS.get(problem, 0):,} steps; all forces in one "
+        "callback, compiled in MuJoCo, from Python in Exudyn. Engine: with an empty callback; bridge: what one "
+        "costs that is handed the state and hands back a damper's forces; kernel: what the real forces cost beyond "
+        "that."
+    )
     heads = ("method", "calls a step", "engine", "bridge", "kernel", "bridge's share, 95 % interval [%]")
     return [Table("What a step is made of", note, heads, tuple(lines))] if lines else []

@@ -18,8 +18,13 @@ from validation.timing import describe
 
 def tables(problem: dict[str, Any], points: list[Point]) -> list[Table]:
     """All tables of one problem from its saved data."""
-    return [cheapest(problem, points), losses(problem, points), every_curve(problem, points), outcomes(points),
-            failures(points)]  # fmt: skip
+    return [
+        cheapest(problem, points),
+        losses(problem, points),
+        every_curve(problem, points),
+        outcomes(points),
+        failures(points),
+    ]
 
 
 def named(curve: str, groups: list[tuple[str, ...]] | None = None) -> str:
@@ -53,14 +58,25 @@ def cheapest(problem: dict[str, Any], points: list[Point]) -> Table:
     for target in problem["tolerances"]:
         calls = cost.reaches(points, quantity, target, work)
         seconds = cost.reaches(points, quantity, target, "seconds")
-        rows.append((f"{target:g}", _won(points, calls, "", work.split()[-1], groups), *(
-            _won(points, seconds, among, "ms") for among in ("", *rivals))))  # fmt: skip
-    note = ("Fixed steps are interpolated log-log between neighbouring settings; methods without one order count at "
-            "the loosest setting tried that does; 'coarsest' is the coarsest setting tried. Nothing is extrapolated. "
-            f"{work.capitalize()} are exact and the same on every machine; seconds are those of this processor, "
-            f"everything built anew. {rounds_of(points)}")  # fmt: skip
-    heads = (f"{quantity} error at most [{unit}]", f"fewest {work}", "fewest seconds",
-             *(f"fewest in {LABELS[engine]}" for engine in rivals))  # fmt: skip
+        rows.append(
+            (
+                f"{target:g}",
+                _won(points, calls, "", work.split()[-1], groups),
+                *(_won(points, seconds, among, "ms") for among in ("", *rivals)),
+            )
+        )
+    note = (
+        "Fixed steps are interpolated log-log between neighbouring settings; methods without one order count at "
+        "the loosest setting tried that does; 'coarsest' is the coarsest setting tried. Nothing is extrapolated. "
+        f"{work.capitalize()} are exact and the same on every machine; seconds are those of this processor, "
+        f"everything built anew. {rounds_of(points)}"
+    )
+    heads = (
+        f"{quantity} error at most [{unit}]",
+        f"fewest {work}",
+        "fewest seconds",
+        *(f"fewest in {LABELS[engine]}" for engine in rivals),
+    )
     return Table("Cheapest setting that meets the tolerance", note, heads, tuple(rows))
 
 
@@ -73,14 +89,17 @@ def rounds_of(points: list[Point]) -> str:
         return "Seconds are those of one run each."
     spread = float(np.median([one["mad"] / one["median"] for one in map(describe, in_rounds)]))
     once = sum(p.status == "ok" for p in points) - len(in_rounds)
-    return (f"Seconds are medians of {told} settings whose seconds decide something (fewer where a run is longer than "
-            f"{1e3 * cost.SLOW:g} ms; median absolute deviation {100 * spread:.0f} %), and of one run for {once} that "
-            f"are far from the cheapest, or longer than {1e3 * cost.LONG:g} ms and not for the middle "
-            "tolerance.")  # fmt: skip
+    return (
+        f"Seconds are medians of {told} settings whose seconds decide something (fewer where a run is longer than "
+        f"{1e3 * cost.SLOW:g} ms; median absolute deviation {100 * spread:.0f} %), and of one run for {once} that "
+        f"are far from the cheapest, or longer than {1e3 * cost.LONG:g} ms and not for the middle "
+        "tolerance."
+    )
 
 
-def _won(points: list[Point], found: dict[str, Reach], among: str, unit: str,
-         groups: list[tuple[str, ...]] | None = None) -> str:  # fmt: skip
+def _won(
+    points: list[Point], found: dict[str, Reach], among: str, unit: str, groups: list[tuple[str, ...]] | None = None
+) -> str:
     best = cost.cheapest(found, among)
     if best is None:
         return "none of those tried"
@@ -98,19 +117,39 @@ def losses(problem: dict[str, Any], points: list[Point]) -> Table:
     """What each engine's default method costs beside the cheapest one, for the same error."""
     quantity = quantity_of(problem)
     owners = cost.defaults(points)
-    rows = [(f"{target:g}", *(
-        _lost(cost.loss(points, quantity, target, kind, own.setting.curve, among))
-        for own in owners.values() for among in (own.setting.engine, "") for kind in cost.costs(points)))
-        for target in problem["tolerances"]]  # fmt: skip
-    heads = tuple(f"{owner} by best of {among}: {kind}"
-                  for owner in owners for among in (owner, "all") for kind in cost.costs(points))  # fmt: skip
-    as_is = "; ".join(f"{owner}: {own.setting.method} at {own.setting.label()}, which by itself "
-                      + (f"gives {own.errors[quantity]:.3g} {problem['units'][quantity]}" if own.status == "ok"
-                         else f"is {STATUSES[own.status]}") for owner, own in owners.items())  # fmt: skip
-    note = ("The default method, its step refined until it meets the tolerance, by the cheapest setting that does. "
-            f"{as_is}. * means that no step tried was fine enough: extrapolated by the method's declared order. "
-            "In brackets: 95 % interval, bootstrapped over the rounds that both have; none after fewer than "
-            f"{cost.FEWEST}.")  # fmt: skip
+    rows = [
+        (
+            f"{target:g}",
+            *(
+                _lost(cost.loss(points, quantity, target, kind, own.setting.curve, among))
+                for own in owners.values()
+                for among in (own.setting.engine, "")
+                for kind in cost.costs(points)
+            ),
+        )
+        for target in problem["tolerances"]
+    ]
+    heads = tuple(
+        f"{owner} by best of {among}: {kind}"
+        for owner in owners
+        for among in (owner, "all")
+        for kind in cost.costs(points)
+    )
+    as_is = "; ".join(
+        f"{owner}: {own.setting.method} at {own.setting.label()}, which by itself "
+        + (
+            f"gives {own.errors[quantity]:.3g} {problem['units'][quantity]}"
+            if own.status == "ok"
+            else f"is {STATUSES[own.status]}"
+        )
+        for owner, own in owners.items()
+    )
+    note = (
+        "The default method, its step refined until it meets the tolerance, by the cheapest setting that does. "
+        f"{as_is}. * means that no step tried was fine enough: extrapolated by the method's declared order. "
+        "In brackets: 95 % interval, bootstrapped over the rounds that both have; none after fewer than "
+        f"{cost.FEWEST}."
+    )
     return Table("Factor that a default setting loses", note, (f"{quantity} error at most", *heads), tuple(rows))
 
 
@@ -134,19 +173,37 @@ def every_curve(problem: dict[str, Any], points: list[Point]) -> Table:
     work, middle = cost.costs(points)[0], cost.middle(problem["tolerances"])
     calls, seconds = (cost.reaches(points, quantity, middle, kind) for kind in (work, "seconds"))
     rows = tuple(
-        (_plain(curve), str(len(own)), f"{own[0].setting.label()} to {own[-1].setting.label()}",
-         f"{own[0].errors[quantity]:.2g} to {own[-1].errors[quantity]:.2g}", _order(orders[curve]),
-         _declared(own[0].setting), _number(calls.get(curve), 1, ",.0f"),
-         _once(own, seconds.get(curve)) + _number(seconds.get(curve), 1e3, ".3g"),
-         named(curve, groups).partition(" = ")[2] or "-")
-        for curve, own in by_curve(points).items())  # fmt: skip
+        (
+            _plain(curve),
+            str(len(own)),
+            f"{own[0].setting.label()} to {own[-1].setting.label()}",
+            f"{own[0].errors[quantity]:.2g} to {own[-1].errors[quantity]:.2g}",
+            _order(orders[curve]),
+            _declared(own[0].setting),
+            _number(calls.get(curve), 1, ",.0f"),
+            _once(own, seconds.get(curve)) + _number(seconds.get(curve), 1e3, ".3g"),
+            named(curve, groups).partition(" = ")[2] or "-",
+        )
+        for curve, own in by_curve(points).items()
+    )
     unit = problem["units"][quantity]
-    note = (f"Order: slope of the error over the step on the three finest settings whose error exceeds {HOLLOW:g} "
-            "times the uncertainty of the reference; for adaptive methods over 1 / calls, where loose tolerances "
-            "are still ruled by stability. Curves coincide if their errors agree to 1 % at every common "
-            "setting. ~: seconds of one run.")  # fmt: skip
-    heads = ("curve", "settings", "from, to", f"{quantity} error [{unit}]", "observed order", "declared",
-             f"{work} for {middle:g} {unit}", f"ms for {middle:g} {unit}", "coincides with")  # fmt: skip
+    note = (
+        f"Order: slope of the error over the step on the three finest settings whose error exceeds {HOLLOW:g} "
+        "times the uncertainty of the reference; for adaptive methods over 1 / calls, where loose tolerances "
+        "are still ruled by stability. Curves coincide if their errors agree to 1 % at every common "
+        "setting. ~: seconds of one run."
+    )
+    heads = (
+        "curve",
+        "settings",
+        "from, to",
+        f"{quantity} error [{unit}]",
+        "observed order",
+        "declared",
+        f"{work} for {middle:g} {unit}",
+        f"ms for {middle:g} {unit}",
+        "coincides with",
+    )
     return Table("Every integrator that each engine offers", note, heads, rows)
 
 
@@ -172,11 +229,15 @@ def _number(one: Reach | None, scale: float, form: str) -> str:
 def outcomes(points: list[Point]) -> Table:
     """How many settings of each engine ended in which way."""
     engines = dict.fromkeys(p.setting.engine for p in points)
-    rows = tuple((LABELS.get(engine, engine), *(_ended(points, engine, status) for status in ("", *STATUSES)))
-                 for engine in engines)  # fmt: skip
-    note = ("Fine: an answer; raised: the run failed and said so; refused: not run, with the reason; flagged: "
-            "an answer came with a doubt; silent: a wrong answer that came back as a result, of which there must be "
-            "none.")  # fmt: skip
+    rows = tuple(
+        (LABELS.get(engine, engine), *(_ended(points, engine, status) for status in ("", *STATUSES)))
+        for engine in engines
+    )
+    note = (
+        "Fine: an answer; raised: the run failed and said so; refused: not run, with the reason; flagged: "
+        "an answer came with a doubt; silent: a wrong answer that came back as a result, of which there must be "
+        "none."
+    )
     return Table("Settings by how they ended", note, ("engine", "settings", *STATUSES.values()), rows)
 
 
@@ -194,5 +255,9 @@ def failures(points: list[Point]) -> Table:
         if p.status != "ok":
             found[_plain(p.setting.curve), STATUSES[p.status], p.reason].append(p.setting.label())
     rows = tuple((curve, ", ".join(labels), status, reason) for (curve, status, reason), labels in found.items())
-    return Table("Settings that gave no answer to rely on", "What was said, by how the setting ended.",
-                 ("curve", "setting", "status", "what was said"), rows)  # fmt: skip
+    return Table(
+        "Settings that gave no answer to rely on",
+        "What was said, by how the setting ended.",
+        ("curve", "setting", "status", "what was said"),
+        rows,
+    )

@@ -70,8 +70,16 @@ def _ask(words: list[str], folder: Path, now: Answer) -> None:
 def _run(words: list[str], folder: Path) -> tuple[int, str, str]:
     surroundings = os.environ | {"COLUMNS": "200", "NO_COLOR": "1", "MPLBACKEND": "agg"}
     try:
-        done = subprocess.run(words, cwd=folder, env=surroundings, capture_output=True, text=True, timeout=LIMIT,
-                              check=False, errors="replace")  # fmt: skip
+        done = subprocess.run(
+            words,
+            cwd=folder,
+            env=surroundings,
+            capture_output=True,
+            text=True,
+            timeout=LIMIT,
+            check=False,
+            errors="replace",
+        )
     except subprocess.TimeoutExpired:
         return -1, "", f"ended after {LIMIT:g} s"
     return done.returncode, done.stdout, done.stderr

@@ -20,8 +20,10 @@ def write_jobs(folder: Path, jobs: list[Job]) -> None:
 
 def read_jobs(folder: Path) -> list[Job]:
     """The jobs of a recording."""
-    return [Job(each["name"], tuple(map(tuple, each["commands"])), each["scene"])
-            for each in json.loads((folder / JOBS).read_text())]  # fmt: skip
+    return [
+        Job(each["name"], tuple(map(tuple, each["commands"])), each["scene"])
+        for each in json.loads((folder / JOBS).read_text())
+    ]
 
 
 def save(folder: Path, name: str, answer: Answer) -> None:

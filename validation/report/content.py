@@ -20,7 +20,7 @@ Results = dict[str, Any]
 KINDS = {
     "native": "both sides have force laws of their own; what they share is the description of the vehicle",
     "handed over": "the engine is handed M, D and K of the description: what is tested is these and the integrator, no "
-                   "spring of the engine's own",
+    "spring of the engine's own",
     "shared kernel": "both sides call the same force code: nothing is learned about that code",
     "closed form": "the other side is an exact answer",
     "published": "the other side is a figure from the literature",
@@ -65,8 +65,10 @@ def systems(results: Results) -> list[dict[str, Any]]:
     """Rows by system and, within it, by case, in the order of the report."""
     order = list(dict.fromkeys((*get_args(System), *(row["system"] for row in results["rows"]))))
     by_system = sorted(results["rows"], key=lambda row: order.index(row["system"]))
-    return [{"name": system, "cases": list(_cases(list(rows), results))}
-            for system, rows in groupby(by_system, key=lambda row: row["system"])]  # fmt: skip
+    return [
+        {"name": system, "cases": list(_cases(list(rows), results))}
+        for system, rows in groupby(by_system, key=lambda row: row["system"])
+    ]
 
 
 def _cases(rows: list[dict[str, Any]], results: Results) -> Iterator[dict[str, Any]]:
@@ -75,8 +77,10 @@ def _cases(rows: list[dict[str, Any]], results: Results) -> Iterator[dict[str, A
         yield {
             "name": name,
             "seconds": results["provenance"]["seconds"].get(name),
-            "groups": [{"why": why, "rows": [row for row in own if row["why"] == why]}
-                       for why in dict.fromkeys(row["why"] for row in own)],
+            "groups": [
+                {"why": why, "rows": [row for row in own if row["why"] == why]}
+                for why in dict.fromkeys(row["why"] for row in own)
+            ],
             "count": len(own),
             "failed": sum(row["status"] == "failed" for row in own),
             "missed": sum(row["status"] == "missed" for row in own),

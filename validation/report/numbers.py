@@ -76,8 +76,10 @@ def duration(seconds: float) -> str:
 
 
 POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]\d+)(?![\w.])")
-NUMERIC = re.compile(r"[-−+±<>≤≥~ ]*\d[\d,]*(\.\d+)?(e[+-]?\d+)?\*?( ?(%|s|ms|x))?( (±|\+/-) [\d.]+)?"
-                     r"|[-–]?|never|refused|not met")  # fmt: skip
+NUMERIC = re.compile(
+    r"[-−+±<>≤≥~ ]*\d[\d,]*(\.\d+)?(e[+-]?\d+)?\*?( ?(%|s|ms|x))?( (±|\+/-) [\d.]+)?"
+    r"|[-–]?|never|refused|not met"
+)
 """A cell of a table that reads as a number, or as the absence of one."""
 
 

@@ -37,8 +37,11 @@ def read(path: Path) -> dict[str, Any]:
     """Saved results; raises InputError if the file is not one."""
     try:
         results = json.loads(path.read_text(encoding="utf-8"))
-        return {"provenance": {**BLANK, **results["provenance"]}, "rows": [of_saved(row) for row in results["rows"]],
-                "against": results.get("against")}  # fmt: skip
+        return {
+            "provenance": {**BLANK, **results["provenance"]},
+            "rows": [of_saved(row) for row in results["rows"]],
+            "against": results.get("against"),
+        }
     except FileNotFoundError:
         raise InputError(path, "", None, "no such file: `twinrig validate` writes it") from None
     except (ValueError, KeyError, TypeError) as error:
@@ -50,10 +53,17 @@ def page(results: dict[str, Any], data: Path, each: Callable[..., Iterable[Any]]
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     loader = FileSystemLoader(Path(__file__).parent)
-    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined,
-                              trim_blocks=True, lstrip_blocks=True)  # fmt: skip
-    environment.filters |= {"number": number, "share": share, "duration": duration, "powers": powers, "marked": marked,
-                            "numeric_columns": numeric_columns}  # fmt: skip
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= {
+        "number": number,
+        "share": share,
+        "duration": duration,
+        "powers": powers,
+        "marked": marked,
+        "numeric_columns": numeric_columns,
+    }
     environment.globals |= {"margin": margin, "case_of": content.case_of}
     names = list(dict.fromkeys(map(content.case_of, results["rows"])))
     drawn = dict(zip(names, each(partial(shown, data), names), strict=True))
@@ -61,8 +71,13 @@ def page(results: dict[str, Any], data: Path, each: Callable[..., Iterable[Any]]
     for case in (case for system in systems for case in system["cases"]):
         case |= drawn[case["name"]]
     return environment.get_template(TEMPLATE).render(
-        verdict=content.verdict(results), against=results.get("against"), systems=systems,
+        verdict=content.verdict(results),
+        against=results.get("against"),
+        systems=systems,
         silent=content.silent_systems(results["rows"]),
-        shares=shares(results), independence=content.independence(results, drawn),
-        conventions=content.conventions(), parameters=content.parameter_tables(), provenance=results["provenance"],
-    )  # fmt: skip
+        shares=shares(results),
+        independence=content.independence(results, drawn),
+        conventions=content.conventions(),
+        parameters=content.parameter_tables(),
+        provenance=results["provenance"],
+    )

@@ -16,8 +16,18 @@ from models.whole_files import write_whole
 from validation.rows import System
 
 KEPT = Path(__file__).with_name("full_report.json")
-QUICK_SHARES = {"pitch-plane": 13, "drift": 16, "contact": 9, "ride": 8, "rolling-vehicle": 5, "anti-lock": 8,
-                "measured": 3, "hard-cases": 14, "cost": 12, "effects": 12}  # fmt: skip
+QUICK_SHARES = {
+    "pitch-plane": 13,
+    "drift": 16,
+    "contact": 9,
+    "ride": 8,
+    "rolling-vehicle": 5,
+    "anti-lock": 8,
+    "measured": 3,
+    "hard-cases": 14,
+    "cost": 12,
+    "effects": 12,
+}
 """Seconds of two cores that each system may take of the quick report's minute, once kernels are compiled."""
 REST = 20
 """Seconds of the minute that are left for starting and drawing."""
@@ -38,20 +48,29 @@ def shares(results: dict[str, Any]) -> list[dict[str, Any]]:
     """
     found = _counted(results["rows"])
     main = {case: systems.most_common(1)[0][0] for case, systems in found.items()}
-    return [_line(system, found, main, results["provenance"]["seconds"]) for system in QUICK_SHARES
-            if any(system in systems for systems in found.values())]  # fmt: skip
+    return [
+        _line(system, found, main, results["provenance"]["seconds"])
+        for system in QUICK_SHARES
+        if any(system in systems for systems in found.values())
+    ]
 
 
-def _line(system: str, found: dict[str, Counter[str]], main: dict[str, str], seconds: dict[str, float],
-          ) -> dict[str, Any]:  # fmt: skip
+def _line(
+    system: str, found: dict[str, Counter[str]], main: dict[str, str], seconds: dict[str, float]
+) -> dict[str, Any]:
     own = [case for case in found if main[case] == system]
     shared = [case for case in found if system in found[case]]
-    return {"name": system, "cases": len(own), "rows": sum(found[case][system] for case in shared),
-            "seconds": sum(seconds.get(case, 0.0) for case in own), "stated": QUICK_SHARES[system],
-            "full_rows": sum(full()[case]["rows"].get(system, 0) for case in shared) if full().keys() >= set(shared)
-            else None,
-            "full_seconds": sum(full()[case]["seconds"] for case in own) if full().keys() >= set(own)
-            else None}  # fmt: skip
+    return {
+        "name": system,
+        "cases": len(own),
+        "rows": sum(found[case][system] for case in shared),
+        "seconds": sum(seconds.get(case, 0.0) for case in own),
+        "stated": QUICK_SHARES[system],
+        "full_rows": sum(full()[case]["rows"].get(system, 0) for case in shared)
+        if full().keys() >= set(shared)
+        else None,
+        "full_seconds": sum(full()[case]["seconds"] for case in own) if full().keys() >= set(own) else None,
+    }
 
 
 def _counted(rows: list[dict[str, Any]]) -> dict[str, Counter[str]]:
@@ -72,8 +91,11 @@ def keep(folder: Path) -> None:
     source = results["provenance"]
     if source["quick"]:
         raise InputError(folder / "results.json", "provenance.quick", True, "the results of a full report")
-    new = {case: {"rows": dict(systems), "seconds": round(source["seconds"][case], 1), "commit": source["commit"]}
-           for case, systems in _counted(results["rows"]).items() if case in source["seconds"]}  # fmt: skip
+    new = {
+        case: {"rows": dict(systems), "seconds": round(source["seconds"][case], 1), "commit": source["commit"]}
+        for case, systems in _counted(results["rows"]).items()
+        if case in source["seconds"]
+    }
     write_whole(KEPT, (json.dumps(dict(sorted((full() | new).items())), indent=1) + "\n").encode())
 
 

@@ -14,9 +14,14 @@ def shown(folder: Path, name: str) -> dict[str, Any]:
     folder : of the saved data, ``CASE.json`` each. The same data give the same bytes in any process.
     """
     module = _module(name)
-    found: dict[str, Any] = {"title": getattr(module, "TITLE", name.replace("_", " ")), "about": _doc(module),
-                             "share": _doc(getattr(module, "measure", None)),
-                             "tables": [], "figures": [], "notes": []}  # fmt: skip
+    found: dict[str, Any] = {
+        "title": getattr(module, "TITLE", name.replace("_", " ")),
+        "about": _doc(module),
+        "share": _doc(getattr(module, "measure", None)),
+        "tables": [],
+        "figures": [],
+        "notes": [],
+    }
     if module is None:
         found["notes"].append("This version of twinrig has no such case; its rows are shown as they were saved.")
     if not (hasattr(module, "tables") or hasattr(module, "draw")):

@@ -58,13 +58,13 @@ def _loaded(name: str) -> SpatialVehicle:
 
 
 def _scene(name: str, road: dict[str, float], speed: float) -> RideScene:
-    table = {"title": "drawn", "system": "ride", "vehicle": {"file": name}, "road": road,
-             "speeds": {"values": [speed]}}  # fmt: skip
+    table = {"title": "drawn", "system": "ride", "vehicle": {"file": name}, "road": road, "speeds": {"values": [speed]}}
     return build(table, "drawn")
 
 
-def _vehicle(vehicle: SpatialVehicle, rng: np.random.Generator,
-             between: Callable[[float, float], float], detailed: bool) -> SpatialVehicle:  # fmt: skip
+def _vehicle(
+    vehicle: SpatialVehicle, rng: np.random.Generator, between: Callable[[float, float], float], detailed: bool
+) -> SpatialVehicle:
     """Light wheels, firm dampers, damped tyres in three of five; a fore-aft bushing and a part on mounts at times."""
     wheels = {tyre.body for tyre in vehicle.tyres}
     light, firm = between(0.15, 1.2), between(0.5, 4.0)
@@ -78,8 +78,18 @@ def _vehicle(vehicle: SpatialVehicle, rng: np.random.Generator,
             if body.name in wheels:
                 bodies[i] = replace(body, freedoms=("x", "z"))
                 axis = (float(np.cos(lean)), 0.0, float(np.sin(lean)))
-                springs.append(SpringDamper(f"{body.name} bush", "body", body.name, body.position, body.position, axis,
-                                            k, 0.1 * float(np.sqrt(k * body.mass))))  # fmt: skip
+                springs.append(
+                    SpringDamper(
+                        f"{body.name} bush",
+                        "body",
+                        body.name,
+                        body.position,
+                        body.position,
+                        axis,
+                        k,
+                        0.1 * float(np.sqrt(k * body.mass)),
+                    )
+                )
     if detailed or rng.random() < 0.6:
         own = next(b for b in bodies if b.name == "body")
         m = own.mass * between(0.002, 0.02 if detailed else 0.15)

@@ -91,9 +91,16 @@ def measured() -> tuple[list[Row], list[dict[str, Any]]]:
 def _correlation_row(tracks: MeasuredTracks) -> Row:
     found = float(np.corrcoef(tracks.left, tracks.right)[0, 1])
     return within(
-        "ride_road.measured.correlation", SYSTEM, f"{tracks.name}: correlation of the two tracks", found, "", -0.38,
-        0.01, "as another reader of the file found", "published",
-    )  # fmt: skip
+        "ride_road.measured.correlation",
+        SYSTEM,
+        f"{tracks.name}: correlation of the two tracks",
+        found,
+        "",
+        -0.38,
+        0.01,
+        "as another reader of the file found",
+        "published",
+    )
 
 
 def _found(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any]:

@@ -49,10 +49,16 @@ def coherency_figure(half_track: float, measured: list[dict[str, Any]]) -> tuple
     )
     left.legend(fontsize=7.5, loc="lower left")
     right.legend(fontsize=7.5, loc="upper right", ncols=2)
-    figure.suptitle("A road of mean and roll process: both tracks move together in long waves and part in short ones",
-                    x=0.01, ha="left", fontweight="bold")  # fmt: skip
-    said = (f"Tracks {2 * half_track:g} m apart with the values read from the paper; its vehicle and measurements are "
-            "not recoverable. Dotted levels: what chance alone shows in 95 % of the windowed estimates.")  # fmt: skip
+    figure.suptitle(
+        "A road of mean and roll process: both tracks move together in long waves and part in short ones",
+        x=0.01,
+        ha="left",
+        fontweight="bold",
+    )
+    said = (
+        f"Tracks {2 * half_track:g} m apart with the values read from the paper; its vehicle and measurements are "
+        "not recoverable. Dotted levels: what chance alone shows in 95 % of the windowed estimates."
+    )
     return said, figure
 
 

@@ -44,8 +44,9 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
         i, (a, b, c) = loaded.ids[body.name], np.array(body.inertia, float) + 1e-6 * np.eye(3)
         place = [*loaded.data.xpos[i], *RotationMatrix2EulerParameters(loaded.data.xmat[i].reshape(3, 3))]
         node = mbs.AddNode(items.NodeRigidBodyEP(referenceCoordinates=place))
-        objects[body.name] = mbs.AddObject(items.ObjectRigidBody(
-            mass=body.mass, inertia=[a[0], b[1], c[2], b[2], a[2], a[1]], nodeNumber=node))  # fmt: skip
+        objects[body.name] = mbs.AddObject(
+            items.ObjectRigidBody(mass=body.mass, inertia=[a[0], b[1], c[2], b[2], a[2], a[1]], nodeNumber=node)
+        )
         centres[body.name] = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=objects[body.name]))
         force, moment = np.split(loaded.data.xfrc_applied[i] - GRAVITY * body.mass * np.eye(6)[2], 2)
         mbs.AddLoad(items.LoadForceVector(markerNumber=centres[body.name], loadVector=force.tolist()))
@@ -54,11 +55,18 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
         assert body.parent is not None
         arm = np.subtract(body.position, vehicle.whole.body(body.parent).position)
         seat = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=objects[body.parent], localPosition=arm.tolist()))
-        joint = mbs.AddObject(items.ObjectJointGeneric(
-            markerNumbers=[seat, centres[body.name]], constrainedAxes=[int(f not in body.freedoms) for f in FREEDOMS]))
-        sensors += [mbs.AddSensor(items.SensorObject(objectNumber=joint, storeInternal=True, writeToFile=False,
-                                                     outputVariableType=kind))
-                    for kind in (exu.OutputVariableType.ForceLocal, exu.OutputVariableType.TorqueLocal)]  # fmt: skip
+        joint = mbs.AddObject(
+            items.ObjectJointGeneric(
+                markerNumbers=[seat, centres[body.name]],
+                constrainedAxes=[int(f not in body.freedoms) for f in FREEDOMS],
+            )
+        )
+        sensors += [
+            mbs.AddSensor(
+                items.SensorObject(objectNumber=joint, storeInternal=True, writeToFile=False, outputVariableType=kind)
+            )
+            for kind in (exu.OutputVariableType.ForceLocal, exu.OutputVariableType.TorqueLocal)
+        ]
     mbs.Assemble()
     options = exu.SimulationSettings()
     options.solution.file.write, options.solution.sensors.writePeriod = False, STEP

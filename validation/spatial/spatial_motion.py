@@ -36,9 +36,17 @@ def path(count: int = 2001, period: float = 1e-3) -> Path:
     ones, none = np.ones_like(t), np.zeros_like(t)
     sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
     turn = np.moveaxis(np.array([[ones, none, -sp], [none, cr, sr * cp], [none, -sr, cr * cp]]), 2, 0)
-    change = np.moveaxis(np.array([[none, none, -cp * dpitch],
-                                   [none, -sr * droll, cr * cp * droll - sr * sp * dpitch],
-                                   [none, -cr * droll, -sr * cp * droll - cr * sp * dpitch]]), 2, 0)  # fmt: skip
+    change = np.moveaxis(
+        np.array(
+            [
+                [none, none, -cp * dpitch],
+                [none, -sr * droll, cr * cp * droll - sr * sp * dpitch],
+                [none, -cr * droll, -sr * cp * droll - cr * sp * dpitch],
+            ]
+        ),
+        2,
+        0,
+    )
     rates = np.einsum("nij,nj->ni", turn, speeds)
     alpha = np.einsum("nij,nj->ni", change, speeds) + np.einsum("nij,nj->ni", turn, changes)
     orientation = from_cardan(roll, pitch, yaw)

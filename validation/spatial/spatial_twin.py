@@ -33,8 +33,18 @@ SKEW = tuple(np.array([0.3, -0.2, 0.9]) / np.sqrt(0.94))
 
 def vehicle(gravity: float = 0.0) -> SpatialVehicle:
     """The twin, unloaded or under a gravity (m/s^2)."""
-    return SpatialVehicle("spatial twin", _bodies(), _springs(), _tyres(), (1.2, -1.4), _bars(), _side_forces(),
-                          (Drag("body", 1.0),), _outputs(), gravity)  # fmt: skip
+    return SpatialVehicle(
+        "spatial twin",
+        _bodies(),
+        _springs(),
+        _tyres(),
+        (1.2, -1.4),
+        _bars(),
+        _side_forces(),
+        (Drag("body", 1.0),),
+        _outputs(),
+        gravity,
+    )
 
 
 def _bodies() -> tuple[Body, ...]:

@@ -37,8 +37,14 @@ class AccelerationPhases(Common):
     slow: bool = False
 
     def __post_init__(self) -> None:
-        self.check(falls=(-ACCELERATION[1], -SMALLEST), rises=ACCELERATION, rises_fast=ACCELERATION, slip=SLIP,
-                   deep=SLIP, pulse=(0.0, 1000.0))  # fmt: skip
+        self.check(
+            falls=(-ACCELERATION[1], -SMALLEST),
+            rises=ACCELERATION,
+            rises_fast=ACCELERATION,
+            slip=SLIP,
+            deep=SLIP,
+            pulse=(0.0, 1000.0),
+        )
         for name, kind in (("pulse", int), ("slow", bool)):
             if not isinstance(getattr(self, name), kind):
                 allowed = "must be a whole number" if kind is int else "must be true or false"

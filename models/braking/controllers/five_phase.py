@@ -38,8 +38,12 @@ class FivePhase(Common):
     deep: float = 0.3
 
     def __post_init__(self) -> None:
-        self.check(**dict.fromkeys(("e1", "e2", "e3", "e5"), ACCELERATION), e4=(-1e4, 1e4), deep=SLIP,
-                   **dict.fromkeys(("falling", "fast", "slow"), PRESSURE_RATE))  # fmt: skip
+        self.check(
+            **dict.fromkeys(("e1", "e2", "e3", "e5"), ACCELERATION),
+            e4=(-1e4, 1e4),
+            deep=SLIP,
+            **dict.fromkeys(("falling", "fast", "slow"), PRESSURE_RATE),
+        )
         if not self.e1 < self.e2 or not self.e4 < self.e3 < self.e2:
             raise InputError("", "controller.parameters.e2", self.e2, "must be above e1 and e3, and e3 above e4")
         self._loop = PerWheel(self.wheels, self, lambda: _Logic(self), pressures=True)

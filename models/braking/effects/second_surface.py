@@ -9,8 +9,10 @@ COUNTS = {"all": {"surfaces": 1, "tables": 1}}
 
 def named(scene: Any) -> bool:
     """Whether a scene has it."""
-    return any(len({s.left for s in scene.road.stretches} | {own.right or s.right or s.left for s in
-                   scene.road.stretches}) > 1 for own in scene.procedures.values())  # fmt: skip
+    return any(
+        len({s.left for s in scene.road.stretches} | {own.right or s.right or s.left for s in scene.road.stretches}) > 1
+        for own in scene.procedures.values()
+    )
 
 
 def leave_out(table: dict[str, Any], scene: Any) -> None:

@@ -10,8 +10,17 @@ import numpy as np
 from models.braking.controller import APPLY, HOLD, LARGEST_PRESSURE, RELEASE, SLOW, Command, Controller, Sample
 from models.errors import RunFailed
 
-NAMES = ("crash", "silence", "wrong length", "wrong frame", "wrong number", "not a number", "no state of a valve",
-         "below zero", "too high")  # fmt: skip
+NAMES = (
+    "crash",
+    "silence",
+    "wrong length",
+    "wrong frame",
+    "wrong number",
+    "not a number",
+    "no state of a valve",
+    "below zero",
+    "too high",
+)
 """What a controller can do wrong: it raised, died or closed; did not answer in time; answered with too little or too
 much; what is no answer frame; to another sample; with what is no finite number; with a valve in none of
 -1, 0, 1, or 2 where there are such valves; with a pressure below none, or above that of the supply."""
@@ -38,8 +47,9 @@ class ControllerFailed(RunFailed):
         super().__init__("controller", f"sample {given.number}: {name}: {reason}", 1e-9 * given.time)
 
 
-def ask(controller: Controller, given: Sample, states: frozenset[int] = STATES,
-        most: float = LARGEST_PRESSURE) -> Command:  # fmt: skip
+def ask(
+    controller: Controller, given: Sample, states: frozenset[int] = STATES, most: float = LARGEST_PRESSURE
+) -> Command:
     """A controller's answer, checked; most : largest pressure (bar).
 
     Raises ControllerFailed, whatever the controller raises.
@@ -55,8 +65,11 @@ def ask(controller: Controller, given: Sample, states: frozenset[int] = STATES,
 
 def raised(error: BaseException) -> str:
     """Kind and text of an error, and the line of the user's file that raised it or led there."""
-    lines = [frame for frame in extract_tb(error.__traceback__)
-             if "site-packages" not in frame.filename and Path(frame.filename).parent != HERE]  # fmt: skip
+    lines = [
+        frame
+        for frame in extract_tb(error.__traceback__)
+        if "site-packages" not in frame.filename and Path(frame.filename).parent != HERE
+    ]
     where = f" ({Path(lines[-1].filename).name}, line {lines[-1].lineno})" if lines else ""
     return f"{type(error).__name__}: {error}"[: LONGEST - len(where)] + where
 
@@ -73,8 +86,9 @@ class Asked:
         return ask(self.inner, given, self.states, given.supply)
 
 
-def checked(command: Command, given: Sample, states: frozenset[int] = STATES,
-            most: float = LARGEST_PRESSURE) -> Command:  # fmt: skip
+def checked(
+    command: Command, given: Sample, states: frozenset[int] = STATES, most: float = LARGEST_PRESSURE
+) -> Command:
     """The same answer if each wheel has one state of its valve or one pressure; raises ControllerFailed."""
     if not isinstance(command, Command) or (command.valves is None) == (command.pressures is None):
         raise ControllerFailed(given, "wrong frame", "needs either valves or pressures")
@@ -89,8 +103,9 @@ def checked(command: Command, given: Sample, states: frozenset[int] = STATES,
         if command.pressures is not None and value < 0.0:
             raise ControllerFailed(given, "below zero", f"a pressure of {value:g} bar")
         if command.pressures is not None and value > most * (1.0 + ROUNDING):
-            raise ControllerFailed(given, "too high", f"a pressure of {value:g} bar, above the {most:g} bar that there "
-                                   "are")  # fmt: skip
+            raise ControllerFailed(
+                given, "too high", f"a pressure of {value:g} bar, above the {most:g} bar that there are"
+            )
         if command.valves is not None and value not in states:
             raise ControllerFailed(given, "no state of a valve", f"{value:g} is none of {_listed(states)}")
     return Command(pressures=values) if command.valves is None else Command(valves=values.astype(np.int64))

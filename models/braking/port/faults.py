@@ -90,5 +90,7 @@ class Faulty:
 
 def missing_teeth(faults: list[Fault], wheel: int, tooth: int, time: float) -> bool:
     """Whether a tooth of a wheel is missing at a time (s)."""
-    return any(one.kind == "tooth" and one.tooth == tooth and (one.wheels is None or wheel in one.wheels)
-               and one.holds(time) for one in faults)  # fmt: skip
+    return any(
+        one.kind == "tooth" and one.tooth == tooth and (one.wheels is None or wheel in one.wheels) and one.holds(time)
+        for one in faults
+    )

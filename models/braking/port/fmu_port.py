@@ -44,8 +44,12 @@ def _slave(description: Any, folder: str, file: str) -> Iterator[Any]:
     from fmpy.fmi2 import FMU2Slave
 
     try:
-        slave = FMU2Slave(guid=description.guid, unzipDirectory=folder, instanceName="controller",
-                          modelIdentifier=description.coSimulation.modelIdentifier)  # fmt: skip
+        slave = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=folder,
+            instanceName="controller",
+            modelIdentifier=description.coSimulation.modelIdentifier,
+        )
         slave.instantiate()
         slave.setupExperiment(startTime=0.0)
         slave.enterInitializationMode()

@@ -50,8 +50,9 @@ class WrongFrame(ValueError):
 def question(given: Sample) -> bytes:
     """Frame of one sample."""
     flags = SWITCH * given.brake | GIVEN * (given.speed == given.speed)
-    return QUESTION.pack(b"TRQ1", given.number, given.time, given.wheels.size, flags, given.supply, given.speed,
-                         *_eight(given.wheels))  # fmt: skip
+    return QUESTION.pack(
+        b"TRQ1", given.number, given.time, given.wheels.size, flags, given.supply, given.speed, *_eight(given.wheels)
+    )
 
 
 def sample(frame: bytes) -> Sample:

@@ -81,8 +81,9 @@ def main(port: int) -> None:
         except ControllerFailed as error:
             what = told(name=error.name, reason=error.why)
         except InputError as error:
-            what = told(file=error.file, place=error.place, value=error.value, allowed=error.allowed,
-                        choices=error.choices)  # fmt: skip
+            what = told(
+                file=error.file, place=error.place, value=error.value, allowed=error.allowed, choices=error.choices
+            )
         except BaseException as error:
             what = told(name="crash", reason=raised(error))
         with suppress(OSError):  # nobody is left to hear it

@@ -46,8 +46,9 @@ class SocketPort:
         except TimeoutError:
             raise ControllerFailed(given, "silence", f"it does not read within {self.timeout:g} s") from None
         except OSError as error:
-            raise ControllerFailed(given, "crash", f"the connection broke: {error.strerror or error}"
-                                   f"{fate(self.process, self.timeout)}") from None  # fmt: skip
+            raise ControllerFailed(
+                given, "crash", f"the connection broke: {error.strerror or error}{fate(self.process, self.timeout)}"
+            ) from None
 
     def _frame(self, given: Sample, end: float) -> bytes:
         """Exactly one answer; bytes beyond it would belong to a question not yet asked."""
@@ -60,8 +61,9 @@ class SocketPort:
             if part is None or time.perf_counter() > end:
                 raise ControllerFailed(given, "silence", f"{_some(got)} within {self.timeout:g} s")
             if not part:
-                raise ControllerFailed(given, "crash", f"the connection was closed after {_some(got)}"
-                                       f"{fate(self.process, self.timeout)}")  # fmt: skip
+                raise ControllerFailed(
+                    given, "crash", f"the connection was closed after {_some(got)}{fate(self.process, self.timeout)}"
+                )
             got += part
             if len(got) < ANSWER.size:
                 self.link.settimeout(max(end - time.perf_counter(), 1e-6))
@@ -104,8 +106,9 @@ def listening(address: int = 0) -> Iterator[socket.socket]:
 
 
 @contextmanager
-def connected(words: Sequence[str] | None, address: int, timeout: float, start: float, folder: Path = Path(),
-              ) -> Iterator[SocketPort]:  # fmt: skip
+def connected(
+    words: Sequence[str] | None, address: int, timeout: float, start: float, folder: Path = Path()
+) -> Iterator[SocketPort]:
     """The controller that a command starts, or that connects by itself, for as long as the block lasts.
 
     words : the command, in which "{port}" stands for the number of the port; None waits for a controller that somebody
@@ -141,8 +144,7 @@ def _started(words: Sequence[str] | None, port: int, folder: Path) -> Iterator[s
         return
     said = [word.replace("{port}", str(port)) for word in words]
     try:
-        process = subprocess.Popen(said, cwd=folder, stdin=subprocess.DEVNULL, stdout=STDERR,
-                                   start_new_session=True)
+        process = subprocess.Popen(said, cwd=folder, stdin=subprocess.DEVNULL, stdout=STDERR, start_new_session=True)
     except OSError as error:
         raise InputError("", "command", list(words), f"cannot be started: {error.strerror}") from None
     grace = 0.0

@@ -49,8 +49,11 @@ class Counted:
         """One sample of wheel i, from the sample before to now."""
         way, step = self._way[i], now - self._before
         turned = wheel.turned + 0.5 * (wheel.speed + speed) * step / way
-        edges = [k for k in range(math.floor(wheel.turned) + 1, math.floor(turned) + 1)
-                 if self._missing is None or not self._missing(i, k % self._own.teeth, now)]  # fmt: skip
+        edges = [
+            k
+            for k in range(math.floor(wheel.turned) + 1, math.floor(turned) + 1)
+            if self._missing is None or not self._missing(i, k % self._own.teeth, now)
+        ]
         if edges:
             at = self._before + _instant((edges[-1] - wheel.turned) * way, wheel.speed, speed, step)
             at = math.floor(at / self._own.tick) * self._own.tick

@@ -30,8 +30,11 @@ def answer(scene: BrakingScene, engine: str) -> Answer:
         samples += len(path.times) - 1
         states = path.states[0].size + path.turning.shape[1] + (scene.pressure is not None) * path.pressures.shape[1]
     steps = samples * scene.run.substeps
-    return Answer({name: _quantity(name, cases) for name, cases in found.items() if np.isfinite(cases).all()},
-                  {"steps": steps, "calls": steps, "states": states}, seconds)  # fmt: skip
+    return Answer(
+        {name: _quantity(name, cases) for name, cases in found.items() if np.isfinite(cases).all()},
+        {"steps": steps, "calls": steps, "states": states},
+        seconds,
+    )
 
 
 def _quantity(name: str, cases: list[np.ndarray]) -> Quantity:

@@ -29,12 +29,19 @@ def answer(scene: HandlingScene, engine: str) -> Answer:
     speeds = [drive.velocity() for drive in drives]
     found = {name: Quantity(unit, tuple(speed[:, i] for speed in speeds)) for name, (i, unit) in MOTION.items()}
     found["lateral acceleration"] = Quantity("m/s^2", tuple(drive.lateral_acceleration() for drive in drives))
-    found |= {name: Quantity(unit, tuple(np.ascontiguousarray(column) for drive in drives
-                                         for column in drive.tyres[:, :, k].T))
-              for name, (k, unit) in TYRES.items()}  # fmt: skip
+    found |= {
+        name: Quantity(
+            unit, tuple(np.ascontiguousarray(column) for drive in drives for column in drive.tyres[:, :, k].T)
+        )
+        for name, (k, unit) in TYRES.items()
+    }
     steps = sum(len(drive.run.times) - 1 for drive in drives)
-    counts = {"steps": steps, "calls": 4 * steps, "states": 2 * drives[0].run.positions.shape[1],
-              "terms": len(handling.waves) * len(handling.vehicle.tyres)}  # fmt: skip
+    counts = {
+        "steps": steps,
+        "calls": 4 * steps,
+        "states": 2 * drives[0].run.positions.shape[1],
+        "terms": len(handling.waves) * len(handling.vehicle.tyres),
+    }
     return Answer(found, counts, seconds)
 
 

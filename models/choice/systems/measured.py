@@ -25,12 +25,17 @@ def answer(scene: MeasuredScene, engine: str) -> Answer:
     """Record, and march; the seconds are those of the march."""
     vehicle = scene.rig().vehicle
     if vehicle is None:
-        raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, "a recording is priced "
-                         "and its effects chosen for a vehicle in space: name vehicle.file")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "vehicle.parameters",
+            scene.vehicle.parameters,
+            "a recording is priced and its effects chosen for a vehicle in space: name vehicle.file",
+        )
     with tempfile.TemporaryDirectory() as name:
         recording = recorded(scene, engine, Path(name))
-        job = SectionRun(vehicle, recording, Sections(vehicle), engine, hold_of(scene, recording), scene.run.step,
-                         scene.file)  # fmt: skip
+        job = SectionRun(
+            vehicle, recording, Sections(vehicle), engine, hold_of(scene, recording), scene.run.step, scene.file
+        )
         begun = time.process_time()
         run = march(job, Path(name) / "run")
         seconds = time.process_time() - begun

@@ -37,8 +37,12 @@ def answer(scene: InTime, engine: str) -> Answer:
             found.setdefault(output.name, []).append(own)
     units = {output.name: output.unit for output in outputs}
     vehicle = scene.vehicle(scene.paces[0])
-    counts = {"steps": scene.steps, "calls": 4 * scene.steps, "states": 2 * len(vehicle.coordinates()),
-              "terms": curves(vehicle) + sum(tyre.pushes_only for tyre in vehicle.tyres)}  # fmt: skip
+    counts = {
+        "steps": scene.steps,
+        "calls": 4 * scene.steps,
+        "states": 2 * len(vehicle.coordinates()),
+        "terms": curves(vehicle) + sum(tyre.pushes_only for tyre in vehicle.tyres),
+    }
     return Answer({name: Quantity(units[name], tuple(cases), True) for name, cases in found.items()}, counts, seconds)
 
 

@@ -13,8 +13,13 @@ from models.rail.scene import WheelsetScene
 
 ENGINE, WINDOWED = "reference", True
 PLACES = {"y": (Y, "m"), "z": (Z, "m"), "roll": (ROLL, "rad"), "yaw": (YAW, "rad"), "spin": (SPIN, "rad/s")}
-CONTACTS = {"normal": (wf.LOAD, "N"), "fx": (wf.FX, "N"), "fy": (wf.FY, "N"), "mz": (wf.MZ, "N m"),
-            "power": (wf.POWER, "W")}  # fmt: skip
+CONTACTS = {
+    "normal": (wf.LOAD, "N"),
+    "fx": (wf.FX, "N"),
+    "fy": (wf.FY, "N"),
+    "mz": (wf.MZ, "N m"),
+    "power": (wf.POWER, "W"),
+}
 """Of every patch: a path begins with the first patch, all its times one after the other."""
 
 
@@ -30,8 +35,10 @@ def answer(scene: WheelsetScene, engine: str) -> Answer:
         seconds += time.process_time() - begun
     found = {name: Quantity(unit, tuple(path.states[:, k] for path in paths)) for name, (k, unit) in PLACES.items()}
     patches = range(paths[0].contacts.shape[1])
-    found |= {name: Quantity(unit, tuple(path.contacts[:, i, k] for path in paths for i in patches))
-              for name, (k, unit) in CONTACTS.items()}  # fmt: skip
+    found |= {
+        name: Quantity(unit, tuple(path.contacts[:, i, k] for path in paths for i in patches))
+        for name, (k, unit) in CONTACTS.items()
+    }
     count = int(np.sum([len(path.times) - 1 for path in paths]))
     return Answer(found, {"steps": count, "calls": 4 * count, "states": STATES, "terms": _cells(scene)}, seconds)
 

@@ -17,8 +17,12 @@ def named(scene: Any) -> bool:
 def leave_out(table: dict[str, Any], scene: Any) -> None:
     """The linear theory, without slip; InputError where there is no ellipse for it."""
     if scene.profiles is not None:
-        raise InputError(scene.file, "method.name", scene.method.name, "cannot be left out on profiles: the "
-                         "linear theory needs an ellipse")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "method.name",
+            scene.method.name,
+            "cannot be left out on profiles: the linear theory needs an ellipse",
+        )
     table["method"] = {"name": "linear"}
 
 

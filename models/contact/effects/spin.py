@@ -17,8 +17,9 @@ def named(scene: Any) -> bool:
 def leave_out(table: dict[str, Any], scene: Any) -> None:
     """Creepage along x and y alone; InputError where spin is what is swept."""
     if scene.sweep is not None and scene.sweep.of == "spin":
-        raise InputError(scene.file, "sweep.of", "spin", "is what this scene asks for: sweep another creepage to "
-                         "leave it out")  # fmt: skip
+        raise InputError(
+            scene.file, "sweep.of", "spin", "is what this scene asks for: sweep another creepage to leave it out"
+        )
     table["creepage"].pop("spin")
 
 

@@ -29,22 +29,42 @@ from models.measured.finding import Finding, Weight
 from models.measured.recording import Recording
 
 CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
-    gaps.check, clipped.check, spikes.check, gravity.check, swapped.check, weight.check, lever.check, factor.check,
-    drift.check, shift.check, turning.check, rigid.check, noise.check,
-)  # fmt: skip
+    gaps.check,
+    clipped.check,
+    spikes.check,
+    gravity.check,
+    swapped.check,
+    weight.check,
+    lever.check,
+    factor.check,
+    drift.check,
+    shift.check,
+    turning.check,
+    rigid.check,
+    noise.check,
+)
 """In this order: what an earlier one has named, a later one does not name again."""
-FAMILIES = defaultdict(frozenset[str], {
-    **dict.fromkeys(("sign", "unit", "gain", "offset", "weight", "gravity", "lever"), frozenset({"size"})),
-    **dict.fromkeys(("drift", "shift"), frozenset({"time"})),
-    "clipped": frozenset({"value"}), "spikes": frozenset({"size", "value"}), "noise": frozenset({"size", "value"}),
-    "rigid": frozenset({"size", "time", "value"}),
-})  # fmt: skip
+FAMILIES = defaultdict(
+    frozenset[str],
+    {
+        **dict.fromkeys(("sign", "unit", "gain", "offset", "weight", "gravity", "lever"), frozenset({"size"})),
+        **dict.fromkeys(("drift", "shift"), frozenset({"time"})),
+        "clipped": frozenset({"value"}),
+        "spikes": frozenset({"size", "value"}),
+        "noise": frozenset({"size", "value"}),
+        "rigid": frozenset({"size", "time", "value"}),
+    },
+)
 """What the findings of a check are about: two of one kind about one channel say the same thing twice."""
 ORDER: tuple[Weight, ...] = ("error", "doubt", "note")
 
 
-def check(recording: Recording, vehicle: CutVehicle | None, places: Mapping[str, Place] | None = None,
-          claimed: Mapping[str, float] | None = None) -> tuple[Finding, ...]:  # fmt: skip
+def check(
+    recording: Recording,
+    vehicle: CutVehicle | None,
+    places: Mapping[str, Place] | None = None,
+    claimed: Mapping[str, float] | None = None,
+) -> tuple[Finding, ...]:
     """All findings, errors first, with what was noticed while reading.
 
     vehicle : None for one that is not in space; places : of accelerometers and gyros by name; claimed : white noise
@@ -64,5 +84,8 @@ def findings(evidence: Evidence) -> tuple[Finding, ...]:
 def _named(finding: Finding, before: list[Finding]) -> bool:
     """Whether what is wrong with one of these channels is what an earlier finding of no less weight has said."""
     return finding.weight != "note" and any(
-        ORDER.index(other.weight) <= ORDER.index(finding.weight) and FAMILIES[other.check] & FAMILIES[finding.check]
-        and set(other.signals) & set(finding.signals) for other in before)  # fmt: skip
+        ORDER.index(other.weight) <= ORDER.index(finding.weight)
+        and FAMILIES[other.check] & FAMILIES[finding.check]
+        and set(other.signals) & set(finding.signals)
+        for other in before
+    )

@@ -29,8 +29,10 @@ def _signal(evidence: Evidence, signal: Signal) -> list[Finding]:
     values, period = evidence.recording.samples(signal), evidence.recording.period
     good = values[np.isfinite(values)]
     if len(good) and good.min() == good.max():
-        text = (f"{signal.name} reads {good[0]:.4g} {UNITS[signal.quantity]} from beginning to end: it is dead, or the "
-                "map names another channel. Leave it out or name the right one.")  # fmt: skip
+        text = (
+            f"{signal.name} reads {good[0]:.4g} {UNITS[signal.quantity]} from beginning to end: it is dead, or the "
+            "map names another channel. Leave it out or name the right one."
+        )
         return [Finding(NAME, "error", signal.name, text, evidence.recording.duration, "s", (signal.name,))]
     ends = [_clipped(signal, values, good, end, period) for end in (good.min(), good.max())] if len(good) else []
     found = [finding for finding in ends if finding]
@@ -47,9 +49,11 @@ def _clipped(signal: Signal, values: np.ndarray, good: np.ndarray, end: float, p
     if np.max(own[:, 1] - own[:, 0]) < 2:
         return None
     share, first = 100 * at / len(good), float(period * own[0, 0])
-    text = (f"{signal.name} is clipped at {end:.5g} {UNITS[signal.quantity]}: {at} samples in {len(own)} runs, "
-            f"{share:.3g} % of all, the first from {first:.4g} s on. What lay beyond is lost, and damage comes out too "
-            "small: measure again with a wider range, or leave these times out.")  # fmt: skip
+    text = (
+        f"{signal.name} is clipped at {end:.5g} {UNITS[signal.quantity]}: {at} samples in {len(own)} runs, "
+        f"{share:.3g} % of all, the first from {first:.4g} s on. What lay beyond is lost, and damage comes out too "
+        "small: measure again with a wider range, or leave these times out."
+    )
     return Finding(NAME, "doubt", signal.name, text, share, "%", (signal.name,), (first, float(period * own[0, 1])))
 
 
@@ -64,8 +68,13 @@ def _stuck(signal: Signal, values: np.ndarray, period: float) -> list[Finding]:
         return []
     first, end = (float(period * i) for i in same[longest])
     held = f"{values[same[longest, 0]]:.5g} {UNITS[signal.quantity]}"
-    text = (f"{signal.name} stands still at {held} for {end - first:.4g} s from {first:.4g} s on: its last value was "
-            "held over a gap; leave these times out.")  # fmt: skip
+    text = (
+        f"{signal.name} stands still at {held} for {end - first:.4g} s from {first:.4g} s on: its last value was "
+        "held over a gap; leave these times out."
+    )
     doubtful = signal.check or end - first <= BRIDGED
-    return [Finding(NAME, "doubt" if doubtful else "error", signal.name, text, end - first, "s", (signal.name,),
-                    (first, end))]  # fmt: skip
+    return [
+        Finding(
+            NAME, "doubt" if doubtful else "error", signal.name, text, end - first, "s", (signal.name,), (first, end)
+        )
+    ]

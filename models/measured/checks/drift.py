@@ -28,9 +28,17 @@ def check(evidence: Evidence) -> list[Finding]:
         return []
     windows = _windows(evidence) if evidence.searched and len(clocks) == 1 else []
     if len(windows) < LEAST:
-        return [Finding(NAME, "note", name, f"Whether the clock of {name} runs as fast as that of the hub forces was "
-                        "not looked at: this needs their motion by the vehicle file, hub forces in one file, and "
-                        f"{LEAST} stretches of {WINDOW:g} s without a gap.") for name in others]  # fmt: skip
+        return [
+            Finding(
+                NAME,
+                "note",
+                name,
+                f"Whether the clock of {name} runs as fast as that of the hub forces was "
+                "not looked at: this needs their motion by the vehicle file, hub forces in one file, and "
+                f"{LEAST} stretches of {WINDOW:g} s without a gap.",
+            )
+            for name in others
+        ]
     return [_finding(evidence, windows, name, min(clocks)) for name in others]
 
 
@@ -47,8 +55,15 @@ def _windows(evidence: Evidence) -> list[tuple[float, Agreement]]:
             lines = np.abs(now.frequencies[:, None] - part.frequencies).argmin(axis=0)
             c, cross = len(now.inputs), part.cross
             readings = np.einsum("fkk->fk", cross[:, c:, c:]).real
-            local = replace(now, frequencies=part.frequencies, forces=cross[:, :c, :c], between=cross[:, c:, :c],
-                            readings=readings, response=now.response[lines], averages=part.averages)  # fmt: skip
+            local = replace(
+                now,
+                frequencies=part.frequencies,
+                forces=cross[:, :c, :c],
+                between=cross[:, c:, :c],
+                readings=readings,
+                response=now.response[lines],
+                averages=part.averages,
+            )
             found.append(((first + length / 2) * own.period, local))
     return found
 
@@ -61,12 +76,16 @@ def _finding(evidence: Evidence, windows: list[tuple[float, Agreement]], name: s
     apart = slope * evidence.recording.duration
     if abs(slope) > CERTAIN * error and abs(apart) > SMALL:
         word = "fast" if slope > 0 else "slow"
-        text = (f"The clock of {name} is {1e6 * abs(slope):.3g} ppm {word} (+-{2e6 * error:.2g} ppm at 95 %) against "
-                f"that of {clock}: {1e3 * abs(apart):.2g} ms over the recording, if the vehicle file is right; add "
-                f"{slope:.3g} to the file's drift under [[files]].")  # fmt: skip
+        text = (
+            f"The clock of {name} is {1e6 * abs(slope):.3g} ppm {word} (+-{2e6 * error:.2g} ppm at 95 %) against "
+            f"that of {clock}: {1e3 * abs(apart):.2g} ms over the recording, if the vehicle file is right; add "
+            f"{slope:.3g} to the file's drift under [[files]]."
+        )
         return Finding(NAME, "doubt", name, text, slope, "1", signals, (0.0, evidence.recording.duration))
-    text = (f"The clock of {name} runs as fast as that of {clock}: {1e6 * slope:+.2g} ppm (+-{2e6 * error:.2g} ppm at "
-            "95 %) by the motion of the vehicle.")  # fmt: skip
+    text = (
+        f"The clock of {name} runs as fast as that of {clock}: {1e6 * slope:+.2g} ppm (+-{2e6 * error:.2g} ppm at "
+        "95 %) by the motion of the vehicle."
+    )
     return Finding(NAME, "note", name, text, slope, "1", signals)
 
 

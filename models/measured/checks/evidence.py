@@ -42,14 +42,20 @@ class Evidence:
     def forces(self) -> tuple[Signal, ...]:
         """Components of the hubs of the vehicle."""
         hubs = self.vehicle.hubs if self.vehicle else ()
-        return tuple(s for s in self.recording.signals if s.at in hubs and s.component in ("x", "y", "z")
-                     and s.quantity in ("force", "moment"))  # fmt: skip
+        return tuple(
+            s
+            for s in self.recording.signals
+            if s.at in hubs and s.component in ("x", "y", "z") and s.quantity in ("force", "moment")
+        )
 
     @cached_property
     def inertial(self) -> tuple[Signal, ...]:
         """Accelerations, rates and angles whose place on the vehicle is known."""
-        return tuple(s for s in self.recording.signals if s.quantity in INERTIAL and s.component in AXES
-                     and self.place(s) is not None)  # fmt: skip
+        return tuple(
+            s
+            for s in self.recording.signals
+            if s.quantity in INERTIAL and s.component in AXES and self.place(s) is not None
+        )
 
     def vertical(self) -> dict[str, Signal]:
         """Vertical force of every hub that has one."""
@@ -115,13 +121,23 @@ class Evidence:
         assert self.vehicle is not None and self._spectra is not None
         found, c = self._spectra, len(self.forces)
         response = Response(self.vehicle, self.frame).at(found.frequencies, self.inertial, self._places)
-        hubs = [6 * self.vehicle.hubs.index(s.at) + 3 * (s.quantity == "moment") + AXES[s.component]
-                for s in self.forces]  # fmt: skip
+        hubs = [
+            6 * self.vehicle.hubs.index(s.at) + 3 * (s.quantity == "moment") + AXES[s.component] for s in self.forces
+        ]
         readings = np.einsum("fkk->fk", found.cross[:, c:, c:]).real
         forces, felt = (np.array([self.coarse.get(s, 1.0) for s in each]) for each in (self.forces, self.inertial))
         response = response[:, :, hubs] / forces * felt[:, None]
-        return Agreement(found.frequencies, self.forces, self.inertial, found.cross[:, :c, :c],
-                         found.cross[:, c:, :c], readings, response, found.averages, self._noise)  # fmt: skip
+        return Agreement(
+            found.frequencies,
+            self.forces,
+            self.inertial,
+            found.cross[:, :c, :c],
+            found.cross[:, c:, :c],
+            readings,
+            response,
+            found.averages,
+            self._noise,
+        )
 
     @property
     def _noise(self) -> np.ndarray:

@@ -13,8 +13,15 @@ TOLD = 0.02, 0.1
 def check(evidence: Evidence) -> list[Finding]:
     """Sizes are shares in %, or recorded by true value where sign or unit is wrong: a doubt if a spike may say so."""
     if evidence.lacking:
-        return [Finding("factor", "note", "", "Signs, units and factors were not checked by the motion of the vehicle: "
-                        f"this needs {evidence.lacking}.")]  # fmt: skip
+        return [
+            Finding(
+                "factor",
+                "note",
+                "",
+                "Signs, units and factors were not checked by the motion of the vehicle: "
+                f"this needs {evidence.lacking}.",
+            )
+        ]
     return [_finding(evidence, fault) for fault in evidence.faults if fault.kind == "factor"] + [_told(evidence)]
 
 

@@ -31,13 +31,26 @@ def _finding(evidence: Evidence, lost: np.ndarray, signals: tuple[Signal, ...]) 
     names = ", ".join(s.name for s in signals)
     others = f"; {len(lost) - 1} shorter gaps, {period * (lengths.sum() - lengths[longest]):.3g} s together"
     stops = any(_driving(s) for s in signals) and lengths[longest] * period > BRIDGED
-    remedy = ("leave it out with [clock] start and duration, for no run can go on without hub forces" if stops
-              else f"up to {BRIDGED:g} s are bridged in hub forces, and the filter goes on without angles")  # fmt: skip
-    text = (f"{names}: {period * lengths[longest]:.4g} s ({lengths[longest]} samples) are missing from {first:.4g} s on"
-            f"{others if len(lost) > 1 else ''}: {remedy}.")  # fmt: skip
+    remedy = (
+        "leave it out with [clock] start and duration, for no run can go on without hub forces"
+        if stops
+        else f"up to {BRIDGED:g} s are bridged in hub forces, and the filter goes on without angles"
+    )
+    text = (
+        f"{names}: {period * lengths[longest]:.4g} s ({lengths[longest]} samples) are missing from {first:.4g} s on"
+        f"{others if len(lost) > 1 else ''}: {remedy}."
+    )
     weight: Weight = "error" if stops else "doubt"
-    return Finding(NAME, weight, names, text, float(period * lengths[longest]), "s", tuple(s.name for s in signals),
-                   (float(first), float(end)))  # fmt: skip
+    return Finding(
+        NAME,
+        weight,
+        names,
+        text,
+        float(period * lengths[longest]),
+        "s",
+        tuple(s.name for s in signals),
+        (float(first), float(end)),
+    )
 
 
 def _driving(signal: Signal) -> bool:

@@ -28,8 +28,10 @@ def _signal(signal: Signal, found: float) -> Finding | None:
         return _vertical(signal, found)
     if not abs(found) > LEVEL:
         return None
-    text = (f"{signal.name} reads {found:.3g} m/s^2 on average, but lies along {signal.component}: it feels gravity, "
-            "so that axes are exchanged or the mount is tilted; correct component and sign in the map.")  # fmt: skip
+    text = (
+        f"{signal.name} reads {found:.3g} m/s^2 on average, but lies along {signal.component}: it feels gravity, "
+        "so that axes are exchanged or the mount is tilted; correct component and sign in the map."
+    )
     return Finding(NAME, "error", signal.name, text, found, "m/s^2", (signal.name,))
 
 
@@ -37,19 +39,25 @@ def _vertical(signal: Signal, found: float) -> Finding | None:
     if not signal.gravity:
         if abs(found) < BIAS:
             return None
-        text = (f"{signal.name} reads {found:.4g} m/s^2 on average, although the channel map says that gravity is not "
-                "included: drop gravity = false, or take off its zero.")  # fmt: skip
+        text = (
+            f"{signal.name} reads {found:.4g} m/s^2 on average, although the channel map says that gravity is not "
+            "included: drop gravity = false, or take off its zero."
+        )
         return Finding(NAME, "error", signal.name, text, found, "m/s^2", (signal.name,))
     missing = GRAVITY - found
     if abs(missing) < BIAS:
         return None
     if abs(found) < BIAS:
-        text = (f"{signal.name} reads {found:.3g} m/s^2 on average: {missing:.4g} m/s^2 of gravity are not included; "
-                "give gravity = false in the channel map.")  # fmt: skip
+        text = (
+            f"{signal.name} reads {found:.3g} m/s^2 on average: {missing:.4g} m/s^2 of gravity are not included; "
+            "give gravity = false in the channel map."
+        )
         return Finding(NAME, "error", signal.name, text, missing, "m/s^2", (signal.name,))
     kind, text = sentence(found / GRAVITY, signal, "gravity, which it feels on average")
     if kind in ("sign", "unit"):
         return Finding(kind, "error", signal.name, text, found / GRAVITY, "1", (signal.name,))
-    text = (f"{signal.name} reads {found:.4g} m/s^2 on average, {-missing:+.3g} m/s^2 off gravity: check its zero, its "
-            "factor and how it is mounted.")  # fmt: skip
+    text = (
+        f"{signal.name} reads {found:.4g} m/s^2 on average, {-missing:+.3g} m/s^2 off gravity: check its zero, its "
+        "factor and how it is mounted."
+    )
     return Finding(NAME, "doubt", signal.name, text, -missing, "m/s^2", (signal.name,))

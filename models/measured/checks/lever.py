@@ -19,10 +19,15 @@ def _finding(fault: Fault) -> Finding:
     names, side = ", ".join(signal.name for signal in fault.signals), "above" if fault.size > 0 else "below"
     length, wheel = abs(fault.size), ""
     if PATCH[0] < length < PATCH[1]:
-        wheel = (", a wheel's radius: they are about the contact patch" if fault.size < 0 else
-                 ", a wheel's radius: they were referred from the contact patch to the hub twice, or with a wrong sign")
+        wheel = (
+            ", a wheel's radius: they are about the contact patch"
+            if fault.size < 0
+            else ", a wheel's radius: they were referred from the contact patch to the hub twice, or with a wrong sign"
+        )
     remedy = ", ".join(f"{hub} = {fault.size:.3g}" for hub in hubs)
-    text = (f"{names} are about a point {length:.3g} m {side} the hub (+-{2 * fault.error:.2g} m at 95 %){wheel}, if "
-            f"the vehicle file is right. Moments are needed about the hub: give levers = {{ {remedy} }} in the scene, "
-            f"which takes {fault.size:.3g} m Fy off Mx and adds {fault.size:.3g} m Fx to My.")  # fmt: skip
+    text = (
+        f"{names} are about a point {length:.3g} m {side} the hub (+-{2 * fault.error:.2g} m at 95 %){wheel}, if "
+        f"the vehicle file is right. Moments are needed about the hub: give levers = {{ {remedy} }} in the scene, "
+        f"which takes {fault.size:.3g} m Fy off Mx and adds {fault.size:.3g} m Fx to My."
+    )
     return Finding(NAME, "doubt", " and ".join(hubs), text, fault.size, "m", tuple(s.name for s in fault.signals))

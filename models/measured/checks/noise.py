@@ -15,15 +15,22 @@ OFF = 1.5
 def check(evidence: Evidence) -> list[Finding]:
     """A doubt for every channel whose stated noise is wrong, and a note for each quantity."""
     found = {s: noise(evidence.recording, s) for s in evidence.recording.signals}
-    doubts = [_doubt(s, size, evidence.claimed[s.name]) for s, size in found.items() if s.name in evidence.claimed
-              and np.isfinite(size) and not 1 / OFF < size / max(evidence.claimed[s.name], 1e-300) < OFF]  # fmt: skip
+    doubts = [
+        _doubt(s, size, evidence.claimed[s.name])
+        for s, size in found.items()
+        if s.name in evidence.claimed
+        and np.isfinite(size)
+        and not 1 / OFF < size / max(evidence.claimed[s.name], 1e-300) < OFF
+    ]
     return doubts + _notes(found)
 
 
 def _doubt(signal: Signal, size: float, stated: float) -> Finding:
     unit = UNITS[signal.quantity]
-    text = (f"The noise of {signal.name} is {size:.3g} {unit} on every sample, where the scene states {stated:.3g} "
-            f"{unit}: correct [noise], or predictions and filter are off.")  # fmt: skip
+    text = (
+        f"The noise of {signal.name} is {size:.3g} {unit} on every sample, where the scene states {stated:.3g} "
+        f"{unit}: correct [noise], or predictions and filter are off."
+    )
     return Finding(NAME, "doubt", signal.name, text, size, unit, (signal.name,))
 
 

@@ -29,13 +29,16 @@ class Response:
         self.vehicle, self.motion = vehicle, Kinematics(vehicle.tree)
         model, n = _built(vehicle, frame), vehicle.size
         rest, moved = np.zeros(n), NUDGE * np.eye(n)
-        self.stiff = np.column_stack([(model.accelerations(0.0, d, rest) - model.accelerations(0.0, -d, rest))
-                                      / (2 * NUDGE) for d in moved])  # fmt: skip
-        self.damped = np.column_stack([(model.accelerations(0.0, rest, d) - model.accelerations(0.0, rest, -d))
-                                       / (2 * NUDGE) for d in moved])  # fmt: skip
+        self.stiff = np.column_stack(
+            [(model.accelerations(0.0, d, rest) - model.accelerations(0.0, -d, rest)) / (2 * NUDGE) for d in moved]
+        )
+        self.damped = np.column_stack(
+            [(model.accelerations(0.0, rest, d) - model.accelerations(0.0, rest, -d)) / (2 * NUDGE) for d in moved]
+        )
         still, hubs = model.accelerations(0.0, rest, rest), WRENCH * len(vehicle.hubs)
-        self.pushed = np.column_stack([(model.accelerations((i + 1) * STEP / 2, rest, rest) - still) / PUSH
-                                       for i in range(hubs)])  # fmt: skip
+        self.pushed = np.column_stack(
+            [(model.accelerations((i + 1) * STEP / 2, rest, rest) - still) / PUSH for i in range(hubs)]
+        )
 
     def at(self, frequencies: np.ndarray, signals: tuple[Signal, ...], places: tuple[Place, ...]) -> np.ndarray:
         """Transfer functions (f, signals, 6 h) at frequencies (f,) in Hz; each signal at its place."""

@@ -67,7 +67,10 @@ def _finding(body: str, array: SensorArray, share: float, suspect: str, rigid: b
     left = f"{100 * share:.2g} % of what its {len(array.names)} accelerometers read against each other"
     if rigid:
         return Finding(NAME, "note", body, f"A rigid body explains {body} but for {left}.", 100 * share, "%", names)
-    cause = f"without {suspect} it is rigid: check its mount, place, axes and factor" if suspect else \
-        "no single sensor explains it: check places and axes of all"  # fmt: skip
+    cause = (
+        f"without {suspect} it is rigid: check its mount, place, axes and factor"
+        if suspect
+        else "no single sensor explains it: check places and axes of all"
+    )
     text = f"No rigid body explains {left} on {body}; {cause}."
     return Finding(NAME, "doubt", suspect or body, text, 100 * share, "%", names)

@@ -12,17 +12,25 @@ TOLD = 3e-3
 def check(evidence: Evidence) -> list[Finding]:
     """Sizes are in s, positive where a channel is late; by the motion that the hub forces should cause."""
     if evidence.agreement is None:
-        return [Finding(NAME, "note", "", "Shifts in time were not checked by the motion of the vehicle: this needs "
-                        f"{evidence.lacking}.")]  # fmt: skip
+        return [
+            Finding(
+                NAME,
+                "note",
+                "",
+                f"Shifts in time were not checked by the motion of the vehicle: this needs {evidence.lacking}.",
+            )
+        ]
     return [_finding(fault) for fault in evidence.faults if fault.kind == "late"] + [_told(evidence)]
 
 
 def _finding(fault: Fault) -> Finding:
     one, late = len(fault.signals) == 1, "late" if fault.size > 0 else "early"
     subject = f"{fault.name} is" if one else f"{fault.name[0].upper()}{fault.name[1:]} are"
-    text = (f"{subject} {1e3 * abs(fault.size):.2f} ms {late} (+-{2e3 * fault.error:.2g} ms at 95 %) against the other "
-            "channels, if the vehicle file is right: take out the delay of filter or telemetry, or give the file "
-            f"offset = {-fault.size:.4f} if all of it is shifted.")  # fmt: skip
+    text = (
+        f"{subject} {1e3 * abs(fault.size):.2f} ms {late} (+-{2e3 * fault.error:.2g} ms at 95 %) against the other "
+        "channels, if the vehicle file is right: take out the delay of filter or telemetry, or give the file "
+        f"offset = {-fault.size:.4f} if all of it is shifted."
+    )
     return Finding(NAME, "doubt", fault.name, text, fault.size, "s", tuple(s.name for s in fault.signals))
 
 

@@ -32,8 +32,9 @@ class Spectra:
     white: float
 
 
-def spectra(recording: Recording, signals: tuple[Signal, ...], band: Sequence[float],
-            stretch: tuple[int, int] | None = None) -> Spectra | None:  # fmt: skip
+def spectra(
+    recording: Recording, signals: tuple[Signal, ...], band: Sequence[float], stretch: tuple[int, int] | None = None
+) -> Spectra | None:
     """Of a band (Hz), in SI units squared by window sums squared; None where too little is unbroken.
 
     stretch : first sample and number of samples that are looked at; else all.

@@ -42,9 +42,19 @@ def _finding(signal: Signal, values: np.ndarray, period: float) -> Finding | Non
     if not len(at):
         return None
     worst, unit = int(np.abs(heights).argmax()), UNITS[signal.quantity]
-    text = (f"{signal.name} has {len(at)} spike(s) of one or two samples, the highest by {heights[worst]:+.4g} {unit} "
-            f"at {period * at[worst]:.6g} s. A transducer or its cable makes such, and their damage is none of the "
-            "vehicle's: repair the file, or leave these times out. So may a sharp edge of the road, which the sampling "
-            "then hardly resolves.")  # fmt: skip
-    return Finding(NAME, "doubt", signal.name, text, float(heights[worst]), unit, (signal.name,),
-                   (period * (at[worst] - 1), period * (at[worst] + 2)))  # fmt: skip
+    text = (
+        f"{signal.name} has {len(at)} spike(s) of one or two samples, the highest by {heights[worst]:+.4g} {unit} "
+        f"at {period * at[worst]:.6g} s. A transducer or its cable makes such, and their damage is none of the "
+        "vehicle's: repair the file, or leave these times out. So may a sharp edge of the road, which the sampling "
+        "then hardly resolves."
+    )
+    return Finding(
+        NAME,
+        "doubt",
+        signal.name,
+        text,
+        float(heights[worst]),
+        unit,
+        (signal.name,),
+        (period * (at[worst] - 1), period * (at[worst] + 2)),
+    )

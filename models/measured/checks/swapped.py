@@ -21,9 +21,11 @@ def check(evidence: Evidence) -> list[Finding]:
 
 
 def _finding(fault: Fault) -> Finding:
-    text = (f"The channels of {fault.name} are exchanged: as mapped, the forces leave {100 * fault.size:.0f} % of the "
-            f"measured motion unexplained, exchanged {100 * fault.error:.0f} %; exchange their names in the channel "
-            "map.")  # fmt: skip
+    text = (
+        f"The channels of {fault.name} are exchanged: as mapped, the forces leave {100 * fault.size:.0f} % of the "
+        f"measured motion unexplained, exchanged {100 * fault.error:.0f} %; exchange their names in the channel "
+        "map."
+    )
     return Finding(NAME, "error", fault.name, text, 100 * fault.size, "%", tuple(s.name for s in fault.signals))
 
 
@@ -34,15 +36,19 @@ def _rest(evidence: Evidence) -> Finding:
     share = left.unexplained
     low, high = int(share.argmin()), int(share.argmax())
     best, worst = (f"{100 * share[i]:.2g} % ({left.outputs[i].name})" for i in (low, high))
-    text = (f"Through the vehicle file the hub forces explain the inertial channels but for {best} to {worst} of their "
-            f"size between {left.frequencies[0]:.3g} and {left.frequencies[-1]:.3g} Hz")  # fmt: skip
+    text = (
+        f"Through the vehicle file the hub forces explain the inertial channels but for {best} to {worst} of their "
+        f"size between {left.frequencies[0]:.3g} and {left.frequencies[-1]:.3g} Hz"
+    )
     told, resolved = left.typical(), float(left.frequencies[1] - left.frequencies[0])
     if told <= FITS:
         return Finding(NAME, "note", "", f"{text}.", 100 * told, "%")
     if told <= FITS * SEGMENT * resolved:
         text += f". Segments of {1 / resolved:.3g} s are too short to say whether they belong together"
         return Finding(NAME, "note", "", f"{text}.", 100 * told, "%")
-    text += (f"; typically {100 * told:.0f} % stay unexplained: forces, motion and vehicle do not belong together, "
-             "so that delays and factors are not to be relied upon, and true ones may be hidden. Check frame, clocks, "
-             "places of the sensors and the vehicle file.")  # fmt: skip
+    text += (
+        f"; typically {100 * told:.0f} % stay unexplained: forces, motion and vehicle do not belong together, "
+        "so that delays and factors are not to be relied upon, and true ones may be hidden. Check frame, clocks, "
+        "places of the sensors and the vehicle file."
+    )
     return Finding(NAME, "doubt", "", text, 100 * told, "%", tuple(s.name for s in left.outputs))

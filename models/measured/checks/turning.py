@@ -21,8 +21,11 @@ def check(evidence: Evidence) -> list[Finding]:
     """Sizes are the rate by the derivative of the angle, or s by which the rate is late."""
     own = evidence.recording
     both = [(angle, rate) for angle in own.find("angle") for rate in own.find("angular rate")]
-    pairs = [(angle, rate) for angle, rate in both if rate.component == angle.component != "yaw"
-             and _body(evidence, rate) == _body(evidence, angle)]  # fmt: skip
+    pairs = [
+        (angle, rate)
+        for angle, rate in both
+        if rate.component == angle.component != "yaw" and _body(evidence, rate) == _body(evidence, angle)
+    ]
     if not pairs:
         return [Finding(NAME, "note", "", "Angles were not compared with rates: no body has both of one axis.")]
     return [finding for pair in pairs for finding in _pair(evidence, *pair)]
@@ -47,15 +50,28 @@ def _pair(evidence: Evidence, angle: Signal, rate: Signal) -> list[Finding]:
     late, error = _late(transfer, omega, weight * found.averages, ratio)
     wrong, text = sentence(ratio, rate, f"the derivative of {angle.name}")
     if wrong in ("sign", "unit"):
-        return [Finding(wrong, "error", names, f"{text} Or {angle.name} is the one that is wrong.", ratio, "1",
-                        (rate.name, angle.name))]  # fmt: skip
+        return [
+            Finding(
+                wrong,
+                "error",
+                names,
+                f"{text} Or {angle.name} is the one that is wrong.",
+                ratio,
+                "1",
+                (rate.name, angle.name),
+            )
+        ]
     if evidence.agreement is None and np.count_nonzero(own) >= LINES and abs(late) > max(LATE, 5 * error):
         way = "late" if late > 0 else "early"
-        text = (f"{rate.name} is {1e3 * abs(late):.2f} ms {way} (+-{2e3 * error:.2g} ms at 95 %) against the "
-                f"derivative of {angle.name}: take the delay of one of them off.")  # fmt: skip
+        text = (
+            f"{rate.name} is {1e3 * abs(late):.2f} ms {way} (+-{2e3 * error:.2g} ms at 95 %) against the "
+            f"derivative of {angle.name}: take the delay of one of them off."
+        )
         return [Finding("shift", "doubt", names, text, late, "s", (rate.name, angle.name))]
-    text = (f"{rate.name} is {ratio:.3g} times the derivative of {angle.name}, and not shifted by more than "
-            f"{5e3 * error:.2g} ms.")  # fmt: skip
+    text = (
+        f"{rate.name} is {ratio:.3g} times the derivative of {angle.name}, and not shifted by more than "
+        f"{5e3 * error:.2g} ms."
+    )
     return [Finding(NAME, "note", names, text, ratio, "1", (rate.name, angle.name))]
 
 

@@ -100,14 +100,17 @@ def _slope(own: Recording, signal: Signal) -> np.ndarray:
 
 def _numbers(evidence: Evidence, vehicle: CutVehicle) -> list[int]:
     """Numbers (k,) of the components among all hubs'."""
-    return [WRENCH * vehicle.hubs.index(evidence.hub(s)) + 3 * (s.quantity == "moment") + AXES[s.component]
-            for s in evidence.forces]  # fmt: skip
+    return [
+        WRENCH * vehicle.hubs.index(evidence.hub(s)) + 3 * (s.quantity == "moment") + AXES[s.component]
+        for s in evidence.forces
+    ]
 
 
 def _coarse(evidence: Evidence, signal: Signal, load: float, static: float) -> Finding | None:
     if abs(load) < EMPTY * static and evidence.empty(signal):
-        return Finding(NAME, "error", signal.name, counted_from_load(signal.name, load, static), load / static, "1",
-                       (signal.name,))  # fmt: skip
+        return Finding(
+            NAME, "error", signal.name, counted_from_load(signal.name, load, static), load / static, "1", (signal.name,)
+        )
     kind, text = sentence(load / static, signal, f"the {static:.0f} N that rest on {signal.at} on average")
     if kind == "gain":
         return None
@@ -146,13 +149,17 @@ def _fine(evidence: Evidence, balance: Balance, signals: tuple[Signal, ...], loa
         if _moves_rightly(evidence, signal, share):
             return [_offset(signal, share * loads[worst], own * loads[worst])]
         _, text = sentence(1 + share, signal, f"the {loads[worst]:.0f} N that rest on {signal.at} on average")
-        sure_text = (f" The mean is known to {2 * own:.2%} (95 %), and what is too much acts at this hub alone; an "
-                     f"offset of {share * loads[worst]:+.3g} N would do the same.")  # fmt: skip
+        sure_text = (
+            f" The mean is known to {2 * own:.2%} (95 %), and what is too much acts at this hub alone; an "
+            f"offset of {share * loads[worst]:+.3g} N would do the same."
+        )
         return [Finding("gain", "doubt", signal.name, text + sure_text, 100 * share, "%", (signal.name,))]
     if fall > CERTAIN and max(abs(excess), float(np.abs(force[1:]).max()) / weight) > max(SMALL, 4 * sure):
         return [_other_weight(force, weight, sure, names)]
-    text = (f"The mean vertical forces carry the vehicle's weight of {weight:.0f} N to {excess:+.2%} (+-{2 * sure:.2%} "
-            f"at 95 %); a channel that is wrong by {max(100 * SMALL, 5 * _coarsest(single)):.2g} % would be seen.")
+    text = (
+        f"The mean vertical forces carry the vehicle's weight of {weight:.0f} N to {excess:+.2%} (+-{2 * sure:.2%} "
+        f"at 95 %); a channel that is wrong by {max(100 * SMALL, 5 * _coarsest(single)):.2g} % would be seen."
+    )
     return [Finding(NAME, "note", "", text, 100 * excess, "%", names)]
 
 
@@ -168,9 +175,11 @@ def _offset(signal: Signal, size: float, sure: float) -> Finding:
     """A constant error (N) of one channel."""
     zero = size / (signal.sign * signal.factor)
     word = "much" if size > 0 else "little"
-    text = (f"{signal.name} reads {abs(size):.3g} N too {word} (+-{2 * sure:.2g} N at 95 %) on average, while its "
-            f"factor is right by the motion of the vehicle: an offset; give it zero = {signal.zero + zero:.4g} in the "
-            "channel map.")  # fmt: skip
+    text = (
+        f"{signal.name} reads {abs(size):.3g} N too {word} (+-{2 * sure:.2g} N at 95 %) on average, while its "
+        f"factor is right by the motion of the vehicle: an offset; give it zero = {signal.zero + zero:.4g} in the "
+        "channel map."
+    )
     return Finding("offset", "doubt", signal.name, text, size, "N", (signal.name,))
 
 
@@ -182,7 +191,9 @@ def _coarsest(single: list[tuple[np.ndarray, np.ndarray, float]]) -> float:
 def _other_weight(force: np.ndarray, weight: float, sure: float, names: tuple[str, ...]) -> Finding:
     """Force (3,) in N and N m that is too much."""
     excess = float(force[0]) / weight
-    text = (f"The mean vertical forces carry {force[0]:+.0f} N ({excess:+.2%}, +-{2 * sure:.2%} at 95 %) more than the "
-            f"vehicle file weighs, with moments of {force[1]:+.0f} N m in roll and {force[2]:+.0f} N m in pitch: enter "
-            "the load that was on board into the vehicle file, or check the calibration of all wheels.")  # fmt: skip
+    text = (
+        f"The mean vertical forces carry {force[0]:+.0f} N ({excess:+.2%}, +-{2 * sure:.2%} at 95 %) more than the "
+        f"vehicle file weighs, with moments of {force[1]:+.0f} N m in roll and {force[2]:+.0f} N m in pitch: enter "
+        "the load that was on board into the vehicle file, or check the calibration of all wheels."
+    )
     return Finding(NAME, "doubt", "", text, 100 * excess, "%", names)

@@ -12,11 +12,17 @@ from models.measured.file_kinds import KNOWN, by_extension, format_of, usual_of
 from models.measured.formats.opened import Opened, notice
 from models.measured.formats.writing import Group, check_names, check_start, new_file
 
-READERS = {"CSV": ("csv", "open_csv"), "ASAM MDF": ("mdf4", "open_mdf"), "RPC III": ("rpc3", "open_rpc"),
-           "TDMS": ("tdms", "open_tdms")}  # fmt: skip
+READERS = {
+    "CSV": ("csv", "open_csv"),
+    "ASAM MDF": ("mdf4", "open_mdf"),
+    "RPC III": ("rpc3", "open_rpc"),
+    "TDMS": ("tdms", "open_tdms"),
+}
 """Format -> module and function; imported when such a file is opened."""
-DRIVE = ("a .drv file usually holds what drives the actuators of a rig, not what was measured: name the response "
-         "(.rsp) of the same run")  # fmt: skip
+DRIVE = (
+    "a .drv file usually holds what drives the actuators of a rig, not what was measured: name the response "
+    "(.rsp) of the same run"
+)
 
 
 def open_source(path: str | Path) -> Source:
@@ -34,9 +40,14 @@ def open_source(path: str | Path) -> Source:
     form = format_of(path, _head(path))
     source = _read(path, form)
     usual = usual_of(path.suffix.lower(), form)
-    said = [notice(path, "doubt", text) for text in (
-        f"the extension {path.suffix} is that of {usual}, but the file is read as {form}" if usual != form else "",
-        DRIVE if form == "RPC III" and path.suffix.lower() == ".drv" else "") if text]  # fmt: skip
+    said = [
+        notice(path, "doubt", text)
+        for text in (
+            f"the extension {path.suffix} is that of {usual}, but the file is read as {form}" if usual != form else "",
+            DRIVE if form == "RPC III" and path.suffix.lower() == ".drv" else "",
+        )
+        if text
+    ]
     return replace(source, noticed=(*said, *source.noticed))
 
 
@@ -56,9 +67,7 @@ WRITERS = {".csv": "write_csv", ".mf4": "write_mdf4:write_mdf", ".rsp": "write_r
 """Extension -> module and function."""
 
 
-def write(
-    path: str | Path, groups: Sequence[Group], start: datetime | None = None, comment: str = ""
-) -> Path:
+def write(path: str | Path, groups: Sequence[Group], start: datetime | None = None, comment: str = "") -> Path:
     """Write channels to a new file, in the format of its extension, block by block, whole or not at all.
 
     Parameters

@@ -83,19 +83,40 @@ def open_csv(path: Path) -> CsvFile:
         start, notes = zoned(path, remarks.start) if remarks.start else (layout.start, [])
         columns = [i for i in layout.numbers if i != clock]
         if not columns:
-            raise InputError(path, f"line {head.header.number} (header)", ", ".join(head.names), "a column of numbers "
-                             "beside time is needed")  # fmt: skip
+            raise InputError(
+                path,
+                f"line {head.header.number} (header)",
+                ", ".join(head.names),
+                "a column of numbers beside time is needed",
+            )
         groups = head.groups()
         families = [groups[i] if groups else "" for i in columns]
         names, repeated = told_apart(path, [heading(head.names[i])[0] for i in columns], families)
         channels = tuple(
-            Channel(name, unit_of(head.names[i]) or units[i], "\n".join(remarks.of_channels.get(name, [])), 0, count,
-                    None, family=family)
+            Channel(
+                name,
+                unit_of(head.names[i]) or units[i],
+                "\n".join(remarks.of_channels.get(name, [])),
+                0,
+                count,
+                None,
+                family=family,
+            )
             for name, family, i in zip(names, families, columns, strict=True)
-        )  # fmt: skip
+        )
         places = {column: i for i, column in enumerate(layout.numbers)}
-        return CsvFile(path, channels, start, "\n".join(remarks.comments), tuple(found + notes + repeated), layout,
-                       rows, places.get(clock), factor, tuple(places[i] for i in columns))  # fmt: skip
+        return CsvFile(
+            path,
+            channels,
+            start,
+            "\n".join(remarks.comments),
+            tuple(found + notes + repeated),
+            layout,
+            rows,
+            places.get(clock),
+            factor,
+            tuple(places[i] for i in columns),
+        )
 
 
 def unit_of(text: str) -> str:
@@ -116,12 +137,19 @@ def _ends(path: Path, layout: Layout, remarks: Remarks, count: int, left: int) -
         raise InputError(path, f"line {layout.line + 1}", None, "rows of numbers are needed, and there is none")
     if left:
         whole = _cells_of_end(path, layout, left) == layout.width
-        found.append(notice(path, "note" if whole else "doubt", f"the last line has no line end and "
-                            f"{'may be' if whole else 'is'} cut off: it is left out, and {count} rows are used"))
+        found.append(
+            notice(
+                path,
+                "note" if whole else "doubt",
+                f"the last line has no line end and "
+                f"{'may be' if whole else 'is'} cut off: it is left out, and {count} rows are used",
+            )
+        )
     samples = remarks.samples
     if samples is not None and samples > count:
-        found.append(notice(path, "doubt", f"the header announces {samples} rows, but {count} are there: "
-                            "the file is cut off"))
+        found.append(
+            notice(path, "doubt", f"the header announces {samples} rows, but {count} are there: the file is cut off")
+        )
     if samples is not None and samples < count:
         raise InputError(path, "samples", samples, f"the header announces fewer rows than there are ({count})")
     return found
@@ -138,6 +166,11 @@ def _factor(path: Path, head: Head, clock: int, unit: str) -> float:
     """Factor of times to seconds."""
     name, own = clock_heading(head.names[clock])
     if (own or unit).casefold() not in TIME_UNITS:
-        raise InputError(path, f"line {head.header.number} (header), column {name!r}, unit", own or unit,
-                         f"write {name} [s]", tuple(SECONDS))  # fmt: skip
+        raise InputError(
+            path,
+            f"line {head.header.number} (header), column {name!r}, unit",
+            own or unit,
+            f"write {name} [s]",
+            tuple(SECONDS),
+        )
     return TIME_UNITS[(own or unit).casefold()]

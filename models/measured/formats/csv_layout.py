@@ -33,13 +33,46 @@ LONGEST = 1 << 20
 MOST = 2000
 """Lines among which they must be."""
 CLOCKS = ("time", "zeit", "t")
-OTHER_CLOCKS = ("timestamp", "timestamps", "time stamp", "zeitstempel", "uhrzeit", "date time", "datetime",
-                "datum zeit", "datum uhrzeit", "elapsed time", "relative time", "absolute time", "rel time", "abs time",
-                "time rel", "time abs", "test time", "run time", "messzeit", "time axis", "zeitachse",
-                "x value")  # fmt: skip
+OTHER_CLOCKS = (
+    "timestamp",
+    "timestamps",
+    "time stamp",
+    "zeitstempel",
+    "uhrzeit",
+    "date time",
+    "datetime",
+    "datum zeit",
+    "datum uhrzeit",
+    "elapsed time",
+    "relative time",
+    "absolute time",
+    "rel time",
+    "abs time",
+    "time rel",
+    "time abs",
+    "test time",
+    "run time",
+    "messzeit",
+    "time axis",
+    "zeitachse",
+    "x value",
+)
 """Names of the column of time, and those that are it where none is called so."""
-TIME_UNITS = {"s": 1.0, "sec": 1.0, "secs": 1.0, "second": 1.0, "seconds": 1.0, "sekunden": 1.0, "ms": 1e-3,
-              "msec": 1e-3, "milliseconds": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}  # fmt: skip
+TIME_UNITS = {
+    "s": 1.0,
+    "sec": 1.0,
+    "secs": 1.0,
+    "second": 1.0,
+    "seconds": 1.0,
+    "sekunden": 1.0,
+    "ms": 1e-3,
+    "msec": 1e-3,
+    "milliseconds": 1e-3,
+    "us": 1e-6,
+    "µs": 1e-6,
+    "μs": 1e-6,
+    "ns": 1e-9,
+}
 """In small letters -> s."""
 _RATE = re.compile(r"\d\s*k?hz\b|(rate|freq|abtast|sampl|interval|period|increment|delta[ _]?t)\D*\d", re.IGNORECASE)
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
@@ -100,9 +133,14 @@ def read_top(path: Path) -> Top:
     """First lines of a file; InputError where it has none that are text."""
     with path.open("rb") as file:
         data = file.read(LONGEST)
-    codec, begin = next(((codec, len(mark)) for mark, codec in
-                         ((b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"), (b"\xef\xbb\xbf", "utf-8"))
-                         if data.startswith(mark)), ("utf-8", 0))  # fmt: skip
+    codec, begin = next(
+        (
+            (codec, len(mark))
+            for mark, codec in ((b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"), (b"\xef\xbb\xbf", "utf-8"))
+            if data.startswith(mark)
+        ),
+        ("utf-8", 0),
+    )
     top = Top(np.dtype({"utf-16-le": "<u2", "utf-16-be": ">u2"}.get(codec, "u1")))
     for line in _lines(data, begin, codec, top):
         shown = line.text.strip()
@@ -146,8 +184,12 @@ def find_headings_of(path: Path, top: Top) -> tuple[Head, int, Remarks, list[Fin
     head, known = _head(path, top)
     clocks = [i for i, name in enumerate(head.names) if known(name)]
     if len(clocks) != 1:
-        raise InputError(path, f"line {head.header.number} (header)", ", ".join(head.names),
-                         f"one column time [s] is needed, found {len(clocks)}")
+        raise InputError(
+            path,
+            f"line {head.header.number} (header)",
+            ", ".join(head.names),
+            f"one column time [s] is needed, found {len(clocks)}",
+        )
     remarks = Remarks()
     above = [line for line in (*top.hashed, *head.titles) if line.number <= head.line and line != head.header]
     for line in sorted(above):
@@ -155,13 +197,23 @@ def find_headings_of(path: Path, top: Top) -> tuple[Head, int, Remarks, list[Fin
             remarks.add(path, line.number, line.text.strip()[1:].strip())
         else:
             remarks.comments.append(line.text.strip(' ",;\t'))
-    said = [notice(path, "doubt", f"line {line.number} is not UTF-8 and is read as Windows-1252: "
-                   f"{line.text.strip()[:60]!r}") for line in top.foreign if line.number <= head.line]  # fmt: skip
+    said = [
+        notice(
+            path, "doubt", f"line {line.number} is not UTF-8 and is read as Windows-1252: {line.text.strip()[:60]!r}"
+        )
+        for line in top.foreign
+        if line.number <= head.line
+    ]
     if top.unit.itemsize > 1:
         said.append(notice(path, "note", "the text is UTF-16"))
     if head.titles:
-        said.append(notice(path, "note", f"{len(head.titles)} line(s) above the headings in line {head.header.number} "
-                           "are kept as the comment"))  # fmt: skip
+        said.append(
+            notice(
+                path,
+                "note",
+                f"{len(head.titles)} line(s) above the headings in line {head.header.number} are kept as the comment",
+            )
+        )
     return head, clocks[0], remarks, said
 
 
@@ -181,8 +233,9 @@ def _head(path: Path, top: Top) -> tuple[Head, Known]:
             if heads:
                 what = " and ".join(SEPARATORS[head.separator] for head in heads)
                 place, text = f"line {heads[0].header.number} (header)", heads[0].header.text
-                raise InputError(path, place, text, "commas alone (or semicolons, or tabs) must part the columns, "
-                                 f"found {what}")  # fmt: skip
+                raise InputError(
+                    path, place, text, f"commas alone (or semicolons, or tabs) must part the columns, found {what}"
+                )
     raise _without_clock(path, top, signs)
 
 
@@ -193,14 +246,24 @@ def _without_clock(path: Path, top: Top, signs: tuple[str, ...]) -> InputError:
     place, text = f"line {first.number} (header)", first.text.strip()
     rate = next((line for line in (*top.lines, *top.hashed) if _RATE.search(line.text)), None)
     if rate is not None:
-        return InputError(path, place, text, f"one column time [s] is needed, found 0: line {rate.number} "
-                          f"({rate.text.strip()[:40]!r}) speaks of the sampling; write the time of every row")
+        return InputError(
+            path,
+            place,
+            text,
+            f"one column time [s] is needed, found 0: line {rate.number} "
+            f"({rate.text.strip()[:40]!r}) speaks of the sampling; write the time of every row",
+        )
     if not any(sign in first.text for sign in signs):
-        return InputError(path, place, text, f"commas alone (or semicolons, or tabs) must part the columns, found no "
-                          f"separator; {NEEDED}")  # fmt: skip
+        return InputError(
+            path,
+            place,
+            text,
+            f"commas alone (or semicolons, or tabs) must part the columns, found no separator; {NEEDED}",
+        )
     if any(all(map(is_number, cells)) for sign in signs if len(cells := split(text, sign)) > 1):
-        return InputError(path, place, text, "the file begins with numbers: write a header line time [s], name [unit], "
-                          "... above them")  # fmt: skip
+        return InputError(
+            path, place, text, "the file begins with numbers: write a header line time [s], name [unit], ... above them"
+        )
     return InputError(path, place, text, "one column time [s] is needed, found 0: call it so in the header line")
 
 
@@ -222,7 +285,8 @@ def is_other_clock(text: str) -> bool:
     """Whether a heading can be that of the column of time where none is called so."""
     name = clock_heading(text)[0]
     return " ".join(re.findall(r"[^\W_]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name).casefold())) in OTHER_CLOCKS or (
-        " ".join(re.findall(r"[^\W_]+", name.casefold())) in OTHER_CLOCKS)
+        " ".join(re.findall(r"[^\W_]+", name.casefold())) in OTHER_CLOCKS
+    )
 
 
 def first_rows(top: Top, head: Head) -> list[list[str]]:
@@ -232,9 +296,7 @@ def first_rows(top: Top, head: Head) -> list[list[str]]:
     return [[row[i] for row in rows] for i in range(len(head.names))]
 
 
-def find_layout(
-    path: Path, top: Top, head: Head, clock: int, units: tuple[str, ...]
-) -> tuple[Layout, list[Finding]]:
+def find_layout(path: Path, top: Top, head: Head, clock: int, units: tuple[str, ...]) -> tuple[Layout, list[Finding]]:
     """How the rows are written, from the first ones; InputError where two readings make sense."""
     columns = first_rows(top, head)
     first = next(iter(columns[clock]), "")
@@ -244,12 +306,21 @@ def find_layout(
     taken = tuple(sorted({*texts, *nameless, *((clock,) if stamps else ())}))
     numbers = {cell: None for i, cells in enumerate(columns) if i not in taken for cell in cells}
     decimal = decimal_sign(path, head.line + 1, head.separator, list(numbers))
-    layout = Layout(head.separator, decimal, head.begin, head.line, head.names, head.width, taken, clock, stamps,
-                    top.unit)  # fmt: skip
-    said = [notice(path, "doubt" if units[i] or heading(head.names[i])[1] else "note",
-                   f"left out, no numbers: {head.names[i]!r}") for i in texts]  # fmt: skip
-    said += [notice(path, "note" if _counts(columns[i]) else "doubt", f"column {i + 1} has no name and is left out")
-             for i in nameless]  # fmt: skip
+    layout = Layout(
+        head.separator, decimal, head.begin, head.line, head.names, head.width, taken, clock, stamps, top.unit
+    )
+    said = [
+        notice(
+            path,
+            "doubt" if units[i] or heading(head.names[i])[1] else "note",
+            f"left out, no numbers: {head.names[i]!r}",
+        )
+        for i in texts
+    ]
+    said += [
+        notice(path, "note" if _counts(columns[i]) else "doubt", f"column {i + 1} has no name and is left out")
+        for i in nameless
+    ]
     return layout, said + [notice(path, "note", text) for text in _how(layout, list(numbers))]
 
 
@@ -258,8 +329,10 @@ def _how(layout: Layout, cells: list[str]) -> Iterator[str]:
     stamps = layout.stamps
     if stamps is not None:
         wraps = "; they go on past midnight" if stamps.form == "hh:mm:ss.fff" else ""
-        yield (f"{layout.names[layout.clock]!r} holds times of the clock ({stamps.form}); seconds are counted from the "
-               f"first, {stamps.first}{wraps}")  # fmt: skip
+        yield (
+            f"{layout.names[layout.clock]!r} holds times of the clock ({stamps.form}); seconds are counted from the "
+            f"first, {stamps.first}{wraps}"
+        )
     marks = [repr(cell) for cell in cells if cell.casefold() not in ("", "nan") and MARKS.fullmatch(cell)]
     if marks:
         yield f"cells {', '.join(marks)} are read as not measured"
@@ -281,8 +354,7 @@ def _counts(cells: list[str]) -> bool:
 def _is_text(cells: list[str]) -> bool:
     """Whether a column holds texts or dates: nothing in it can be meant as a number."""
     said = [cell for cell in cells if not MARKS.fullmatch(cell)]
-    return bool(said) and all(TIMED.fullmatch(cell) or _DATE.fullmatch(cell) or not _BEGUN.match(cell)
-                              for cell in said)  # fmt: skip
+    return bool(said) and all(TIMED.fullmatch(cell) or _DATE.fullmatch(cell) or not _BEGUN.match(cell) for cell in said)
 
 
 def find_units(path: Path, top: Top, head: Head, clock: int) -> tuple[tuple[str, ...], list[Finding]]:
@@ -292,8 +364,10 @@ def find_units(path: Path, top: Top, head: Head, clock: int) -> tuple[tuple[str,
     known = {*TIME_UNITS, "", "-"} if clock_heading(head.names[clock])[1] else set(TIME_UNITS)
     found = next((row for row in rows if row[1][clock].casefold() in known or stamped), None)
     if found is None:
-        said = [notice(path, "note", f"line {line.number}, beneath the headings, is not read: "
-                       f"{line.text.strip()[:60]!r}") for line, _ in rows]  # fmt: skip
+        said = [
+            notice(path, "note", f"line {line.number}, beneath the headings, is not read: {line.text.strip()[:60]!r}")
+            for line, _ in rows
+        ]
         return ("",) * len(head.names), said
     line, units = found
     for i, (name, unit) in enumerate(zip(head.names, units, strict=True)):

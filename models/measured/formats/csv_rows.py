@@ -123,8 +123,12 @@ def numbers(path: Path, layout: Layout, data: bytes, first: int) -> tuple[np.nda
     beyond = np.isfinite(table[:, len(layout.numbers) :])
     if beyond.any():
         row = int(np.argmax(beyond.any(axis=1)))
-        raise InputError(path, f"line {line + row}", None, "a value stands beyond the last heading: "
-                         f"{len(layout.names)} values are needed")  # fmt: skip
+        raise InputError(
+            path,
+            f"line {line + row}",
+            None,
+            f"a value stands beyond the last heading: {len(layout.names)} values are needed",
+        )
     return table[:, : len(layout.numbers)], times
 
 
@@ -176,8 +180,10 @@ def _without(text: bytes, begins: np.ndarray, ends: np.ndarray) -> bytes:
 def _parted(layout: Layout, text: bytes) -> tuple[bytes, list[str]]:
     """Rows without the columns of text, and the cells of the clock."""
     bounds, kept = _bounds(layout, text), [i for i in range(layout.width) if i not in layout.texts]
-    cells = [text[a + 1 : b].replace(_WRONG, layout.separator.encode()).decode("latin-1")
-             for a, b in bounds[:, layout.clock : layout.clock + 2].tolist()]  # fmt: skip
+    cells = [
+        text[a + 1 : b].replace(_WRONG, layout.separator.encode()).decode("latin-1")
+        for a, b in bounds[:, layout.clock : layout.clock + 2].tolist()
+    ]
     inner = [i for i in layout.texts if i < kept[-1]]
     begins, ends = bounds[:, inner].ravel() + 1, bounds[:, [i + 1 for i in inner]].ravel() + 1
     if kept[-1] + 1 < layout.width:  # the last ones go with the separator before them
@@ -196,8 +202,15 @@ def _parsed(layout: Layout, text: bytes) -> np.ndarray | None:
     if text.translate(None, _ALLOWED):
         return None
     try:
-        table = pandas.read_csv(io.BytesIO(text), header=None, dtype=np.float64, keep_default_na=False,
-                                na_values=_GAPS, skip_blank_lines=False, skipinitialspace=True)  # fmt: skip
+        table = pandas.read_csv(
+            io.BytesIO(text),
+            header=None,
+            dtype=np.float64,
+            keep_default_na=False,
+            na_values=_GAPS,
+            skip_blank_lines=False,
+            skipinitialspace=True,
+        )
     except (ValueError, OverflowError):
         return None
     return table.to_numpy()
@@ -230,8 +243,9 @@ def _culprit(path: Path, layout: Layout, text: bytes, line: int) -> InputError:
         for name, cell in zip(names, cells, strict=False):
             plain = cell.replace(",", ".") if layout.decimal == "," else cell
             try:
-                wrong = other in cell or not (MARKS.fullmatch(cell) or (cell.isascii() and "_" not in cell and
-                                              float(plain) is not None))  # fmt: skip
+                wrong = other in cell or not (
+                    MARKS.fullmatch(cell) or (cell.isascii() and "_" not in cell and float(plain) is not None)
+                )
             except ValueError:
                 wrong = True
             if wrong:

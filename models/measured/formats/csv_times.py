@@ -64,8 +64,12 @@ class Stamps:
                 np.datetime64(self._written(cell), "ns")
             except ValueError:
                 where = f" with the zone {self.zone}" if self.zone else ""
-                return InputError(path, f"line {line + i}, column {name!r}", cell.strip(),
-                                  f"a time such as {self.first} is needed ({self.form}{where}, as in the first row)")
+                return InputError(
+                    path,
+                    f"line {line + i}, column {name!r}",
+                    cell.strip(),
+                    f"a time such as {self.first} is needed ({self.form}{where}, as in the first row)",
+                )
         return InputError(path, f"line {line} and after, column {name!r}", None, "times of the clock are needed")
 
 
@@ -81,8 +85,13 @@ def find_stamps(path: Path, cell: str, line: int, name: str) -> Stamps:
             except ValueError:
                 raise plain._culprit(path, [cell], line, name) from None
             return Stamps(form, plain.zone, zero, cell)
-    raise InputError(path, f"line {line}, column {name!r}", cell, "this notation of times has two meanings or none: "
-                     "write 2026-03-02T09:30:00.000, 09:30:00.000, or seconds in a column time [s]")  # fmt: skip
+    raise InputError(
+        path,
+        f"line {line}, column {name!r}",
+        cell,
+        "this notation of times has two meanings or none: "
+        "write 2026-03-02T09:30:00.000, 09:30:00.000, or seconds in a column time [s]",
+    )
 
 
 def _iso(found: re.Match[str]) -> str:

@@ -21,8 +21,10 @@ class LeftOut:
 
     def findings(self, path: Path) -> list[Finding]:
         """One sentence per reason."""
-        return [notice(path, "note", f"left out, {why}: {', '.join(names[:SHOWN])}{more(len(names) - SHOWN)}")
-                for why, names in self.names.items()]  # fmt: skip
+        return [
+            notice(path, "note", f"left out, {why}: {', '.join(names[:SHOWN])}{more(len(names) - SHOWN)}")
+            for why, names in self.names.items()
+        ]
 
 
 def more(count: int) -> str:

@@ -154,23 +154,37 @@ def _listed(path: Path, mdf: Any, version: int, found: list[Finding]) -> MdfFile
                 channels.append(channel)
     found = found + left.findings(path)
     if not places:
-        raise InputError(path, "channels", None, "; ".join(["no channel of numbers over time is in the file",
-                                                             *(one.text for one in found)]))  # fmt: skip
+        raise InputError(
+            path,
+            "channels",
+            None,
+            "; ".join(["no channel of numbers over time is in the file", *(one.text for one in found)]),
+        )
     groups = [_groups(mdf.groups[g].channel_group, channel) for channel, (g, _) in zip(channels, places, strict=True)]
     names, repeated = told_apart(path, [channel.name for channel in channels], *zip(*groups, strict=True))
     listed = tuple(
-        Channel(name, channel.unit or "", _plain(channel.comment), g, mdf.groups[g].channel_group.cycles_nr, None,
-                _resolution(channel, version), next(filter(None, texts), ""))
+        Channel(
+            name,
+            channel.unit or "",
+            _plain(channel.comment),
+            g,
+            mdf.groups[g].channel_group.cycles_nr,
+            None,
+            _resolution(channel, version),
+            next(filter(None, texts), ""),
+        )
         for name, channel, (g, _), texts in zip(names, channels, places, groups, strict=True)
-    )  # fmt: skip
+    )
     start, notes = _start(path, mdf.header, version)
     return MdfFile(path, listed, start, _plain(mdf.header.comment), tuple(found + repeated + notes), tuple(places))
 
 
 def _groups(group: Any, channel: Any) -> tuple[str, str, str, str]:
     """What can name a channel's group: as acquired, its source, the first line of its comment, the channel's source."""
-    sources = [f"{getattr(one, 'name', '')} {getattr(one, 'path', '')}".strip()
-               for one in (getattr(group, "acq_source", None), getattr(channel, "source", None))]  # fmt: skip
+    sources = [
+        f"{getattr(one, 'name', '')} {getattr(one, 'path', '')}".strip()
+        for one in (getattr(group, "acq_source", None), getattr(channel, "source", None))
+    ]
     comment = _plain(group.comment or "").partition("\n")[0]
     return (getattr(group, "acq_name", None) or "").strip(), sources[0], comment.strip(), sources[1]
 
@@ -195,8 +209,12 @@ def _unusable(group: Any, i: int, version: int) -> str:
     conversion = 0 if channel.conversion is None else channel.conversion.conversion_type
     if version == 4 and channel.flags & ALL_INVALID:
         return "marked as invalid by the recorder"
-    numbers = (channel.channel_type == 0 and channel.data_type in PLAIN[version]
-               and conversion in CONVERSIONS[version] and not group.channel_dependencies[i])  # fmt: skip
+    numbers = (
+        channel.channel_type == 0
+        and channel.data_type in PLAIN[version]
+        and conversion in CONVERSIONS[version]
+        and not group.channel_dependencies[i]
+    )
     if not numbers:
         return "no numbers"
     return "" if _inside(group, channel, version) else "bits outside the records (a damaged file has such)"
@@ -207,8 +225,11 @@ def _inside(group: Any, channel: Any, version: int) -> bool:
     own, whole = group.channel_group, channel.data_type in WHOLE[version]
     if version == 4 and channel.channel_type == VIRTUAL_MASTER:
         return True
-    begin = 8 * channel.byte_offset + channel.bit_offset if version == 4 else (
-        channel.start_offset + 8 * getattr(channel, "additional_byte_offset", 0))  # fmt: skip
+    begin = (
+        8 * channel.byte_offset + channel.bit_offset
+        if version == 4
+        else (channel.start_offset + 8 * getattr(channel, "additional_byte_offset", 0))
+    )
     marked = version == 4 and channel.flags & INVALIDATION
     return (
         0 <= begin <= begin + channel.bit_count <= 8 * own.samples_byte_nr
@@ -244,8 +265,14 @@ def _start(path: Path, header: Any, version: int) -> tuple[datetime | None, list
         return None, [notice(path, "note", "the file does not say when it was measured")]
     if version == 4 and header.time_flags & LOCAL:
         clock = datetime.fromtimestamp(header.abs_time / 1e9, UTC)
-        return None, [notice(path, "doubt", f"the start ({clock:%Y-%m-%d %H:%M:%S}) is local in a zone that the "
-                             "file does not name, and is not used")]  # fmt: skip
+        return None, [
+            notice(
+                path,
+                "doubt",
+                f"the start ({clock:%Y-%m-%d %H:%M:%S}) is local in a zone that the "
+                "file does not name, and is not used",
+            )
+        ]
     minutes = 60 * header.tz_offset if version == 3 else 0
     if version == 4 and header.time_flags & OFFSET:
         minutes = header.tz_offset + header.daylight_save_time

@@ -41,8 +41,12 @@ def check_blocks(path: Path) -> list[Finding]:
         raise InputError(path, f"byte {size}", None, "the file ends in its header")
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         if data[:8] == b"UnFinMF " or struct.unpack_from("<H", data, 60)[0]:
-            raise InputError(path, "byte 0", data[:8].decode("latin-1").strip(), "the recorder did not finish this "
-                             "file: let its software finalise it, or asammdf save it anew")
+            raise InputError(
+                path,
+                "byte 0",
+                data[:8].decode("latin-1").strip(),
+                "the recorder did not finish this file: let its software finalise it, or asammdf save it anew",
+            )
         blocks = dict(_walk(path, data, size))
         if blocks[FIRST].kind != b"##HD":
             raise InputError(path, f"byte {FIRST}", None, "the header block ##HD is needed")
@@ -57,12 +61,21 @@ def _walk(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int, Block]]
     while ahead:
         place = ahead.pop()
         if not FIRST <= place <= size - HEAD or data[place : place + 2] != b"##":
-            raise InputError(path, f"byte {place}", None, f"a block must begin here; the file has {size} bytes: it is "
-                             "cut off or damaged")
+            raise InputError(
+                path,
+                f"byte {place}",
+                None,
+                f"a block must begin here; the file has {size} bytes: it is cut off or damaged",
+            )
         length, count = struct.unpack_from("<QQ", data, place + 8)
         if place + length > size or HEAD + 8 * count > length:
-            raise InputError(path, f"byte {place}", None, f"a block of {length} bytes with {count} links begins here; "
-                             f"the file has {size} bytes: it is cut off or damaged")
+            raise InputError(
+                path,
+                f"byte {place}",
+                None,
+                f"a block of {length} bytes with {count} links begins here; "
+                f"the file has {size} bytes: it is cut off or damaged",
+            )
         links = struct.unpack_from(f"<{count}Q", data, place + HEAD)
         rest = place + HEAD + 8 * count
         yield place, Block(data[place : place + 4], length, links, data[rest : min(rest + 100, place + length)])
@@ -100,8 +113,13 @@ def _records(path: Path, place: int, group: Block, blocks: dict[int, Block]) -> 
         allowed = f"the records of this data group need {needed} bytes, and {there} are there"
         raise InputError(path, f"byte {place}", None, allowed)
     if needed < there and not loose:
-        return [notice(path, "doubt", f"the data group at byte {place} has {there} bytes of records; {needed} are "
-                       "announced and read")]  # fmt: skip
+        return [
+            notice(
+                path,
+                "doubt",
+                f"the data group at byte {place} has {there} bytes of records; {needed} are announced and read",
+            )
+        ]
     return []
 
 

@@ -67,8 +67,12 @@ class Opened(ABC):
         with readable(self.path):
             for (first, count), (times, values) in zip(spans, self.pieces(chosen, spans), strict=True):
                 if len(times) != count:
-                    raise InputError(self.path, f"sample {first + len(times)}", None,
-                                     f"the data end here, although {first + count} samples or more are announced")
+                    raise InputError(
+                        self.path,
+                        f"sample {first + len(times)}",
+                        None,
+                        f"the data end here, although {first + count} samples or more are announced",
+                    )
                 self._finite(first, ["time"], times[:, None], np.isfinite(times[:, None]))
                 self._finite(first, [self.channels[i].name for i in chosen], values, ~np.isinf(values))
                 yield Block(first, times, values)
@@ -77,8 +81,12 @@ class Opened(ABC):
         """Refuse the first value that is not a measured one."""
         if not good.all():
             row, column = (int(i[0]) for i in np.nonzero(~good))
-            raise InputError(self.path, f"channel {names[column]!r}, sample {first + row}", float(values[row, column]),
-                             "a finite value is needed (NaN in a channel says that nothing was measured)")
+            raise InputError(
+                self.path,
+                f"channel {names[column]!r}, sample {first + row}",
+                float(values[row, column]),
+                "a finite value is needed (NaN in a channel says that nothing was measured)",
+            )
 
 
 @contextmanager
@@ -112,8 +120,14 @@ def told_apart(path: Path, names: Sequence[str], *groups: Sequence[str]) -> tupl
     for name in (name for name, uses in Counter(names).items() if uses > 1):
         new = [i for i, each in enumerate(names) if each == name]
         weight: Weight = "doubt" if any(unique[i] != by_group[i] for i in new) else "note"
-        said.append(notice(path, weight, f"{len(new)} channels are called {name!r}: they are read as "
-                           + ", ".join(repr(unique[i]) for i in new), name))  # fmt: skip
+        said.append(
+            notice(
+                path,
+                weight,
+                f"{len(new)} channels are called {name!r}: they are read as " + ", ".join(repr(unique[i]) for i in new),
+                name,
+            )
+        )
     return unique, said
 
 
@@ -145,9 +159,20 @@ def zoned(path: Path, text: str) -> tuple[datetime | None, list[Finding]]:
     try:
         start = datetime.fromisoformat(text.strip())
     except ValueError:
-        return None, [notice(path, "doubt", f"the start {text.strip()!r} is not a date such as "
-                             "2026-11-21T08:00:00+00:00, and is not used")]
+        return None, [
+            notice(
+                path,
+                "doubt",
+                f"the start {text.strip()!r} is not a date such as 2026-11-21T08:00:00+00:00, and is not used",
+            )
+        ]
     if start.tzinfo is None:
-        return None, [notice(path, "doubt", f"the start {text.strip()!r} names no time zone, and is not used: "
-                             "write it as 2026-11-21T08:00:00+00:00")]
+        return None, [
+            notice(
+                path,
+                "doubt",
+                f"the start {text.strip()!r} names no time zone, and is not used: "
+                "write it as 2026-11-21T08:00:00+00:00",
+            )
+        ]
     return start, []

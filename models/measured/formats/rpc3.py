@@ -72,10 +72,17 @@ def open_rpc(path: Path) -> RpcFile:
         names, repeated = told_apart(path, [_name(parameters, i) for i in indices])
         steps = layout.scales if layout.dtype == TYPES["SHORT_INTEGER"] else np.zeros(layout.width)
         channels = tuple(
-            Channel(name, parameters.get(f"UNITS.CHAN_{i}", "").strip(), _long(parameters, f"COMMENT.CHAN_{i}"), 0,
-                    count, layout.period, abs(float(steps[i - 1])))
+            Channel(
+                name,
+                parameters.get(f"UNITS.CHAN_{i}", "").strip(),
+                _long(parameters, f"COMMENT.CHAN_{i}"),
+                0,
+                count,
+                layout.period,
+                abs(float(steps[i - 1])),
+            )
             for name, i in zip(names, indices, strict=True)
-        )  # fmt: skip
+        )
         start, notes = zoned(path, parameters["DATE"]) if parameters.get("DATE", "").strip() else (None, [])
         return RpcFile(path, channels, start, _long(parameters, "COMMENT"), tuple(found + repeated + notes), layout)
 
@@ -88,8 +95,12 @@ def read_parameters(path: Path) -> dict[str, str]:
             raise InputError(path, f"byte {len(head)}", None, "the file ends in its header")
         first = [_record(head, i) for i in range(3)]
         if [key for key, _ in first] != ["FORMAT", "NUM_HEADER_BLOCKS", "NUM_PARAMS"]:
-            raise InputError(path, "header", [key for key, _ in first], "RPC III begins with FORMAT, NUM_HEADER_BLOCKS "
-                             "and NUM_PARAMS")
+            raise InputError(
+                path,
+                "header",
+                [key for key, _ in first],
+                "RPC III begins with FORMAT, NUM_HEADER_BLOCKS and NUM_PARAMS",
+            )
         if first[0][1] not in LITTLE:
             raise InputError(path, "header, FORMAT", first[0][1], f"one of {', '.join(LITTLE)} can be read")
         blocks = whole(path, dict(first), "NUM_HEADER_BLOCKS", MOST_BLOCKS)
@@ -125,8 +136,12 @@ def _real(path: Path, parameters: dict[str, str], name: str, positive: bool) -> 
     except ValueError:
         value = np.nan
     if not np.isfinite(value) or (positive and value <= 0.0):
-        raise InputError(path, f"header, {name}", parameters.get(name, ""), "a finite number is needed"
-                         + (" above 0" if positive else ""))
+        raise InputError(
+            path,
+            f"header, {name}",
+            parameters.get(name, ""),
+            "a finite number is needed" + (" above 0" if positive else ""),
+        )
     return value
 
 
@@ -159,14 +174,25 @@ def _count(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int,
     if "SAMPLES" in parameters:
         announced = whole(path, parameters, "SAMPLES", announced)
     else:
-        found.append(notice(path, "doubt", f"the header does not say how many of the {announced} samples are measured: "
-                            f"up to {layout.points - 1} at the end may be padding of the last group"))
+        found.append(
+            notice(
+                path,
+                "doubt",
+                f"the header does not say how many of the {announced} samples are measured: "
+                f"up to {layout.points - 1} at the end may be padding of the last group",
+            )
+        )
     count = min(announced, there)
     if count == 0:
         raise InputError(path, f"byte {layout.begin}", None, "the file ends before its first group of samples does")
     if count < announced:
-        found.append(notice(path, "doubt", f"the header announces {announced} samples, but {count} are there in whole "
-                            "groups: the file is cut off"))
+        found.append(
+            notice(
+                path,
+                "doubt",
+                f"the header announces {announced} samples, but {count} are there in whole groups: the file is cut off",
+            )
+        )
     extra = data - size * -(-announced // layout.points)
     if extra > 0:
         found.append(notice(path, "doubt", f"{extra} bytes follow the samples that the header announces, unread"))

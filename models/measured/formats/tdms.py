@@ -121,8 +121,9 @@ def check_segments(path: Path) -> list[Finding]:
 
 
 def _cut(path: Path, place: int) -> Finding:
-    return notice(path, "doubt", f"the segment at byte {place} is not complete: the file is cut off, and what is whole "
-                  "is read")  # fmt: skip
+    return notice(
+        path, "doubt", f"the segment at byte {place} is not complete: the file is cut off, and what is whole is read"
+    )
 
 
 def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
@@ -133,12 +134,15 @@ def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
         raise InputError(path, "channels", None, "more samples are announced than the file has bytes")
     started = [start for _, channel in usable if (start := _started(channel)) is not None]
     zero = min(started, default=None)
-    own = [(channel, place) for group, channel in usable
-           if (place := _place(group, channel, zero, left)) is not None]  # fmt: skip
+    own = [(channel, place) for group, channel in usable if (place := _place(group, channel, zero, left)) is not None]
     found = [*cut, *left.findings(path)]
     if not own:
-        raise InputError(path, "channels", None, "; ".join(["no channel of numbers over time is in the file",
-                                                             *(one.text for one in found)]))  # fmt: skip
+        raise InputError(
+            path,
+            "channels",
+            None,
+            "; ".join(["no channel of numbers over time is in the file", *(one.text for one in found)]),
+        )
     clocks = [(place.group, place.clock, place.first, place.increment) for _, place in own]
     counts = [len(channel) for channel, _ in own]
     if cut:
@@ -146,10 +150,18 @@ def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     keys = list(zip(clocks, counts, strict=True))
     names, repeated = told_apart(path, [place.name for _, place in own], [place.group for _, place in own])
     channels = tuple(
-        Channel(name, _text(channel, *UNITS), _text(channel, "description"), keys.index(key), key[1],
-                None if place.clock else place.increment, _resolution(channel), place.group)
+        Channel(
+            name,
+            _text(channel, *UNITS),
+            _text(channel, "description"),
+            keys.index(key),
+            key[1],
+            None if place.clock else place.increment,
+            _resolution(channel),
+            place.group,
+        )
         for name, key, (channel, place) in zip(names, keys, own, strict=True)
-    )  # fmt: skip
+    )
     comment = str(data.properties.get("description", "")).strip()
     return TdmsData(path, channels, zero, comment, (*found, *repeated), tuple(place for _, place in own))
 
@@ -173,8 +185,11 @@ def _place(group: Any, channel: Any, zero: datetime | None, left: LeftOut) -> Pl
         return None
     if np.isfinite(increment) and increment > 0.0:
         return Place(group.name, channel.name, "", late + float(properties.get("wf_start_offset", 0.0)), increment)
-    clocks = [one for one in group.channels() if one.name.casefold() in CLOCKS and len(one) == len(channel)
-              and _text(one, *UNITS).casefold() in SECONDS]  # fmt: skip
+    clocks = [
+        one
+        for one in group.channels()
+        if one.name.casefold() in CLOCKS and len(one) == len(channel) and _text(one, *UNITS).casefold() in SECONDS
+    ]
     if channel.name.casefold() in CLOCKS and clocks:
         return None
     if len(clocks) != 1:

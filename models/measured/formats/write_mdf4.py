@@ -46,5 +46,7 @@ def _append(mdf: Any, index: int, group: Group, times: np.ndarray, values: np.nd
         mdf.extend(index, [(times, None), *((column, None) for column in columns)])
         return
     texts = zip(columns, group.names, group.units, group.comments, strict=True)
-    mdf.append([Signal(column, times, name=name, unit=unit, comment=text) for column, name, unit, text in texts],
-               common_timebase=True)  # fmt: skip
+    mdf.append(
+        [Signal(column, times, name=name, unit=unit, comment=text) for column, name, unit, text in texts],
+        common_timebase=True,
+    )

@@ -54,20 +54,44 @@ def header(path: Path, group: Group, limits: np.ndarray, start: datetime | None,
     """Header blocks; of the same length whatever the limits are."""
     frames = -(-group.count // POINTS)
     own: dict[str, object] = {
-        "FILE_TYPE": "TIME_HISTORY", "TIME_TYPE": "RESPONSE", "DATA_TYPE": "FLOATING_POINT",
-        "DATE": "" if start is None else start.isoformat(), "OPERATION": "twinrig", "CHANNELS": len(group.names),
-        "DELTA_T": repr(group.period), "PTS_PER_FRAME": POINTS, "PTS_PER_GROUP": POINTS, "FRAMES": frames,
-        "SAMPLES": group.count, "BYPASS_FILTER": 0, "HALF_FRAMES": 0, "INT_FULL_SCALE": 32752, "REPEATS": 1,
-        "PARTITIONS": 1, "PART.CHAN_1": 1, "PART.NCHAN_1": len(group.names), **_long("COMMENT", comment),
-    }  # fmt: skip
+        "FILE_TYPE": "TIME_HISTORY",
+        "TIME_TYPE": "RESPONSE",
+        "DATA_TYPE": "FLOATING_POINT",
+        "DATE": "" if start is None else start.isoformat(),
+        "OPERATION": "twinrig",
+        "CHANNELS": len(group.names),
+        "DELTA_T": repr(group.period),
+        "PTS_PER_FRAME": POINTS,
+        "PTS_PER_GROUP": POINTS,
+        "FRAMES": frames,
+        "SAMPLES": group.count,
+        "BYPASS_FILTER": 0,
+        "HALF_FRAMES": 0,
+        "INT_FULL_SCALE": 32752,
+        "REPEATS": 1,
+        "PARTITIONS": 1,
+        "PART.CHAN_1": 1,
+        "PART.NCHAN_1": len(group.names),
+        **_long("COMMENT", comment),
+    }
     for i, (name, unit, text) in enumerate(zip(group.names, group.units, group.comments, strict=True)):
-        own |= {f"DESC.CHAN_{i + 1}": name, f"UNITS.CHAN_{i + 1}": unit, f"SCALE.CHAN_{i + 1}": "1.0",
-                f"LOWER_LIMIT.CHAN_{i + 1}": f"{limits[0, i]:.9g}", f"UPPER_LIMIT.CHAN_{i + 1}": f"{limits[1, i]:.9g}",
-                f"MAP.CHAN_{i + 1}": i + 1, **_long(f"COMMENT.CHAN_{i + 1}", text)}  # fmt: skip
+        own |= {
+            f"DESC.CHAN_{i + 1}": name,
+            f"UNITS.CHAN_{i + 1}": unit,
+            f"SCALE.CHAN_{i + 1}": "1.0",
+            f"LOWER_LIMIT.CHAN_{i + 1}": f"{limits[0, i]:.9g}",
+            f"UPPER_LIMIT.CHAN_{i + 1}": f"{limits[1, i]:.9g}",
+            f"MAP.CHAN_{i + 1}": i + 1,
+            **_long(f"COMMENT.CHAN_{i + 1}", text),
+        }
     count = len(own) + 3
     if count > MOST:
-        raise InputError(path, "channels", len(group.names), f"the header has {MOST} parameters, {count} are needed: "
-                         "write fewer channels or comments, or MDF 4")
+        raise InputError(
+            path,
+            "channels",
+            len(group.names),
+            f"the header has {MOST} parameters, {count} are needed: write fewer channels or comments, or MDF 4",
+        )
     blocks = -(-count // (BLOCK // RECORD))
     own = {"FORMAT": "BINARY", "NUM_HEADER_BLOCKS": blocks, "NUM_PARAMS": count, **own}
     return b"".join(_record(path, key, str(value)) for key, value in own.items()).ljust(blocks * BLOCK, b"\0")

@@ -23,10 +23,12 @@ def write_tdms(path: Path, part: Path, groups: Sequence[Group], start: datetime 
             file.write_segment([GroupObject(f"group {number}", {})])
             for first, values in group.rows(path):
                 columns = np.ascontiguousarray(values.T)
-                file.write_segment([
-                    ChannelObject(f"group {number}", name, column, own if first == 0 else {})
-                    for name, column, own in zip(group.names, columns, properties, strict=True)
-                ])  # fmt: skip
+                file.write_segment(
+                    [
+                        ChannelObject(f"group {number}", name, column, own if first == 0 else {})
+                        for name, column, own in zip(group.names, columns, properties, strict=True)
+                    ]
+                )
 
 
 def clock(group: Group, start: datetime | None) -> dict[str, object]:
@@ -40,5 +42,7 @@ def clock(group: Group, start: datetime | None) -> dict[str, object]:
 def texts(group: Group) -> list[dict[str, object]]:
     """Unit and comment of every channel, where it has them."""
     keys = ("unit_string", "description")
-    return [{key: text for key, text in zip(keys, pair, strict=True) if text}
-            for pair in zip(group.units, group.comments, strict=True)]  # fmt: skip
+    return [
+        {key: text for key, text in zip(keys, pair, strict=True) if text}
+        for pair in zip(group.units, group.comments, strict=True)
+    ]

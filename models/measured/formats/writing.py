@@ -37,8 +37,12 @@ class Group:
                 raise ValueError(f"a block of shape {values.shape} at sample {first} of {self.count}")
             if np.isinf(values).any():
                 row, column = (int(i[0]) for i in np.nonzero(np.isinf(values)))
-                raise InputError(path, f"channel {self.names[column]!r}, sample {first + row}", None,
-                                 "an infinite value cannot be written")
+                raise InputError(
+                    path,
+                    f"channel {self.names[column]!r}, sample {first + row}",
+                    None,
+                    "an infinite value cannot be written",
+                )
             yield first, values
             first += len(values)
         if first != self.count:

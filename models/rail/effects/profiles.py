@@ -18,8 +18,9 @@ def named(scene: Any) -> bool:
 def leave_out(table: dict[str, Any], scene: Any) -> None:
     """Cones, heads of one radius, and flanges that are springs; InputError where the parameters have profiles."""
     if scene.profiles is None:
-        raise InputError(scene.file, "wheelset.parameters", scene.wheelset.parameters, "has profiles: name a file "
-                         "without them")  # fmt: skip
+        raise InputError(
+            scene.file, "wheelset.parameters", scene.wheelset.parameters, "has profiles: name a file without them"
+        )
     del table["profiles"]
 
 

@@ -41,8 +41,13 @@ def activity(whole: Whole) -> dict[str, float]:
         _elastic(out, spring.name, k, c, *deviations(np.array(spring.axis) @ apart))
     for bar in vehicle.bars:
         risen = motion.shift(bar.left, bar.point_left)[2] - motion.shift(bar.right, bar.point_right)[2]
-        _elastic(out, bar.name, bar.stiffness, bar.damping, *deviations(motion.coordinate(bar.body, "rx")
-                                                                        - risen / bar.track))  # fmt: skip
+        _elastic(
+            out,
+            bar.name,
+            bar.stiffness,
+            bar.damping,
+            *deviations(motion.coordinate(bar.body, "rx") - risen / bar.track),
+        )
     heights = np.hstack([np.zeros((len(vehicle.tyres), 2 * n)), *whole.excitation.heights])
     for tyre, height in zip(vehicle.tyres, heights, strict=True):
         row = motion.shift(tyre.body, tyre.point)[2]
@@ -53,8 +58,13 @@ def activity(whole: Whole) -> dict[str, float]:
         for freedom, row, value in zip(("x", "y", "z", "rx", "ry", "rz"), rows, values, strict=True):
             if row.any() and value:
                 s_a = np.inf if abs(row @ noise).max() > 0 else _deviation(row @ acceleration, P)
-                out[f"inertia {body.name} {freedom}"] = 2 / np.pi * value * s_a * _deviation(
-                    np.concatenate([np.zeros(n), row, np.zeros(states - 2 * n)]), P)  # fmt: skip
+                out[f"inertia {body.name} {freedom}"] = (
+                    2
+                    / np.pi
+                    * value
+                    * s_a
+                    * _deviation(np.concatenate([np.zeros(n), row, np.zeros(states - 2 * n)]), P)
+                )
     return out
 
 

@@ -76,8 +76,9 @@ class Choice:
 class Chooser:
     """Candidates of a scene at its speeds (m/s), for quantities (names of outputs, weighted ones too)."""
 
-    def __init__(self, held: Held, speeds: Sequence[float] | np.ndarray, quantities: Sequence[str],
-                 tolerance: float) -> None:  # fmt: skip
+    def __init__(
+        self, held: Held, speeds: Sequence[float] | np.ndarray, quantities: Sequence[str], tolerance: float
+    ) -> None:
         self.held, self.tolerance, self.effects = held, tolerance, effects_of(held)
         self.wholes = [Whole(held, float(speed)) for speed in speeds]
         names = self.wholes[0].full.system.names
@@ -168,8 +169,9 @@ class Chooser:
         screen = self.screen(whole, chosen)
         return np.full(len(self.rows), inf) if screen is None else screen.predicted(reduced)
 
-    def _worst(self, wholes: Sequence[Whole], chosen: Set,
-               variances: Callable[[Whole, Set, Reduced], np.ndarray]) -> np.ndarray:  # fmt: skip
+    def _worst(
+        self, wholes: Sequence[Whole], chosen: Set, variances: Callable[[Whole, Set, Reduced], np.ndarray]
+    ) -> np.ndarray:
         changes = []
         for whole in wholes:
             reduced, full = self.system(whole, chosen), self.full[self.wholes.index(whole)]
@@ -185,8 +187,9 @@ class Chooser:
         if chosen not in self._between:
             reduced = self.system(self.wholes[0], chosen)
             finite = reduced is not None and all((d[self.rows] == 0).all() for d in reduced.system.D)
-            self._between[chosen] = (largest(self.near.changes(self.rest(chosen))) if finite
-                                     else np.full(len(self.rows), inf))  # fmt: skip
+            self._between[chosen] = (
+                largest(self.near.changes(self.rest(chosen))) if finite else np.full(len(self.rows), inf)
+            )
         return self._between[chosen]
 
     def off(self, chosen: Set) -> np.ndarray:
@@ -216,8 +219,11 @@ class Chooser:
 
         Changes without end do not count: white noise that passes is nothing that another change could make up for.
         """
-        parts = {f"{effect.name} alone changes": step
-                 for effect, step in zip(self.effects, self._singles(), strict=True) if step < chosen}  # fmt: skip
+        parts = {
+            f"{effect.name} alone changes": step
+            for effect, step in zip(self.effects, self._singles(), strict=True)
+            if step < chosen
+        }
         parts |= {f"all but {effect.name} change": chosen - {effect} for effect in chosen}
         for said, part in parts.items():
             found = np.zeros(len(self.rows)) if not part or illegal(part) else self.between(part)
@@ -249,8 +255,10 @@ class Chooser:
         """Runs at the screened speeds."""
         weightings = tuple((row, by) for row, (_, by) in zip(self.rows, self.near.quantities, strict=True) if by)
         systems = [whole.reduced(self.rest(chosen)) for whole in self.screened]
-        return [March(reduced, whole.speed, tuple(self.rows), weightings)
-                for reduced, whole in zip(systems, self.screened, strict=True)]  # fmt: skip
+        return [
+            March(reduced, whole.speed, tuple(self.rows), weightings)
+            for reduced, whole in zip(systems, self.screened, strict=True)
+        ]
 
     def _at(self, chosen: Set, step: float) -> Cost:
         return Cost(self.cost(chosen).states, step, STAGES / step if step else inf)
@@ -271,16 +279,28 @@ class Chooser:
         found, between, none = self.confirm(chosen), self.between(chosen), frozenset[Effect]()
         off = self.off(chosen) if chosen else np.zeros(len(self.rows))
         left_out = tuple(effect for effect in self.effects if effect in chosen)
-        return Choice(self.effects, left_out, self.predicted(chosen), found, between, off,
-                      self.holds(found) and self.holds(between) and self.holds(off), self._by_run(none),
-                      self._by_run(chosen), (self.cost(none).step, self.cost(chosen).step), rounds,
-                      self._reasons(chosen))  # fmt: skip
+        return Choice(
+            self.effects,
+            left_out,
+            self.predicted(chosen),
+            found,
+            between,
+            off,
+            self.holds(found) and self.holds(between) and self.holds(off),
+            self._by_run(none),
+            self._by_run(chosen),
+            (self.cost(none).step, self.cost(chosen).step),
+            rounds,
+            self._reasons(chosen),
+        )
 
     def _reasons(self, chosen: Set) -> tuple[str, ...]:
         """Of the larger sets that kept the tolerance as they stood, and were refused all the same."""
         found = {frozenset(refused - chosen): why for refused, why in self.refused.items() if refused - chosen}
-        return tuple(f"{' and '.join(sorted(effect.name for effect in more))} stays: without it, the choice {why}"
-                     for more, why in found.items())  # fmt: skip
+        return tuple(
+            f"{' and '.join(sorted(effect.name for effect in more))} stays: without it, the choice {why}"
+            for more, why in found.items()
+        )
 
     def _greedy(self, measures: tuple[Saved, ...]) -> tuple[Set, int]:
         """The set, and how many were confirmed."""
@@ -365,8 +385,7 @@ class Chooser:
         return singles + [step | damping for step in singles if damping and not np.isfinite(self.predicted(step)).all()]
 
     def _best(self, chosen: Set, banned: set[Set], saved: Saved) -> Set:
-        """The step that saves most for what it adds to the predicted error; empty where none is within the tolerance.
-        """
+        """The step that saves most for what it adds to the predicted error; empty if none is within the tolerance."""
         best, most, now = frozenset[Effect](), 0.0, self._share(chosen)
         for step in self._steps():
             further = chosen | step

@@ -70,10 +70,15 @@ def effects_of(held: Held) -> tuple[Effect, ...]:
     modules = {name: module_of(held.scene.system, name) for name in names_of(held.scene.system)}
     own = tuple(tables_of(held.scene))
     found = {name: module.found(held) for name, module in modules.items() if hasattr(module, "found")}
-    found |= {name: [Effect(name, partial(_without, names=(name,)), modules[name].COST, singular=True, own=True)]
-              for name in own}  # fmt: skip
-    return tuple(_with_needy(effect, tuple(other for other in own if name in modules[other].NEEDS))
-                 for name in sorted(found) for effect in found[name])  # fmt: skip
+    found |= {
+        name: [Effect(name, partial(_without, names=(name,)), modules[name].COST, singular=True, own=True)]
+        for name in own
+    }
+    return tuple(
+        _with_needy(effect, tuple(other for other in own if name in modules[other].NEEDS))
+        for name in sorted(found)
+        for effect in found[name]
+    )
 
 
 def _without(held: Held, names: tuple[str, ...]) -> Held:
@@ -94,8 +99,12 @@ def holds(scene: RideScene, found: Callable[[Held], list[Effect]]) -> bool:
 
 def of_vehicle(table: dict[str, Any], scene: RideScene) -> None:
     """The ``leave_out`` of what a vehicle has: InputError, for it stands in no table of the scene."""
-    raise InputError(scene.file, "vehicle.file", scene.vehicle.file, "has it: name a file without it, or let effects "
-                     '= "auto" leave it out')  # fmt: skip
+    raise InputError(
+        scene.file,
+        "vehicle.file",
+        scene.vehicle.file,
+        'has it: name a file without it, or let effects = "auto" leave it out',
+    )
 
 
 def illegal(chosen: Iterable[Effect]) -> str:

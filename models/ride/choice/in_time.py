@@ -198,10 +198,11 @@ def _may_go(held: Held, effect: Effect) -> bool:
 
 
 def left(held: Held, moving: dict[str, BentSpring]) -> SpatialVehicle:
-    """The vehicle of what is held; ``moving``: how bent springs move, for the gains of those whose laws are straight.
-    """
-    vehicle = replace(held.vehicle, springs=tuple(_straight(s, held.straight, moving) for s in held.vehicle.springs
-                                                  if s.name not in held.rigid))  # fmt: skip
+    """The vehicle of what is held; ``moving``: how bent springs move, for the gains of straight laws."""
+    vehicle = replace(
+        held.vehicle,
+        springs=tuple(_straight(s, held.straight, moving) for s in held.vehicle.springs if s.name not in held.rigid),
+    )
     seats = {s.one: s.two for s in _named(held.vehicle, held.rigid) if s.two is not None}
     bodies = [_held(body, held, seats) for body in vehicle.bodies]
     return replace(vehicle, bodies=tuple(sorted(bodies, key=lambda body: body.name in seats)))
@@ -244,8 +245,18 @@ _kept: dict[tuple[object, ...], np.ndarray] = {}
 def _roads(path: RoadPath, steps: int, samples: Samples) -> np.ndarray:
     """Heights and rates (2 steps + 1, 2 w, copies); the last few that were asked for are kept."""
     own = path.excitation
-    key = (own.F.tobytes(), own.G.tobytes(), *(H.tobytes() for H in own.heights), own.lengths, own.independent,
-           path.speed, path.half, steps, samples.copies, samples.seed)  # fmt: skip
+    key = (
+        own.F.tobytes(),
+        own.G.tobytes(),
+        *(H.tobytes() for H in own.heights),
+        own.lengths,
+        own.independent,
+        path.speed,
+        path.half,
+        steps,
+        samples.copies,
+        samples.seed,
+    )
     if key not in _kept:
         while sum(roads.nbytes for roads in _kept.values()) > ROOM:
             del _kept[next(iter(_kept))]

@@ -60,8 +60,9 @@ class March:
         """Quantities by states (q, n + m), before their weightings."""
         weighted = dict(self.weightings)
         names = self.reduced.system.names
-        plain = [names.index(names[row].removesuffix(f" {weighted[row]}")) if row in weighted else row
-                 for row in self.rows]  # fmt: skip
+        plain = [
+            names.index(names[row].removesuffix(f" {weighted[row]}")) if row in weighted else row for row in self.rows
+        ]
         return np.asarray(self.reduced.system.C[plain, : self.reduced.states])
 
     def heard(self, states: np.ndarray) -> np.ndarray:
@@ -108,12 +109,15 @@ class March:
     def _heard(self, omega: np.ndarray) -> np.ndarray:
         """Factors (q, w) of the weightings."""
         names = dict(self.weightings)
-        return np.array([WEIGHTINGS[names[row]].response(omega / (2 * np.pi)) if row in names else np.ones(len(omega))
-                         for row in self.rows])  # fmt: skip
+        return np.array(
+            [
+                WEIGHTINGS[names[row]].response(omega / (2 * np.pi)) if row in names else np.ones(len(omega))
+                for row in self.rows
+            ]
+        )
 
     def _road(self, omega: np.ndarray, apart: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
-        """States of all axles' filters by each noise (a m, w, a k), and the mean noise (a k, w, a k) as a run reads it.
-        """
+        """States of all axles' filters by each noise (a m, w, a k), and the mean noise (a k, w, a k) of a run."""
         road, speeds, s = self.reduced.excitation, np.array([self.speed]), 1j * omega[:, None, None]
         states = filtered(road, speeds, omega)
         end, half = np.exp(step * s), np.exp(step / 2 * s)

@@ -112,6 +112,8 @@ def _noise(march: March, road: np.ndarray, step: float) -> np.ndarray:
     if not into.any():
         return np.zeros((len(road) // 2, 1, 1))
     begin, middle, end = road[:-2:2], road[1::2], road[2::2]
-    path, back = (np.kron(np.eye(len(own.heights)), each)
-                  for each in (march.speed * own.F, np.linalg.pinv(march.speed**0.5 * own.G)))  # fmt: skip
+    path, back = (
+        np.kron(np.eye(len(own.heights)), each)
+        for each in (march.speed * own.F, np.linalg.pinv(march.speed**0.5 * own.G))
+    )
     return np.asarray(into @ (back @ ((end - begin) / step - path @ (begin + 4 * middle + end) / 6)))

@@ -22,8 +22,12 @@ from models.vehicles.spatial import SpatialVehicle
 
 OFF = 0.05
 """Share by which every mass, inertia, stiffness and damping may be off, each for itself."""
-PARTS = {"bodies": ("mass", "inertia"), "springs": ("stiffness", "damping"), "tyres": ("stiffness", "damping"),
-         "bars": ("stiffness", "damping")}  # fmt: skip
+PARTS = {
+    "bodies": ("mass", "inertia"),
+    "springs": ("stiffness", "damping"),
+    "tyres": ("stiffness", "damping"),
+    "bars": ("stiffness", "damping"),
+}
 """Parameters of a vehicle's parts."""
 LOBES, EVEN = 12.0, 10
 """Speeds so close that waves of this frequency (Hz) turn by an eighth between axles, and at least so many."""
@@ -38,15 +42,24 @@ Parameter = tuple[str, str, str]
 
 def parameters(vehicle: SpatialVehicle) -> list[Parameter]:
     """All values that may be off."""
-    return [(group, part.name, key) for group, keys in PARTS.items() for part in getattr(vehicle, group)
-            for key in keys if np.any(getattr(part, key))]  # fmt: skip
+    return [
+        (group, part.name, key)
+        for group, keys in PARTS.items()
+        for part in getattr(vehicle, group)
+        for key in keys
+        if np.any(getattr(part, key))
+    ]
 
 
 def changed(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) -> SpatialVehicle:
     """The vehicle with these values so many times as large; those that it has not are passed over."""
+
     def part(group: str, own: Any) -> Any:
-        values = {key: _times(getattr(own, key), factors[group, own.name, key])
-                  for key in PARTS[group] if (group, own.name, key) in factors}  # fmt: skip
+        values = {
+            key: _times(getattr(own, key), factors[group, own.name, key])
+            for key in PARTS[group]
+            if (group, own.name, key) in factors
+        }
         return replace(own, **values)
 
     groups: dict[str, Any] = {group: tuple(part(group, own) for own in getattr(vehicle, group)) for group in PARTS}
@@ -132,8 +145,12 @@ class Neighbourhood:
 
     def _heard(self, omega: np.ndarray) -> np.ndarray:
         """Factors (w, q) of the weightings."""
-        return np.array([WEIGHTINGS[name].response(omega / (2 * np.pi)) if name else np.ones(len(omega))
-                         for _, name in self.quantities]).T  # fmt: skip
+        return np.array(
+            [
+                WEIGHTINGS[name].response(omega / (2 * np.pi)) if name else np.ones(len(omega))
+                for _, name in self.quantities
+            ]
+        ).T
 
 
 class Response:
@@ -153,19 +170,24 @@ class Response:
 
     def _less(self, other: LinearVehicle) -> LinearVehicle:
         keys = ("acceleration", "rate", "displacement", "road", "road_rate")
-        outputs = tuple(replace(a, **{key: getattr(a, key) - getattr(b, key) for key in keys})
-                        for a, b in zip(other.outputs, self.vehicle.outputs, strict=True))  # fmt: skip
+        outputs = tuple(
+            replace(a, **{key: getattr(a, key) - getattr(b, key) for key in keys})
+            for a, b in zip(other.outputs, self.vehicle.outputs, strict=True)
+        )
         matrices = ("mass", "damping", "stiffness", "road_stiffness", "road_damping")
-        return replace(other, outputs=outputs,
-                       **{key: getattr(other, key) - getattr(self.vehicle, key) for key in matrices})  # fmt: skip
+        return replace(
+            other, outputs=outputs, **{key: getattr(other, key) - getattr(self.vehicle, key) for key in matrices}
+        )
 
     def _stiffness(self, vehicle: LinearVehicle) -> tuple[np.ndarray, np.ndarray]:
         Z = vehicle.stiffness + self.s * vehicle.damping + self.s**2 * vehicle.mass
         return Z, vehicle.road_stiffness + self.s * vehicle.road_damping
 
     def _outputs(self, vehicle: LinearVehicle) -> tuple[np.ndarray, np.ndarray]:
-        of = {key: np.array([getattr(vehicle.outputs[row], key) for row in self.rows])
-              for key in ("acceleration", "rate", "displacement", "road", "road_rate")}  # fmt: skip
+        of = {
+            key: np.array([getattr(vehicle.outputs[row], key) for row in self.rows])
+            for key in ("acceleration", "rate", "displacement", "road", "road_rate")
+        }
         C = of["displacement"] + self.s * of["rate"] + self.s**2 * of["acceleration"]
         return C, of["road"] + self.s * of["road_rate"]
 

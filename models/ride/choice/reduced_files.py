@@ -27,8 +27,12 @@ def write(rest: Held, folder: Path) -> Path:
     road = dict(table.get("road", {}))
     if "file" in road:
         road["file"] = str(rest.scene.path(road["file"], "road.file").resolve())
-    changes = {"title": f"{rest.scene.title}, less what was left out", "system": "ride", "study": CLOSED,
-               "vehicle": {**scene["vehicle"], "file": VEHICLE}}  # fmt: skip
+    changes = {
+        "title": f"{rest.scene.title}, less what was left out",
+        "system": "ride",
+        "study": CLOSED,
+        "vehicle": {**scene["vehicle"], "file": VEHICLE},
+    }
     with (folder / SCENE).open("x") as file:
         file.write(toml({**table, **changes, **({"road": road} if road else {})}))
     return folder / SCENE
@@ -42,8 +46,11 @@ def reduced(table: dict[str, Any], rest: Held) -> dict[str, Any]:
     if "anti_roll_bars" in table:
         found["anti_roll_bars"] = [bar for bar in table["anti_roll_bars"] if bar["name"] in bars]
     found["tyres"] = [{**tyre, "damping": 0.0} if tyre["name"] in undamped else tyre for tyre in table["tyres"]]
-    limits = {"massless": sorted(rest.massless), "rigid": sorted(rest.rigid),
-              "locked": [list(one) for one in sorted(rest.locked)]}  # fmt: skip
+    limits = {
+        "massless": sorted(rest.massless),
+        "rigid": sorted(rest.rigid),
+        "locked": [list(one) for one in sorted(rest.locked)],
+    }
     given = {key: names for key, names in limits.items() if names}
     return found | ({"reduced": given} if given else {})
 

@@ -57,8 +57,13 @@ class Screen:
         self.base, self.rows = base, rows
         A, C = base.system.A, base.system.C[rows]
         if still(A):
-            raise InputError("", "vehicle", None, "has a motion that nothing pulls back, as one that is free to drive "
-                             "away: effects are chosen for vehicles of which every motion dies out")
+            raise InputError(
+                "",
+                "vehicle",
+                None,
+                "has a motion that nothing pulls back, as one that is free to drive "
+                "away: effects are chosen for vehicles of which every motion dies out",
+            )
         self.P = solve_continuous_lyapunov(A, -noise_of(base.system))
         self.L = np.array([solve_continuous_lyapunov(A.T, -np.outer(c, c)) for c in C])
 

@@ -41,8 +41,9 @@ def filtered(excitation: Excitation, speeds: np.ndarray, omega: np.ndarray) -> n
     return np.asarray(speeds[:, None, None, None] ** 0.5 * (V @ (driven / waves[..., None])))
 
 
-def at_axles(each: np.ndarray, excitation: Excitation, speeds: np.ndarray, omega: np.ndarray,
-             apart: np.ndarray) -> np.ndarray:  # fmt: skip
+def at_axles(
+    each: np.ndarray, excitation: Excitation, speeds: np.ndarray, omega: np.ndarray, apart: np.ndarray
+) -> np.ndarray:
     """What one axle meets, (v, w, m, k), met by all after their delays: (v, w, axles m, noises).
 
     Axles that are ``apart`` (w,), or independent, have noises of their own, axles k; all others share the first k.

@@ -35,8 +35,9 @@ def _of(held: Held, name: str, bodies: list[str], excludes: tuple[str, ...]) -> 
     white = held.scene.road.cutoff is None and any(t.damping and t.body in bodies for t in held.vehicle.tyres)
     needs = (tyre_damping.NAME,) if white else ()
     why = "for the road's white noise would reach a body without mass" if white else "one names the other's bodies"
-    return Effect(name, partial(_without, bodies=bodies), f"{', '.join(bodies)} without mass", needs, excludes, why,
-                  singular=True)  # fmt: skip
+    return Effect(
+        name, partial(_without, bodies=bodies), f"{', '.join(bodies)} without mass", needs, excludes, why, singular=True
+    )
 
 
 def _without(held: Held, bodies: list[str]) -> Held:

@@ -24,8 +24,12 @@ def found(held: Held) -> list[Effect]:
     for spring in held.vehicle.springs:
         if {spring.one, spring.two} & wheels:
             pairs[spring.one, spring.two].append(spring)
-    stiff = [spring for springs in pairs.values() for spring in springs
-             if _stiffness(spring) > ALIKE * min(map(_stiffness, springs))]  # fmt: skip
+    stiff = [
+        spring
+        for springs in pairs.values()
+        for spring in springs
+        if _stiffness(spring) > ALIKE * min(map(_stiffness, springs))
+    ]
     sorts: list[list[SpringDamper]] = []
     for spring in sorted(stiff, key=_stiffness):
         if sorts and _stiffness(spring) <= ALIKE * _stiffness(sorts[-1][0]):
@@ -44,8 +48,14 @@ def _of(springs: list[SpringDamper]) -> Effect:
     said = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
     bodies = {body for spring in springs for body in (spring.one, spring.two)}
     excludes = tuple(f"{body} {freedom}" for body in bodies for freedom in ("x", "y"))
-    return Effect(f"bushings: {said}", partial(_without, springs=names), f"rigid: {', '.join(names)}", (), excludes,
-                  "a rigid bushing and a freedom that is locked would hold the same motion twice")  # fmt: skip
+    return Effect(
+        f"bushings: {said}",
+        partial(_without, springs=names),
+        f"rigid: {', '.join(names)}",
+        (),
+        excludes,
+        "a rigid bushing and a freedom that is locked would hold the same motion twice",
+    )
 
 
 def _without(held: Held, springs: list[str]) -> Held:

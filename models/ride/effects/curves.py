@@ -19,8 +19,11 @@ def found(held: Held) -> list[Effect]:
     """One effect per law that any spring has, where laws are not taken by their slopes anyway."""
     if held.scene.vehicle.small_motion:
         return []
-    return [Effect(name, partial(_without, law=law), f"{name}: the gains of statistical linearisation", singular=True)
-            for law, name in LAWS.items() if any(getattr(spring, law) for spring in held.vehicle.springs)]  # fmt: skip
+    return [
+        Effect(name, partial(_without, law=law), f"{name}: the gains of statistical linearisation", singular=True)
+        for law, name in LAWS.items()
+        if any(getattr(spring, law) for spring in held.vehicle.springs)
+    ]
 
 
 def _without(held: Held, law: str) -> Held:
@@ -30,7 +33,8 @@ def _without(held: Held, law: str) -> Held:
 def named(scene: Any) -> bool:
     """Whether a scene has it."""
     return not scene.vehicle.small_motion and any(
-        spring.travel_force or spring.rate_force or spring.friction for spring in vehicle_of(scene).springs)
+        spring.travel_force or spring.rate_force or spring.friction for spring in vehicle_of(scene).springs
+    )
 
 
 def leave_out(table: dict[str, Any], scene: Any) -> None:

@@ -23,11 +23,17 @@ def found(held: Held) -> list[Effect]:
 
 
 def _of(held: Held, pair: tuple[str, str], springs: list[str]) -> Effect:
-    excludes = tuple(f"{body.name} {freedom}" for body in held.vehicle.bodies if body.name == pair[0]
-                     for freedom in body.freedoms)  # fmt: skip
-    return Effect(f"springs of {pair[0]} on {pair[1]}", partial(_without, springs=springs),
-                  f"{pair[0]} sits rigidly on {pair[1]}", (), (*excludes, f"mass of {pair[0]}"),
-                  "a body that sits rigidly on another has no motion of its own left")  # fmt: skip
+    excludes = tuple(
+        f"{body.name} {freedom}" for body in held.vehicle.bodies if body.name == pair[0] for freedom in body.freedoms
+    )
+    return Effect(
+        f"springs of {pair[0]} on {pair[1]}",
+        partial(_without, springs=springs),
+        f"{pair[0]} sits rigidly on {pair[1]}",
+        (),
+        (*excludes, f"mass of {pair[0]}"),
+        "a body that sits rigidly on another has no motion of its own left",
+    )
 
 
 def _without(held: Held, springs: list[str]) -> Held:

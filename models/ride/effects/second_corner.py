@@ -15,8 +15,16 @@ def found(held: Held) -> list[Effect]:
     if held.scene.road.cutoff is None:
         return []
     damped = any(tyre.damping for tyre in held.vehicle.tyres)
-    return [Effect("second corner of the road", _without, "road filters of first order",
-                   (tyre_damping.NAME,) if damped else (), (), "for it would pass white noise")]  # fmt: skip
+    return [
+        Effect(
+            "second corner of the road",
+            _without,
+            "road filters of first order",
+            (tyre_damping.NAME,) if damped else (),
+            (),
+            "for it would pass white noise",
+        )
+    ]
 
 
 def _without(held: Held) -> Held:

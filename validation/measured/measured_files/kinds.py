@@ -42,8 +42,11 @@ KINDS = (
     ("text called .mat", raw(TEXT, "odd.mat"), "a MATLAB file"),
     ("HDF5", raw(b"\x89HDF\r\n\x1a\n" + BINARY, "odd.h5"), "HDF5"),
     ("Parquet", raw(b"PAR1" + BINARY, "odd.parquet"), "read_parquet"),
-    ("bus trace as text", raw(b"date Mon Mar 2 09:30:00 am 2026\nbase hex  timestamps absolute\n", "odd.asc"),
-     "bus messages (Vector ASC)"),
+    (
+        "bus trace as text",
+        raw(b"date Mon Mar 2 09:30:00 am 2026\nbase hex  timestamps absolute\n", "odd.asc"),
+        "bus messages (Vector ASC)",
+    ),
     ("bus trace", raw(b"LOGG" + BINARY, "odd.blf"), "bus messages (Vector BLF)"),
     ("DIAdem header", raw(b"DIAEXTENDED  {@:ENGLISH\n#BEGINGLOBALHEADER\n", "odd.dat"), "export the data set as TDMS"),
     ("DIAdem TDM", raw(b'<?xml version="1.0"?>\n<usi:tdm xmlns="x"/>', "odd.tdm"), "TDMS or MDF 4"),
@@ -58,6 +61,11 @@ FILES = (
     Odd("kind: RPC III called .tim", "another extension of the same", called("odd.tim"), "right"),
     Odd("kind: RPC III called .drv", "drive signals are no measurement", called("odd.drv"), "named", "actuators"),
     Odd("kind: table called .asc", "a bus trace, or text", raw(plain().encode(), "odd.asc"), "right"),
-    Odd("kind: table called .xlsx", "saved under the wrong name", raw(plain().encode(), "odd.xlsx"), "named",
-        "extension .xlsx"),
+    Odd(
+        "kind: table called .xlsx",
+        "saved under the wrong name",
+        raw(plain().encode(), "odd.xlsx"),
+        "named",
+        "extension .xlsx",
+    ),
 )

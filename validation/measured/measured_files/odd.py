@@ -54,7 +54,7 @@ class Odd:
     def error(self, folder: Path) -> float:
         """Largest difference to the truth, inf where something is missing, or the reader's refusal; AssertionError
         where a refusal says too little, the file was changed, or took more than it may.
-        """  # fmt: skip
+        """
         folder.mkdir(parents=True, exist_ok=True)
         path = self.make(folder)
         before = _state(folder)

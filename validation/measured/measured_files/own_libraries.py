@@ -43,7 +43,9 @@ def by_nptdms(path: Path) -> Read:
 
 
 LIBRARIES: dict[str, tuple[str, Callable[[Path], Read]]] = {
-    ".csv": ("numpy", by_numpy), ".mf4": ("asammdf", by_asammdf), ".rsp": ("rpc3-file", by_rpc3),
+    ".csv": ("numpy", by_numpy),
+    ".mf4": ("asammdf", by_asammdf),
+    ".rsp": ("rpc3-file", by_rpc3),
     ".tdms": ("npTDMS", by_nptdms),
-}  # fmt: skip
+}
 """Extension -> name of the library and its reading."""

@@ -94,15 +94,22 @@ class OwnBraking:
 
     def lines(self, setting: Setting) -> list[str]:
         """Steps within a sample."""
-        return ["[run]", f"substeps = {round(self.scene.run.sample / setting.value)}",
-                f"# twinrig run SCENE --engine {setting.engine}"]  # fmt: skip
+        return [
+            "[run]",
+            f"substeps = {round(self.scene.run.sample / setting.value)}",
+            f"# twinrig run SCENE --engine {setting.engine}",
+        ]
 
 
 def own(scene: BrakingScene, quantity: str | None, engines: tuple[str, ...]) -> OwnBraking:
     """The scene with a quantity, PROCEDURE.QUANTITY; the first procedure where none is named."""
     if scene.port is not None:
-        raise InputError(scene.file, "port", None, "cannot be priced: what stands behind it answers one run; leave it "
-                         "out, with a controller in its place")  # fmt: skip
+        raise InputError(
+            scene.file,
+            "port",
+            None,
+            "cannot be priced: what stands behind it answers one run; leave it out, with a controller in its place",
+        )
     name, asked = part_of(quantity, USUAL, scene.procedures, "procedure")
     chosen(asked, QUANTITIES)
     others = [one for one in scene.procedures if one != name]

@@ -56,12 +56,22 @@ class OwnHandling(Meshed):
         handling = self._with(cells)
         model, start = build(self.own, handling), np.concatenate(handling.straight(self.speed))
         n, times = start.size // 2, step * np.arange(round(duration / step) + 1)
-        done = solve_ivp(lambda t, y: np.concatenate((y[n:], model.acceleration(t, y[:n], y[n:]))), (0.0, duration),
-                         start, "DOP853", np.minimum(times, duration), rtol=TIGHT, atol=TIGHT)  # fmt: skip
+        done = solve_ivp(
+            lambda t, y: np.concatenate((y[n:], model.acceleration(t, y[:n], y[n:]))),
+            (0.0, duration),
+            start,
+            "DOP853",
+            np.minimum(times, duration),
+            rtol=TIGHT,
+            atol=TIGHT,
+        )
         if not done.success:
             raise RunFailed(self.own, done.message)
-        return read(handling, SpatialRun(times, np.ascontiguousarray(done.y[:n].T), np.ascontiguousarray(done.y[n:].T),
-                                         {}), self.own)  # fmt: skip
+        return read(
+            handling,
+            SpatialRun(times, np.ascontiguousarray(done.y[:n].T), np.ascontiguousarray(done.y[n:].T), {}),
+            self.own,
+        )
 
     def read(self, run: Drive) -> tuple[np.ndarray, np.ndarray, int]:
         """The quantity over time."""
@@ -70,8 +80,13 @@ class OwnHandling(Meshed):
 
     def lines(self, setting: Setting) -> list[str]:
         """Cells and step."""
-        return ["[tyres]", f"cells = {round(1 / setting.value)}", "[run]", f"step = {self.steps[setting.method]!r}",
-                f"# twinrig run SCENE --engine {setting.engine}"]  # fmt: skip
+        return [
+            "[tyres]",
+            f"cells = {round(1 / setting.value)}",
+            "[run]",
+            f"step = {self.steps[setting.method]!r}",
+            f"# twinrig run SCENE --engine {setting.engine}",
+        ]
 
 
 def own(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) -> OwnHandling:
@@ -80,6 +95,19 @@ def own(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) ->
     chosen(asked, QUANTITIES)
     manoeuvre, step, others = scene.manoeuvres[name], scene.run.step, [one for one in scene.manoeuvres if one != name]
     note = f"manoeuvre {name}" + (f"; of another one by --quantity {others[0]}.{asked}" if others else "")
-    return OwnHandling(scene.title, asked, QUANTITIES[asked][1], note, manoeuvre.duration,
-                       first_part(manoeuvre.duration, FIRST), engines, "mujoco", step, 2.0 * step, scene.tyres.cells,
-                       name, manoeuvre.speed, scene.handling(name))  # fmt: skip
+    return OwnHandling(
+        scene.title,
+        asked,
+        QUANTITIES[asked][1],
+        note,
+        manoeuvre.duration,
+        first_part(manoeuvre.duration, FIRST),
+        engines,
+        "mujoco",
+        step,
+        2.0 * step,
+        scene.tyres.cells,
+        name,
+        manoeuvre.speed,
+        scene.handling(name),
+    )

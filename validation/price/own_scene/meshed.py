@@ -83,15 +83,17 @@ class Meshed(ABC):
             return [Ladder(engine, "RK4", steps, 4, default=self._part(self.step)) for engine in self.engines]
         values = tuple(1.0 / n for n in sorted({*CELLS, self.cells}))
         usual = f"RK4 at {1e3 * self._part(self.step):.3g} ms"
-        return [Ladder(engine, method, values, 2, default=1.0 / self.cells if method == usual else 0.0, cells=True)
-                for engine in self.engines for method in self.steps]  # fmt: skip
+        return [
+            Ladder(engine, method, values, 2, default=1.0 / self.cells if method == usual else 0.0, cells=True)
+            for engine in self.engines
+            for method in self.steps
+        ]
 
     def reference(self) -> Ladder:
         """Twice the cells on every rung and half the step on every second; or half the step alone."""
         if not self.cells:
             return Ladder(self.own, "RK4", tuple(self._part(self.longest) / 2**k for k in range(16)), 4)
-        return Ladder(self.own, TOGETHER, tuple(1.0 / (ROUGH * 2**k) for k in range(DOUBLED)), 2, cells=True,
-                      sure=SURE)  # fmt: skip
+        return Ladder(self.own, TOGETHER, tuple(1.0 / (ROUGH * 2**k) for k in range(DOUBLED)), 2, cells=True, sure=SURE)
 
     def second(self, last: Setting) -> Setting | None:
         """DOP853; None where there are cells, for all solvers share the error that these have."""

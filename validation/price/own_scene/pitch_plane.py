@@ -19,14 +19,23 @@ from validation.price.problems.road_excited import ADAPTIVE_STEP, RADII, setting
 
 FIRST = 2.0
 """s: of a longer run only so much is searched; what is recommended is then confirmed over all of it."""
-STEPS = tuple(mantissa * 10.0**power for power in (-2, -3, -4, -5, -6)
-              for mantissa in (10.0, 8.0, 6.25, 5.0, 4.0, 3.2, 2.5, 2.0, 1.6, 1.25))[5:]
+STEPS = tuple(
+    mantissa * 10.0**power
+    for power in (-2, -3, -4, -5, -6)
+    for mantissa in (10.0, 8.0, 6.25, 5.0, 4.0, 3.2, 2.5, 2.0, 1.6, 1.25)
+)[5:]
 """Steps that are tried (s), each as the nearest one below that divides the run."""
 TOLERANCES = tuple(10.0**-k for k in range(2, 13))
 DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9"): 1e-2, ("mujoco", "Euler"): 2e-3}
 """What the engines do if not told otherwise: Exudyn 100 steps in 1 s, MuJoCo a timestep of 2 ms."""
-USUAL = {"free": "f1,f2", "road": "f1,f2", "force": "pitch", "force-body": "pitch", "pitch": "enforced_moment",
-         "heave-pitch": "enforced_force"}  # fmt: skip
+USUAL = {
+    "free": "f1,f2",
+    "road": "f1,f2",
+    "force": "pitch",
+    "force-body": "pitch",
+    "pitch": "enforced_moment",
+    "heave-pitch": "enforced_force",
+}
 """The quantity that is asked about where the user names none, by what drives the vehicle."""
 SPACING = 1e-3
 """s: of the rows of an adaptive method from outside the tree."""
@@ -124,8 +133,12 @@ class OwnPitchPlane:
             return _outside(setting)
         name, (_, _, radius) = setting.method.split()[0], setting.method.partition(" ")
         last = f"tolerance = {setting.value:.4g}" if setting.adaptive else f"step = {setting.value!r}"
-        return [f"[engines.{setting.engine}]", f'integrator = "{name}"', last,
-                *([f"spectral_radius = {radius}"] if radius else [])]  # fmt: skip
+        return [
+            f"[engines.{setting.engine}]",
+            f'integrator = "{name}"',
+            last,
+            *([f"spectral_radius = {radius}"] if radius else []),
+        ]
 
     def _settings(self, setting: Setting, duration: float) -> Settings:
         if not setting.adaptive:
@@ -143,8 +156,11 @@ class OwnPitchPlane:
 def _outside(setting: Setting) -> list[str]:
     """A class from outside the tree, which no scene names."""
     asked = f"# twinrig run SCENE --engine {setting.engine}"
-    return [asked, f"# with the {setting.label()} in the class itself"] if setting.adaptive else [
-        "[run]", f"step = {setting.value!r}", asked]  # fmt: skip
+    return (
+        [asked, f"# with the {setting.label()} in the class itself"]
+        if setting.adaptive
+        else ["[run]", f"step = {setting.value!r}", asked]
+    )
 
 
 def own(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> OwnPitchPlane:
@@ -184,6 +200,10 @@ def _unit(scene: OwnPitchPlane) -> str:
             raise InputError("--quantity", "", name, "is no channel of this scene", tuple(found))
     units = list(dict.fromkeys(found[name][0] for name in scene.channels))
     if len(units) > 1:
-        raise InputError("--quantity", "", ",".join(scene.channels), f"has several units, {' and '.join(units)}: one "
-                         "tolerance cannot hold for all")  # fmt: skip
+        raise InputError(
+            "--quantity",
+            "",
+            ",".join(scene.channels),
+            f"has several units, {' and '.join(units)}: one tolerance cannot hold for all",
+        )
     return units[0]

@@ -21,8 +21,15 @@ from validation.price.own_scene.truth import Truth, truth
 from validation.price.problems import Setting
 from validation.timing import interleave, paired_ratio
 
-SYSTEMS = {system: f"validation.price.own_scene.{module}" for system, module in (
-    ("pitch-plane", "pitch_plane"), ("wheelset", "wheelset"), ("handling", "handling"), ("braking", "braking"))}
+SYSTEMS = {
+    system: f"validation.price.own_scene.{module}"
+    for system, module in (
+        ("pitch-plane", "pitch_plane"),
+        ("wheelset", "wheelset"),
+        ("handling", "handling"),
+        ("braking", "braking"),
+    )
+}
 """Systems whose scenes have a price, and the modules that know them."""
 WITHOUT = {
     "ride": "answers by covariances, which have no step; what its effects cost is told by `show SCENE --price`",
@@ -95,8 +102,9 @@ def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in the quantity's unit")
     if scene.system not in SYSTEMS:
         why = WITHOUT.get(scene.system, "has no steps to choose")
-        raise InputError(scene.file, "system", scene.system, f"{why}; accuracy is priced in scenes of other systems",
-                         tuple(SYSTEMS))  # fmt: skip
+        raise InputError(
+            scene.file, "system", scene.system, f"{why}; accuracy is priced in scenes of other systems", tuple(SYSTEMS)
+        )
     return recommend(import_module(SYSTEMS[scene.system]).own(scene, quantity, engines), tolerance)
 
 
@@ -105,13 +113,20 @@ def recommend(scene: OwnScene, tolerance: float) -> Recommendation:
     searched = known = truth(scene, tolerance, scene.first)
     search = Search(scene, searched, tolerance, scene.first).everything()
     timed = _timed(search)
-    winners = {(engine, kind): best for engine in ("", *dict.fromkeys(one.engine for one in scene.ladders()))
-               for kind in ("seconds", "calls") if (best := _cheapest(timed, engine, kind)) is not None}  # fmt: skip
+    winners = {
+        (engine, kind): best
+        for engine in ("", *dict.fromkeys(one.engine for one in scene.ladders()))
+        for kind in ("seconds", "calls")
+        if (best := _cheapest(timed, engine, kind)) is not None
+    }
     if scene.whole > scene.first * (1 + 1e-9) and winners:
         known, timed, winners = _confirmed(search, timed, winners)
     known, timed, winners = _resolved(scene, known, timed, winners)
-    defaults = {ladder.engine: found for ladder in scene.ladders()
-                if ladder.default and (found := _default(search, ladder, timed)) is not None}  # fmt: skip
+    defaults = {
+        ladder.engine: found
+        for ladder in scene.ladders()
+        if ladder.default and (found := _default(search, ladder, timed)) is not None
+    }
     return Recommendation(scene, tolerance, searched, known, winners, defaults, tuple(search.tried))
 
 
@@ -128,8 +143,10 @@ def _timed(search: Search) -> list[Choice]:
     taken = _raced(search, _rivals(found))
     longer = search.scene.whole / search.duration
     seconds = {one.setting: tuple(longer * taken.get(one.setting, np.array([one.seconds]))) for one in found}
-    return [Choice(one, one.error, longer * one.calls, float(np.median(seconds[one.setting])), False,
-                   seconds[one.setting]) for one in found]  # fmt: skip
+    return [
+        Choice(one, one.error, longer * one.calls, float(np.median(seconds[one.setting])), False, seconds[one.setting])
+        for one in found
+    ]
 
 
 def _rivals(found: list[Tried]) -> list[Tried]:
@@ -147,10 +164,15 @@ def _raced(search: Search, rivals: list[Tried]) -> dict[Setting, np.ndarray]:
     """Seconds of each in a few rounds; of those that are not far behind by then, in more."""
     seconds = _rounds(search, rivals, FEWEST)
     middle = {one.setting: float(np.median(seconds[one.setting])) for one in rivals}
-    least = {engine: min(own for setting, own in middle.items() if setting.engine == engine)
-             for engine in dict.fromkeys(setting.engine for setting in middle)}  # fmt: skip
-    left = [one for one in rivals if middle[one.setting]
-            <= (USUAL_BEHIND if one.setting.default else BEHIND) * least[one.setting.engine]]  # fmt: skip
+    least = {
+        engine: min(own for setting, own in middle.items() if setting.engine == engine)
+        for engine in dict.fromkeys(setting.engine for setting in middle)
+    }
+    left = [
+        one
+        for one in rivals
+        if middle[one.setting] <= (USUAL_BEHIND if one.setting.default else BEHIND) * least[one.setting.engine]
+    ]
     more = min(ROUNDS, int(PATIENCE / max(sum(middle[one.setting] for one in left), 1e-9))) - FEWEST
     further = _rounds(search, left, more) if more > 0 and len(left) > 1 else {}
     return seconds | {setting: np.concatenate((seconds[setting], own)) for setting, own in further.items()}
@@ -181,9 +203,9 @@ def _slower(one: Choice, best: Choice) -> bool:
     return paired_ratio(one.rounds[:both], best.rounds[:both])[1] > SLOWER
 
 
-def _confirmed(search: Search, timed: list[Choice],
-               winners: dict[tuple[str, str], Choice]) -> (
-                   tuple[Truth, list[Choice], dict[tuple[str, str], Choice]]):  # fmt: skip
+def _confirmed(
+    search: Search, timed: list[Choice], winners: dict[tuple[str, str], Choice]
+) -> tuple[Truth, list[Choice], dict[tuple[str, str], Choice]]:
     """The winners and the defaults run over the whole scene, and refined until they meet the tolerance there."""
     scene = search.scene
     known = truth(scene, search.tolerance, scene.whole, max(0, search.truth.rung - 1), twice=False)
@@ -213,25 +235,28 @@ def _over_all(over: Search, ladder: Ladder, one: Choice) -> Choice | None:
     return None
 
 
-def _resolved(scene: OwnScene, known: Truth, timed: list[Choice],
-              winners: dict[tuple[str, str], Choice]) -> (
-                  tuple[Truth, list[Choice], dict[tuple[str, str], Choice]]):  # fmt: skip
+def _resolved(
+    scene: OwnScene, known: Truth, timed: list[Choice], winners: dict[tuple[str, str], Choice]
+) -> tuple[Truth, list[Choice], dict[tuple[str, str], Choice]]:
     """Errors of the winners and the defaults against a truth that is better known than they are small: a setting may
     be far better than its tolerance asks, and as good as the reference that judged it."""
     shown = list(dict.fromkeys([*winners.values(), *(one for one in timed if one.tried.setting.default)]))
     errors = {one.tried.setting: one.error for one in shown}
     if _blurred(known, errors):
-        known, errors = _finer(scene, known, {setting: scene.answer(scene.solve(setting, scene.whole))
-                                              for setting in errors})  # fmt: skip
+        known, errors = _finer(
+            scene, known, {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in errors}
+        )
     told = {one.tried.setting: replace(one, error=max(errors[one.tried.setting], known.uncertainty)) for one in shown}
-    return (known, [told.get(one.tried.setting, one) for one in timed],
-            {key: told[one.tried.setting] for key, one in winners.items()})  # fmt: skip
+    return (
+        known,
+        [told.get(one.tried.setting, one) for one in timed],
+        {key: told[one.tried.setting] for key, one in winners.items()},
+    )
 
 
 def _blurred(known: Truth, errors: dict[Setting, float]) -> bool:
     """Whether an error is as small as the truth is uncertain, and another truth takes seconds, not minutes."""
-    return (min(errors.values(), default=np.inf) < RESOLVED * known.uncertainty
-            and DEARER * known.seconds < PATIENCE)  # fmt: skip
+    return min(errors.values(), default=np.inf) < RESOLVED * known.uncertainty and DEARER * known.seconds < PATIENCE
 
 
 def _finer(scene: OwnScene, known: Truth, answers: dict[Setting, Answer]) -> tuple[Truth, dict[Setting, float]]:

@@ -79,8 +79,9 @@ class Search:
             error_of = self.truth.error(answer)
             lies = not error_of <= BEYOND * max(self.truth.size, self.tolerance)
             why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result" if lies else ""
-            found = Tried(setting, "SILENT" if lies else "ok", why, error_of, answer.counts.get(self.scene.counted, 0),
-                          seconds)  # fmt: skip
+            found = Tried(
+                setting, "SILENT" if lies else "ok", why, error_of, answer.counts.get(self.scene.counted, 0), seconds
+            )
         self.tried.append(found)
         return found
 
@@ -115,15 +116,22 @@ class Search:
 
     def _elsewhere(self, ladder: Ladder) -> float:
         """The value that the method needs in another engine, 0 where none has it."""
-        return max((one.setting.value for one in self.meeting() if one.setting.method == ladder.method
-                    and one.setting.value in ladder.values), default=0.0)  # fmt: skip
+        return max(
+            (
+                one.setting.value
+                for one in self.meeting()
+                if one.setting.method == ladder.method and one.setting.value in ladder.values
+            ),
+            default=0.0,
+        )
 
     def _affordable(self, ladder: Ladder, last: Tried) -> int:
         """The finest rung whose run takes no longer than PATIENCE, or than what the engine has that meets."""
         best = min(one.seconds for one in self.meeting(ladder.engine))
         most = max(PATIENCE, best) / max(last.seconds, 1e-9)
-        return max(i for i, value in enumerate(ladder.values)
-                   if i == 0 or ladder.work(last.setting.value, value) <= most)  # fmt: skip
+        return max(
+            i for i, value in enumerate(ladder.values) if i == 0 or ladder.work(last.setting.value, value) <= most
+        )
 
     def _hopeless(self, ladder: Ladder, i: int, last: Tried | None) -> bool:
         """Whether a rung would cost far more than what its engine has that meets the tolerance."""
@@ -133,8 +141,7 @@ class Search:
         seconds, calls, best = finer * last.seconds, finer * last.calls, self.meeting(ladder.engine)
         if ladder.default or not best:
             return False
-        return (seconds > WORTH * min(one.seconds for one in best)
-                and calls > WORTH * min(one.calls for one in best))  # fmt: skip
+        return seconds > WORTH * min(one.seconds for one in best) and calls > WORTH * min(one.calls for one in best)
 
     def _too_long(self, ladder: Ladder, i: int, last: Tried | None) -> bool:
         """Whether a rung would take minutes where another engine has met the tolerance long since; said if so."""
@@ -142,8 +149,13 @@ class Search:
         seconds = 0.0 if last is None else ladder.work(last.setting.value, ladder.values[i]) * last.seconds
         if seconds <= max(TOO_LONG, WORTH * best):
             return False
-        self.tried.append(Tried(ladder.setting(i), "refused", f"not run: it would take about {seconds:.0f} s, and the "
-                                f"tolerance is met in {best:.2g} s"))  # fmt: skip
+        self.tried.append(
+            Tried(
+                ladder.setting(i),
+                "refused",
+                f"not run: it would take about {seconds:.0f} s, and the tolerance is met in {best:.2g} s",
+            )
+        )
         return True
 
 

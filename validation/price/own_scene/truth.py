@@ -54,8 +54,12 @@ def at(answer: Answer, times: np.ndarray, cell: float = 0.0) -> np.ndarray:
     first = np.minimum((place + NEARLY) // rows * rows, last - 3).astype(int)
     left = np.clip(np.floor(place).astype(int) - 1, first, np.minimum(first + rows, last) - 3)
     s = place - left
-    weights = (-(s - 1) * (s - 2) * (s - 3) / 6, s * (s - 2) * (s - 3) / 2, -s * (s - 1) * (s - 3) / 2,
-               s * (s - 1) * (s - 2) / 6)  # fmt: skip
+    weights = (
+        -(s - 1) * (s - 2) * (s - 3) / 6,
+        s * (s - 2) * (s - 3) / 2,
+        -s * (s - 1) * (s - 3) / 2,
+        s * (s - 1) * (s - 2) / 6,
+    )
     return sum((w[:, None] * answer.values[left + i] for i, w in enumerate(weights)), np.zeros((1, 1)))
 
 
@@ -74,14 +78,15 @@ def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twi
         return alone
     differs = alone.error(scene.answer(scene.solve(other, duration)))
     if differs > tolerance / AGREED:
-        raise RunFailed("reference", f"{said} and {_named(other)} differ by {differs:.3g} {scene.unit}: the tolerance "
-                        "cannot be judged")  # fmt: skip
+        raise RunFailed(
+            "reference",
+            f"{said} and {_named(other)} differ by {differs:.3g} {scene.unit}: the tolerance cannot be judged",
+        )
     return replace(alone, uncertainty=max(change, differs), how=f"{said} and {_named(other)}, which differ by")
 
 
 def _change(scene: OwnScene, before: Answer, now: Answer) -> float:
-    """Largest difference that half the step makes, at the rows of both: between rows the coarser one is interpolated.
-    """
+    """Largest difference that half the step makes, at the rows of both: between rows the coarser is interpolated."""
     both = ((now, before), (before, now))
     return max(Truth(one, 0.0, "", 0, scene.cell).error(other) for one, other in both)
 
@@ -90,8 +95,9 @@ def _named(setting: Setting) -> str:
     return f"{setting.engine} {setting.method} at {setting.label()}"
 
 
-def _settled(scene: OwnScene, ladder: Ladder, tolerance: float, duration: float,
-             rung: int) -> tuple[Answer, int, float, float]:  # fmt: skip
+def _settled(
+    scene: OwnScene, ladder: Ladder, tolerance: float, duration: float, rung: int
+) -> tuple[Answer, int, float, float]:
     """The first answer that the finer rung changed by no more than a part of the tolerance; its rung; the change; the
     seconds that it took."""
     before: Answer | None = None
@@ -114,5 +120,9 @@ def _settled(scene: OwnScene, ladder: Ladder, tolerance: float, duration: float,
         before = now
     if before is None:
         raise RunFailed("reference", failure or "no step is fine enough")
-    raise InputError("--tolerance", "", tolerance, f"is finer than the scene's own reference can be known here: "
-                     f"at least {ladder.sure * change:.2g} {scene.unit}")  # fmt: skip
+    raise InputError(
+        "--tolerance",
+        "",
+        tolerance,
+        f"is finer than the scene's own reference can be known here: at least {ladder.sure * change:.2g} {scene.unit}",
+    )

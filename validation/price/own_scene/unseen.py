@@ -87,16 +87,24 @@ def drawn(number: int, folder: Path) -> Drawn:
     rng = np.random.Generator(np.random.Philox(key=[SEED, number]))
     kind = KINDS[number % len(KINDS)]
     name, effects, more = kind(rng, folder, number)
-    override = {key: float(np.exp(rng.uniform(-0.5, 0.5))) * getattr(PARAMETERS, key)
-                for key in map(str, rng.choice(CHANGED, 4, replace=False))}  # fmt: skip
+    override = {
+        key: float(np.exp(rng.uniform(-0.5, 0.5))) * getattr(PARAMETERS, key)
+        for key in map(str, rng.choice(CHANGED, 4, replace=False))
+    }
     table = {
         "title": f"scene {number}, {name}",
         "vehicle": {"geometry": str(rng.choice(["exact", "linear"])), "override": override},
         "run": {"duration": float(more.pop("duration", round(rng.uniform(0.1, 0.3), 2))), "step": 1e-3},
-        "effects": effects, **more,
-    }  # fmt: skip
-    quantity = "enforced_moment" if "prescribed_pitch" in effects else str(
-        rng.choice(["f1,f2", "pitch", "z3", "f3,f4"] if "wheel_forces" not in effects else ["pitch", "z3", "f3,f4"]))
+        "effects": effects,
+        **more,
+    }
+    quantity = (
+        "enforced_moment"
+        if "prescribed_pitch" in effects
+        else str(
+            rng.choice(["f1,f2", "pitch", "z3", "f3,f4"] if "wheel_forces" not in effects else ["pitch", "z3", "f3,f4"])
+        )
+    )
     return Drawn(build(table, "", folder), quantity, SCALES[quantity] * 10.0 ** rng.uniform(*PARTS))
 
 
@@ -104,8 +112,12 @@ Kind = Callable[[np.random.Generator, Path, int], tuple[str, dict[str, Any], dic
 
 
 def _iso_road(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, dict[str, Any], dict[str, Any]]:
-    road = {"source": "iso8608", "road_class": str(rng.choice(list("ABCDE"))), "seed": number,
-            "speed": float(round(rng.uniform(5.0, 35.0), 1))}  # fmt: skip
+    road = {
+        "source": "iso8608",
+        "road_class": str(rng.choice(list("ABCDE"))),
+        "seed": number,
+        "speed": float(round(rng.uniform(5.0, 35.0), 1)),
+    }
     return "rough road", {"road": road}, {}
 
 
@@ -116,8 +128,14 @@ def _study_road(rng: np.random.Generator, folder: Path, number: int) -> tuple[st
 
 def _release(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, dict[str, Any], dict[str, Any]]:
     start = {"z1": 2e-2, "z3": 5e-2, "pitch": 5e-2, "pitch_rate": 0.3, "z2_rate": 0.3}
-    return "release", {}, {"start": {key: float(size * rng.uniform(-1, 1)) for key, size in start.items()},
-                           "duration": float(rng.choice([0.2, 0.4, 2.5]))}  # fmt: skip
+    return (
+        "release",
+        {},
+        {
+            "start": {key: float(size * rng.uniform(-1, 1)) for key, size in start.items()},
+            "duration": float(rng.choice([0.2, 0.4, 2.5])),
+        },
+    )
 
 
 def _forces(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, dict[str, Any], dict[str, Any]]:
@@ -131,19 +149,39 @@ def _guided(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, d
     times = 5e-3 * np.arange(101)
     wave = rng.uniform(5e-3, 3e-2) * (1 - np.cos(2 * np.pi * rng.uniform(0.5, 3.0) * times))
     write_time_series(folder / pitch, {"pitch": ("rad", wave)}, 5e-3)
-    return "prescribed pitch", {"wheel_forces": {"file": file, "interpolation": "smooth"},
-                                "prescribed_pitch": {"file": pitch}}, {"duration": 0.2}  # fmt: skip
+    return (
+        "prescribed pitch",
+        {"wheel_forces": {"file": file, "interpolation": "smooth"}, "prescribed_pitch": {"file": pitch}},
+        {"duration": 0.2},
+    )
 
 
-KINDS: tuple[Kind, ...] = (_iso_road, _forces, _release, _iso_road, _guided, _study_road, _forces, _iso_road,
-                           _release, _forces)  # fmt: skip
+KINDS: tuple[Kind, ...] = (
+    _iso_road,
+    _forces,
+    _release,
+    _iso_road,
+    _guided,
+    _study_road,
+    _forces,
+    _iso_road,
+    _release,
+    _forces,
+)
 
 
 def _written(rng: np.random.Generator, folder: Path, number: int, period: float) -> str:
     """A file of wheel forces: the weight, two waves and noise of each sample."""
     times, name = period * np.arange(round(0.5 / period) + 1), f"forces{number}.csv"
-    forces = {wheel: ("N", 3825.9 + 500 * np.sin(2 * np.pi * rng.uniform(1, 10) * times + rng.uniform(0, 6))
-                      + 200 * rng.standard_normal(len(times))) for wheel in ("front", "rear")}  # fmt: skip
+    forces = {
+        wheel: (
+            "N",
+            3825.9
+            + 500 * np.sin(2 * np.pi * rng.uniform(1, 10) * times + rng.uniform(0, 6))
+            + 200 * rng.standard_normal(len(times)),
+        )
+        for wheel in ("front", "rear")
+    }
     write_time_series(folder / name, forces, period)
     return name
 
@@ -153,10 +191,20 @@ def judge(one: Drawn, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
     scene = own(one.scene, one.quantity, engines)
     found = recommend(scene, one.tolerance)
     errors = true_errors(scene, [choice.tried.setting for choice in found.winners.values()])
-    return [Verdict(one.scene.title, choice.tried.setting.curve, choice.tried.setting.label(), one.tolerance,
-                    choice.error, errors[choice.tried.setting], found.truth.uncertainty, slower(found, key, choice),
-                    key[1])
-            for key, choice in found.winners.items()]  # fmt: skip
+    return [
+        Verdict(
+            one.scene.title,
+            choice.tried.setting.curve,
+            choice.tried.setting.label(),
+            one.tolerance,
+            choice.error,
+            errors[choice.tried.setting],
+            found.truth.uncertainty,
+            slower(found, key, choice),
+            key[1],
+        )
+        for key, choice in found.winners.items()
+    ]
 
 
 def true_errors(scene: OwnPitchPlane, settings: list[Setting]) -> dict[Setting, float]:
@@ -195,11 +243,13 @@ def _defaults(found: Recommendation) -> list[Tried]:
     """The coarsest setting of each default method that meets the tolerance, of all that were tried where the whole run
     was searched: what is recommended may have forgotten one."""
     if found.scene.whole > found.scene.first * (1 + 1e-9):
-        return [one.refined.tried for one in found.defaults.values()
-                if one.refined is not None and not one.extrapolated]  # fmt: skip
+        return [
+            one.refined.tried for one in found.defaults.values() if one.refined is not None and not one.extrapolated
+        ]
     held = found.tolerance - found.searched.uncertainty
-    able = sorted((one for one in found.tried if one.setting.default and one.error <= held),
-                  key=lambda one: one.setting.value)  # fmt: skip
+    able = sorted(
+        (one for one in found.tried if one.setting.default and one.error <= held), key=lambda one: one.setting.value
+    )
     return list({one.setting.curve: one for one in able}.values())
 
 
@@ -207,5 +257,4 @@ def _loses(found: Recommendation, choice: Choice, rival: Tried) -> bool:
     if rival.setting == choice.tried.setting or rival.seconds > CONTEST * choice.seconds:
         return False
     jobs = [partial(found.scene.solve, one.setting, found.scene.first) for one in (choice.tried, rival)]
-    return all(paired_ratio(*interleave(jobs, rounds, LEAST, clock=time.process_time))[1] > SLOWER
-               for rounds in ROUNDS)  # fmt: skip
+    return all(paired_ratio(*interleave(jobs, rounds, LEAST, clock=time.process_time))[1] > SLOWER for rounds in ROUNDS)

@@ -26,8 +26,14 @@ FINER, LEAST, MOST = 4, 60, 200
 """Times the cells recommended, and the fewest and most cells of a contact."""
 MORE = 3
 """Times the steps of the search's own truth."""
-TOLERANCES = {"y": (1e-6, 1e-4), "fy": (20.0, 500.0), "yaw_rate": (1e-4, 3e-3), "load": (1.0, 50.0),
-              "stopping_distance": (1e-5, 0.05), "yaw": (1e-4, 1e-2)}  # fmt: skip
+TOLERANCES = {
+    "y": (1e-6, 1e-4),
+    "fy": (20.0, 500.0),
+    "yaw_rate": (1e-4, 3e-3),
+    "load": (1.0, 50.0),
+    "stopping_distance": (1e-5, 0.05),
+    "yaw": (1e-4, 1e-2),
+}
 
 
 def drawn(system: str, number: int) -> Drawn:
@@ -42,18 +48,31 @@ def drawn(system: str, number: int) -> Drawn:
 
 
 def _wheelset(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]]:
-    override = {"conicity": float(rng.uniform(0.02, 0.2)), "stiffness_x": float(rng.uniform(1e5, 1e6)),
-                "friction": float(rng.uniform(0.1, 0.5))}  # fmt: skip
-    run = {"duration": 0.1, "step": 5e-4, "displacement": float(rng.uniform(1e-3, 5e-3)),
-           "speeds": [float(round(rng.uniform(10.0, 60.0), 1))]}  # fmt: skip
+    override = {
+        "conicity": float(rng.uniform(0.02, 0.2)),
+        "stiffness_x": float(rng.uniform(1e5, 1e6)),
+        "friction": float(rng.uniform(0.1, 0.5)),
+    }
+    run = {
+        "duration": 0.1,
+        "step": 5e-4,
+        "displacement": float(rng.uniform(1e-3, 5e-3)),
+        "speeds": [float(round(rng.uniform(10.0, 60.0), 1))],
+    }
     law = str(rng.choice(["fastsim", "fastsim", "linear"]))
-    return {"wheelset": {"override": override}, "contact": {"law": law}, "run": run,
-            "speeds": {"values": [10.0]}}, ["y", "fy"]  # fmt: skip
+    return {"wheelset": {"override": override}, "contact": {"law": law}, "run": run, "speeds": {"values": [10.0]}}, [
+        "y",
+        "fy",
+    ]
 
 
 def _handling(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]]:
-    own = {"speed": float(rng.uniform(12.0, 30.0)), "duration": 0.5, "rough": bool(rng.integers(2)),
-           "steer": [[0.05, 0.0], [float(rng.uniform(0.2, 0.4)), float(rng.uniform(-0.06, 0.06))]]}  # fmt: skip
+    own = {
+        "speed": float(rng.uniform(12.0, 30.0)),
+        "duration": 0.5,
+        "rough": bool(rng.integers(2)),
+        "steer": [[0.05, 0.0], [float(rng.uniform(0.2, 0.4)), float(rng.uniform(-0.06, 0.06))]],
+    }
     tyres = {"friction": float(rng.uniform(0.4, 1.0))}
     return {"tyres": tyres, "manoeuvres": {"drawn": own}}, ["yaw_rate", "load"]
 
@@ -67,8 +86,13 @@ def _braking(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]]:
         own["right"] = "ice"
     controller = {"kind": str(rng.choice(["none", "slip_bang_bang", "slip_pi"]))}
     quantities = ["stopping_distance"] if kind == "straight" else ["stopping_distance", "yaw"]
-    return {"controller": controller, "pressure": {}, "load_transfer": {}, "procedures": {"drawn": own},
-            "road": {"stretches": [{"left": surface}]}}, quantities  # fmt: skip
+    return {
+        "controller": controller,
+        "pressure": {},
+        "load_transfer": {},
+        "procedures": {"drawn": own},
+        "road": {"stretches": [{"left": surface}]},
+    }, quantities
 
 
 def judge(one: Drawn) -> list[Verdict]:
@@ -76,12 +100,24 @@ def judge(one: Drawn) -> list[Verdict]:
     system = one.scene.system
     scene = import_module(PRICED[system]).own(one.scene, one.quantity, ENGINES[system])
     found = recommend(scene, one.tolerance)
-    errors = {setting: _error(scene, found, setting)
-              for setting in dict.fromkeys(choice.tried.setting for choice in found.winners.values())}  # fmt: skip
-    return [Verdict(one.scene.title, choice.tried.setting.curve, choice.tried.setting.label(), one.tolerance,
-                    choice.error, errors[choice.tried.setting], found.truth.uncertainty, slower(found, key, choice),
-                    key[1])
-            for key, choice in found.winners.items()]  # fmt: skip
+    errors = {
+        setting: _error(scene, found, setting)
+        for setting in dict.fromkeys(choice.tried.setting for choice in found.winners.values())
+    }
+    return [
+        Verdict(
+            one.scene.title,
+            choice.tried.setting.curve,
+            choice.tried.setting.label(),
+            one.tolerance,
+            choice.error,
+            errors[choice.tried.setting],
+            found.truth.uncertainty,
+            slower(found, key, choice),
+            key[1],
+        )
+        for key, choice in found.winners.items()
+    ]
 
 
 def _error(scene: Any, found: Recommendation, setting: Setting) -> float:

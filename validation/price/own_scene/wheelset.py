@@ -49,8 +49,10 @@ class OwnWheelset(Meshed):
 
     def run(self, engine: str, cells: int, step: float, duration: float) -> list[Path]:
         """A path for every speed."""
-        return [equations.run(state, duration, step)
-                for equations, state in (self._started(engine, cells, speed) for speed in self.speeds)]  # fmt: skip
+        return [
+            equations.run(state, duration, step)
+            for equations, state in (self._started(engine, cells, speed) for speed in self.speeds)
+        ]
 
     def exact(self, cells: int, step: float, duration: float) -> list[Path]:
         """The same by DOP853."""
@@ -73,8 +75,15 @@ def _exact(equations: Equations, start: np.ndarray, step: float, duration: float
     """A path by a Runge-Kutta method of order 8 with steps of its own; RunFailed where it gives up."""
     times = step * np.arange(round(duration / step) + 1)
     scale = np.maximum(np.abs(start), 1e-3)
-    done = solve_ivp(lambda t, y: equations.rates(y), (0.0, duration), start, "DOP853", np.minimum(times, duration),
-                     rtol=TIGHT, atol=TIGHT * 1e-1 * scale)  # fmt: skip
+    done = solve_ivp(
+        lambda t, y: equations.rates(y),
+        (0.0, duration),
+        start,
+        "DOP853",
+        np.minimum(times, duration),
+        rtol=TIGHT,
+        atol=TIGHT * 1e-1 * scale,
+    )
     if not done.success:
         raise RunFailed("reference", done.message)
     states = np.ascontiguousarray(done.y.T)
@@ -88,10 +97,25 @@ def own(scene: WheelsetScene, quantity: str | None, engines: tuple[str, ...]) ->
     """The scene with a quantity: a state or a force of the contacts, of its paths at all speeds."""
     asked, wheelset, contact = chosen(quantity or USUAL, QUANTITIES), wheelset_of(scene), scene.contact
     speeds, run = tuple(path_speeds(scene)), scene.run
-    fastest = max(float(np.abs(np.linalg.eigvals(Equations(wheelset, speed, contact.law).state_matrix)).max())
-                  for speed in speeds)  # fmt: skip
+    fastest = max(
+        float(np.abs(np.linalg.eigvals(Equations(wheelset, speed, contact.law).state_matrix)).max()) for speed in speeds
+    )
     longest, cells = 0.95 * STIFF / fastest, contact.cells if contact.law == "fastsim" else 0
     note = f"all paths together, at {' and '.join(f'{speed:g}' for speed in speeds)} m/s"
-    return OwnWheelset(scene.title, asked, QUANTITIES[asked][1], note, run.duration, first_part(run.duration, FIRST),
-                       engines, "reference", run.step, longest, cells, wheelset, contact.law, speeds,
-                       (run.displacement, run.yaw))  # fmt: skip
+    return OwnWheelset(
+        scene.title,
+        asked,
+        QUANTITIES[asked][1],
+        note,
+        run.duration,
+        first_part(run.duration, FIRST),
+        engines,
+        "reference",
+        run.step,
+        longest,
+        cells,
+        wheelset,
+        contact.law,
+        speeds,
+        (run.displacement, run.yaw),
+    )

@@ -102,8 +102,20 @@ def march(method, u, w, torques, change, mass, radius, inertia, slips, mu, step)
     x = 0.0
     for n in range(torques.size - 1):
         table = mu[0] if x < change else mu[1]
-        after, turning = advanced(method, u, w, torques[n], 0.5 * (torques[n] + torques[n + 1]), torques[n + 1], mass,
-                                  radius, inertia, slips, table, step)  # fmt: skip
+        after, turning = advanced(
+            method,
+            u,
+            w,
+            torques[n],
+            0.5 * (torques[n] + torques[n + 1]),
+            torques[n + 1],
+            mass,
+            radius,
+            inertia,
+            slips,
+            table,
+            step,
+        )
         if after <= 0.0:
             return x + 0.5 * u * step * u / (u - after), n + 1
         x += 0.5 * step * (u + after)
@@ -115,14 +127,18 @@ class BrakingStop:
     """The problem with its reference; see ``validation.price.problems.Problem``."""
 
     key = "braking"
-    note = (f"Steps are those of {1e3 * SAMPLE:g} ms, the paper's, and its parts. The exact wheel walks twice in one, "
-            "from node to node; literal is the paper's scheme as it is written. An engine that carries the chassis "
-            "leaves wheel and tyre with the exact step, and gives its digits.")  # fmt: skip
+    note = (
+        f"Steps are those of {1e3 * SAMPLE:g} ms, the paper's, and its parts. The exact wheel walks twice in one, "
+        "from node to node; literal is the paper's scheme as it is written. An engine that carries the chassis "
+        "leaves wheel and tyre with the exact step, and gives its digits."
+    )
 
     def __init__(self, quick: bool) -> None:
         self.speed, self.change = (SPEED / 2, CHANGE / 4) if quick else (SPEED, CHANGE)
-        self.title = (f"Anti-lock stop of a quarter vehicle from {self.speed:.4g} m/s, {SURFACES[0]} and from "
-                      f"{self.change:g} m on {SURFACES[1]}, valves replayed")  # fmt: skip
+        self.title = (
+            f"Anti-lock stop of a quarter vehicle from {self.speed:.4g} m/s, {SURFACES[0]} and from "
+            f"{self.change:g} m on {SURFACES[1]}, valves replayed"
+        )
         self.units, self.bound = {"stopping distance": "m"}, 10.0
         self.tolerances: tuple[float, ...] = (1e-2, 1e-3) if quick else (1e-2, 1e-3, 1e-4)
         self._tables = [surface(name) for name in SURFACES]
@@ -145,8 +161,9 @@ class BrakingStop:
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting by its curve and the longest step (s) up to ``value`` that divides a sample."""
         substeps = math.ceil(SAMPLE / value * (1 - 1e-9))
-        return Setting(engine, method, SAMPLE / substeps, ORDERS.get(method, 0),
-                       default=DEFAULTS.get((method, substeps), ""))  # fmt: skip
+        return Setting(
+            engine, method, SAMPLE / substeps, ORDERS.get(method, 0), default=DEFAULTS.get((method, substeps), "")
+        )
 
     def build(self, setting: Setting) -> Solver:
         """The stop by one method in steps."""
@@ -162,8 +179,17 @@ class BrakingStop:
         """Valves (n,) of the controller's own run, one a sample, and the last ones for a while."""
         tape = Tape(CONTROLLERS["slip_bang_bang"](1), [])
         kind, slope = np.zeros(1, dtype=np.int64), max(table.cornering for table in self._tables)
-        Braked(VEHICLE.plane, kind, stacked(self._tables), slope, self._road, self._brakes, self._chambers,
-               np.zeros(1), substeps=FINE).run(tape, self.speed)  # fmt: skip
+        Braked(
+            VEHICLE.plane,
+            kind,
+            stacked(self._tables),
+            slope,
+            self._road,
+            self._brakes,
+            self._chambers,
+            np.zeros(1),
+            substeps=FINE,
+        ).run(tape, self.speed)
         return np.array(tape.valves + [tape.valves[-1]] * MORE)
 
     def _by(self, method: str, tolerance: float) -> float:
@@ -184,17 +210,28 @@ class BrakingStop:
         return np.concatenate(found)
 
     def _ours(self, substeps: int) -> Result:
-        stop = braked(VEHICLE, stacked(self._tables), self._road, self._torques(substeps), SAMPLE / substeps,
-                      self.speed)  # fmt: skip
+        stop = braked(
+            VEHICLE, stacked(self._tables), self._road, self._torques(substeps), SAMPLE / substeps, self.speed
+        )
         if stop.rest < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
         return Result(stop.distance, {"steps": stop.rest, "force calls": WALKS[OURS] * stop.rest})
 
     def _others(self, method: str, substeps: int) -> Result:
         number = (EULER, RK4, LITERAL).index(method)
-        way, steps = march(number, self.speed, self.speed / VEHICLE.radius, self._torques(substeps), self.change,
-                           VEHICLE.mass, VEHICLE.radius, VEHICLE.spin_inertia, self.slips, self.mu,
-                           SAMPLE / substeps)  # fmt: skip
+        way, steps = march(
+            number,
+            self.speed,
+            self.speed / VEHICLE.radius,
+            self._torques(substeps),
+            self.change,
+            VEHICLE.mass,
+            VEHICLE.radius,
+            VEHICLE.spin_inertia,
+            self.slips,
+            self.mu,
+            SAMPLE / substeps,
+        )
         if steps < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
         return Result(way, {"steps": steps, "force calls": WALKS[method] * steps})

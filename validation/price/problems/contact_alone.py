@@ -56,8 +56,10 @@ class ContactAlone:
     """The problem with its reference; see ``validation.price.problems.Problem``."""
 
     key, duration, sure = "contact", 1.0, 0.25
-    note = ("Cells are those of the square about the contact; the exact theory solves for all of them together, others "
-            "march along strips. Seconds are those of all contacts, one call from Python each.")  # fmt: skip
+    note = (
+        "Cells are those of the square about the contact; the exact theory solves for all of them together, others "
+        "march along strips. Seconds are those of all contacts, one call from Python each."
+    )
     reference = "exact theory, cells extrapolated to none"
     tolerances: tuple[float, ...] = (10.0, 5.0, 2.0, 1.0)
     bound = 100.0
@@ -73,8 +75,11 @@ class ContactAlone:
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """Every theory with every number of cells."""
-        return tuple(self.setting(*curve, 1.0 / cells) for curve, way in self._ways.items()
-                     for cells in CELLS.get(way.name, _STRIPS))  # fmt: skip
+        return tuple(
+            self.setting(*curve, 1.0 / cells)
+            for curve, way in self._ways.items()
+            for cells in CELLS.get(way.name, _STRIPS)
+        )
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting of this problem by its curve and 1 by its cells."""

@@ -70,8 +70,10 @@ class ForceExcited:
         """first : a quantity and its unit on which tolerances are set, before those of the states."""
         self.units = dict([*([first] if first else []), ("state", "m, rad, m/s, rad/s")])
         steps = [1e3 * one.value for one in self.settings(quick)]
-        self.title = (f"Pitch-plane vehicle {self.what}, {DURATION:g} s at {SPEED:g} m/s, before "
-                      f"drift-off, fixed steps of {min(steps):g} to {max(steps):g} ms")  # fmt: skip
+        self.title = (
+            f"Pitch-plane vehicle {self.what}, {DURATION:g} s at {SPEED:g} m/s, before "
+            f"drift-off, fixed steps of {min(steps):g} to {max(steps):g} ms"
+        )
         self.assembly = self.driven()
         other = Settings("RK4", 2 * FINE, DURATION) if quick else Settings("DOP853", PERIOD, DURATION, 1e-12)
         self.reference = f"RK4 at {1e6 * FINE:.2g} us and " + ("twice that" if quick else "DOP853 at 1e-12")

@@ -84,14 +84,18 @@ class FreeVehicle:
 
     key = "vehicle"
     duration = DURATION
-    note = ("All of Exudyn's calls ask Python for side forces, bars and the road, fifty times as dear as MuJoCo's "
-            "compiled callback: force calls do not show it, seconds do.")  # fmt: skip
+    note = (
+        "All of Exudyn's calls ask Python for side forces, bars and the road, fifty times as dear as MuJoCo's "
+        "compiled callback: force calls do not show it, seconds do."
+    )
     tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1)
 
     def __init__(self, quick: bool) -> None:
         steps = [1e3 * one.value for one in self.settings(quick) if not one.adaptive]
-        self.title = (f"Passenger car of 19 freedoms, free on a road of two tracks, {DURATION:g} s at {SPEED:g} m/s, "
-                      f"steps of {min(steps):g} to {max(steps):g} ms")  # fmt: skip
+        self.title = (
+            f"Passenger car of 19 freedoms, free on a road of two tracks, {DURATION:g} s at {SPEED:g} m/s, "
+            f"steps of {min(steps):g} to {max(steps):g} ms"
+        )
         self.units = {"wheel load": "N", "acceleration": "m/s^2"}
         self.vehicle = replace(load_vehicle("r19_free"), gravity=GRAVITY)
         self.instants = GRID * np.arange(round(DURATION / GRID) + 1)
@@ -106,8 +110,9 @@ class FreeVehicle:
 
     def road(self, times: ArrayLike) -> np.ndarray:
         """Heights (m) under the wheels at times (..., ) in s, then their rates (m/s): (..., 2 w)."""
-        found = [heights(SPEED * np.asarray(times) + tyre.point[0], int(tyre.point[1] < 0))
-                 for tyre in self.vehicle.tyres]  # fmt: skip
+        found = [
+            heights(SPEED * np.asarray(times) + tyre.point[0], int(tyre.point[1] < 0)) for tyre in self.vehicle.tyres
+        ]
         return np.stack([*(height for height, _ in found), *(SPEED * slope for _, slope in found)], axis=-1)
 
     def _solved(self, acceleration: Callable[..., np.ndarray], method: str, tolerance: float) -> np.ndarray:
@@ -117,8 +122,15 @@ class FreeVehicle:
         def rates(t: float, y: np.ndarray) -> np.ndarray:
             return np.concatenate([y[n:], acceleration(y[:n], y[n:], self.road(t))])
 
-        found = solve_ivp(rates, (0.0, DURATION), np.zeros(2 * n), method=method, t_eval=self.instants,
-                          rtol=tolerance, atol=1e-2 * tolerance)  # fmt: skip
+        found = solve_ivp(
+            rates,
+            (0.0, DURATION),
+            np.zeros(2 * n),
+            method=method,
+            t_eval=self.instants,
+            rtol=tolerance,
+            atol=1e-2 * tolerance,
+        )
         return found.y.T
 
     def read(self, states: np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
@@ -127,8 +139,10 @@ class FreeVehicle:
         n = states.shape[1] // 2
         given = [self._model.acceleration(y[:n], y[n:], z) for y, z in zip(states, road, strict=True)]
         motion = np.column_stack([given, states[:, n:], states[:, :n], road])
-        return {name: motion @ np.array([row_of(output) for output in self._outputs if output.kind == kind]).T
-                for name, kind in KINDS.items()}  # fmt: skip
+        return {
+            name: motion @ np.array([row_of(output) for output in self._outputs if output.kind == kind]).T
+            for name, kind in KINDS.items()
+        }
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """FULL: there is no quick share, of which the reference alone would take seconds."""

@@ -68,11 +68,13 @@ def attitude(times: np.ndarray) -> np.ndarray:
 def gyro(times: np.ndarray) -> np.ndarray:
     """Local rates (n, 3) in rad/s at times (n,) in s: what a gyro without errors measures."""
     (roll, pitch, _), (by_roll, by_pitch, by_yaw) = (part.T for part in angles(times))
-    return np.column_stack([
-        by_roll - by_yaw * np.sin(pitch),
-        by_pitch * np.cos(roll) + by_yaw * np.sin(roll) * np.cos(pitch),
-        -by_pitch * np.sin(roll) + by_yaw * np.cos(roll) * np.cos(pitch),
-    ])  # fmt: skip
+    return np.column_stack(
+        [
+            by_roll - by_yaw * np.sin(pitch),
+            by_pitch * np.cos(roll) + by_yaw * np.sin(roll) * np.cos(pitch),
+            -by_pitch * np.sin(roll) + by_yaw * np.cos(roll) * np.cos(pitch),
+        ]
+    )
 
 
 def magnus(step: float) -> np.ndarray:
@@ -121,8 +123,14 @@ class InEngine:
     def run(self) -> Attitudes:
         """Attitudes at the instants; Refused or RunFailed by the engine."""
         solve = in_exudyn if self.engine == "exudyn" else in_mujoco
-        return solve(self.method, self.period, round(DURATION / self.period), round(GRID / self.period),
-                     attitude(np.zeros(1))[0], gyro)  # fmt: skip
+        return solve(
+            self.method,
+            self.period,
+            round(DURATION / self.period),
+            round(GRID / self.period),
+            attitude(np.zeros(1))[0],
+            gyro,
+        )
 
 
 class InertialUnit:
@@ -130,15 +138,18 @@ class InertialUnit:
 
     key = "unit"
     duration = DURATION
-    note = ("A force call is a sample of the rates, in an engine an evaluation of the torque. Rates are linear between "
-            "the samples for an engine, which leaves its methods order two at most.")  # fmt: skip
+    note = (
+        "A force call is a sample of the rates, in an engine an evaluation of the torque. Rates are linear between "
+        "the samples for an engine, which leaves its methods order two at most."
+    )
     tolerances: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
     bound = 1.0
 
     def __init__(self, quick: bool) -> None:
         rates = [1 / one.value for one in self.settings(quick)]
-        self.title = (f"Attitude of a car for {DURATION:g} s from {min(rates):g} to {max(rates):g} samples of its "
-                      "rates a second")  # fmt: skip
+        self.title = (
+            f"Attitude of a car for {DURATION:g} s from {min(rates):g} to {max(rates):g} samples of its rates a second"
+        )
         self.units = {"attitude": "rad"}
         self.reference = f"closed form, and a Magnus method of order six at {1e3 * FINE:g} ms"
         self.true = attitude(GRID * np.arange(round(DURATION / GRID) + 1))
@@ -154,8 +165,15 @@ class InertialUnit:
         step = GRID / np.ceil(GRID / value * (1 - 1e-9))
         order = RULES[method][1] if engine == "reference" else 1 if method in FIRST else 2
         stages = 1 if engine == "reference" else STAGES.get(method, 0)
-        return Setting(engine, method, float(step), order, method in ADAPTIVE, stages,
-                       default=DEFAULTS.get((engine, method, float(step)), ""))  # fmt: skip
+        return Setting(
+            engine,
+            method,
+            float(step),
+            order,
+            method in ADAPTIVE,
+            stages,
+            default=DEFAULTS.get((engine, method, float(step)), ""),
+        )
 
     def build(self, setting: Setting) -> Rules | InEngine:
         """One way to integrate, ready to run."""

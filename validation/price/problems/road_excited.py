@@ -25,9 +25,18 @@ GRID = 1.25e-4
 ADAPTIVE_STEP = {"exudyn": 5e-3, "reference": 1e-3}
 """Largest step of Exudyn's adaptive solvers, which they also begin with, and the spacing of scipy's output (s)."""
 STAGES = {
-    "RK44": 4, "RK67": 7, "RK33": 3, "ExplicitMidpoint": 2, "ExplicitEuler": 1, "VelocityVerlet": 1,
-    "RK4": 4, "Euler": 1, "implicit": 1, "implicitfast": 1, "discrete": 1,
-}  # fmt: skip
+    "RK44": 4,
+    "RK67": 7,
+    "RK33": 3,
+    "ExplicitMidpoint": 2,
+    "ExplicitEuler": 1,
+    "VelocityVerlet": 1,
+    "RK4": 4,
+    "Euler": 1,
+    "implicit": 1,
+    "implicitfast": 1,
+    "discrete": 1,
+}
 """Force evaluations per step, from the methods' tableaux. Newton iterations are not fixed."""
 RADII = {"GeneralizedAlpha 0.9": 0.9, "GeneralizedAlpha 0.6": 0.6}
 DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Euler", 2e-3): "MuJoCo"}
@@ -82,10 +91,14 @@ one."""
 
 def scene(duration: float = DURATION):
     """The scene of the problem."""
-    return build_scene({
-        "title": "pitch-plane vehicle on the study road", "vehicle": {"parameters": "itwm_drift"},
-        "run": {"duration": duration, "step": 1e-3}, "effects": {"road": {"source": "study", "speed": SPEED}},
-    })  # fmt: skip
+    return build_scene(
+        {
+            "title": "pitch-plane vehicle on the study road",
+            "vehicle": {"parameters": "itwm_drift"},
+            "run": {"duration": duration, "step": 1e-3},
+            "effects": {"road": {"source": "study", "speed": SPEED}},
+        }
+    )
 
 
 def settings_of(setting: Setting, duration: float = DURATION) -> Settings:
@@ -119,8 +132,15 @@ def _dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
     edges = [0.0, *assembly.input.knots(DURATION), DURATION]
     times, pieces, y = [0.0], list[Any](), assembly.initial
     for start, end in pairwise(edges):
-        part = solve_ivp(lambda t, y: derivative(y, at(t), p), (start, end), y, method=method, dense_output=True,
-                         rtol=tolerance, atol=1e-2 * tolerance)  # fmt: skip
+        part = solve_ivp(
+            lambda t, y: derivative(y, at(t), p),
+            (start, end),
+            y,
+            method=method,
+            dense_output=True,
+            rtol=tolerance,
+            atol=1e-2 * tolerance,
+        )
         times += list(part.t[1:])
         pieces += part.sol.interpolants
         y = part.y[:, -1]
@@ -132,13 +152,17 @@ class RoadExcited:
 
     key = "road"
     duration = DURATION
-    note = ("Exudyn's RK33, RK67 and adaptive methods read the road anew at every stage, in Python: their seconds show "
-            "it, their force calls do not.")  # fmt: skip
+    note = (
+        "Exudyn's RK33, RK67 and adaptive methods read the road anew at every stage, in Python: their seconds show "
+        "it, their force calls do not."
+    )
 
     def __init__(self, quick: bool) -> None:
         steps = [1e3 * one.value for one in self.settings(quick) if not one.adaptive]
-        self.title = (f"Pitch-plane vehicle on the study road, {DURATION:g} s at {SPEED:g} m/s, "
-                      f"fixed steps of {min(steps):g} to {max(steps):g} ms")  # fmt: skip
+        self.title = (
+            f"Pitch-plane vehicle on the study road, {DURATION:g} s at {SPEED:g} m/s, "
+            f"fixed steps of {min(steps):g} to {max(steps):g} ms"
+        )
         self.units = {"wheel force": "N", "state": "m, rad, m/s, rad/s"}
         self.tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1, 0.01)
         self.assembly = assemble(scene())

@@ -49,8 +49,13 @@ def in_mujoco(method: str, period: float, count: int, every: int, start: np.ndar
     rates = gyro(period * np.arange(count + 1))
     torques = np.diff(rates, axis=0)[None] / period
     with quiet():
-        path, _ = rollout.rollout(model, mujoco.MjData(model), np.concatenate([[0.0], start, rates[0]])[None], torques,
-                                  control_spec=int(mujoco.mjtState.mjSTATE_QFRC_APPLIED))  # fmt: skip
+        path, _ = rollout.rollout(
+            model,
+            mujoco.MjData(model),
+            np.concatenate([[0.0], start, rates[0]])[None],
+            torques,
+            control_spec=int(mujoco.mjtState.mjSTATE_QFRC_APPLIED),
+        )
     found = np.vstack([start, path[0, every - 1 :: every, 1:5]])
     return _sound("mujoco", found, {"steps": count, "force calls": (4 if method == "RK4" else 1) * count})
 
@@ -75,18 +80,25 @@ def in_exudyn(method: str, period: float, count: int, every: int, start: np.ndar
     return _sound("exudyn", found, counted(mbs))
 
 
-def _sphere(start: np.ndarray, rate: np.ndarray, torques: list[list[float]], period: float,
-            implicit: bool, held: bool) -> tuple[Any, Any]:  # fmt: skip
+def _sphere(
+    start: np.ndarray, rate: np.ndarray, torques: list[list[float]], period: float, implicit: bool, held: bool
+) -> tuple[Any, Any]:
     """The system and its sensor: a rotation vector from the start for explicit methods, Euler parameters for others."""
     mbs = exu.SystemContainer().AddSystem()
     still, turning = [0.0] * 3, np.concatenate([[0.0], rate])
     if implicit:
-        node = mbs.AddNode(items.NodeRigidBodyEP(
-            referenceCoordinates=still + start.tolist(),
-            initialVelocities=still + (0.5 * product(start, turning)).tolist()))  # fmt: skip
+        node = mbs.AddNode(
+            items.NodeRigidBodyEP(
+                referenceCoordinates=still + start.tolist(),
+                initialVelocities=still + (0.5 * product(start, turning)).tolist(),
+            )
+        )
     else:
-        node = mbs.AddNode(items.NodeRigidBodyRotVecLG(
-            referenceCoordinates=still + logarithm(start).tolist(), initialVelocities=still + rate.tolist()))
+        node = mbs.AddNode(
+            items.NodeRigidBodyRotVecLG(
+                referenceCoordinates=still + logarithm(start).tolist(), initialVelocities=still + rate.tolist()
+            )
+        )
     body = mbs.AddObject(items.ObjectRigidBody(nodeNumber=node, mass=1.0, inertia=[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     row = [0]
 
@@ -95,11 +107,21 @@ def _sphere(start: np.ndarray, rate: np.ndarray, torques: list[list[float]], per
         return True
 
     mbs.SetPreStepUserFunction(begin)
-    mbs.AddLoad(items.LoadTorqueVector(
-        markerNumber=mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=body)), bodyFixed=True,
-        loadVectorUserFunction=lambda mbs, t, load: torques[row[0]]))  # fmt: skip
-    sensor = mbs.AddSensor(items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False,
-                                            outputVariableType=KINDS.Coordinates if implicit else KINDS.RotationMatrix))
+    mbs.AddLoad(
+        items.LoadTorqueVector(
+            markerNumber=mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=body)),
+            bodyFixed=True,
+            loadVectorUserFunction=lambda mbs, t, load: torques[row[0]],
+        )
+    )
+    sensor = mbs.AddSensor(
+        items.SensorNode(
+            nodeNumber=node,
+            storeInternal=True,
+            writeToFile=False,
+            outputVariableType=KINDS.Coordinates if implicit else KINDS.RotationMatrix,
+        )
+    )
     mbs.Assemble()
     return mbs, sensor
 

@@ -52,8 +52,7 @@ EXPLICIT = {
     "exudyn": ("RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler", "VelocityVerlet"),
     "mujoco": ("RK4", "Euler", "implicit", "implicitfast", "discrete"),
 }
-_LONG = (10 * MS, 5 * MS, 4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS, 0.0625 * MS,
-         0.02 * MS)
+_LONG = (10 * MS, 5 * MS, 4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS, 0.0625 * MS, 0.02 * MS)
 _TIGHT = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 OTHERS: dict[tuple[str, str], tuple[float, ...]] = {
     ("reference", "DOP853"): _TIGHT[:6],
@@ -125,8 +124,10 @@ class RollingWheels:
     """The problem with its reference; see ``validation.price.problems.Problem``."""
 
     duration = DURATION
-    note = (f"Errors at the end. Every set of slopes that is given to an implicit method counts as {PLACES} force "
-            "calls; Exudyn's own differences count by themselves.")  # fmt: skip
+    note = (
+        f"Errors at the end. Every set of slopes that is given to an implicit method counts as {PLACES} force "
+        "calls; Exudyn's own differences count by themselves."
+    )
     tolerances: tuple[float, ...] = (10.0, 1.0, 0.1, 0.01)
 
     def __init__(self, speed: float) -> None:

@@ -12,8 +12,13 @@ from pathlib import Path
 from validation.price.sheets import braking, inertial_unit, pitch_plane, ride, vehicle
 from validation.price.sheets.page import Value
 
-WRITERS: tuple[Callable[[Path], list[Value]], ...] = (pitch_plane.write, braking.write, vehicle.write, ride.write,
-                                                      inertial_unit.write)  # fmt: skip
+WRITERS: tuple[Callable[[Path], list[Value]], ...] = (
+    pitch_plane.write,
+    braking.write,
+    vehicle.write,
+    ride.write,
+    inertial_unit.write,
+)
 HEADS = ("problem", "quantity", "unit", "time [s]", "value", "uncertainty")
 
 

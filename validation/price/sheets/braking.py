@@ -42,6 +42,12 @@ def write(folder: Path) -> list[Value]:
     columns(folder, "braking_friction", heads, np.column_stack([problem.slips, *problem.mu]))
     columns(folder, "braking_valves", ("valve",), problem.valves[:, None])
     values = [Value("braking", "stopping distance", "m", 0.0, problem.true, problem.uncertainty["stopping distance"])]
-    write_page(folder, "braking", problem.title, BODY, f"The distance ({problem.reference}); the uncertainty is the "
-               "difference of the two.", values)  # fmt: skip
+    write_page(
+        folder,
+        "braking",
+        problem.title,
+        BODY,
+        f"The distance ({problem.reference}); the uncertainty is the difference of the two.",
+        values,
+    )
     return values

@@ -14,19 +14,30 @@ def write(folder: Path) -> list[Value]:
     """The sheet; the quaternion at the end."""
     problem = inertial_unit.problem(False)
     sure = problem.uncertainty["attitude"]
-    values = [Value("unit", name, "", DURATION, float(part), sure)
-              for name, part in zip(NAMES, problem.true[-1], strict=True)]  # fmt: skip
-    write_page(folder, "unit", problem.title, _body(), f"The quaternion at {DURATION:g} s ({problem.reference}); the "
-               "uncertainty is the largest angle between the two, rad. q and -q are the same attitude.",
-               values)  # fmt: skip
+    values = [
+        Value("unit", name, "", DURATION, float(part), sure) for name, part in zip(NAMES, problem.true[-1], strict=True)
+    ]
+    write_page(
+        folder,
+        "unit",
+        problem.title,
+        _body(),
+        f"The quaternion at {DURATION:g} s ({problem.reference}); the "
+        "uncertainty is the largest angle between the two, rad. q and -q are the same attitude.",
+        values,
+    )
     return values
 
 
 def _body() -> str:
-    angles = "\n".join(f"    {name:5s} = " + " + ".join(
-        ([f"{TURN:g} t"] if name == "yaw" else []) + [f"{size:g} sin({rate:g} t + {phase:g})"
-                                                      for size, rate, phase in sines])
-        for name, sines in SINES.items())  # fmt: skip
+    angles = "\n".join(
+        f"    {name:5s} = "
+        + " + ".join(
+            ([f"{TURN:g} t"] if name == "yaw" else [])
+            + [f"{size:g} sin({rate:g} t + {phase:g})" for size, rate, phase in sines]
+        )
+        for name, sines in SINES.items()
+    )
     return f"""{inertial_unit.InertialUnit.note}
 
 A car turns by (rad, t in s)

@@ -41,15 +41,26 @@ def write(folder: Path) -> list[Value]:
 def on_road(folder: Path) -> list[Value]:
     """The sheet of the vehicle on the study road."""
     problem, road = road_excited.problem(False), study_road()
-    columns(folder, "road", ("amplitude [m]", "wavenumber [rad/m]", "phase [rad]"),
-            np.column_stack([road.amplitude, road.wavenumber, road.phase]))  # fmt: skip
+    columns(
+        folder,
+        "road",
+        ("amplitude [m]", "wavenumber [rad/m]", "phase [rad]"),
+        np.column_stack([road.amplitude, road.wavenumber, road.phase]),
+    )
     end = np.array([road_excited.DURATION])
     true, *others = (road_excited._dense(problem.assembly, *solver)(end)[:, 0] for solver in SOLVERS[False])
     sure = np.max([np.abs(other - true) for other in others], axis=0)
     values = _values("road", problem.duration, true, sure)
     body = f"{EQUATIONS}{ON_ROAD}\n{_numbers(problem)}"
-    write_page(folder, "road", problem.title, body, f"End values at {problem.duration:g} s ({problem.reference}); the "
-               "uncertainty is the largest difference of the three.", values)  # fmt: skip
+    write_page(
+        folder,
+        "road",
+        problem.title,
+        body,
+        f"End values at {problem.duration:g} s ({problem.reference}); the "
+        "uncertainty is the largest difference of the three.",
+        values,
+    )
     return values
 
 
@@ -63,16 +74,24 @@ def by_forces(problem: ForceExcited, folder: Path) -> list[Value]:
     inputs = signal.sample(0.0, PERIOD, len(times))[:, : len(heads) - 1]
     columns(folder, problem.key, heads, np.column_stack([times, inputs]))
     values = ends(problem)
-    write_page(folder, problem.key, problem.title, _body(problem, guided), f"End values at {DURATION:g} s "
-               f"({problem.reference}); the uncertainty is the largest difference of the two over the run.",
-               values)  # fmt: skip
+    write_page(
+        folder,
+        problem.key,
+        problem.title,
+        _body(problem, guided),
+        f"End values at {DURATION:g} s "
+        f"({problem.reference}); the uncertainty is the largest difference of the two over the run.",
+        values,
+    )
     return values
 
 
 def ends(problem: ForceExcited) -> list[Value]:
     """Every state at the end, with the largest difference of the two reference solvers over the run."""
-    runs = [build("reference", problem.assembly, settings).run()
-            for settings in (Settings("RK4", FINE, DURATION), Settings("DOP853", PERIOD, DURATION, 1e-12))]  # fmt: skip
+    runs = [
+        build("reference", problem.assembly, settings).run()
+        for settings in (Settings("RK4", FINE, DURATION), Settings("DOP853", PERIOD, DURATION, 1e-12))
+    ]
     true, other = (run.states[:: (len(run.states) - 1) // round(DURATION / PERIOD)] for run in runs)
     return _values(problem.key, DURATION, true[-1], np.abs(true - other).max(axis=0))
 
@@ -89,8 +108,12 @@ def _numbers(problem: ForceExcited | road_excited.RoadExcited) -> str:
 
 
 def _body(problem: ForceExcited, guided: bool) -> str:
-    pitch = (" The pitch is a quintic spline through its samples (not-a-knot at both ends), prescribed; M is the "
-             "moment that this takes." if guided else " M is zero.")  # fmt: skip
+    pitch = (
+        " The pitch is a quintic spline through its samples (not-a-knot at both ends), prescribed; M is the "
+        "moment that this takes."
+        if guided
+        else " M is zero."
+    )
     asked = ", ".join(f"largest error of the {name} [{unit}]" for name, unit in problem.units.items())
     return f"""{problem.note}
 {EQUATIONS}

@@ -16,24 +16,40 @@ def write(folder: Path) -> list[Value]:
     """The sheet and its matrices; the standard deviation of every output."""
     problem = ride.problem()
     vehicle = problem.vehicle
-    matrices(folder, "ride", {
-        "M": vehicle.mass, "D": vehicle.damping, "K": vehicle.stiffness, "R": vehicle.road_stiffness,
-        "S": vehicle.road_damping,
-        **{key: np.array([getattr(output, name) for output in vehicle.outputs]) for key, name in PARTS.items()},
-    })  # fmt: skip
+    matrices(
+        folder,
+        "ride",
+        {
+            "M": vehicle.mass,
+            "D": vehicle.damping,
+            "K": vehicle.stiffness,
+            "R": vehicle.road_stiffness,
+            "S": vehicle.road_damping,
+            **{key: np.array([getattr(output, name) for output in vehicle.outputs]) for key, name in PARTS.items()},
+        },
+    )
     sure = problem.truth * max(0.5 * problem.uncertainty, float(np.abs(ride.direct(problem) / problem.truth - 1).max()))
-    values = [Value("ride", output.name, output.unit, 0.0, *map(float, known))
-              for output, *known in zip(vehicle.outputs, problem.truth, sure, strict=True)]  # fmt: skip
-    write_page(folder, "ride", f"Standard deviations of a passenger car of 19 freedoms at {ride.SPEED:g} m/s",
-               _body(problem), "Standard deviations by quadrature over frequencies; the uncertainty holds its own "
-               "estimate and the largest relative difference from a Lyapunov equation.", values)  # fmt: skip
+    values = [
+        Value("ride", output.name, output.unit, 0.0, *map(float, known))
+        for output, *known in zip(vehicle.outputs, problem.truth, sure, strict=True)
+    ]
+    write_page(
+        folder,
+        "ride",
+        f"Standard deviations of a passenger car of 19 freedoms at {ride.SPEED:g} m/s",
+        _body(problem),
+        "Standard deviations by quadrature over frequencies; the uncertainty holds its own "
+        "estimate and the largest relative difference from a Lyapunov equation.",
+        values,
+    )
     return values
 
 
 def _body(problem: ride.Ride) -> str:
     road = road_of_level(half_track(problem.vehicle.wheels))
-    wheels = "\n".join(f"| {i} | {w.name} | {w.x:.17g} | {w.y:.17g} |"
-                       for i, w in enumerate(problem.vehicle.wheels, start=1))  # fmt: skip
+    wheels = "\n".join(
+        f"| {i} | {w.name} | {w.x:.17g} | {w.y:.17g} |" for i, w in enumerate(problem.vehicle.wheels, start=1)
+    )
     front = max(w.x for w in problem.vehicle.wheels)
     return f"""A linear vehicle with {len(problem.vehicle.mass)} coordinates q on {len(problem.vehicle.wheels)} wheels:
 

@@ -59,20 +59,32 @@ def write(folder: Path) -> list[Value]:
     """The sheet; every place and rate at the end."""
     problem = free_vehicle.problem(False)
     sure = np.abs(problem.states - problem.others).max(axis=0)
-    values = [Value("vehicle", name, unit, DURATION, *map(float, known)) for (name, unit), *known in
-              zip(_states(problem), problem.states[-1], sure, strict=True)]  # fmt: skip
-    asked = ("Asked for: the largest error of a tyre force and of an acceleration along z of body, engine or seats at "
-             f"every {1e3 * free_vehicle.GRID:g} ms.")  # fmt: skip
-    write_page(folder, "vehicle", problem.title, f"{LAWS}\n{_tables(problem.vehicle)}\n\n{asked}",
-               f"End values at {DURATION:g} s ({problem.reference}); the uncertainty is the largest difference of the "
-               "two over the run.", values)  # fmt: skip
+    values = [
+        Value("vehicle", name, unit, DURATION, *map(float, known))
+        for (name, unit), *known in zip(_states(problem), problem.states[-1], sure, strict=True)
+    ]
+    asked = (
+        "Asked for: the largest error of a tyre force and of an acceleration along z of body, engine or seats at "
+        f"every {1e3 * free_vehicle.GRID:g} ms."
+    )
+    write_page(
+        folder,
+        "vehicle",
+        problem.title,
+        f"{LAWS}\n{_tables(problem.vehicle)}\n\n{asked}",
+        f"End values at {DURATION:g} s ({problem.reference}); the uncertainty is the largest difference of the "
+        "two over the run.",
+        values,
+    )
     return values
 
 
 def _states(problem: FreeVehicle) -> list[tuple[str, str]]:
     """Names and units of positions, then of rates."""
-    places = [(f"{body} {freedom}", "rad" if freedom.startswith("r") else "m")
-              for body, freedom in problem.vehicle.coordinates()]  # fmt: skip
+    places = [
+        (f"{body} {freedom}", "rad" if freedom.startswith("r") else "m")
+        for body, freedom in problem.vehicle.coordinates()
+    ]
     return places + [(f"{name} rate", f"{unit}/s") for name, unit in places]
 
 
@@ -81,21 +93,53 @@ def _tables(vehicle: SpatialVehicle) -> str:
     held = preloads(vehicle)
     parts: dict[tuple[str, ...], Sequence[tuple[str, ...]]] = {
         ("body", "mass [kg]", "place", "freedoms", "inertia, rows", "parent"): [
-            (b.name, f"{b.mass:.17g}", vector(b.position), " ".join(b.freedoms), " ".join(map(vector, b.inertia)),
-             b.parent or "space") for b in vehicle.bodies],
+            (
+                b.name,
+                f"{b.mass:.17g}",
+                vector(b.position),
+                " ".join(b.freedoms),
+                " ".join(map(vector, b.inertia)),
+                b.parent or "space",
+            )
+            for b in vehicle.bodies
+        ],
         ("spring", "one", "two", "p1", "p2", "a", "k [N/m]", "c [N s/m]", "F0 [N]"): [
-            (s.name, s.one, s.two or "ground", vector(s.point_one), vector(s.point_two), vector(s.axis),
-             f"{s.stiffness:.17g}", f"{s.damping:.17g}", f"{held.parts[s.name]:.17g}") for s in vehicle.springs],
+            (
+                s.name,
+                s.one,
+                s.two or "ground",
+                vector(s.point_one),
+                vector(s.point_two),
+                vector(s.axis),
+                f"{s.stiffness:.17g}",
+                f"{s.damping:.17g}",
+                f"{held.parts[s.name]:.17g}",
+            )
+            for s in vehicle.springs
+        ],
         ("bar", "body", "left", "right", "left point", "right point", "k [N m/rad]", "c", "M0 [N m]"): [
-            (b.name, b.body, b.left, b.right, vector(b.point_left), vector(b.point_right), f"{b.stiffness:.17g}",
-             f"{b.damping:.17g}", f"{held.parts[b.name]:.17g}") for b in vehicle.bars],
+            (
+                b.name,
+                b.body,
+                b.left,
+                b.right,
+                vector(b.point_left),
+                vector(b.point_right),
+                f"{b.stiffness:.17g}",
+                f"{b.damping:.17g}",
+                f"{held.parts[b.name]:.17g}",
+            )
+            for b in vehicle.bars
+        ],
         ("tyre", "body", "place", "k [N/m]", "F0 [N]"): [
             (t.name, t.body, vector(t.point), f"{t.stiffness:.17g}", f"{held.tyres[t.name]:.17g}")
-            for t in vehicle.tyres],
+            for t in vehicle.tyres
+        ],
         ("side force", "body", "point", "C [N/rad]"): [
-            (f.name, f.body, vector(f.point), f"{f.stiffness:.17g}") for f in vehicle.side_forces],
+            (f.name, f.body, vector(f.point), f"{f.stiffness:.17g}") for f in vehicle.side_forces
+        ],
         ("drag", "c [N s^2/m^2]"): [(d.body, f"{d.coefficient:.17g}") for d in vehicle.drags],
-    }  # fmt: skip
+    }
     return "\n\n".join(_table(heads, rows) for heads, rows in parts.items())
 
 
