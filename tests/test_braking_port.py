@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
 from itertools import pairwise
 from pathlib import Path
 
@@ -372,6 +372,57 @@ def test_a_callable_that_is_not_made_in_time_or_crashes_as_it_is_made(tmp_path):
         table = PortTable(callable="made.py:Made", start=start)
         with pytest.raises(RunFailed, match=told), opened(table, Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)):
             pass
+
+
+NEVER = {
+    "callable": "class Made:\n    def __init__(self, wheels):\n        while True: pass\n    def sample(self, given): pass\n",
+    "module": "while True: pass\n",
+    "parameters": "class Made:\n    def __init__(self, wheels, size):\n        while True: pass\n",
+}
+
+
+@pytest.mark.parametrize("kind", NEVER)
+def test_making_a_controller_may_take_as_long_as_an_answer(kind, tmp_path):
+    """The time that our own process needs to start is not part of it."""
+    (tmp_path / "made.py").write_text(f"import time\nopen('begun', 'w').write(repr(time.time()))\n{NEVER[kind]}")
+    given = {"size": 3} if kind == "parameters" else {}
+    table = PortTable(callable="made.py:Made", timeout=0.4, parameters=given)
+    with (
+        chdir(tmp_path),
+        pytest.raises(RunFailed, match="not made within 0.4 s; .* give start"),
+        opened(table, Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
+    ):
+        pass
+    assert time.time() - float((tmp_path / "begun").read_text()) < 2 * table.timeout
+
+
+def test_an_fmu_that_is_never_ready_ends_as_an_answer_does(tmp_path):
+    builder = pytest.importorskip("pythonfmu").FmuBuilder
+    lines = (HERE / "example_slave.py").read_text().replace("import", f"import os, time\n{WAITS}import", 1)
+    (tmp_path / "slave.py").write_text(lines.replace("super().__init__(", "waits()\n        super().__init__("))
+    file = builder.build_FMU(tmp_path / "slave.py", dest=tmp_path)
+    table, run = PortTable(fmu=Path(file).name, timeout=0.8), Run(RADIUS, SAMPLE, folder=tmp_path)
+    (tmp_path / "begun").touch()
+    with chdir(tmp_path), pytest.raises(RunFailed, match=r"not made within 0.8 s"), opened(table, run, Example(4)):
+        pass
+    assert time.time() - float((tmp_path / "begun").read_text()) < 2 * table.timeout
+
+
+WAITS = """
+def waits():
+    if os.path.exists("begun"):  # not yet as it is built
+        open("begun", "w").write(repr(time.time()))
+        while True: pass
+"""
+
+
+def test_a_command_has_as_long_to_connect_and_a_process_started_by_hand_longer(tmp_path):
+    table = PortTable(command=["sleep", "30"], timeout=0.2)
+    begun = time.perf_counter()
+    with pytest.raises(RunFailed, match="nobody connected to .* within 0.2 s; .* give start"):
+        opened(table, Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)).__enter__()
+    assert time.perf_counter() - begun < 2 * table.timeout
+    assert PortTable(port=5000).patience > 10 and PortTable(port=5000, start=3.0).patience == 3.0
 
 
 @pytest.mark.parametrize("table", [{"signals": {"gain": 0.9}}, {"faults": [{"kind": "stuck"}]}, {"log": "a.log"}, {}])

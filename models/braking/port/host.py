@@ -1,8 +1,7 @@
 """The other end of a hosted controller: the process in which a callable or an FMU runs, and nothing else does.
 
-It connects, is told what to make, says that it is ready, and answers frame by frame as ``frame`` documents. What goes
-wrong in it is told in a frame of its own: "TRE1", the length of a text as uint32, and the text, which is JSON.
-"""
+It connects, is told what to make, says that it has all that it needs for that, says when the controller is made, and
+answers frame by frame as ``frame`` documents. What goes """
 
 import json
 import pickle
@@ -64,6 +63,9 @@ def serve(link: socket.socket) -> None:
     """Make the controller that is asked for, and answer until the connection is closed."""
     with link.makefile("rb") as reader:
         guest = pickle.loads(reader.read(LENGTH.unpack(reader.read(LENGTH.size))[0]))
+        if guest.fmu is not None:
+            import fmpy.fmi2  # noqa: F401 the library's time is none of the FMU's
+        link.sendall(HEAD.pack(READY, 0))
         with made(guest) as controller:
             link.sendall(HEAD.pack(READY, 0))
             while len(frame := reader.read(QUESTION.size)) == QUESTION.size:

@@ -1,7 +1,8 @@
 """A callable or an FMU in a process of its own, which is ended when its time is over: nothing in it can prevent that.
 
 So a controller that never returns, whatever it catches, or that takes its process with it, ends the run in one named
-error. The process is started once per run, before any answer is timed; an exchange costs the way there and back.
+error. The process is started once per run, before anything of the controller is timed: its start-up is our own. An
+exchange costs the way there and back.
 """
 
 import json
@@ -19,11 +20,13 @@ from models.braking.controller import Command, Sample
 from models.braking.port.ask import NAMES, ControllerFailed
 from models.braking.port.frame import ANSWER, WrongFrame, command, question
 from models.braking.port.host import HEAD, LENGTH, READY, TOLD, Guest
-from models.braking.port.socket_port import connected, fate
+from models.braking.port.socket_port import LONGER, connected, fate
 from models.errors import InputError, RunFailed
 
 MOST_TOLD = 100_000
 """Bytes of what a process may tell of its failure."""
+STARTUP = 30.0
+"""s for the process to be there, with all that the host needs, before it touches the controller."""
 
 
 class Failed(Exception):
@@ -46,11 +49,12 @@ class Hosted:
         """Have the controller made within so many seconds; raises InputError, RunFailed."""
         text = pickle.dumps(guest)
         try:
-            self._got(LENGTH.pack(len(text)) + text, HEAD.size, READY, start)
+            self._got(LENGTH.pack(len(text)) + text, HEAD.size, READY, STARTUP)
+            self._got(b"", HEAD.size, READY, start)
         except Failed as error:
             raise _as_input(error.what) from None
         except TimeoutError:
-            raise RunFailed("controller", f"silence: it was not made within {start:g} s") from None
+            raise RunFailed("controller", f"silence: it was not made within {start:g} s; {LONGER}") from None
         except (OSError, EOFError):
             raise RunFailed("controller", f"crash: it ended as it was made{fate(self.process, self.timeout)}") from None
 
@@ -110,12 +114,12 @@ def _as_input(what: dict[str, Any]) -> InputError | RunFailed:
 
 @contextmanager
 def hosted(guest: Guest, timeout: float, start: float) -> Iterator[Hosted]:
-    """The controller of a guest for as long as the block lasts; start : seconds for its process, and for making it.
+    """The controller of a guest for as long as the block lasts; start : seconds for making it.
 
     However the block ends, no process of it stays. Raises InputError, RunFailed.
     """
     code = f"import sys; sys.path[:] = {sys.path!r}; from models.braking.port.host import main; main(int(sys.argv[1]))"
-    with connected([sys.executable, "-c", code, "{port}"], 0, timeout, start) as port:
+    with connected([sys.executable, "-c", code, "{port}"], 0, timeout, STARTUP) as port:
         own = Hosted(port.link, port.process, timeout)
         own.begin(guest, start)
         yield own

@@ -27,6 +27,8 @@ from models.strict import Strict, quantity
 
 BEHIND = ("callable", "command", "port", "fmu", "replay")
 """What can stand behind the port in place of a controller of the scene; at most one does."""
+BY_HAND = 20.0
+"""s for a process that somebody starts by hand to connect to a port, where the scene does not say."""
 
 
 class PortTable(Strict):
@@ -40,13 +42,22 @@ class PortTable(Strict):
     fmu: str | None = Field(default=None, description="an FMU file, FMI 2 co-simulation")
     replay: str | None = Field(default=None, description="a log of this scene")
     timeout: float = quantity("s", "for one answer", default=1.0)
-    start: float = quantity("s", "for a process to connect, for a callable or an FMU to be made", default=20.0)
+    start: float | None = quantity(
+        "s", "for a command to connect, for a callable or an FMU to be made; as timeout if not given", default=None
+    )
     pace: Literal["simulated", "wall"] = Field(default="simulated", description="simulated, or wall: the clock's")
     log: str | None = Field(default=None, description="file to which every exchange is written")
     signals: Conversion = Conversion()
     pressures: Conversion = Conversion()
     teeth: Teeth | None = Field(default=None, description="signals are counted from teeth; not named, they are known")
     faults: list[Fault] = Field(default_factory=list, description="on demand")
+
+    @property
+    def patience(self) -> float:
+        """Time (s) until the controller must be there."""
+        if self.start is not None:
+            return self.start
+        return self.timeout if self.port is None else BY_HAND
 
     @model_validator(mode="after")
     def _one_behind(self) -> "PortTable":
@@ -107,7 +118,7 @@ def _behind(table: PortTable, run: Run, own: Controller) -> Iterator[Controller]
     with ExitStack() as stack:
         if table.command is not None or table.port is not None:
             with _told_of_scene(table, run):
-                link = socket_port.connected(table.command, table.port or 0, table.timeout, table.start, run.folder)
+                link = socket_port.connected(table.command, table.port or 0, table.timeout, table.patience, run.folder)
                 entered = stack.enter_context(link)
             yield entered
         elif table.replay is not None:
@@ -119,7 +130,7 @@ def _behind(table: PortTable, run: Run, own: Controller) -> Iterator[Controller]
             fmu = None if table.fmu is None else run.path(table.fmu).absolute()
             guest = Guest(table.callable, fmu, folder, run.radius.size, run.sample, table.parameters, run.file)
             with _told_of_scene(table, run):
-                made = stack.enter_context(hosted(guest, table.timeout, table.start))
+                made = stack.enter_context(hosted(guest, table.timeout, table.patience))
             yield made
         else:
             yield own

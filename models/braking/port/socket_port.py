@@ -19,6 +19,8 @@ LOOPBACK = "127.0.0.1"
 """The only address that this port ever listens on."""
 STDERR = 2
 """Where a controller's own prints go: standard output is for the results alone."""
+LONGER = "if it needs longer, give start (s) under [port]"
+"""Remedy where a controller is not there in time."""
 GRACE = 0.5
 """Seconds for a process to end by itself once its connection is closed at the end of a run."""
 
@@ -133,7 +135,7 @@ def _accepted(server: socket.socket, process: subprocess.Popen[bytes] | None, st
         if status is not None:
             raise RunFailed("controller", f"crash: its command ended with status {status} before it connected")
     where = f"{LOOPBACK}:{server.getsockname()[1]}"
-    raise RunFailed("controller", f"silence: nobody connected to {where} within {start:g} s")
+    raise RunFailed("controller", f"silence: nobody connected to {where} within {start:g} s; {LONGER}")
 
 
 @contextmanager
