@@ -98,7 +98,7 @@ def trust_line(assembly: Assembly) -> list[str]:
     if found is None:
         return []
     if found.until is None and assembly.doubts:
-        return [_line("trust", "only as far as the doubts about the wheel forces allow")]
+        return [_line("trust", f"only as far as the doubts about the wheel forces allow; {found.unchecked}")]
     return [_line("trust", str(found))]
 
 

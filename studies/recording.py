@@ -23,9 +23,9 @@ from models.measured.checks.place import Place
 from models.measured.checks.weight import moments
 from models.measured.clock import record
 from models.measured.comparison import Compared, checks, compare
-from models.measured.consequences import Consequence, consequences, judged
+from models.measured.consequences import Consequence, consequences, judged, told
 from models.measured.counting import Counted, count
-from models.measured.finding import Finding
+from models.measured.finding import Finding, gathered, queries
 from models.measured.hand_on import NAME, forces, hand_on
 from models.measured.hold_of import NOISE, hold_of, noise_of
 from models.measured.pattern import write_pattern
@@ -121,6 +121,7 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
         "page": str(page),
         "verdicts": {name: [own.word, own.reason] for name, own in found.verdicts.items()},
         "effects": [str(one) for one in found.consequences],
+        "findings": queries(finding for finding in found.findings if finding.weight != "note"),
         "doubts": sum(finding.weight == "doubt" for finding in found.findings),
         "channels": _sizes(found),
         "table": [*_told(found), f"  the page: {page}"],
@@ -163,7 +164,12 @@ def compute(scene: MeasuredScene, engine: str, folder: Path, progress: Progress 
 def _in_space(found: Found, work: Path, progress: Progress) -> None:
     """Predict, run and judge a vehicle in space."""
     found.drift = _predicted(found)
-    found.trust = ("section forces", found.drift.trust()), ("motion", found.drift.trust(ANGLE))
+    lacking = found.evidence.lacking
+    rest = f"not checked: whether a channel is late; this needs {lacking}" if lacking else ""
+    found.trust = tuple(
+        (what, replace(found.drift.trust(angle), unchecked=rest))
+        for what, angle in (("section forces", None), ("motion", ANGLE))
+    )
     _run(found, work, progress)
     _judged(found)
 
@@ -404,14 +410,14 @@ def _failed(found: Found) -> dict[str, str]:
 
 def _told(found: Found) -> list[str]:
     """Lines for the terminal: findings that matter, and how the runs ended."""
-    lines = [f"  {finding.weight}: {finding.text}" for finding in found.findings if finding.weight != "note"]
+    lines = [f"  {finding.weight}: {finding.text}" for finding in gathered(found.findings) if finding.weight != "note"]
     notes = sum(finding.weight == "note" for finding in found.findings)
     lines.append(f"  {notes} notes say what was looked at and found good, or could not be looked at: see the page")
     lines += [f"  {what} of the free run: {own}" for what, own in found.trust]
     for name, outcome in found.runs.items():
         end = found.failed.get(name, "to the end")
         lines.append(f"  {name} run: {outcome.period * (outcome.done - 1):.6g} s, {end}")
-    lines += [f"  effect of {one}" for one in found.consequences]
+    lines += [f"  effect of {text}" for text in told(found.consequences)]
     lines += [f"  verdict on the {name} run: {own.word} ({own.reason})" for name, own in found.verdicts.items()]
     return lines
 

@@ -375,7 +375,7 @@ def test_a_callable_that_is_not_made_in_time_or_crashes_as_it_is_made(tmp_path):
 
 
 NEVER = {
-    "callable": "class Made:\n    def __init__(self, wheels):\n        while True: pass\n    def sample(self, given): pass\n",
+    "callable": "class Made:\n    def __init__(self, wheels):\n        while True: pass\n",
     "module": "while True: pass\n",
     "parameters": "class Made:\n    def __init__(self, wheels, size):\n        while True: pass\n",
 }
@@ -389,7 +389,7 @@ def test_making_a_controller_may_take_as_long_as_an_answer(kind, tmp_path):
     table = PortTable(callable="made.py:Made", timeout=0.4, parameters=given)
     with (
         chdir(tmp_path),
-        pytest.raises(RunFailed, match="not made within 0.4 s; .* give start"),
+        pytest.raises(RunFailed, match=r"not made within 0.4 s; .* give start"),
         opened(table, Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
     ):
         pass
@@ -419,7 +419,7 @@ def waits():
 def test_a_command_has_as_long_to_connect_and_a_process_started_by_hand_longer(tmp_path):
     table = PortTable(command=["sleep", "30"], timeout=0.2)
     begun = time.perf_counter()
-    with pytest.raises(RunFailed, match="nobody connected to .* within 0.2 s; .* give start"):
+    with pytest.raises(RunFailed, match=r"nobody connected to .* within 0.2 s; .* give start"):
         opened(table, Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)).__enter__()
     assert time.perf_counter() - begun < 2 * table.timeout
     assert PortTable(port=5000).patience > 10 and PortTable(port=5000, start=3.0).patience == 3.0

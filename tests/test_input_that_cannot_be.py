@@ -156,6 +156,19 @@ def test_a_doubt_is_printed_saved_and_taken_into_the_trust(tmp_path):
     assert not findings_of(accepted)
 
 
+@pytest.mark.parametrize("late", [0.0, 0.05])
+def test_the_trust_says_that_a_late_axle_was_not_looked_for(tmp_path, late, twinrig, capsys):
+    """Speed is not known: the rear axle 50 ms late is that of a slower vehicle."""
+    forces, shift = true(("study", 0.0))[0], round(late / PERIOD)
+    moved = np.column_stack([forces[shift:, 0], forces[: len(forces) - shift, 1]])
+    scene(tmp_path, moved)
+    assert twinrig("show", str(tmp_path / "s.toml")) == 0
+    (trust,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("  trust"))
+    assert "not checked: whether an axle is late" in trust and "kalman_filter" in trust
+    told = float(trust.split("right for about ")[1].split(" m/s")[0])
+    assert told == pytest.approx(2.1 / (2.1 / 20.0 + late), rel=0.1)
+
+
 def test_an_error_refuses_the_run_unless_it_is_accepted(tmp_path):
     with pytest.raises(InputError, match=r'sign is wrong.*accept = \["sign"\]'):
         simulate(scene(tmp_path, -true()[0]), "reference")

@@ -15,8 +15,9 @@ from models.measured.checks.means import mean
 from models.measured.checks.place import Place
 from models.measured.checks.response import Response
 from models.measured.columns import Columns
+from models.measured.consequences import CORRECTIONS, Consequence, told
 from models.measured.faults_of_measurement import Faults
-from models.measured.finding import Finding
+from models.measured.finding import Finding, gathered, queries
 from models.measured.inputs import Inputs
 from models.measured.ratios import wrong
 from models.measured.recording import Recording
@@ -89,6 +90,51 @@ def test_two_percent_are_seen_in_five_seconds(fault, check_name, size, ridden, t
     # the mean moment of the hub forces is what the gyros say that it must be
     (found,) = case.findings(ridden, ridden.samples(Faults(noise=case.NOISE, **fault), 5), tmp_path)
     assert found.check == check_name and found.size == pytest.approx(size, rel=0.2) and "offset of" in found.text
+
+
+@pytest.mark.parametrize(
+    "pair", [("fl_fz", "fr_fz"), ("fl_fx", "fl_fy"), ("fl_fz", "rl_fz"), ("roll", "pitch"), ("roll_rate", "pitch_rate")]
+)
+def test_two_channels_that_are_exchanged_are_named(pair, ridden, tmp_path):
+    """Hubs as a whole were looked for, and a sign, or a delay, that would not have helped was named instead."""
+    samples = ridden.samples(Faults(noise=case.NOISE), 5)
+    one, other = case._columns(ridden, *pair)
+    samples[:, [one, other]] = samples[:, [other, one]]
+    found = case.findings(ridden, samples, tmp_path)
+    assert [(f.check, set(f.signals)) for f in found if f.check in ("exchanged", "sign", "shift", "swapped")] == [
+        ("exchanged", set(pair))
+    ]
+    (named,) = (f for f in found if f.check == "exchanged")
+    recorded = {s: np.array([i]) for i, s in enumerate(ridden.signals)}
+    signals = [s for s in ridden.signals if s.name in pair]
+    right = CORRECTIONS["exchanged"](named, signals, recorded, ridden.period)
+    assert [int(right[s][0]) for s in signals] == [int(recorded[s][0]) for s in reversed(signals)]
+
+
+def test_pairs_that_move_the_vehicle_alike_are_named_as_not_seen(ridden, tmp_path):
+    own = case.recording(ridden, ridden.samples(Faults(noise=case.NOISE), 5), tmp_path / "a.columns")
+    notes = [f.text for f in check(own, ridden.vehicle) if f.check == "exchanged"]
+    assert len(notes) == 1 and "fl_my with fr_my" in notes[0] and "fl_fz with fr_fz" not in notes[0]
+
+
+@pytest.mark.parametrize("count, period", [(200, 2e-6), (1000, 2.0), (110, 1e-3), (100, 5e-4), (300, 1e-3)])
+def test_recordings_with_no_line_or_few_in_the_band_of_the_motion(ridden, tmp_path, count, period):
+    """Times of another unit, and short ones: the spectra had no line, which ended in a traceback."""
+    own = case.recording(ridden, ridden.samples(Faults(), 1)[:count], tmp_path / "a.columns")
+    check(replace(own, period=period), ridden.vehicle)
+
+
+def test_many_findings_of_one_kind_are_one_line_with_the_worst():
+    gap = [Finding("gaps", "doubt", f"c{i}", f"c{i} lacks {i} s.", float(i), "s", (f"c{i}",)) for i in range(20)]
+    others = [Finding("sign", "error", "x", "turn it."), Finding("gaps", "note", "", "looked at.")]
+    assert [f.text for f in gathered(others + gap)] == [
+        "turn it.",
+        "looked at.",
+        "'gaps' at 20 channels, the worst: c19 lacks 19 s.",
+    ]
+    assert gathered(gap[:3]) == gap[:3] and len(queries(gap)) == 20
+    effects = [Consequence(one, "s F", 1e-3 * one.size, 1.0) for one in gap]
+    assert len(told(effects[:3])) == 3 and told(effects) == [f"{effects[19]}, the worst of 20"]
 
 
 def test_the_slope_of_delays_and_its_error_by_their_scatter():

@@ -162,6 +162,18 @@ def test_gaps_are_not_measured_and_all_else_is(tmp_path):
     assert any(finding.check == "clock gaps" and finding.size == pytest.approx(0.201) for finding in found.noticed)
 
 
+@pytest.mark.parametrize("head, period, said", [("ms", 5e-3, "seconds"), ("s", 5.0, "milliseconds"), ("s", 5e-3, "")])
+def test_times_under_a_head_of_another_unit_are_told_with_the_remedy(tmp_path, head, period, said):
+    t = np.arange(400) * period
+    name = write_csv(tmp_path / "a.csv", t, fl__N=np.sin(t), fr__N=np.cos(t))
+    path = tmp_path / name
+    path.write_text(path.read_text().replace("time [s]", f"time [{head}]"))
+    own = scene(tmp_path, {"file": name, "channels": [force("fl", "fl"), force("fr", "fr")]})
+    found = [f for f in recorded(own, tmp_path).noticed if f.check == "times"]
+    assert [f.weight for f in found] == [{"ms": "doubt", "s": "error"}[head]] * bool(said)
+    assert all(f"if its times are in {said}, not in" in f.text for f in found)
+
+
 def test_times_that_are_late_repeated_or_go_back(tmp_path):
     t = np.arange(100) * 1e-3
     late = t.copy()

@@ -8,6 +8,7 @@ their rate, nothing here can see.
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from models.drift.growth import MEDIAN, growth_rate, growth_until, pitch_rate_of
 from models.drift.tangent import STEP, Path, path_of
 from models.signals import Sampled, Smooth
 from models.vehicles.pitch_plane import Parameters
+
+if TYPE_CHECKING:
+    from models.measured.axle_forces import AxleForces
 
 ANGLE = 0.05
 """A pitch error (rad) from which on a run is not trusted: 0.05 rad turn 5 % of a vertical force into the x axis."""
@@ -125,11 +129,15 @@ def rounding(assembly: Assembly) -> Curve:
 
 @dataclass(frozen=True)
 class Trust:
-    """Times (s) by source of error, None where it does not end the run's trust; ``rate`` in 1/s, ``angle`` in rad."""
+    """Times (s) by source of error, None where it does not end the run's trust; ``rate`` in 1/s, ``angle`` in rad.
+
+    unchecked : what was not looked at, with what would show it.
+    """
 
     times: dict[str, float | None]
     rate: float
     angle: float
+    unchecked: str = ""
 
     @property
     def until(self) -> tuple[str, float] | None:
@@ -139,11 +147,11 @@ class Trust:
 
     def __str__(self) -> str:
         """The one line of a plan."""
-        grown = f"{self.angle:g} rad, growth rate {self.rate:.3g} 1/s"
+        grown, rest = f"{self.angle:g} rad, growth rate {self.rate:.3g} 1/s", self.unchecked and f"; {self.unchecked}"
         if self.until is None:
-            return f"nothing known limits this run ({grown}; looked at: {', '.join(self.times)})"
+            return f"nothing known limits this run ({grown}; looked at: {', '.join(self.times)}){rest}"
         name, time = self.until
-        return f"trusted until about {time:.3g} s ({grown}, {name})"
+        return f"trusted until about {time:.3g} s ({grown}, {name}){rest}"
 
 
 def trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
@@ -161,7 +169,7 @@ def trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
         times[named] = noise(assembly, added.deviation).passes(angle)
     times |= _steady(assembly, angle)
     times["rounding"] = rounding(assembly).passes(angle)
-    return Trust(times, growth(assembly).rate, angle)
+    return Trust(times, growth(assembly).rate, angle, _unchecked(assembly))
 
 
 def _steady(assembly: Assembly, angle: float) -> dict[str, float]:
@@ -169,22 +177,28 @@ def _steady(assembly: Assembly, angle: float) -> dict[str, float]:
     or rise by as much as that angle moves one axle against the other."""
     if not assembly.doubts:
         return {}
-    from models.measured.axle_forces import AxleForces, steady
+    from models.measured.axle_forces import steady
 
-    path, p = path_of(assembly), assembly.parameters
-    found = steady(
-        AxleForces(
-            _covering(path),
-            path.forces.period,
-            p,
-            ((), ()),
-            assembly.scene.run.duration,
-            turn=assembly.mode == "force-body",
-        )
-    )
+    p, found = assembly.parameters, steady(_axles(assembly))
     ways = {"mean of the wheel forces": angle * (p.a + p.b), "balance of the axles": angle}
     return {
         name: math.sqrt(2 * way / abs(acceleration))
         for (name, way), acceleration, seen in zip(ways.items(), found.accelerations.tolist(), found.seen, strict=True)
         if seen
     }
+
+
+def _axles(assembly: Assembly) -> "AxleForces":
+    """The wheel forces of a run as the checks of recordings read them."""
+    from models.measured.axle_forces import AxleForces
+
+    path, turn = path_of(assembly), assembly.mode == "force-body"
+    forces, lasts = _covering(path), assembly.scene.run.duration
+    return AxleForces(forces, path.forces.period, assembly.parameters, ((), ()), lasts, turn=turn)
+
+
+def _unchecked(assembly: Assembly) -> str:
+    """What was not looked at of wheel forces from a file."""
+    from models.measured.axle_forces import unchecked
+
+    return unchecked(_axles(assembly)) if "wheel_forces" in assembly.scene.effects else ""

@@ -9,7 +9,7 @@ import numpy as np
 from models.errors import InputError
 from models.hub_forces.cut_vehicle import CutVehicle
 from models.hub_forces.measurement import Angles, HubForces
-from models.measured.finding import Finding
+from models.measured.finding import Finding, gathered
 from models.measured.signal import UNITS, Quantity, Signal
 
 if TYPE_CHECKING:
@@ -45,7 +45,8 @@ def judged(scene: "HubScene", vehicle: CutVehicle) -> tuple[Finding, ...]:
             scene.file,
             "forces.file",
             scene.forces.file,
-            f"{' '.join(each.text for each in errors)} {REMEDY}; if it is meant so: accept = {names} under [forces].",
+            f"{' '.join(each.text for each in gathered(errors))} {REMEDY}; if it is meant so: accept = {names} under "
+            "[forces].",
         )
     return tuple(each for each in found if each.weight == "doubt")
 

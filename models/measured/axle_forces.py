@@ -474,6 +474,18 @@ def _delay(own: AxleForces) -> tuple[float, float, float]:
     return sign * (low + int(best.argmax())) * own.period, float(best.max()), float(other.max())
 
 
+def unchecked(own: AxleForces) -> str:
+    """What these forces alone do not show of the time from axle to axle, and what would; "" of constant forces."""
+    if not np.ptp(own.forces, axis=0).any():
+        return ""
+    late, alike, _ = _delay(own)
+    seen = ""
+    if late > 0 and alike >= ALIKE:
+        speed = (own.parameters.a + own.parameters.b) / late
+        seen = f" (the rear repeats the front {late:.3g} s later, which is right for about {speed:.2g} m/s)"
+    return f"not checked: whether an axle is late{seen}; the driven speed tells, or a measured pitch (effect kalman_filter)"
+
+
 def _good(own: AxleForces) -> Finding:
     found = steady(own)
     text = (

@@ -32,6 +32,10 @@ Progress = Callable[[str, float], None]
 COLUMNS, RAW, SOURCES, ABSURD = "recording.columns", "raw.columns", "sources.json", "no_value.json"
 LEAST = 100
 """Samples of the shortest recording."""
+SLOW = {"force": 0.02, "moment": 0.02, "acceleration": 1.0, "angular rate": 1.0}
+"""s between samples beyond which a channel shows nothing of its quantity; wheel forces move with up to 25 Hz."""
+FAST = 60e3
+"""Hz: no amplifier of wheel forces or gyros is faster."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +106,7 @@ def record(
             scene.file, "files", None, "no channel is mapped to a hub: wheel forces are what drives the vehicle"
         )
     grid = _grid(scene, leading)
-    noticed += [finding for group in groups for finding in (*group.timing.findings, *_outside(scene, group, grid))]
+    noticed += [finding for group in groups for finding in (*_of_group(group), *_outside(scene, group, grid))]
     columns = _columns(folder, scene, signals, sources, grid)
     if columns.done < grid.count:
         absurd = list[Finding]()
@@ -185,6 +189,24 @@ def _groups(source: Source, signals: Sequence[Signal], shift: float, drift: floa
         found = timing(times, where, tuple(s.name for s in mapped[:1]))
         slowed = replace(found, times=found.times / (1 + drift) + shift, period=found.period / (1 + drift))
         yield Group(source, mapped, slowed, shift, drift)
+
+
+def _of_group(group: Group) -> Iterator[Finding]:
+    """What was found in the times of a group, and whether they seem to be of another unit."""
+    yield from group.timing.findings
+    own, where = group.timing, f"{group.source.path.name}, {group.names[0]}{' ...' if len(group.names) > 1 else ''}"
+    slowest = min(SLOW.get(s.quantity, np.inf) for s in group.signals)
+    slow = own.period > slowest
+    if not slow and own.rate < FAST:
+        return
+    true, written = ("milliseconds", "seconds") if slow else ("seconds", "milliseconds")
+    text = (
+        f"{where}: the samples lie {own.period:.4g} s apart ({own.rate:.4g} Hz) and last for "
+        f"{own.end - own.times[0]:.4g} s, which is too {'slow' if slow else 'fast'} for {group.signals[0].quantity}: "
+        f"if its times are in {true}, not in {written}, correct the unit that heads them."
+    )
+    weight: Weight = "error" if own.period > 10 * slowest else "doubt"
+    yield Finding("times", weight, where, text, own.period, "s", (group.signals[0].name,))
 
 
 def _grid(scene: MeasuredScene, leading: list[Group]) -> Grid:

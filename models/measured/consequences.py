@@ -18,7 +18,7 @@ from models.drift.score import Verdict, rms
 from models.errors import InputError, RunFailed
 from models.measured.checks.spikes import spikes
 from models.measured.columns import Columns
-from models.measured.finding import Finding
+from models.measured.finding import FEW, Finding
 from models.measured.gaps import filled
 from models.measured.inputs import BRIDGED
 from models.measured.recording import Recording
@@ -99,9 +99,21 @@ def judged(verdict: Verdict, found: Sequence[Consequence]) -> Verdict:
     worst = max((one.grade for one in found), default=0)
     if verdict.word != "accepted" or worst == 0:
         return verdict
-    told = "; ".join(str(one) for one in found if one.grade == worst)
+    reason = "; ".join(told(one for one in found if one.grade == worst))
     bounds = f"accepted up to {FORCE[0]:.0%} and {DAMAGE[0]:.0%}, rejected beyond {FORCE[1]:.0%} and {DAMAGE[1]:.0%}"
-    return Verdict("rejected" if worst > 1 else "accepted with doubt", f"{told} ({bounds})")
+    return Verdict("rejected" if worst > 1 else "accepted with doubt", f"{reason} ({bounds})")
+
+
+def told(found: Iterable[Consequence]) -> list[str]:
+    """A text each; where more than FEW are of one check only the worst, which says of how many."""
+    kinds: dict[str, list[Consequence]] = {}
+    for consequence in found:
+        kinds.setdefault(consequence.finding.check, []).append(consequence)
+    out = list[str]()
+    for alike in kinds.values():
+        worst = max(alike, key=lambda one: (one.grade, np.nan_to_num(abs(one.force))))
+        out += [f"{worst}, the worst of {len(alike)}"] if len(alike) > FEW else map(str, alike)
+    return out
 
 
 def _different(findings: Iterable[Finding]) -> list[Finding]:
@@ -187,6 +199,11 @@ def _referred(finding: Finding, signals: Sequence[Signal], samples: Samples, per
     return out
 
 
+def _exchanged(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+    one, other = signals
+    return {one: samples[other], other: samples[one]}
+
+
 def _smooth(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
     """Without spikes of one or two samples."""
     out = dict[Signal, np.ndarray]()
@@ -217,6 +234,7 @@ CORRECTIONS: dict[str, Callable[[Finding, Sequence[Signal], Samples, float], Sam
     "unit": _gained,
     "offset": _offset,
     "lever": _referred,
+    "exchanged": _exchanged,
     "spikes": _smooth,
     "gaps": _bridged,
     "no value": _bridged,

@@ -1,11 +1,14 @@
 """What a check finds in a recording: one sentence with place and size."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 Weight = Literal["error", "doubt", "note"]
 """An error stops what follows, a doubt is carried into the report, a note says what was looked at and found good."""
+
+FEW = 3
+"""Findings of one check that are told one by one where people read."""
 
 
 @dataclass(frozen=True)
@@ -36,5 +39,21 @@ def queries(findings: Iterable[Finding]) -> list[dict[str, Any]]:
 
 
 def lines(findings: Iterable[Finding]) -> list[str]:
-    """A line each, as plans and summaries print them."""
-    return [f"  {f.weight:<10} {f.text}" for f in findings]
+    """A line each, or for many of one kind, as plans and summaries print them."""
+    return [f"  {f.weight:<10} {f.text}" for f in gathered(findings)]
+
+
+def gathered(findings: Iterable[Finding]) -> list[Finding]:
+    """The same, but where more than FEW of one check and weight were found only the worst, which says so."""
+    kinds: dict[tuple[str, str], list[Finding]] = {}
+    for finding in findings:
+        kinds.setdefault((finding.check, finding.weight), []).append(finding)
+    return [f for alike in kinds.values() for f in (alike if len(alike) <= FEW else [_worst(alike)])]
+
+
+def _worst(alike: list[Finding]) -> Finding:
+    """The one of the largest size, with the number of channels or places."""
+    worst = max(alike, key=lambda finding: abs(finding.size or 0.0))
+    names = {name for finding in alike for name in finding.signals or (finding.place,)}
+    what = "channels" if worst.signals else "places"
+    return replace(worst, text=f"{worst.check!r} at {len(names)} {what}, the worst: {worst.text}")

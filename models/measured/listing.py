@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from models.measured.channel import BLOCK, Source
+from models.measured.finding import gathered
 from models.measured.formats import open_source
 from models.measured.guess import scene_text
 
@@ -31,7 +32,7 @@ def describe(path: Path) -> str:
     ]
     ranges = {name: text for group in _groups(source) for name, text in _ranges(source, group).items()}
     lines += [f"  {c.name:<{width}} {c.unit:<9}{ranges[c.name]}" for c in source.channels]
-    lines += [f"  {finding.weight}: {finding.text}" for finding in source.noticed]
+    lines += [f"  {finding.weight}: {finding.text}" for finding in gathered(source.noticed)]
     lines += ["", "A scene to begin with, its map guessed from names and units; check every line."]
     return "\n".join([*(f"# {line}".rstrip() for line in lines), "", scene_text(source)])
 

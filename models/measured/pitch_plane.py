@@ -78,6 +78,8 @@ def run(job: PlaneJob, folder: Path, limits: Limits | None = None) -> PlaneRun:
     scene, said = scene_of(job, folder)
     result = simulate(scene, job.engine)
     limited = trusted(scene, job.hold.force)
+    if limited and job.recording.find("angle", CHASSIS, "pitch"):
+        limited = replace(limited, unchecked="")  # the run is compared with it
     own = score.own_figures(result, scene.vehicle_parameters())
     until = limited.until[1] if limited and limited.until else result.times[-1]
     effects = [job.effect] if job.effect else []

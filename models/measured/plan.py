@@ -6,6 +6,7 @@ from models.errors import InputError
 from models.measured.channel import Source
 from models.measured.channel_map import signals
 from models.measured.finding import Finding
+from models.measured.finding import lines as told
 from models.measured.formats import open_source
 from models.measured.rig import Rig
 from models.measured.scene import MeasuredScene
@@ -128,7 +129,7 @@ def _files(scene: MeasuredScene, rig: Rig) -> list[str]:
             lines.append(
                 _line("", f"{s.channel:<24} {what} at {s.at}, axes {s.frame}, {sign}{s.factor:g} x [{s.unit}]{use}")
             )
-        lines += [_line(f.weight, f.text) for f in source.noticed]
+        lines += told(source.noticed)
     return lines
 
 

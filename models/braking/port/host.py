@@ -1,7 +1,7 @@
 """The other end of a hosted controller: the process in which a callable or an FMU runs, and nothing else does.
 
 It connects, is told what to make, says that it has all that it needs for that, says when the controller is made, and
-answers frame by frame as ``frame`` documents. What goes """
+answers frame by frame as ``frame`` documents. What goes"""
 
 import json
 import pickle

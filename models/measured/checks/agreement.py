@@ -16,7 +16,7 @@ import numpy as np
 
 from models.measured.signal import Signal
 
-Kind = Literal["late", "factor", "swapped", "lever"]
+Kind = Literal["late", "factor", "swapped", "crossed", "lever"]
 KNOWN = 0.03
 """Share of an expected reading by which a vehicle file is taken to be wrong at the least: no one knows a car better."""
 REACH, GRID = 0.25, 5e-4
@@ -48,11 +48,11 @@ class Group:
 
 @dataclass(frozen=True)
 class Fault:
-    """late : size in s; factor : recorded by true value; swapped : size is the share that is explained only then;
-    lever : size in m by which the point that moments are about lies above the hub.
+    """late : size in s; factor : recorded by true value; swapped, of hubs, and crossed, of two channels : size is the
+    share that is explained only then; lever : size in m by which the point that moments are about lies above the hub.
 
-    error : standard error of the size, of random errors alone; of swapped the share that is left when they are put
-    right. fall : of chi square. exchanged : hubs, each with the one whose channels it has.
+    error : standard error of the size, of random errors alone; of swapped and crossed the share that is left when they
+    are put right. fall : of chi square. exchanged : hubs, each with the one whose channels it has.
     """
 
     kind: Kind
@@ -126,6 +126,8 @@ class Agreement:
         response = self.response.copy()
         if fault.kind == "swapped":
             return replace(self, response=response[:, :, self._order(dict(fault.exchanged))])
+        if fault.kind == "crossed":
+            return replace(self, response=self._crossed(fault.signals))
         if fault.kind == "lever":
             hubs = tuple(dict.fromkeys(s.at for s in fault.signals))
             return replace(self, response=response + fault.size * self._levers(hubs))
@@ -144,6 +146,7 @@ class Agreement:
                 if self._worth(self.without(fault), weights):
                     yield fault
         yield from self._swapped(weights)
+        yield from self._pairs(weights)
         yield from self._about(weights)
 
     def groups(self) -> Iterator[Group]:
@@ -255,6 +258,40 @@ class Agreement:
                 if fall > CERTAIN and other.left.sum() < self.left.sum():
                     share, rest = (float(np.sqrt(np.mean(each.unexplained**2))) for each in (self, other))
                     yield replace(fault, size=share, error=rest, fall=fall)
+
+    def _pairs(self, weights: np.ndarray) -> Iterator[Fault]:
+        """Two channels that each have what the other one measured."""
+        for pair, other in self._exchanges():
+            fall = self._better(other, weights)
+            if fall:
+                share, rest = (float(np.sqrt(np.mean(each.unexplained**2))) for each in (self, other))
+                yield Fault("crossed", " and ".join(s.name for s in pair), pair, share, rest, fall)
+
+    def blind(self) -> list[tuple[Signal, ...]]:
+        """Pairs of forces or moments of one axis that might be exchanged without being named."""
+        alike = ((pair, other) for pair, other in self._exchanges() if len({s.component for s in pair}) == 1)
+        return [pair for pair, other in alike if pair[0] in self.inputs and not other._better(self, other.weights)]
+
+    def _exchanges(self) -> Iterator[tuple[tuple[Signal, ...], "Agreement"]]:
+        """Pairs of channels of one quantity, of one place or of one axis, and this with them exchanged."""
+        for own in (self.inputs, self.outputs):
+            for pair in combinations(own, 2):
+                what, at, axis = (len({getattr(s, key) for s in pair}) for key in ("quantity", "at", "component"))
+                if what == 1 and (at == 1 or axis == 1):
+                    yield pair, replace(self, response=self._crossed(pair))
+
+    def _better(self, other: "Agreement", weights: np.ndarray) -> float:
+        """Fall of chi square from this to the other one; 0 where it is not certain, or not worth its name."""
+        fall = float((weights * (self.left - other.left)).sum())
+        return fall if fall > CERTAIN and self._worth(other, weights) else 0.0
+
+    def _crossed(self, pair: tuple[Signal, ...]) -> np.ndarray:
+        """Response (f, k, c) if two channels are exchanged, both of the forces or both of the readings."""
+        forces, response = pair[0] in self.inputs, self.response.copy()
+        pick = [(self.inputs if forces else self.outputs).index(s) for s in pair]
+        index = (slice(None), slice(None)) if forces else (slice(None),)
+        response[(*index, pick)] = response[(*index, pick[::-1])]
+        return response
 
     def _exchange(self, exchanged: tuple[tuple[str, str], ...]) -> Fault | None:
         """Of pairs of hubs; None where they do not have the same channels."""

@@ -82,7 +82,7 @@ class Evidence:
             return "an accelerometer or gyro whose place on the vehicle is known"
         if self.dead:
             return f"life in {', '.join(self.dead)}"
-        return "" if self._spectra is not None else "a few seconds without a gap in any channel"
+        return "" if self._spectra is not None else "a few seconds at 5 Hz or more without a gap in any channel"
 
     @cached_property
     def dead(self) -> tuple[str, ...]:
@@ -170,6 +170,8 @@ class Evidence:
         for fault in self.faults:
             if fault.kind == "swapped" and signal.at in dict(fault.exchanged):
                 return dict(fault.exchanged)[signal.at]
+            if fault.kind == "crossed" and signal in fault.signals:
+                return next(s.at for s in fault.signals if s != signal)
         return signal.at
 
 

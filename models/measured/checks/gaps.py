@@ -4,7 +4,7 @@ import numpy as np
 
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.runs import runs
-from models.measured.finding import Finding, Weight
+from models.measured.finding import FEW, Finding, Weight
 from models.measured.inputs import BRIDGED
 from models.measured.signal import Signal
 
@@ -36,8 +36,9 @@ def _finding(evidence: Evidence, lost: np.ndarray, signals: tuple[Signal, ...]) 
         if stops
         else f"up to {BRIDGED:g} s are bridged in hub forces, and the filter goes on without angles"
     )
+    short = names if len(signals) <= FEW else f"{len(signals)} channels, {signals[0].name} to {signals[-1].name}"
     text = (
-        f"{names}: {period * lengths[longest]:.4g} s ({lengths[longest]} samples) are missing from {first:.4g} s on"
+        f"{short}: {period * lengths[longest]:.4g} s ({lengths[longest]} samples) are missing from {first:.4g} s on"
         f"{others if len(lost) > 1 else ''}: {remedy}."
     )
     weight: Weight = "error" if stops else "doubt"

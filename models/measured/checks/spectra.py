@@ -12,6 +12,8 @@ SEGMENT = 4.0
 """s: resolves the modes of a car; shorter where the recording is."""
 LEAST = 3
 """Segments in a recording at the least, half overlapping."""
+LINES = 2
+"""Frequencies in the band at the least."""
 MOST = 300
 """Segments looked at, spread evenly: ten minutes."""
 OVERLAPPING = 0.75
@@ -35,7 +37,8 @@ class Spectra:
 def spectra(
     recording: Recording, signals: tuple[Signal, ...], band: Sequence[float], stretch: tuple[int, int] | None = None
 ) -> Spectra | None:
-    """Of a band (Hz), in SI units squared by window sums squared; None where too little is unbroken.
+    """Of a band (Hz), in SI units squared by window sums squared; None where too little is unbroken, or the band
+    has no line.
 
     stretch : first sample and number of samples that are looked at; else all.
     """
@@ -52,6 +55,6 @@ def spectra(
             lines = np.fft.rfft(window * (samples - samples.mean(axis=0)), axis=0)[own]
             cross += lines[:, :, None] * lines[:, None, :].conj()
             found += 1
-    if found < LEAST:
+    if found < LEAST or np.count_nonzero(own) < LINES:
         return None
     return Spectra(frequencies[own], cross / found, max(1.0, OVERLAPPING * found), float(np.sum(window**2)))

@@ -1,11 +1,11 @@
-"""Hubs whose channels are exchanged: left and right, front and rear, across."""
+"""Hubs whose channels are exchanged: left and right, front and rear, across; and two channels that are."""
 
 from models.measured.checks.agreement import Fault
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import SEGMENT
 from models.measured.finding import Finding
 
-NAME = "swapped"
+NAME, PAIR = "swapped", "exchanged"
 FITS = 0.3
 """Share of the readings that may stay unexplained on average before vehicle and recording are called strangers: of
 segments of SEGMENT s. Shorter ones begin and end in the middle of the vehicle's vibrations, and leave as much more
@@ -17,7 +17,8 @@ def check(evidence: Evidence) -> list[Finding]:
     if evidence.searched is None:
         return [Finding(NAME, "note", "", f"Exchanged hubs were not looked for: this needs {evidence.lacking}.")]
     found = [_finding(fault) for fault in evidence.faults if fault.kind == "swapped"]
-    return [*found, _rest(evidence)]
+    found += [_pair(fault) for fault in evidence.faults if fault.kind == "crossed"]
+    return [*found, _rest(evidence), _blind(evidence)]
 
 
 def _finding(fault: Fault) -> Finding:
@@ -27,6 +28,27 @@ def _finding(fault: Fault) -> Finding:
         "map."
     )
     return Finding(NAME, "error", fault.name, text, 100 * fault.size, "%", tuple(s.name for s in fault.signals))
+
+
+def _pair(fault: Fault) -> Finding:
+    text = (
+        f"{fault.name} are exchanged: as mapped, {100 * fault.size:.0f} % of the measured motion stays unexplained, "
+        f"exchanged {100 * fault.error:.0f} %; exchange their names in the channel map."
+    )
+    return Finding(PAIR, "doubt", fault.name, text, 100 * fault.size, "%", tuple(s.name for s in fault.signals))
+
+
+def _blind(evidence: Evidence) -> Finding:
+    """Which pairs move the vehicle too much alike to be told apart."""
+    assert evidence.searched is not None
+    pairs = [" with ".join(s.name for s in pair) for pair in evidence.searched[0].blind()]
+    if not pairs:
+        return Finding(PAIR, "note", "", "Any two channels of hub forces that were exchanged would be seen.")
+    text = (
+        f"Two channels of hub forces that were exchanged would be seen by the motion of the vehicle, but not "
+        f"{', '.join(pairs)}: check their names."
+    )
+    return Finding(PAIR, "note", "", text, float(len(pairs)), "pairs")
 
 
 def _rest(evidence: Evidence) -> Finding:
