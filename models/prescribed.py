@@ -24,7 +24,7 @@ def prescribe(
     ``p`` holds the effect's ``file`` and ``bandwidth`` (Hz or None); ``columns`` names the file's columns, with the
     factors of their units, in the order of the mode's coordinates. Raises InputError.
     """
-    from models.time_series import read_time_series
+    from models.time_series import other_unit, read_time_series
 
     scene = assembly.scene
     _check_scene(scene, columns)
@@ -37,7 +37,8 @@ def prescribe(
             scene.file,
             f"effects.{effect}.file",
             p.file,
-            f"ends at {motion.end:g} s, but the run lasts {scene.run.duration:g} s: shorten run.duration",
+            f"ends at {motion.end:g} s, but the run lasts {scene.run.duration:g} s: shorten run.duration"
+            f"{other_unit(motion.end, scene.run.duration)}",
         )
     assert assembly.input is not None
     guided = assembly.with_input(mode, Stacked((assembly.input, motion)))

@@ -11,6 +11,9 @@ from models.tables import SECONDS, read_table, write_table
 MARK = 1e28
 """SI: what is beyond this nobody measured; exporters write 9.9E+34 and the like, in any unit."""
 
+SHORT = 100.0
+"""Part of the time that is needed below which a file's times may be of another unit."""
+
 
 def read_time_series(
     path: str | Path, columns: Mapping[str, Mapping[str, float]], *, gaps: bool = False
@@ -29,6 +32,12 @@ def read_time_series(
     for name in columns:
         _check_marks(path, name, table[name], time)
     return np.column_stack([table[name] for name in columns]), float(f"{period:.12g}")
+
+
+def other_unit(lasts: float, needed: float) -> str:
+    """What to say of a file that lasts for so little (s) of what is needed that its times may be of another unit."""
+    wrong = lasts < needed / SHORT
+    return "; if its times are in seconds, not in milliseconds, correct the unit that heads them" if wrong else ""
 
 
 def _check_marks(path: str | Path, name: str, values: np.ndarray, time: np.ndarray) -> None:

@@ -63,6 +63,7 @@ FAULTS = {
     "front 2 % high": (lambda f: f * [1.02, 1], "doubt", "balance"),
     "offset at the rear": (lambda f: f + np.array([0, 60.0]), "doubt", "balance"),
     "front constant": (lambda f: np.column_stack([np.full(len(f), LOADS[0]), f[:, 1]]), "doubt", "balance"),
+    "one channel twice": (lambda f: f[:, [0, 0]] * [1, LOADS[1] / LOADS[0]], "doubt", "copied"),
     "no value": (lambda f: np.where(np.arange(len(f))[:, None] == 500, 9.9e34, f), "error", "weight"),
 }
 
@@ -154,6 +155,29 @@ def test_a_doubt_is_printed_saved_and_taken_into_the_trust(tmp_path):
     assert "mean of the wheel forces" in trust_line(assemble(own))[0]
     accepted = scene(tmp_path, 0.95 * true()[0], 'accept = ["weight"]\n')
     assert not findings_of(accepted)
+
+
+SAMPLES = {
+    "spikes": lambda f: np.where(np.arange(len(f))[:, None] == 700, [60e3, 0.0], 0.0) + f,
+    "clipped": lambda f: np.minimum(f, np.quantile(f, 0.98, axis=0)),
+}
+
+
+@pytest.mark.parametrize("kind", SAMPLES)
+def test_samples_that_no_wheel_felt_are_doubted_as_in_a_recording(kind, tmp_path):
+    own = scene(tmp_path, SAMPLES[kind](true(("study", 0.0))[0]))
+    found = findings_of(own)
+    assert found and all({"spikes": "spike(s)", "clipped": "is clipped at"}[kind] in finding.text for finding in found)
+    assert not findings_of(scene(tmp_path, SAMPLES[kind](true(("study", 0.0))[0]), f'accept = ["{kind}"]\n'))
+    assert not findings_of(scene(tmp_path, true(("study", 0.0))[0]))
+
+
+def test_a_file_that_is_far_too_short_may_be_in_seconds_under_milliseconds(tmp_path):
+    scene(tmp_path, true(("study", 0.0))[0])
+    path = tmp_path / "f.csv"
+    path.write_text(path.read_text().replace("time [s]", "time [ms]"))
+    with pytest.raises(InputError, match=r"ends at 0\.02 s, but .* in seconds, not in milliseconds"):
+        findings_of(load_scene(str(tmp_path / "s.toml"), []))
 
 
 @pytest.mark.parametrize("late", [0.0, 0.05])

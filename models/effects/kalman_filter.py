@@ -206,7 +206,7 @@ def _digest(assembly: Assembly, measured: "Measurement", p: Parameters) -> str:
 def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
     """The file's columns with their deviations; refuses what the filter could not use."""
     from models.drift.pitch_filter import PITCH, RATE, Measurement
-    from models.time_series import read_time_series
+    from models.time_series import other_unit, read_time_series
 
     scene, place = assembly.scene, "effects.kalman_filter"
     known = (("pitch", RADIANS, PITCH, p.pitch_deviation), ("pitch_rate", RADIANS_PER_SECOND, RATE, p.rate_deviation))
@@ -223,7 +223,8 @@ def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
             scene.file,
             f"{place}.file",
             p.file,
-            f"ends at {len(values) * period:g} s, but the run lasts {scene.run.duration:g} s",
+            f"ends at {len(values) * period:g} s, but the run lasts {scene.run.duration:g} s"
+            f"{other_unit(len(values) * period, scene.run.duration)}",
         )
     _check_periods(assembly, p, period)
     return Measurement(values, period, tuple(own[1] for own in given.values()), tuple(own[2] for own in given.values()))

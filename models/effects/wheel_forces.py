@@ -1,7 +1,7 @@
 """Wheel forces prescribed from a file (eq. 37): the vehicle is cut off the road."""
 
 from dataclasses import replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -11,6 +11,10 @@ from models.errors import InputError
 from models.signals import Interpolation, sampled
 from models.strict import Strict
 from models.tables import NEWTONS
+
+if TYPE_CHECKING:
+    from models.measured.finding import Finding
+    from models.measured.signal import Signal
 
 EXCLUDES = ("road",)
 COST = "one force per wheel, read from a table; no tyre"
@@ -26,14 +30,14 @@ class Parameters(Strict):
     file: str = Field(description="CSV with the columns time [s], front [N], rear [N]; forces up on the wheels")
     interpolation: Interpolation = Field(description="held, linear or smooth between the samples")
     frame: Literal["inertial", "body"] = Field("inertial", description="axis of the forces: vertical, or the chassis'")
-    accept: list[Literal["weight", "balance", "sign", "unit", "swapped", "start", "times"]] = Field(
-        [], description="findings of the checks against the vehicle's weight that are meant as they are"
-    )
+    accept: list[
+        Literal["weight", "balance", "sign", "unit", "swapped", "start", "times", "copied", "spikes", "clipped"]
+    ] = Field([], description="findings of the checks against the vehicle's weight that are meant as they are")
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The vehicle without tyres, driven by the two forces."""
-    from models.time_series import read_time_series
+    from models.time_series import other_unit, read_time_series
 
     scene = assembly.scene
     columns = {"front": NEWTONS, "rear": NEWTONS}
@@ -44,7 +48,8 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
             scene.file,
             "effects.wheel_forces.file",
             p.file,
-            f"ends at {signal.end:g} s, but the run lasts {scene.run.duration:g} s: shorten run.duration",
+            f"ends at {signal.end:g} s, but the run lasts {scene.run.duration:g} s: shorten run.duration"
+            f"{other_unit(signal.end, scene.run.duration)}",
         )
     turns = p.frame == "body" and assembly.vehicle.geometry == "exact"
     driven = assembly.without_tyres().with_input("force-body" if turns else "force", signal)
@@ -70,7 +75,8 @@ def _judged(assembly: Assembly, p: Parameters, values: np.ndarray, period: float
         rests=not scene.start,
         turn=assembly.mode == "force-body",
     )
-    findings = tuple(each for each in check(own) if each.weight != "note" and each.check not in p.accept)
+    looked = (*check(own), *_samples((front, rear), values, period))
+    findings = tuple(each for each in looked if each.weight != "note" and each.check not in p.accept)
     errors = [each for each in findings if each.weight == "error"]
     if errors:
         names = ", ".join(f'"{name}"' for name in dict.fromkeys(each.check for each in errors))
@@ -81,3 +87,15 @@ def _judged(assembly: Assembly, p: Parameters, values: np.ndarray, period: float
             f"{' '.join(each.text for each in errors)} If it is meant so: accept = [{names}].",
         )
     return tuple(each.text for each in findings)
+
+
+def _samples(signals: "tuple[Signal, ...]", values: np.ndarray, period: float) -> "list[Finding]":
+    """Samples that no wheel has felt: spikes, and what a range has cut off. A lifted wheel's zeros are neither."""
+    from models.measured.checks import clipped, spikes
+    from models.measured.checks.evidence import Evidence
+    from models.measured.columns import MemoryColumns
+    from models.measured.recording import Recording
+
+    felt = MemoryColumns(tuple(s.name for s in signals), np.where(values == 0.0, np.nan, values))
+    evidence = Evidence(Recording(signals, felt, period), None)
+    return [*spikes.check(evidence), *(found for found in clipped.check(evidence) if found.unit == "%")]

@@ -22,8 +22,8 @@ from models.measured.recording import Recording
 from models.measured.signal import Signal
 from models.vehicles.pitch_plane import Parameters
 
-CHECKS = ("weight", "balance", "sign", "unit", "swapped", "start", "times")
-"""Names of all findings."""
+CHECKS = ("weight", "balance", "sign", "unit", "swapped", "start", "times", "copied", "spikes", "clipped")
+"""Names of all findings, with those of the samples of a file."""
 AXLES = {"front": ("front", "front left", "front right"), "rear": ("rear", "rear left", "rear right")}
 """Where vertical forces may be measured: at an axle, or at its wheels, whose forces are added."""
 GRAVITY = 9.81
@@ -64,6 +64,8 @@ LAG = 0.02, 2.0
 """s, between the axles of a vehicle."""
 ALIKE = 0.3
 """Correlation from which on one axle is said to repeat the other."""
+COPIED = 1e-3
+"""Rms of what is left of an axle's changes without the other's, by their own, up to which they are the same."""
 IN_FILE: dict[Wrong, str] = {
     "sign": "forces up on the wheels are positive; turn its sign",
     "unit": "correct the unit in its header",
@@ -275,7 +277,7 @@ def check(own: AxleForces) -> list[Finding]:
         found = look(own)
         if found:
             return found + _dead(own)
-    return _dead(own) + _order(own) or [_good(own)]
+    return _dead(own) + _copied(own) + _order(own) or [_good(own)]
 
 
 def _sparse(own: AxleForces) -> list[Finding]:
@@ -443,6 +445,19 @@ def _dead(own: AxleForces) -> list[Finding]:
     return [Finding("balance", "doubt", axle.at, text, 0.0, "N", (axle.name,))]
 
 
+def _copied(own: AxleForces) -> list[Finding]:
+    """An axle that has the other one's samples, times a factor."""
+    off = own.forces - own.means
+    size = np.sqrt(np.mean(off**2, axis=0))
+    if not size.all() or np.sqrt(np.mean((off[:, 1] / size[1] - off[:, 0] / size[0]) ** 2)) > COPIED:
+        return []
+    text = (
+        f"The rear axle's force changes as the front axle's does, times {size[1] / size[0]:.4g}, in every sample: one "
+        "channel was written twice, unless both axles were moved alike."
+    )
+    return [Finding("copied", "doubt", "wheel forces", text, float(size[1] / size[0]), "1", own.names)]
+
+
 def _order(own: AxleForces) -> list[Finding]:
     """Axles that feel the road in the wrong order."""
     late, alike, other = _delay(own)
@@ -483,7 +498,8 @@ def unchecked(own: AxleForces) -> str:
     if late > 0 and alike >= ALIKE:
         speed = (own.parameters.a + own.parameters.b) / late
         seen = f" (the rear repeats the front {late:.3g} s later, which is right for about {speed:.2g} m/s)"
-    return f"not checked: whether an axle is late{seen}; the driven speed tells, or a measured pitch (effect kalman_filter)"
+    tells = "the driven speed tells, or a measured pitch (effect kalman_filter)"
+    return f"not checked: whether an axle is late{seen}; {tells}"
 
 
 def _good(own: AxleForces) -> Finding:
