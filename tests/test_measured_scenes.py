@@ -200,6 +200,14 @@ def test_rounded_times_are_those_of_an_even_clock(rate, digits, way):
     assert np.ptp(found.times - t) < 1e-9 and [finding.weight for finding in found.findings] == ["note"]
 
 
+@pytest.mark.parametrize("rate", [200.0, 500.0, 1000.0, 2048.0])
+def test_seconds_since_1970_have_the_rate_of_their_clock(rate):
+    """Steps are off by up to 1e-4 of themselves: their median is no rate, and samples lay between those of the clock."""
+    found = timing(np.array([float(f"{1767600000 + i / rate:.6f}") for i in range(8000)]), "a.csv")
+    off = found.times - found.times[0] - found.period * np.arange(8000)
+    assert found.rate == pytest.approx(rate, rel=1e-7) and np.abs(off).max() < 2e-6
+
+
 def test_times_that_no_even_clock_explains_are_not_believed():
     t = np.delete(np.arange(1500) * 1e-3, slice(700, 760))
     broken = timing(np.round(t, 2), "a.csv")  # rounded, and a gap: where it lies, nobody can tell

@@ -18,6 +18,8 @@ JITTER = 0.1
 """Of a period: a standard deviation of the steps that is worth a doubt."""
 
 
+FINE = 1e-9
+"""Of a period: what double precision may round off a time without a word."""
 SLIPS = 5
 """Repeated times, or steps that are off, from which on rounding may be what makes them: one is a row written twice."""
 DIGITS = range(1, 9)
@@ -106,7 +108,7 @@ def _of_times(times: np.ndarray, place: str, signals: tuple[str, ...]) -> Timing
             (times[0], times[-1]),
         )
         return Timing(even[0] + even[1] * np.arange(whole), None, even[1], tuple(findings))
-    period = float(f"{np.median(rising):.9g}")
+    period = float(f"{_step(times, rising):.9g}")
     if (steps < 0).any():
         deepest, at = -float(steps.min()), int(np.argmax(steps < -SHUFFLED * period))
         if deepest > SHUFFLED * period:
@@ -154,6 +156,19 @@ def _of_times(times: np.ndarray, place: str, signals: tuple[str, ...]) -> Timing
     _gaps(own, period, say)
     _jitter(own, period, say)
     return Timing(own, order, period, tuple(findings))
+
+
+def _step(times: np.ndarray, rising: np.ndarray) -> float:
+    """Median of the rising steps (s) of times (n,).
+
+    Steps of times so large that double precision rounds them, such as seconds since 1970, are counted, and their mean
+    is taken: half of them are alike, and all of these off by the same.
+    """
+    middle = float(np.median(rising))
+    if np.spacing(np.abs(times).max()) < FINE * middle:
+        return middle
+    counted = np.rint(rising / middle)
+    return float(rising.sum() / counted.sum()) if counted.sum() else middle
 
 
 def rounded(times: np.ndarray) -> tuple[float, float] | None:
