@@ -283,6 +283,7 @@ def _exits(given):
         (lambda given: Command(pressures=np.array([1, 1, np.inf, 1])), "not a number: inf"),
         (lambda given: Command(pressures=np.array([1, -1e-9, 1, 1])), "below zero"),
         (lambda given: Command(pressures=["a"] * 4), "wrong frame"),
+        (lambda given: Command(valves=np.ma.array(np.ones(4), mask=[0, 1, 0, 0])), "not a number: a masked value"),
     ],
 )
 def test_nonsense_of_a_callable_is_named(answer, name):

@@ -116,6 +116,8 @@ def _listed(states: frozenset[int]) -> str:
 
 
 def _array(values: object, given: Sample) -> np.ndarray:
+    if np.ma.is_masked(values):
+        raise ControllerFailed(given, "not a number", "a masked value for a wheel")
     try:
         array = np.asarray(values)
         if array.dtype.kind == "c":
