@@ -290,3 +290,27 @@ def test_a_last_number_that_was_cut_off_is_refused(tmp_path, kept):
     (tmp_path / "f.csv").write_text("\n".join(["time [s],front [N],rear [N]", *rows, cut]))
     with pytest.raises(InputError, match="no line end and was cut off"):
         read_time_series(tmp_path / "f.csv", {"front": {"N": 1.0}, "rear": {"N": 1.0}})
+
+
+TRUCKS = {
+    "mass=1e7": ["mass", "inertia"],
+    "yaw_inertia=2.5e-2": ["inertia"],
+    "height=120.0": ["size"],
+    "front={radius=50.0}": ["size"],
+    "rear={x=-2190.0}": ["size", "inertia"],
+}
+
+
+@pytest.mark.parametrize("change", TRUCKS)
+def test_a_truck_that_no_one_builds_is_queried(change):
+    """One of 10,000 t braked without a word."""
+    own = load_scene("braking", [f"vehicle.override={{{change}}}"])
+    assert [finding.check for finding in findings_of(own)] == TRUCKS[change]
+    accepted = load_scene("braking", [f"vehicle.override={{{change}}}", f"vehicle.accept={TRUCKS[change]}"])
+    assert not findings_of(accepted) and not findings_of(load_scene("braking", []))
+
+
+@pytest.mark.parametrize("radius, said", [(1e-4, 1), (2e-3, 0), (0.46, 0)])
+def test_a_contact_as_large_as_its_body_is_doubted(radius, said):
+    found = findings_of(load_scene("contact_ellipse", [f"radii.wheel_x={radius}"]))
+    assert ["radii.wheel_x" in finding.text and finding.weight for finding in found] == ["doubt"] * said

@@ -9,6 +9,7 @@ from models.errors import InputError
 from models.measured.finding import Finding
 from models.scene_effects import lines as effect_lines
 from models.vehicles.plausible import plausible
+from models.vehicles.plausible_truck import plausible_truck
 
 PROCEDURES = {
     "straight": "straight braking",
@@ -62,8 +63,10 @@ def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def findings(scene: BrakingScene) -> tuple[Finding, ...]:
-    """Queries about a vehicle on its suspension."""
-    return () if scene.vehicle.file is None else plausible(sprung_of(scene).handling.given, scene.vehicle.accept)
+    """Queries about the vehicle."""
+    if scene.vehicle.file is not None:
+        return plausible(sprung_of(scene).handling.given, scene.vehicle.accept)
+    return tuple(query for query in plausible_truck(vehicle_of(scene)) if query.check not in scene.vehicle.accept)
 
 
 def describe(scene: BrakingScene) -> str:

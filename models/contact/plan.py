@@ -2,6 +2,7 @@
 
 from models.contact.material import Material
 from models.contact.scene import ContactScene
+from models.measured.finding import Finding
 from models.scene_effects import lines as effect_lines
 
 THEORIES = {
@@ -11,10 +12,32 @@ THEORIES = {
     "exact": "half-spaces with Coulomb friction, the theory that the others approximate",
 }
 
+SMALL = 0.3
+"""Of a body's radius, that the semi-axis of the contact may be: half-spaces stand for bodies that are much larger."""
+
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
     """Refuse, before any file is written, what reading alone does not find: materials that are too unlike."""
     _ = scene.pair.G
+
+
+def findings(scene: ContactScene) -> tuple[Finding, ...]:
+    """A doubt about every radius that is not large beside the contact."""
+    if scene.radii is None or scene.contact is None:
+        return ()
+    from models.contact.of_scene import hertz_of
+
+    area = hertz_of(scene)
+    out = list[Finding]()
+    for name, radius in scene.radii:
+        axis = float(area.a if name.endswith("x") else area.b)
+        if radius is not None and axis > SMALL * abs(radius):
+            text = (
+                f"radii.{name}: {radius:.4g} m, where the contact is {axis:.4g} m long to either side; its theory needs "
+                f"radii of at least {axis / SMALL:.3g} m. Radii are in m, loads in N."
+            )
+            out.append(Finding("size", "doubt", f"radii.{name}", text, radius, "m"))
+    return tuple(out)
 
 
 def describe(scene: ContactScene) -> str:
