@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ def prescribe(
     ``p`` holds the effect's ``file`` and ``bandwidth`` (Hz or None); ``columns`` names the file's columns, with the
     factors of their units, in the order of the mode's coordinates. Raises InputError.
     """
-    from models.time_series import other_unit, read_time_series
+    from models.time_series import CHASSIS, other_unit, read_time_series, sparse
 
     scene = assembly.scene
     _check_scene(scene, columns)
@@ -43,7 +44,8 @@ def prescribe(
     assert assembly.input is not None
     guided = assembly.with_input(mode, Stacked((assembly.input, motion)))
     guided.initial[[*GUIDED[mode], *(4 + i for i in GUIDED[mode])]] = motion.at(0.0)[: 2 * len(columns)]
-    return guided
+    doubt = sparse(len(values), period, scene.run.duration, CHASSIS)
+    return replace(guided, doubts=(*guided.doubts, doubt)) if doubt else guided
 
 
 def _check_scene(scene: Any, columns: Mapping[str, Any]) -> None:

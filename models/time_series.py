@@ -13,6 +13,9 @@ MARK = 1e28
 
 SHORT = 100.0
 """Part of the time that is needed below which a file's times may be of another unit."""
+MANY, WHEEL, CHASSIS = 1000, 0.02, 0.2
+"""Samples of a record, and s between them, from which on times may be of another unit: a wheel moves with up to 25 Hz,
+a chassis with up to 2.5 Hz on its springs, and shows nothing of it in fewer."""
 
 
 def read_time_series(
@@ -38,6 +41,19 @@ def other_unit(lasts: float, needed: float) -> str:
     """What to say of a file that lasts for so little (s) of what is needed that its times may be of another unit."""
     wrong = lasts < needed / SHORT
     return "; if its times are in seconds, not in milliseconds, correct the unit that heads them" if wrong else ""
+
+
+def sparse(count: int, period: float, needed: float, apart: float = WHEEL) -> str:
+    """What to say of so many samples, ``period`` (s) apart, of which next to none are needed (s), and that are too far
+    ``apart`` (s) for what moves: their times may be of another unit; "" of others."""
+    lasts = period * (count - 1)
+    if count < MANY or lasts < SHORT * needed or period < apart:
+        return ""
+    return (
+        f"The samples lie {period:.4g} s apart and last for {lasts:.4g} s, of which the run takes {needed:.4g} s; "
+        f"{'a wheel' if apart == WHEEL else 'a chassis'} moves with up to {0.5 / apart:g} Hz. If their times are in "
+        "milliseconds, head the column time [ms]."
+    )
 
 
 def _check_marks(path: str | Path, name: str, values: np.ndarray, time: np.ndarray) -> None:

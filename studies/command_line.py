@@ -163,14 +163,15 @@ def run(
 
 @contextmanager
 def _queried(scene: Any) -> Iterator[None]:
-    """Where a scene is refused, tell queries about its vehicle, too: they may be the cause."""
+    """Where a scene is refused, tell queries about its vehicle and channels, too: they may be the cause."""
     from models.strict import Query
 
     try:
         yield
     except InputError:
         with suppress(InputError):
-            for line in lines(finding for finding in findings_of(scene) if finding.check in get_args(Query)):
+            causes = (*get_args(Query), "exchanged", "shift")
+            for line in lines(finding for finding in findings_of(scene) if finding.check in causes):
                 print(line, file=sys.stderr)
         raise
 

@@ -173,3 +173,18 @@ def test_a_file_of_ones_own(tmp_path, measured):
     (tmp_path / "hub_forces.csv").write_text("\n".join([header.replace("fl_fx [N]", "fl_fx [lbf]"), *rows]) + "\n")
     with pytest.raises(InputError, match="lbf"):
         scene_of(own, "s.toml", tmp_path).measured(case.r19())
+
+
+@pytest.mark.parametrize("unit, factor, said", [("s", 1e3, "in milliseconds, not"), ("ms", 1.0, "in seconds, not")])
+def test_files_with_times_of_another_unit_are_refused_with_the_remedy(tmp_path, unit, factor, said):
+    """The smoothing of angles was refused, or the duration of the run."""
+    heads = [f"{hub}_{f}{axis} [N{' m' * (f == 'm')}]" for hub in case.r19().hubs for f in "fm" for axis in "xyz"]
+    angles = ["roll [rad]", "pitch [rad]", "roll_rate [rad/s]", "pitch_rate [rad/s]"]
+    for name, columns in (("forces", heads), ("angles", angles)):
+        rows = [",".join([f"{factor * 1e-3 * i:g}", *["0"] * len(columns)]) for i in range(2000)]
+        (tmp_path / f"{name}.csv").write_text("\n".join([",".join([f"time [{unit}]", *columns]), *rows, ""]))
+    table = ALL | {"forces": {"file": "forces.csv"}, "angles": {"file": "angles.csv"}, "run": {"duration": 1.0}}
+    del table["road"]
+    own = scene_of(table, "s.toml", tmp_path)
+    with pytest.raises(InputError, match=said):
+        own.measured(own.cut_vehicle())

@@ -157,6 +157,20 @@ def test_a_doubt_is_printed_saved_and_taken_into_the_trust(tmp_path):
     assert not findings_of(accepted)
 
 
+@pytest.mark.parametrize("unit, said", [("s", "head the column time"), ("ms", "correct the unit")])
+def test_a_prescribed_pitch_with_times_of_another_unit_is_told(tmp_path, unit, said):
+    """Twenty of its 20,000 samples made a pitch that nobody had measured."""
+    forces, pitch = true(("study", 0.0))
+    times = PERIOD * np.arange(len(pitch)) * {"s": 1e3, "ms": 1.0}[unit]
+    rows = "\n".join(f"{time:.9g},{value:.9g}" for time, value in zip(times, pitch, strict=True))
+    (tmp_path / "p.csv").write_text(f"time [{unit}],pitch [rad]\n{rows}\n")
+    try:
+        told = [f.text for f in findings_of(scene(tmp_path, forces, '[effects.prescribed_pitch]\nfile = "p.csv"\n'))]
+    except InputError as error:
+        told = [str(error)]
+    assert len(told) == 1 and said in told[0]
+
+
 SAMPLES = {
     "spikes": lambda f: np.where(np.arange(len(f))[:, None] == 700, [60e3, 0.0], 0.0) + f,
     "clipped": lambda f: np.minimum(f, np.quantile(f, 0.98, axis=0)),

@@ -111,6 +111,17 @@ def test_two_channels_that_are_exchanged_are_named(pair, ridden, tmp_path):
     assert [int(right[s][0]) for s in signals] == [int(recorded[s][0]) for s in reversed(signals)]
 
 
+def test_an_angle_and_a_rate_of_different_axes_have_no_sign_to_turn(ridden, tmp_path):
+    """Their ratio is chance: the sign of one was called wrong, and the run stopped with a remedy that does not help."""
+    samples = ridden.samples(Faults(noise=case.NOISE), 5)
+    one, other = case._columns(ridden, "roll", "pitch")
+    samples[:, [one, other]] = samples[:, [other, one]]
+    own = case.recording(ridden, samples, tmp_path / "a.columns")
+    for vehicle in (ridden.vehicle, None):
+        found = [f for f in turning.check(Evidence(own, vehicle)) if f.weight != "note"]
+        assert all(f.weight == "doubt" and "is not the derivative" in f.text for f in found)
+
+
 def test_pairs_that_move_the_vehicle_alike_are_named_as_not_seen(ridden, tmp_path):
     own = case.recording(ridden, ridden.samples(Faults(noise=case.NOISE), 5), tmp_path / "a.columns")
     notes = [f.text for f in check(own, ridden.vehicle) if f.check == "exchanged"]

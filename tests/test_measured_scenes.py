@@ -202,7 +202,7 @@ def test_rounded_times_are_those_of_an_even_clock(rate, digits, way):
 
 @pytest.mark.parametrize("rate", [200.0, 500.0, 1000.0, 2048.0])
 def test_seconds_since_1970_have_the_rate_of_their_clock(rate):
-    """Steps are off by up to 1e-4 of themselves: their median is no rate, and samples lay between those of the clock."""
+    """Steps are off by up to 1e-4 of themselves: their median is no rate, and samples fell between those of a clock."""
     found = timing(np.array([float(f"{1767600000 + i / rate:.6f}") for i in range(8000)]), "a.csv")
     off = found.times - found.times[0] - found.period * np.arange(8000)
     assert found.rate == pytest.approx(rate, rel=1e-7) and np.abs(off).max() < 2e-6

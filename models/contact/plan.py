@@ -33,8 +33,8 @@ def findings(scene: ContactScene) -> tuple[Finding, ...]:
         axis = float(area.a if name.endswith("x") else area.b)
         if radius is not None and axis > SMALL * abs(radius):
             text = (
-                f"radii.{name}: {radius:.4g} m, where the contact is {axis:.4g} m long to either side; its theory needs "
-                f"radii of at least {axis / SMALL:.3g} m. Radii are in m, loads in N."
+                f"radii.{name}: {radius:.4g} m, where the contact is {axis:.4g} m long to either side; its theory "
+                f"needs radii of at least {axis / SMALL:.3g} m. Radii are in m, loads in N."
             )
             out.append(Finding("size", "doubt", f"radii.{name}", text, radius, "m"))
     return tuple(out)

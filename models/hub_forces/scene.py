@@ -15,7 +15,7 @@ from models.scene_file import SceneFile, checked
 from models.steps import divides, fitting
 from models.strict import Query, Strict, accepted, quantity
 from models.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
-from models.time_series import read_time_series
+from models.time_series import CHASSIS, other_unit, read_time_series
 from models.vehicles.vehicle_file import load_vehicle
 
 Frame = Literal["hub", "body", "inertial"]
@@ -116,6 +116,12 @@ class HubScene(SceneFile):
         columns = {f"{hub}_{name}": units for hub in vehicle.hubs for name, units in COMPONENTS.items()}
         path = self.path(self.forces.file, "forces.file")
         forces, period = read_time_series(path, columns)
+        if period > CHASSIS:
+            allowed = (
+                f"its samples lie {period:g} s apart, and a vehicle moves within {CHASSIS:g} s: if its times are "
+                "in milliseconds, not in seconds, correct the unit that heads them"
+            )
+            raise InputError(self.file, "forces.file", self.forces.file, allowed)
         angles, other = read_time_series(self.path(self.angles.file, "angles.file"), ANGLES)
         if abs(other - period) > 1e-9 * period:
             raise InputError(
@@ -126,7 +132,8 @@ class HubScene(SceneFile):
             )
         last = period * (min(len(forces), len(angles)) - 1)
         if last < self.run.duration * (1 - 1e-9):
-            raise InputError(self.file, "run.duration", self.run.duration, f"the files end at {last:g} s")
+            allowed = f"the files end at {last:g} s{other_unit(last, self.run.duration)}"
+            raise InputError(self.file, "run.duration", self.run.duration, allowed)
         count = round(self.run.duration / period) + 1
         return HubForces(forces[:count], period, self.forces.frame), Angles(angles[:count], period)
 

@@ -20,6 +20,7 @@ from models.measured.finding import Finding, Weight
 from models.measured.ratios import EMPTY, Wrong, counted_from_load, sentence
 from models.measured.recording import Recording
 from models.measured.signal import Signal
+from models.time_series import sparse
 from models.vehicles.pitch_plane import Parameters
 
 CHECKS = ("weight", "balance", "sign", "unit", "swapped", "start", "times", "copied", "spikes", "clipped")
@@ -58,8 +59,6 @@ OFF = 0.05
 """Share of its static load by which an axle may begin off it."""
 BAND = 1.0, 25.0
 """Hz, between which both axles feel the same road one after the other."""
-MANY, UNUSED = 1000, 100.0
-"""Samples of a record, and its length by that of the run, from which on its times are of another unit: milliseconds."""
 LAG = 0.02, 2.0
 """s, between the axles of a vehicle."""
 ALIKE = 0.3
@@ -282,13 +281,9 @@ def check(own: AxleForces) -> list[Finding]:
 
 def _sparse(own: AxleForces) -> list[Finding]:
     """A long record of which a run takes next to nothing, too sparse for a wheel."""
-    if len(own.forces) < MANY or own.lasted < UNUSED * own.duration or own.period < 0.5 / BAND[1]:
+    text = sparse(len(own.forces), own.period, own.duration)
+    if not text:
         return []
-    text = (
-        f"The samples lie {own.period:.4g} s apart and last for {own.lasted:.4g} s, of which the run takes "
-        f"{own.duration:.4g} s; forces of a wheel move with up to {BAND[1]:g} Hz. If their times are in "
-        "milliseconds, head the column time [ms]."
-    )
     return [Finding("times", "doubt", "wheel forces", text, own.period, "s", own.names)]
 
 

@@ -49,6 +49,7 @@ FAMILIES = defaultdict(
     {
         **dict.fromkeys(("sign", "unit", "gain", "offset", "weight", "gravity", "lever"), frozenset({"size"})),
         **dict.fromkeys(("drift", "shift"), frozenset({"time"})),
+        **dict.fromkeys(("exchanged", "turning"), frozenset({"axis"})),
         "clipped": frozenset({"value"}),
         "spikes": frozenset({"size", "value"}),
         "noise": frozenset({"size", "value"}),

@@ -13,6 +13,8 @@ BAND = 0.5, 12.0
 """Hz."""
 COHERENT = 0.8
 """Squared coherence of lines that are used; below it noise speaks."""
+ALIKE = 0.25
+"""Part of a rate in phase with the angle's derivative from which on a factor between them means anything."""
 LATE, LINES = 1e-3, 8
 """s, and coherent lines: smaller shifts, or shifts by fewer, are not named; nor any where hub forces tell better."""
 
@@ -49,6 +51,12 @@ def _pair(evidence: Evidence, angle: Signal, rate: Signal) -> list[Finding]:
     ratio = float((weight @ transfer).real / weight.sum())
     late, error = _late(transfer, omega, weight * found.averages, ratio)
     wrong, text = sentence(ratio, rate, f"the derivative of {angle.name}")
+    if wrong in ("sign", "unit") and _alike(transfer, weight) < ALIKE:
+        text = (
+            f"{rate.name} is not the derivative of {angle.name}, whatever its sign and unit: one of them belongs to "
+            "another axis or body; check their names."
+        )
+        return [Finding(NAME, "doubt", names, text, ratio, "1", (rate.name, angle.name))]
     if wrong in ("sign", "unit"):
         return [
             Finding(
@@ -73,6 +81,12 @@ def _pair(evidence: Evidence, angle: Signal, rate: Signal) -> list[Finding]:
         f"{5e3 * error:.2g} ms."
     )
     return [Finding(NAME, "note", names, text, ratio, "1", (rate.name, angle.name))]
+
+
+def _alike(transfer: np.ndarray, weight: np.ndarray) -> float:
+    """Part of what a rate has at coherent lines that is in phase with the derivative of the angle, by one factor."""
+    whole = float(weight.sum() * (weight @ np.abs(transfer) ** 2))
+    return float((weight @ transfer).real ** 2) / whole if whole > 0 else 0.0
 
 
 def _coherence(cross: np.ndarray) -> np.ndarray:
