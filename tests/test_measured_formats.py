@@ -290,3 +290,14 @@ def test_no_cut_at_any_byte_is_silent(tmp_path, extension):
 def test_every_row_of_the_full_case_passes(tmp_path):
     rows, _ = case.measure(False, tmp_path)
     assert [row.id for row in rows if row.status in ("failed", "not run")] == []
+
+
+@pytest.mark.parametrize("unit, factor", [("ms", 1e3), ("s", 1.0), ("us", 1e6), ("", 1.0)])
+def test_a_master_channel_in_another_unit_is_read_in_seconds(tmp_path, unit, factor):
+    asammdf = pytest.importorskip("asammdf")
+    times, file = np.arange(50) * 2e-3, asammdf.MDF(version="4.10")
+    file.append([asammdf.Signal(np.sin(times), factor * times, name="fz", unit="kN")], common_timebase=True)
+    file.groups[0].channels[0].unit = unit
+    file.save(tmp_path / "a.mf4")
+    (block,) = open_source(tmp_path / "a.mf4").blocks(["fz"])
+    np.testing.assert_allclose(block.times, times, rtol=1e-12, atol=1e-15)

@@ -31,6 +31,8 @@ from models.measured.formats.opened import Opened, Span, notice, readable, told_
 
 SECONDS = 1
 """Synchronisation type of a master channel that counts seconds (MDF 4; that of MDF 3 always does)."""
+CLOCKS = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+"""s, of the units of a master channel that some exporters write beside the standard's own."""
 ALL_INVALID, INVALIDATION, VIRTUAL_MASTER = 1, 2, 3
 """Flags of a channel of MDF 4 that was never measured, and of one with marks; kind of a clock without samples."""
 LOCAL, OFFSET = 1, 2
@@ -99,7 +101,8 @@ def _block(mdf: Any, group: int, indices: list[int], first: int, count: int) -> 
     """Times and values of some records, loaded once: the public calls load them, or the file, anew for each channel."""
     getattr(mdf._mdf, "_invalidation_cache", {}).clear()  # it knows a block by its length, and takes the one before
     parts = list(mdf._mdf._load_data(mdf.groups[group], record_offset=first, record_count=count))
-    times = np.concatenate([mdf.get_master(group, data=part) for part in parts])
+    unit = mdf.groups[group].channels[mdf.masters_db[group]].unit or ""
+    times = CLOCKS.get(unit.strip(), 1.0) * np.concatenate([mdf.get_master(group, data=part) for part in parts])
     values = [np.concatenate([_values(mdf, group, i, part) for part in parts]) for i in indices]
     return times[:count], np.column_stack(values)[:count]
 
