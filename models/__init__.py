@@ -27,6 +27,6 @@ Noise
     and belongs to the samples, never to the integrator's step.
 """
 
-from models.threads import use_one_thread
+from models.machine.threads import use_one_thread
 
 use_one_thread()

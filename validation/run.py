@@ -12,15 +12,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from models.core.result import provenance
+from models.core.whole_files import whole_file, write_whole
 from models.ensemble.store import locked
 from models.ensemble.workers import processes
-from models.result import provenance
-from models.whole_files import whole_file, write_whole
-from validation.changes import against, lines
-from validation.kept_cases import Cases, Outcomes, measured
+from validation.common.changes import against, lines
+from validation.common.kept_cases import Cases, Outcomes, measured
+from validation.common.rows import STATUSES, Row
+from validation.common.scenes import data_folder
 from validation.report.shares import full
-from validation.rows import STATUSES, Row
-from validation.scenes import data_folder
 
 CASES = (
     "audit",
@@ -167,7 +167,6 @@ def _written(pool: Executor, folder: Path) -> Path:
 def seeds() -> dict[str, int]:
     """Every seed that the rows depend on; with them and the versions all counts and states repeat exactly."""
     from studies.six_runs import Options
-    from validation import checks, timing
     from validation.cases import (
         braking_controllers,
         contact_price,
@@ -197,9 +196,10 @@ def seeds() -> dict[str, int]:
         wheelset,
     )
     from validation.choice import drawn_scenes
+    from validation.common import checks, timing
     from validation.contact import contact_set
     from validation.measured import long_recording
-    from validation.price.own_scene import unseen, unseen_systems
+    from validation.price import unseen, unseen_systems
     from validation.ride import fitted_roads
 
     return {

@@ -15,8 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
+from models.core.finding import Finding, Weight
 from models.drift.growth import RigidPitch, rigid_pitch
-from models.measured.finding import Finding, Weight
 from models.measured.ratios import EMPTY, Wrong, counted_from_load, sentence
 from models.measured.recording import Recording
 from models.measured.signal import Signal

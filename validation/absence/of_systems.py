@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from models.errors import Refused
-from models.scene_effects import beside, module_of, names_of
-from models.systems import SYSTEMS
+from models.core.errors import Refused
+from models.core.scene_effects import beside, module_of, names_of
+from models.core.systems import SYSTEMS
 from validation.absence.probes import registered
-from validation.rows import Row, System, at_most, behaves
+from validation.common.rows import Row, System, at_most, behaves
 
 SYSTEM: System = "effects"
 FILES = {

@@ -3,7 +3,7 @@
 A case module holds
 
 ``TITLE``, ``SYSTEM``
-    heading, and one of the systems of ``validation.rows``
+    heading, and one of the systems of ``validation.common.rows``
 ``measure(quick, folder) -> (rows, data)``
     runs what it needs (a named small share of it where ``quick`` is true); ``data`` is saved as JSON
 ``tables(data) -> [Table]`` and ``draw(data) -> [(caption, Figure)]``, both optional

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import InputError
-from models.ride.choice.cost import cost
-from models.ride.choice.held import Effect, Held, effects_of, illegal, without
-from models.ride.choice.reduced import Reduced, Whole
-from models.ride.choice.screen import confirmed
-from models.ride.of_scene import told_by, vehicle_of
-from models.scene_effects import absent, beside, listing
-from validation.price.effects import ROUNDS, SEED, Changed, Price, PriceList, spread
-from validation.timing import paired_ratio
+from models.advice.price.effects import ROUNDS, SEED, Changed, Price, PriceList, spread
+from models.advice.ride_choice.cost import cost
+from models.advice.ride_choice.reduced import Reduced, Whole
+from models.advice.ride_choice.screen import confirmed
+from models.core.errors import InputError
+from models.core.scene_effects import absent, beside, listing
+from models.systems.ride.of_scene import told_by, vehicle_of
+from models.systems.ride.reduced_scene import Effect, Held, effects_of, illegal, without
+from validation.common.timing import paired_ratio
 
 STEPS = 500
 """Steps that are timed in every turn."""

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.figures import COLOURS, plt
+from models.drawing.figures import COLOURS, plt
 from validation.price import curves
 from validation.price import runner as cost
 from validation.price.runner import Point, by_curve

@@ -15,10 +15,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
+from validation.common.timing import interleave, interval, resamples
 from validation.price import curves
 from validation.price.problems import Problem, Setting
-from validation.timing import interleave, interval, resamples
 
 Status = Literal["ok", "raised", "refused", "flagged", "SILENT"]
 WORK = ("contact cells", "force calls")

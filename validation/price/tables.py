@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from studies.figures import LABELS
+from models.drawing.figures import LABELS
+from validation.common.rows import Table
+from validation.common.timing import describe
 from validation.price import runner as cost
 from validation.price.curves import HOLLOW, Reach
 from validation.price.problems import Setting
 from validation.price.runner import Loss, Point, by_curve
-from validation.rows import Table
-from validation.timing import describe
 
 
 def tables(problem: dict[str, Any], points: list[Point]) -> list[Table]:

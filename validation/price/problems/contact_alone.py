@@ -11,7 +11,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from models.contact.work_precision import WAYS, Case, Way
+from models.systems.contact.work_precision import WAYS, Case, Way
 from studies.contact import doubted
 from validation.contact.contact_set import read
 from validation.price.problems import Setting

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from models.engines.catalogue import CATALOGUE
 from models.engines.spatial_protocol import SpatialRun, build
 from models.engines.spatial_reference import SpatialReference
-from models.ride.in_engines import row_of
+from models.systems.ride.in_engines import row_of
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.price.problems import Setting

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from scipy.integrate import OdeSolution, solve_ivp
 
-from models.assembly import Assembly, assemble
+from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Model, Settings, Trajectory, build
 from models.engines.reference import derivative_of
-from models.scene import build as build_scene
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import build as build_scene
 from validation.price.problems import Setting
 
 DURATION, SPEED = 2.0, 20.0
