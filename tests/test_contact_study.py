@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from models.advice.price import runner as cost
 from models.contact.accuracy import BANDS, KNOTS, MOMENT_BANDS, band, moment_band, rolled, spin_share
 from models.contact.fastsim import fastsim
 from models.contact.fastsim_fields import fastsim_fields
@@ -22,7 +23,6 @@ from studies import contact_table
 from studies.contact_table import told
 from validation.cases import contact_price
 from validation.contact.contact_set import FRICTION, JUDGED, LOAD, read, read_drawn
-from validation.price import runner as cost
 from validation.price.problems import contact_alone
 
 CASES = "a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [-],spin [1/mm]\n"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.advice.choice.variants import system_of
-from models.advice.price import effects, effects_text
+from models.advice.price import effects, effects_of_ride, effects_text
 from models.advice.price.effects import Changed, price_list
 from models.advice.ride_choice.reduced import Whole
 from models.core.errors import InputError
@@ -30,7 +30,6 @@ from models.vehicles.vehicle_file import load_vehicle
 from studies.asked import SCENES
 from validation.absence.contact import BARE as CONTACT
 from validation.absence.of_systems import added, bare, declared, seen
-from validation.price import effects_of_ride
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from models.advice.price import curves
+from models.advice.price import runner as cost
+from models.advice.price.problem import Setting
 from models.core.errors import Refused, RunFailed
-from validation.common.timing import describe, interleave, paired_ratio
-from validation.price import curves
-from validation.price import runner as cost
-from validation.price.problems import Setting
+from models.machine.timing import describe, interleave, paired_ratio
 from validation.price.rows import rows_of
 from validation.price.tables import rounds_of, tables
 

@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 from models.advice.price.meshed import Meshed, first_part
+from models.advice.price.problem import Setting
 from models.advice.price.recommendation import SYSTEMS as PRICED
 from models.advice.price.recommendation import price, recommend
 from models.advice.price.text import lines
 from models.core.errors import InputError, RunFailed
 from models.core.systems import SYSTEMS, load
 from studies.asked import SCENES
-from validation.price.problems import Setting
 
 STOP = {
     "title": "a stop",

@@ -166,6 +166,7 @@ def _written(pool: Executor, folder: Path) -> Path:
 
 def seeds() -> dict[str, int]:
     """Every seed that the rows depend on; with them and the versions all counts and states repeat exactly."""
+    from models.machine import timing
     from studies.six_runs import Options
     from validation.cases import (
         braking_controllers,
@@ -196,7 +197,7 @@ def seeds() -> dict[str, int]:
         wheelset,
     )
     from validation.choice import drawn_scenes
-    from validation.common import checks, timing
+    from validation.common import checks
     from validation.contact import contact_set
     from validation.measured import long_recording
     from validation.price import unseen, unseen_systems

@@ -5,7 +5,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.core.scene_file import SceneFile
 from models.core.signals import Signal
 from models.vehicles import pitch_plane
 from models.vehicles.description import Vehicle
@@ -34,7 +33,7 @@ class Assembly:
     doubts : sentences on what contradicts the scene, with size and remedy: told before the run and saved with it
     """
 
-    scene: SceneFile
+    scene: Any
     vehicle: Vehicle
     parameters: pitch_plane.Parameters
     mode: Mode

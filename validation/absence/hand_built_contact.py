@@ -15,7 +15,7 @@ from models.contact.fastsim_grid import grid
 from models.contact.linear_theory import flexibilities
 from models.contact.material import Pair
 from models.machine.compiled import njit
-from validation.common.timing import interleave, paired_ratio
+from models.machine.timing import interleave, paired_ratio
 
 CELLS, AXIS, LOAD, FRICTION = 21, 5e-3, 8e4, 0.3
 """Cells of a strip, semi-axes (m), load (N), coefficient of friction."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numba.core.runtime import _nrt_python, rtsys  # type: ignore[attr-defined]
 
+from models.machine.timing import interleave, paired_ratio
 from models.rail.equations import Path
 from models.rail.wheel_forces import LOAD, MZ
 from models.systems.wheelset.of_scene import equations_of
@@ -16,7 +17,6 @@ from validation.absence.bare_cars import cars
 from validation.absence.bare_rides import copies, rides
 from validation.absence.of_systems import bare
 from validation.common.rows import Row, System, at_most
-from validation.common.timing import interleave, paired_ratio
 
 SYSTEM: System = "effects"
 STEP, SHORT = 5e-4, 40

@@ -20,12 +20,12 @@ from models.brake.controller import SAMPLE, Controller, Sample
 from models.brake.port.ask import ControllerFailed, ask
 from models.brake.port.example import Example
 from models.brake.port.setup import PortTable, Run, opened
+from models.machine.timing import median
 from models.systems.braking.procedures import drive
 from models.systems.braking.run import Path as Driven
 from models.systems.braking.scene import build
 from validation.braking import misbehaving_client
 from validation.common.rows import Row, System, Table, aim, behaves, finding, not_run
-from validation.common.timing import median
 
 TITLE = "The controller port: same bits on every way, and controllers that fail"
 SYSTEM: System = "anti-lock"

@@ -21,8 +21,8 @@ from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, nati
 from models.engines.mujoco_callback import installed
 from models.machine.compiled import njit
 from models.machine.stack import start
+from models.machine.timing import interleave, median, spelled
 from validation.common.rows import Row, System, Table, aim, at_most, behaves
-from validation.common.timing import interleave, median, spelled
 from validation.contact import slow_wheels
 
 TITLE = "What a contact kernel costs inside an engine"

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.engines.protocol import build, guard
+from models.machine.timing import describe, interleave, paired_ratio
 from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import outputs
 from models.systems.pitch_plane.scene import Scene, settings_of
@@ -19,7 +20,6 @@ from validation.absence.hand_built_contact import ratio_of_contacts
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import EFFECTS, ENGINES, STEP, change, changes, model, pair, scene, write_files
 from validation.common.rows import Row, System, Table, aim, at_most
-from validation.common.timing import describe, interleave, paired_ratio
 
 TITLE = "What the machinery costs, and each effect"
 SYSTEM: System = "effects"

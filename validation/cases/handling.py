@@ -13,6 +13,7 @@ from models.engines.contact_bridge_mujoco import Marcher
 from models.engines.free_vehicle_mujoco import FreeMujoco
 from models.engines.mujoco_callback import installed
 from models.machine.compiled import njit
+from models.machine.timing import interleave, median
 from models.multibody import forces as at
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.road.plane_waves import plane_waves
@@ -23,7 +24,6 @@ from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.load_transfer import braked_error, sliding, turning, turning_error
 from validation.braking.sprung_box import box
 from validation.common.rows import Row, System, Table, aim, at_most, behaves, finding
-from validation.common.timing import interleave, median
 
 TITLE = "A car on four rolling tyres"
 SYSTEM: System = "rolling-vehicle"

@@ -1,6 +1,6 @@
 """A vehicle that bounces on the flat road, exact: piece by piece, by matrix exponentials.
 
-With geometry linear in the pitch and the tyres of ``models.systems.pitch_plane.effects.lift_off`` the motion is linear as long as each tyre
+With geometry linear in the pitch and the tyres of the effect ``lift_off`` the motion is linear as long as each tyre
 stays in one of three states: in the air (no force), pressed (k e + d e') or hit so fast that the damper is limited by
 the spring (2 k e). Where a tyre goes from one to another is found by bisection to the last bits of time. Nothing here
 is shared with the implementations but the mass, damping and stiffness of the vehicle without tyres.

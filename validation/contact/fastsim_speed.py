@@ -12,8 +12,8 @@ from models.contact.fastsim_grid import grid
 from models.contact.fastsim_kernels import LANES, ROWS, march_plain, march_second_order
 from models.contact.material import Pair
 from models.machine.compiled import njit
+from models.machine.timing import median, paired_ratio, spelled
 from validation.common.rows import Row, System, aim
-from validation.common.timing import median, paired_ratio, spelled
 
 SYSTEM: System = "contact"
 CELLS = 21

@@ -9,9 +9,9 @@ from models.contact.hertz import by_axes
 from models.contact.simplified_theory import CELLS, PAPER, NormalContact, press, roll
 from models.contact.undeformed_distance import quadratic
 from models.machine.seconds import cost
+from models.machine.timing import interleave
 from models.systems.contact.work_precision import Case
 from validation.common.rows import Table
-from validation.common.timing import interleave
 
 ROUNDS = 5
 """Of timing."""

@@ -14,11 +14,11 @@ from unittest.mock import patch
 import numpy as np
 
 from models.advice.price import Answer, Ladder, recommendation, search, truth
+from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Choice, Recommendation
 from models.advice.price.truth import Truth, at
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
-from validation.price.problems import Setting
 
 STEPS = tuple(0.2 / n for n in (1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40, 64, 100, 160, 250))
 STAGES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {

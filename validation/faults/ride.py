@@ -28,11 +28,11 @@ INERTIA = np.diag([207.26524557936952, 1565.8178787125541, 1791.5995300122856])
 
 
 def _system(name: str, road: Callable[[LinearVehicle], Excitation]) -> tuple[LinearVehicle, Excitation, DelayedSystem]:
-    from models.road import excitation
+    from models.ride import excited
 
     vehicle = spatial_linear.linearise(vehicle_file.load_vehicle(name))
     met = road(vehicle)
-    return vehicle, met, excitation.excited(vehicle, met, SPEED)
+    return vehicle, met, excited.excited(vehicle, met, SPEED)
 
 
 def _one_track(vehicle: LinearVehicle) -> Excitation:
@@ -76,9 +76,9 @@ def _heights() -> float:
     rows = [*unit, left]
     outputs = tuple(Output(str(i), "m", "road", no, no, no, row, 0.0 * row) for i, row in enumerate(rows))
     road = two_track.excitation(two_track.road_of_level(two_track.half_track(vehicle.wheels)), vehicle.wheels)
-    from models.road import excitation
+    from models.ride import excited
 
-    found = stationary(excitation.excited(replace(vehicle, outputs=outputs), road, SPEED)).variance
+    found = stationary(excited.excited(replace(vehicle, outputs=outputs), road, SPEED)).variance
     return _off(found, _covariance_of_heights())
 
 

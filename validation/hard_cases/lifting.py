@@ -1,7 +1,7 @@
 """Wheels that leave the road and land: both at once, from a height, on hard tyres, at the switch, on steps and on roads
 of few samples, in the first step, in space and above a cut.
 
-The half car on a flat road has an exact path, piece by piece between the switches (``validation.common.bounces``). Its error
+The half car on a flat road has an exact path, piece by piece between the switches (``bounces``). Its error
 is a velocity, the coarsest of its states: a landing within a step costs the square of the step.
 """
 

@@ -15,6 +15,7 @@ from unittest import mock
 import numpy as np
 from matplotlib.figure import Figure
 
+from models.machine.timing import interleave
 from models.ride.covariance import stationary
 from models.ride.excited import excited
 from models.ride.frequency import quadrature, spectra
@@ -26,7 +27,6 @@ from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Row, System, Table, at_most, finding, within
-from validation.common.timing import interleave
 
 SYSTEM: System = "cost"
 SPEED, LOWEST = 20.0, 1e-2

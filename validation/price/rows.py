@@ -1,10 +1,10 @@
 """Rows that every work-precision problem answers for."""
 
+from models.advice.price import runner as cost
+from models.advice.price.curves import Reach
+from models.advice.price.problem import Problem, Setting
+from models.advice.price.runner import Point
 from validation.common.rows import Row, System, at_most, finding, within
-from validation.price import runner as cost
-from validation.price.curves import Reach
-from validation.price.problems import Problem, Setting
-from validation.price.runner import Point
 from validation.price.tables import named
 
 SYSTEM: System = "cost"

@@ -8,9 +8,9 @@ import numpy as np
 
 from models.engines.assembly import Assembly
 from models.engines.protocol import Settings, build
+from models.machine.timing import describe, interleave, median, paired_ratio
 from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.scene import build as build_scene
-from validation.common.timing import describe, interleave, median, paired_ratio
 from validation.price.compiled_forces import CompiledForces
 
 STEP = 1e-3

@@ -21,9 +21,9 @@ from models.engines.protocol import Settings
 from models.engines.reference import derivative_of
 from models.machine.compiled import njit
 from models.machine.stack import at, beyond
+from models.machine.timing import interleave, median
 from models.systems.pitch_plane.assembly import assemble
 from validation.common.rows import Row, System, Table, finding
-from validation.common.timing import interleave, median
 from validation.price.compiled_forces import CompiledForces, law
 from validation.price.instructions_run import exudyn_marches
 from validation.price.problems import road_excited, wheelset

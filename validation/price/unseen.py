@@ -16,16 +16,16 @@ import numpy as np
 
 from models.advice.price import Answer
 from models.advice.price.pitch_plane import OwnPitchPlane, own
+from models.advice.price.problem import Setting
 from models.advice.price.recommendation import LEAST, SLOWER, Choice, Recommendation, recommend
 from models.advice.price.search import Tried
 from models.advice.price.truth import Truth
 from models.core.time_series import write_time_series
 from models.engines.protocol import Settings
 from models.engines.protocol import build as build_model
+from models.machine.timing import interleave, paired_ratio
 from models.systems.pitch_plane.scene import Scene, build
 from models.vehicles.parameters.itwm_drift import PARAMETERS
-from validation.common.timing import interleave, paired_ratio
-from validation.price.problems import Setting
 
 SEED = 907
 ENGINES = ("reference", "exudyn", "mujoco")

@@ -12,11 +12,11 @@ import numpy as np
 
 from models.advice.price import Answer, Ladder
 from models.advice.price.meshed import Meshed
+from models.advice.price.problem import Setting
 from models.advice.price.recommendation import SYSTEMS as PRICED
 from models.advice.price.recommendation import Recommendation, recommend
 from models.advice.price.truth import Truth
 from models.core.systems import SYSTEMS
-from validation.price.problems import Setting
 from validation.price.unseen import Drawn, Verdict, slower
 
 SEED = 908

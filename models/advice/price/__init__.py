@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from validation.price.problems import Setting
+from models.advice.price.problem import Setting
 
 
 @dataclass(frozen=True)

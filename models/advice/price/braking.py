@@ -7,12 +7,12 @@ import numpy as np
 
 from models.advice.price import Answer, Ladder
 from models.advice.price.meshed import chosen, part_of
+from models.advice.price.problem import Setting
 from models.core.errors import InputError, RunFailed
 from models.systems.braking.procedures import drive, engines_of
 from models.systems.braking.run import Path
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import Stop
-from validation.price.problems import Setting
 
 METHOD = "exact wheel"
 SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)

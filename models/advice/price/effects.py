@@ -16,7 +16,7 @@ from models.advice.choice.answer import Answer, by_chance, less, relative, round
 from models.advice.choice.variants import Variants, system_of
 from models.advice.ride_choice.in_time import goes_in_time
 from models.core.errors import InputError, RunFailed
-from validation.common.timing import describe, paired_ratio
+from models.machine.timing import describe, paired_ratio
 
 STEPS = 960
 """Of every run, so many are priced."""
@@ -77,7 +77,7 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
     """Run the scene, and every scene that has one effect more or less. Raises InputError or RunFailed where the scene
     itself cannot be run."""
     if scene.system == "ride" and not goes_in_time(scene):
-        from validation.price.effects_of_ride import price_list_of_ride
+        from models.advice.price.effects_of_ride import price_list_of_ride
 
         return price_list_of_ride(scene)
     system = system_of(scene)

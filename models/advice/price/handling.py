@@ -8,13 +8,13 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from models.advice.price.meshed import TIGHT, Meshed, chosen, first_part, part_of
+from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.engines.spatial_protocol import SpatialRun
 from models.multibody import forces as at
 from models.multibody.numbers import Handling
 from models.systems.handling.in_engines import Drive, build, driven, read
 from models.systems.handling.scene import HandlingScene
-from validation.price.problems import Setting
 
 FIRST = 1.0
 """s: of a longer manoeuvre only so much is searched."""

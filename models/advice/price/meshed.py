@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from models.advice.price import Answer, Ladder
+from models.advice.price.problem import Setting
 from models.core.errors import InputError
-from validation.price.problems import Setting
 
 CELLS = (3, 5, 7, 9, 11, 15, 21, 31, 45, 63, 91, 127, 200)
 """Cells along a contact that are tried, and those of the scene."""

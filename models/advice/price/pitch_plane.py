@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.advice.price import Answer, Ladder
+from models.advice.price.problem import Setting
 from models.core.errors import InputError
 from models.core.steps import divides
 from models.engines.assembly import Assembly
@@ -15,8 +16,11 @@ from models.engines.protocol import Settings, build
 from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import outputs
 from models.systems.pitch_plane.scene import Scene
-from validation.price.problems import Setting
-from validation.price.problems.road_excited import ADAPTIVE_STEP, RADII, settings_of
+
+ADAPTIVE_STEP = {"exudyn": 5e-3, "reference": 1e-3}
+"""Largest step of Exudyn's adaptive solvers, which they also begin with, and the spacing of scipy's output (s)."""
+RADII = {"GeneralizedAlpha 0.9": 0.9, "GeneralizedAlpha 0.6": 0.6}
+"""Spectral radii of the generalised-alpha method that are tried."""
 
 FIRST = 2.0
 """s: of a longer run only so much is searched; what is recommended is then confirmed over all of it."""
@@ -143,7 +147,7 @@ class OwnPitchPlane:
 
     def _settings(self, setting: Setting, duration: float) -> Settings:
         if not setting.adaptive:
-            return settings_of(setting, duration)
+            return engine_settings(setting, duration)
         signal = self.assembly.input
         longest = min(ADAPTIVE_STEP.get(setting.engine, SPACING), signal.resolution if signal is not None else 1.0)
         return Settings(setting.method, duration / math.ceil(duration / longest * (1 - 1e-9)), duration, setting.value)
@@ -208,3 +212,12 @@ def _unit(scene: OwnPitchPlane) -> str:
             f"has several units, {' and '.join(units)}: one tolerance cannot hold for all",
         )
     return units[0]
+
+
+def engine_settings(setting: Setting, duration: float) -> Settings:
+    """A setting as the engines take it."""
+    integrator = setting.method.split()[0]
+    radius = RADII.get(setting.method, 0.6)
+    if setting.adaptive:
+        return Settings(integrator, ADAPTIVE_STEP[setting.engine], duration, setting.value, radius)
+    return Settings(integrator, setting.value, duration, spectral_radius=radius)

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from models.advice.price import Answer, Ladder, OwnScene
+from models.advice.price.problem import Setting
 from models.advice.price.search import Search, Tried
 from models.advice.price.truth import Truth, truth
 from models.core.errors import InputError, RunFailed
-from validation.common.timing import interleave, paired_ratio
-from validation.price.problems import Setting
+from models.machine.timing import interleave, paired_ratio
 
 SYSTEMS = {
     system: f"models.advice.price.{module}"

@@ -6,10 +6,10 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from models.advice.price import Ladder, OwnScene
+from models.advice.price.problem import Setting
+from models.advice.price.runner import Status
 from models.advice.price.truth import Truth
 from models.core.errors import InputError, RunFailed
-from validation.price.problems import Setting
-from validation.price.runner import Status
 
 START = 2e-3
 """s: the step that is tried first; an engine's default method begins with its default step."""

@@ -3,11 +3,11 @@
 from collections import defaultdict
 from typing import Any
 
+from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Choice, Recommendation
 from models.advice.price.search import Tried
 from models.drawing.figures import LABELS
 from models.machine.seconds import cost
-from validation.price.problems import Setting
 
 SAME = 0.005
 """Ratios so near to one are not worth a word."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.advice.price import Answer, Ladder, OwnScene
+from models.advice.price.problem import Setting
 from models.core.errors import InputError, RunFailed
-from validation.price.problems import Setting
 
 AGREED = 4.0
 """A solver of another family differs by less than this part of the tolerance."""

@@ -8,14 +8,14 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from models.advice.price.meshed import TIGHT, Meshed, chosen, first_part
+from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.rail.equations import STATES, STIFF, YAW, Equations, Path, rates
 from models.rail.wheelset import Wheelset
+from models.systems.wheelset.channels import CONTACTS
+from models.systems.wheelset.channels import STATES as COORDINATES
 from models.systems.wheelset.of_scene import implementation, path_speeds, wheelset_of
 from models.systems.wheelset.scene import WheelsetScene
-from studies.wheelset import CONTACTS
-from studies.wheelset import STATES as COORDINATES
-from validation.price.problems import Setting
 
 FIRST = 0.25
 """s: of a longer path only so much is searched."""

@@ -1,8 +1,9 @@
 """A recording on the pitch-plane vehicle: its vertical wheel forces, summed by axle, drive it; its pitch may hold it.
 
-The vehicle, its effects, engines, trust and verdict are those of its scenes (``models.systems.pitch_plane.scene``); the recording is handed
-to them as the files that such scenes read. A recording's pitch is positive nose down (ISO 8855), this vehicle's nose
-up. Forces in the axes of hubs or chassis turn with the vehicle: its wheels do not pitch against the chassis.
+The vehicle, its effects, engines, trust and verdict are those of its scenes (``models.systems.pitch_plane``); the
+recording is handed to them as the files that such scenes read. A recording's pitch is positive nose down (ISO 8855),
+this vehicle's nose up. Forces in the axes of hubs or chassis turn with the vehicle: its wheels do not pitch against
+the chassis.
 """
 
 import math

@@ -14,6 +14,7 @@ from functools import cache, partial
 
 import numpy as np
 
+from models.advice.price.problem import Setting
 from models.brake.brake import PAPER_FRONT, of_wheels
 from models.brake.controller import SAMPLE, Command, Controller, Sample
 from models.brake.controllers import CONTROLLERS
@@ -28,7 +29,6 @@ from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import stacked
 from validation.braking.braking_schemes import advanced
 from validation.braking.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
-from validation.price.problems import Setting
 
 VEHICLE = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
 """A front wheel of the paper's truck under what it bears while braking."""

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from models.advice.price.problem import Setting
 from models.contact.inputs import Array
 from models.core.errors import Refused, RunFailed
 from models.engines.catalogue import MISSING
@@ -28,7 +29,6 @@ from models.engines.stability import LONG_RUN, limit
 from models.machine.compiled import njit
 from models.machine.stack import start
 from validation.price.force_calls import AT_START
-from validation.price.problems import Setting
 from validation.price.problems.road_excited import STAGES, setting
 
 DURATION = 0.1

@@ -1,8 +1,8 @@
 """Pitch drawn by a moment towards what a Kalman filter makes of measured angle and rate, gaps and all.
 
 The filter runs before the simulation and alone, beside a vehicle of the scene's own parameters and forces
-(``models/systems/pitch_plane/pitch_filter.py``). The simulation then feels two moments. One is what the model's inertia lacks by
-the filter's estimate: its share of the suspension's moment. The other draws the pitch to the estimate,
+(``pitch_filter``). The simulation then feels two moments. One is what the model's inertia lacks by the filter's
+estimate: its share of the suspension's moment. The other draws the pitch to the estimate,
 (I + J) (wc^2 (estimate - pitch) + 2 zeta wc (its rate - pitch rate)) with J of the wheels, wc = 2 pi bandwidth: a
 native rotational spring and damper, and a moment over time. So no estimate is differentiated, the forces stay
 functions of time and state alone, and every engine gets the very same estimate.

@@ -15,10 +15,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from models.advice.price import curves
+from models.advice.price.problem import Problem, Setting
 from models.core.errors import InputError, RunFailed
-from validation.common.timing import interleave, interval, resamples
-from validation.price import curves
-from validation.price.problems import Problem, Setting
+from models.machine.timing import interleave, interval, resamples
 
 Status = Literal["ok", "raised", "refused", "flagged", "SILENT"]
 WORK = ("contact cells", "force calls")

@@ -14,9 +14,9 @@ from models.advice.ride_choice.reduced import Reduced, Whole
 from models.advice.ride_choice.screen import confirmed
 from models.core.errors import InputError
 from models.core.scene_effects import absent, beside, listing
+from models.machine.timing import paired_ratio
 from models.systems.ride.of_scene import told_by, vehicle_of
 from models.systems.ride.reduced_scene import Effect, Held, effects_of, illegal, without
-from validation.common.timing import paired_ratio
 
 STEPS = 500
 """Steps that are timed in every turn."""
