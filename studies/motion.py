@@ -23,7 +23,7 @@ from models.sensors.rigid_body_motion import LIMIT, Motion, Quality, Start, moti
 from models.sensors.rotations import GimbalLock, from_cardan
 from models.sensors.sensor_array import SensorArray, sensor_array
 from models.systems.pitch_plane.effects.accelerometers import Parameters, names
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.sampling import write
 from models.systems.pitch_plane.scene import Scene
 

@@ -10,7 +10,8 @@ from models.core.errors import RunFailed
 from models.core.result import Result
 from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.plan import doubt_lines, trust_line
-from models.systems.pitch_plane.run import simulate, state_names, summary
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.run import state_names, summary
 from models.systems.pitch_plane.scene import Scene
 
 Progress = Callable[[str, float], None]

@@ -16,7 +16,7 @@ from models.core.errors import RunFailed
 from models.core.result import Result
 from models.core.strict import Strict, quantity, read
 from models.core.whole_files import write_whole
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from studies.virtual_measurement import PAPER, check_road, follower, measure, stride, write_measurement
 

@@ -39,7 +39,7 @@ from models.drift.score import (
 from models.drift.section_forces import CHANNELS
 from models.fatigue.damage import CONVENTION, SLOPE
 from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, build
 from models.systems.pitch_plane.trust import trust
 from models.vehicles.pitch_plane import Parameters

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from studies.comparison import compare
 from validation.common.scenes import road_scene
 

@@ -15,7 +15,7 @@ from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.covariance import covariance
 from models.systems.pitch_plane.effects import pitch_spring
 from models.systems.pitch_plane.plan import describe, trust_line
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import settings_of
 from models.systems.pitch_plane.tangent import Path, path_of, swing, tilted
 from models.systems.pitch_plane.trust import growth, interpolation, model, noise, trust

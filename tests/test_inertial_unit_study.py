@@ -11,7 +11,7 @@ from models.core.systems import load
 from models.drift.section_forces import CHANNELS, section_forces
 from models.fatigue.damage import pseudo_damage
 from models.sensors.gyro import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from studies import inertial_unit as study
 from studies.asked import SCENES

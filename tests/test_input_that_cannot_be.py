@@ -13,7 +13,7 @@ from models.core.tables import ended
 from models.core.time_series import read_time_series, write_time_series
 from models.measured.axle_forces import IN_FILE, AxleForces, check
 from models.measured.signal import Signal
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.parameters import asymmetric_twin, itwm_drift
 from models.vehicles.plausible import plausible
 from models.vehicles.plausible_plane import plausible_plane

@@ -15,7 +15,7 @@ from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.pitch_filter import INERTIA, PITCH, RATE, Measurement, estimate
 from models.systems.pitch_plane.pitch_step import KEPT, RELATIVE, PitchStep
 from models.systems.pitch_plane.plan import describe
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build as build_scene
 
 PERIOD, DURATION = 5e-3, 2.0

@@ -21,7 +21,7 @@ from models.systems.hub_forces.measurement import truth, two_tracks
 from models.systems.hub_forces.scene import build as build_hubs
 from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.effects import lift_off
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build as build_scene
 from models.systems.pitch_plane.scene import settings_of
 from models.systems.ride.in_engines import ridden

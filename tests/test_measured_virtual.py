@@ -25,7 +25,7 @@ from models.systems.measured.trust import Level, drift, position
 from models.systems.measured.verdict import disagreement, uncertainty
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
 from models.systems.measured.virtual import check as check_virtual
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.cut_vehicle import CutVehicle, cut
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.scenes import road_scene

@@ -9,7 +9,7 @@ from models.core.errors import InputError
 from models.core.scene_effects import beside, extended, names_of, own_table, rebuilt
 from models.core.systems import DEFAULT, SYSTEMS
 from models.systems.pitch_plane.plan import describe
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from studies.command_line import list_scenes
 from validation.absence.of_systems import added, bare, declared
 from validation.cases import absent

@@ -16,7 +16,7 @@ from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED
 from models.engines.outside import register
 from models.engines.protocol import Settings, build
 from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from validation import conformity
 from validation.common import checks, wrong_engines
 from validation.common.scenes import force_scene, road_scene, write_forces

@@ -8,7 +8,7 @@ import xarray as xr
 
 from models.core.errors import InputError
 from models.core.result import Result, load
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 
 STUDY = {"road": {"source": "study", "speed": 15.0}}

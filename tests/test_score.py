@@ -21,7 +21,7 @@ from models.drift.score import (
 )
 from models.drift.section_forces import CHANNELS, section_forces
 from models.fatigue.damage import damage_ratio, pseudo_damage, turning_points
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from validation.common.scenes import force_scene, road_scene, write_forces
 
 DURATION = 4.0

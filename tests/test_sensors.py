@@ -9,7 +9,7 @@ from models.core.time_series import read_time_series
 from models.engines.protocol import Settings
 from models.sensors.gyro import DEGREES_PER_HOUR, angle_variance, bias
 from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.sampling import write
 from models.systems.pitch_plane.scene import build
 

@@ -14,7 +14,7 @@ from models.engines.protocol import Settings, build
 from models.engines.stability import first_order, linearised, step_matrix
 from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.plan import describe
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring
 from validation.common import checks

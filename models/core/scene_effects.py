@@ -1,6 +1,7 @@
-"""Effects of the scenes of every system: one file each, found by listing its system's folder; nothing registers them.
+"""Effects of the scenes of every system: lines of the system's table, and files found by listing its folder.
 
-A system's ``effects`` is the package that holds them. An effect's file has
+A system's ``effects`` is the package that holds them. What a key of the system's own tables names is a line (``Entry``)
+of its ``TABLE``; an effect with physics or code of its own has a file, which nothing registers. The file has
 
 - a docstring, whose first sentence is its line in every list;
 - ``COST``, one sentence on what it takes;
@@ -16,12 +17,12 @@ remedy where it cannot be. Where an effect is a choice of method, to leave it ou
 import ast
 import re
 import traceback
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from copy import deepcopy
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from models.core.errors import InputError, RunFailed
@@ -31,8 +32,62 @@ from models.core.systems import SYSTEMS
 Table = dict[str, Any]
 
 
+@dataclass(frozen=True)
+class Entry:
+    """A line of a system's table of effects: one that a key of the system's own tables names.
+
+    says : what it is, a sentence; place : the key, as "port.teeth"; cost : what it takes, a sentence; counts : what it
+    adds in every engine; needs, excludes, why, after, modules, channels : as of ``Effect``.
+    usual : what the key is where the effect has usual values, None where there are none. An effect that is not the
+    presence of that one key has functions of its own: ``there(scene)``, ``leave_out(table, scene)``,
+    ``put_in(table, scene)``.
+    """
+
+    says: str
+    place: str
+    cost: str
+    counts: Mapping[str, int] = field(default_factory=dict)
+    needs: tuple[str, ...] = ()
+    excludes: tuple[str, ...] = ()
+    why: str = ""
+    after: tuple[str, ...] = ()
+    modules: tuple[str, ...] = ()
+    channels: tuple[str, ...] = ()
+    usual: Any = None
+    there: Callable[[Any], bool] | None = None
+    leave_out: Callable[[Table, Any], None] | None = None
+    put_in: Callable[[Table, Any], None] | None = None
+
+    def named(self, scene: Any) -> bool:
+        """Whether a scene names the effect."""
+        if self.there is not None:
+            return self.there(scene)
+        value = scene
+        for key in self.place.split("."):
+            value = getattr(value, key, None)
+        return value is not None and value is not False and value != 0.0
+
+    def drop(self, table: Table, scene: Any) -> None:
+        """Take the effect out of a scene's table."""
+        if self.leave_out is not None:
+            return self.leave_out(table, scene)
+        *above, key = self.place.split(".")
+        for name in above:
+            table = table[name]
+        del table[key]
+
+    def add(self, table: Table, scene: Any) -> None:
+        """Put the effect into a scene's table, with its usual values."""
+        if self.put_in is not None:
+            return self.put_in(table, scene)
+        *above, key = self.place.split(".")
+        for name in above:
+            table = table.setdefault(name, {})
+        table[key] = deepcopy(self.usual)
+
+
 class Effect:
-    """The file of an effect: its own names, and nothing for those of these that it does not have.
+    """An effect as its file or its line of the table gives it; what it has not of these is as here.
 
     Attributes
     ----------
@@ -53,13 +108,28 @@ class Effect:
     CHANNELS: tuple[str, ...] = ()
     BESIDE: Mapping[str, Table] = {}
 
-    def __init__(self, file: ModuleType) -> None:
-        vars(self).update(vars(file))
+    def __init__(self, names: Mapping[str, Any]) -> None:
+        vars(self).update(names)
+
+
+def _of_entry(entry: Entry) -> Effect:
+    """An effect of the table, with the names that an effect's file has."""
+    said = ("place", "cost", "needs", "excludes", "why", "after", "modules", "channels")
+    known = {key.upper(): getattr(entry, key) for key in said}
+    known |= {"COUNTS": {"all": entry.counts}} if entry.counts else {}
+    known |= {"__doc__": entry.says, "named": entry.named, "leave_out": entry.drop}
+    return Effect(known if entry.usual is None and entry.put_in is None else known | {"put_in": entry.add})
 
 
 def names_of(system: str) -> tuple[str, ...]:
     """All effects that scenes of a system may have; none is imported."""
-    return tuple(sorted(_files(system)))
+    return tuple(sorted({*_files(system), *_table(system)}))
+
+
+def _table(system: str) -> Mapping[str, Entry]:
+    """The table of effects of a system; empty where all of them have files."""
+    package = SYSTEMS[system].effects
+    return getattr(import_module(package), "TABLE", {}) if package else {}
 
 
 def _files(system: str) -> dict[str, Path]:
@@ -70,7 +140,9 @@ def _files(system: str) -> dict[str, Path]:
 
 def listing(system: str) -> dict[str, str]:
     """First sentence of every effect of a system, read and not imported."""
-    return {name: _says(file) for name, file in sorted(_files(system).items())}
+    says = {name: _says(file) for name, file in _files(system).items()}
+    says |= {name: entry.says.rstrip(".") for name, entry in _table(system).items()}
+    return dict(sorted(says.items()))
 
 
 def _says(file: Path) -> str:
@@ -83,6 +155,8 @@ def _says(file: Path) -> str:
 
 def module_of(system: str, name: str) -> Any:
     """``Effect`` of a name; any other attribute is its file's own. Raises InputError for a file that is none."""
+    if entry := _table(system).get(name):
+        return _of_entry(entry)
     try:
         file = import_module(f"{SYSTEMS[system].effects}.{name}")
     except (ImportError, SyntaxError) as error:
@@ -96,16 +170,19 @@ def module_of(system: str, name: str) -> Any:
             None,
             f"has no {' and no '.join(missing)}: models/core/scene_effects.py says what the file of an effect holds",
         )
-    return Effect(file)
+    return Effect(vars(file))
 
 
 def named(scene: Any) -> tuple[str, ...]:
     """Effects that a scene names; none that it could name by a table alone is imported to know it."""
-    return tuple(
-        name
-        for name, file in sorted(_files(scene.system).items())
-        if name in tables_of(scene) or (_placed(file) and module_of(scene.system, name).named(scene))
-    )
+    there = [name for name, file in _files(scene.system).items() if name in tables_of(scene) or _names(scene, file)]
+    there += [name for name, entry in _table(scene.system).items() if entry.named(scene)]
+    return tuple(sorted(there))
+
+
+def _names(scene: Any, file: Path) -> bool:
+    """Whether a scene names the effect of a file by its system's own tables."""
+    return _placed(file) and module_of(scene.system, file.stem).named(scene)
 
 
 def absent(scene: Any) -> tuple[str, ...]:

@@ -167,7 +167,8 @@ def _removed(system: str, modules: list[str]) -> Iterator[None]:
     assert not _loaded(modules), "the process is not fresh"
     blocked: dict[str, Any] = dict.fromkeys(modules)
     sys.modules.update(blocked)
-    with mock.patch.object(import_module(SYSTEMS[system].effects), "__path__", []):
+    package = import_module(SYSTEMS[system].effects)
+    with mock.patch.object(package, "__path__", []), mock.patch.object(package, "TABLE", {}, create=True):
         assert not names_of(system)
         yield
     for name in modules:

@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from models.core.systems import load
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from studies.six_runs import followed, row
 from validation.common.rows import Row, System, Table, finding, within

@@ -19,7 +19,7 @@ from models.engines.assembly import Assembly
 from models.engines.protocol import Settings, build
 from models.fatigue.damage import damage_ratio
 from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from validation.common.rows import Row, System, Table, finding, within
 from validation.common.scenes import force_scene, road_scene, write_forces
 

@@ -18,7 +18,7 @@ from models.ensemble.runner import run_paths
 from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.covariance import covariance
 from models.systems.pitch_plane.noise_paths import noise_paths
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, build
 from models.systems.pitch_plane.tangent import Path as ErrorPath
 from models.systems.pitch_plane.tangent import measured_growth, swing

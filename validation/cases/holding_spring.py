@@ -20,7 +20,7 @@ from models.engines.assembly import Assembly
 from models.engines.protocol import build
 from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.effects import pitch_spring
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import settings_of
 from models.systems.pitch_plane.trust import growth
 from validation.common.rows import Row, System, Table, behaves, finding, within

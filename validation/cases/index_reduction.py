@@ -12,7 +12,7 @@ from models.core.time_series import write_time_series
 from models.engines.assembly import Assembly
 from models.engines.protocol import Settings, build
 from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from validation.common.rows import Row, System, at_most, behaves, finding, not_run
 from validation.common.scenes import force_scene, road_scene, write_forces

@@ -13,7 +13,7 @@ from models.drift.section_forces import section_forces
 from models.sensors import inertial_unit as unit
 from models.sensors.gyro import DEGREES_PER_HOUR, angle_variance, bias
 from models.sensors.rotations import conjugate, exponential, integrate, logarithm, matrix, product
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from studies.virtual_measurement import follower, write_measurement
 from studies.virtual_measurement import measure as measure_road
 from validation.common.bands import mean_square

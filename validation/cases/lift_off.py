@@ -15,7 +15,7 @@ from models.ride.road_path import road_path
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.measurement import truth, two_tracks
 from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from models.systems.ride.in_engines import ridden

@@ -11,7 +11,7 @@ from models.road.iso8608 import CLASSES, iso8608_road
 from models.road.opencrg import read_opencrg, write_opencrg
 from models.road.profile import Profile
 from models.road.study import study_road
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from validation.common.rows import Row, System, at_most, not_run, within
 from validation.common.scenes import COURSE, data_folder, gap, road_scene
 

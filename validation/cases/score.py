@@ -13,7 +13,7 @@ from models.core.systems import load
 from models.drift.score import errors
 from models.drift.section_forces import CHANNELS
 from models.fatigue.damage import SLOPE, pseudo_damage
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from studies.stabilisers import Bench, Options, run
 from validation.common.rows import Row, System, Table, at_most, behaves, finding, within

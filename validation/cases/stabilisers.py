@@ -14,7 +14,7 @@ from models.engines.assembly import Assembly
 from models.engines.protocol import Settings
 from models.engines.stability import first_order, linearised
 from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from models.vehicles.pitch_plane import Parameters
 from studies.virtual_measurement import Follow, follower, write_measurement

@@ -5,7 +5,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from models.core.result import Result
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from validation.common.rows import Row, System, at_most, not_run
 from validation.common.scenes import COURSE, VEHICLES, data_folder, force_scene, gap, road_scene, write_forces

@@ -14,7 +14,7 @@ import numpy as np
 from models.core.result import Result
 from models.core.tables import write_table
 from models.core.whole_files import FULL
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from validation.common.scenes import road_scene
 
 MOMENTS = 20

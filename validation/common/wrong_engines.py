@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from models.core.errors import RunFailed
 from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED
 from models.engines.outside import register
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from validation.common.scenes import road_scene
 
 

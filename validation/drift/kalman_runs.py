@@ -22,7 +22,7 @@ from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.effects.kalman_filter import guide_of, pull
 from models.systems.pitch_plane.pitch_filter import PITCH, RATE, Estimate, Measurement, estimate
 from models.systems.pitch_plane.pitch_step import KEPT, RELATIVE
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.common.scenes import road_scene, write_forces

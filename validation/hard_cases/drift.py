@@ -11,7 +11,7 @@ from models.drift.growth import drift_off_time
 from models.drift.score import Errors, Limits, Own, blind_verdict, errors, own_figures, verdict
 from models.engines.protocol import Settings
 from models.fatigue.damage import damage_ratio, pseudo_damage
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from validation.common.scenes import STUDY_ROAD, force_scene, road_scene, write_forces
 from validation.hard_cases import setups

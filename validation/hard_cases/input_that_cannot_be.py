@@ -12,7 +12,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.measured.axle_forces import IN_FILE, AxleForces, check
 from models.measured.signal import Signal
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.parameters.asymmetric_twin import PARAMETERS as TWIN
 from models.vehicles.plausible_plane import plausible_plane
 from validation.common.scenes import road_scene

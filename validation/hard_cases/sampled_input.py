@@ -16,7 +16,7 @@ from models.road.continuation import run_in
 from models.road.polyline import PolylineProfile
 from models.road.profile import SplineProfile
 from models.road.signal import RoadUnderWheels
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case, Word

@@ -30,7 +30,7 @@ from models.systems.measured.section_run import Hold, Outcome
 from models.systems.measured.sections import Answer
 from models.systems.pitch_plane import trust as drift_trust
 from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, build
 from models.systems.pitch_plane.trust import Trust
 

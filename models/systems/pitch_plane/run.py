@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.result import Result, provenance
+from models.core.result import Channel, Result, result
 from models.engines.assembly import Assembly
 from models.engines.catalogue import OUTSIDE
 from models.engines.protocol import Model, Settings, Trajectory, build
@@ -18,7 +18,7 @@ from models.vehicles import pitch_plane
 Channels = dict[str, tuple[str, str, np.ndarray]]
 
 
-def simulate(scene: Scene, engine: str, settings: Settings | None = None) -> Result:
+def run(scene: Scene, engine: str, settings: Settings | None = None) -> Result:
     """Run a scene in one engine; raises InputError, Refused or RunFailed, never returns a partial run.
 
     A run of an engine from outside the tree is compared with the reference, and says so in "beside reference".
@@ -30,12 +30,13 @@ def simulate(scene: Scene, engine: str, settings: Settings | None = None) -> Res
     start = time.perf_counter()
     trajectory = model.run()
     seconds = time.perf_counter() - start
-    result = _label(assembly, engine, own, trajectory, outputs(assembly, trajectory, model), keep, seconds)
+    channels = outputs(assembly, trajectory, model)
+    found = _labelled(assembly, engine, own, trajectory, channels, keep, seconds)
     if engine in OUTSIDE:
         from models.engines.beside_reference import beside_reference
 
-        result.data.attrs["beside reference"] = beside_reference(engine, assembly, own, trajectory)
-    return result
+        found.data.attrs["beside reference"] = beside_reference(engine, assembly, own, trajectory)
+    return found
 
 
 def _keep_every(scene: Scene, settings: Settings) -> int:
@@ -49,36 +50,23 @@ def _keep_every(scene: Scene, settings: Settings) -> int:
     return round(ratio)
 
 
-def _label(
+def _labelled(
     assembly: Assembly, engine: str, settings: Settings, run: Trajectory, channels: Channels, keep: int, seconds: float
 ) -> Result:
-    import xarray as xr
-
     rows = slice(None, None, keep)
-    data = xr.Dataset(
-        {
-            name: ("time", values[rows], {"units": unit, "long_name": meaning})
-            for name, (unit, meaning, values) in channels.items()
-        },
-        coords={"time": ("time", run.times[rows], {"units": "s", "long_name": "time"})},
+    return result(
+        assembly.scene,
+        {name: Channel("time", values[rows], unit, meaning) for name, (unit, meaning, values) in channels.items()},
+        {"time": Channel("time", run.times[rows], "s", "time")},
+        engine=engine,
+        counts=run.counts,
+        seconds=seconds,
+        doubts=assembly.doubts,
+        mode=assembly.mode,
+        integrator=settings.integrator,
+        step=settings.step,
+        coordinates=json.dumps(pitch_plane.STATES),
     )
-    data.attrs = {
-        "title": assembly.scene.title,
-        "scene": assembly.scene.file,
-        "system": assembly.scene.system,
-        "mode": assembly.mode,
-        "engine": engine,
-        "integrator": settings.integrator,
-        "step": settings.step,
-        "status": "complete, in doubt" if assembly.doubts else "complete",
-        "doubts": json.dumps(assembly.doubts),
-        "counts": json.dumps(run.counts),
-        "coordinates": json.dumps(pitch_plane.STATES),
-        "seconds": seconds,
-        "scene_table": json.dumps(assembly.scene.table()),
-        "provenance": json.dumps(provenance()),
-    }
-    return Result(data)
 
 
 def outputs(assembly: Assembly, run: Trajectory, model: Model | None = None) -> Channels:

@@ -16,7 +16,7 @@ from models.core.signals import Sampled
 from models.engines.assembly import Assembly
 from models.engines.protocol import Model, Settings, Trajectory, build
 from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import simulate
+from models.systems.pitch_plane.run import run as simulate
 from validation.price.problems.road_excited import SPEED, scene, setting, settings_of
 
 DURATION, RATE = 2.0, 100.0
