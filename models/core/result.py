@@ -62,7 +62,7 @@ class Result:
     @property
     def states(self) -> np.ndarray:
         """States (n, 2 k): the k coordinates that the run integrated, then their rates."""
-        names = json.loads(self.data.attrs["coordinates"])
+        names = json.loads(self.data.attrs["integrated"])
         return np.column_stack([self[name] for name in (*names, *(f"{name}_rate" for name in names))])
 
     def counts(self) -> dict[str, int]:

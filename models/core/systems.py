@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from models.core.errors import InputError
-from models.core.scene_file import changed
 
 DEFAULT = "pitch-plane"
 """System of a scene that names none."""
@@ -64,6 +63,8 @@ SYSTEMS = listed(Path(__file__).parents[1] / "systems", "models.systems")
 
 def load(path: Path, changes: Iterable[str] = (), systems: Mapping[str, System] = SYSTEMS) -> Any:
     """Read a scene file of any system, with ``--set`` changes of the form KEY.KEY=VALUE applied on top."""
+    from models.core.scene_file import changed
+
     changes = list(changes)
     table = changed(path, changes)
     file = path.name + (" with --set" if changes else "")

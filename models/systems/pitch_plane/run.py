@@ -65,7 +65,7 @@ def _labelled(
         mode=assembly.mode,
         integrator=settings.integrator,
         step=settings.step,
-        coordinates=json.dumps(pitch_plane.STATES),
+        integrated=json.dumps(pitch_plane.STATES),
     )
 
 
