@@ -11,9 +11,9 @@ from itertools import groupby
 from types import ModuleType
 from typing import Any, get_args
 
+from validation.cases import CASES
 from validation.common.rows import STATUSES, Independence, System
 from validation.report.numbers import margin
-from validation.run import CASES
 
 Results = dict[str, Any]
 
